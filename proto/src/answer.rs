@@ -1,0 +1,334 @@
+//! Answers of the HTTP interface.
+
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::Estimate;
+use crate::event::TripEnd;
+use crate::settings::SpaceSettings;
+use crate::watermark::Watermark;
+
+/// Error answer after RFC 9457 (`application/problem+json`).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Problem {
+    /// Kind of the problem, `/problems/{kind}`; stable, for programs.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// The same for people.
+    pub title: String,
+    /// HTTP status.
+    pub status: u16,
+    /// What was wrong this time.
+    pub detail: String,
+}
+
+/// The spaces of the service.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct SpaceList {
+    /// The spaces, by name.
+    pub spaces: Vec<SpaceInfo>,
+}
+
+/// A space.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct SpaceInfo {
+    /// Name.
+    pub name: String,
+    /// Settings, as fixed on creation.
+    pub settings: SpaceSettings,
+    /// Number of records that the map includes.
+    pub map_revision: u64,
+    /// Digest of the map's state: equal digests, equal maps.
+    pub digest: String,
+    /// Number of agents.
+    pub agents: u64,
+    /// Number of places.
+    pub places: u64,
+    /// Number of trips.
+    pub trips: u64,
+    /// Number of landmarks.
+    pub landmarks: u64,
+}
+
+/// One page of agents.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct AgentPage {
+    /// The agents, by name.
+    pub agents: Vec<AgentSummary>,
+    /// Pass as `after` for the next page; absent on the last one.
+    pub next: Option<String>,
+}
+
+/// An agent in a list.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct AgentSummary {
+    /// Name.
+    pub name: String,
+    /// Its latest estimate; absent before its first motion, sighting or start pose.
+    pub estimate: Option<Estimate>,
+}
+
+/// An agent: where it is, how sure that is, and how far its samples have come.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct AgentDetail {
+    /// Name.
+    pub name: String,
+    /// Its latest estimate; absent before its first sample.
+    pub estimate: Option<Estimate>,
+    /// Its pose in `odom`, i.e. by motion alone since the session began.
+    pub odometry: Option<StampedPose>,
+    /// How far its samples have come.
+    pub watermark: Watermark,
+    /// Samples received but not yet durable.
+    pub lag_samples: u64,
+    /// Path travelled in this session \[m\].
+    pub travelled_m: f64,
+}
+
+/// A pose at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct StampedPose {
+    /// Stamp \[ns\].
+    pub stamp_ns: i64,
+    /// Position \[m\].
+    pub translation_m: [f64; 3],
+    /// Orientation, unit quaternion `[x, y, z, w]`.
+    pub rotation_xyzw: [f64; 4],
+}
+
+/// Grid-cell state of an agent.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct GridState {
+    /// Agent.
+    pub agent: String,
+    /// Stamp \[ns\].
+    pub stamp_ns: i64,
+    /// The modules, finest first.
+    pub modules: Vec<GridModuleState>,
+    /// Position decoded from the modules' phases around the reference grid point \[m\].
+    pub decoded_m: [f64; 3],
+    /// Interference pattern of the cells, `Σ aᵢcᵢ / Σ aᵢ` \[m\] (seed Eq. 4, normalised).
+    pub interference_m: [f64; 3],
+    /// Octant of the latest movement, 1 to 8; absent before the first one.
+    pub octant: Option<u8>,
+    /// Length of the latest movement \[m\] (seed Eq. 2).
+    pub displacement_m: f64,
+    /// Angle between the latest two movements \[rad\] (seed Eq. 3).
+    pub turning_rad: f64,
+    /// Heading in the x-y plane of `map` \[rad\].
+    pub heading_rad: f64,
+}
+
+/// State of a grid module.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct GridModuleState {
+    /// Spacing \[m\].
+    pub spacing_m: f64,
+    /// Lattice index of the reference grid point.
+    pub reference: [i64; 3],
+    /// Position of the reference grid point in `map` \[m\].
+    pub reference_m: [f64; 3],
+    /// Phase, `[0, 1)³` along the lattice axes.
+    pub phase: [f64; 3],
+    /// Activation of the module's cells, in \[0, 1\].
+    pub activation: Vec<f64>,
+}
+
+/// A trajectory.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Trajectory {
+    /// Agent.
+    pub agent: String,
+    /// Session of the agent.
+    pub session: u64,
+    /// Frame; always `map`.
+    pub frame: String,
+    /// `causal`: each pose as it was known when its sample was applied.
+    pub kind: String,
+    /// Poses, oldest first.
+    pub poses: Vec<StampedPose>,
+    /// Pass as `from_ns` for the next page; absent on the last one.
+    pub next_from_ns: Option<i64>,
+}
+
+/// Answer to samples sent over HTTP: they are on disk.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct IngestAnswer {
+    /// How far the agent's samples have come.
+    pub watermark: Watermark,
+    /// Samples of the request that had been there before.
+    pub duplicates: u64,
+}
+
+/// A place cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Place {
+    /// Identifier, counted from 0.
+    pub id: u64,
+    /// Position in `map` \[m\].
+    pub translation_m: [f64; 3],
+    /// Orientation of the founder at the founding, unit quaternion `[x, y, z, w]`.
+    pub rotation_xyzw: [f64; 4],
+    /// Standard deviation of the position at the founding, along the axes of `map` \[m\].
+    pub position_sd_m: [f64; 3],
+    /// Grid code: phase of each module.
+    pub code: Vec<[f64; 3]>,
+    /// Times an agent came here, the founding included.
+    pub visits: u64,
+    /// Agent that founded it.
+    pub founder: String,
+    /// Stamp of the founding \[ns\].
+    pub first_stamp_ns: i64,
+    /// Stamp of the latest visit \[ns\].
+    pub last_stamp_ns: i64,
+}
+
+/// One page of places.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct PlacePage {
+    /// Frame of the positions; always `map`.
+    pub frame: String,
+    /// Number of records that the map includes.
+    pub map_revision: u64,
+    /// The places, by id.
+    pub places: Vec<Place>,
+    /// Pass as `after` for the next page; absent on the last one.
+    pub next: Option<u64>,
+}
+
+/// Answer to a [`crate::RecallQuery`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct RecallAnswer {
+    /// Space.
+    pub space: String,
+    /// Frame of the positions; always `map`.
+    pub frame: String,
+    /// Number of records that the map includes.
+    pub map_revision: u64,
+    /// The places, best first.
+    pub places: Vec<RecalledPlace>,
+}
+
+/// A place and how well it answers the cue.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct RecalledPlace {
+    /// The place.
+    pub place: Place,
+    /// Cosine of the cue's and the place's activation (seed Eq. 5); absent without a cue.
+    pub cosine: Option<f64>,
+    /// Confidence (seed Eq. 8), in \[0, 1\]; absent without a cue.
+    pub confidence: Option<f64>,
+    /// Distance from `position_m` \[m\]; absent without it.
+    pub distance_m: Option<f64>,
+}
+
+/// A trip in a list.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Trip {
+    /// Identifier, counted from 0.
+    pub id: u64,
+    /// Agent.
+    pub agent: String,
+    /// Session of the agent.
+    pub session: u64,
+    /// Stamp of the start \[ns\].
+    pub start_stamp_ns: i64,
+    /// Stamp of the latest leg's end \[ns\].
+    pub end_stamp_ns: i64,
+    /// Why it ended; absent while it goes on.
+    pub ended: Option<TripEnd>,
+    /// Number of legs.
+    pub leg_count: u64,
+    /// Length of its path \[m\].
+    pub length_m: f64,
+}
+
+/// A trip with its legs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct TripDetail {
+    /// The trip.
+    pub trip: Trip,
+    /// Its legs, in order.
+    pub legs: Vec<Leg>,
+}
+
+/// One page of trips.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct TripPage {
+    /// The trips, by id.
+    pub trips: Vec<Trip>,
+    /// Pass as `after` for the next page; absent on the last one.
+    pub next: Option<u64>,
+}
+
+/// A leg: the way from one place to the next, as motion measured it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Leg {
+    /// Place at its start.
+    pub from: u64,
+    /// Place at its end.
+    pub to: u64,
+    /// Displacement, in the body frame at the start \[m\].
+    pub translation_m: [f64; 3],
+    /// Rotation, unit quaternion `[x, y, z, w]`.
+    pub rotation_xyzw: [f64; 4],
+    /// Upper triangle, row by row, of the 6 × 6 covariance of (translation, rotation) in the body
+    /// frame at the end.
+    pub covariance: [f64; 21],
+    /// Phase displacement of each grid module, turns along the lattice axes.
+    pub phase_displacement: Vec<[f64; 3]>,
+    /// Octant of the displacement in `map`, 1 to 8.
+    pub octant: u8,
+    /// Duration \[s\].
+    pub duration_s: f64,
+    /// Length of the path \[m\].
+    pub length_m: f64,
+}
+
+/// A landmark.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Landmark {
+    /// Label.
+    pub id: String,
+    /// Position in `map` \[m\].
+    pub translation_m: [f64; 3],
+    /// Upper triangle, row by row, of the 3 × 3 covariance of the position \[m²\].
+    pub covariance: [f64; 6],
+    /// Times it was seen.
+    pub sightings: u64,
+    /// Stamp of the first sighting \[ns\].
+    pub first_stamp_ns: i64,
+    /// Stamp of the latest sighting \[ns\].
+    pub last_stamp_ns: i64,
+}
+
+/// One page of landmarks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct LandmarkPage {
+    /// Frame of the positions; always `map`.
+    pub frame: String,
+    /// The landmarks, by label.
+    pub landmarks: Vec<Landmark>,
+    /// Pass as `after` for the next page; absent on the last one.
+    pub next: Option<String>,
+}

@@ -1,0 +1,73 @@
+//! Reading a batch without holding more samples than a batch may have.
+//!
+//! A postcard sample can be as short as four bytes, and is some forty times as long in memory: a
+//! hostile message of the allowed length would fill forty megabytes before its samples were
+//! counted. So samples beyond the limit are read, counted and dropped.
+
+use std::fmt;
+
+use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
+
+use crate::codec::DecodeError;
+use crate::limits::BATCH_SAMPLES_MAX;
+use crate::sample::{Sample, SampleBatch};
+
+/// A [`SampleBatch`] on its way in. The fields are the same, in the same order.
+#[derive(serde::Deserialize)]
+#[serde(expecting = "a batch of samples")]
+pub(crate) struct BoundedBatch {
+    session: u64,
+    first_seq: u64,
+    samples: BoundedSamples,
+}
+
+impl BoundedBatch {
+    /// The batch, if it is within its bounds.
+    pub(crate) fn into_batch(self) -> Result<SampleBatch, DecodeError> {
+        if self.samples.count > BATCH_SAMPLES_MAX {
+            return Err(DecodeError::TooManySamples(self.samples.count));
+        }
+        let batch = SampleBatch {
+            session: self.session,
+            first_seq: self.first_seq,
+            samples: self.samples.kept,
+        };
+        batch.check()?;
+        Ok(batch)
+    }
+}
+
+/// The first [`BATCH_SAMPLES_MAX`] samples, and how many there were.
+struct BoundedSamples {
+    kept: Vec<Sample>,
+    count: usize,
+}
+
+impl<'de> Deserialize<'de> for BoundedSamples {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(BoundedVisitor)
+    }
+}
+
+struct BoundedVisitor;
+
+impl<'de> Visitor<'de> for BoundedVisitor {
+    type Value = BoundedSamples;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("an array of samples")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<BoundedSamples, A::Error> {
+        let expected = seq.size_hint().unwrap_or(0).min(BATCH_SAMPLES_MAX);
+        let mut kept = Vec::with_capacity(expected);
+        let mut count = 0;
+        while let Some(sample) = seq.next_element()? {
+            if count < BATCH_SAMPLES_MAX {
+                kept.push(sample);
+            }
+            count += 1;
+        }
+        Ok(BoundedSamples { kept, count })
+    }
+}

@@ -1,0 +1,184 @@
+//! The three codecs, chosen by the Zenoh `Encoding` or the HTTP `Content-Type`.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::bounded::BoundedBatch;
+use crate::cbor;
+use crate::limits::{BATCH_SAMPLES_MAX, MESSAGE_BYTES_MAX};
+use crate::sample::SampleBatch;
+
+/// Encoding of version 1 postcard messages.
+pub const POSTCARD_V1: &str = "application/vnd.cogmap.postcard;v1";
+/// Encoding of CBOR messages.
+pub const CBOR: &str = "application/cbor";
+/// Encoding of JSON messages.
+pub const JSON: &str = "application/json";
+
+/// What all postcard encodings start with, whatever their version.
+const POSTCARD: &str = "application/vnd.cogmap.postcard";
+
+/// How a message is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Codec {
+    /// postcard, version 1.
+    Postcard,
+    /// CBOR (RFC 8949).
+    Cbor,
+    /// JSON (RFC 8259).
+    Json,
+}
+
+/// Why bytes are not the message that they should be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    /// No codec has this encoding.
+    #[error("unknown encoding {0:?}")]
+    UnknownEncoding(String),
+    /// The codec is known, this version of it is not.
+    #[error("unsupported version {0:?}; this build speaks {POSTCARD_V1:?}")]
+    UnsupportedVersion(String),
+    /// The message is longer than [`MESSAGE_BYTES_MAX`].
+    #[error("message of {0} bytes, the limit is {MESSAGE_BYTES_MAX}")]
+    TooLong(usize),
+    /// The bytes are not a message in this codec.
+    #[error("malformed {codec}: {detail}")]
+    Malformed {
+        /// Name of the codec.
+        codec: &'static str,
+        /// What the codec says.
+        detail: String,
+    },
+    /// A batch without samples.
+    #[error("a batch has at least one sample")]
+    EmptyBatch,
+    /// A batch with more than [`BATCH_SAMPLES_MAX`] samples.
+    #[error("batch of {0} samples, the limit is {BATCH_SAMPLES_MAX}")]
+    TooManySamples(usize),
+    /// Sequence numbers beyond what can be counted.
+    #[error("the batch's sequence numbers run past the largest number")]
+    SequenceOverflow,
+}
+
+impl Codec {
+    /// The codec of an encoding. Parameters after `;` are part of the postcard version and are
+    /// ignored for CBOR and JSON (`application/json; charset=utf-8`).
+    ///
+    /// # Errors
+    /// The encoding or its version is unknown.
+    pub fn of_encoding(encoding: &str) -> Result<Self, DecodeError> {
+        if encoding == POSTCARD_V1 {
+            return Ok(Self::Postcard);
+        }
+        let essence = encoding.split(';').next().unwrap_or_default().trim();
+        if essence.eq_ignore_ascii_case(CBOR) {
+            Ok(Self::Cbor)
+        } else if essence.eq_ignore_ascii_case(JSON) {
+            Ok(Self::Json)
+        } else if essence == POSTCARD {
+            Err(DecodeError::UnsupportedVersion(encoding.to_owned()))
+        } else {
+            Err(DecodeError::UnknownEncoding(encoding.to_owned()))
+        }
+    }
+
+    /// The encoding of messages in this codec.
+    pub fn encoding(self) -> &'static str {
+        match self {
+            Self::Postcard => POSTCARD_V1,
+            Self::Cbor => CBOR,
+            Self::Json => JSON,
+        }
+    }
+
+    /// Its name in messages and metrics.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Postcard => "postcard",
+            Self::Cbor => "cbor",
+            Self::Json => "json",
+        }
+    }
+
+    /// Writes a message.
+    ///
+    /// JSON has no NaN and no infinity: they become `null`, which no reader takes for a number.
+    /// Nothing is refused here, because the messages that go out never hold them: the service
+    /// rejects such numbers on arrival, and a client's own reach it in postcard and CBOR, where
+    /// it names the sample that it rejects.
+    ///
+    /// # Panics
+    /// Never for the messages of this crate: they are plain data, and memory is the only sink.
+    pub fn encode<T: Serialize>(self, message: &T) -> Vec<u8> {
+        match self {
+            Self::Postcard => postcard::to_stdvec(message).expect("plain data encodes"),
+            Self::Cbor => {
+                let mut bytes = Vec::new();
+                ciborium::into_writer(message, &mut bytes).expect("plain data encodes");
+                bytes
+            }
+            Self::Json => serde_json::to_vec(message).expect("plain data encodes"),
+        }
+    }
+
+    /// Reads a message; bytes after it are an error.
+    ///
+    /// In CBOR and JSON a whole number may stand for a float (`1` for `1.0`). Floats come out of
+    /// postcard and CBOR as they went in, NaN included. JSON keeps 15 digits of them; the 16th and
+    /// 17th may change by a unit or two.
+    ///
+    /// # Errors
+    /// The bytes are too long or not such a message.
+    pub fn decode<T: DeserializeOwned>(self, bytes: &[u8]) -> Result<T, DecodeError> {
+        if bytes.len() > MESSAGE_BYTES_MAX {
+            return Err(DecodeError::TooLong(bytes.len()));
+        }
+        let malformed = |detail: String| DecodeError::Malformed {
+            codec: self.name(),
+            detail,
+        };
+        match self {
+            Self::Postcard => {
+                let (message, rest) = postcard::take_from_bytes(bytes)
+                    .map_err(|error| malformed(error.to_string()))?;
+                if rest.is_empty() {
+                    Ok(message)
+                } else {
+                    Err(malformed(format!("{} bytes after the message", rest.len())))
+                }
+            }
+            Self::Cbor => cbor::from_slice(bytes).map_err(malformed),
+            Self::Json => {
+                serde_json::from_slice(bytes).map_err(|error| malformed(error.to_string()))
+            }
+        }
+    }
+
+    /// Reads a batch of samples and checks its bounds. Whether each sample makes sense is checked
+    /// later, sample by sample.
+    ///
+    /// # Errors
+    /// As [`Codec::decode`], or the batch is beyond a bound.
+    pub fn decode_batch(self, bytes: &[u8]) -> Result<SampleBatch, DecodeError> {
+        self.decode::<BoundedBatch>(bytes)?.into_batch()
+    }
+}
+
+impl SampleBatch {
+    /// Checks the bounds of the batch as a whole.
+    ///
+    /// # Errors
+    /// It is empty, too large, or its sequence numbers overflow.
+    pub fn check(&self) -> Result<(), DecodeError> {
+        if self.samples.is_empty() {
+            return Err(DecodeError::EmptyBatch);
+        }
+        if self.samples.len() > BATCH_SAMPLES_MAX {
+            return Err(DecodeError::TooManySamples(self.samples.len()));
+        }
+        self.first_seq
+            .checked_add(self.samples.len() as u64)
+            .map(|_| ())
+            .ok_or(DecodeError::SequenceOverflow)
+    }
+}

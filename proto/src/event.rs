@@ -1,0 +1,103 @@
+//! Events: what happened in a space, for whoever follows it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::watermark::SkipReason;
+
+/// One event, published on `cogmap/{space}/events` and as a server-sent event.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Event {
+    /// Space.
+    pub space: String,
+    /// Agent that caused it.
+    pub agent: String,
+    /// Number of records that the map includes.
+    pub map_revision: u64,
+    /// Stamp of the sample that caused it \[ns\].
+    pub stamp_ns: i64,
+    /// What happened.
+    pub kind: EventKind,
+}
+
+/// What happened. New kinds are added at the end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum EventKind {
+    /// The space met a new agent.
+    AgentEnrolled {},
+    /// The agent began a session.
+    SessionStarted {
+        /// The session.
+        session: u64,
+    },
+    /// A place cell was recruited.
+    PlaceRecruited {
+        /// The place.
+        place: u64,
+        /// Its position in `map` \[m\].
+        translation_m: [f64; 3],
+    },
+    /// The agent came to a place that the space knew.
+    PlaceEntered {
+        /// The place.
+        place: u64,
+        /// Confidence of the recall, in \[0, 1\].
+        confidence: f64,
+    },
+    /// A trip began.
+    TripStarted {
+        /// The trip.
+        trip: u64,
+    },
+    /// A trip ended.
+    TripEnded {
+        /// The trip.
+        trip: u64,
+        /// Its number of legs.
+        legs: u64,
+        /// Why it ended.
+        reason: TripEnd,
+    },
+    /// A landmark was seen for the first time.
+    LandmarkLearned {
+        /// Its label.
+        landmark: String,
+        /// Its position in `map` \[m\].
+        translation_m: [f64; 3],
+    },
+    /// Samples were refused for good.
+    SamplesSkipped {
+        /// First sequence number.
+        from: u64,
+        /// First beyond.
+        to: u64,
+        /// Why.
+        reason: SkipReason,
+    },
+    /// The agent passed a marker.
+    MarkerPassed {
+        /// Its label.
+        label: String,
+    },
+}
+
+/// Why a trip ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum TripEnd {
+    /// The agent stood still.
+    Stillness,
+    /// Samples were lost, or none came for a long time on the sensor's clock.
+    Gap,
+    /// The session ended.
+    SessionEnd,
+    /// A marker said so.
+    Marker,
+    /// The trip reached the longest allowed number of legs; the next one continues it.
+    Full,
+    /// The agent was told where it stands, which breaks the thread of motion.
+    StartPose,
+}

@@ -1,0 +1,45 @@
+//! What may cross a wire.
+//!
+//! One description of every message serves three codecs: postcard for Rust clients, CBOR and JSON
+//! for everyone else, with the same field names in both. The Zenoh `Encoding` of a message (or the
+//! `Content-Type` of an HTTP body) says which codec it is in; nothing is guessed.
+//!
+//! **Version rule.** The version stands in the postcard encoding string ([`codec::POSTCARD_V1`]),
+//! because postcard has no field tags: a change there is a new enum variant at the end, or a new
+//! version. CBOR and JSON evolve by addition: a reader ignores sample fields it does not know, and a
+//! field that it does not find takes its documented default.
+//!
+//! Units are SI, angles radians, stamps nanoseconds of the sensor's clock. Quaternions are
+//! `[x, y, z, w]` as in ROS.
+
+mod answer;
+mod bounded;
+mod cbor;
+mod codec;
+mod estimate;
+mod event;
+mod key;
+pub mod limits;
+mod name;
+mod query;
+mod sample;
+mod settings;
+mod watermark;
+
+pub use answer::{
+    AgentDetail, AgentPage, AgentSummary, GridModuleState, GridState, IngestAnswer, Landmark,
+    LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer, RecalledPlace, SpaceInfo,
+    SpaceList, StampedPose, Trajectory, Trip, TripDetail, TripPage,
+};
+pub use codec::{CBOR, Codec, DecodeError, JSON, POSTCARD_V1};
+pub use estimate::{Estimate, Status};
+pub use event::{Event, EventKind, TripEnd};
+pub use key::{AgentKey, KeyError, durable_key, estimate_key, events_key, query_key, samples_key};
+pub use name::{Name, NameError};
+pub use query::{RecallQuery, Verb, WatermarkQuery};
+pub use sample::{
+    Descriptor, Increment, Level, Marker, MotionNoise, Relation, Sample, SampleBatch, SampleBody,
+    Sighting, StartPose, Target, Velocity,
+};
+pub use settings::{NoiseSettings, Recruitment, SpaceSettings};
+pub use watermark::{Rejection, SeqRange, SkipReason, Watermark};

@@ -1,0 +1,53 @@
+//! Bodies of queries, the same over HTTP and Zenoh.
+
+use serde::{Deserialize, Serialize};
+
+/// Queries that a space answers on `cogmap/{space}/query/{verb}`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verb {
+    /// [`RecallQuery`] → [`crate::RecallAnswer`].
+    Recall,
+    /// [`WatermarkQuery`] → [`crate::Watermark`].
+    Watermark,
+}
+
+impl Verb {
+    /// Last chunk of the key.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Recall => "recall",
+            Self::Watermark => "watermark",
+        }
+    }
+}
+
+/// Asks for the watermark of an agent.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct WatermarkQuery {
+    /// The agent.
+    pub agent: String,
+}
+
+/// Asks for places. At least one of `position_m` and `code` is the cue that ranks them; the other
+/// fields filter. Without a cue the latest places come first.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct RecallQuery {
+    /// Cue: a position in `map` \[m\].
+    pub position_m: Option<[f64; 3]>,
+    /// Cue: a grid code, one entry per module: phase `[0, 1)³` or null for an erased module.
+    pub code: Option<Vec<Option<[f64; 3]>>>,
+    /// Only places within this distance of `position_m` \[m\].
+    pub radius_m: Option<f64>,
+    /// Only places that this agent founded.
+    pub agent: Option<String>,
+    /// Only places visited at or after this stamp \[ns\].
+    pub since_ns: Option<i64>,
+    /// Only places founded before this stamp \[ns\].
+    pub until_ns: Option<i64>,
+    /// Most places in the answer, 1 to 1000; 10 when absent.
+    pub limit: Option<u32>,
+}

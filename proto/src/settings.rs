@@ -1,0 +1,91 @@
+//! Settings of a space, fixed when it is created: the fold over its journal depends on them.
+
+use serde::{Deserialize, Serialize};
+
+/// Settings of a space. Every field has a default, and all are physical.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct SpaceSettings {
+    /// Seed of everything random in the space.
+    pub seed: u64,
+    /// Number of grid modules, 1 to 16.
+    pub grid_modules: u32,
+    /// Spacing of the finest grid module \[m\].
+    pub grid_spacing_m: f64,
+    /// Ratio of the spacings of neighbouring modules.
+    pub grid_ratio: f64,
+    /// Distance at which a place's confidence has fallen to one half \[m\].
+    pub field_radius_m: f64,
+    /// When a place cell is recruited.
+    pub recruitment: Recruitment,
+    /// Noise of motion samples that carry none.
+    pub odometry_noise: NoiseSettings,
+    /// An agent is `localized` up to this standard deviation of position \[m\].
+    pub localized_sd_m: f64,
+    /// An agent is `lost` beyond this standard deviation of position \[m\].
+    pub lost_sd_m: f64,
+    /// Standing still for this long ends a trip \[s\].
+    pub trip_stillness_s: f64,
+    /// No sample for this long, on the sensor's clock, ends a trip \[s\].
+    pub trip_gap_s: f64,
+    /// Closest two poses of a stored trajectory \[s\]: at most this often a row is kept.
+    pub trajectory_interval_s: f64,
+}
+
+/// When a place cell is recruited.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Recruitment {
+    /// Where no place answers with a confidence of at least one half.
+    Novelty {},
+    /// At every motion sample with this probability (the seed paper's `P_new`).
+    Bernoulli {
+        /// Probability, in \[0, 1\].
+        probability: f64,
+    },
+}
+
+/// Noise of motion that carries none: standard deviations that grow with the square root of the
+/// path, as independent errors do, so that they do not depend on the sampling rate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct NoiseSettings {
+    /// Of the translation, per square root of metre travelled \[m/√m\].
+    pub translation_sd_per_sqrt_m: f64,
+    /// Of the rotation, per square root of metre travelled \[rad/√m\].
+    pub rotation_sd_per_sqrt_m: f64,
+    /// Of the rotation, per square root of radian turned \[rad/√rad\].
+    pub rotation_sd_per_sqrt_rad: f64,
+}
+
+impl Default for SpaceSettings {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            grid_modules: 5,
+            grid_spacing_m: 1.0,
+            grid_ratio: std::f64::consts::SQRT_2,
+            field_radius_m: 0.25,
+            recruitment: Recruitment::Novelty {},
+            odometry_noise: NoiseSettings::default(),
+            localized_sd_m: 0.5,
+            lost_sd_m: 5.0,
+            trip_stillness_s: 5.0,
+            trip_gap_s: 2.0,
+            trajectory_interval_s: 0.005,
+        }
+    }
+}
+
+impl Default for NoiseSettings {
+    fn default() -> Self {
+        Self {
+            translation_sd_per_sqrt_m: 0.02,
+            rotation_sd_per_sqrt_m: 0.02,
+            rotation_sd_per_sqrt_rad: 0.02,
+        }
+    }
+}

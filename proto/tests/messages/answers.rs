@@ -1,0 +1,288 @@
+//! Answers of the HTTP interface, and the settings of a space.
+
+use cogmap_proto::{
+    AgentDetail, AgentPage, AgentSummary, GridModuleState, GridState, IngestAnswer, Landmark,
+    LandmarkPage, Leg, NoiseSettings, Place, PlacePage, Problem, RecallAnswer, RecalledPlace,
+    Recruitment, SpaceInfo, SpaceList, SpaceSettings, StampedPose, Status, Trajectory, Trip,
+    TripDetail, TripPage,
+};
+
+use super::Visit;
+use super::published::{ENDS, estimate, upper_triangle, watermark};
+
+pub(super) fn each(visit: &mut impl Visit) {
+    visit.message("space_settings_bernoulli", &bernoulli());
+    visit.message("space_settings_novelty", &novelty());
+    visit.message("space_list", &spaces());
+    visit.message("agent_page", &agents());
+    visit.message("agent_detail", &agent());
+    visit.message("agent_detail_before_first_sample", &silent_agent());
+    visit.message("grid_state", &grid());
+    visit.message("trajectory", &trajectory());
+    visit.message(
+        "ingest_answer",
+        &IngestAnswer {
+            watermark: watermark(),
+            duplicates: 4,
+        },
+    );
+    visit.message("place_page", &places());
+    visit.message("recall_answer", &recalled());
+    visit.message("recall_answer_without_cue", &recalled_without_cue());
+    visit.message("trip_page", &trips());
+    visit.message("trip_detail", &trip_detail());
+    visit.message("landmark_page", &landmarks());
+    visit.message("problem", &problem());
+}
+
+fn novelty() -> SpaceSettings {
+    SpaceSettings {
+        grid_ratio: 1.5,
+        ..SpaceSettings::default()
+    }
+}
+
+/// No setting has its default.
+fn bernoulli() -> SpaceSettings {
+    SpaceSettings {
+        seed: u64::MAX,
+        grid_modules: 7,
+        grid_spacing_m: 0.5,
+        grid_ratio: 1.75,
+        field_radius_m: 0.4,
+        recruitment: Recruitment::Bernoulli { probability: 0.05 },
+        odometry_noise: NoiseSettings {
+            translation_sd_per_sqrt_m: 0.03,
+            rotation_sd_per_sqrt_m: 0.04,
+            rotation_sd_per_sqrt_rad: 0.05,
+        },
+        localized_sd_m: 0.6,
+        lost_sd_m: 6.0,
+        trip_stillness_s: 7.0,
+        trip_gap_s: 3.0,
+        trajectory_interval_s: 0.25,
+    }
+}
+
+fn spaces() -> SpaceList {
+    let space = SpaceInfo {
+        name: "lab".to_owned(),
+        settings: novelty(),
+        map_revision: 4_711,
+        digest: "00000000deadbeef".to_owned(),
+        agents: 2,
+        places: 30,
+        trips: 4,
+        landmarks: 1,
+    };
+    SpaceList {
+        spaces: vec![space],
+    }
+}
+
+fn agents() -> AgentPage {
+    AgentPage {
+        agents: vec![
+            AgentSummary {
+                name: "robot-1".to_owned(),
+                estimate: Some(estimate(Status::Localized)),
+            },
+            AgentSummary {
+                name: "robot-2".to_owned(),
+                estimate: None,
+            },
+        ],
+        next: Some("robot-2".to_owned()),
+    }
+}
+
+fn agent() -> AgentDetail {
+    AgentDetail {
+        name: "robot-1".to_owned(),
+        estimate: Some(estimate(Status::Localized)),
+        odometry: Some(pose(1_800_000_000_610_000_000)),
+        watermark: watermark(),
+        lag_samples: 12,
+        travelled_m: 31.75,
+    }
+}
+
+fn silent_agent() -> AgentDetail {
+    AgentDetail {
+        estimate: None,
+        odometry: None,
+        lag_samples: 0,
+        travelled_m: 0.0,
+        ..agent()
+    }
+}
+
+fn pose(stamp_ns: i64) -> StampedPose {
+    StampedPose {
+        stamp_ns,
+        translation_m: [12.5, -7.25, 0.1],
+        rotation_xyzw: [0.0, 0.0, 0.6, 0.8],
+    }
+}
+
+fn grid() -> GridState {
+    let module = GridModuleState {
+        spacing_m: 1.0,
+        reference: [12, -8, 0],
+        reference_m: [8.0, -7.0, 0.0],
+        phase: [0.25, 0.5, 0.875],
+        activation: vec![0.0, 0.125, 1.0],
+    };
+    GridState {
+        agent: "robot-1".to_owned(),
+        stamp_ns: 1_800_000_000_610_000_000,
+        modules: vec![
+            module.clone(),
+            GridModuleState {
+                spacing_m: 1.5,
+                ..module
+            },
+        ],
+        decoded_m: [12.5, -7.25, 0.1],
+        interference_m: [12.25, -7.5, 0.125],
+        octant: Some(8),
+        displacement_m: 0.015,
+        turning_rad: -0.25,
+        heading_rad: 3.125,
+    }
+}
+
+fn trajectory() -> Trajectory {
+    Trajectory {
+        agent: "robot-1".to_owned(),
+        session: 1_800_000_000_000_000_000,
+        frame: "map".to_owned(),
+        kind: "causal".to_owned(),
+        poses: vec![
+            pose(1_800_000_000_610_000_000),
+            pose(1_800_000_000_620_000_000),
+        ],
+        next_from_ns: Some(1_800_000_000_620_000_001),
+    }
+}
+
+fn place() -> Place {
+    Place {
+        id: 3,
+        translation_m: [12.5, -7.0, 0.3],
+        rotation_xyzw: [0.0, 0.0, 0.6, 0.8],
+        position_sd_m: [0.1, 0.2, 0.3],
+        code: vec![[0.0, 0.25, 0.5], [0.75, 0.125, 0.875]],
+        visits: 5,
+        founder: "robot-1".to_owned(),
+        first_stamp_ns: 1_800_000_000_510_000_000,
+        last_stamp_ns: 1_800_000_000_610_000_000,
+    }
+}
+
+fn places() -> PlacePage {
+    PlacePage {
+        frame: "map".to_owned(),
+        map_revision: 4_711,
+        places: vec![place()],
+        next: Some(3),
+    }
+}
+
+fn recalled() -> RecallAnswer {
+    let best = RecalledPlace {
+        place: place(),
+        cosine: Some(0.9375),
+        confidence: Some(0.875),
+        distance_m: Some(0.25),
+    };
+    RecallAnswer {
+        space: "lab".to_owned(),
+        frame: "map".to_owned(),
+        map_revision: 4_711,
+        places: vec![best],
+    }
+}
+
+fn recalled_without_cue() -> RecallAnswer {
+    let latest = RecalledPlace {
+        place: place(),
+        cosine: None,
+        confidence: None,
+        distance_m: None,
+    };
+    RecallAnswer {
+        places: vec![latest],
+        ..recalled()
+    }
+}
+
+fn trip() -> Trip {
+    Trip {
+        id: 0,
+        agent: "robot-1".to_owned(),
+        session: 1_800_000_000_000_000_000,
+        start_stamp_ns: 1_800_000_000_500_000_000,
+        end_stamp_ns: 1_800_000_000_610_000_000,
+        ended: None,
+        leg_count: 1,
+        length_m: 0.75,
+    }
+}
+
+/// A trip for each end, and one that goes on.
+fn trips() -> TripPage {
+    let ends = ENDS.into_iter().map(Some).chain([None]);
+    let trips = (0..)
+        .zip(ends)
+        .map(|(id, ended)| Trip {
+            id,
+            ended,
+            ..trip()
+        })
+        .collect();
+    TripPage { trips, next: None }
+}
+
+fn trip_detail() -> TripDetail {
+    let leg = Leg {
+        from: 3,
+        to: 4,
+        translation_m: [0.5, 0.25, 0.0],
+        rotation_xyzw: [0.0, 0.0, -0.6, 0.8],
+        covariance: upper_triangle(),
+        phase_displacement: vec![[0.5, -0.25, 0.0], [1.25, 0.0, -3.5]],
+        octant: 1,
+        duration_s: 1.1,
+        length_m: 0.75,
+    };
+    TripDetail {
+        trip: trip(),
+        legs: vec![leg],
+    }
+}
+
+fn landmarks() -> LandmarkPage {
+    let landmark = Landmark {
+        id: "porte 3, étage α".to_owned(),
+        translation_m: [2.0, -1.5, 0.25],
+        covariance: [0.01, 0.001, 0.002, 0.02, 0.003, 0.03],
+        sightings: 9,
+        first_stamp_ns: 1_800_000_000_540_000_000,
+        last_stamp_ns: 1_800_000_000_610_000_000,
+    };
+    LandmarkPage {
+        frame: "map".to_owned(),
+        landmarks: vec![landmark],
+        next: None,
+    }
+}
+
+fn problem() -> Problem {
+    Problem {
+        kind: "/problems/no-such-space".to_owned(),
+        title: "No such space".to_owned(),
+        status: 404,
+        detail: "there is no space \"lab2\"".to_owned(),
+    }
+}
