@@ -1,0 +1,183 @@
+//! Agents: who samples the space, and where each of them is.
+
+mod body;
+mod status;
+
+use nalgebra::{Isometry3, Point3};
+
+pub(crate) use body::Body;
+pub use status::Status;
+
+use crate::geometry::PoseCovariance;
+use crate::grid::{GridModules, GridState, octant};
+use crate::place::PlaceId;
+use crate::sample::Label;
+use crate::settings::Settings;
+use crate::state::state_of_struct;
+use crate::trip::{Recorder, TripId};
+
+/// An agent of a space.
+///
+/// The first agent that moves or sees a landmark in an empty map defines the `map` frame: it starts
+/// at identity. Any later agent is *unplaced* until a start pose tells where it stands; its pose then
+/// still counts from identity, but nothing that it does changes the map.
+#[derive(Clone, Debug)]
+pub struct Agent {
+    pub(crate) name: Label,
+    /// `None` before the first session.
+    pub(crate) session: Option<u64>,
+    pub(crate) next_seq: u64,
+    pub(crate) stamp_ns: Option<i64>,
+    pub(crate) placed: bool,
+    pub(crate) body: Body,
+    /// Where the places were last asked who answers; `None` asks at the next motion.
+    pub(crate) asked_at: Option<Point3<f64>>,
+    /// Where and since when \[ns\] the agent has stayed within an eighth of a field radius.
+    pub(crate) still_since: Option<(Point3<f64>, i64)>,
+    /// The place that answered, and its confidence.
+    pub(crate) place: Option<(PlaceId, f64)>,
+    /// The place entered last; `None` once no place answers any more.
+    pub(crate) entered: Option<PlaceId>,
+    pub(crate) recorder: Recorder,
+    pub(crate) sightings: u64,
+    pub(crate) percepts: u64,
+}
+
+state_of_struct!(Agent {
+    name,
+    session,
+    next_seq,
+    stamp_ns,
+    placed,
+    body,
+    asked_at,
+    still_since,
+    place,
+    entered,
+    recorder,
+    sightings,
+    percepts,
+});
+
+impl Agent {
+    /// A new agent.
+    pub(crate) fn new(name: Label, modules: &GridModules) -> Self {
+        Self {
+            name,
+            session: None,
+            next_seq: 0,
+            stamp_ns: None,
+            placed: false,
+            body: Body::new(modules),
+            asked_at: None,
+            still_since: None,
+            place: None,
+            entered: None,
+            recorder: Recorder::default(),
+            sightings: 0,
+            percepts: 0,
+        }
+    }
+
+    /// Whether the sample numbers up to and without `to` of a session hold news.
+    pub(crate) fn awaits(&self, session: u64, to: u64) -> bool {
+        self.session
+            .is_none_or(|own| session > own || (session == own && to > self.next_seq))
+    }
+
+    /// Name.
+    pub fn name(&self) -> &Label {
+        &self.name
+    }
+
+    /// Current session; 0 before the first one.
+    pub fn session(&self) -> u64 {
+        self.session.unwrap_or(0)
+    }
+
+    /// Every sample of the session below this number has been applied or skipped.
+    pub fn next_seq(&self) -> u64 {
+        self.next_seq
+    }
+
+    /// Stamp of the session's latest sample \[ns\].
+    pub fn stamp_ns(&self) -> Option<i64> {
+        self.stamp_ns
+    }
+
+    /// Whether it is known where the agent stands in `map`.
+    pub fn placed(&self) -> bool {
+        self.placed
+    }
+
+    /// Pose in `map`; counted from identity while the agent is not placed.
+    pub fn pose(&self) -> &Isometry3<f64> {
+        &self.body.in_map
+    }
+
+    /// Pose in `odom`: by motion alone since the session began.
+    pub fn odometry(&self) -> &Isometry3<f64> {
+        &self.body.in_odom
+    }
+
+    /// Covariance of [`Agent::pose`].
+    pub fn covariance(&self) -> &PoseCovariance {
+        &self.body.covariance
+    }
+
+    /// How well the agent is localised.
+    pub fn status(&self, settings: &Settings) -> Status {
+        Status::of(self.placed, self.body.covariance.position_sd_m(), settings)
+    }
+
+    /// The place cell that answers strongest, with its confidence in \[0, 1\], as of the last time
+    /// that the places were asked: less than an eighth of a field radius ago.
+    pub fn place(&self) -> Option<(PlaceId, f64)> {
+        self.place
+    }
+
+    /// Grid state.
+    pub fn grid(&self) -> &GridState {
+        &self.body.grid
+    }
+
+    /// Length of the session's latest movement \[m\] (seed Eq. 2); 0 before the first one.
+    pub fn displacement_m(&self) -> f64 {
+        self.body.latest.map_or(0.0, |latest| latest.norm())
+    }
+
+    /// Octant of the session's latest movement in `map`, 1 to 8.
+    pub fn octant(&self) -> Option<u8> {
+        self.body.latest.map(|latest| octant::octant_of(&latest))
+    }
+
+    /// Angle between the session's latest two movements \[rad\], in \[0, π\] (seed Eq. 3); 0 before
+    /// the second one.
+    pub fn turning_rad(&self) -> f64 {
+        let movements = self.body.before_latest.zip(self.body.latest);
+        movements.map_or(0.0, |(before, latest)| {
+            octant::turning_angle_rad(&before, &latest)
+        })
+    }
+
+    /// Path travelled in this session \[m\].
+    pub fn travelled_m(&self) -> f64 {
+        self.body.travelled_m
+    }
+
+    /// The trip under way, once its first leg is complete.
+    pub fn trip(&self) -> Option<TripId> {
+        self.recorder.trip
+    }
+
+    /// Sightings so far, of all sessions. Those of landmarks teach the map; those of agents and of
+    /// own samples are counted and stay in the journal.
+    pub fn sightings(&self) -> u64 {
+        self.sightings
+    }
+
+    /// Levels and descriptors so far, of all sessions; they are counted and stay in the journal.
+    pub fn percepts(&self) -> u64 {
+        self.percepts
+    }
+}

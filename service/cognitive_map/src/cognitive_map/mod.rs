@@ -1,0 +1,150 @@
+//! The cognitive map of a space: everything that is derived from its journal.
+
+mod checkpoint;
+mod fold;
+mod header;
+mod motion;
+mod read;
+
+use std::sync::Arc;
+
+pub use checkpoint::{CheckpointPage, CorruptCheckpoint};
+
+use crate::agent::Agent;
+use crate::event::{Event, EventKind};
+use crate::grid::GridModules;
+use crate::landmark::LandmarkMap;
+use crate::paged::PagedVec;
+use crate::place::PlaceMap;
+use crate::record::{AgentId, Record, SkipReason};
+use crate::settings::Settings;
+use crate::trip::Trip;
+
+use fold::Fold;
+
+/// Agents per page: few, because the agents change with every sample.
+const AGENT_PAGE: usize = 4;
+/// Trips per page.
+const TRIP_PAGE: usize = 16;
+
+/// The cognitive map of a space, a fold over its journal: [`CognitiveMap::apply`] is the only way to
+/// change it, and the same records in the same order give the same map, bit by bit.
+///
+/// A clone is a snapshot. It shares all memory with the original and stays as it is while the
+/// original goes on; the original then copies the pages that it changes.
+#[derive(Clone, Debug)]
+pub struct CognitiveMap {
+    settings: Arc<Settings>,
+    modules: Arc<GridModules>,
+    /// Number of records that had an effect.
+    revision: u64,
+    /// Whether some agent has defined the `map` frame.
+    framed: bool,
+    agents: PagedVec<Agent, AGENT_PAGE>,
+    places: PlaceMap,
+    trips: PagedVec<Trip, TRIP_PAGE>,
+    landmarks: LandmarkMap,
+}
+
+impl CognitiveMap {
+    /// The map of a space where nothing has happened yet.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            modules: Arc::new(GridModules::new(&settings)),
+            places: PlaceMap::new(&settings),
+            settings: Arc::new(settings),
+            revision: 0,
+            framed: false,
+            agents: PagedVec::default(),
+            trips: PagedVec::default(),
+            landmarks: LandmarkMap::default(),
+        }
+    }
+
+    /// Applies the next record of the journal, and appends to `events` what it brought about.
+    ///
+    /// Every record is legal. One that says nothing new has no effect at all: the enrolment of an
+    /// agent that is there (or is not next in line), a sample of an unknown agent, of an earlier
+    /// session, or with a sequence number that has been applied or skipped. A sample whose number is
+    /// ahead first skips the missing ones as [`SkipReason::Lost`]. Work and memory per sample are
+    /// bounded, whatever the size of the map.
+    pub fn apply(&mut self, record: &Record, events: &mut Vec<Event>) {
+        match record {
+            Record::Enrol { agent, name } => {
+                if agent.0 as usize == self.agents.len() {
+                    self.revision += 1;
+                    self.agents
+                        .push(Agent::new(name.clone(), &self.modules), self.revision);
+                    events.push(Event {
+                        agent: *agent,
+                        stamp_ns: 0,
+                        kind: EventKind::AgentEnrolled,
+                    });
+                }
+            }
+            Record::Sample {
+                agent,
+                session,
+                seq,
+                sample,
+            } => {
+                // The last number of all has no successor, so it is never a sample's.
+                let Some(next_seq) = seq.checked_add(1) else {
+                    return;
+                };
+                let Some(mut fold) = self.fold(*agent, *session, next_seq, events) else {
+                    return;
+                };
+                fold.enter_session(*session, Some(sample.stamp_ns));
+                fold.skip(*seq, SkipReason::Lost);
+                fold.sample(*seq, sample);
+            }
+            Record::Skip {
+                agent,
+                session,
+                from,
+                to,
+                reason,
+            } => {
+                if from >= to {
+                    return;
+                }
+                let Some(mut fold) = self.fold(*agent, *session, *to, events) else {
+                    return;
+                };
+                fold.enter_session(*session, None);
+                fold.skip(*from, SkipReason::Lost);
+                fold.skip(*to, *reason);
+            }
+        }
+    }
+
+    /// Opens the map for the samples up to and without `to` of an agent, if they hold news.
+    fn fold<'a>(
+        &'a mut self,
+        agent_id: AgentId,
+        session: u64,
+        to: u64,
+        events: &'a mut Vec<Event>,
+    ) -> Option<Fold<'a>> {
+        let index = agent_id.0 as usize;
+        if !self.agents.get(index)?.awaits(session, to) {
+            return None;
+        }
+        self.revision += 1;
+        let agent = self.agents.get_mut(index, self.revision)?;
+        Some(Fold {
+            settings: &self.settings,
+            modules: &self.modules,
+            revision: self.revision,
+            framed: &mut self.framed,
+            places: &mut self.places,
+            trips: &mut self.trips,
+            landmarks: &mut self.landmarks,
+            agent_id,
+            stamp_ns: agent.stamp_ns.unwrap_or(0),
+            agent,
+            events,
+        })
+    }
+}

@@ -1,0 +1,198 @@
+//! What motion does to the map: path integration, place cells, trips.
+
+use nalgebra::Point3;
+
+use super::fold::Fold;
+use crate::event::{Event, EventKind};
+use crate::place::{Place, PlaceId, confidence};
+use crate::random;
+use crate::sample::Motion;
+use crate::settings::Recruitment;
+use crate::trip::{LegUnderWay, TRIPS_MAX, Trip, TripEnd, TripId, interval_s};
+
+/// The places are asked again when the agent has moved by this part of a field radius. Confidence
+/// changes by at most a tenth over that distance, and a robot at rest asks nothing.
+const ASK_PER_FIELD_RADIUS: f64 = 0.125;
+/// A place answers from this confidence on.
+const ANSWER_MIN: f64 = 0.5;
+
+impl Fold<'_> {
+    /// The body moved.
+    pub(super) fn motion(&mut self, seq: u64, motion: &Motion) {
+        self.define_frame();
+        let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
+        let events = &mut *self.events;
+        let step =
+            self.agent
+                .body
+                .step(motion, self.settings, self.modules, |module, reference| {
+                    // Of an agent that is not placed, the cells are those of no map.
+                    if placed && let Ok(module) = u8::try_from(module) {
+                        let kind = EventKind::CellEntered { module, reference };
+                        events.push(Event {
+                            agent,
+                            stamp_ns,
+                            kind,
+                        });
+                    }
+                });
+        if !placed {
+            return;
+        }
+        if let Some(leg) = &mut self.agent.recorder.leg {
+            leg.extend(motion.increment(), &step.noise_sd, step.path_m);
+        }
+        let drawn = match self.settings.recruitment {
+            Recruitment::Novelty => false,
+            Recruitment::Bernoulli { probability } => {
+                let session = self.agent.session();
+                random::uniform(self.settings.seed, agent, session, seq) < probability
+            }
+        };
+        let rests = self.rest();
+        let position = self.position();
+        let moved = self
+            .agent
+            .asked_at
+            .is_none_or(|at| self.is_step_away(&at, &position));
+        if drawn || (moved && !rests) {
+            self.ask(&position, drawn);
+        }
+    }
+
+    /// Ends the trip of an agent that has stayed where it is for long; answers whether it has.
+    pub(super) fn rest(&mut self) -> bool {
+        if !self.agent.placed {
+            return false;
+        }
+        let position = self.position();
+        match self.agent.still_since {
+            Some((at, since_ns)) if !self.is_step_away(&at, &position) => {
+                let rests = interval_s(since_ns, self.stamp_ns) >= self.settings.trip_stillness_s;
+                let recorder = &self.agent.recorder;
+                if rests && (recorder.leg.is_some() || recorder.trip.is_some()) {
+                    self.end_trip(TripEnd::Stillness);
+                }
+                rests
+            }
+            _ => {
+                self.agent.still_since = Some((position, self.stamp_ns));
+                false
+            }
+        }
+    }
+
+    /// Asks which place answers here; recruits one, enters one, closes the leg under way.
+    fn ask(&mut self, position: &Point3<f64>, drawn: bool) {
+        self.agent.asked_at = Some(*position);
+        let winner = self.places.winner(position);
+        let novel = match self.settings.recruitment {
+            Recruitment::Novelty => {
+                winner.is_none_or(|(_, distance_m)| self.confidence(distance_m) < ANSWER_MIN)
+            }
+            // Two places closer than a step of asking could not be told apart, and without a bound
+            // on their density neither would there be one on the search among them.
+            Recruitment::Bernoulli { .. } => {
+                drawn && winner.is_none_or(|(_, distance_m)| distance_m >= self.ask_step_m())
+            }
+        };
+        if novel && let Some(place) = self.recruit(position) {
+            self.agent.place = Some((place, 1.0));
+            self.agent.entered = Some(place);
+            self.arrive(place);
+            return;
+        }
+        self.agent.place = winner.map(|(place, distance_m)| (place, self.confidence(distance_m)));
+        match self.agent.place {
+            Some((place, confidence)) if confidence >= ANSWER_MIN => {
+                if self.agent.entered != Some(place) {
+                    self.agent.entered = Some(place);
+                    self.places.visit(place, self.stamp_ns, self.revision);
+                    self.emit(EventKind::PlaceEntered { place, confidence });
+                }
+                self.arrive(place);
+            }
+            Some(_) => {}
+            // An agent that hovers at the rim of a field does not enter it again and again; one that
+            // has left the reach of all places enters the next one afresh.
+            None => self.agent.entered = None,
+        }
+    }
+
+    /// Recruits a place cell where the agent stands.
+    fn recruit(&mut self, position: &Point3<f64>) -> Option<PlaceId> {
+        let rotation = self.agent.body.in_map().rotation;
+        let covariance = self.agent.body.covariance().in_map_axes(&rotation);
+        let position_sd_m = covariance
+            .diagonal()
+            .fixed_rows::<3>(0)
+            .map(|x| x.max(0.0).sqrt());
+        let (founder, stamp_ns) = (self.agent_id, self.stamp_ns);
+        let place = Place::found(*position, rotation, position_sd_m, founder, stamp_ns);
+        let place = self.places.recruit(place, self.revision)?;
+        self.emit(EventKind::PlaceRecruited {
+            place,
+            position: *position,
+        });
+        Some(place)
+    }
+
+    /// The agent is in the field of a place: the leg under way ends here if it started elsewhere,
+    /// and the next one starts here.
+    fn arrive(&mut self, place: PlaceId) {
+        match &self.agent.recorder.leg {
+            Some(leg) if leg.from() == place => return,
+            Some(leg) => {
+                let body = &self.agent.body;
+                let done = leg.finish(place, self.stamp_ns, body.in_odom(), body.in_map());
+                let start_stamp_ns = leg.start_stamp_ns();
+                if let Some(trip) = self.trip_under_way(start_stamp_ns)
+                    && let Some(record) = self.trips.get_mut(trip.0 as usize, self.revision)
+                {
+                    record.push(done, self.stamp_ns, self.revision);
+                    if record.is_full() {
+                        self.close_trip(TripEnd::Full);
+                    }
+                }
+            }
+            None => {}
+        }
+        let body = &self.agent.body;
+        let leg = LegUnderWay::start(place, self.stamp_ns, body.in_odom(), body.in_map());
+        self.agent.recorder.leg = Some(leg);
+    }
+
+    /// The trip under way, or a new one. None when there are as many as a space can hold.
+    fn trip_under_way(&mut self, start_stamp_ns: i64) -> Option<TripId> {
+        if self.agent.recorder.trip.is_none() {
+            let id = u32::try_from(self.trips.len())
+                .ok()
+                .filter(|&id| id < TRIPS_MAX)?;
+            let trip = Trip::new(self.agent_id, self.agent.session(), start_stamp_ns);
+            self.trips.push(trip, self.revision);
+            self.agent.recorder.trip = Some(TripId(id));
+            self.emit(EventKind::TripStarted { trip: TripId(id) });
+        }
+        self.agent.recorder.trip
+    }
+
+    /// Where the agent is in `map`.
+    fn position(&self) -> Point3<f64> {
+        self.agent.body.in_map().translation.vector.into()
+    }
+
+    /// Confidence of a place at a distance.
+    fn confidence(&self, distance_m: f64) -> f64 {
+        confidence(distance_m, self.settings.field_radius_m)
+    }
+
+    /// Distance after which the places are asked again \[m\].
+    fn ask_step_m(&self) -> f64 {
+        ASK_PER_FIELD_RADIUS * self.settings.field_radius_m
+    }
+
+    /// Whether two positions lie a step of asking apart.
+    fn is_step_away(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
+        (to - from).norm_squared() >= self.ask_step_m().powi(2)
+    }
+}

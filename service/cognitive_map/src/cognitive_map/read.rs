@@ -1,0 +1,153 @@
+//! What can be read from a map.
+
+use nalgebra::Point3;
+
+use super::CognitiveMap;
+use super::header::Header;
+use crate::agent::Agent;
+use crate::digest::Digest;
+use crate::grid::GridModules;
+use crate::landmark::{Landmark, LandmarkId};
+use crate::place::{Place, PlaceId};
+use crate::recall::{self, RecallCue, Recalled};
+use crate::record::AgentId;
+use crate::settings::Settings;
+use crate::state::{State, StateWriter};
+use crate::trip::{Trip, TripId};
+
+impl CognitiveMap {
+    /// Settings of the space.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Grid modules of the space.
+    pub fn modules(&self) -> &GridModules {
+        &self.modules
+    }
+
+    /// Number of records that had an effect; duplicates do not count.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// Digest of the whole map, the settings included: equal digests, equal maps, now and after any
+    /// further records.
+    ///
+    /// Only what changed since the last digest (of this map or of the one it was cloned from) is
+    /// hashed anew.
+    pub fn digest(&self) -> Digest {
+        let mut out = StateWriter::default();
+        Header::of(self).write(&mut out);
+        self.agents.write_digests(&mut out);
+        self.places.places().write_digests(&mut out);
+        self.trips.write_digests(&mut out);
+        self.landmarks.landmarks().write_digests(&mut out);
+        out.digest()
+    }
+
+    /// Number of agents.
+    pub fn agent_count(&self) -> usize {
+        self.agents.len()
+    }
+
+    /// The agents, in the order of enrolment.
+    pub fn agents(&self) -> impl Iterator<Item = (AgentId, &Agent)> {
+        (0..).map(AgentId).zip(self.agents.iter())
+    }
+
+    /// An agent.
+    pub fn agent(&self, agent: AgentId) -> Option<&Agent> {
+        self.agents.get(agent.0 as usize)
+    }
+
+    /// Number of places.
+    pub fn place_count(&self) -> usize {
+        self.places.places().len()
+    }
+
+    /// The places, in the order of recruitment.
+    pub fn places(&self) -> impl Iterator<Item = (PlaceId, &Place)> {
+        self.places_from(PlaceId(0))
+    }
+
+    /// The places from one on, in the order of recruitment.
+    pub fn places_from(&self, first: PlaceId) -> impl Iterator<Item = (PlaceId, &Place)> {
+        (first.0..)
+            .map(PlaceId)
+            .zip(self.places.places().iter_from(first.0 as usize))
+    }
+
+    /// A place.
+    pub fn place(&self, place: PlaceId) -> Option<&Place> {
+        self.places.get(place)
+    }
+
+    /// The place nearest to a position in `map`, with its distance \[m\]; of equally near ones that
+    /// of the lowest identifier. Quick within two field radii of a place, a scan elsewhere.
+    pub fn nearest_place(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
+        self.places.nearest(position)
+    }
+
+    /// The places that answer a cue, best first, equally good ones by identifier. Exact.
+    ///
+    /// By position the nearest come first. By code all places are compared. By both the confidences
+    /// are multiplied. Without a cue the place visited last comes first.
+    pub fn recall(&self, cue: &RecallCue) -> Vec<Recalled> {
+        recall::recall(cue, &self.places, &self.modules, &self.settings)
+    }
+
+    /// Number of trips.
+    pub fn trip_count(&self) -> usize {
+        self.trips.len()
+    }
+
+    /// The trips, in the order of recording.
+    pub fn trips(&self) -> impl Iterator<Item = (TripId, &Trip)> {
+        self.trips_from(TripId(0))
+    }
+
+    /// The trips from one on, in the order of recording.
+    pub fn trips_from(&self, first: TripId) -> impl Iterator<Item = (TripId, &Trip)> {
+        (first.0..)
+            .map(TripId)
+            .zip(self.trips.iter_from(first.0 as usize))
+    }
+
+    /// A trip.
+    pub fn trip(&self, trip: TripId) -> Option<&Trip> {
+        self.trips.get(trip.0 as usize)
+    }
+
+    /// Number of landmarks.
+    pub fn landmark_count(&self) -> usize {
+        self.landmarks.landmarks().len()
+    }
+
+    /// The landmarks, in the order of learning.
+    pub fn landmarks(&self) -> impl Iterator<Item = (LandmarkId, &Landmark)> {
+        (0..).map(LandmarkId).zip(self.landmarks.landmarks().iter())
+    }
+
+    /// The landmarks in the order of their labels (by bytes), from the first one after `label` on;
+    /// all of them without one.
+    pub fn landmarks_after(
+        &self,
+        label: Option<&str>,
+    ) -> impl Iterator<Item = (LandmarkId, &Landmark)> {
+        self.landmarks
+            .after(label)
+            .filter_map(|id| Some((id, self.landmarks.get(id)?)))
+    }
+
+    /// A landmark.
+    pub fn landmark(&self, landmark: LandmarkId) -> Option<&Landmark> {
+        self.landmarks.get(landmark)
+    }
+
+    /// The landmark with a label.
+    pub fn landmark_by_label(&self, label: &str) -> Option<(LandmarkId, &Landmark)> {
+        let id = self.landmarks.by_label(label)?;
+        Some((id, self.landmarks.get(id)?))
+    }
+}

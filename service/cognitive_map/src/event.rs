@@ -1,0 +1,89 @@
+//! Events: what a record brought about.
+
+use nalgebra::Point3;
+
+use crate::landmark::LandmarkId;
+use crate::place::PlaceId;
+use crate::record::{AgentId, SkipReason};
+use crate::sample::Label;
+use crate::trip::{TripEnd, TripId};
+
+/// One event.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// The agent that caused it.
+    pub agent: AgentId,
+    /// Stamp of the sample that caused it \[ns\]; for a skip, of the latest sample before it;
+    /// 0 where there is none.
+    pub stamp_ns: i64,
+    /// What happened.
+    pub kind: EventKind,
+}
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EventKind {
+    /// The space met a new agent.
+    AgentEnrolled,
+    /// The agent began a session.
+    SessionStarted {
+        /// The session.
+        session: u64,
+    },
+    /// The agent entered a new lattice cell of a grid module; the reference point moved there.
+    CellEntered {
+        /// Index of the module, finest first.
+        module: u8,
+        /// Lattice index of the new reference point.
+        reference: [i64; 3],
+    },
+    /// A place cell was recruited.
+    PlaceRecruited {
+        /// The place.
+        place: PlaceId,
+        /// Its position in `map` \[m\].
+        position: Point3<f64>,
+    },
+    /// The agent came to a known place.
+    PlaceEntered {
+        /// The place.
+        place: PlaceId,
+        /// Confidence of the recall, in \[0, 1\].
+        confidence: f64,
+    },
+    /// A trip began.
+    TripStarted {
+        /// The trip.
+        trip: TripId,
+    },
+    /// A trip ended.
+    TripEnded {
+        /// The trip.
+        trip: TripId,
+        /// Its number of legs.
+        legs: usize,
+        /// Why.
+        reason: TripEnd,
+    },
+    /// A landmark was seen for the first time.
+    LandmarkLearned {
+        /// The landmark.
+        landmark: LandmarkId,
+        /// Its position in `map` \[m\].
+        position: Point3<f64>,
+    },
+    /// Samples were skipped.
+    SamplesSkipped {
+        /// First sequence number.
+        from: u64,
+        /// First beyond.
+        to: u64,
+        /// Why.
+        reason: SkipReason,
+    },
+    /// The agent passed a marker.
+    MarkerPassed {
+        /// Its label.
+        label: Label,
+    },
+}

@@ -1,0 +1,6 @@
+//! Geometry: rigid motions and their uncertainty.
+
+mod covariance;
+pub mod se3;
+
+pub use covariance::{PoseCovariance, upper_triangle};

@@ -1,0 +1,97 @@
+//! Landmarks: things seen from several poses, whose positions are learned, never assumed.
+
+mod estimate;
+mod map;
+mod sighting;
+
+use nalgebra::{Matrix3, Point3};
+
+pub(crate) use estimate::PositionEstimate;
+pub(crate) use map::LandmarkMap;
+pub(crate) use sighting::seen;
+
+use crate::sample::Label;
+use crate::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+
+/// A landmark, counted from 0 in the order of learning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LandmarkId(pub u32);
+
+/// A landmark.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Landmark {
+    label: Label,
+    estimate: PositionEstimate,
+    sightings: u64,
+    first_stamp_ns: i64,
+    last_stamp_ns: i64,
+}
+
+state_of_struct!(Landmark {
+    label,
+    estimate,
+    sightings,
+    first_stamp_ns,
+    last_stamp_ns
+});
+
+impl Landmark {
+    /// A landmark seen for the first time.
+    pub(crate) fn learn(label: Label, estimate: PositionEstimate, stamp_ns: i64) -> Self {
+        Self {
+            label,
+            estimate,
+            sightings: 1,
+            first_stamp_ns: stamp_ns,
+            last_stamp_ns: stamp_ns,
+        }
+    }
+
+    /// The landmark was seen again.
+    pub(crate) fn see(&mut self, estimate: &PositionEstimate, stamp_ns: i64) {
+        self.estimate = self.estimate.intersect(estimate);
+        self.sightings += 1;
+        // The clocks of two agents may differ, so a later sighting may carry an earlier stamp.
+        self.last_stamp_ns = self.last_stamp_ns.max(stamp_ns);
+    }
+
+    /// Label.
+    pub fn label(&self) -> &Label {
+        &self.label
+    }
+
+    /// Position in `map` \[m\].
+    pub fn position(&self) -> &Point3<f64> {
+        &self.estimate.position
+    }
+
+    /// Covariance of the position, along the axes of `map` \[m²\].
+    pub fn covariance(&self) -> &Matrix3<f64> {
+        &self.estimate.covariance
+    }
+
+    /// Times it was seen.
+    pub fn sightings(&self) -> u64 {
+        self.sightings
+    }
+
+    /// Stamp of the first sighting \[ns\].
+    pub fn first_stamp_ns(&self) -> i64 {
+        self.first_stamp_ns
+    }
+
+    /// Latest stamp of a sighting \[ns\].
+    pub fn last_stamp_ns(&self) -> i64 {
+        self.last_stamp_ns
+    }
+}
+
+impl State for LandmarkId {
+    fn write(&self, out: &mut StateWriter) {
+        self.0.write(out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        State::read(input).map(Self)
+    }
+}

@@ -1,0 +1,34 @@
+//! The pure core of cogmap: a cognitive map as a deterministic fold over a journal of samples.
+
+pub mod geometry;
+pub mod grid;
+
+mod agent;
+mod cognitive_map;
+mod digest;
+mod event;
+mod landmark;
+mod paged;
+mod place;
+mod random;
+mod recall;
+mod record;
+mod sample;
+mod settings;
+mod state;
+mod trip;
+
+pub use agent::{Agent, Status};
+pub use cognitive_map::{CheckpointPage, CognitiveMap, CorruptCheckpoint};
+pub use digest::{Digest, InvalidDigest};
+pub use event::{Event, EventKind};
+pub use landmark::{Landmark, LandmarkId};
+pub use place::{Place, PlaceId};
+pub use recall::{RecallCue, Recalled};
+pub use record::{AgentId, Record, SkipReason};
+pub use sample::{
+    Descriptor, InvalidSample, Label, Level, Marker, Motion, PoseNoise, RangeBearing, Relation,
+    RelativePose, RelativePosition, Sample, SampleBody, Sighting, StartPose, Target,
+};
+pub use settings::{InvalidSettings, Recruitment, Settings, SettingsValues};
+pub use trip::{Leg, Trip, TripEnd, TripId};

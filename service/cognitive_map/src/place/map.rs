@@ -1,0 +1,201 @@
+//! The places of a space and the way to the nearest of them.
+
+use nalgebra::Point3;
+
+use super::index::SpatialIndex;
+use super::{Place, PlaceId};
+use crate::paged::PagedVec;
+use crate::settings::Settings;
+use crate::state::CorruptState;
+
+/// Places per page: small enough to copy one for each change after a snapshot.
+const PAGE: usize = 64;
+/// A place answers up to this distance, in field radii; its confidence is 1/16 there.
+const REACH_IN_FIELD_RADII: f64 = 2.0;
+
+/// All places, in the order of recruitment.
+#[derive(Clone, Debug)]
+pub(crate) struct PlaceMap {
+    places: PagedVec<Place, PAGE>,
+    index: SpatialIndex,
+    reach_m: f64,
+}
+
+impl PlaceMap {
+    /// No places yet.
+    pub(crate) fn new(settings: &Settings) -> Self {
+        let reach_m = REACH_IN_FIELD_RADII * settings.field_radius_m;
+        Self {
+            places: PagedVec::default(),
+            index: SpatialIndex::new(reach_m),
+            reach_m,
+        }
+    }
+
+    /// The places.
+    pub(crate) fn places(&self) -> &PagedVec<Place, PAGE> {
+        &self.places
+    }
+
+    /// A place.
+    pub(crate) fn get(&self, place: PlaceId) -> Option<&Place> {
+        self.places.get(place.0 as usize)
+    }
+
+    /// Adds a place. None when there are 2³² already.
+    pub(crate) fn recruit(&mut self, place: Place, revision: u64) -> Option<PlaceId> {
+        let id = PlaceId(u32::try_from(self.places.len()).ok()?);
+        self.index.insert(id, place.position());
+        self.places.push(place, revision);
+        Some(id)
+    }
+
+    /// An agent came to a place.
+    pub(crate) fn visit(&mut self, place: PlaceId, stamp_ns: i64, revision: u64) {
+        if let Some(place) = self.places.get_mut(place.0 as usize, revision) {
+            place.visit(stamp_ns);
+        }
+    }
+
+    /// The place that answers strongest at a position, with its distance \[m\]: the nearest one
+    /// within two field radii, the lowest id of equally near ones.
+    ///
+    /// This is the exact arg max of the codes' cosine (seed Eq. 6) in the limit of many cells: there
+    /// the cosine of two codes of the same reference grid point falls with the distance between
+    /// them, so the most similar place is the nearest one.
+    pub(crate) fn winner(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
+        let winner = self
+            .index
+            .nearest(position, self.reach_m, |id| self.squared(id, position));
+        winner.map(|(id, squared)| (id, squared.sqrt()))
+    }
+
+    /// The place nearest to a position, however far, with its distance \[m\].
+    pub(crate) fn nearest(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
+        self.winner(position).or_else(|| {
+            let all = self.ids().map(|id| (self.squared(id, position), id));
+            let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0));
+            nearest.map(|(squared, id)| (id, squared.sqrt()))
+        })
+    }
+
+    /// The places within a distance of a position, with their distances \[m\], in no particular order.
+    pub(crate) fn within(&self, position: &Point3<f64>, radius_m: f64) -> Vec<(PlaceId, f64)> {
+        let mut found = Vec::new();
+        let mut check = |id| {
+            let squared: f64 = self.squared(id, position);
+            if squared <= radius_m * radius_m {
+                found.push((id, squared.sqrt()));
+            }
+        };
+        match self.index.near(position, radius_m) {
+            Some(near) => near.for_each(&mut check),
+            None => self.ids().for_each(&mut check),
+        }
+        found
+    }
+
+    /// All identifiers.
+    pub(crate) fn ids(&self) -> impl Iterator<Item = PlaceId> + use<> {
+        (0..u32::try_from(self.places.len()).unwrap_or(u32::MAX)).map(PlaceId)
+    }
+
+    /// Squared distance of a place from a position \[m²\].
+    fn squared(&self, place: PlaceId, position: &Point3<f64>) -> f64 {
+        self.get(place).map_or(f64::INFINITY, |place| {
+            (place.position() - position).norm_squared()
+        })
+    }
+
+    /// Appends a checkpoint's page of places.
+    pub(crate) fn push_page(&mut self, bytes: &[u8], revision: u64) -> Result<(), CorruptState> {
+        let first = u32::try_from(self.places.len()).map_err(|_| CorruptState::Invalid)?;
+        self.places.push_page(bytes, revision)?;
+        for (id, place) in (first..)
+            .map(PlaceId)
+            .zip(self.places.iter_from(first as usize))
+        {
+            self.index.insert(id, place.position());
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::AgentId;
+    use nalgebra::{UnitQuaternion, Vector3};
+    use proptest::prelude::*;
+
+    fn map_of(positions: &[Point3<f64>]) -> PlaceMap {
+        let mut map = PlaceMap::new(&Settings::default());
+        for &position in positions {
+            let rotation = UnitQuaternion::identity();
+            let place = Place::found(position, rotation, Vector3::zeros(), AgentId(0), 0);
+            map.recruit(place, 1).unwrap();
+        }
+        map
+    }
+
+    /// Coordinates on a coarse lattice, so that equal distances occur, or anywhere; near the origin
+    /// or far away from it.
+    fn coordinate() -> impl Strategy<Value = f64> {
+        let near = prop_oneof![(-12i32..12).prop_map(|x| f64::from(x) * 0.125), -3.0..3.0];
+        (near, prop::sample::select(vec![0.0, 0.0, 0.0, 1e8])).prop_map(|(x, far)| x + far)
+    }
+
+    fn point() -> impl Strategy<Value = Point3<f64>> {
+        (coordinate(), coordinate(), coordinate()).prop_map(|(x, y, z)| Point3::new(x, y, z))
+    }
+
+    proptest! {
+        #[test]
+        fn equals_the_exhaustive_scan(
+            positions in prop::collection::vec(point(), 0..150),
+            query in point(),
+            radius_m in 0.0..4.0f64,
+        ) {
+            let map = map_of(&positions);
+            let distance = |position: &Point3<f64>| (position - query).norm();
+            let nearest = (0u32..).zip(&positions).map(|(id, p)| (distance(p), PlaceId(id)));
+            let nearest = nearest.min_by(|a, b| a.partial_cmp(b).unwrap()).map(|(d, id)| (id, d));
+            prop_assert_eq!(map.nearest(&query), nearest);
+            prop_assert_eq!(map.winner(&query), nearest.filter(|(_, d)| *d <= 0.5));
+
+            let mut within = map.within(&query, radius_m);
+            within.sort_by_key(|(id, _)| *id);
+            let all = (0u32..).zip(&positions).map(|(id, p)| (PlaceId(id), distance(p)));
+            prop_assert_eq!(within, all.filter(|(_, d)| *d <= radius_m).collect::<Vec<_>>());
+        }
+
+        #[test]
+        fn a_snapshot_keeps_its_places(
+            positions in prop::collection::vec(point(), 1..100),
+            later in prop::collection::vec(point(), 1..100),
+        ) {
+            let mut map = map_of(&positions);
+            let snapshot = map.clone();
+            for position in &later {
+                let rotation = UnitQuaternion::identity();
+                let place = Place::found(*position, rotation, Vector3::zeros(), AgentId(0), 0);
+                map.recruit(place, 2).unwrap();
+            }
+            let near = snapshot.within(&positions[0], 1e3);
+            prop_assert!(near.iter().all(|(id, _)| (id.0 as usize) < positions.len()));
+            prop_assert_eq!(map.places().len(), positions.len() + later.len());
+        }
+    }
+
+    #[test]
+    fn absurd_positions_are_no_harm() {
+        let far = [f64::MAX, -f64::MAX, 1e300, f64::INFINITY, f64::NAN];
+        let positions: Vec<_> = far.into_iter().map(|x| Point3::new(x, 0.0, -x)).collect();
+        let map = map_of(&positions);
+        for position in &positions {
+            map.winner(position);
+            map.within(position, 1.0);
+            map.within(position, f64::INFINITY);
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! Recall: which places answer a cue.
+
+use std::cmp::Ordering;
+
+use nalgebra::Point3;
+
+use crate::grid::population::TUNING_WIDTH;
+use crate::grid::{GridModules, PartialCode, similarity};
+use crate::place::{Place, PlaceId, PlaceMap, confidence};
+use crate::record::AgentId;
+use crate::settings::Settings;
+
+/// Halvings of the interval in which a kernel's distance is sought: to 1e-12 of its length.
+const BISECTIONS: u32 = 40;
+
+/// What to recall places by. `position` and `code` rank the places; the other fields filter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecallCue {
+    /// A position in `map` \[m\].
+    pub position: Option<Point3<f64>>,
+    /// A grid code, perhaps with erased modules.
+    pub code: Option<PartialCode>,
+    /// Only places within this distance of `position` \[m\]; without a position it has no effect.
+    pub radius_m: Option<f64>,
+    /// Only places that this agent founded.
+    pub founder: Option<AgentId>,
+    /// Only places visited at or after this stamp \[ns\].
+    pub since_ns: Option<i64>,
+    /// Only places founded before this stamp \[ns\].
+    pub until_ns: Option<i64>,
+    /// Most places in the answer.
+    pub limit: usize,
+}
+
+/// A place and how well it answers the cue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recalled {
+    /// The place.
+    pub place: PlaceId,
+    /// Cosine of the cue's and the place's population activation, in the limit of many cells (seed
+    /// Eq. 5); `None` without a cue. The cue's code is `code`, or else the code of `position`.
+    pub cosine: Option<f64>,
+    /// Confidence, in \[0, 1\] (seed Eq. 8); `None` without a cue. By position it follows from the
+    /// distance; by code from the distance at which two codes are on average as alike as the cue and
+    /// the place's code; by both it is the product of the two.
+    pub confidence: Option<f64>,
+    /// Distance from `position` \[m\]; `None` without it.
+    pub distance_m: Option<f64>,
+}
+
+/// The places that answer a cue, best first, equally good ones by identifier. Exact.
+///
+/// By position the nearest come first, found through the spatial index where `radius_m` is a few
+/// field radii, by a scan otherwise. By code all places are compared. By both the confidences are
+/// multiplied, as those of two independent witnesses. Without a cue the place visited last comes first.
+pub(crate) fn recall(
+    cue: &RecallCue,
+    places: &PlaceMap,
+    modules: &GridModules,
+    settings: &Settings,
+) -> Vec<Recalled> {
+    let asked = Asked {
+        cue,
+        places,
+        modules,
+        settings,
+    };
+    match (&cue.position, &cue.code) {
+        (Some(position), None) => asked.by_position(position),
+        (None, Some(code)) => asked.by_code(code),
+        (Some(position), Some(code)) => asked.by_both(position, code),
+        (None, None) => asked.latest(),
+    }
+}
+
+/// A cue and what it is put to.
+struct Asked<'a> {
+    cue: &'a RecallCue,
+    places: &'a PlaceMap,
+    modules: &'a GridModules,
+    settings: &'a Settings,
+}
+
+impl Asked<'_> {
+    /// Ranked by distance.
+    fn by_position(&self, position: &Point3<f64>) -> Vec<Recalled> {
+        let ranked = self.best(self.with_distances(position), f64::total_cmp);
+        let code = PartialCode::from(&self.modules.code_at(position));
+        let recalled = ranked.into_iter().map(|(place, distance_m)| Recalled {
+            place,
+            cosine: self.kernel(&code, place),
+            confidence: Some(confidence(distance_m, self.settings.field_radius_m)),
+            distance_m: Some(distance_m),
+        });
+        recalled.collect()
+    }
+
+    /// Ranked by the codes' similarity.
+    fn by_code(&self, code: &PartialCode) -> Vec<Recalled> {
+        let all = self
+            .all()
+            .filter_map(|place| Some((place, self.kernel(code, place)?)));
+        let ranked = self.best(all.collect(), |a, b| b.total_cmp(a));
+        let recalled = ranked.into_iter().map(|(place, cosine)| Recalled {
+            place,
+            cosine: Some(cosine),
+            confidence: Some(self.code_confidence(code, cosine)),
+            distance_m: None,
+        });
+        recalled.collect()
+    }
+
+    /// Ranked by the product of both confidences, and where both have faded to nothing by distance.
+    fn by_both(&self, position: &Point3<f64>, code: &PartialCode) -> Vec<Recalled> {
+        let near = self
+            .with_distances(position)
+            .into_iter()
+            .filter_map(|(place, distance_m)| {
+                let cosine = self.kernel(code, place)?;
+                let by_distance = confidence(distance_m, self.settings.field_radius_m);
+                let confidence = by_distance * self.code_confidence(code, cosine);
+                Some((place, (confidence, distance_m, cosine)))
+            });
+        let ranked = self.best(near.collect(), |a, b| {
+            b.0.total_cmp(&a.0).then_with(|| a.1.total_cmp(&b.1))
+        });
+        let recalled = ranked
+            .into_iter()
+            .map(|(place, (confidence, distance_m, cosine))| Recalled {
+                place,
+                cosine: Some(cosine),
+                confidence: Some(confidence),
+                distance_m: Some(distance_m),
+            });
+        recalled.collect()
+    }
+
+    /// The latest first.
+    fn latest(&self) -> Vec<Recalled> {
+        let stamped = self
+            .all()
+            .filter_map(|id| Some((id, self.places.get(id)?.last_stamp_ns())));
+        let ranked = self.best(stamped.collect(), |a, b| b.cmp(a));
+        let recalled = ranked.into_iter().map(|(place, _)| Recalled {
+            place,
+            cosine: None,
+            confidence: None,
+            distance_m: None,
+        });
+        recalled.collect()
+    }
+
+    /// The places that pass the filters.
+    fn all(&self) -> impl Iterator<Item = PlaceId> {
+        self.places.ids().filter(|&id| self.passes(id))
+    }
+
+    /// The places that pass the filters, the radius among them, with their distances \[m\].
+    fn with_distances(&self, position: &Point3<f64>) -> Vec<(PlaceId, f64)> {
+        let mut near = self
+            .places
+            .within(position, self.cue.radius_m.unwrap_or(f64::INFINITY));
+        near.retain(|&(id, _)| self.passes(id));
+        near
+    }
+
+    /// Whether a place passes the filters on founder and time.
+    fn passes(&self, place: PlaceId) -> bool {
+        let passes = |place: &Place| {
+            self.cue
+                .founder
+                .is_none_or(|founder| place.founder() == founder)
+                && self
+                    .cue
+                    .since_ns
+                    .is_none_or(|since| place.last_stamp_ns() >= since)
+                && self
+                    .cue
+                    .until_ns
+                    .is_none_or(|until| place.first_stamp_ns() < until)
+        };
+        self.places.get(place).is_some_and(passes)
+    }
+
+    /// The best places, as many as asked for, in order; equal scores by identifier.
+    fn best<S>(
+        &self,
+        mut scored: Vec<(PlaceId, S)>,
+        compare: impl Fn(&S, &S) -> Ordering,
+    ) -> Vec<(PlaceId, S)> {
+        let order =
+            |a: &(PlaceId, S), b: &(PlaceId, S)| compare(&a.1, &b.1).then_with(|| a.0.cmp(&b.0));
+        let limit = self.cue.limit;
+        if 0 < limit && limit < scored.len() {
+            // Linear in the number of places; only the answer is sorted.
+            scored.select_nth_unstable_by(limit - 1, order);
+        }
+        scored.truncate(limit);
+        scored.sort_unstable_by(order);
+        scored
+    }
+
+    /// Similarity of a code and a place's code.
+    fn kernel(&self, code: &PartialCode, place: PlaceId) -> Option<f64> {
+        let place = self.places.get(place)?;
+        Some(similarity::kernel(
+            self.modules,
+            code,
+            &place.code(self.modules),
+        ))
+    }
+
+    /// Confidence of a code's similarity: that of the distance d for which the known modules answer
+    /// as much on average,
+    ///
+    /// ```text
+    /// mean over known m of exp(−d² / (4 σ_m²)) = similarity
+    /// ```
+    ///
+    /// The left side falls from 1 to 0 as d grows, so d is unique; it is found by bisection.
+    fn code_confidence(&self, code: &PartialCode, similarity: f64) -> f64 {
+        let known = code.phases().iter().zip(self.modules.lattices());
+        let widths_m = known.filter_map(|(phase, lattice)| {
+            phase.as_ref().map(|_| TUNING_WIDTH * lattice.spacing_m())
+        });
+        let widths_m: Vec<f64> = widths_m.collect();
+        let answer = |distance_m: f64| {
+            let of = |width_m: &f64| (-(distance_m / (2.0 * width_m)).powi(2)).exp();
+            widths_m.iter().map(of).sum::<f64>() / widths_m.len() as f64
+        };
+        // Beyond five field radii the confidence is below 1e-7: as good as none.
+        let (mut near, mut far) = (0.0, 5.0 * self.settings.field_radius_m);
+        if answer(far) >= similarity {
+            return 0.0;
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (near + far);
+            if answer(middle) > similarity {
+                near = middle;
+            } else {
+                far = middle;
+            }
+        }
+        confidence(near, self.settings.field_radius_m)
+    }
+}

@@ -1,0 +1,54 @@
+//! Records: the journal's entries, in the order in which the fold meets them.
+
+use crate::sample::{InvalidSample, Label, Sample};
+
+/// An agent of a space, counted from 0 in the order of enrolment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct AgentId(pub u32);
+
+/// One entry of the journal.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Record {
+    /// A new agent; its identifier is the number of agents before it.
+    Enrol {
+        /// Its identifier.
+        agent: AgentId,
+        /// Its name.
+        name: Label,
+    },
+    /// A sample of an agent.
+    Sample {
+        /// The agent.
+        agent: AgentId,
+        /// Its session; a larger one than before begins a new session.
+        session: u64,
+        /// The sample's number within the session, from 0.
+        seq: u64,
+        /// The sample.
+        sample: Sample,
+    },
+    /// Samples that will never come or were refused: the numbers `from..to`.
+    Skip {
+        /// The agent.
+        agent: AgentId,
+        /// Its session.
+        session: u64,
+        /// First number.
+        from: u64,
+        /// First number beyond.
+        to: u64,
+        /// Why.
+        reason: SkipReason,
+    },
+}
+
+/// Why samples are skipped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SkipReason {
+    /// The sample made no sense.
+    Invalid(InvalidSample),
+    /// Its stamp ran backwards.
+    TimeBackwards,
+    /// It never came.
+    Lost,
+}

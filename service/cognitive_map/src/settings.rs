@@ -1,0 +1,142 @@
+//! Settings of a space: fixed when it is created, because the fold depends on them.
+
+/// Most grid modules.
+const GRID_MODULES_MAX: usize = 16;
+
+/// Valid settings. Build with [`Settings::new`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Settings(SettingsValues);
+
+/// The values of [`Settings`]; all physical, all with a default.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SettingsValues {
+    /// Seed of everything random in the space.
+    pub seed: u64,
+    /// Number of grid modules, 1 to 16.
+    pub grid_modules: usize,
+    /// Spacing of the finest grid module \[m\].
+    pub grid_spacing_m: f64,
+    /// Ratio of the spacings of neighbouring modules, above 1 (√2 in rats: Stensola et al. 2012).
+    pub grid_ratio: f64,
+    /// Distance at which a place's confidence has fallen to one half \[m\].
+    pub field_radius_m: f64,
+    /// When a place cell is recruited.
+    pub recruitment: Recruitment,
+    /// Odometry noise of motion that carries none: translation \[m/√m\].
+    pub translation_sd_per_sqrt_m: f64,
+    /// Rotation per path \[rad/√m\].
+    pub rotation_sd_per_sqrt_m: f64,
+    /// Rotation per rotation \[rad/√rad\].
+    pub rotation_sd_per_sqrt_rad: f64,
+    /// An agent is localised up to this standard deviation of position \[m\].
+    pub localized_sd_m: f64,
+    /// An agent is lost beyond this standard deviation of position \[m\].
+    pub lost_sd_m: f64,
+    /// Standing still for this long ends a trip \[s\].
+    pub trip_stillness_s: f64,
+    /// No sample for this long, on the sensor's clock, ends a trip \[s\].
+    pub trip_gap_s: f64,
+}
+
+/// When a place cell is recruited.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Recruitment {
+    /// Where no place answers with a confidence of at least one half.
+    Novelty,
+    /// At every motion sample with this probability (seed `P_new`), unless a place is closer than an
+    /// eighth of a field radius: those two could not be told apart.
+    Bernoulli {
+        /// Probability, in \[0, 1\].
+        probability: f64,
+    },
+}
+
+/// A value of the settings that makes no sense.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{field} must be {rule}")]
+pub struct InvalidSettings {
+    /// Name of the field.
+    pub field: &'static str,
+    /// What it must be.
+    pub rule: &'static str,
+}
+
+impl Default for SettingsValues {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            grid_modules: 5,
+            grid_spacing_m: 1.0,
+            grid_ratio: std::f64::consts::SQRT_2,
+            field_radius_m: 0.25,
+            recruitment: Recruitment::Novelty,
+            translation_sd_per_sqrt_m: 0.02,
+            rotation_sd_per_sqrt_m: 0.02,
+            rotation_sd_per_sqrt_rad: 0.02,
+            localized_sd_m: 0.5,
+            lost_sd_m: 5.0,
+            trip_stillness_s: 5.0,
+            trip_gap_s: 2.0,
+        }
+    }
+}
+
+impl Settings {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// Names the first field that makes no sense, and the rule that it breaks.
+    pub fn new(values: SettingsValues) -> Result<Self, InvalidSettings> {
+        let check = |holds: bool, field, rule| {
+            if holds {
+                Ok(())
+            } else {
+                Err(InvalidSettings { field, rule })
+            }
+        };
+        // A comparison with NaN is false, so each of these refuses NaN too.
+        let positive = |x: f64| x > 0.0 && x <= 1e6;
+        let share = |x: f64| (0.0..=1.0).contains(&x);
+        let v = &values;
+        let modules = (1..=GRID_MODULES_MAX).contains(&v.grid_modules);
+        check(modules, "grid_modules", "1 to 16")?;
+        let spacing = (1e-3..=1e6).contains(&v.grid_spacing_m);
+        check(spacing, "grid_spacing_m", "0.001 to 1000000")?;
+        let ratio = v.grid_ratio > 1.0 && v.grid_ratio <= 10.0;
+        check(ratio, "grid_ratio", "above 1, at most 10")?;
+        let radius = (1e-3..=1e6).contains(&v.field_radius_m);
+        check(radius, "field_radius_m", "0.001 to 1000000")?;
+        if let Recruitment::Bernoulli { probability } = v.recruitment {
+            check(share(probability), "recruitment.probability", "0 to 1")?;
+        }
+        check(
+            share(v.translation_sd_per_sqrt_m),
+            "translation_sd_per_sqrt_m",
+            "0 to 1",
+        )?;
+        check(
+            share(v.rotation_sd_per_sqrt_m),
+            "rotation_sd_per_sqrt_m",
+            "0 to 1",
+        )?;
+        check(
+            share(v.rotation_sd_per_sqrt_rad),
+            "rotation_sd_per_sqrt_rad",
+            "0 to 1",
+        )?;
+        check(positive(v.localized_sd_m), "localized_sd_m", "positive")?;
+        let lost = v.lost_sd_m > v.localized_sd_m && v.lost_sd_m <= 1e6;
+        check(lost, "lost_sd_m", "above localized_sd_m")?;
+        check(positive(v.trip_stillness_s), "trip_stillness_s", "positive")?;
+        check(positive(v.trip_gap_s), "trip_gap_s", "positive")?;
+        Ok(Self(values))
+    }
+}
+
+impl std::ops::Deref for Settings {
+    type Target = SettingsValues;
+
+    fn deref(&self) -> &SettingsValues {
+        &self.0
+    }
+}

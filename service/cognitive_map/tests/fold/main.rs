@@ -1,0 +1,15 @@
+//! The fold from outside: journals in, maps and events out.
+
+#![expect(
+    clippy::unwrap_used,
+    reason = "clippy knows test functions, but not what they call"
+)]
+
+mod checkpoint; // pages out and in, damaged ones too
+mod determinism; // the same records, the same map
+mod journal; // arbitrary journals, and a robot to write readable ones
+mod landmarks; // what sightings teach
+mod motion; // path integration against closed forms
+mod places; // recruitment, revisits
+mod recall; // recall against an exhaustive scan
+mod trips; // legs, and every way a trip ends
