@@ -1,0 +1,61 @@
+//! Experiments for cogmap: simulated worlds, dataset readers and trajectory metrics.
+//!
+//! Everything here ends in a stream of [`Reading`](reading::Reading)s: plain numbers, as a sensor
+//! gives them. A reading becomes a sample of the core by `cognitive_map::Sample::try_from`, or a
+//! message on a wire; the same stream can go either way, so an experiment run straight into the
+//! core and one sent through a network are the same experiment.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`reading`] | one reading, and its way into the core |
+//! | [`world`] | the obstacle world of the seed paper and a team of robots that walk in it |
+//! | [`mrclam`] | the UTIAS multi-robot data sets |
+//! | [`metrics`] | the absolute trajectory error (ATE), alignment, dead reckoning |
+//! | [`tum`] | trajectories as text in the TUM format |
+//! | [`stamp`] | seconds in decimal to nanoseconds and back, exactly |
+//!
+//! # From a data set to a score
+//!
+//! ```no_run
+//! use cogmap_experiments::metrics::{Alignment, Trajectory, ate_rmse_m, dead_reckoned};
+//! use cogmap_experiments::mrclam::Mrclam;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let set = Mrclam::load("data/MRCLAM_Dataset6".as_ref())?;
+//! for (&robot, log) in set.robots() {
+//!     let estimate = Trajectory::from_poses(&dead_reckoned(&set.robot_readings(robot))?)?;
+//!     let ate_m = ate_rmse_m(&estimate, &log.truth_trajectory(), set.span(), Alignment::None)?;
+//!     assert!(ate_m < 10.0);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # A simulated team
+//!
+//! ```
+//! use cogmap_experiments::world::{ObstacleWorld, Team, TeamSettings};
+//! use cognitive_map::Sample;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let settings = TeamSettings { seed: 1, n_robots: 3, ..TeamSettings::default() };
+//! let mut team = Team::new(ObstacleWorld::new(1), settings)?;
+//! for tick in team.tick() {
+//!     for reading in &tick.readings {
+//!         let sample = Sample::try_from(reading)?;
+//!         assert_eq!(sample.stamp_ns, tick.truth.stamp_ns);
+//!     }
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Nothing here reads a clock or draws randomness that was not seeded. Only
+//! [`Mrclam::load`](mrclam::Mrclam::load) touches files.
+
+pub mod metrics;
+pub mod mrclam;
+pub mod reading;
+pub mod stamp;
+pub mod tum;
+pub mod world;
