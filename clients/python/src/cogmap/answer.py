@@ -1,0 +1,419 @@
+"""Answers of the service: estimates, watermarks, memories.
+
+Positions are in the frame `map`, in metres; rotations are unit quaternions `[x, y, z, w]`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import ClassVar, Dict, Optional, Tuple
+
+from .settings import SpaceSettings
+from .vector import Quaternion, Vec3
+
+
+class Status(str, Enum):
+    """How an agent is localised."""
+
+    #: Its position is known to within the space's `localized_sd_m`.
+    LOCALIZED = "localized"
+    #: Less well than that.
+    UNCERTAIN = "uncertain"
+    #: Less well than the space's `lost_sd_m`.
+    LOST = "lost"
+    #: A status that this version of the package does not know.
+    UNKNOWN = "unknown"
+
+    @classmethod
+    def _missing_(cls, value: object) -> Status:
+        return cls.UNKNOWN
+
+
+class SkipReason(str, Enum):
+    """Why a sample was refused for good."""
+
+    #: A number is NaN, infinite or beyond its limit.
+    NUMBER_OUT_OF_RANGE = "number_out_of_range"
+    #: A quaternion is not a unit quaternion.
+    NON_UNIT_QUATERNION = "non_unit_quaternion"
+    #: A standard deviation is negative.
+    NEGATIVE_NOISE = "negative_noise"
+    #: The stamp runs backwards within the session.
+    TIME_BACKWARDS = "time_backwards"
+    #: A descriptor has a wrong length or no direction.
+    INVALID_DESCRIPTOR = "invalid_descriptor"
+    #: A channel, landmark, agent or marker label is empty, too long or has forbidden characters.
+    INVALID_LABEL = "invalid_label"
+    #: A surface normal is not a unit vector.
+    INVALID_NORMAL = "invalid_normal"
+    #: The sample never came, and the wait for it is over.
+    LOST = "lost"
+    #: A reason that this version of the package does not know.
+    UNKNOWN = "unknown"
+
+    @classmethod
+    def _missing_(cls, value: object) -> SkipReason:
+        return cls.UNKNOWN
+
+
+class TripEnd(str, Enum):
+    """Why a trip ended."""
+
+    #: The agent stood still.
+    STILLNESS = "stillness"
+    #: Samples were lost, or none came for a long time on the sensor's clock.
+    GAP = "gap"
+    #: The session ended.
+    SESSION_END = "session_end"
+    #: A marker said so.
+    MARKER = "marker"
+    #: The trip was full; the next one continues it.
+    FULL = "full"
+    #: The agent was told where it stands.
+    START_POSE = "start_pose"
+    #: An end that this version of the package does not know.
+    UNKNOWN = "unknown"
+
+    @classmethod
+    def _missing_(cls, value: object) -> TripEnd:
+        return cls.UNKNOWN
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The pose of an agent as known when its sample was applied (the causal estimate)."""
+
+    space: str
+    agent: str
+    #: Session of the agent.
+    session: int
+    #: Sequence number of the latest sample that the estimate includes.
+    seq: int
+    #: Stamp of that sample [ns].
+    stamp_ns: int
+    #: Frame of the pose; always `map`.
+    frame: str
+    #: Number of records that the map includes.
+    map_revision: int
+    status: Status
+    #: Position [m].
+    translation_m: Vec3
+    #: Orientation, unit quaternion `[x, y, z, w]`.
+    rotation_xyzw: Quaternion
+    #: Upper triangle, row by row, of the 6 × 6 covariance of (x, y, z, rotation about x, y, z)
+    #: along the axes of `map`: 21 numbers [m², m·rad, rad²].
+    covariance: Tuple[float, ...]
+    #: The place cell that answers strongest, if any does.
+    place: Optional[int] = None
+    #: Its confidence, in [0, 1]; 0 without a place.
+    confidence: float = 0.0
+
+    def covariance_matrix(self) -> Tuple[Tuple[float, ...], ...]:
+        """The covariance as a full symmetric 6 × 6 matrix."""
+        rows = [[0.0] * 6 for _ in range(6)]
+        entries = iter(self.covariance)
+        for row in range(6):
+            for column in range(row, 6):
+                rows[row][column] = rows[column][row] = next(entries)
+        return tuple(tuple(row) for row in rows)
+
+
+@dataclass(frozen=True)
+class SeqRange:
+    """The sequence numbers from `start` up to but without `stop`."""
+
+    start: int
+    stop: int
+
+    #: Names on the wire, where `from` is free to be a field.
+    WIRE_NAMES: ClassVar[Dict[str, str]] = {"start": "from", "stop": "to"}
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """A range of samples refused for good, and why."""
+
+    range: SeqRange
+    reason: SkipReason
+
+
+@dataclass(frozen=True)
+class Watermark:
+    """How far an agent's samples have come: the acknowledgement."""
+
+    #: The agent's current session.
+    session: int
+    #: Every sample below this sequence number is on disk.
+    durable: int
+    #: Every sample below this sequence number has been applied, or rejected for good.
+    applied: int
+    #: The samples that are missing now, while later ones wait for them.
+    gap: Optional[SeqRange] = None
+    #: Samples refused for good, the latest few.
+    rejected: Tuple[Rejection, ...] = ()
+
+
+@dataclass(frozen=True)
+class IngestAnswer:
+    """Answer to samples sent over HTTP: they are on disk."""
+
+    watermark: Watermark
+    #: Samples of the request that had been there before.
+    duplicates: int
+
+
+@dataclass(frozen=True)
+class SpaceInfo:
+    """A space."""
+
+    name: str
+    #: Settings, as fixed on creation.
+    settings: SpaceSettings
+    #: Number of records that the map includes.
+    map_revision: int
+    #: Digest of the map's state: equal digests, equal maps.
+    digest: str
+    agents: int
+    places: int
+    trips: int
+    landmarks: int
+
+
+@dataclass(frozen=True)
+class SpaceList:
+    """The spaces of the service."""
+
+    spaces: Tuple[SpaceInfo, ...]
+
+
+@dataclass(frozen=True)
+class StampedPose:
+    """A pose at a time."""
+
+    stamp_ns: int
+    translation_m: Vec3
+    rotation_xyzw: Quaternion
+
+
+@dataclass(frozen=True)
+class AgentSummary:
+    """An agent in a list."""
+
+    name: str
+    #: Its latest estimate; absent before its first motion, sighting or start pose.
+    estimate: Optional[Estimate] = None
+
+
+@dataclass(frozen=True)
+class AgentPage:
+    """One page of agents."""
+
+    agents: Tuple[AgentSummary, ...]
+    #: Where the next page begins; absent on the last one.
+    next: Optional[str] = None
+
+
+@dataclass(frozen=True)
+class AgentDetail:
+    """An agent: where it is, how sure that is, and how far its samples have come."""
+
+    name: str
+    estimate: Optional[Estimate]
+    #: Its pose in `odom`, i.e. by motion alone since the session began.
+    odometry: Optional[StampedPose]
+    watermark: Watermark
+    #: Samples received but not yet durable.
+    lag_samples: int
+    #: Path travelled in this session [m].
+    travelled_m: float
+
+
+@dataclass(frozen=True)
+class GridModuleState:
+    """State of a grid module."""
+
+    spacing_m: float
+    #: Lattice index of the reference grid point.
+    reference: Tuple[int, int, int]
+    #: Position of the reference grid point [m].
+    reference_m: Vec3
+    #: Phase, `[0, 1)³` along the lattice axes.
+    phase: Vec3
+    #: Activation of the module's cells, in [0, 1].
+    activation: Tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class GridState:
+    """Grid-cell state of an agent."""
+
+    agent: str
+    stamp_ns: int
+    #: The modules, finest first.
+    modules: Tuple[GridModuleState, ...]
+    #: Position decoded from the modules' phases around the reference grid point [m].
+    decoded_m: Vec3
+    #: Interference pattern of the cells, normalised [m].
+    interference_m: Vec3
+    #: Octant of the latest movement, 1 to 8; absent before the first one.
+    octant: Optional[int]
+    #: Length of the latest movement [m].
+    displacement_m: float
+    #: Angle between the latest two movements [rad].
+    turning_rad: float
+    #: Heading in the x-y plane [rad].
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A trajectory."""
+
+    agent: str
+    #: Session of the agent.
+    session: int
+    #: Frame; always `map`.
+    frame: str
+    #: `causal`: each pose as it was known when its sample was applied.
+    kind: str
+    #: Poses, oldest first.
+    poses: Tuple[StampedPose, ...]
+    #: Where the next page begins; absent on the last one.
+    next_from_ns: Optional[int] = None
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place cell."""
+
+    id: int
+    translation_m: Vec3
+    #: Orientation of the founder at the founding.
+    rotation_xyzw: Quaternion
+    #: Standard deviation of the position at the founding, along the axes of `map` [m].
+    position_sd_m: Vec3
+    #: Grid code: phase of each module.
+    code: Tuple[Vec3, ...]
+    #: Times an agent came here, the founding included.
+    visits: int
+    #: Agent that founded it.
+    founder: str
+    first_stamp_ns: int
+    last_stamp_ns: int
+
+
+@dataclass(frozen=True)
+class PlacePage:
+    """One page of places."""
+
+    frame: str
+    map_revision: int
+    places: Tuple[Place, ...]
+    next: Optional[int] = None
+
+
+@dataclass(frozen=True)
+class RecalledPlace:
+    """A place and how well it answers the cue."""
+
+    place: Place
+    #: Cosine of the cue's and the place's activation; absent without a cue.
+    cosine: Optional[float] = None
+    #: Confidence, in [0, 1]; absent without a cue.
+    confidence: Optional[float] = None
+    #: Distance from the cue's position [m]; absent without one.
+    distance_m: Optional[float] = None
+
+
+@dataclass(frozen=True)
+class RecallAnswer:
+    """Places that answer a cue."""
+
+    space: str
+    frame: str
+    map_revision: int
+    #: The places, best first.
+    places: Tuple[RecalledPlace, ...]
+
+
+@dataclass(frozen=True)
+class Trip:
+    """A trip in a list."""
+
+    id: int
+    agent: str
+    session: int
+    start_stamp_ns: int
+    #: Stamp of the latest leg's end [ns].
+    end_stamp_ns: int
+    #: Why it ended; absent while it goes on.
+    ended: Optional[TripEnd]
+    leg_count: int
+    #: Length of its path [m].
+    length_m: float
+
+
+@dataclass(frozen=True)
+class Leg:
+    """The way from one place to the next, as motion measured it."""
+
+    #: Place at its start.
+    start: int
+    #: Place at its end.
+    end: int
+    #: Displacement, in the body frame at the start [m].
+    translation_m: Vec3
+    rotation_xyzw: Quaternion
+    #: Upper triangle, row by row, of the 6 × 6 covariance of (translation, rotation) in the body
+    #: frame at the end: 21 numbers.
+    covariance: Tuple[float, ...]
+    #: Phase displacement of each grid module, turns along the lattice axes.
+    phase_displacement: Tuple[Vec3, ...]
+    #: Octant of the displacement in `map`, 1 to 8.
+    octant: int
+    duration_s: float
+    #: Length of the path [m].
+    length_m: float
+
+    WIRE_NAMES: ClassVar[Dict[str, str]] = {"start": "from", "end": "to"}
+
+
+@dataclass(frozen=True)
+class TripDetail:
+    """A trip with its legs, in order."""
+
+    trip: Trip
+    legs: Tuple[Leg, ...]
+
+
+@dataclass(frozen=True)
+class TripPage:
+    """One page of trips."""
+
+    trips: Tuple[Trip, ...]
+    next: Optional[int] = None
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """A landmark."""
+
+    #: Label.
+    id: str
+    translation_m: Vec3
+    #: Upper triangle, row by row, of the 3 × 3 covariance of the position: 6 numbers [m²].
+    covariance: Tuple[float, ...]
+    #: Times it was seen.
+    sightings: int
+    first_stamp_ns: int
+    last_stamp_ns: int
+
+
+@dataclass(frozen=True)
+class LandmarkPage:
+    """One page of landmarks."""
+
+    frame: str
+    landmarks: Tuple[Landmark, ...]
+    next: Optional[str] = None

@@ -1,0 +1,309 @@
+"""The HTTP interface: spaces, agents, memories, events."""
+
+from __future__ import annotations
+
+import json
+import urllib.error
+import urllib.parse
+import urllib.request
+from dataclasses import replace
+from typing import Any, Dict, Iterable, Iterator, List, Optional, Type, TypeVar, Union
+
+from .answer import (
+    AgentDetail,
+    AgentPage,
+    AgentSummary,
+    GridState,
+    IngestAnswer,
+    Landmark,
+    LandmarkPage,
+    Place,
+    PlacePage,
+    RecallAnswer,
+    SpaceInfo,
+    SpaceList,
+    StampedPose,
+    Trajectory,
+    Trip,
+    TripDetail,
+    TripPage,
+)
+from .errors import ApiError
+from .event import Event
+from .query import RecallQuery
+from .sample import SampleBatch
+from .settings import SpaceSettings
+from .sse import data_fields
+from .vector import vec3
+from .wire import CBOR, JSON, decode, encode, to_wire
+
+#: Members that every problem has (RFC 9457).
+_PROBLEM = frozenset(("type", "title", "status", "detail"))
+
+T = TypeVar("T")
+_Query = Dict[str, Union[None, str, int, float]]
+
+
+class Client:
+    """Asks a cogmap service over HTTP.
+
+    Holds no connection between calls, so it may be shared by threads. Lists that the service answers in
+    pages are iterated to the end, page by page as they are consumed.
+
+    Args:
+        url: Address of the service, for example `http://127.0.0.1:8080`.
+        token: Bearer token, if the service asks for one.
+        timeout_s: Longest silence of a connection [s].
+
+    Raises (all methods):
+        ApiError: The service refused the request.
+        WireError: The answer is not what the interface promises.
+        OSError: The service could not be reached, or fell silent.
+    """
+
+    def __init__(self, url: str, token: Optional[str] = None, timeout_s: float = 10.0) -> None:
+        scheme = urllib.parse.urlsplit(url).scheme
+        if scheme not in ("http", "https"):
+            raise ValueError(f"url {url!r}: expected http:// or https://")
+        self._url = url.rstrip("/")
+        self._token = token
+        self._timeout_s = timeout_s
+
+    # Spaces
+
+    def spaces(self) -> List[SpaceInfo]:
+        """All spaces, by name."""
+        return list(self._get(SpaceList, _path()).spaces)
+
+    def create_space(self, space: str, **settings: Any) -> SpaceInfo:
+        """Creates a space. Settings that are not given take the service's defaults; their values are
+        plain data or messages (`recruitment=Bernoulli(0.05)`)."""
+        body = {name: to_wire(value) for name, value in settings.items()}
+        return self._send(SpaceInfo, "PUT", _path(space), JSON, json.dumps(body).encode())
+
+    def create_space_from(self, space: str, settings: SpaceSettings) -> SpaceInfo:
+        """Creates a space with all settings given, for example those of another space."""
+        return self.create_space(space, **to_wire(settings))
+
+    def space(self, space: str) -> SpaceInfo:
+        """A space, its settings and the size of its memory."""
+        return self._get(SpaceInfo, _path(space))
+
+    def delete_space(self, space: str) -> None:
+        """Deletes a space and everything in it."""
+        self._request("DELETE", _path(space))
+
+    # Agents
+
+    def agents(self, space: str) -> Iterator[AgentSummary]:
+        """All agents of a space, by name."""
+        query: _Query = {}
+        while True:
+            page = self._get(AgentPage, _path(space, "agents"), query)
+            yield from page.agents
+            if page.next is None:
+                return
+            query = {"after": page.next}
+
+    def agent(self, space: str, agent: str) -> AgentDetail:
+        """Where an agent is, how sure that is, and how far its samples have come."""
+        return self._get(AgentDetail, _path(space, "agents", agent))
+
+    def grid(self, space: str, agent: str) -> GridState:
+        """Grid-cell state of an agent."""
+        return self._get(GridState, _path(space, "agents", agent, "grid"))
+
+    def trajectory(
+        self,
+        space: str,
+        agent: str,
+        from_ns: Optional[int] = None,
+        to_ns: Optional[int] = None,
+    ) -> Trajectory:
+        """The poses of an agent within a span of stamps, all pages in one."""
+        path = _path(space, "agents", agent, "trajectory")
+        poses: List[StampedPose] = []
+        while True:
+            page = self._get(Trajectory, path, {"from_ns": from_ns, "to_ns": to_ns})
+            poses.extend(page.poses)
+            if page.next_from_ns is None:
+                return replace(page, poses=tuple(poses))
+            from_ns = page.next_from_ns
+
+    def post_samples(self, space: str, agent: str, batch: SampleBatch) -> IngestAnswer:
+        """Sends samples without Zenoh; returns when they are on the service's disk."""
+        path = _path(space, "agents", agent, "samples")
+        return self._send(IngestAnswer, "POST", path, CBOR, encode(batch))
+
+    # Memories
+
+    def recall(
+        self,
+        space: str,
+        *,
+        position_m: Optional[Iterable[float]] = None,
+        code: Optional[Iterable[Optional[Iterable[float]]]] = None,
+        radius_m: Optional[float] = None,
+        agent: Optional[str] = None,
+        since_ns: Optional[int] = None,
+        until_ns: Optional[int] = None,
+        limit: Optional[int] = None,
+    ) -> RecallAnswer:
+        """Places that answer a cue, best first: a position [m], a grid code (a phase per module, `None`
+        for an erased one), or both. The other arguments filter: places within `radius_m` of the
+        position, founded by `agent`, visited from `since_ns` on, founded before `until_ns`."""
+        query = RecallQuery(
+            position_m=None if position_m is None else vec3("position_m", position_m),
+            code=None
+            if code is None
+            else tuple(None if phase is None else vec3("code", phase) for phase in code),
+            radius_m=radius_m,
+            agent=agent,
+            since_ns=since_ns,
+            until_ns=until_ns,
+            limit=limit,
+        )
+        body = {name: value for name, value in to_wire(query).items() if value is not None}
+        path = _path(space, "recall")
+        return self._send(RecallAnswer, "POST", path, JSON, json.dumps(body).encode())
+
+    def places(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Place]:
+        """All places of a space, by id. `filters` are passed on as query parameters."""
+        query: _Query = dict(filters)
+        while True:
+            page = self._get(PlacePage, _path(space, "places"), query)
+            yield from page.places
+            if page.next is None:
+                return
+            query["after"] = page.next
+
+    def place(self, space: str, place: int) -> Place:
+        """A place."""
+        return self._get(Place, _path(space, "places", str(place)))
+
+    def trips(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Trip]:
+        """All trips of a space, by id. `filters` are passed on as query parameters."""
+        query: _Query = dict(filters)
+        while True:
+            page = self._get(TripPage, _path(space, "trips"), query)
+            yield from page.trips
+            if page.next is None:
+                return
+            query["after"] = page.next
+
+    def trip(self, space: str, trip: int) -> TripDetail:
+        """A trip with its legs."""
+        return self._get(TripDetail, _path(space, "trips", str(trip)))
+
+    def landmarks(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Landmark]:
+        """All landmarks of a space, by label. `filters` are passed on as query parameters."""
+        query: _Query = dict(filters)
+        while True:
+            page = self._get(LandmarkPage, _path(space, "landmarks"), query)
+            yield from page.landmarks
+            if page.next is None:
+                return
+            query["after"] = page.next
+
+    def landmark(self, space: str, label: str) -> Landmark:
+        """A landmark, by its label."""
+        return self._get(Landmark, _path(space, "landmarks", label))
+
+    # Streams and files
+
+    def events(self, space: str, timeout_s: Optional[float] = None) -> Iterator[Event]:
+        """What happens in a space from now on. Ends when the service ends the stream; close the
+        generator to end it here. A silence longer than `timeout_s`, if given, raises `TimeoutError`.
+        """
+        request = self._make_request("GET", _path(space, "events"), accept="text/event-stream")
+        with self._open(request, timeout_s) as response:
+            for data in data_fields(response):
+                yield decode(Event, data.encode(), JSON)
+
+    def export(self, space: str, format: str) -> bytes:
+        """A space as a file: `format` is one that the service knows, such as `json`, `tum` or `g2o`."""
+        return self._request("GET", _path(space, "export"), {"format": format}, accept="*/*")
+
+    # The service itself
+
+    def health(self) -> bool:
+        """Whether the service is alive."""
+        return self._answers("/healthz")
+
+    def ready(self) -> bool:
+        """Whether the service takes samples and answers queries; False while it recovers."""
+        return self._answers("/readyz")
+
+    def _answers(self, path: str) -> bool:
+        try:
+            self._request("GET", path, accept="*/*")
+        except ApiError as error:
+            if error.status == 503:
+                return False
+            raise
+        return True
+
+    # Requests
+
+    def _get(self, kind: Type[T], path: str, query: Optional[_Query] = None) -> T:
+        return decode(kind, self._request("GET", path, query), JSON)
+
+    def _send(self, kind: Type[T], method: str, path: str, content_type: str, body: bytes) -> T:
+        answer = self._request(method, path, body=body, content_type=content_type)
+        return decode(kind, answer, JSON)
+
+    def _request(
+        self,
+        method: str,
+        path: str,
+        query: Optional[_Query] = None,
+        *,
+        body: Optional[bytes] = None,
+        content_type: Optional[str] = None,
+        accept: str = JSON,
+    ) -> bytes:
+        given = {name: value for name, value in (query or {}).items() if value is not None}
+        if given:
+            path = f"{path}?{urllib.parse.urlencode(given)}"
+        request = self._make_request(method, path, accept=accept, body=body)
+        if content_type is not None:
+            request.add_header("Content-Type", content_type)
+        with self._open(request, self._timeout_s) as response:
+            data: bytes = response.read()
+            return data
+
+    def _make_request(
+        self, method: str, path: str, *, accept: str, body: Optional[bytes] = None
+    ) -> urllib.request.Request:
+        request = urllib.request.Request(self._url + path, data=body, method=method)
+        request.add_header("Accept", accept)
+        if self._token is not None:
+            # Not a header that redirects carry along: the token is for this service alone.
+            request.add_unredirected_header("Authorization", f"Bearer {self._token}")
+        return request
+
+    def _open(self, request: urllib.request.Request, timeout_s: Optional[float]) -> Any:
+        try:
+            return urllib.request.urlopen(request, timeout=timeout_s)
+        except urllib.error.HTTPError as error:
+            with error:
+                raise _api_error(error.code, error.reason, error.read()) from None
+
+
+def _path(*segments: str) -> str:
+    return "/v1/spaces" + "".join(f"/{urllib.parse.quote(segment, safe='')}" for segment in segments)
+
+
+def _api_error(status: int, reason: str, body: bytes) -> ApiError:
+    """The error of a refused request; the body may be anything when a proxy wrote it."""
+    try:
+        problem = json.loads(body)
+        return ApiError(
+            status,
+            str(problem["type"]),
+            str(problem["title"]),
+            str(problem.get("detail", "")),
+            {name: value for name, value in problem.items() if name not in _PROBLEM},
+        )
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return ApiError(status, "about:blank", reason, body[:200].decode("utf-8", "replace"))

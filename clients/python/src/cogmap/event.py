@@ -1,0 +1,131 @@
+"""Events: what happened in a space, for whoever follows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Dict, Union
+
+from .answer import SkipReason, TripEnd
+from .vector import Vec3
+
+
+@dataclass(frozen=True)
+class AgentEnrolled:
+    """The space met a new agent."""
+
+    TAG: ClassVar[str] = "agent_enrolled"
+
+
+@dataclass(frozen=True)
+class SessionStarted:
+    """The agent began a session."""
+
+    TAG: ClassVar[str] = "session_started"
+    session: int
+
+
+@dataclass(frozen=True)
+class PlaceRecruited:
+    """A place cell was recruited."""
+
+    TAG: ClassVar[str] = "place_recruited"
+    place: int
+    #: Its position in `map` [m].
+    translation_m: Vec3
+
+
+@dataclass(frozen=True)
+class PlaceEntered:
+    """The agent came to a place that the space knew."""
+
+    TAG: ClassVar[str] = "place_entered"
+    place: int
+    #: Confidence of the recall, in [0, 1].
+    confidence: float
+
+
+@dataclass(frozen=True)
+class TripStarted:
+    """A trip began."""
+
+    TAG: ClassVar[str] = "trip_started"
+    trip: int
+
+
+@dataclass(frozen=True)
+class TripEnded:
+    """A trip ended."""
+
+    TAG: ClassVar[str] = "trip_ended"
+    trip: int
+    #: Its number of legs.
+    legs: int
+    reason: TripEnd
+
+
+@dataclass(frozen=True)
+class LandmarkLearned:
+    """A landmark was seen for the first time."""
+
+    TAG: ClassVar[str] = "landmark_learned"
+    landmark: str
+    #: Its position in `map` [m].
+    translation_m: Vec3
+
+
+@dataclass(frozen=True)
+class SamplesSkipped:
+    """Samples from `start` up to but without `stop` were refused for good."""
+
+    TAG: ClassVar[str] = "samples_skipped"
+    start: int
+    stop: int
+    reason: SkipReason
+
+    WIRE_NAMES: ClassVar[Dict[str, str]] = {"start": "from", "stop": "to"}
+
+
+@dataclass(frozen=True)
+class MarkerPassed:
+    """The agent passed a marker."""
+
+    TAG: ClassVar[str] = "marker_passed"
+    label: str
+
+
+@dataclass(frozen=True)
+class UnknownKind:
+    """Something that this version of the package has no word for."""
+
+    #: Its name on the wire.
+    name: str
+    #: Its fields as they came.
+    fields: Dict[str, Any] = field(default_factory=dict)
+
+
+EventKind = Union[
+    AgentEnrolled,
+    SessionStarted,
+    PlaceRecruited,
+    PlaceEntered,
+    TripStarted,
+    TripEnded,
+    LandmarkLearned,
+    SamplesSkipped,
+    MarkerPassed,
+    UnknownKind,
+]
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event."""
+
+    space: str
+    #: Agent that caused it.
+    agent: str
+    #: Number of records that the map includes.
+    map_revision: int
+    #: Stamp of the sample that caused it [ns].
+    stamp_ns: int
+    kind: EventKind

@@ -1,0 +1,62 @@
+"""The Zenoh session of a robot: opened with everything explicit, closed within a bound."""
+
+from __future__ import annotations
+
+import json
+import threading
+from typing import Callable, Iterable, Union
+
+import zenoh
+
+from .errors import Timeout
+
+#: Where a Zenoh router listens unless told otherwise.
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def open_session(
+    connect: Union[str, Iterable[str]] = DEFAULT_ENDPOINT, *, timeout_s: float = 10.0
+) -> zenoh.Session:
+    """Opens a Zenoh session in client mode to one of the endpoints, without multicast.
+
+    Several robots of one process may share it. Raises `Timeout` when no endpoint answers in time.
+    """
+    endpoints = [connect] if isinstance(connect, str) else list(connect)
+    config = zenoh.Config()
+    config.insert_json5("mode", json.dumps("client"))
+    config.insert_json5("connect/endpoints", json.dumps(endpoints))
+    config.insert_json5("connect/timeout_ms", json.dumps(max(1, int(1000 * timeout_s))))
+    config.insert_json5("connect/exit_on_failure", "true")
+    config.insert_json5("listen/endpoints", "[]")
+    config.insert_json5("scouting/multicast/enabled", "false")
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise Timeout(f"no Zenoh router answers at {', '.join(endpoints)}: {error}") from error
+
+
+def has_subscriber(publisher: zenoh.Publisher) -> bool:
+    """Whether anybody subscribes to what is published here."""
+    status: object = publisher.matching_status
+    # The type stubs of zenoh 1.10 say bool; what comes is an object, and that is always true.
+    return bool(getattr(status, "matching", status))
+
+
+def within(timeout_s: float, *actions: Callable[[], object]) -> bool:
+    """Runs teardown steps in order on a thread of their own; says whether they ended in time.
+
+    A step that hangs on a dead network must not hang the robot's program.
+    """
+
+    def run() -> None:
+        for action in actions:
+            try:
+                action()
+            except zenoh.ZError:
+                # The session is gone already, which is what the step was for.
+                continue
+
+    thread = threading.Thread(target=run, name="cogmap-close", daemon=True)
+    thread.start()
+    thread.join(timeout_s)
+    return not thread.is_alive()

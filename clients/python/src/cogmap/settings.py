@@ -1,0 +1,71 @@
+"""Settings of a space, fixed when it is created. The service holds the defaults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Union
+
+
+@dataclass(frozen=True)
+class Novelty:
+    """Recruit a place cell where no place answers with a confidence of at least one half."""
+
+    TAG: ClassVar[str] = "novelty"
+
+
+@dataclass(frozen=True)
+class Bernoulli:
+    """Recruit a place cell at every motion sample with this probability."""
+
+    TAG: ClassVar[str] = "bernoulli"
+    #: Probability, in [0, 1].
+    probability: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "probability", float(self.probability))
+
+
+Recruitment = Union[Novelty, Bernoulli]
+
+
+@dataclass(frozen=True)
+class NoiseSettings:
+    """Noise of motion that carries none: standard deviations that grow with the square root of the
+    path."""
+
+    #: Of the translation, per square root of metre travelled [m/√m].
+    translation_sd_per_sqrt_m: float
+    #: Of the rotation, per square root of metre travelled [rad/√m].
+    rotation_sd_per_sqrt_m: float
+    #: Of the rotation, per square root of radian turned [rad/√rad].
+    rotation_sd_per_sqrt_rad: float
+
+
+@dataclass(frozen=True)
+class SpaceSettings:
+    """Settings of a space."""
+
+    #: Seed of everything random in the space.
+    seed: int
+    #: Number of grid modules, 1 to 16.
+    grid_modules: int
+    #: Spacing of the finest grid module [m].
+    grid_spacing_m: float
+    #: Ratio of the spacings of neighbouring modules.
+    grid_ratio: float
+    #: Distance at which a place's confidence has fallen to one half [m].
+    field_radius_m: float
+    #: When a place cell is recruited.
+    recruitment: Recruitment
+    #: Noise of motion samples that carry none.
+    odometry_noise: NoiseSettings
+    #: An agent is `localized` up to this standard deviation of position [m].
+    localized_sd_m: float
+    #: An agent is `lost` beyond this standard deviation of position [m].
+    lost_sd_m: float
+    #: Standing still for this long ends a trip [s].
+    trip_stillness_s: float
+    #: No sample for this long, on the sensor's clock, ends a trip [s].
+    trip_gap_s: float
+    #: Closest two poses of a stored trajectory [s].
+    trajectory_interval_s: float

@@ -1,0 +1,282 @@
+"""The HTTP client against a small server in a thread, with the golden answers of the protocol."""
+
+from __future__ import annotations
+
+import json
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any, Callable, Dict, Iterator, List, Tuple, Union
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+
+import cogmap
+from cogmap.sse import data_fields
+from cogmap.wire import JSON, decode, encode
+
+GOLDEN = Path(__file__).resolve().parents[3] / "proto" / "golden"
+Body = Union[bytes, List[bytes], None]
+Answer = Tuple[int, str, Body]
+
+
+def golden(name: str) -> Any:
+    return json.loads((GOLDEN / f"{name}.json").read_text())
+
+
+class Request:
+    """What the server saw."""
+
+    def __init__(self, handler: BaseHTTPRequestHandler, body: bytes) -> None:
+        split = urlsplit(handler.path)
+        self.line = f"{handler.command} {split.path}"
+        self.query = {name: values[0] for name, values in parse_qs(split.query).items()}
+        self.headers = handler.headers
+        self.body = body
+
+
+class Server:
+    """Answers each request by the function of its method and path, and remembers it."""
+
+    def __init__(self) -> None:
+        self.routes: Dict[str, Callable[[Request], Answer]] = {}
+        self.seen: List[Request] = []
+        outer = self
+
+        class Handler(BaseHTTPRequestHandler):
+            def handle_any(self) -> None:
+                body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+                request = Request(self, body)
+                outer.seen.append(request)
+                problem = json.dumps(golden("problem")).encode()
+                route = outer.routes.get(request.line)
+                not_found: Answer = (404, "application/problem+json", problem)
+                status, content_type, answer = not_found if route is None else route(request)
+                self.send_response(status)
+                self.send_header("Content-Type", content_type)
+                chunks = answer if isinstance(answer, list) else [answer or b""]
+                if not isinstance(answer, list):
+                    self.send_header("Content-Length", str(len(chunks[0])))
+                self.end_headers()
+                for chunk in chunks:
+                    self.wfile.write(chunk)
+                    self.wfile.flush()
+
+            do_GET = do_PUT = do_POST = do_DELETE = handle_any
+
+            def log_message(self, format: str, *args: Any) -> None:
+                pass
+
+        self._server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self._server.daemon_threads = True
+        self.url = f"http://127.0.0.1:{self._server.server_address[1]}"
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,), daemon=True)
+        self._thread.start()
+
+    def answer(self, line: str, value: Any, status: int = 200) -> None:
+        """Answers a request line with JSON."""
+        self.routes[line] = lambda _: (status, JSON, json.dumps(value).encode())
+
+    def close(self) -> None:
+        self._server.shutdown()
+        self._server.server_close()
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    server = Server()
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def client(server: Server) -> cogmap.Client:
+    return cogmap.Client(server.url, token="secret", timeout_s=5.0)
+
+
+def test_spaces_are_listed_created_shown_and_deleted(server: Server, client: cogmap.Client) -> None:
+    spaces = golden("space_list")
+    info = spaces["spaces"][0]
+    server.answer("GET /v1/spaces", spaces)
+    server.answer("PUT /v1/spaces/lab", info, 201)
+    server.answer("GET /v1/spaces/lab", info)
+    server.routes["DELETE /v1/spaces/lab"] = lambda _: (204, JSON, None)
+
+    assert [space.name for space in client.spaces()] == ["lab"]
+    created = client.create_space("lab", seed=7, recruitment=cogmap.Bernoulli(0.05))
+    assert created == client.space("lab")
+    assert created.settings.recruitment == cogmap.Novelty()
+    client.delete_space("lab")
+
+    put = server.seen[1]
+    assert json.loads(put.body) == {"seed": 7, "recruitment": {"bernoulli": {"probability": 0.05}}}
+    assert put.headers["Content-Type"] == "application/json"
+    assert {seen.headers["Authorization"] for seen in server.seen} == {"Bearer secret"}
+
+
+def test_a_space_is_created_with_the_settings_of_another(server: Server, client: cogmap.Client) -> None:
+    info = golden("space_list")["spaces"][0]
+    server.answer("GET /v1/spaces/lab", info)
+    server.answer("PUT /v1/spaces/copy", info)
+    client.create_space_from("copy", client.space("lab").settings)
+    assert json.loads(server.seen[1].body) == info["settings"]
+
+
+def test_agents_come_page_by_page(server: Server, client: cogmap.Client) -> None:
+    def page(request: Request) -> Answer:
+        after = request.query.get("after")
+        names = {None: ["a", "b"], "b": ["c"], "c": []}[after]
+        following = {None: "b", "b": "c", "c": None}[after]
+        agents = [{"name": name, "estimate": None} for name in names]
+        return 200, JSON, json.dumps({"agents": agents, "next": following}).encode()
+
+    server.routes["GET /v1/spaces/lab/agents"] = page
+    iterator = client.agents("lab")
+    assert next(iterator).name == "a"
+    assert len(server.seen) == 1, "the second page is asked for when it is needed"
+    assert [agent.name for agent in iterator] == ["b", "c"]
+    assert len(server.seen) == 3
+
+
+def test_an_agent_its_grid_and_its_samples(server: Server, client: cogmap.Client) -> None:
+    server.answer("GET /v1/spaces/lab/agents/ada", golden("agent_detail"))
+    server.answer("GET /v1/spaces/lab/agents/ada/grid", golden("grid_state"))
+    server.answer("POST /v1/spaces/lab/agents/ada/samples", golden("ingest_answer"))
+    assert client.agent("lab", "ada").watermark.durable > 0
+    assert len(client.grid("lab", "ada").modules) > 0
+    batch = cogmap.SampleBatch(1, 0, (cogmap.Sample(5, cogmap.Marker("x")),))
+    answer = client.post_samples("lab", "ada", batch)
+    assert answer == decode(cogmap.IngestAnswer, json.dumps(golden("ingest_answer")).encode(), JSON)
+    assert server.seen[-1].headers["Content-Type"] == "application/cbor"
+    assert server.seen[-1].body == encode(batch)
+
+
+def test_a_trajectory_is_joined_from_its_pages(server: Server, client: cogmap.Client) -> None:
+    def page(request: Request) -> Answer:
+        start = int(request.query["from_ns"])
+        pose = {"stamp_ns": start, "translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1]}
+        answer = dict(golden("trajectory"), poses=[pose])
+        answer["next_from_ns"] = start + 10 if start < 30 else None
+        return 200, JSON, json.dumps(answer).encode()
+
+    server.routes["GET /v1/spaces/lab/agents/ada/trajectory"] = page
+    trajectory = client.trajectory("lab", "ada", from_ns=10, to_ns=99)
+    assert [pose.stamp_ns for pose in trajectory.poses] == [10, 20, 30]
+    assert trajectory.next_from_ns is None
+    assert {seen.query["to_ns"] for seen in server.seen} == {"99"}
+
+
+def test_recall_sends_only_what_was_asked(server: Server, client: cogmap.Client) -> None:
+    server.answer("POST /v1/spaces/lab/recall", golden("recall_answer"))
+    found = client.recall("lab", position_m=[1, 2, 3], code=[[0.1, 0.2, 0.3], None], limit=5)
+    assert found.places[0].confidence is not None
+    assert json.loads(server.seen[0].body) == {
+        "position_m": [1.0, 2.0, 3.0],
+        "code": [[0.1, 0.2, 0.3], None],
+        "limit": 5,
+    }
+
+
+def test_memories_are_iterated_and_shown_one_by_one(server: Server, client: cogmap.Client) -> None:
+    places = dict(golden("place_page"), next=None)
+    server.answer("GET /v1/spaces/lab/places", places)
+    server.answer("GET /v1/spaces/lab/places/3", places["places"][0])
+    trips = dict(golden("trip_page"), next=None)
+    server.answer("GET /v1/spaces/lab/trips", trips)
+    server.answer("GET /v1/spaces/lab/trips/0", golden("trip_detail"))
+    landmarks = dict(golden("landmark_page"), next=None)
+    server.answer("GET /v1/spaces/lab/landmarks", landmarks)
+    server.answer("GET /v1/spaces/lab/landmarks/door%20%2F%20left", landmarks["landmarks"][0])
+
+    assert len(list(client.places("lab", limit=2))) == len(places["places"])
+    assert server.seen[0].query == {"limit": "2"}
+    assert client.place("lab", 3).id == places["places"][0]["id"]
+    assert [trip.ended for trip in client.trips("lab")][:2] == [
+        cogmap.TripEnd.STILLNESS,
+        cogmap.TripEnd.GAP,
+    ]
+    assert client.trip("lab", 0).legs[0].duration_s > 0
+    assert len(list(client.landmarks("lab"))) == len(landmarks["landmarks"])
+    assert client.landmark("lab", "door / left").sightings > 0
+
+
+def test_events_are_read_as_they_come(server: Server, client: cogmap.Client) -> None:
+    first, second = golden("event_place_entered"), golden("event_trip_ended")
+    stream = [
+        b": keep-alive\n\n",
+        b"event: place_entered\r\nid: 1\r\ndata: " + json.dumps(first).encode() + b"\r\n\r\n",
+        b"data: " + json.dumps(second).encode()[:40],
+        json.dumps(second).encode()[40:] + b"\n\n",
+        b"data: cut off",
+    ]
+    server.routes["GET /v1/spaces/lab/events"] = lambda _: (200, "text/event-stream", stream)
+    events = list(client.events("lab", timeout_s=5.0))
+    kinds = [type(event.kind) for event in events]
+    assert kinds == [cogmap.PlaceEntered, cogmap.TripEnded]
+    assert server.seen[0].headers["Accept"] == "text/event-stream"
+
+
+def test_an_event_may_have_several_lines() -> None:
+    lines = [b"data:{\n", b"data: }\n", b"\n", b"retry: 5\n", b"\n", b"data\n", b"\n"]
+    assert list(data_fields(lines)) == ["{\n}", ""]
+
+
+def test_export_is_the_file_as_it_came(server: Server, client: cogmap.Client) -> None:
+    server.routes["GET /v1/spaces/lab/export"] = lambda request: (
+        200,
+        "text/plain",
+        request.query["format"].encode() + b"\x00",
+    )
+    assert client.export("lab", "g2o") == b"g2o\x00"
+
+
+def test_health_and_readiness_are_told_apart(server: Server, client: cogmap.Client) -> None:
+    server.routes["GET /healthz"] = lambda _: (200, "text/plain", b"ok")
+    server.routes["GET /readyz"] = lambda _: (503, "text/plain", b"recovering")
+    assert client.health() is True
+    assert client.ready() is False
+
+
+def test_a_refusal_carries_the_problem(server: Server, client: cogmap.Client) -> None:
+    with pytest.raises(cogmap.ApiError) as raised:
+        client.space("nowhere")
+    problem, error = golden("problem"), raised.value
+    assert (error.status, error.kind) == (404, problem["type"])
+    assert (error.title, error.detail) == (problem["title"], problem["detail"])
+    assert error.extra == {}
+
+
+def test_a_problem_may_say_more(server: Server, client: cogmap.Client) -> None:
+    server.answer("GET /v1/spaces", dict(golden("problem"), session=7, expected_seq=40), 409)
+    with pytest.raises(cogmap.ApiError) as raised:
+        client.spaces()
+    assert raised.value.extra == {"session": 7, "expected_seq": 40}
+
+
+@pytest.mark.parametrize("body", [b"", b"<html>", b"[]", b'"x"', b"null", b"{}", b"\xff"])
+def test_a_refusal_by_something_else_is_still_an_api_error(
+    server: Server, client: cogmap.Client, body: bytes
+) -> None:
+    server.routes["GET /v1/spaces"] = lambda _: (502, "text/html", body)
+    with pytest.raises(cogmap.ApiError) as raised:
+        client.spaces()
+    assert raised.value.status == 502
+
+
+def test_an_answer_that_is_not_one_is_a_wire_error(server: Server, client: cogmap.Client) -> None:
+    server.routes["GET /v1/spaces"] = lambda _: (200, "text/html", b"<html>")
+    with pytest.raises(cogmap.WireError):
+        client.spaces()
+
+
+def test_without_a_token_none_is_sent(server: Server) -> None:
+    server.answer("GET /v1/spaces", {"spaces": []})
+    assert cogmap.Client(server.url + "/").spaces() == []
+    assert "Authorization" not in server.seen[0].headers
+
+
+def test_a_service_out_of_reach_is_an_os_error() -> None:
+    with pytest.raises(OSError):
+        cogmap.Client("http://127.0.0.1:1", timeout_s=1.0).health()
+    with pytest.raises(ValueError):
+        cogmap.Client("ftp://example.org")

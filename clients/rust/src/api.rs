@@ -1,0 +1,378 @@
+//! The service's HTTP interface.
+
+use std::time::Duration;
+
+use cogmap_proto::limits::PAGE_ITEMS_MAX;
+use cogmap_proto::{
+    AgentDetail, AgentPage, AgentSummary, Codec, GridState, IngestAnswer, Landmark, LandmarkPage,
+    Name, NameError, Place, PlacePage, Problem, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo,
+    SpaceList, SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
+};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use ureq::http::{Method, Request, Response, StatusCode};
+use ureq::{Agent, Body};
+
+/// Longest wait for a whole answer; the service itself gives up earlier.
+const TIMEOUT: Duration = Duration::from_secs(30);
+/// Longest answer \[bytes\]: a full page of the longest items, many times over.
+const ANSWER_BYTES_MAX: u64 = 64 << 20;
+/// Longest text kept of an answer that is no problem document \[bytes\].
+const EXCERPT_BYTES_MAX: usize = 400;
+
+/// Why a request got no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum ApiError {
+    /// A name of a space or agent cannot stand in a URL.
+    #[error("{0}")]
+    Name(#[from] NameError),
+    /// The service said what is wrong.
+    #[error("{}: {} ({})", .0.title, .0.detail, .0.status)]
+    Problem(Problem),
+    /// Something that is not the service answered: no problem document.
+    #[error("status {status}: {body}")]
+    Status {
+        /// HTTP status.
+        status: u16,
+        /// Start of the answer.
+        body: String,
+    },
+    /// The request did not get through.
+    #[error("{0}")]
+    Transport(#[source] Box<ureq::Error>),
+    /// The answer is not what this version expects.
+    #[error("answer of {path}: {source}")]
+    Answer {
+        /// What was asked.
+        path: String,
+        /// What is wrong with the answer.
+        source: serde_json::Error,
+    },
+}
+
+impl From<ureq::Error> for ApiError {
+    fn from(error: ureq::Error) -> Self {
+        Self::Transport(Box::new(error))
+    }
+}
+
+/// Asks a service over HTTP. Cheap to clone; connections are pooled.
+#[derive(Clone, Debug)]
+pub struct Api {
+    base: String,
+    token: Option<String>,
+    agent: Agent,
+}
+
+impl Api {
+    /// A client of the service at `base`, for example `http://127.0.0.1:8080`; `token` is sent as
+    /// the bearer token. Nothing is sent yet. A web proxy in the environment is not used, because
+    /// it would not know the robots' network.
+    pub fn new(base: &str, token: Option<&str>) -> Self {
+        let config = Agent::config_builder()
+            .http_status_as_error(false)
+            .timeout_global(Some(TIMEOUT))
+            .proxy(None)
+            .build();
+        Self {
+            base: base.trim_end_matches('/').to_owned(),
+            token: token.map(str::to_owned),
+            agent: config.new_agent(),
+        }
+    }
+
+    /// Whether the service is ready to take samples. A service that cannot be reached is an error.
+    ///
+    /// # Errors
+    /// The service cannot be reached or answers neither yes (200) nor no (503).
+    pub fn ready(&self) -> Result<bool, ApiError> {
+        let response = self.run(Method::GET, "/readyz", None)?;
+        match response.status() {
+            StatusCode::SERVICE_UNAVAILABLE => Ok(false),
+            status if status.is_success() => Ok(true),
+            _ => Err(refusal(response)),
+        }
+    }
+
+    /// All spaces.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn spaces(&self) -> Result<Vec<SpaceInfo>, ApiError> {
+        Ok(self.get::<SpaceList>("/v1/spaces")?.spaces)
+    }
+
+    /// Creates a space.
+    ///
+    /// # Errors
+    /// See [`ApiError`]; it is a problem if the space exists with other settings.
+    pub fn create_space(
+        &self,
+        space: &str,
+        settings: &SpaceSettings,
+    ) -> Result<SpaceInfo, ApiError> {
+        self.send(Method::PUT, &path(space, "")?, &json(settings))
+    }
+
+    /// A space.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn space(&self, space: &str) -> Result<SpaceInfo, ApiError> {
+        self.get(&path(space, "")?)
+    }
+
+    /// Deletes a space and everything in it.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn delete_space(&self, space: &str) -> Result<(), ApiError> {
+        let response = self.run(Method::DELETE, &path(space, "")?, None)?;
+        if response.status().is_success() {
+            Ok(())
+        } else {
+            Err(refusal(response))
+        }
+    }
+
+    /// All agents of a space, by name.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn agents(&self, space: &str) -> Result<Vec<AgentSummary>, ApiError> {
+        self.pages(&path(space, "/agents")?, |page: AgentPage| {
+            (page.agents, page.next)
+        })
+    }
+
+    /// An agent.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn agent(&self, space: &str, agent: &str) -> Result<AgentDetail, ApiError> {
+        self.get(&agent_path(space, agent, "")?)
+    }
+
+    /// The grid-cell state of an agent.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn grid(&self, space: &str, agent: &str) -> Result<GridState, ApiError> {
+        self.get(&agent_path(space, agent, "/grid")?)
+    }
+
+    /// The whole causal trajectory of an agent, all pages of it.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn trajectory(&self, space: &str, agent: &str) -> Result<Trajectory, ApiError> {
+        let path = agent_path(space, agent, "/trajectory")?;
+        let mut whole: Trajectory = self.get(&format!("{path}?limit={PAGE_ITEMS_MAX}"))?;
+        let mut from_ns = whole.next_from_ns.take();
+        while let Some(from) = from_ns {
+            let page: Trajectory =
+                self.get(&format!("{path}?limit={PAGE_ITEMS_MAX}&from_ns={from}"))?;
+            // A page that does not lead on would be asked for without end.
+            from_ns = page.next_from_ns.filter(|next| *next > from);
+            whole.poses.extend(page.poses);
+        }
+        Ok(whole)
+    }
+
+    /// Sends samples without Zenoh; returns when they are durable.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn post_samples(
+        &self,
+        space: &str,
+        agent: &str,
+        batch: &SampleBatch,
+    ) -> Result<IngestAnswer, ApiError> {
+        let content = Content {
+            kind: Codec::Postcard.encoding(),
+            bytes: Codec::Postcard.encode(batch),
+        };
+        self.send(
+            Method::POST,
+            &agent_path(space, agent, "/samples")?,
+            &content,
+        )
+    }
+
+    /// Places that answer a cue, best first.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn recall(&self, space: &str, query: &RecallQuery) -> Result<RecallAnswer, ApiError> {
+        self.send(Method::POST, &path(space, "/recall")?, &json(query))
+    }
+
+    /// All places of a space, by id.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn places(&self, space: &str) -> Result<Vec<Place>, ApiError> {
+        self.pages(&path(space, "/places")?, |page: PlacePage| {
+            (page.places, page.next.map(|next| next.to_string()))
+        })
+    }
+
+    /// All trips of a space, by id.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn trips(&self, space: &str) -> Result<Vec<Trip>, ApiError> {
+        self.pages(&path(space, "/trips")?, |page: TripPage| {
+            (page.trips, page.next.map(|next| next.to_string()))
+        })
+    }
+
+    /// A trip with its legs.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn trip(&self, space: &str, trip: u64) -> Result<TripDetail, ApiError> {
+        self.get(&path(space, &format!("/trips/{trip}"))?)
+    }
+
+    /// All landmarks of a space, by label.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn landmarks(&self, space: &str) -> Result<Vec<Landmark>, ApiError> {
+        self.pages(&path(space, "/landmarks")?, |page: LandmarkPage| {
+            (page.landmarks, page.next)
+        })
+    }
+
+    fn pages<P: DeserializeOwned, I>(
+        &self,
+        path: &str,
+        open: impl Fn(P) -> (Vec<I>, Option<String>),
+    ) -> Result<Vec<I>, ApiError> {
+        let first = format!("{path}?limit={PAGE_ITEMS_MAX}");
+        let (mut items, mut after) = open(self.get(&first)?);
+        while let Some(last) = after {
+            let (more, next) = open(self.get(&format!("{first}&after={}", escaped(&last)))?);
+            // A page that does not lead on would be asked for without end.
+            after = next.filter(|next| *next != last && !more.is_empty());
+            items.extend(more);
+        }
+        Ok(items)
+    }
+
+    fn get<T: DeserializeOwned>(&self, path: &str) -> Result<T, ApiError> {
+        answer(path, self.run(Method::GET, path, None)?)
+    }
+
+    fn send<T: DeserializeOwned>(
+        &self,
+        method: Method,
+        path: &str,
+        content: &Content,
+    ) -> Result<T, ApiError> {
+        answer(path, self.run(method, path, Some(content))?)
+    }
+
+    fn run(
+        &self,
+        method: Method,
+        path: &str,
+        content: Option<&Content>,
+    ) -> Result<Response<Body>, ApiError> {
+        let mut request = Request::builder()
+            .method(method)
+            .uri(format!("{}{path}", self.base))
+            .header("accept", "application/json");
+        if let Some(token) = &self.token {
+            request = request.header("authorization", format!("Bearer {token}"));
+        }
+        let response = match content {
+            Some(content) => {
+                let request = request
+                    .header("content-type", content.kind)
+                    .body(content.bytes.as_slice())
+                    .map_err(ureq::Error::from)?;
+                self.agent.run(request)?
+            }
+            None => self
+                .agent
+                .run(request.body(()).map_err(ureq::Error::from)?)?,
+        };
+        Ok(response)
+    }
+}
+
+/// Body of a request.
+struct Content {
+    kind: &'static str,
+    bytes: Vec<u8>,
+}
+
+fn json<T: Serialize>(body: &T) -> Content {
+    Content {
+        kind: Codec::Json.encoding(),
+        bytes: Codec::Json.encode(body),
+    }
+}
+
+fn path(space: &str, rest: &str) -> Result<String, ApiError> {
+    Name::check(space)?;
+    Ok(format!("/v1/spaces/{space}{rest}"))
+}
+
+fn agent_path(space: &str, agent: &str, rest: &str) -> Result<String, ApiError> {
+    Name::check(agent)?;
+    path(space, &format!("/agents/{agent}{rest}"))
+}
+
+/// A landmark's label may have any characters; in a URL all but the unreserved ones are escaped
+/// (RFC 3986, section 2.3).
+fn escaped(text: &str) -> String {
+    use std::fmt::Write as _;
+    text.bytes().fold(String::new(), |mut url, byte| {
+        if byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'.' | b'_' | b'~') {
+            url.push(char::from(byte));
+        } else {
+            write!(url, "%{byte:02X}").expect("writing to a String does not fail");
+        }
+        url
+    })
+}
+
+fn bytes(response: Response<Body>) -> Result<Vec<u8>, ApiError> {
+    Ok(response
+        .into_body()
+        .into_with_config()
+        .limit(ANSWER_BYTES_MAX)
+        .read_to_vec()?)
+}
+
+fn answer<T: DeserializeOwned>(path: &str, response: Response<Body>) -> Result<T, ApiError> {
+    if !response.status().is_success() {
+        return Err(refusal(response));
+    }
+    serde_json::from_slice(&bytes(response)?).map_err(|source| ApiError::Answer {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn refusal(response: Response<Body>) -> ApiError {
+    let status = response.status().as_u16();
+    let body = match bytes(response) {
+        Ok(body) => body,
+        Err(error) => return error,
+    };
+    serde_json::from_slice(&body).map_or_else(
+        |_| ApiError::Status {
+            status,
+            body: String::from_utf8_lossy(&body[..body.len().min(EXCERPT_BYTES_MAX)]).into_owned(),
+        },
+        ApiError::Problem,
+    )
+}
+
+#[cfg(test)]
+mod tests;

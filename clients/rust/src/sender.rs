@@ -1,0 +1,142 @@
+//! The one thread of a robot: it alone puts samples on Zenoh, so that they leave in order.
+
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use cogmap_proto::{Codec, Verb, WatermarkQuery, query_key};
+use zenoh::pubsub::Publisher;
+use zenoh::{Session, Wait};
+
+use crate::batch;
+use crate::error::ClientError;
+use crate::state::Shared;
+
+/// How often a service is looked for before the first batch.
+const MATCH_PAUSE: Duration = Duration::from_millis(10);
+/// How long a query for the watermark may take.
+const QUERY_TIMEOUT: Duration = Duration::from_secs(2);
+/// Longest sleep of the thread when nothing is due.
+const IDLE: Duration = Duration::from_secs(60);
+
+/// What the thread works with.
+pub(crate) struct Sender {
+    pub(crate) shared: Arc<Shared>,
+    pub(crate) zenoh: Session,
+    pub(crate) publisher: Publisher<'static>,
+    pub(crate) space: String,
+    pub(crate) agent: String,
+    pub(crate) session: u64,
+    pub(crate) codec: Codec,
+    pub(crate) match_timeout: Duration,
+}
+
+/// What to do next, decided under the lock and done without it.
+enum Step {
+    Put(Vec<u8>),
+    Ask,
+    End,
+}
+
+impl Sender {
+    pub(crate) fn start(self) -> Result<JoinHandle<()>, ClientError> {
+        thread::Builder::new()
+            .name("cogmap-sender".to_owned())
+            .spawn(move || self.run())
+            .map_err(ClientError::Thread)
+    }
+
+    fn run(self) {
+        self.await_service();
+        loop {
+            match self.next_step() {
+                Step::Put(bytes) => self.put(bytes),
+                Step::Ask => self.ask(),
+                Step::End => break,
+            }
+        }
+        let shared = Arc::clone(&self.shared);
+        // Undeclares the publisher, and closes the session where nobody shares it.
+        drop(self);
+        shared.lock().sender_ended = true;
+        shared.caller_bell.notify_all();
+    }
+
+    /// Waits for a subscriber, because Zenoh drops what is put before one matches. A bounded wait:
+    /// what is dropped is still held, and sent again.
+    fn await_service(&self) {
+        let deadline = Instant::now() + self.match_timeout;
+        while Instant::now() < deadline {
+            match self.publisher.matching_status().wait() {
+                Ok(status) if !status.matching() => {}
+                _ => return,
+            }
+            let state = self.shared.lock();
+            if state.stop {
+                return;
+            }
+            drop(Shared::wait(&self.shared.sender_bell, state, MATCH_PAUSE));
+        }
+    }
+
+    fn next_step(&self) -> Step {
+        let mut state = self.shared.lock();
+        loop {
+            if state.stop {
+                return Step::End;
+            }
+            let now = self.shared.now();
+            let over = state.superseded_by.is_some();
+            if !over {
+                if state.window.poll(now) {
+                    state.counters.queries += 1;
+                    return Step::Ask;
+                }
+                if let Some(run) = state.window.take(now) {
+                    let samples = state.window.samples(run);
+                    let bytes = batch::encode(self.session, run.first_seq, samples, self.codec);
+                    state.counters.batches += 1;
+                    if run.repeated {
+                        state.counters.samples_resent += run.len as u64;
+                    } else {
+                        state.counters.samples_sent += run.len as u64;
+                    }
+                    return Step::Put(bytes);
+                }
+            }
+            let due = state.window.wake_at().filter(|_| !over);
+            let pause = due.map_or(IDLE, |at| at.saturating_sub(now).min(IDLE));
+            state.sender_waits = true;
+            state = Shared::wait(&self.shared.sender_bell, state, pause);
+            state.sender_waits = false;
+        }
+    }
+
+    fn put(&self, bytes: Vec<u8>) {
+        if self.publisher.put(bytes).wait().is_err() {
+            self.shared.lock().counters.puts_failed += 1;
+        }
+    }
+
+    /// Asks for the watermark; the answer comes to a callback. A failure needs no handling: the
+    /// window sends everything again when the answer stays away.
+    fn ask(&self) {
+        let query = WatermarkQuery {
+            agent: self.agent.clone(),
+        };
+        let shared = Arc::clone(&self.shared);
+        let asked = self
+            .zenoh
+            .get(query_key(&self.space, Verb::Watermark.as_str()))
+            .payload(self.codec.encode(&query))
+            .encoding(self.codec.encoding())
+            .timeout(QUERY_TIMEOUT)
+            .callback(move |reply| {
+                if let Ok(sample) = reply.result() {
+                    shared.hear_watermark(sample);
+                }
+            })
+            .wait();
+        drop(asked);
+    }
+}

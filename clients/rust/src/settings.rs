@@ -1,0 +1,143 @@
+//! Settings of a robot's connection, and the builder that takes them.
+
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use cogmap_proto::limits::BATCH_SAMPLES_MAX;
+use cogmap_proto::{Codec, Name};
+use zenoh::Session;
+
+use crate::error::ClientError;
+use crate::link;
+use crate::robot::Robot;
+
+/// How a robot numbers, batches and holds its samples. The defaults suit one robot of up to a few
+/// kilohertz.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RobotSettings {
+    /// The run of the agent; the Unix time at connecting \[ns\] when absent. A larger number takes
+    /// the agent's name over from a smaller one.
+    pub session: Option<u64>,
+    /// A batch leaves when it has this many samples, 1 to [`BATCH_SAMPLES_MAX`] …
+    pub batch_samples: usize,
+    /// … or when its first sample has waited this long.
+    pub batch_delay: Duration,
+    /// Most samples held for the service's acknowledgement: at 1 kHz, the default is a minute.
+    pub window_samples: usize,
+    /// Most bytes held, counted as an upper bound of their length on the wire.
+    pub window_bytes: usize,
+    /// How long `send` waits for room in a full window.
+    pub send_timeout: Duration,
+    /// How long connecting waits for a router that is not up yet.
+    pub connect_timeout: Duration,
+    /// How long the first batch waits for a service to subscribe. After that it is sent whether or
+    /// not anyone listens; it is held, and sent again, in any case.
+    pub match_timeout: Duration,
+    /// Codec of samples and queries.
+    pub codec: Codec,
+}
+
+impl Default for RobotSettings {
+    fn default() -> Self {
+        Self {
+            session: None,
+            batch_samples: 64,
+            batch_delay: Duration::from_millis(20),
+            window_samples: 65_536,
+            window_bytes: 64 << 20,
+            send_timeout: Duration::from_secs(10),
+            connect_timeout: Duration::from_secs(10),
+            match_timeout: Duration::from_secs(3),
+            codec: Codec::Postcard,
+        }
+    }
+}
+
+impl RobotSettings {
+    pub(crate) fn check(&self) -> Result<(), ClientError> {
+        if !(1..=BATCH_SAMPLES_MAX).contains(&self.batch_samples) {
+            return Err(ClientError::Settings("batch_samples is 1 to 4096"));
+        }
+        if self.window_samples == 0 || self.window_bytes == 0 {
+            return Err(ClientError::Settings(
+                "the window holds at least one sample",
+            ));
+        }
+        Ok(())
+    }
+
+    pub(crate) fn session_or_now(&self) -> u64 {
+        self.session.unwrap_or_else(|| {
+            SystemTime::now()
+                .duration_since(UNIX_EPOCH)
+                .ok()
+                .and_then(|since| u64::try_from(since.as_nanos()).ok())
+                .unwrap_or_default()
+        })
+    }
+}
+
+/// Builds a [`Robot`].
+#[derive(Debug)]
+#[must_use]
+pub struct RobotBuilder {
+    space: String,
+    agent: String,
+    endpoints: Vec<String>,
+    shared: Option<Session>,
+    settings: RobotSettings,
+}
+
+impl RobotBuilder {
+    pub(crate) fn new(space: &str, agent: &str) -> Self {
+        Self {
+            space: space.to_owned(),
+            agent: agent.to_owned(),
+            endpoints: Vec::new(),
+            shared: None,
+            settings: RobotSettings::default(),
+        }
+    }
+
+    /// Adds a Zenoh endpoint, for example `tcp/127.0.0.1:7447`. Of several, the first that answers
+    /// is used.
+    pub fn endpoint(mut self, endpoint: &str) -> Self {
+        self.endpoints.push(endpoint.to_owned());
+        self
+    }
+
+    /// Uses a Zenoh session that is open already, and leaves it open; endpoints are then ignored.
+    /// Many robots of one process share a session this way, and authentication or TLS are
+    /// configured on it.
+    pub fn zenoh_session(mut self, session: Session) -> Self {
+        self.shared = Some(session);
+        self
+    }
+
+    /// Sets the number of this run of the agent; see [`RobotSettings::session`].
+    pub fn session(mut self, session: u64) -> Self {
+        self.settings.session = Some(session);
+        self
+    }
+
+    /// Sets all settings.
+    pub fn settings(mut self, settings: RobotSettings) -> Self {
+        self.settings = settings;
+        self
+    }
+
+    /// Connects, subscribes to the agent's watermarks and estimates, and starts the thread that
+    /// sends.
+    ///
+    /// # Errors
+    /// A name or setting is not valid, no router answers in time, or Zenoh refuses a declaration.
+    pub fn connect(self) -> Result<Robot, ClientError> {
+        Name::check(&self.space).map_err(ClientError::Space)?;
+        Name::check(&self.agent).map_err(ClientError::Agent)?;
+        self.settings.check()?;
+        let session = match self.shared {
+            Some(session) => session,
+            None => link::open_session(&self.endpoints, self.settings.connect_timeout)?,
+        };
+        Robot::start(session, self.space, self.agent, &self.settings)
+    }
+}
