@@ -1,0 +1,40 @@
+//! Grid-cell state of an agent.
+
+use cogmap_proto as wire;
+use cognitive_map::grid::heading::heading_rad;
+use cognitive_map::grid::population::{activation, interference_pattern};
+use cognitive_map::{Agent, CognitiveMap};
+use nalgebra::Point3;
+
+/// The grid state of an agent; nothing before its first sample.
+pub fn grid_state(map: &CognitiveMap, agent: &Agent) -> Option<wire::GridState> {
+    let stamp_ns = agent.stamp_ns()?;
+    let modules = map.modules();
+    let states = modules.lattices().iter().zip(agent.grid().modules());
+    let believed = Point3::from(agent.pose().translation.vector);
+    let interference = interference_pattern(modules, &agent.grid().code(), &believed);
+    // Some cell is always near the phase; the fallback says the same as no correction.
+    let interference = interference.normalised().unwrap_or(believed);
+    Some(wire::GridState {
+        agent: agent.name().as_str().to_owned(),
+        stamp_ns,
+        modules: states
+            .map(|(lattice, state)| wire::GridModuleState {
+                spacing_m: lattice.spacing_m(),
+                reference: state.reference,
+                reference_m: lattice
+                    .position(state.reference, &cognitive_map::grid::Phase::zero())
+                    .coords
+                    .into(),
+                phase: (*state.phase.turns()).into(),
+                activation: activation(lattice, &state.phase).to_vec(),
+            })
+            .collect(),
+        decoded_m: agent.grid().decode(modules).coords.into(),
+        interference_m: interference.coords.into(),
+        octant: agent.octant(),
+        displacement_m: agent.displacement_m(),
+        turning_rad: agent.turning_rad(),
+        heading_rad: heading_rad(&agent.pose().rotation),
+    })
+}

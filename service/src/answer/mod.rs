@@ -1,0 +1,21 @@
+//! From the map to the messages that answer questions about it, and from questions to cues.
+
+mod grid;
+mod landmark;
+mod place;
+mod recall;
+mod space;
+mod trip;
+
+pub use grid::grid_state;
+pub use landmark::landmark;
+pub use place::place;
+pub use recall::{InvalidQuery, cue, recall};
+pub use space::space_info;
+pub use trip::{leg, trip, trip_detail};
+
+/// Frame of all positions in answers.
+pub const FRAME: &str = "map";
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,136 @@
+//! Recall: from the query to the cue, and from the places found to the answer.
+
+use cogmap_proto as wire;
+use cogmap_proto::limits::{METRES_MAX, PAGE_ITEMS_MAX};
+use cogmap_proto::{Name, NameError, RecallQuery};
+use cognitive_map::grid::{InvalidCode, PartialCode, Phase};
+use cognitive_map::{AgentId, CognitiveMap, RecallCue};
+use nalgebra::{Point3, Vector3};
+
+use super::{FRAME, place};
+
+/// Places of an answer when the query names no limit.
+const LIMIT_DEFAULT: u32 = 10;
+
+/// Why a query cannot be answered.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidQuery {
+    /// A coordinate of `position_m` is not a number or is too large.
+    #[error("position_m must hold finite numbers of at most {METRES_MAX} m")]
+    Position,
+    /// `radius_m` is negative, not a number or too large.
+    #[error("radius_m must be 0 to {METRES_MAX} m")]
+    Radius,
+    /// There is a radius but no centre.
+    #[error("radius_m needs position_m, its centre")]
+    RadiusWithoutPosition,
+    /// A phase is outside \[0, 1).
+    #[error("phases in code must be at least 0 and less than 1")]
+    Phase,
+    /// The code is not one of this space.
+    #[error("code: {0}")]
+    Code(#[from] InvalidCode),
+    /// The agent's name is none.
+    #[error("agent: {0}")]
+    Agent(#[from] NameError),
+    /// The limit is out of range.
+    #[error("limit must be 1 to {PAGE_ITEMS_MAX}")]
+    Limit,
+}
+
+/// The cue of a query; nothing if the query can have no answer, because nobody has the name of the
+/// agent that it asks for.
+///
+/// # Errors
+/// Says which rule the query breaks.
+pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<Option<RecallCue>, InvalidQuery> {
+    let position = query.position_m.map(position).transpose()?;
+    if let Some(radius_m) = query.radius_m {
+        // A comparison with NaN is false.
+        if !(0.0..=METRES_MAX).contains(&radius_m) {
+            return Err(InvalidQuery::Radius);
+        }
+        if position.is_none() {
+            return Err(InvalidQuery::RadiusWithoutPosition);
+        }
+    }
+    let code = query
+        .code
+        .as_deref()
+        .map(|phases| code(map, phases))
+        .transpose()?;
+    let limit = query.limit.unwrap_or(LIMIT_DEFAULT) as usize;
+    if !(1..=PAGE_ITEMS_MAX).contains(&limit) {
+        return Err(InvalidQuery::Limit);
+    }
+    let mut founder = None;
+    if let Some(name) = &query.agent {
+        Name::check(name)?;
+        founder = agent_by_name(map, name);
+        if founder.is_none() {
+            return Ok(None);
+        }
+    }
+    Ok(Some(RecallCue {
+        position,
+        code,
+        radius_m: query.radius_m,
+        founder,
+        since_ns: query.since_ns,
+        until_ns: query.until_ns,
+        limit,
+    }))
+}
+
+/// The places of a space that answer a query.
+///
+/// # Errors
+/// Says which rule the query breaks.
+pub fn recall(
+    space: &str,
+    map: &CognitiveMap,
+    query: &RecallQuery,
+) -> Result<wire::RecallAnswer, InvalidQuery> {
+    let recalled = cue(map, query)?
+        .map(|cue| map.recall(&cue))
+        .unwrap_or_default();
+    let places = recalled.into_iter().filter_map(|recalled| {
+        Some(wire::RecalledPlace {
+            place: place(map, recalled.place, map.place(recalled.place)?),
+            cosine: recalled.cosine,
+            confidence: recalled.confidence,
+            distance_m: recalled.distance_m,
+        })
+    });
+    Ok(wire::RecallAnswer {
+        space: space.to_owned(),
+        frame: FRAME.to_owned(),
+        map_revision: map.revision(),
+        places: places.collect(),
+    })
+}
+
+fn position(metres: [f64; 3]) -> Result<Point3<f64>, InvalidQuery> {
+    let legal = metres.iter().all(|metre| metre.abs() <= METRES_MAX);
+    legal
+        .then(|| Point3::from(metres))
+        .ok_or(InvalidQuery::Position)
+}
+
+fn code(map: &CognitiveMap, phases: &[Option<[f64; 3]>]) -> Result<PartialCode, InvalidQuery> {
+    let legal = |turns: &[f64; 3]| turns.iter().all(|turn| (0.0..1.0).contains(turn));
+    if !phases.iter().flatten().all(legal) {
+        return Err(InvalidQuery::Phase);
+    }
+    let phase = |turns: &[f64; 3]| Phase::wrap(Vector3::from(*turns));
+    let phases = phases.iter().map(|turns| turns.as_ref().map(phase));
+    Ok(PartialCode::new(map.modules(), phases.collect())?)
+}
+
+/// An agent by its name. Spaces have at most some thousand agents, so a scan will do.
+fn agent_by_name(map: &CognitiveMap, name: &str) -> Option<AgentId> {
+    let mut agents = map.agents();
+    agents
+        .find(|(_, agent)| agent.name().as_str() == name)
+        .map(|(id, _)| id)
+}

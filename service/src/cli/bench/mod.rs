@@ -1,0 +1,34 @@
+//! `cogmap bench`: speed, each figure beside its yardstick from the same run.
+
+mod http;
+mod ingest;
+mod load;
+mod quantile;
+mod step;
+
+pub(super) use self::quantile::quantile;
+pub(super) use ingest::free_port;
+
+use clap::Subcommand;
+
+#[derive(Debug, Subcommand)]
+pub(in crate::cli) enum BenchCommand {
+    /// A motion step through the map, at different numbers of places.
+    Step(step::StepArgs),
+    /// Samples that become durable, beside the raw rate of the same messages.
+    Ingest(ingest::IngestArgs),
+    /// Answers to "where is this agent" while samples come in, beside a bare handler.
+    Http(http::HttpArgs),
+    /// Publishes samples for the other benchmarks, from a process of its own.
+    #[command(hide = true)]
+    Load(load::LoadArgs),
+}
+
+pub(super) fn run(command: &BenchCommand) -> anyhow::Result<()> {
+    match command {
+        BenchCommand::Step(args) => step::run(args),
+        BenchCommand::Ingest(args) => ingest::run(args),
+        BenchCommand::Http(args) => http::run(args),
+        BenchCommand::Load(args) => load::run(args),
+    }
+}

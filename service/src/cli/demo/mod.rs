@@ -1,0 +1,138 @@
+//! `cogmap demo`: the service, with a simulated team that uses it as real robots would.
+
+mod progress;
+mod summary;
+mod team;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::Context;
+use clap::Args;
+use cogmap_client::Api;
+use cogmap_proto::Name;
+
+use self::progress::Progress;
+use self::summary::Summary;
+use self::team::DemoTeam;
+use super::bench::free_port;
+use super::{output, serve};
+use crate::config::Config;
+use crate::metrics;
+use crate::service::Service;
+
+/// The demo's space.
+const SPACE: &str = "demo";
+/// Ports that the demo takes if nobody else has them, as they are easiest to remember.
+const HTTP_PORT: u16 = 8080;
+const ZENOH_PORT: u16 = 7447;
+
+#[derive(Debug, Args)]
+pub(super) struct DemoArgs {
+    /// How long the robots drive \[s\].
+    #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
+    duration: f64,
+    /// Number of robots.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
+    robots: u32,
+    /// Seed of the world, the walks and the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Directory of the store, kept afterwards; a temporary one, removed, when absent.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+    /// Print one JSON object at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
+    anyhow::ensure!(
+        args.duration > 0.0 && args.duration < 1e6,
+        "--duration is a positive number of seconds"
+    );
+    let temporary = args.data_dir.is_none();
+    let directory = args.data_dir.clone().unwrap_or_else(|| {
+        std::env::temp_dir().join(format!("cogmap-demo-{}", std::process::id()))
+    });
+    let mut config = Config::default();
+    config.store.directory.clone_from(&directory);
+    config.http.listen = ([127, 0, 0, 1], port(HTTP_PORT)?).into();
+    let endpoint = format!("tcp/127.0.0.1:{}", port(ZENOH_PORT)?);
+    config.zenoh.listen = vec![endpoint.clone()];
+    let name: Name = SPACE.parse().context("the demo's space")?;
+    config.spaces = [(name, cogmap_proto::SpaceSettings::default())].into();
+    "warn".clone_into(&mut config.log.filter);
+    output::start_log(&config.log);
+
+    let prometheus = metrics::install()?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()?;
+    let result = runtime.block_on(async {
+        let service = Service::start(&config, prometheus.clone()).await?;
+        let url = format!("http://{}", service.address());
+        let robots = args.robots;
+        output::progress(&format!(
+            "{robots} robots in the obstacle world, over {endpoint}"
+        ));
+        output::progress(&format!("start page   {url}/"));
+        output::progress(&format!("HTTP API     {url}/docs"));
+        output::progress(&format!(
+            "try          curl {url}/v1/spaces/{SPACE}/agents/robot1"
+        ));
+        let stop = Stop::default();
+        let interrupted = stop.clone();
+        tokio::spawn(async move {
+            // Without signals the demo simply ends when its time is over.
+            if serve::interrupted().await.is_ok() {
+                interrupted.store(true, std::sync::atomic::Ordering::Relaxed);
+            }
+        });
+        let (robots, seed, counted) = (args.robots, args.seed, prometheus.clone());
+        let duration = Duration::from_secs_f64(args.duration);
+        let summary = tokio::task::spawn_blocking(move || -> anyhow::Result<Summary> {
+            let api = Api::new(&url, None);
+            wait_until_ready(&api)?;
+            let mut team = DemoTeam::connect(&endpoint, SPACE, robots, seed)?;
+            let progress = Progress::new(robots, duration);
+            team.drive(duration, &stop, &api, &progress)?;
+            progress.finish();
+            team.finish(&api, || metrics::total(&counted, metrics::DUPLICATE_SAMPLES))
+        })
+        .await?;
+        service.stop().await;
+        summary
+    });
+    if temporary {
+        // Left-overs in the temporary directory are no failure of the demo.
+        let _ = std::fs::remove_dir_all(&directory);
+    }
+    let summary = result?;
+    if args.json {
+        output::json(&summary)
+    } else {
+        summary.print()
+    }
+}
+
+type Stop = std::sync::Arc<std::sync::atomic::AtomicBool>;
+
+/// The port if it is free, another free one otherwise.
+fn port(wanted: u16) -> std::io::Result<u16> {
+    match std::net::TcpListener::bind(("127.0.0.1", wanted)) {
+        Ok(_) => Ok(wanted),
+        Err(_) => free_port(),
+    }
+}
+
+fn wait_until_ready(api: &Api) -> anyhow::Result<()> {
+    // A store that was kept from an earlier demo takes a moment to load.
+    for _ in 0..600 {
+        if api.ready()? {
+            return Ok(());
+        }
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    anyhow::bail!("the service is not ready after a minute")
+}

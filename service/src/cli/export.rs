@@ -1,0 +1,132 @@
+//! `cogmap export`: what a store holds, read while no service runs on it.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::{Args, Subcommand};
+
+use super::output;
+use crate::engine::{Recorder, core_settings, entries, records_of, trajectory_interval_ns};
+use crate::store::{FjallStore, SpaceNumber, Store};
+use cogmap_experiments::metrics::StampedPose;
+use cogmap_experiments::tum::write_tum;
+use cogmap_proto::SpaceSettings;
+use cognitive_map::{CognitiveMap, Record};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+
+#[derive(Debug, Subcommand)]
+pub(super) enum ExportCommand {
+    /// The journal of a space, one JSON object for each entry.
+    Journal(Source),
+    /// The causal trajectory of an agent's latest session, as TUM lines `t x y z qx qy qz qw`.
+    Trajectory {
+        #[command(flatten)]
+        source: Source,
+        /// Agent.
+        #[arg(long)]
+        agent: String,
+    },
+}
+
+/// A space of a store.
+#[derive(Debug, Args)]
+pub(super) struct Source {
+    /// Directory of the store.
+    #[arg(long, value_name = "DIR", default_value = "cogmap-data")]
+    data_dir: PathBuf,
+    /// Space.
+    #[arg(long, default_value = "default")]
+    space: String,
+}
+
+pub(super) fn run(command: &ExportCommand) -> anyhow::Result<()> {
+    match command {
+        ExportCommand::Journal(source) => journal(source),
+        ExportCommand::Trajectory { source, agent } => trajectory(source, agent),
+    }
+}
+
+fn open(source: &Source) -> anyhow::Result<(FjallStore, SpaceNumber, SpaceSettings)> {
+    let directory = &source.data_dir;
+    anyhow::ensure!(
+        directory.is_dir(),
+        "there is no store at {}",
+        directory.display()
+    );
+    let store = FjallStore::open(directory)
+        .with_context(|| format!("open the store {}", directory.display()))?;
+    let space = store
+        .spaces()?
+        .into_iter()
+        .find(|space| space.name == source.space)
+        .with_context(|| format!("the store has no space {:?}", source.space))?;
+    let settings = serde_json::from_slice(&space.settings).context("read the space's settings")?;
+    Ok((store, space.number, settings))
+}
+
+fn journal(source: &Source) -> anyhow::Result<()> {
+    let (store, space, _) = open(source)?;
+    for block in store.journal(space, 0) {
+        let (number, bytes) = block?;
+        for entry in entries(&bytes).with_context(|| format!("read block {number}"))? {
+            output::json(&entry)?;
+        }
+    }
+    Ok(())
+}
+
+/// The journal is the ground state, so the trajectory is folded from it anew.
+fn trajectory(source: &Source, agent: &str) -> anyhow::Result<()> {
+    let (store, space, settings) = open(source)?;
+    let mut map = CognitiveMap::new(core_settings(&settings)?);
+    let interval_ns = trajectory_interval_ns(&settings);
+    let (mut recorder, mut rows, mut events) = (Recorder::default(), Vec::new(), Vec::new());
+    let mut known = None;
+    for block in store.journal(space, 0) {
+        let (number, bytes) = block?;
+        for entry in entries(&bytes).with_context(|| format!("read block {number}"))? {
+            records_of(&entry, |record| {
+                map.apply(&record, &mut events);
+                events.clear();
+                if let Record::Enrol { agent: id, name } = &record
+                    && name.as_str() == agent
+                {
+                    known = Some(*id);
+                }
+                let Record::Sample {
+                    agent: id, session, ..
+                } = &record
+                else {
+                    return;
+                };
+                if known != Some(*id) {
+                    return;
+                }
+                if *session != recorder.session() {
+                    rows.clear(); // a newer session replaces the one before
+                }
+                let Some(of_map) = map.agent(*id) else { return };
+                if let Some(chunk) = recorder.note(&record, of_map, interval_ns)
+                    && chunk.session == *session
+                {
+                    rows.extend(chunk.rows);
+                }
+            });
+        }
+    }
+    known.with_context(|| format!("the space has no agent {agent:?}"))?;
+    rows.extend_from_slice(recorder.rows());
+    let poses: Vec<_> = rows.iter().map(pose).collect();
+    Ok(output::line(write_tum(&poses).trim_end())?)
+}
+
+/// A pose of the wire as one of the metrics.
+pub(super) fn pose(row: &cogmap_proto::StampedPose) -> StampedPose {
+    let [x, y, z, w] = row.rotation_xyzw;
+    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+    let translation = Translation3::from(nalgebra::Vector3::from(row.translation_m));
+    StampedPose {
+        stamp_ns: row.stamp_ns,
+        pose: Isometry3::from_parts(translation, rotation),
+    }
+}

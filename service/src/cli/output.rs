@@ -1,0 +1,46 @@
+//! What goes to the terminal: answers to standard output, everything else to standard error.
+
+use std::io::{self, IsTerminal, Write};
+
+use serde::Serialize;
+use tracing_subscriber::EnvFilter;
+
+use crate::config::{LogConfig, LogFormat};
+
+/// Writes a line to standard output. A closed pipe (`| head`) is no failure.
+pub(super) fn line(text: &str) -> io::Result<()> {
+    match writeln!(io::stdout().lock(), "{text}") {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => result,
+    }
+}
+
+/// Writes an object as one line of JSON.
+pub(super) fn json<T: Serialize>(value: &T) -> anyhow::Result<()> {
+    Ok(line(&serde_json::to_string(value)?)?)
+}
+
+/// Writes a line to standard error.
+pub(super) fn progress(text: &str) {
+    // With standard error closed there is nobody left to tell.
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// Says why a command failed, with all causes.
+pub(super) fn complain(error: &anyhow::Error) {
+    progress(&format!("cogmap: {error:#}"));
+}
+
+/// Begins to log to standard error.
+pub(super) fn start_log(log: &LogConfig) {
+    // The filter was checked with the settings.
+    let filter = EnvFilter::try_new(&log.filter).unwrap_or_else(|_| EnvFilter::new("info"));
+    let builder = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(io::stderr)
+        .with_ansi(io::stderr().is_terminal());
+    match log.format {
+        LogFormat::Text => builder.init(),
+        LogFormat::Json => builder.json().init(),
+    }
+}

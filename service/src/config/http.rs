@@ -1,0 +1,108 @@
+//! Settings of the HTTP interface.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use super::rule::{INTERVAL_S, check, is_interval_s};
+use super::{ConfigError, Token};
+use crate::http::HttpSettings;
+
+/// Settings of the HTTP interface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HttpConfig {
+    /// Address and port; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// Bearer token that every request but those for health must carry; absent, none is asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub token: Option<Token>,
+    /// File whose first line is the token, instead of `token`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub token_file: Option<PathBuf>,
+    /// Longest time from a request's head to the head of its answer \[s\].
+    pub request_timeout_s: f64,
+    /// Most requests under way; further ones are told to come back.
+    pub requests_max: usize,
+    /// Most open event streams; further ones are told to come back.
+    pub streams_max: usize,
+    /// Most connections; further ones wait in the system's queue.
+    pub connections_max: usize,
+    /// Longest wait for open requests when the service stops \[s\].
+    pub shutdown_timeout_s: f64,
+}
+
+impl Default for HttpConfig {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            token: None,
+            token_file: None,
+            request_timeout_s: 30.0,
+            requests_max: 1024,
+            streams_max: 256,
+            connections_max: 4096,
+            shutdown_timeout_s: 5.0,
+        }
+    }
+}
+
+impl HttpConfig {
+    /// What the HTTP interface itself needs to know. The times must have been checked.
+    pub fn settings(&self) -> HttpSettings {
+        HttpSettings {
+            token: self.token.clone(),
+            request_timeout: Duration::from_secs_f64(self.request_timeout_s),
+            requests_max: self.requests_max,
+            streams_max: self.streams_max,
+            connections_max: self.connections_max,
+            shutdown_timeout: Duration::from_secs_f64(self.shutdown_timeout_s),
+        }
+    }
+
+    pub(super) fn read_token_file(&mut self) -> Result<(), ConfigError> {
+        let Some(path) = &self.token_file else {
+            return Ok(());
+        };
+        let shown = path.display().to_string();
+        if self.token.is_some() {
+            let rule = "absent when http.token is set";
+            return check(false, "http.token_file", &shown, rule);
+        }
+        let source = format!("http.token_file {shown}");
+        let text =
+            std::fs::read_to_string(path).map_err(|error| ConfigError::source(&source, &error))?;
+        self.token = Some(Token::new(text.lines().next().unwrap_or_default().trim()));
+        Ok(())
+    }
+
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
+        if let Some(token) = &self.token {
+            let rule = "visible ASCII without spaces, at least one character";
+            check(token.is_presentable(), "http.token", &"(hidden)", rule)?;
+        }
+        let bounds = [
+            ("http.requests_max", self.requests_max),
+            ("http.streams_max", self.streams_max),
+            ("http.connections_max", self.connections_max),
+        ];
+        for (key, value) in bounds {
+            check(
+                (1..=1_000_000).contains(&value),
+                key,
+                &value,
+                "1 to 1000000",
+            )?;
+        }
+        let times = [
+            ("http.request_timeout_s", self.request_timeout_s),
+            ("http.shutdown_timeout_s", self.shutdown_timeout_s),
+        ];
+        for (key, value) in times {
+            check(is_interval_s(value), key, &value, INTERVAL_S)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,136 @@
+//! Settings of the service: from a TOML file, then the environment, then flags; the later wins.
+//!
+//! `cogmap.toml` beside the crate's manifest documents every key with its default, unit and reason.
+//! In the environment `COGMAP_HTTP__LISTEN` stands for `http.listen`; see [`Assignment`] for the
+//! rules. Nothing unknown is ignored: a misspelt key is an error.
+
+mod assignment;
+mod engine;
+mod error;
+mod http;
+mod log;
+mod rule;
+mod store;
+mod token;
+mod zenoh;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use cogmap_proto::{Name, SpaceSettings};
+use serde::{Deserialize, Serialize};
+
+use crate::engine::core_settings;
+
+pub use assignment::Assignment;
+pub use engine::EngineConfig;
+pub use error::ConfigError;
+pub use http::HttpConfig;
+pub use log::{LogConfig, LogFormat};
+pub use store::StoreConfig;
+pub use token::Token;
+pub use zenoh::{ZenohConfig, ZenohEncoding, ZenohMode};
+
+/// All settings of the service.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// The HTTP interface.
+    pub http: HttpConfig,
+    /// The Zenoh session.
+    pub zenoh: ZenohConfig,
+    /// Where the journal and what is derived from it are kept.
+    pub store: StoreConfig,
+    /// Bounds and intervals of the engine.
+    pub engine: EngineConfig,
+    /// Spaces that exist from the start; those that the store does not hold yet are created.
+    pub spaces: BTreeMap<Name, SpaceSettings>,
+    /// What is logged, and how.
+    pub log: LogConfig,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        let name: Name = "default".parse().expect("the word is a name");
+        Self {
+            http: HttpConfig::default(),
+            zenoh: ZenohConfig::default(),
+            store: StoreConfig::default(),
+            engine: EngineConfig::default(),
+            spaces: BTreeMap::from([(name, SpaceSettings::default())]),
+            log: LogConfig::default(),
+        }
+    }
+}
+
+impl Config {
+    /// Settings from the file at `path`, if one is given, then the process's environment, then
+    /// `overrides` (`key=value`, the key with dots between its levels), each checked.
+    ///
+    /// # Errors
+    /// Names the source, the key and the rule that it breaks.
+    pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, ConfigError> {
+        let environment = std::env::vars_os()
+            .filter_map(|(name, value)| Some((name.into_string().ok()?, value)))
+            .map(|(name, value)| (name, value.to_string_lossy().into_owned()));
+        Self::from_sources(path, environment, overrides)
+    }
+
+    /// As [`Config::load`], with the environment as an argument.
+    ///
+    /// # Errors
+    /// As [`Config::load`].
+    pub fn from_sources(
+        path: Option<&Path>,
+        environment: impl IntoIterator<Item = (String, String)>,
+        overrides: &[String],
+    ) -> Result<Self, ConfigError> {
+        let mut table = toml::Table::new();
+        let mut config = Self::default();
+        if let Some(path) = path {
+            let source = path.display().to_string();
+            let text = std::fs::read_to_string(path)
+                .map_err(|error| ConfigError::source(&source, &error))?;
+            config = toml::from_str(&text).map_err(|error| ConfigError::source(&source, &error))?;
+            table = toml::from_str(&text).map_err(|error| ConfigError::source(&source, &error))?;
+        }
+        let mut assignments = Assignment::of_environment(environment)?;
+        for text in overrides {
+            assignments.push(Assignment::of_flag(text)?);
+        }
+        for assignment in &assignments {
+            (table, config) = assignment.apply(&table)?;
+        }
+        config.http.read_token_file()?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Checks what types alone cannot say.
+    ///
+    /// # Errors
+    /// Names the first key that breaks its rule, its value and the rule.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        self.http.check()?;
+        self.zenoh.check()?;
+        self.store.check()?;
+        self.engine.check()?;
+        self.log.check()?;
+        for (name, settings) in &self.spaces {
+            let source = format!("spaces.{name}");
+            core_settings(settings).map_err(|error| ConfigError::source(&source, &error))?;
+        }
+        Ok(())
+    }
+
+    /// The effective settings as TOML; the token is not shown.
+    ///
+    /// # Panics
+    /// Never: all keys are texts, and all values have a form in TOML.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("settings are tables of plain values")
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,156 @@
+//! Checkpoints: what changed since the last one, written beside the running space.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{Builder, JoinHandle};
+use std::time::{Duration, Instant};
+
+use cognitive_map::CognitiveMap;
+
+use super::health::Health;
+use super::trajectory::Recorder;
+use crate::store::{Checkpoint, SpaceNumber, Store};
+
+/// A space's side of the checkpoints.
+#[derive(Debug)]
+pub(crate) struct Checkpointer {
+    space: SpaceNumber,
+    store: Arc<dyn Store>,
+    health: Arc<Health>,
+    jobs: Sender<Job>,
+    progress: Arc<Progress>,
+    interval: Duration,
+    last: Instant,
+    last_block: u64,
+}
+
+/// How far the checkpoints of a space are.
+#[derive(Debug)]
+struct Progress {
+    /// Whether one is being written.
+    writing: AtomicBool,
+    /// Revision of the map that the latest one holds.
+    revision: AtomicU64,
+}
+
+/// A checkpoint to write.
+#[derive(Debug)]
+pub(crate) struct Job {
+    space: SpaceNumber,
+    next_block: u64,
+    map: CognitiveMap,
+    recorders: Vec<Recorder>,
+    progress: Arc<Progress>,
+}
+
+/// Starts the thread that writes checkpoints. It ends when all senders are gone.
+pub(crate) fn start(store: Arc<dyn Store>, health: Arc<Health>) -> (Sender<Job>, JoinHandle<()>) {
+    let (sender, receiver) = channel();
+    let thread = Builder::new()
+        .name("checkpointer".into())
+        .spawn(move || run(&*store, &health, &receiver))
+        .expect("the system can start a thread");
+    (sender, thread)
+}
+
+fn run(store: &dyn Store, health: &Health, jobs: &Receiver<Job>) {
+    while let Ok(job) = jobs.recv() {
+        write(store, health, &job);
+        job.progress.writing.store(false, Ordering::Release);
+    }
+}
+
+fn write(store: &dyn Store, health: &Health, job: &Job) {
+    if health.failed().is_some() {
+        return;
+    }
+    let since = job.progress.revision.load(Ordering::Acquire);
+    let checkpoint = Checkpoint {
+        next_block: job.next_block,
+        pages: job.map.checkpoint(since).collect(),
+        recorders: Recorder::write_all(&job.recorders),
+    };
+    match store.write_checkpoint(job.space, &checkpoint) {
+        Ok(()) => job
+            .progress
+            .revision
+            .store(job.map.revision(), Ordering::Release),
+        Err(error) => health.fail(&error),
+    }
+}
+
+impl Checkpointer {
+    pub(crate) fn new(
+        space: SpaceNumber,
+        store: Arc<dyn Store>,
+        health: Arc<Health>,
+        jobs: Sender<Job>,
+        interval: Duration,
+        (revision, next_block): (u64, u64),
+    ) -> Self {
+        let progress = Progress {
+            writing: AtomicBool::new(false),
+            revision: revision.into(),
+        };
+        let progress = Arc::new(progress);
+        let last = Instant::now();
+        Self {
+            space,
+            store,
+            health,
+            jobs,
+            progress,
+            interval,
+            last,
+            last_block: next_block,
+        }
+    }
+
+    /// Begins a checkpoint if it is time for one.
+    pub(crate) fn offer(
+        &mut self,
+        next_block: u64,
+        map: &CognitiveMap,
+        recorders: impl FnOnce() -> Vec<Recorder>,
+    ) {
+        let due = next_block > self.last_block && self.last.elapsed() >= self.interval;
+        if due && !self.progress.writing.swap(true, Ordering::AcqRel) {
+            (self.last, self.last_block) = (Instant::now(), next_block);
+            // The thread outlives the writers; were it gone, the journal would still be whole.
+            let _ = self.jobs.send(self.job(next_block, map, recorders()));
+        }
+    }
+
+    /// Writes a last checkpoint, here and now.
+    pub(crate) fn finish(
+        &mut self,
+        next_block: u64,
+        map: &CognitiveMap,
+        recorders: impl FnOnce() -> Vec<Recorder>,
+    ) {
+        while self.progress.writing.load(Ordering::Acquire) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        if next_block > self.last_block
+            || self.progress.revision.load(Ordering::Acquire) < map.revision()
+        {
+            write(
+                &*self.store,
+                &self.health,
+                &self.job(next_block, map, recorders()),
+            );
+        }
+    }
+
+    fn job(&self, next_block: u64, map: &CognitiveMap, recorders: Vec<Recorder>) -> Job {
+        let progress = Arc::clone(&self.progress);
+        Job {
+            space: self.space,
+            next_block,
+            map: map.clone(),
+            recorders,
+            progress,
+        }
+    }
+}

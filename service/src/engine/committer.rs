@@ -1,0 +1,130 @@
+//! The committer: one thread that makes groups of blocks durable and then says so.
+//!
+//! While it syncs, further blocks gather for the next sync; that is the group commit. Only it moves
+//! watermarks, and only after the sync has returned.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{Builder, JoinHandle};
+use std::time::{Duration, Instant};
+
+use cogmap_proto::IngestAnswer;
+
+use super::counters::CommitCounters;
+use super::desk::AgentDesk;
+use super::health::Health;
+use super::message::{IngestError, Reply};
+use super::outlet::Outlet;
+use crate::store::Store;
+
+/// What a writer has appended to the store and applied.
+#[derive(Debug)]
+pub(crate) struct Commit {
+    pub(crate) space: Arc<str>,
+    pub(crate) samples: u64,
+    pub(crate) marks: Vec<Mark>,
+    pub(crate) answers: Vec<Answer>,
+}
+
+/// Samples of an agent's session below `next` are in the store.
+#[derive(Debug)]
+pub(crate) struct Mark {
+    pub(crate) desk: Arc<AgentDesk>,
+    pub(crate) session: u64,
+    pub(crate) next: u64,
+}
+
+/// Someone to answer when it is durable.
+#[derive(Debug)]
+pub(crate) struct Answer {
+    pub(crate) reply: Reply,
+    pub(crate) desk: Arc<AgentDesk>,
+    pub(crate) duplicates: u64,
+}
+
+/// Starts the committer. It ends when all senders are gone.
+pub(crate) fn start(
+    store: Arc<dyn Store>,
+    outlet: Arc<dyn Outlet>,
+    health: Arc<Health>,
+    interval: Duration,
+) -> (Sender<Commit>, JoinHandle<()>) {
+    let (sender, receiver) = channel();
+    let thread = Builder::new()
+        .name("committer".into())
+        .spawn(move || run(&*store, &*outlet, &health, &receiver, interval))
+        .expect("the system can start a thread");
+    (sender, thread)
+}
+
+fn run(
+    store: &dyn Store,
+    outlet: &dyn Outlet,
+    health: &Health,
+    commits: &Receiver<Commit>,
+    interval: Duration,
+) {
+    let counters = CommitCounters::new();
+    let mut group = Vec::new();
+    let mut last_sync: Option<Instant> = None;
+    while let Ok(first) = commits.recv() {
+        group.push(first);
+        // A group that comes alone is synced at once; under load the interval lets groups gather.
+        if let Some(rest) = last_sync.and_then(|last| interval.checked_sub(last.elapsed())) {
+            let until = Instant::now() + rest;
+            while let Ok(commit) =
+                commits.recv_timeout(until.saturating_duration_since(Instant::now()))
+            {
+                group.push(commit);
+            }
+        }
+        group.extend(commits.try_iter());
+        let began = Instant::now();
+        let result = if health.failed().is_some() {
+            None
+        } else {
+            Some(store.sync())
+        };
+        counters.latency(began.elapsed());
+        last_sync = Some(Instant::now());
+        match result {
+            Some(Ok(())) => group
+                .drain(..)
+                .for_each(|commit| acknowledge(commit, outlet, &counters)),
+            Some(Err(error)) => {
+                health.fail(&error);
+                group.drain(..).for_each(|commit| refuse(commit, health));
+            }
+            None => group.drain(..).for_each(|commit| refuse(commit, health)),
+        }
+    }
+}
+
+fn acknowledge(commit: Commit, outlet: &dyn Outlet, counters: &CommitCounters) {
+    counters.durable(&commit.space, commit.samples);
+    for mark in &commit.marks {
+        mark.desk.marks().durable(mark.session, mark.next);
+    }
+    for mark in &commit.marks {
+        outlet.watermark(&commit.space, mark.desk.name(), &mark.desk.watermark());
+    }
+    for Answer {
+        reply,
+        desk,
+        duplicates,
+    } in commit.answers
+    {
+        // Whoever asked may have gone; the samples are durable all the same.
+        let _ = reply.send(Ok(IngestAnswer {
+            watermark: desk.watermark(),
+            duplicates,
+        }));
+    }
+}
+
+fn refuse(commit: Commit, health: &Health) {
+    for answer in commit.answers {
+        let refusal = health.refusal().unwrap_or(IngestError::Closed);
+        let _ = answer.reply.send(Err(refusal));
+    }
+}

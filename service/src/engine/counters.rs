@@ -1,0 +1,212 @@
+//! What the engine counts. Handles are taken once, so that counting costs one atomic addition.
+
+use std::time::Duration;
+
+use cogmap_proto::{Codec, DecodeError, SkipReason};
+use cognitive_map::CognitiveMap;
+use metrics::{Counter, Gauge, Histogram, counter, gauge, histogram};
+
+use super::sequencer::Offered;
+use crate::metrics as names;
+
+/// Why a message is dropped whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Drop {
+    BadKey,
+    UnknownSpace,
+    QueueFull,
+    SpaceClosed,
+    TooManyAgents,
+    StaleSession,
+    StoreFailed,
+}
+
+impl Drop {
+    const ALL: [Self; 7] = [
+        Self::BadKey,
+        Self::UnknownSpace,
+        Self::QueueFull,
+        Self::SpaceClosed,
+        Self::TooManyAgents,
+        Self::StaleSession,
+        Self::StoreFailed,
+    ];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::BadKey => "bad_key",
+            Self::UnknownSpace => "unknown_space",
+            Self::QueueFull => "queue_full",
+            Self::SpaceClosed => "space_closed",
+            Self::TooManyAgents => "too_many_agents",
+            Self::StaleSession => "stale_session",
+            Self::StoreFailed => "store_failed",
+        }
+    }
+}
+
+/// Counters of messages on their way to a space.
+#[derive(Debug)]
+pub(crate) struct IntakeCounters {
+    messages: [Counter; 3],
+    bytes: [Counter; 3],
+    dropped: [Counter; Drop::ALL.len()],
+}
+
+impl IntakeCounters {
+    pub(crate) fn new() -> Self {
+        let codecs = [Codec::Postcard, Codec::Cbor, Codec::Json];
+        Self {
+            messages: codecs
+                .map(|codec| counter!(names::RECEIVED_MESSAGES, "codec" => codec.name())),
+            bytes: codecs.map(|codec| counter!(names::RECEIVED_BYTES, "codec" => codec.name())),
+            dropped: dropped(),
+        }
+    }
+
+    pub(crate) fn received(&self, codec: Codec, bytes: usize) {
+        self.messages[codec as usize].increment(1);
+        self.bytes[codec as usize].increment(bytes as u64);
+    }
+
+    pub(crate) fn dropped(&self, reason: Drop) {
+        self.dropped[reason as usize].increment(1);
+    }
+}
+
+/// Counters of one space's writer.
+pub(crate) struct SpaceCounters {
+    space: String,
+    dropped: [Counter; Drop::ALL.len()],
+    applied: Counter,
+    duplicates: Counter,
+    reordered: Counter,
+    beyond_window: Counter,
+    abandoned: Counter,
+    journal_bytes: Counter,
+    round_samples: Histogram,
+    published: Counter,
+    queue: Gauge,
+    agents: Gauge,
+    places: Gauge,
+    trips: Gauge,
+    landmarks: Gauge,
+}
+
+impl SpaceCounters {
+    pub(crate) fn new(space: &str) -> Self {
+        let label = || space.to_owned();
+        Self {
+            space: space.to_owned(),
+            dropped: dropped(),
+            applied: counter!(names::APPLIED_SAMPLES, "space" => label()),
+            duplicates: counter!(names::DUPLICATE_SAMPLES, "space" => label()),
+            reordered: counter!(names::REORDERED_SAMPLES, "space" => label()),
+            beyond_window: counter!(names::BEYOND_WINDOW_SAMPLES, "space" => label()),
+            abandoned: counter!(names::ABANDONED_SAMPLES, "space" => label()),
+            journal_bytes: counter!(names::JOURNAL_BYTES, "space" => label()),
+            round_samples: histogram!(names::ROUND_SAMPLES, "space" => label()),
+            published: counter!(names::PUBLISHED_ESTIMATES, "space" => label()),
+            queue: gauge!(names::QUEUE_MESSAGES, "space" => label()),
+            agents: gauge!(names::AGENTS, "space" => label()),
+            places: gauge!(names::PLACES, "space" => label()),
+            trips: gauge!(names::TRIPS, "space" => label()),
+            landmarks: gauge!(names::LANDMARKS, "space" => label()),
+        }
+    }
+
+    pub(crate) fn dropped(&self, reason: Drop) {
+        self.dropped[reason as usize].increment(1);
+    }
+
+    /// Counts samples refused for good, or lost.
+    pub(crate) fn skipped(&self, samples: u64, reason: SkipReason) {
+        let reason = match reason {
+            SkipReason::Lost => "lost",
+            SkipReason::NumberOutOfRange => "number_out_of_range",
+            SkipReason::NonUnitQuaternion => "non_unit_quaternion",
+            SkipReason::NegativeNoise => "negative_noise",
+            SkipReason::TimeBackwards => "time_backwards",
+            SkipReason::InvalidDescriptor => "invalid_descriptor",
+            SkipReason::InvalidLabel => "invalid_label",
+            SkipReason::InvalidNormal => "invalid_normal",
+        };
+        let space = self.space.clone();
+        counter!(names::SKIPPED_SAMPLES, "space" => space, "reason" => reason).increment(samples);
+    }
+
+    pub(crate) fn offered(&self, offered: &Offered) {
+        self.duplicates.increment(offered.duplicates);
+        self.reordered.increment(offered.reordered);
+        self.beyond_window.increment(offered.beyond_window);
+    }
+
+    /// Counts samples that waited for earlier ones when their session was taken over.
+    pub(crate) fn abandoned(&self, samples: usize) {
+        self.abandoned.increment(samples as u64);
+    }
+
+    /// Counts a round that applied samples.
+    pub(crate) fn round(&self, samples: u64, estimates: u64) {
+        if samples > 0 {
+            self.applied.increment(samples);
+            self.round_samples.record(samples as f64);
+            self.published.increment(estimates);
+        }
+    }
+
+    pub(crate) fn journaled(&self, bytes: usize) {
+        self.journal_bytes.increment(bytes as u64);
+    }
+
+    pub(crate) fn sizes(&self, map: &CognitiveMap, queued: usize) {
+        self.queue.set(queued as f64);
+        self.agents.set(map.agent_count() as f64);
+        self.places.set(map.place_count() as f64);
+        self.trips.set(map.trip_count() as f64);
+        self.landmarks.set(map.landmark_count() as f64);
+    }
+}
+
+/// Counters of the committer.
+pub(crate) struct CommitCounters {
+    latency: Histogram,
+}
+
+impl CommitCounters {
+    pub(crate) fn new() -> Self {
+        Self {
+            latency: histogram!(names::COMMIT_SECONDS),
+        }
+    }
+
+    pub(crate) fn latency(&self, latency: Duration) {
+        self.latency.record(latency.as_secs_f64());
+    }
+
+    #[expect(
+        clippy::unused_self,
+        reason = "the handle belongs to a space, spaces come and go"
+    )]
+    pub(crate) fn durable(&self, space: &str, samples: u64) {
+        counter!(names::DURABLE_SAMPLES, "space" => space.to_owned()).increment(samples);
+    }
+}
+
+/// Counts a message that cannot be read.
+pub(crate) fn undecodable(error: &DecodeError) {
+    let kind = match error {
+        DecodeError::UnknownEncoding(_) => "unknown_encoding",
+        DecodeError::UnsupportedVersion(_) => "unsupported_version",
+        DecodeError::TooLong(_) => "too_long",
+        DecodeError::Malformed { .. } => "malformed",
+        DecodeError::EmptyBatch => "empty_batch",
+        DecodeError::TooManySamples(_) => "too_many_samples",
+        DecodeError::SequenceOverflow => "sequence_overflow",
+    };
+    counter!(names::DECODE_ERRORS, "kind" => kind).increment(1);
+}
+
+fn dropped() -> [Counter; Drop::ALL.len()] {
+    Drop::ALL.map(|reason| counter!(names::DROPPED_MESSAGES, "reason" => reason.name()))
+}

@@ -1,0 +1,177 @@
+//! The desk of an agent: what others may know of it without asking the writer.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use arc_swap::ArcSwapOption;
+use cogmap_proto::limits::WATERMARK_REJECTIONS_MAX;
+use cogmap_proto::{AgentDetail, Estimate, Rejection, SeqRange, StampedPose, Watermark};
+use cognitive_map::AgentId;
+
+use super::trajectory::Recorder;
+
+/// What is known of an agent outside its space's writer. Readers never hold the writer up: the
+/// readout is swapped whole, and the two locks guard a few words each.
+#[derive(Debug)]
+pub struct AgentDesk {
+    id: AgentId,
+    name: String,
+    readout: ArcSwapOption<Readout>,
+    marks: Mutex<Marks>,
+    recorder: Mutex<Recorder>,
+}
+
+/// An agent after a group of its samples.
+#[derive(Clone, Debug)]
+pub(crate) struct Readout {
+    pub(crate) estimate: Estimate,
+    pub(crate) odometry: StampedPose,
+    pub(crate) travelled_m: f64,
+}
+
+/// How far an agent's samples have come.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Marks {
+    session: u64,
+    durable: u64,
+    applied: u64,
+    waiting: u64,
+    gap: Option<SeqRange>,
+    rejected: VecDeque<Rejection>,
+}
+
+impl AgentDesk {
+    /// A desk for an agent whose samples below `next` are durable.
+    pub(crate) fn new(
+        id: AgentId,
+        name: &str,
+        session: u64,
+        next: u64,
+        recorder: Recorder,
+    ) -> Self {
+        let marks = Marks {
+            session,
+            durable: next,
+            applied: next,
+            ..Marks::default()
+        };
+        Self {
+            id,
+            name: name.to_owned(),
+            readout: ArcSwapOption::empty(),
+            marks: Mutex::new(marks),
+            recorder: Mutex::new(recorder),
+        }
+    }
+
+    /// The agent's number.
+    pub fn id(&self) -> AgentId {
+        self.id
+    }
+
+    /// The agent's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its latest estimate.
+    pub fn estimate(&self) -> Option<Estimate> {
+        self.readout
+            .load()
+            .as_ref()
+            .map(|readout| readout.estimate.clone())
+    }
+
+    /// How far its samples have come.
+    pub fn watermark(&self) -> Watermark {
+        self.marks().watermark()
+    }
+
+    /// All that is known of it here.
+    pub fn detail(&self) -> AgentDetail {
+        let readout = self.readout.load();
+        let (watermark, lag_samples) = {
+            let marks = self.marks();
+            (
+                marks.watermark(),
+                marks.applied.saturating_sub(marks.durable) + marks.waiting,
+            )
+        };
+        AgentDetail {
+            name: self.name.clone(),
+            estimate: readout.as_ref().map(|readout| readout.estimate.clone()),
+            odometry: readout.as_ref().map(|readout| readout.odometry),
+            watermark,
+            lag_samples,
+            travelled_m: readout.as_ref().map_or(0.0, |readout| readout.travelled_m),
+        }
+    }
+
+    pub(crate) fn publish(&self, readout: Readout) -> Arc<Readout> {
+        let readout = Arc::new(readout);
+        self.readout.store(Some(Arc::clone(&readout)));
+        readout
+    }
+
+    // A panic while one of these locks is held cannot leave half a change behind.
+    pub(crate) fn marks(&self) -> MutexGuard<'_, Marks> {
+        self.marks.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn recorder(&self) -> MutexGuard<'_, Recorder> {
+        self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Marks {
+    /// Notes what has been applied; a new session starts the count anew. Returns how many samples
+    /// have been applied since the last note.
+    pub(crate) fn applied(
+        &mut self,
+        session: u64,
+        applied: u64,
+        waiting: u64,
+        gap: Option<SeqRange>,
+    ) -> u64 {
+        if session != self.session {
+            *self = Self {
+                session,
+                ..Self::default()
+            };
+        }
+        let news = applied.saturating_sub(self.applied);
+        (self.applied, self.waiting, self.gap) = (applied, waiting, gap);
+        news
+    }
+
+    /// Notes a rejection; the oldest makes room.
+    pub(crate) fn rejected(&mut self, session: u64, rejection: Rejection) {
+        if session != self.session {
+            *self = Self {
+                session,
+                ..Self::default()
+            };
+        }
+        if self.rejected.len() == WATERMARK_REJECTIONS_MAX {
+            self.rejected.pop_front();
+        }
+        self.rejected.push_back(rejection);
+    }
+
+    /// Notes what is on disk.
+    pub(crate) fn durable(&mut self, session: u64, durable: u64) {
+        if session == self.session {
+            self.durable = self.durable.max(durable);
+        }
+    }
+
+    fn watermark(&self) -> Watermark {
+        Watermark {
+            session: self.session,
+            durable: self.durable,
+            applied: self.applied,
+            gap: self.gap,
+            rejected: self.rejected.iter().cloned().collect(),
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! From settings and journal entries of the wire to those of the core.
+//!
+//! Recovery and the offline commands meet the same records as the live writer, so that they cannot
+//! differ.
+
+use cogmap_proto::SpaceSettings;
+use cognitive_map::{AgentId, InvalidSettings, Label, Record, SkipReason};
+
+use super::block::Entry;
+use super::readout::skip_reason_of_wire;
+use crate::decode;
+
+/// Settings of the core from those of the wire.
+///
+/// # Errors
+/// Names the field that makes no sense and the rule that it breaks.
+pub fn core_settings(settings: &SpaceSettings) -> Result<cognitive_map::Settings, InvalidSettings> {
+    let recruitment = match settings.recruitment {
+        cogmap_proto::Recruitment::Novelty {} => cognitive_map::Recruitment::Novelty,
+        cogmap_proto::Recruitment::Bernoulli { probability } => {
+            cognitive_map::Recruitment::Bernoulli { probability }
+        }
+    };
+    if !(0.001..=3600.0).contains(&settings.trajectory_interval_s) {
+        let field = "trajectory_interval_s";
+        return Err(InvalidSettings {
+            field,
+            rule: "0.001 to 3600",
+        });
+    }
+    cognitive_map::Settings::new(cognitive_map::SettingsValues {
+        seed: settings.seed,
+        grid_modules: settings.grid_modules as usize,
+        grid_spacing_m: settings.grid_spacing_m,
+        grid_ratio: settings.grid_ratio,
+        field_radius_m: settings.field_radius_m,
+        recruitment,
+        translation_sd_per_sqrt_m: settings.odometry_noise.translation_sd_per_sqrt_m,
+        rotation_sd_per_sqrt_m: settings.odometry_noise.rotation_sd_per_sqrt_m,
+        rotation_sd_per_sqrt_rad: settings.odometry_noise.rotation_sd_per_sqrt_rad,
+        localized_sd_m: settings.localized_sd_m,
+        lost_sd_m: settings.lost_sd_m,
+        trip_stillness_s: settings.trip_stillness_s,
+        trip_gap_s: settings.trip_gap_s,
+    })
+}
+
+/// Closest rows of a stored trajectory \[ns\].
+pub fn trajectory_interval_ns(settings: &SpaceSettings) -> i64 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "checked to be at most an hour"
+    )]
+    let interval = (settings.trajectory_interval_s * 1e9).round() as i64;
+    interval
+}
+
+/// Passes the records of a journal entry to `take`, in order.
+pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
+    match entry {
+        Entry::Enrol { agent, name } => {
+            if let Ok(name) = Label::new(name) {
+                take(Record::Enrol {
+                    agent: AgentId(*agent),
+                    name,
+                });
+            }
+        }
+        Entry::Samples { agent, batch } => {
+            let agent = AgentId(*agent);
+            let session = batch.session;
+            for (seq, wire) in (batch.first_seq..).zip(&batch.samples) {
+                take(match decode::sample(wire) {
+                    Ok(sample) => Record::Sample {
+                        agent,
+                        session,
+                        seq,
+                        sample,
+                    },
+                    // Only samples that passed are journaled. A build with stricter rules than the
+                    // one that wrote the journal says so by skipping.
+                    Err(invalid) => {
+                        let reason = SkipReason::Invalid(invalid);
+                        Record::Skip {
+                            agent,
+                            session,
+                            from: seq,
+                            to: seq + 1,
+                            reason,
+                        }
+                    }
+                });
+            }
+        }
+        Entry::Skip {
+            agent,
+            session,
+            from,
+            to,
+            reason,
+        } => take(Record::Skip {
+            agent: AgentId(*agent),
+            session: *session,
+            from: *from,
+            to: *to,
+            reason: skip_reason_of_wire(*reason),
+        }),
+    }
+}

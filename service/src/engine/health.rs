@@ -1,0 +1,50 @@
+//! Whether the store still takes writes.
+
+use std::sync::OnceLock;
+
+use super::message::IngestError;
+use crate::store::StoreError;
+
+/// The first failure of the store, if there was one. After it nothing is written until the service
+/// starts anew and recovers: what the disk holds is then the truth.
+#[derive(Debug, Default)]
+pub(crate) struct Health {
+    failure: OnceLock<Failure>,
+}
+
+#[derive(Debug)]
+struct Failure {
+    detail: String,
+    disk_full: bool,
+}
+
+impl Health {
+    /// Notes a failure; the first one counts.
+    pub(crate) fn fail(&self, error: &StoreError) {
+        let disk_full = matches!(error, StoreError::DiskFull);
+        let failure = Failure {
+            detail: error.to_string(),
+            disk_full,
+        };
+        if self.failure.set(failure).is_ok() {
+            tracing::error!(%error, "write to the store; no more samples are taken");
+        }
+    }
+
+    /// What went wrong, if anything did.
+    pub(crate) fn failed(&self) -> Option<String> {
+        self.failure.get().map(|failure| failure.detail.clone())
+    }
+
+    /// What to answer whoever wants to write, if the store failed.
+    pub(crate) fn refusal(&self) -> Option<IngestError> {
+        self.failure.get().map(|failure| {
+            let detail = failure.detail.clone();
+            if failure.disk_full {
+                IngestError::DiskFull(detail)
+            } else {
+                IngestError::Store(detail)
+            }
+        })
+    }
+}

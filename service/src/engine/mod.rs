@@ -1,0 +1,299 @@
+//! The engine: spaces, each with one writer, over one store.
+//!
+//! ```text
+//! transport, http ─► queue ─► writer: decode ─► sequence ─► journal ─► apply ─► publish
+//!                                                             │
+//!                                            committer: sync ─┴─► watermark
+//! ```
+//!
+//! The writer owns the map; nobody else locks it. Readers take readouts from an agent's desk, or a
+//! snapshot of the whole map, which the writer hands out between two rounds.
+
+mod block;
+mod checkpointer;
+mod committer;
+mod counters;
+mod desk;
+mod fold;
+mod health;
+mod message;
+mod outlet;
+mod readout;
+mod recovery;
+mod sequencer;
+mod settings;
+mod space;
+mod trajectory;
+mod writer;
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+use arc_swap::ArcSwap;
+use cogmap_proto::{Codec, DecodeError, Name, SpaceSettings};
+use cognitive_map::InvalidSettings;
+
+pub use block::{CorruptBlock, Entry, entries};
+pub use desk::AgentDesk;
+pub use fold::{core_settings, records_of, trajectory_interval_ns};
+pub use message::IngestError;
+pub use outlet::{Outlet, Silent};
+pub(crate) use readout::trip_end;
+pub use settings::EngineSettings;
+pub use space::{Space, TrajectoryError, Unavailable};
+pub use trajectory::{Chunk, Recorder};
+
+use crate::store::{Store, StoreError};
+use counters::{Drop, IntakeCounters};
+use health::Health;
+use message::NotQueued;
+use space::Surroundings;
+
+/// The engine. Clones share it.
+#[derive(Clone, Debug)]
+pub struct Engine(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    spaces: ArcSwap<BTreeMap<String, Arc<Space>>>,
+    /// Taken to create or delete a space, and to shut down.
+    control: Mutex<Control>,
+    health: Arc<Health>,
+    intake: IntakeCounters,
+    spaces_max: usize,
+}
+
+#[derive(Debug)]
+struct Control {
+    /// Gone after the shutdown.
+    around: Option<Surroundings>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+/// Whether the service can do its work.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Readiness {
+    /// It can.
+    Ready,
+    /// These spaces are still loading.
+    Recovering {
+        /// Their names.
+        spaces: Vec<String>,
+    },
+    /// It takes no samples.
+    Failed {
+        /// Why.
+        detail: String,
+    },
+}
+
+/// Why a space cannot be created or deleted.
+#[derive(Debug, thiserror::Error)]
+pub enum SpaceError {
+    /// Its settings make no sense.
+    #[error(transparent)]
+    InvalidSettings(#[from] InvalidSettings),
+    /// It exists with other settings, and settings are fixed on creation.
+    #[error("the space exists with other settings")]
+    ExistsWithOtherSettings,
+    /// There are as many spaces as there may be.
+    #[error("there are {0} spaces already")]
+    TooManySpaces(usize),
+    /// There is no such space.
+    #[error("unknown space")]
+    Unknown,
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The service is shutting down.
+    #[error("the service is shutting down")]
+    Closed,
+}
+
+impl Engine {
+    /// Starts the spaces that the store holds. Returns at once; they load in their own threads.
+    ///
+    /// # Errors
+    /// The list of spaces cannot be read.
+    pub fn open(
+        store: Arc<dyn Store>,
+        settings: EngineSettings,
+        outlet: Arc<dyn Outlet>,
+    ) -> Result<Self, StoreError> {
+        let health = Arc::new(Health::default());
+        let stored = store.spaces()?;
+        let (commits, committer) = committer::start(
+            Arc::clone(&store),
+            Arc::clone(&outlet),
+            Arc::clone(&health),
+            settings.commit_interval,
+        );
+        let (jobs, checkpointer) = checkpointer::start(Arc::clone(&store), Arc::clone(&health));
+        let spaces_max = settings.spaces_max;
+        let around = Surroundings {
+            store,
+            outlet,
+            health: Arc::clone(&health),
+            commits,
+            jobs,
+            settings,
+        };
+        let mut spaces = BTreeMap::new();
+        for stored in stored {
+            let corrupt = |detail: String| {
+                StoreError::Corrupt(format!("settings of space {}: {detail}", stored.name))
+            };
+            let settings: SpaceSettings = serde_json::from_slice(&stored.settings)
+                .map_err(|error| corrupt(error.to_string()))?;
+            let core = core_settings(&settings).map_err(|error| corrupt(error.to_string()))?;
+            let core = (core, trajectory_interval_ns(&settings));
+            let space = Space::start(stored.number, &stored.name, settings, core, &around);
+            spaces.insert(stored.name, Arc::new(space));
+        }
+        let control = Control {
+            around: Some(around),
+            threads: vec![committer, checkpointer],
+        };
+        Ok(Self(Arc::new(Inner {
+            spaces: ArcSwap::from_pointee(spaces),
+            control: Mutex::new(control),
+            health,
+            intake: IntakeCounters::new(),
+            spaces_max,
+        })))
+    }
+
+    /// Whether the service can do its work.
+    pub fn readiness(&self) -> Readiness {
+        let spaces = self.0.spaces.load();
+        if let Some(detail) = self.0.health.failed() {
+            return Readiness::Failed { detail };
+        }
+        if let Some(detail) = spaces.values().find_map(|space| space.failure()) {
+            return Readiness::Failed { detail };
+        }
+        let recovering: Vec<_> = spaces
+            .values()
+            .filter(|space| space.recovering())
+            .map(|space| space.name().to_owned())
+            .collect();
+        if recovering.is_empty() {
+            Readiness::Ready
+        } else {
+            Readiness::Recovering { spaces: recovering }
+        }
+    }
+
+    /// The spaces, by name.
+    pub fn spaces(&self) -> Vec<Arc<Space>> {
+        self.0.spaces.load().values().cloned().collect()
+    }
+
+    /// A space, by name.
+    pub fn space(&self, name: &str) -> Option<Arc<Space>> {
+        self.0.spaces.load().get(name).cloned()
+    }
+
+    /// Creates a space, or finds it if it exists with the same settings. Says whether it is new.
+    ///
+    /// # Errors
+    /// See [`SpaceError`].
+    ///
+    /// # Panics
+    /// Never: settings are plain data, which always encodes.
+    pub fn create_space(
+        &self,
+        name: &Name,
+        settings: &SpaceSettings,
+    ) -> Result<(Arc<Space>, bool), SpaceError> {
+        let core = (core_settings(settings)?, trajectory_interval_ns(settings));
+        let control = self.control();
+        let around = control.around.as_ref().ok_or(SpaceError::Closed)?;
+        if let Some(space) = self.space(name.as_str()) {
+            return if space.settings() == settings {
+                Ok((space, false))
+            } else {
+                Err(SpaceError::ExistsWithOtherSettings)
+            };
+        }
+        let count = self.0.spaces.load().len();
+        if count >= self.0.spaces_max {
+            return Err(SpaceError::TooManySpaces(count));
+        }
+        let bytes = serde_json::to_vec(settings).expect("plain data encodes");
+        let number = around.store.create_space(name.as_str(), &bytes)?;
+        let space = Space::start(number, name.as_str(), settings.clone(), core, around);
+        let space = Arc::new(space);
+        self.0.spaces.rcu(|spaces| {
+            let mut spaces = BTreeMap::clone(spaces);
+            spaces.insert(name.as_str().to_owned(), Arc::clone(&space));
+            spaces
+        });
+        Ok((space, true))
+    }
+
+    /// Deletes a space with all that it holds.
+    ///
+    /// # Errors
+    /// See [`SpaceError`].
+    pub fn delete_space(&self, name: &str) -> Result<(), SpaceError> {
+        let control = self.control();
+        let around = control.around.as_ref().ok_or(SpaceError::Closed)?;
+        let space = self.space(name).ok_or(SpaceError::Unknown)?;
+        self.0.spaces.rcu(|spaces| {
+            let mut spaces = BTreeMap::clone(spaces);
+            spaces.remove(name);
+            spaces
+        });
+        space.close();
+        Ok(around.store.delete_space(space.number())?)
+    }
+
+    /// Takes a message as it came over Zenoh. Never blocks; what cannot be taken is counted.
+    pub fn offer(&self, space: &str, agent: &str, codec: Codec, payload: &[u8]) {
+        let intake = &self.0.intake;
+        intake.received(codec, payload.len());
+        let spaces = self.0.spaces.load();
+        let Some(space) = spaces.get(space) else {
+            return intake.dropped(Drop::UnknownSpace);
+        };
+        match space.offer(agent, codec, payload) {
+            Ok(()) => {}
+            Err(NotQueued::Full) => intake.dropped(Drop::QueueFull),
+            Err(NotQueued::Closed) => intake.dropped(Drop::SpaceClosed),
+        }
+    }
+
+    /// Counts a message whose key is not a samples key with valid names.
+    pub fn refuse_key(&self) {
+        self.0.intake.dropped(Drop::BadKey);
+    }
+
+    /// Counts a message that cannot be read, whatever its space.
+    pub fn refuse(&self, error: &DecodeError) {
+        counters::undecodable(error);
+    }
+
+    /// Takes what is queued, makes it durable, checkpoints every space and ends all threads.
+    pub fn shutdown(&self) {
+        let mut control = self.control();
+        control.around = None;
+        for space in self.spaces() {
+            space.close();
+        }
+        // With the writers gone, the last senders are too, and these threads end by themselves.
+        for thread in control.threads.drain(..) {
+            if thread.join().is_err() {
+                tracing::error!("a thread of the engine ended with a panic");
+            }
+        }
+    }
+
+    fn control(&self) -> MutexGuard<'_, Control> {
+        self.0
+            .control
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,137 @@
+//! From the map's agent and events to what is published of them.
+
+use cogmap_proto as wire;
+use cognitive_map::{
+    Agent, CognitiveMap, Event, EventKind, InvalidSample, Settings, SkipReason, Status, TripEnd,
+};
+
+use super::desk::Readout;
+use super::trajectory::stamped;
+
+/// What is published of an agent; nothing before its first sample.
+pub(crate) fn readout(space: &str, agent: &Agent, map: &CognitiveMap) -> Option<Readout> {
+    let stamp_ns = agent.stamp_ns()?;
+    let pose = stamped(stamp_ns, agent.pose());
+    let covariance = agent.covariance().in_map_axes(&agent.pose().rotation);
+    let (place, confidence) = match agent.place() {
+        Some((place, confidence)) => (Some(place.0.into()), confidence),
+        None => (None, 0.0),
+    };
+    let estimate = wire::Estimate {
+        space: space.to_owned(),
+        agent: agent.name().as_str().to_owned(),
+        session: agent.session(),
+        seq: agent.next_seq().saturating_sub(1),
+        stamp_ns,
+        frame: "map".to_owned(),
+        map_revision: map.revision(),
+        status: status(agent, map.settings()),
+        translation_m: pose.translation_m,
+        rotation_xyzw: pose.rotation_xyzw,
+        covariance: cognitive_map::geometry::upper_triangle(&covariance),
+        place,
+        confidence,
+    };
+    Some(Readout {
+        estimate,
+        odometry: stamped(stamp_ns, agent.odometry()),
+        travelled_m: agent.travelled_m(),
+    })
+}
+
+fn status(agent: &Agent, settings: &Settings) -> wire::Status {
+    match agent.status(settings) {
+        Status::Localized => wire::Status::Localized,
+        Status::Uncertain => wire::Status::Uncertain,
+        Status::Lost => wire::Status::Lost,
+    }
+}
+
+/// The published form of an event; cell crossings stay inside, there are too many.
+pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wire::Event> {
+    let kind = match &event.kind {
+        EventKind::CellEntered { .. } => return None,
+        EventKind::AgentEnrolled => wire::EventKind::AgentEnrolled {},
+        EventKind::SessionStarted { session } => {
+            wire::EventKind::SessionStarted { session: *session }
+        }
+        EventKind::PlaceRecruited { place, position } => wire::EventKind::PlaceRecruited {
+            place: place.0.into(),
+            translation_m: position.coords.into(),
+        },
+        EventKind::PlaceEntered { place, confidence } => wire::EventKind::PlaceEntered {
+            place: place.0.into(),
+            confidence: *confidence,
+        },
+        EventKind::TripStarted { trip } => wire::EventKind::TripStarted {
+            trip: trip.0.into(),
+        },
+        EventKind::TripEnded { trip, legs, reason } => wire::EventKind::TripEnded {
+            trip: trip.0.into(),
+            legs: *legs as u64,
+            reason: trip_end(*reason),
+        },
+        EventKind::LandmarkLearned { landmark, position } => wire::EventKind::LandmarkLearned {
+            landmark: map.landmark(*landmark)?.label().as_str().to_owned(),
+            translation_m: position.coords.into(),
+        },
+        EventKind::SamplesSkipped { from, to, reason } => wire::EventKind::SamplesSkipped {
+            from: *from,
+            to: *to,
+            reason: skip_reason(*reason),
+        },
+        EventKind::MarkerPassed { label } => wire::EventKind::MarkerPassed {
+            label: label.as_str().to_owned(),
+        },
+    };
+    Some(wire::Event {
+        space: space.to_owned(),
+        agent: map.agent(event.agent)?.name().as_str().to_owned(),
+        map_revision: map.revision(),
+        stamp_ns: event.stamp_ns,
+        kind,
+    })
+}
+
+/// Why a trip ended, as the wire has it.
+pub(crate) fn trip_end(reason: TripEnd) -> wire::TripEnd {
+    match reason {
+        TripEnd::Stillness => wire::TripEnd::Stillness,
+        TripEnd::Gap => wire::TripEnd::Gap,
+        TripEnd::SessionEnd => wire::TripEnd::SessionEnd,
+        TripEnd::Marker => wire::TripEnd::Marker,
+        TripEnd::Full => wire::TripEnd::Full,
+        TripEnd::StartPose => wire::TripEnd::StartPose,
+    }
+}
+
+/// Why samples are skipped, as the wire has it.
+pub(crate) fn skip_reason(reason: SkipReason) -> wire::SkipReason {
+    match reason {
+        SkipReason::Lost => wire::SkipReason::Lost,
+        SkipReason::TimeBackwards => wire::SkipReason::TimeBackwards,
+        SkipReason::Invalid(invalid) => match invalid {
+            InvalidSample::NumberOutOfRange => wire::SkipReason::NumberOutOfRange,
+            InvalidSample::NonUnitQuaternion => wire::SkipReason::NonUnitQuaternion,
+            InvalidSample::NegativeNoise => wire::SkipReason::NegativeNoise,
+            InvalidSample::InvalidDescriptor => wire::SkipReason::InvalidDescriptor,
+            InvalidSample::InvalidLabel => wire::SkipReason::InvalidLabel,
+            InvalidSample::InvalidNormal => wire::SkipReason::InvalidNormal,
+        },
+    }
+}
+
+/// Why samples are skipped, from the journal.
+pub(crate) fn skip_reason_of_wire(reason: wire::SkipReason) -> SkipReason {
+    let invalid = match reason {
+        wire::SkipReason::Lost => return SkipReason::Lost,
+        wire::SkipReason::TimeBackwards => return SkipReason::TimeBackwards,
+        wire::SkipReason::NumberOutOfRange => InvalidSample::NumberOutOfRange,
+        wire::SkipReason::NonUnitQuaternion => InvalidSample::NonUnitQuaternion,
+        wire::SkipReason::NegativeNoise => InvalidSample::NegativeNoise,
+        wire::SkipReason::InvalidDescriptor => InvalidSample::InvalidDescriptor,
+        wire::SkipReason::InvalidLabel => InvalidSample::InvalidLabel,
+        wire::SkipReason::InvalidNormal => InvalidSample::InvalidNormal,
+    };
+    SkipReason::Invalid(invalid)
+}

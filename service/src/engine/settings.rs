@@ -1,0 +1,40 @@
+//! Bounds and intervals of the engine.
+
+use std::time::Duration;
+
+/// How much the engine holds and how long it waits. None of these changes the maps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EngineSettings {
+    /// Most messages that wait for a space's writer; further ones are dropped and counted.
+    pub queue_messages: usize,
+    /// Most bytes of such messages.
+    pub queue_bytes: usize,
+    /// Most agents of a space; samples of further names are dropped and counted.
+    pub agents_max: usize,
+    /// Most spaces of the service.
+    pub spaces_max: usize,
+    /// Most samples of one agent that wait for earlier ones; further ones are dropped and counted,
+    /// and the client sends them again.
+    pub reorder_window: usize,
+    /// How long missing samples are waited for before they count as lost.
+    pub gap_timeout: Duration,
+    /// Longest time between the syncs of the store while samples come in.
+    pub commit_interval: Duration,
+    /// Time between checkpoints while samples come in.
+    pub checkpoint_interval: Duration,
+}
+
+impl Default for EngineSettings {
+    fn default() -> Self {
+        Self {
+            queue_messages: 131_072,
+            queue_bytes: 64 << 20,
+            agents_max: 1024,
+            spaces_max: 256,
+            reorder_window: 8192,
+            gap_timeout: Duration::from_secs(10),
+            commit_interval: Duration::from_millis(10),
+            checkpoint_interval: Duration::from_secs(30),
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! Causal trajectories: each pose as it was known when its sample was applied.
+//!
+//! ```text
+//! chunk  = version:u8  row*            at most 256 rows
+//! row    = stamp_ns:i64  x y z qx qy qz qw : f64        little endian, 64 bytes
+//! ```
+
+use cogmap_proto::{StampedPose, Trajectory};
+use cognitive_map::{Agent, CognitiveMap, Record, SampleBody};
+
+use super::desk::AgentDesk;
+use super::space::TrajectoryError;
+use crate::store::{SpaceNumber, Store, StoreError};
+
+/// Rows of a full chunk.
+const CHUNK_ROWS: usize = 256;
+/// Version of chunks that this build writes.
+const VERSION: u8 = 1;
+const ROW_BYTES: usize = 64;
+/// Chunks read from the store at once.
+const CHUNKS_AT_ONCE: usize = 64;
+
+/// The part of an agent's trajectory that is not yet a full chunk.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recorder {
+    session: u64,
+    rows: Vec<StampedPose>,
+    /// Stamp of the latest row of the session, also after its chunk has been handed out.
+    latest_ns: Option<i64>,
+}
+
+/// Rows that are complete: a full chunk, or the rest of an ended session.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chunk {
+    /// Session.
+    pub session: u64,
+    /// Rows; at least one.
+    pub rows: Vec<StampedPose>,
+}
+
+/// Chunk bytes that cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("malformed trajectory chunk")]
+pub(crate) struct CorruptChunk;
+
+impl Recorder {
+    /// Notes the pose of `agent` after a record has been applied to it, if the record moved it and
+    /// the latest row is at least `interval_ns` old. A start pose at the stamp of the latest row
+    /// replaces that row. Returns a chunk when one is complete.
+    pub fn note(&mut self, record: &Record, agent: &Agent, interval_ns: i64) -> Option<Chunk> {
+        let Record::Sample {
+            session, sample, ..
+        } = record
+        else {
+            return None;
+        };
+        let jumped = match sample.body {
+            SampleBody::Motion(_) => false,
+            SampleBody::StartPose(_) => true,
+            _ => return None,
+        };
+        let mut complete = None;
+        if *session != self.session {
+            complete = self.take();
+            self.session = *session;
+            self.latest_ns = None;
+        }
+        let row = stamped(sample.stamp_ns, agent.pose());
+        match self.latest_ns {
+            Some(latest) if jumped && latest == sample.stamp_ns => match self.rows.last_mut() {
+                Some(last) => *last = row,
+                None => return complete, // the replaced row is already in a chunk: keep the first
+            },
+            Some(latest) if sample.stamp_ns.saturating_sub(latest) < interval_ns => {
+                return complete;
+            }
+            _ => {
+                self.rows.push(row);
+                self.latest_ns = Some(sample.stamp_ns);
+            }
+        }
+        if self.rows.len() == CHUNK_ROWS {
+            self.take()
+        } else {
+            complete
+        }
+    }
+
+    /// Session of the rows.
+    pub fn session(&self) -> u64 {
+        self.session
+    }
+
+    /// Rows that are not yet in a chunk.
+    pub fn rows(&self) -> &[StampedPose] {
+        &self.rows
+    }
+
+    fn take(&mut self) -> Option<Chunk> {
+        if self.rows.is_empty() {
+            return None;
+        }
+        Some(Chunk {
+            session: self.session,
+            rows: std::mem::take(&mut self.rows),
+        })
+    }
+
+    /// Bytes of the recorders of all agents, for a checkpoint.
+    pub(crate) fn write_all(recorders: &[Self]) -> Vec<u8> {
+        let plain: Vec<_> = recorders
+            .iter()
+            .map(|r| (r.session, r.latest_ns, encode(&r.rows)))
+            .collect();
+        postcard::to_stdvec(&plain).expect("plain data encodes")
+    }
+
+    /// Reads what [`Recorder::write_all`] wrote.
+    pub(crate) fn read_all(bytes: &[u8]) -> Result<Vec<Self>, CorruptChunk> {
+        let plain: Vec<(u64, Option<i64>, Vec<u8>)> =
+            postcard::from_bytes(bytes).map_err(|_| CorruptChunk)?;
+        plain
+            .into_iter()
+            .map(|(session, latest_ns, rows)| {
+                Ok(Self {
+                    session,
+                    rows: decode(&rows)?,
+                    latest_ns,
+                })
+            })
+            .collect()
+    }
+}
+
+/// A map whose trajectories are noted as it grows: what the engine and an offline replay share.
+pub(crate) fn note_all(
+    recorders: &mut Vec<Recorder>,
+    map: &CognitiveMap,
+    record: &Record,
+    interval_ns: i64,
+) -> Option<(u32, Chunk)> {
+    let Record::Sample { agent, .. } = record else {
+        return None;
+    };
+    let index = agent.0 as usize;
+    if recorders.len() <= index {
+        recorders.resize_with(index + 1, Recorder::default);
+    }
+    let chunk = recorders[index].note(record, map.agent(*agent)?, interval_ns)?;
+    Some((agent.0, chunk))
+}
+
+/// A pose at a time, as the wire has it.
+pub(crate) fn stamped(stamp_ns: i64, pose: &nalgebra::Isometry3<f64>) -> StampedPose {
+    let rotation = pose.rotation.coords;
+    StampedPose {
+        stamp_ns,
+        translation_m: pose.translation.vector.into(),
+        rotation_xyzw: [rotation.x, rotation.y, rotation.z, rotation.w],
+    }
+}
+
+/// Bytes of a chunk.
+pub(crate) fn encode(rows: &[StampedPose]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(1 + rows.len() * ROW_BYTES);
+    bytes.push(VERSION);
+    for row in rows {
+        bytes.extend_from_slice(&row.stamp_ns.to_le_bytes());
+        for number in row.translation_m.iter().chain(&row.rotation_xyzw) {
+            bytes.extend_from_slice(&number.to_le_bytes());
+        }
+    }
+    bytes
+}
+
+/// Rows of a chunk.
+pub(crate) fn decode(bytes: &[u8]) -> Result<Vec<StampedPose>, CorruptChunk> {
+    let (&version, rows) = bytes.split_first().ok_or(CorruptChunk)?;
+    if version != VERSION || rows.len() % ROW_BYTES != 0 {
+        return Err(CorruptChunk);
+    }
+    let eight = |row: &[u8], at: usize| -> [u8; 8] {
+        row[8 * at..8 * at + 8].try_into().expect("eight bytes")
+    };
+    Ok(rows
+        .chunks_exact(ROW_BYTES)
+        .map(|row| StampedPose {
+            stamp_ns: i64::from_le_bytes(eight(row, 0)),
+            translation_m: [1, 2, 3].map(|at| f64::from_le_bytes(eight(row, at))),
+            rotation_xyzw: [4, 5, 6, 7].map(|at| f64::from_le_bytes(eight(row, at))),
+        })
+        .collect())
+}
+
+/// Rows of an agent's session with `from_ns <= stamp < to_ns`, at most `limit` of them.
+pub(crate) fn read(
+    store: &dyn Store,
+    space: SpaceNumber,
+    desk: &AgentDesk,
+    session: Option<u64>,
+    (from_ns, to_ns): (Option<i64>, Option<i64>),
+    limit: usize,
+) -> Result<Trajectory, TrajectoryError> {
+    // The rows at the desk first, the store afterwards: a chunk that moves from one to the other in
+    // between is then found twice and never missed.
+    let (current, fresh) = {
+        let recorder = desk.recorder();
+        (recorder.session(), recorder.rows().to_vec())
+    };
+    let session = session.unwrap_or(current);
+    let from_ns = from_ns.unwrap_or(i64::MIN);
+    let to_ns = to_ns.unwrap_or(i64::MAX);
+    let mut poses: Vec<StampedPose> = Vec::new();
+    let mut next_from_ns = from_ns;
+    'chunks: loop {
+        let agent = desk.id().0;
+        let chunks = store.chunks(space, agent, session, next_from_ns, CHUNKS_AT_ONCE)?;
+        let last = chunks.len() < CHUNKS_AT_ONCE;
+        for (_, bytes) in chunks {
+            let rows = decode(&bytes).map_err(|error| StoreError::Corrupt(error.to_string()))?;
+            poses.extend(rows.into_iter().filter(|row| row.stamp_ns >= next_from_ns));
+            let Some(latest) = poses.last() else { continue };
+            if poses.len() > limit || latest.stamp_ns >= to_ns {
+                break 'chunks;
+            }
+            next_from_ns = latest.stamp_ns.saturating_add(1);
+        }
+        if last {
+            if session == current {
+                poses.extend(fresh.into_iter().filter(|row| row.stamp_ns >= next_from_ns));
+            }
+            break;
+        }
+    }
+    poses.retain(|row| row.stamp_ns < to_ns);
+    let next_from_ns = poses.get(limit).map(|row| row.stamp_ns);
+    poses.truncate(limit);
+    Ok(Trajectory {
+        agent: desk.name().to_owned(),
+        session,
+        frame: "map".to_owned(),
+        kind: "causal".to_owned(),
+        poses,
+        next_from_ns,
+    })
+}

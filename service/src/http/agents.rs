@@ -1,0 +1,82 @@
+//! Agents: where they are, and how sure that is.
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::Response;
+use cogmap_proto::{AgentDetail, AgentPage, AgentSummary, GridState};
+use serde::Deserialize;
+
+use super::extract::{AgentOfPath, AgentParams, NoQuery, Query, SpaceOfPath, SpaceParam};
+use super::page;
+use super::problem::{Kind, Problem};
+use super::reply;
+use super::state::Service;
+use crate::answer;
+
+/// Which page of the agents.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct AgentsQuery {
+    /// Only agents whose names come after this one.
+    after: Option<String>,
+    /// Most agents in the answer; 100 when absent.
+    #[param(minimum = 1, maximum = 1000)]
+    limit: Option<u32>,
+}
+
+/// The agents of a space.
+#[utoipa::path(get, path = "/v1/spaces/{space}/agents", tag = "agents", operation_id = "list_agents",
+    params(SpaceParam, AgentsQuery),
+    responses(
+        (status = 200, description = "The agents, by name", body = AgentPage),
+        (status = 404, description = "There is no such space")))]
+pub(crate) async fn list(
+    SpaceOfPath(space): SpaceOfPath,
+    Query(query): Query<AgentsQuery>,
+) -> Result<Response<Body>, Problem> {
+    let limit = page::limit(query.limit)?;
+    let desks = space.agents_after(query.after.as_deref(), limit + 1);
+    let (desks, next) = page::cut(desks.into_iter(), limit, |desk| desk.name().to_owned());
+    let summary = |name: &str, estimate| AgentSummary {
+        name: name.to_owned(),
+        estimate,
+    };
+    let agents = desks
+        .iter()
+        .map(|desk| summary(desk.name(), desk.estimate()))
+        .collect();
+    Ok(reply::json(&AgentPage { agents, next }))
+}
+
+/// An agent: where it is, how sure that is, and how far its samples have come.
+#[utoipa::path(get, path = "/v1/spaces/{space}/agents/{agent}", tag = "agents",
+    operation_id = "get_agent", params(AgentParams),
+    responses(
+        (status = 200, description = "The agent", body = AgentDetail),
+        (status = 404, description = "There is no such space or agent")))]
+pub(crate) async fn get(AgentOfPath(_, desk): AgentOfPath, _: NoQuery) -> Response<Body> {
+    reply::json(&desk.detail())
+}
+
+/// The grid-cell state of an agent.
+#[utoipa::path(get, path = "/v1/spaces/{space}/agents/{agent}/grid", tag = "agents",
+    operation_id = "get_agent_grid", params(AgentParams),
+    responses(
+        (status = 200, description = "The state of its grid modules", body = GridState),
+        (status = 404, description = "There is no such space or agent, or it has no sample yet")))]
+pub(crate) async fn grid(
+    State(_): State<Service>,
+    AgentOfPath(space, desk): AgentOfPath,
+    _: NoQuery,
+) -> Result<Response<Body>, Problem> {
+    let map = space.snapshot().await?;
+    let state = map
+        .agent(desk.id())
+        .and_then(|agent| answer::grid_state(&map, agent));
+    let detail = || format!("the agent {:?} has no sample yet", desk.name());
+    state.map_or_else(
+        || Err(Problem::new(Kind::UnknownAgent, detail())),
+        |state| Ok(reply::json(&state)),
+    )
+}

@@ -1,0 +1,223 @@
+//! Export of a space's map.
+
+use std::convert::Infallible;
+use std::fmt::Write;
+use std::sync::Arc;
+
+use axum::body::{Body, Bytes};
+use axum::http::Response;
+use axum::http::header::{CONTENT_DISPOSITION, HeaderValue};
+use cogmap_proto::limits::PAGE_ITEMS_MAX;
+use cogmap_proto::{AgentSummary, Landmark, Place, SpaceInfo, TripDetail};
+use cognitive_map::{CognitiveMap, LandmarkId, PlaceId, TripId};
+use futures_util::stream;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::extract::{Query, SpaceOfPath, SpaceParam};
+use super::problem::{Kind, Problem};
+use super::reply;
+use super::trajectory::{TUM, tum};
+use crate::answer;
+use crate::engine::{Space, TrajectoryError};
+
+/// Items that are written at once: an answer of any length takes the memory of this many.
+const CHUNK_ITEMS: usize = 256;
+
+/// Form of an export.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum ExportFormat {
+    /// The whole map as one JSON object.
+    #[default]
+    Json,
+    /// The places as a point cloud.
+    Ply,
+    /// The causal trajectory of one agent as lines `t x y z qx qy qz qw`.
+    Tum,
+}
+
+/// What to export.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct ExportQuery {
+    /// `json` (the map; when absent), `ply` (the places) or `tum` (the trajectory of `agent`).
+    #[param(inline)]
+    format: Option<ExportFormat>,
+    /// Name of the agent, for `tum`.
+    agent: Option<String>,
+    /// Session of the agent, for `tum`; the current one when absent.
+    session: Option<u64>,
+}
+
+/// A whole map.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct MapExport {
+    /// The space.
+    space: SpaceInfo,
+    /// Its agents, in the order of enrolment.
+    agents: Vec<AgentSummary>,
+    /// Its places, by number.
+    places: Vec<Place>,
+    /// Its trips, by number, with their legs.
+    trips: Vec<TripDetail>,
+    /// Its landmarks, in the order of learning.
+    landmarks: Vec<Landmark>,
+}
+
+/// Export the map of a space.
+///
+/// The map is as it was when the request came, whatever happens while it is sent.
+#[utoipa::path(get, path = "/v1/spaces/{space}/export", tag = "spaces", operation_id = "export_space",
+    params(SpaceParam, ExportQuery),
+    responses(
+        (status = 200, description = "The map", content(
+            (MapExport = "application/json"), (String = "text/plain"))),
+        (status = 404, description = "There is no such space or agent"),
+        (status = 422, description = "A trajectory was asked for, but no agent named")))]
+pub(crate) async fn get(
+    SpaceOfPath(space): SpaceOfPath,
+    Query(query): Query<ExportQuery>,
+) -> Result<Response<Body>, Problem> {
+    let (mut response, file) = match query.format.unwrap_or_default() {
+        ExportFormat::Json => (map(&space).await?, format!("{}.json", space.name())),
+        ExportFormat::Ply => (cloud(&space).await?, format!("{}.ply", space.name())),
+        ExportFormat::Tum => {
+            let detail = "format=tum needs agent";
+            let agent = query
+                .agent
+                .ok_or_else(|| Problem::new(Kind::InvalidQuery, detail))?;
+            let file = format!("{}-{agent}.tum", space.name());
+            (trajectory(space, agent, query.session).await?, file)
+        }
+    };
+    if let Ok(disposition) = HeaderValue::try_from(format!("attachment; filename=\"{file}\"")) {
+        response
+            .headers_mut()
+            .insert(CONTENT_DISPOSITION, disposition);
+    }
+    Ok(response)
+}
+
+/// A list of a map that can be written from any of its items on, as JSON.
+type Section = fn(&CognitiveMap, &Space, u32) -> Vec<String>;
+
+async fn map(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
+    let map = space.snapshot().await?;
+    let info = answer::space_info(space.name(), space.settings(), &map);
+    let head = format!("{{\"space\":{}", text(&info));
+    let sections: [(&str, Section); 4] = [
+        ("agents", |_, space, first| {
+            let desks = space.agents_after(None, usize::MAX);
+            let desks = desks.iter().skip(first as usize).take(CHUNK_ITEMS);
+            desks
+                .map(|desk| {
+                    let (name, estimate) = (desk.name().to_owned(), desk.estimate());
+                    text(&AgentSummary { name, estimate })
+                })
+                .collect()
+        }),
+        ("places", |map, _, first| {
+            let places = map.places_from(PlaceId(first)).take(CHUNK_ITEMS);
+            places
+                .map(|(id, place)| text(&answer::place(map, id, place)))
+                .collect()
+        }),
+        ("trips", |map, _, first| {
+            // A trip has up to a thousand legs.
+            let trips = map.trips_from(TripId(first)).take(1);
+            trips
+                .map(|(id, trip)| text(&answer::trip_detail(map, id, trip)))
+                .collect()
+        }),
+        ("landmarks", |map, _, first| {
+            let ids = (first..).take(CHUNK_ITEMS).map(LandmarkId);
+            ids.map_while(|id| Some(text(&answer::landmark(map.landmark(id)?))))
+                .collect()
+        }),
+    ];
+    let space = Arc::clone(space);
+    let lists = sections.into_iter().flat_map(move |(name, section)| {
+        let (map, space, mut first) = (Arc::clone(&map), Arc::clone(&space), 0);
+        let items = std::iter::from_fn(move || {
+            let items = section(&map, &space, first);
+            if items.is_empty() {
+                return None;
+            }
+            let separator = if first == 0 { "" } else { "," };
+            first += u32::try_from(items.len()).ok()?;
+            Some(format!("{separator}{}", items.join(",")))
+        });
+        let open = std::iter::once(format!(",\"{name}\":["));
+        open.chain(items).chain(std::iter::once("]".to_owned()))
+    });
+    let texts = std::iter::once(head)
+        .chain(lists)
+        .chain(std::iter::once("}".to_owned()));
+    Ok(reply::with_type("application/json", streamed(texts)))
+}
+
+async fn cloud(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
+    let map = space.snapshot().await?;
+    let head = format!(
+        "ply\nformat ascii 1.0\ncomment places of the cogmap space {}\nelement vertex {}\n\
+         property double x\nproperty double y\nproperty double z\n\
+         property uint id\nproperty uint visits\nend_header\n",
+        space.name(),
+        map.place_count()
+    );
+    let mut first = 0;
+    let lines = std::iter::from_fn(move || {
+        let mut lines = String::new();
+        for (id, place) in map.places_from(PlaceId(first)).take(CHUNK_ITEMS) {
+            let (at, visits) = (place.position(), place.visits().min(u32::MAX.into()));
+            writeln!(lines, "{} {} {} {} {visits}", at.x, at.y, at.z, id.0)
+                .expect("a text takes what fits into memory");
+            first = id.0.checked_add(1)?;
+        }
+        (!lines.is_empty()).then_some(lines)
+    });
+    Ok(reply::with_type(
+        TUM,
+        streamed(std::iter::once(head).chain(lines)),
+    ))
+}
+
+async fn trajectory(
+    space: Arc<Space>,
+    agent: String,
+    session: Option<u64>,
+) -> Result<Response<Body>, Problem> {
+    // The first page comes before the answer's head, so that its errors can still be told.
+    let first = space
+        .trajectory(&agent, session, None, None, PAGE_ITEMS_MAX)
+        .await?;
+    let session = first.session;
+    let pages = stream::try_unfold(Some(first), move |page| {
+        let (space, agent) = (Arc::clone(&space), agent.clone());
+        async move {
+            let Some(page) = page else { return Ok(None) };
+            let next = match page.next_from_ns {
+                None => None,
+                from => Some(
+                    space
+                        .trajectory(&agent, Some(session), from, None, PAGE_ITEMS_MAX)
+                        .await?,
+                ),
+            };
+            Ok::<_, TrajectoryError>(Some((Bytes::from(tum(&page.poses)), next)))
+        }
+    });
+    Ok(reply::with_type(TUM, Body::from_stream(pages)))
+}
+
+fn text<T: Serialize>(message: &T) -> String {
+    serde_json::to_string(message).expect("plain data encodes")
+}
+
+fn streamed(texts: impl Iterator<Item = String> + Send + 'static) -> Body {
+    Body::from_stream(stream::iter(
+        texts.map(|text| Ok::<_, Infallible>(Bytes::from(text))),
+    ))
+}

@@ -1,0 +1,246 @@
+//! What handlers take from a request; whatever does not fit is answered as a problem.
+
+use std::sync::Arc;
+
+use axum::body::Bytes;
+use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::http::StatusCode;
+use axum::http::header::{CONTENT_TYPE, HeaderValue};
+use axum::http::request::Parts;
+use cogmap_proto::{Codec, Name};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::json;
+use super::problem::{Kind, Problem};
+use super::state::Service;
+use crate::engine::{AgentDesk, Space};
+
+/// The space that the path names.
+#[derive(Debug)]
+pub(crate) struct SpaceOfPath(pub(crate) Arc<Space>);
+
+/// The space that the path names, and the name of an agent that may be there or not.
+#[derive(Debug)]
+pub(crate) struct AgentName(pub(crate) Arc<Space>, pub(crate) Name);
+
+/// The space and the agent that the path names.
+#[derive(Debug)]
+pub(crate) struct AgentOfPath(pub(crate) Arc<Space>, pub(crate) Arc<AgentDesk>);
+
+/// Query parameters; unknown ones are refused.
+#[derive(Debug)]
+pub(crate) struct Query<T>(pub(crate) T);
+
+/// No query parameters at all.
+#[derive(Debug)]
+pub(crate) struct NoQuery;
+
+/// A JSON body.
+#[derive(Debug)]
+pub(crate) struct Json<T>(pub(crate) T);
+
+/// A body in one of the codecs, and which one its `Content-Type` says.
+#[derive(Debug)]
+pub(crate) struct Encoded {
+    pub(crate) codec: Codec,
+    pub(crate) bytes: Bytes,
+}
+
+/// A space in a path.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Path)]
+pub(crate) struct SpaceParam {
+    /// Name of the space.
+    #[param(
+        pattern = "^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+        min_length = 1,
+        max_length = 64
+    )]
+    pub(crate) space: String,
+}
+
+/// An agent of a space in a path.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Path)]
+pub(crate) struct AgentParams {
+    /// Name of the space.
+    #[param(
+        pattern = "^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+        min_length = 1,
+        max_length = 64
+    )]
+    space: String,
+    /// Name of the agent.
+    #[param(
+        pattern = "^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+        min_length = 1,
+        max_length = 64
+    )]
+    agent: String,
+}
+
+/// A place or trip of a space in a path.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Path)]
+pub(crate) struct IdParams {
+    /// Name of the space.
+    #[param(
+        pattern = "^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+        min_length = 1,
+        max_length = 64
+    )]
+    pub(crate) space: String,
+    /// Its number.
+    pub(crate) id: u64,
+}
+
+/// A landmark of a space in a path.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Path)]
+pub(crate) struct LabelParams {
+    /// Name of the space.
+    #[param(
+        pattern = "^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+        min_length = 1,
+        max_length = 64
+    )]
+    pub(crate) space: String,
+    /// Label of the landmark.
+    #[param(min_length = 1, max_length = 128)]
+    pub(crate) id: String,
+}
+
+/// A name in a path.
+pub(crate) fn name(text: &str) -> Result<Name, Problem> {
+    text.parse()
+        .map_err(|error| Problem::new(Kind::InvalidPath, format!("{text:?}: {error}")))
+}
+
+/// The space of a name in a path.
+pub(crate) fn space(service: &Service, text: &str) -> Result<Arc<Space>, Problem> {
+    let found = service.engine.space(text);
+    // Only what was not found needs the name's rules: what exists has a valid one.
+    found.map_or_else(|| Err(Problem::unknown_space(name(text)?.as_str())), Ok)
+}
+
+/// The parameters of a path.
+pub(crate) async fn path<T>(parts: &mut Parts, service: &Service) -> Result<T, Problem>
+where
+    T: DeserializeOwned + Send,
+{
+    let path = Path::<T>::from_request_parts(parts, service).await;
+    path.map(|Path(params)| params)
+        .map_err(|rejection| Problem::new(Kind::InvalidPath, rejection.body_text()))
+}
+
+impl FromRequestParts<Service> for SpaceOfPath {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
+        let params: SpaceParam = path(parts, service).await?;
+        space(service, &params.space).map(Self)
+    }
+}
+
+impl FromRequestParts<Service> for AgentName {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
+        let params: AgentParams = path(parts, service).await?;
+        let agent = name(&params.agent)?;
+        Ok(Self(space(service, &params.space)?, agent))
+    }
+}
+
+impl FromRequestParts<Service> for AgentOfPath {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
+        let params: AgentParams = path(parts, service).await?;
+        let space = space(service, &params.space)?;
+        match space.agent(&params.agent) {
+            Some(desk) => Ok(Self(space, desk)),
+            None => Err(Problem::unknown_agent(name(&params.agent)?.as_str())),
+        }
+    }
+}
+
+impl<T: DeserializeOwned> FromRequestParts<Service> for Query<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &Service) -> Result<Self, Problem> {
+        axum::extract::Query::try_from_uri(&parts.uri)
+            .map(|axum::extract::Query(query)| Self(query))
+            .map_err(|rejection| Problem::new(Kind::InvalidParameter, rejection.body_text()))
+    }
+}
+
+impl FromRequestParts<Service> for NoQuery {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &Service) -> Result<Self, Problem> {
+        match parts.uri.query() {
+            None | Some("") => Ok(Self),
+            Some(_) => Err(Problem::new(
+                Kind::InvalidParameter,
+                "this path takes no query parameters",
+            )),
+        }
+    }
+}
+
+impl<T: DeserializeOwned + Serialize> FromRequest<Service> for Json<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, service: &Service) -> Result<Self, Problem> {
+        must_be_json(request.headers().get(CONTENT_TYPE))?;
+        let bytes = whole_body(request, service).await?;
+        json::message(&bytes).map(Self)
+    }
+}
+
+impl FromRequest<Service> for Encoded {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, service: &Service) -> Result<Self, Problem> {
+        let codec = codec(request.headers().get(CONTENT_TYPE))?;
+        Ok(Self {
+            codec,
+            bytes: whole_body(request, service).await?,
+        })
+    }
+}
+
+/// The codec that a `Content-Type` names.
+fn codec(media_type: Option<&HeaderValue>) -> Result<Codec, Problem> {
+    let media_type = media_type
+        .and_then(|value| value.to_str().ok())
+        .unwrap_or_default();
+    Codec::of_encoding(media_type)
+        .map_err(|error| Problem::new(Kind::UnsupportedMediaType, error.to_string()))
+}
+
+/// Refuses a `Content-Type` that is not JSON.
+pub(crate) fn must_be_json(media_type: Option<&HeaderValue>) -> Result<(), Problem> {
+    match codec(media_type)? {
+        Codec::Json => Ok(()),
+        Codec::Cbor | Codec::Postcard => {
+            let detail = format!("a body here is {}", Codec::Json.encoding());
+            Err(Problem::new(Kind::UnsupportedMediaType, detail))
+        }
+    }
+}
+
+/// The whole body.
+pub(crate) async fn whole_body(request: Request, service: &Service) -> Result<Bytes, Problem> {
+    Bytes::from_request(request, service)
+        .await
+        .map_err(|rejection| {
+            let kind = match rejection.status() {
+                StatusCode::PAYLOAD_TOO_LARGE => Kind::BodyTooLong,
+                _ => Kind::MalformedBody,
+            };
+            Problem::new(kind, rejection.body_text())
+        })
+}

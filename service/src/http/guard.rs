@@ -1,0 +1,171 @@
+//! What stands before every handler: the token, the bounds, the clock and the count.
+
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::panic::AssertUnwindSafe;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use axum::body::Body;
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::header::AUTHORIZATION;
+use axum::http::{Response, StatusCode};
+use axum::middleware::Next;
+use axum::response::IntoResponse;
+use futures_util::FutureExt;
+use metrics::{Counter, Histogram, counter, histogram};
+use subtle::ConstantTimeEq;
+use tokio::sync::Semaphore;
+
+use super::problem::{Kind, Problem};
+use super::settings::HttpSettings;
+use crate::config::Token;
+use crate::metrics::{HTTP_REQUEST_SECONDS, HTTP_REQUESTS};
+
+/// Paths that need no token and are answered however much is under way.
+const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
+/// Label of requests that no route matches.
+const UNMATCHED: &str = "unmatched";
+/// Statuses that have counters of their own.
+const STATUSES: [u16; 17] = [
+    200, 201, 204, 303, 400, 401, 404, 405, 409, 413, 415, 422, 500, 503, 504, 507, 0,
+];
+
+/// What stands before every handler.
+#[derive(Clone)]
+pub(crate) struct Guard(Arc<Inner>);
+
+struct Inner {
+    token: Option<Token>,
+    timeout: Duration,
+    requests: Semaphore,
+    routes: BTreeMap<String, RouteMeters>,
+    unmatched: RouteMeters,
+}
+
+/// Meters of a route. Handles are taken once, so that counting allocates nothing.
+struct RouteMeters {
+    route: String,
+    seconds: Histogram,
+    by_status: [OnceLock<Counter>; STATUSES.len()],
+}
+
+impl Guard {
+    pub(crate) fn new(settings: &HttpSettings, routes: impl Iterator<Item = String>) -> Self {
+        Self(Arc::new(Inner {
+            token: settings.token.clone(),
+            timeout: settings.request_timeout,
+            requests: Semaphore::new(settings.requests_max),
+            routes: routes
+                .map(|route| (route.clone(), RouteMeters::new(route)))
+                .collect(),
+            unmatched: RouteMeters::new(UNMATCHED.to_owned()),
+        }))
+    }
+
+    async fn answer(&self, request: Request, next: Next) -> Response<Body> {
+        let mut _permit = None;
+        if !OPEN_PATHS.contains(&request.uri().path()) {
+            if !self.admits(&request) {
+                let detail = "the header Authorization must be: Bearer, a space, the token";
+                return Problem::new(Kind::Unauthorized, detail).into_response();
+            }
+            match self.0.requests.try_acquire() {
+                Ok(permit) => _permit = Some(permit),
+                Err(_) => return Problem::new(Kind::Busy, "too much is under way").into_response(),
+            }
+        }
+        let answer = AssertUnwindSafe(next.run(request)).catch_unwind();
+        match tokio::time::timeout(self.0.timeout, answer).await {
+            Ok(Ok(response)) => response,
+            Ok(Err(panic)) => {
+                tracing::error!(panic = words(&*panic), "a handler ended with a panic");
+                Problem::new(Kind::Internal, "a fault of the service; its log says more")
+                    .into_response()
+            }
+            Err(_) => {
+                let detail = format!("no answer within {} s", self.0.timeout.as_secs_f64());
+                Problem::new(Kind::Timeout, detail).into_response()
+            }
+        }
+    }
+
+    /// Whether the request carries the token, if one is asked for.
+    fn admits(&self, request: &Request) -> bool {
+        let Some(token) = &self.0.token else {
+            return true;
+        };
+        let header = request
+            .headers()
+            .get(AUTHORIZATION)
+            .map_or(&[][..], |value| value.as_bytes());
+        // The scheme's name may be in any case (RFC 7235); the comparison of the secret takes the
+        // same time wherever the first difference is.
+        header
+            .split_at_checked("Bearer ".len())
+            .is_some_and(|(scheme, given)| {
+                scheme.eq_ignore_ascii_case(b"Bearer ")
+                    && bool::from(given.ct_eq(token.reveal().as_bytes()))
+            })
+    }
+
+    fn meters(&self, route: Option<&MatchedPath>) -> &RouteMeters {
+        let route = route.and_then(|route| self.0.routes.get(route.as_str()));
+        route.unwrap_or(&self.0.unmatched)
+    }
+}
+
+impl RouteMeters {
+    fn new(route: String) -> Self {
+        let seconds = histogram!(HTTP_REQUEST_SECONDS, "route" => route.clone());
+        Self {
+            route,
+            seconds,
+            by_status: Default::default(),
+        }
+    }
+
+    fn note(&self, status: StatusCode, seconds: f64) {
+        self.seconds.record(seconds);
+        // The last status stands for all others.
+        let known = STATUSES.iter().position(|known| *known == status.as_u16());
+        let meter = &self.by_status[known.unwrap_or(STATUSES.len() - 1)];
+        let counter = meter.get_or_init(|| {
+            let status = if known.is_some() {
+                status.as_str()
+            } else {
+                "other"
+            }
+            .to_owned();
+            counter!(HTTP_REQUESTS, "route" => self.route.clone(), "status" => status)
+        });
+        counter.increment(1);
+    }
+}
+
+/// The middleware.
+pub(crate) async fn guard(
+    State(guard): State<Guard>,
+    route: Option<MatchedPath>,
+    request: Request,
+    next: Next,
+) -> Response<Body> {
+    let start = Instant::now();
+    let traced = tracing::enabled!(tracing::Level::DEBUG)
+        .then(|| (request.method().clone(), request.uri().path().to_owned()));
+    let response = guard.answer(request, next).await;
+    let seconds = start.elapsed().as_secs_f64();
+    guard
+        .meters(route.as_ref())
+        .note(response.status(), seconds);
+    if let Some((method, path)) = traced {
+        tracing::debug!(%method, path, status = response.status().as_u16(), seconds, "answered");
+    }
+    response
+}
+
+fn words(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no words")
+}

@@ -1,0 +1,125 @@
+//! JSON bodies, read as their schemas say rather than as serde would.
+//!
+//! To JSON Schema `1.0` is an integer, and some languages write integers so; to serde it is not. And
+//! serde takes an array for an object, which no schema here does.
+
+use cogmap_proto::{Codec, DecodeError, SampleBatch};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use super::problem::{Kind, Problem};
+
+/// Largest number up to which every integer has a float of its own.
+const FLOAT_INTEGER_MAX: f64 = 9_007_199_254_740_992.0;
+
+/// A JSON text as a message.
+pub(crate) fn message<T: DeserializeOwned + Serialize>(bytes: &[u8]) -> Result<T, Problem> {
+    let malformed = |detail: String| Problem::new(Kind::MalformedBody, detail);
+    let mut given: Value =
+        serde_json::from_slice(bytes).map_err(|error| malformed(error.to_string()))?;
+    make_whole_numbers_integers(&mut given);
+    let message = T::deserialize(&given).map_err(|error| malformed(error.to_string()))?;
+    let written = serde_json::to_value(&message).map_err(|error| malformed(error.to_string()))?;
+    if has_array_for_object(&given, &written) {
+        return Err(malformed(
+            "there is an array where an object should be".to_owned(),
+        ));
+    }
+    Ok(message)
+}
+
+/// Whether an array stands in `given` for an object: serde takes one for the fields in their order,
+/// and an empty one for no fields at all, which nobody means.
+fn has_array_for_object(given: &Value, written: &Value) -> bool {
+    match (given, written) {
+        (Value::Array(_), Value::Object(_)) => true,
+        (Value::Array(given), Value::Array(written)) => given
+            .iter()
+            .zip(written)
+            .any(|(given, written)| has_array_for_object(given, written)),
+        (Value::Object(given), Value::Object(written)) => given.iter().any(|(key, given)| {
+            written
+                .get(key)
+                .is_some_and(|written| has_array_for_object(given, written))
+        }),
+        _ => false,
+    }
+}
+
+/// A batch of samples. What serde can read directly takes no detour.
+pub(crate) fn batch(bytes: &[u8]) -> Result<SampleBatch, DecodeError> {
+    let array = bytes.trim_ascii_start().first() == Some(&b'[');
+    if array {
+        let detail = "a batch is an object, not an array".to_owned();
+        return Err(DecodeError::Malformed {
+            codec: Codec::Json.name(),
+            detail,
+        });
+    }
+    let direct = Codec::Json.decode_batch(bytes);
+    if !matches!(direct, Err(DecodeError::Malformed { .. })) {
+        return direct;
+    }
+    let Ok(mut value) = serde_json::from_slice::<Value>(bytes) else {
+        return direct;
+    };
+    make_whole_numbers_integers(&mut value);
+    Codec::Json
+        .decode_batch(value.to_string().as_bytes())
+        .or(direct)
+}
+
+fn make_whole_numbers_integers(value: &mut Value) {
+    match value {
+        Value::Number(number) => {
+            let float = number.as_f64().filter(|_| number.is_f64());
+            if let Some(float) = float
+                && float.fract() == 0.0
+                && float.abs() <= FLOAT_INTEGER_MAX
+            {
+                #[expect(clippy::cast_possible_truncation, reason = "whole and within 2⁵³")]
+                let integer = float as i64;
+                *value = integer.into();
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(make_whole_numbers_integers),
+        Value::Object(object) => object.values_mut().for_each(make_whole_numbers_integers),
+        Value::Null | Value::Bool(_) | Value::String(_) => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cogmap_proto::{RecallQuery, SpaceSettings};
+
+    use super::*;
+
+    #[test]
+    fn whole_floats_are_integers_and_others_are_not() {
+        let read = |text: &str| message::<RecallQuery>(text.as_bytes());
+        let query = read("{\"since_ns\": -3.0, \"position_m\": [1.0, 2, 0.5]}").expect("legal");
+        assert_eq!(
+            (query.since_ns, query.position_m),
+            (Some(-3), Some([1.0, 2.0, 0.5]))
+        );
+        assert!(read("{\"since_ns\": 0.5}").is_err());
+        assert!(read("{\"since_ns\": 1e300}").is_err());
+        let text = b"{\"session\": 1.0, \"first_seq\": 2.0, \"samples\": [{\"stamp_ns\": 3.0, \
+            \"body\": {\"marker\": {\"label\": \"a\"}}}]}";
+        let batch = batch(text).expect("legal");
+        assert_eq!(
+            (batch.session, batch.first_seq, batch.samples[0].stamp_ns),
+            (1, 2, 3)
+        );
+    }
+
+    #[test]
+    fn arrays_are_not_objects_at_any_depth() {
+        let read = |text: &str| message::<SpaceSettings>(text.as_bytes());
+        assert!(read("{\"odometry_noise\": {}}").is_ok());
+        assert!(read("[]").is_err());
+        assert!(read("{\"odometry_noise\": []}").is_err());
+        assert!(batch(b" [1, 0, [{\"stamp_ns\": 0, \"body\": {\"marker\": [\"a\"]}}]]").is_err());
+    }
+}

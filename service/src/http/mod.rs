@@ -1,0 +1,168 @@
+//! The HTTP interface: questions, samples and administration, described by `OpenAPI`.
+//!
+//! Routes and their description are one: each handler carries both. Every error is a problem
+//! document; `guard` stands before all handlers.
+
+mod agents;
+mod docs;
+mod events;
+mod export;
+mod extract;
+mod guard;
+mod health;
+mod json;
+mod landmarks;
+mod listener;
+mod openapi;
+mod page;
+mod places;
+mod problem;
+mod recall;
+mod reply;
+mod samples;
+mod settings;
+mod spaces;
+mod state;
+mod trajectory;
+mod trips;
+
+use std::future::{Future, IntoFuture};
+use std::io;
+
+use axum::Router;
+use axum::extract::DefaultBodyLimit;
+use axum::middleware;
+use cogmap_proto::limits::MESSAGE_BYTES_MAX;
+use metrics_exporter_prometheus::PrometheusHandle;
+use tokio::net::TcpListener;
+use tokio::sync::watch;
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+pub use problem::{Kind, Problem};
+pub use settings::HttpSettings;
+
+use crate::engine::Engine;
+use guard::{Guard, guard};
+use listener::BoundedListener;
+use state::Service;
+
+/// What the description says of the whole.
+#[derive(OpenApi)]
+#[openapi(
+    info(title = "cogmap", description = "Shared spatial memory for robot teams. Units are SI, \
+        angles radians, stamps nanoseconds of the sensor's clock, quaternions [x, y, z, w]; \
+        positions are in the frame `map` of their space."),
+    tags(
+        (name = "spaces", description = "Spaces, their events and exports"),
+        (name = "agents", description = "Where agents are, where they were, and their samples"),
+        (name = "memory", description = "Places, trips and landmarks"),
+        (name = "service", description = "Health and metrics")),
+    components(schemas(cogmap_proto::Problem)))]
+struct Description;
+
+fn described() -> OpenApiRouter<Service> {
+    OpenApiRouter::with_openapi(Description::openapi())
+        .routes(routes!(spaces::list))
+        .routes(routes!(spaces::get, spaces::put, spaces::delete))
+        .routes(routes!(agents::list))
+        .routes(routes!(agents::get))
+        .routes(routes!(agents::grid))
+        .routes(routes!(trajectory::get))
+        .routes(routes!(samples::post))
+        .routes(routes!(recall::post))
+        .routes(routes!(places::list))
+        .routes(routes!(places::get))
+        .routes(routes!(trips::list))
+        .routes(routes!(trips::get))
+        .routes(routes!(landmarks::list))
+        .routes(routes!(landmarks::get))
+        .routes(routes!(events::get))
+        .routes(routes!(export::get))
+        .routes(routes!(health::healthz))
+        .routes(routes!(health::readyz))
+        .routes(routes!(health::metrics))
+}
+
+/// The description of the interface (`OpenAPI` 3.1, JSON). With `token`, it says that a bearer token is
+/// asked for.
+///
+/// # Panics
+/// Never: a description is plain data.
+pub fn openapi(token: bool) -> serde_json::Value {
+    let described = described().into_openapi();
+    let plain = serde_json::to_value(described).expect("plain data encodes");
+    openapi::complete(plain, token)
+}
+
+/// The whole interface as a service. Event streams end when `stopping` turns true.
+pub fn router(
+    engine: Engine,
+    settings: &HttpSettings,
+    prometheus: PrometheusHandle,
+    stopping: watch::Receiver<bool>,
+) -> Router {
+    let (described, paths) = described().split_for_parts();
+    let guarded = Guard::new(settings, paths.paths.paths.into_keys());
+    described
+        .merge(docs::routes(&openapi(settings.token.is_some())))
+        .fallback(unknown_route)
+        .method_not_allowed_fallback(method_not_allowed)
+        .layer(DefaultBodyLimit::max(MESSAGE_BYTES_MAX))
+        .layer(middleware::from_fn_with_state(guarded, guard))
+        .with_state(Service::new(engine, prometheus, settings, stopping))
+}
+
+async fn unknown_route() -> Problem {
+    Problem::new(
+        Kind::UnknownRoute,
+        "there is nothing under this path; /docs lists what there is",
+    )
+}
+
+async fn method_not_allowed() -> Problem {
+    Problem::new(
+        Kind::MethodNotAllowed,
+        "the header Allow lists the methods of this path",
+    )
+}
+
+/// Serves until `shutdown` comes, then finishes what is under way, within a bounded time.
+///
+/// # Errors
+/// The listener fails.
+pub async fn run(
+    listener: TcpListener,
+    engine: Engine,
+    settings: HttpSettings,
+    prometheus: PrometheusHandle,
+    shutdown: impl Future<Output = ()> + Send + 'static,
+) -> io::Result<()> {
+    let (stop, stopping) = watch::channel(false);
+    let router = router(engine, &settings, prometheus, stopping.clone());
+    let signal = async move {
+        shutdown.await;
+        stop.send_replace(true);
+    };
+    let listener = BoundedListener::new(listener, settings.connections_max);
+    let served = axum::serve(listener, router)
+        .with_graceful_shutdown(signal)
+        .into_future();
+    let mut stopping = stopping;
+    let overdue = async move {
+        // The sender goes after it has sent, so an error means the same as a stop.
+        let _ = stopping.wait_for(|stopping| *stopping).await;
+        tokio::time::sleep(settings.shutdown_timeout).await;
+    };
+    tokio::select! {
+        result = served => result,
+        () = overdue => {
+            tracing::warn!("requests were still under way when the time to finish them was over");
+            Ok(())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,258 @@
+//! The description of the interface: what the handlers say of themselves, completed by what holds
+//! for all of them.
+
+use cogmap_proto::limits::{BATCH_SAMPLES_MAX, GRID_MODULES_MAX, METRES_MAX, NAME_BYTES_MAX};
+use serde_json::{Map, Value, json};
+
+use super::problem::PROBLEM_JSON;
+
+/// Statuses that every route may answer with, whoever handles it.
+const EVERYWHERE: [(&str, &str); 6] = [
+    ("400", "The request is malformed"),
+    ("401", "The token is missing or wrong"),
+    ("405", "The path does not take this method"),
+    ("500", "A fault of the service, or the store has failed"),
+    (
+        "503",
+        "The service is busy, loading or closing; come back after Retry-After",
+    ),
+    ("504", "The answer took too long"),
+];
+/// Statuses of routes that take a body.
+const WITH_BODY: [(&str, &str); 2] = [
+    ("413", "The body is too long"),
+    ("415", "The body's Content-Type is not one of these"),
+];
+
+/// Lengths of arrays, by the names of the fields that hold them.
+const LENGTHS: [(&str, usize); 20] = [
+    ("translation_m", 3),
+    ("rotation_xyzw", 4),
+    ("translation_sd_m", 3),
+    ("rotation_sd_rad", 3),
+    ("linear_m_s", 3),
+    ("angular_rad_s", 3),
+    ("offset_m", 3),
+    ("normal", 3),
+    ("sd_m", 3),
+    ("position_m", 3),
+    ("position_sd_m", 3),
+    ("reference", 3),
+    ("reference_m", 3),
+    ("phase", 3),
+    ("decoded_m", 3),
+    ("interference_m", 3),
+    ("covariance", 21),
+    ("min_m", 3),
+    ("max_m", 3),
+    ("activation", 27),
+];
+
+/// Completes a description. With `token`, it says that a bearer token is asked for.
+pub(crate) fn complete(mut openapi: Value, token: bool) -> Value {
+    for (path, item) in entries(&mut openapi["paths"]) {
+        for (_, operation) in entries(item) {
+            complete_operation(operation);
+            if token && !matches!(path.as_str(), "/healthz" | "/readyz") {
+                operation["security"] = json!([{ "token": [] }]);
+            }
+        }
+    }
+    if token {
+        openapi["components"]["securitySchemes"] =
+            json!({ "token": { "type": "http", "scheme": "bearer" } });
+    }
+    bound_integers(&mut openapi);
+    measure_arrays(&mut openapi);
+    close_variants(&mut openapi["components"]["schemas"]);
+    let creation = &mut openapi["paths"]["/v1/spaces/{space}"]["put"]["requestBody"];
+    creation["required"] = json!(false);
+    constrain(&mut openapi["components"]["schemas"]);
+    openapi
+}
+
+fn complete_operation(operation: &mut Value) {
+    let with_body = operation.get("requestBody").is_some();
+    let responses = &mut operation["responses"];
+    for (status, description) in EVERYWHERE {
+        add(responses, status, description);
+    }
+    if with_body {
+        for (status, description) in WITH_BODY {
+            add(responses, status, description);
+        }
+    }
+    for (status, response) in entries(responses) {
+        if status.as_str() >= "400" && response.get("content").is_none() {
+            let schema = json!({ "$ref": "#/components/schemas/Problem" });
+            response["content"] = json!({ PROBLEM_JSON: { "schema": schema } });
+        }
+    }
+}
+
+fn add(responses: &mut Value, status: &str, description: &str) {
+    if responses.get(status).is_none() {
+        responses[status] = json!({ "description": description });
+    }
+}
+
+/// Gives integers the bounds of their type, and those without a sign a format that says so: JSON has
+/// neither of its own.
+fn bound_integers(value: &mut Value) {
+    if let Some(object) = value.as_object_mut() {
+        let format = object.get("format").and_then(Value::as_str);
+        let unsigned = object.get("minimum").is_some();
+        let bounds = match (format, unsigned) {
+            (Some("int64"), false) => Some(("int64", json!(i64::MIN), json!(i64::MAX))),
+            (Some("int64"), true) => Some(("uint64", json!(0), json!(u64::MAX))),
+            (Some("int32"), false) => Some(("int32", json!(i32::MIN), json!(i32::MAX))),
+            (Some("int32"), true) => Some(("uint32", json!(0), json!(u32::MAX))),
+            _ => None,
+        };
+        if let Some((format, minimum, maximum)) = bounds {
+            object.insert("format".to_owned(), json!(format));
+            object.entry("minimum").or_insert(minimum);
+            object.entry("maximum").or_insert(maximum);
+        }
+    }
+    match value {
+        Value::Object(object) => object.values_mut().for_each(bound_integers),
+        Value::Array(items) => items.iter_mut().for_each(bound_integers),
+        _ => {}
+    }
+}
+
+/// Writes the lengths of arrays into all schemas: the derived ones do not tell `[f64; 3]` from a list.
+fn measure_arrays(value: &mut Value) {
+    match value {
+        Value::Object(object) => {
+            for (name, length) in LENGTHS {
+                if let Some(field) = object.get_mut(name) {
+                    merge_into_array(field, length);
+                }
+            }
+            // A parameter carries its name beside its schema.
+            let length = LENGTHS
+                .iter()
+                .find(|(name, _)| object.get("name") == Some(&json!(name)));
+            if let (Some((_, length)), Some(schema)) = (length, object.get_mut("schema")) {
+                merge_into_array(schema, *length);
+            }
+            object.values_mut().for_each(measure_arrays);
+        }
+        Value::Array(items) => items.iter_mut().for_each(measure_arrays),
+        _ => {}
+    }
+}
+
+/// A variant is an object with one key: its name.
+fn close_variants(schemas: &mut Value) {
+    for (_, schema) in entries(schemas) {
+        let variants = schema.get_mut("oneOf").and_then(Value::as_array_mut);
+        for variant in variants.into_iter().flatten() {
+            if variant["properties"]
+                .as_object()
+                .is_some_and(|keys| keys.len() == 1)
+            {
+                merge(variant, &json!({ "additionalProperties": false }));
+            }
+        }
+    }
+}
+
+fn merge_into_array(schema: &mut Value, length: usize) {
+    let types = &schema["type"];
+    let array = types == "array"
+        || types
+            .as_array()
+            .is_some_and(|types| types.iter().any(|one| one == "array"));
+    if array {
+        merge(schema, &json!({ "minItems": length, "maxItems": length }));
+    }
+}
+
+/// Writes the bounds of request bodies into their schemas: the types cannot carry them.
+fn constrain(schemas: &mut Value) {
+    let metres = json!({ "minimum": -METRES_MAX, "maximum": METRES_MAX });
+    let query = &mut schemas["RecallQuery"]["properties"];
+    merge(&mut query["position_m"]["items"], &metres);
+    merge(
+        &mut query["radius_m"],
+        &json!({ "minimum": 0.0, "maximum": METRES_MAX }),
+    );
+    merge(
+        &mut query["limit"],
+        &json!({ "minimum": 1, "maximum": 1000 }),
+    );
+    merge(
+        &mut query["agent"],
+        &json!({
+            "pattern": "^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+            "minLength": 1,
+            "maxLength": NAME_BYTES_MAX,
+        }),
+    );
+    let phase = &mut query["code"]["items"];
+    merge_into_array(phase, 3);
+    merge(
+        &mut phase["items"],
+        &json!({ "minimum": 0.0, "exclusiveMaximum": 1.0 }),
+    );
+    merge(
+        &mut query["code"],
+        &json!({ "minItems": 1, "maxItems": GRID_MODULES_MAX }),
+    );
+    merge_into_array(&mut schemas["Landmark"]["properties"]["covariance"], 6);
+    let batch = &mut schemas["SampleBatch"]["properties"];
+    merge(
+        &mut batch["samples"],
+        &json!({ "minItems": 1, "maxItems": BATCH_SAMPLES_MAX }),
+    );
+    merge(
+        &mut batch["first_seq"],
+        &json!({ "maximum": u64::MAX - BATCH_SAMPLES_MAX as u64 }),
+    );
+    let share = json!({ "minimum": 0.0, "maximum": 1.0 });
+    let noise = &mut schemas["NoiseSettings"]["properties"];
+    for (_, field) in entries(noise) {
+        merge(field, &share);
+    }
+    let bernoulli = "/Recruitment/oneOf/1/properties/bernoulli/properties/probability";
+    if let Some(probability) = schemas.pointer_mut(bernoulli) {
+        merge(probability, &share);
+    }
+    let settings = &mut schemas["SpaceSettings"]["properties"];
+    let large = json!({ "minimum": 0.001, "maximum": 1e6 });
+    for field in ["grid_spacing_m", "field_radius_m"] {
+        merge(&mut settings[field], &large);
+    }
+    let positive = json!({ "exclusiveMinimum": 0.0, "maximum": 1e6 });
+    for field in [
+        "localized_sd_m",
+        "lost_sd_m",
+        "trip_stillness_s",
+        "trip_gap_s",
+    ] {
+        merge(&mut settings[field], &positive);
+    }
+    merge(
+        &mut settings["grid_modules"],
+        &json!({ "minimum": 1, "maximum": 16 }),
+    );
+    merge(
+        &mut settings["grid_ratio"],
+        &json!({ "exclusiveMinimum": 1.0, "maximum": 10.0 }),
+    );
+    let interval = json!({ "minimum": 0.001, "maximum": 3600.0 });
+    merge(&mut settings["trajectory_interval_s"], &interval);
+}
+
+fn merge(into: &mut Value, from: &Value) {
+    if let (Some(into), Some(from)) = (into.as_object_mut(), from.as_object()) {
+        into.extend(from.clone());
+    }
+}
+
+fn entries(value: &mut Value) -> impl Iterator<Item = (&String, &mut Value)> {
+    value.as_object_mut().into_iter().flat_map(Map::iter_mut)
+}

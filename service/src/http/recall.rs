@@ -1,0 +1,30 @@
+//! Recall of places.
+
+use axum::body::Body;
+use axum::http::Response;
+use cogmap_proto::{RecallAnswer, RecallQuery};
+
+use super::extract::{Json, NoQuery, SpaceOfPath, SpaceParam};
+use super::problem::Problem;
+use super::reply;
+use crate::answer;
+
+/// Recall places by position, by grid code or by both; filtered by agent and time.
+#[utoipa::path(post, path = "/v1/spaces/{space}/recall", tag = "memory", operation_id = "recall",
+    params(SpaceParam), request_body = RecallQuery,
+    responses(
+        (status = 200, description = "The places, best first", body = RecallAnswer),
+        (status = 404, description = "There is no such space"),
+        (status = 422, description = "The query makes no sense in this space")))]
+pub(crate) async fn post(
+    SpaceOfPath(space): SpaceOfPath,
+    _: NoQuery,
+    Json(query): Json<RecallQuery>,
+) -> Result<Response<Body>, Problem> {
+    let map = space.snapshot().await?;
+    // A cue by code is compared with every place: work for a thread that may be busy.
+    let answered = tokio::task::spawn_blocking(move || {
+        answer::recall(space.name(), &map, &query).map(|answer| reply::json(&answer))
+    });
+    Ok(answered.await.map_err(|_| Problem::interrupted())??)
+}

@@ -1,0 +1,49 @@
+//! Samples over HTTP.
+
+use axum::body::Body;
+use axum::http::Response;
+use cogmap_proto::{Codec, DecodeError, IngestAnswer, SampleBatch};
+
+use super::extract::{AgentName, AgentParams, Encoded, NoQuery};
+use super::json;
+use super::problem::{Kind, Problem, SequenceProblem};
+use super::reply;
+
+/// Send samples.
+///
+/// Answers when they are on disk. Samples that had been there before are counted and otherwise
+/// ignored, so a request may be sent again after a broken connection. Samples that make no sense are
+/// refused one by one and listed in the watermark.
+#[utoipa::path(post, path = "/v1/spaces/{space}/agents/{agent}/samples", tag = "agents",
+    operation_id = "send_samples", params(AgentParams),
+    request_body(content(
+        (SampleBatch = "application/json"),
+        (SampleBatch = "application/cbor"),
+        (Vec<u8> = "application/vnd.cogmap.postcard;v1")),
+        description = "Consecutive samples of the agent"),
+    responses(
+        (status = 200, description = "The samples are on disk", body = IngestAnswer),
+        (status = 404, description = "There is no such space"),
+        (status = 409, description = "Earlier samples are missing, a newer session has taken the \
+            agent over, or the space has its full number of agents",
+            body = SequenceProblem, content_type = "application/problem+json"),
+        (status = 507, description = "The store is full")))]
+pub(crate) async fn post(
+    AgentName(space, agent): AgentName,
+    _: NoQuery,
+    body: Encoded,
+) -> Result<Response<Body>, Problem> {
+    let batch = match body.codec {
+        Codec::Json => json::batch(&body.bytes),
+        Codec::Cbor | Codec::Postcard => body.codec.decode_batch(&body.bytes),
+    };
+    let batch = batch.map_err(|error| {
+        let kind = match error {
+            DecodeError::TooLong(_) => Kind::BodyTooLong,
+            _ => Kind::MalformedBody,
+        };
+        Problem::new(kind, error.to_string())
+    })?;
+    let answer: IngestAnswer = space.ingest(&agent, batch).await?;
+    Ok(reply::json(&answer))
+}

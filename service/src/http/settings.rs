@@ -1,0 +1,22 @@
+//! What the HTTP interface needs to know.
+
+use std::time::Duration;
+
+use crate::config::Token;
+
+/// Settings of the HTTP interface. The settings file explains them.
+#[derive(Clone, Debug)]
+pub struct HttpSettings {
+    /// Bearer token that requests must carry; absent, none is asked for.
+    pub token: Option<Token>,
+    /// Longest time from a request's head to the head of its answer.
+    pub request_timeout: Duration,
+    /// Most requests under way.
+    pub requests_max: usize,
+    /// Most open event streams.
+    pub streams_max: usize,
+    /// Most connections.
+    pub connections_max: usize,
+    /// Longest wait for open requests when the service stops.
+    pub shutdown_timeout: Duration,
+}

@@ -1,0 +1,133 @@
+//! Spaces.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::extract::{FromRequest, Request, State};
+use axum::http::header::{CONTENT_TYPE, LOCATION};
+use axum::http::{HeaderValue, Response, StatusCode};
+use cogmap_proto::{Name, SpaceInfo, SpaceList, SpaceSettings};
+
+use super::extract::{NoQuery, SpaceOfPath, SpaceParam, must_be_json, name, whole_body};
+use super::json;
+use super::problem::{Kind, Problem};
+use super::reply;
+use super::state::Service;
+use crate::answer;
+use crate::engine::{Space, Unavailable};
+
+/// How often to look whether a new space has been set up.
+const SET_UP_POLL: Duration = Duration::from_millis(1);
+
+/// The spaces.
+#[utoipa::path(get, path = "/v1/spaces", tag = "spaces", operation_id = "list_spaces",
+    responses((status = 200, description = "All spaces, by name", body = SpaceList)))]
+pub(crate) async fn list(
+    State(service): State<Service>,
+    _: NoQuery,
+) -> Result<Response<Body>, Problem> {
+    let mut spaces = Vec::new();
+    for space in service.engine.spaces() {
+        spaces.push(info(&space).await?);
+    }
+    Ok(reply::json(&SpaceList { spaces }))
+}
+
+/// A space.
+#[utoipa::path(get, path = "/v1/spaces/{space}", tag = "spaces", operation_id = "get_space",
+    params(SpaceParam),
+    responses(
+        (status = 200, description = "The space", body = SpaceInfo),
+        (status = 404, description = "There is no such space")))]
+pub(crate) async fn get(
+    SpaceOfPath(space): SpaceOfPath,
+    _: NoQuery,
+) -> Result<Response<Body>, Problem> {
+    Ok(reply::json(&info(&space).await?))
+}
+
+/// Create a space.
+///
+/// Its settings are fixed then, because its map depends on them. Without a body, or without a
+/// field, the defaults hold. Creating it again with the same settings changes nothing.
+#[utoipa::path(put, path = "/v1/spaces/{space}", tag = "spaces", operation_id = "create_space",
+    params(SpaceParam), request_body = SpaceSettings,
+    responses(
+        (status = 201, description = "The space has been created", body = SpaceInfo),
+        (status = 200, description = "The space was there, with these settings", body = SpaceInfo),
+        (status = 409, description = "The space exists with other settings, or there are too many spaces"),
+        (status = 422, description = "The settings make no sense"),
+        (status = 507, description = "The store is full")))]
+pub(crate) async fn put(
+    State(service): State<Service>,
+    _: NoQuery,
+    NewSpace(name, settings): NewSpace,
+) -> Result<Response<Body>, Problem> {
+    let engine = service.engine.clone();
+    // The store syncs before it answers.
+    let created = tokio::task::spawn_blocking(move || engine.create_space(&name, &settings));
+    let (space, created) = created.await.map_err(|_| Problem::interrupted())??;
+    if !created {
+        return Ok(reply::json(&info(&space).await?));
+    }
+    while space.recovering() {
+        tokio::time::sleep(SET_UP_POLL).await;
+    }
+    let mut response = reply::json(&info(&space).await?);
+    *response.status_mut() = StatusCode::CREATED;
+    if let Ok(location) = HeaderValue::try_from(format!("/v1/spaces/{}", space.name())) {
+        response.headers_mut().insert(LOCATION, location);
+    }
+    Ok(response)
+}
+
+/// Delete a space with all that it remembers.
+#[utoipa::path(delete, path = "/v1/spaces/{space}", tag = "spaces", operation_id = "delete_space",
+    params(SpaceParam),
+    responses(
+        (status = 204, description = "The space is gone"),
+        (status = 404, description = "There is no such space")))]
+pub(crate) async fn delete(
+    State(service): State<Service>,
+    SpaceOfPath(space): SpaceOfPath,
+    _: NoQuery,
+) -> Result<StatusCode, Problem> {
+    // The space's writer finishes what it has before the store forgets it.
+    let deleted = tokio::task::spawn_blocking(move || service.engine.delete_space(space.name()));
+    deleted.await.map_err(|_| Problem::interrupted())??;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// What is known of a space.
+pub(crate) async fn info(space: &Arc<Space>) -> Result<SpaceInfo, Problem> {
+    let map = space.snapshot().await.map_err(|error| match error {
+        Unavailable::Recovering => Problem::new(
+            Kind::Recovering,
+            format!("the space {:?} is loading", space.name()),
+        ),
+        Unavailable::Failed(_) => error.into(),
+    })?;
+    Ok(answer::space_info(space.name(), space.settings(), &map))
+}
+
+/// The name in the path and the settings in the body.
+pub(crate) struct NewSpace(Name, SpaceSettings);
+
+impl FromRequest<Service> for NewSpace {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, service: &Service) -> Result<Self, Problem> {
+        let (mut parts, body) = request.into_parts();
+        let params: SpaceParam = super::extract::path(&mut parts, service).await?;
+        let name = name(&params.space)?;
+        let media_type = parts.headers.get(CONTENT_TYPE).cloned();
+        let bytes = whole_body(Request::from_parts(parts, body), service).await?;
+        if bytes.is_empty() {
+            return Ok(Self(name, SpaceSettings::default()));
+        }
+        must_be_json(media_type.as_ref())?;
+        let settings = json::message(&bytes)?;
+        Ok(Self(name, settings))
+    }
+}

@@ -1,0 +1,287 @@
+//! Every way to be refused is a problem document.
+
+use super::*;
+
+const JSON: &str = "application/json";
+
+#[tokio::test]
+async fn paths_that_lead_nowhere() {
+    let rig = rig();
+    rig.get("/nowhere").await.problem(404, "unknown-route");
+    rig.get("/v1/spaces/lab/nowhere")
+        .await
+        .problem(404, "unknown-route");
+    rig.get("/docs/nowhere.js")
+        .await
+        .problem(404, "unknown-route");
+    rig.get("/v1/spaces/void")
+        .await
+        .problem(404, "unknown-space");
+    rig.get("/v1/spaces/void/places")
+        .await
+        .problem(404, "unknown-space");
+    rig.get("/v1/spaces/void/agents/rover")
+        .await
+        .problem(404, "unknown-space");
+    rig.get("/v1/spaces/lab/agents/rover")
+        .await
+        .problem(404, "unknown-agent");
+    rig.get("/v1/spaces/lab/agents/rover/grid")
+        .await
+        .problem(404, "unknown-agent");
+    rig.get("/v1/spaces/lab/agents/rover/trajectory")
+        .await
+        .problem(404, "unknown-agent");
+    rig.get("/v1/spaces/lab/places/0")
+        .await
+        .problem(404, "unknown-memory");
+    rig.get("/v1/spaces/lab/trips/18446744073709551615")
+        .await
+        .problem(404, "unknown-memory");
+    rig.get("/v1/spaces/lab/landmarks/post")
+        .await
+        .problem(404, "unknown-memory");
+    rig.get("/v1/spaces/lab/export?format=tum&agent=rover")
+        .await
+        .problem(404, "unknown-agent");
+    let gone = Request::delete("/v1/spaces/void")
+        .body(Body::empty())
+        .expect("a request");
+    rig.ask(gone).await.problem(404, "unknown-space");
+}
+
+#[tokio::test]
+async fn paths_that_cannot_be() {
+    let rig = rig();
+    rig.get("/v1/spaces/a%20b")
+        .await
+        .problem(400, "invalid-path");
+    rig.get("/v1/spaces/.hidden/places")
+        .await
+        .problem(400, "invalid-path");
+    rig.get("/v1/spaces/%FF").await.problem(400, "invalid-path");
+    rig.get("/v1/spaces/lab/agents/a*b")
+        .await
+        .problem(400, "invalid-path");
+    rig.get("/v1/spaces/lab/places/-1")
+        .await
+        .problem(400, "invalid-path");
+    rig.get("/v1/spaces/lab/places/one")
+        .await
+        .problem(400, "invalid-path");
+    let long = format!("/v1/spaces/{}", "a".repeat(65));
+    rig.send(Method::PUT, &long, JSON, "{}")
+        .await
+        .problem(400, "invalid-path");
+}
+
+#[tokio::test]
+async fn parameters_that_cannot_be() {
+    let rig = rig();
+    for query in [
+        "limit=0",
+        "limit=1001",
+        "limit=-1",
+        "limit=many",
+        "limit=",
+        "lim=1",
+        "after=-1",
+        "min_m=1,2",
+        "min_m=1,2,3,4",
+        "max_m=a,b,c",
+        "min_m=nan,0,0",
+        "min_m=inf,0,0",
+        "min_m=",
+        "since_ns=1.5",
+        "since_ns=9223372036854775808",
+        "limit=1&limit=2",
+    ] {
+        let path = format!("/v1/spaces/lab/places?{query}");
+        rig.get(&path).await.problem(400, "invalid-parameter");
+    }
+    for path in [
+        "/v1/spaces?x=1",
+        "/v1/spaces/lab?x=1",
+        "/healthz?x=1",
+        "/readyz?x=1",
+        "/metrics?x=1",
+        "/v1/spaces/lab/agents?x=1",
+        "/v1/spaces/lab/trips?x=1",
+        "/v1/spaces/lab/landmarks?x=1",
+        "/v1/spaces/lab/events?x=1",
+        "/v1/spaces/lab/export?format=bmp",
+    ] {
+        rig.get(path).await.problem(400, "invalid-parameter");
+    }
+    rig.get("/v1/spaces/lab/export?format=tum")
+        .await
+        .problem(422, "invalid-query");
+}
+
+#[tokio::test]
+async fn methods_that_a_path_does_not_take_are_told_those_that_it_takes() {
+    let rig = rig();
+    for (method, path, allowed) in [
+        (Method::POST, "/v1/spaces", "GET,HEAD"),
+        (Method::PATCH, "/v1/spaces/lab", "GET,HEAD,PUT,DELETE"),
+        (Method::GET, "/v1/spaces/lab/recall", "POST"),
+        (Method::TRACE, "/healthz", "GET,HEAD"),
+        (Method::OPTIONS, "/v1/spaces/lab/events", "GET,HEAD"),
+        (Method::DELETE, "/openapi.json", "GET,HEAD"),
+    ] {
+        let request = Request::builder()
+            .method(method)
+            .uri(path)
+            .body(Body::empty());
+        let answer = rig.ask(request.expect("a request")).await;
+        answer.problem(405, "method-not-allowed");
+        assert_eq!(answer.header("allow"), allowed, "{path}");
+    }
+}
+
+#[tokio::test]
+async fn bodies_that_cannot_be_read() {
+    let rig = rig();
+    let recall = "/v1/spaces/lab/recall";
+    let samples = "/v1/spaces/lab/agents/rover/samples";
+    for path in [recall, samples] {
+        for media_type in ["", "text/plain", "application/xml"] {
+            let answer = rig.send(Method::POST, path, media_type, "{}").await;
+            answer.problem(415, "unsupported-media-type");
+        }
+        for body in [
+            "",
+            "{",
+            "[]",
+            "null",
+            "{\"session\": true}",
+            "{\"limit\": -1}",
+            "\u{7f}",
+        ] {
+            rig.send(Method::POST, path, JSON, body)
+                .await
+                .problem(400, "malformed-body");
+        }
+        let long = vec![b' '; MESSAGE_BYTES_MAX + 1];
+        rig.send(Method::POST, path, JSON, long)
+            .await
+            .problem(413, "body-too-long");
+    }
+    let cbor = rig
+        .send(Method::POST, recall, "application/cbor", vec![0xa0])
+        .await;
+    cbor.problem(415, "unsupported-media-type");
+    let v2 = "application/vnd.cogmap.postcard;v2";
+    rig.send(Method::POST, samples, v2, vec![0])
+        .await
+        .problem(415, "unsupported-media-type");
+    let unknown = rig
+        .send(Method::POST, recall, JSON, "{\"positon_m\": [0, 0, 0]}")
+        .await;
+    let problem = unknown.problem(400, "malformed-body");
+    assert!(
+        problem["detail"]
+            .as_str()
+            .is_some_and(|detail| detail.contains("positon_m"))
+    );
+    for settings in [
+        "[]",
+        "[1]",
+        "{\"odometry_noise\": []}",
+        "{\"recruitment\": {\"novelty\": []}}",
+    ] {
+        let answer = rig
+            .send(Method::PUT, "/v1/spaces/new", JSON, settings)
+            .await;
+        answer.problem(400, "malformed-body");
+    }
+    let empty = SampleBatch {
+        samples: Vec::new(),
+        ..steps(1, 0, 1)
+    };
+    rig.samples("rover", &empty)
+        .await
+        .problem(400, "malformed-body");
+    rig.samples(
+        "rover",
+        &SampleBatch {
+            first_seq: u64::MAX,
+            ..steps(1, 0, 1)
+        },
+    )
+    .await
+    .problem(400, "malformed-body");
+}
+
+#[tokio::test]
+async fn bodies_that_make_no_sense() {
+    let rig = rig();
+    for (body, part) in [
+        ("{\"radius_m\": 1}", "position_m"),
+        ("{\"position_m\": [0, 0, 1e9]}", "position_m"),
+        ("{\"position_m\": [0, 0, 0], \"radius_m\": -1}", "radius_m"),
+        ("{\"limit\": 0}", "limit"),
+        ("{\"limit\": 1001}", "limit"),
+        ("{\"code\": [[0.5, 0.5, 0.5]]}", "modules"),
+        ("{\"code\": [[1, 0, 0], null, null, null, null]}", "phases"),
+        ("{\"agent\": \"a b\"}", "agent"),
+    ] {
+        let answer = rig
+            .send(Method::POST, "/v1/spaces/lab/recall", JSON, body)
+            .await;
+        let problem = answer.problem(422, "invalid-query");
+        assert!(
+            problem["detail"].as_str().is_some_and(|d| d.contains(part)),
+            "{body}: {problem}"
+        );
+    }
+    let lost = "{\"localized_sd_m\": 2, \"lost_sd_m\": 1}";
+    let answer = rig.send(Method::PUT, "/v1/spaces/new", JSON, lost).await;
+    let problem = answer.problem(422, "invalid-settings");
+    assert!(
+        problem["detail"]
+            .as_str()
+            .is_some_and(|detail| detail.contains("lost_sd_m"))
+    );
+}
+
+#[tokio::test]
+async fn samples_out_of_order_are_told_what_is_next() {
+    let rig = rig();
+    let gap = rig
+        .samples("rover", &steps(5, 3, 2))
+        .await
+        .problem(409, "sequence-gap");
+    assert_eq!(
+        (&gap["session"], &gap["expected_seq"]),
+        (&5.into(), &0.into()),
+        "{gap}"
+    );
+    rig.samples("rover", &steps(5, 0, 4)).await.good();
+    let gap = rig
+        .samples("rover", &steps(5, 9, 2))
+        .await
+        .problem(409, "sequence-gap");
+    assert_eq!(gap["expected_seq"], 4, "{gap}");
+    let stale = rig
+        .samples("rover", &steps(4, 0, 1))
+        .await
+        .problem(409, "stale-session");
+    assert_eq!(stale["session"], 5, "{stale}");
+}
+
+#[tokio::test]
+async fn bounds_of_the_engine_are_conflicts() {
+    let engine = EngineSettings {
+        agents_max: 1,
+        spaces_max: 1,
+        ..EngineSettings::default()
+    };
+    let rig = rig_with(&settings(), engine);
+    rig.samples("one", &steps(1, 0, 1)).await.good();
+    rig.samples("two", &steps(1, 0, 1))
+        .await
+        .problem(409, "too-many-agents");
+    let answer = rig.send(Method::PUT, "/v1/spaces/more", JSON, "{}").await;
+    answer.problem(409, "too-many-spaces");
+}

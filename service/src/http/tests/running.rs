@@ -1,0 +1,165 @@
+//! The interface on a socket: streams, and the end of the service.
+
+use std::io::Read;
+
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
+
+use super::*;
+
+struct Running {
+    address: std::net::SocketAddr,
+    stop: oneshot::Sender<()>,
+    task: JoinHandle<io::Result<()>>,
+}
+
+async fn run_on(rig: &Rig, settings: HttpSettings) -> Running {
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+    let address = listener.local_addr().expect("bound");
+    let prometheus = PrometheusBuilder::new().build_recorder().handle();
+    let (stop, stopped) = oneshot::channel::<()>();
+    let task = tokio::spawn(run(
+        listener,
+        rig.engine.clone(),
+        settings,
+        prometheus,
+        async {
+            let _ = stopped.await;
+        },
+    ));
+    Running {
+        address,
+        stop,
+        task,
+    }
+}
+
+async fn connect(running: &Running, path: &str) -> TcpStream {
+    let mut stream = TcpStream::connect(running.address)
+        .await
+        .expect("it listens");
+    let request = format!("GET {path} HTTP/1.1\r\nhost: test\r\n\r\n");
+    stream.write_all(request.as_bytes()).await.expect("sent");
+    stream
+}
+
+/// Reads until `text` has come.
+async fn read_until(stream: &mut TcpStream, text: &str) -> String {
+    let mut read = Vec::new();
+    let mut buffer = [0; 4096];
+    while !String::from_utf8_lossy(&read).contains(text) {
+        let count = stream.read(&mut buffer).await.expect("readable");
+        assert!(
+            count > 0,
+            "ended before {text}: {}",
+            String::from_utf8_lossy(&read)
+        );
+        read.extend_from_slice(&buffer[..count]);
+    }
+    String::from_utf8_lossy(&read).into_owned()
+}
+
+#[tokio::test]
+async fn events_stream_in_and_end_with_the_service() {
+    let rig = rig();
+    let running = run_on(&rig, settings()).await;
+    let mut all = connect(&running, "/v1/spaces/lab/events").await;
+    let mut other = connect(&running, "/v1/spaces/lab/events?agent=other").await;
+    let head = read_until(&mut all, "\r\n\r\n").await;
+    assert!(head.contains("content-type: text/event-stream"), "{head}");
+    read_until(&mut other, "\r\n\r\n").await;
+    rig.samples("rover", &steps(1, 0, 2)).await.good();
+    rig.samples("other", &steps(1, 0, 2)).await.good();
+    let events = read_until(&mut all, "\"agent\":\"other\"").await;
+    assert!(
+        events.contains("\"agent\":\"rover\"") && events.contains("agent_enrolled"),
+        "{events}"
+    );
+    let filtered = read_until(&mut other, "session_started").await;
+    assert!(!filtered.contains("rover"), "{filtered}");
+
+    running.stop.send(()).expect("it runs");
+    // Well within the time limit for open requests: the streams end by themselves.
+    let ended = tokio::time::timeout(Duration::from_secs(4), running.task).await;
+    ended.expect("it ends").expect("joined").expect("no error");
+    let mut rest = Vec::new();
+    all.read_to_end(&mut rest)
+        .await
+        .expect("the stream ends well");
+    assert!(rest.ends_with(b"0\r\n\r\n"), "the last chunk is missing");
+}
+
+#[tokio::test]
+async fn a_client_that_stalls_does_not_hold_up_the_end() {
+    let rig = rig();
+    let shutdown_timeout = Duration::from_millis(200);
+    let running = run_on(
+        &rig,
+        HttpSettings {
+            shutdown_timeout,
+            ..settings()
+        },
+    )
+    .await;
+    let mut stream = TcpStream::connect(running.address)
+        .await
+        .expect("it listens");
+    let head = "POST /v1/spaces/lab/recall HTTP/1.1\r\nhost: test\r\n\
+        content-type: application/json\r\ncontent-length: 100\r\n\r\n{";
+    stream.write_all(head.as_bytes()).await.expect("sent");
+    let mut probe = connect(&running, "/healthz").await;
+    read_until(&mut probe, "\"ok\"").await;
+    running.stop.send(()).expect("it runs");
+    let ended = tokio::time::timeout(Duration::from_secs(10), running.task).await;
+    ended.expect("it ends").expect("joined").expect("no error");
+}
+
+#[tokio::test]
+async fn more_streams_than_the_bound_are_told_to_come_back() {
+    let rig = rig();
+    let running = run_on(
+        &rig,
+        HttpSettings {
+            streams_max: 1,
+            ..settings()
+        },
+    )
+    .await;
+    let mut first = connect(&running, "/v1/spaces/lab/events").await;
+    read_until(&mut first, "\r\n\r\n").await;
+    let mut second = connect(&running, "/v1/spaces/lab/events").await;
+    let refusal = read_until(&mut second, "/problems/busy").await;
+    assert!(refusal.starts_with("HTTP/1.1 503"), "{refusal}");
+    drop((running.stop, rig.stop.clone()));
+}
+
+#[tokio::test]
+async fn more_connections_than_the_bound_wait() {
+    let rig = rig();
+    let running = run_on(
+        &rig,
+        HttpSettings {
+            connections_max: 1,
+            ..settings()
+        },
+    )
+    .await;
+    let mut first = connect(&running, "/healthz").await;
+    read_until(&mut first, "\"ok\"").await;
+    let address = running.address;
+    let second = tokio::task::spawn_blocking(move || {
+        use std::io::Write;
+        let mut stream = std::net::TcpStream::connect(address).expect("the system takes it");
+        let request = "GET /healthz HTTP/1.1\r\nhost: test\r\nconnection: close\r\n\r\n";
+        stream.write_all(request.as_bytes()).expect("sent");
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).expect("a text");
+        answer
+    });
+    // The second is answered once the first has gone, however long that takes.
+    drop(first);
+    assert!(second.await.expect("joined").starts_with("HTTP/1.1 200"));
+    running.stop.send(()).expect("it runs");
+}

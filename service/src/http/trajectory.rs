@@ -1,0 +1,176 @@
+//! Trajectories, as JSON or in the TUM format.
+
+use axum::body::Body;
+use axum::http::header::{ACCEPT, HeaderMap, HeaderValue, LINK};
+use axum::http::{Response, Uri};
+use cogmap_proto::{StampedPose, Trajectory};
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+use super::extract::{AgentOfPath, AgentParams, Query};
+use super::page;
+use super::problem::Problem;
+use super::reply;
+
+/// Media type of the TUM format.
+pub(crate) const TUM: &str = "text/plain; charset=utf-8";
+
+/// Form of a trajectory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum TrajectoryFormat {
+    /// A JSON object.
+    Json,
+    /// Lines `t x y z qx qy qz qw`, t in seconds.
+    Tum,
+}
+
+/// Which part of the trajectory, and in which form.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct TrajectoryQuery {
+    /// `json` or `tum`; when absent, `tum` if `Accept` asks for text/plain.
+    #[param(inline)]
+    format: Option<TrajectoryFormat>,
+    /// Only poses of this session; of the current one when absent.
+    session: Option<u64>,
+    /// Only poses at or after this stamp \[ns\].
+    from_ns: Option<i64>,
+    /// Only poses before this stamp \[ns\].
+    to_ns: Option<i64>,
+    /// Most poses in the answer; 100 when absent.
+    #[param(minimum = 1, maximum = 1000)]
+    limit: Option<u32>,
+}
+
+/// The causal trajectory of an agent: each pose as it was known when its sample was applied.
+///
+/// The next page begins at `next_from_ns`; in the TUM format the header `Link` names it.
+#[utoipa::path(get, path = "/v1/spaces/{space}/agents/{agent}/trajectory", tag = "agents",
+    operation_id = "get_agent_trajectory", params(AgentParams, TrajectoryQuery),
+    responses(
+        (status = 200, description = "The poses, oldest first", content(
+            (Trajectory = "application/json"), (String = "text/plain"))),
+        (status = 404, description = "There is no such space or agent")))]
+pub(crate) async fn get(
+    AgentOfPath(space, desk): AgentOfPath,
+    Query(query): Query<TrajectoryQuery>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response<Body>, Problem> {
+    let limit = page::limit(query.limit)?;
+    let read = space
+        .trajectory(
+            desk.name(),
+            query.session,
+            query.from_ns,
+            query.to_ns,
+            limit,
+        )
+        .await?;
+    let format = query.format.unwrap_or_else(|| accepted(&headers));
+    if format == TrajectoryFormat::Json {
+        return Ok(reply::json(&read));
+    }
+    let mut response = reply::with_type(TUM, Body::from(tum(&read.poses)));
+    if let Some(next) = read.next_from_ns {
+        let link = next_page(&uri, read.session, next);
+        response.headers_mut().insert(LINK, link);
+    }
+    Ok(response)
+}
+
+fn accepted(headers: &HeaderMap) -> TrajectoryFormat {
+    let accept = headers
+        .get(ACCEPT)
+        .and_then(|accept| accept.to_str().ok())
+        .unwrap_or_default();
+    let mut types = accept
+        .split(',')
+        .map(|range| range.split(';').next().unwrap_or("").trim());
+    if types.any(|range| range.eq_ignore_ascii_case("text/plain")) {
+        TrajectoryFormat::Tum
+    } else {
+        TrajectoryFormat::Json
+    }
+}
+
+/// `Link` to the page that begins at `from_ns`. The session stays the same even if the agent begins
+/// another one meanwhile.
+fn next_page(uri: &Uri, session: u64, from_ns: i64) -> HeaderValue {
+    let kept = uri.query().unwrap_or_default().split('&').filter(|pair| {
+        !pair.is_empty() && !pair.starts_with("from_ns=") && !pair.starts_with("session=")
+    });
+    let new = [format!("session={session}"), format!("from_ns={from_ns}")];
+    let query = kept
+        .chain(new.iter().map(String::as_str))
+        .collect::<Vec<_>>()
+        .join("&");
+    let link = format!("<{}?{query}>; rel=\"next\"", uri.path());
+    HeaderValue::try_from(link).expect("a URI is visible ASCII, and so are numbers")
+}
+
+/// Poses as TUM lines: seconds with all nanoseconds, metres and quaternion as exact as they are.
+pub(crate) fn tum(poses: &[StampedPose]) -> String {
+    use std::fmt::Write;
+    let mut text = String::with_capacity(poses.len() * 128);
+    for pose in poses {
+        let sign = if pose.stamp_ns < 0 { "-" } else { "" };
+        let stamp_ns = pose.stamp_ns.unsigned_abs();
+        let (whole, rest) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
+        let [x, y, z] = pose.translation_m;
+        let [qx, qy, qz, qw] = pose.rotation_xyzw;
+        writeln!(
+            text,
+            "{sign}{whole}.{rest:09} {x} {y} {z} {qx} {qy} {qz} {qw}"
+        )
+        .expect("a text takes what fits into memory");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stamps_keep_their_nanoseconds_and_sign() {
+        let pose = |stamp_ns| StampedPose {
+            stamp_ns,
+            translation_m: [1.5, -2.0, 0.0],
+            rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+        };
+        let stamps = [1_700_000_000_123_456_789, -1, 0, i64::MIN];
+        let text = tum(&stamps.map(pose));
+        let first: Vec<_> = text
+            .lines()
+            .map(|line| line.split(' ').next().expect("a stamp"))
+            .collect();
+        assert_eq!(
+            first,
+            [
+                "1700000000.123456789",
+                "-0.000000001",
+                "0.000000000",
+                "-9223372036.854775808"
+            ]
+        );
+        assert!(
+            text.starts_with("1700000000.123456789 1.5 -2 0 0 0 0 1\n"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn the_next_page_keeps_the_other_parameters() {
+        let uri: Uri = "/t?format=tum&from_ns=1&limit=2&session=4"
+            .parse()
+            .expect("a URI");
+        let link = next_page(&uri, 5, -7);
+        assert_eq!(
+            link,
+            "</t?format=tum&limit=2&session=5&from_ns=-7>; rel=\"next\""
+        );
+    }
+}

@@ -1,0 +1,85 @@
+//! Trips.
+
+use axum::body::Body;
+use axum::http::Response;
+use cogmap_proto::{TripDetail, TripPage};
+use cognitive_map::TripId;
+use serde::Deserialize;
+
+use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam};
+use super::page;
+use super::places::{MemoryOfPath, unknown};
+use super::problem::Problem;
+use super::reply;
+use crate::answer;
+
+/// Which trips.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct TripsQuery {
+    /// Only trips with a larger number.
+    after: Option<u64>,
+    /// Most trips in the answer; 100 when absent.
+    #[param(minimum = 1, maximum = 1000)]
+    limit: Option<u32>,
+    /// Only trips of the agent with this name.
+    agent: Option<String>,
+    /// Only trips under way at or after this stamp \[ns\].
+    since_ns: Option<i64>,
+}
+
+/// The trips of a space.
+#[utoipa::path(get, path = "/v1/spaces/{space}/trips", tag = "memory", operation_id = "list_trips",
+    params(SpaceParam, TripsQuery),
+    responses(
+        (status = 200, description = "The trips, by number", body = TripPage),
+        (status = 404, description = "There is no such space")))]
+pub(crate) async fn list(
+    SpaceOfPath(space): SpaceOfPath,
+    Query(query): Query<TripsQuery>,
+) -> Result<Response<Body>, Problem> {
+    let limit = page::limit(query.limit)?;
+    let map = space.snapshot().await?;
+    // Nobody has the number of an agent that is not there.
+    let agent = query
+        .agent
+        .as_deref()
+        .map(|name| space.agent(name).map(|desk| desk.id()));
+    let first = page::first(query.after);
+    let listed = first
+        .into_iter()
+        .flat_map(|first| map.trips_from(TripId(first)));
+    let wanted = listed.filter(|(_, trip)| {
+        agent.is_none_or(|agent| agent == Some(trip.agent()))
+            && query
+                .since_ns
+                .is_none_or(|since| trip.end_stamp_ns() >= since)
+    });
+    let (trips, next) = page::cut(wanted, limit, |(id, _)| u64::from(id.0));
+    let trips = trips
+        .into_iter()
+        .map(|(id, trip)| answer::trip(&map, id, trip))
+        .collect();
+    Ok(reply::json(&TripPage { trips, next }))
+}
+
+/// A trip with its legs.
+#[utoipa::path(get, path = "/v1/spaces/{space}/trips/{id}", tag = "memory", operation_id = "get_trip",
+    params(IdParams),
+    responses(
+        (status = 200, description = "The trip", body = TripDetail),
+        (status = 404, description = "There is no such space or trip")))]
+pub(crate) async fn get(
+    MemoryOfPath(space, id): MemoryOfPath,
+    _: NoQuery,
+) -> Result<Response<Body>, Problem> {
+    let map = space.snapshot().await?;
+    let id = u32::try_from(id).map(TripId);
+    let found = id
+        .ok()
+        .and_then(|id| Some(answer::trip_detail(&map, id, map.trip(id)?)));
+    found
+        .map(|trip| reply::json(&trip))
+        .ok_or_else(|| unknown("trip"))
+}

@@ -1,0 +1,7 @@
+//! The binary `cogmap`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cogmap::cli::main()
+}

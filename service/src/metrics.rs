@@ -1,0 +1,176 @@
+//! Metrics: their names, their descriptions, and the recorder behind `/metrics`.
+
+use metrics::{Unit, describe_counter, describe_gauge, describe_histogram};
+use metrics_exporter_prometheus::{BuildError, Matcher, PrometheusBuilder, PrometheusHandle};
+
+/// Messages received; label `codec` (`postcard`, `cbor`, `json`).
+pub const RECEIVED_MESSAGES: &str = "cogmap_received_messages_total";
+/// Bytes of messages received; label `codec`.
+pub const RECEIVED_BYTES: &str = "cogmap_received_bytes_total";
+/// Messages dropped whole; label `reason` (`queue_full`, `unknown_space`, `bad_key`,
+/// `too_many_agents`, `stale_session` and others).
+pub const DROPPED_MESSAGES: &str = "cogmap_dropped_messages_total";
+/// Messages that could not be read; label `kind`.
+pub const DECODE_ERRORS: &str = "cogmap_decode_errors_total";
+/// Samples skipped for good; labels `space`, `reason` (the wire's `SkipReason`, so `lost` too).
+pub const SKIPPED_SAMPLES: &str = "cogmap_skipped_samples_total";
+/// Samples applied to a map; label `space`.
+pub const APPLIED_SAMPLES: &str = "cogmap_applied_samples_total";
+/// Samples received again; label `space`.
+pub const DUPLICATE_SAMPLES: &str = "cogmap_duplicate_samples_total";
+/// Samples that came before earlier ones and were put in order; label `space`.
+pub const REORDERED_SAMPLES: &str = "cogmap_reordered_samples_total";
+/// Samples dropped because too many waited for earlier ones; label `space`.
+pub const BEYOND_WINDOW_SAMPLES: &str = "cogmap_beyond_window_samples_total";
+/// Samples that waited for earlier ones when their session was taken over; label `space`.
+pub const ABANDONED_SAMPLES: &str = "cogmap_abandoned_samples_total";
+/// Samples made durable; label `space`.
+pub const DURABLE_SAMPLES: &str = "cogmap_durable_samples_total";
+/// Bytes appended to journals; label `space`.
+pub const JOURNAL_BYTES: &str = "cogmap_journal_bytes_total";
+/// Time that a sync of the store takes \[s\].
+pub const COMMIT_SECONDS: &str = "cogmap_commit_seconds";
+/// Agents of a space; label `space`.
+pub const AGENTS: &str = "cogmap_agents";
+/// Places of a space; label `space`.
+pub const PLACES: &str = "cogmap_places";
+/// Trips of a space; label `space`.
+pub const TRIPS: &str = "cogmap_trips";
+/// Landmarks of a space; label `space`.
+pub const LANDMARKS: &str = "cogmap_landmarks";
+/// Samples applied in one round of a writer; label `space`.
+pub const ROUND_SAMPLES: &str = "cogmap_round_samples";
+/// Messages that wait for a space's writer; label `space`.
+pub const QUEUE_MESSAGES: &str = "cogmap_queue_messages";
+/// Estimates published; label `space`.
+pub const PUBLISHED_ESTIMATES: &str = "cogmap_published_estimates_total";
+/// HTTP requests answered; labels `route` (the pattern, not the path), `status`.
+pub const HTTP_REQUESTS: &str = "cogmap_http_requests_total";
+/// Time from a request's head to its answer's head \[s\]; label `route`.
+pub const HTTP_REQUEST_SECONDS: &str = "cogmap_http_request_seconds";
+/// Event streams open now.
+pub const HTTP_STREAMS: &str = "cogmap_http_streams";
+
+/// Bounds of the histograms of times \[s\]: from a motion step to a stalled disk.
+const SECONDS: [f64; 16] = [
+    1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1.0, 3.0, 10.0,
+];
+/// Bounds of the histograms of sample counts.
+const COUNTS: [f64; 8] = [1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0, 16384.0];
+
+/// Installs the recorder of the process and describes the metrics. What was counted before is lost,
+/// so this comes first.
+///
+/// # Errors
+/// The process has a recorder already.
+pub fn install() -> Result<PrometheusHandle, BuildError> {
+    let handle = builder()?.install_recorder()?;
+    describe();
+    Ok(handle)
+}
+
+/// Sum of a counter over all its labels.
+pub fn total(handle: &PrometheusHandle, counter: &str) -> u64 {
+    let text = handle.render();
+    text.lines()
+        .filter(|line| !line.starts_with('#'))
+        .filter(|line| line.split(['{', ' ']).next() == Some(counter))
+        .filter_map(|line| line.rsplit(' ').next()?.parse::<u64>().ok())
+        .sum()
+}
+
+fn builder() -> Result<PrometheusBuilder, BuildError> {
+    PrometheusBuilder::new()
+        .set_buckets_for_metric(Matcher::Suffix("_seconds".to_owned()), &SECONDS)?
+        .set_buckets_for_metric(Matcher::Full(ROUND_SAMPLES.to_owned()), &COUNTS)
+}
+
+/// Tells the recorder what the metrics mean.
+fn describe() {
+    describe_counter!(
+        RECEIVED_MESSAGES,
+        Unit::Count,
+        "Messages received, by codec"
+    );
+    describe_counter!(RECEIVED_BYTES, Unit::Bytes, "Bytes received, by codec");
+    describe_counter!(
+        DROPPED_MESSAGES,
+        Unit::Count,
+        "Messages dropped whole, by reason"
+    );
+    describe_counter!(
+        DECODE_ERRORS,
+        Unit::Count,
+        "Messages that could not be read, by kind"
+    );
+    describe_counter!(
+        SKIPPED_SAMPLES,
+        Unit::Count,
+        "Samples skipped for good, by reason"
+    );
+    describe_counter!(APPLIED_SAMPLES, Unit::Count, "Samples applied to a map");
+    describe_counter!(DUPLICATE_SAMPLES, Unit::Count, "Samples received again");
+    describe_counter!(REORDERED_SAMPLES, Unit::Count, "Samples put in order");
+    describe_counter!(
+        BEYOND_WINDOW_SAMPLES,
+        Unit::Count,
+        "Samples too far ahead to wait"
+    );
+    describe_counter!(
+        ABANDONED_SAMPLES,
+        Unit::Count,
+        "Samples of a session taken over"
+    );
+    describe_counter!(DURABLE_SAMPLES, Unit::Count, "Samples made durable");
+    describe_counter!(JOURNAL_BYTES, Unit::Bytes, "Bytes appended to journals");
+    describe_histogram!(COMMIT_SECONDS, Unit::Seconds, "Time of a sync of the store");
+    describe_gauge!(AGENTS, Unit::Count, "Agents of a space");
+    describe_gauge!(PLACES, Unit::Count, "Places of a space");
+    describe_gauge!(TRIPS, Unit::Count, "Trips of a space");
+    describe_gauge!(LANDMARKS, Unit::Count, "Landmarks of a space");
+    describe_histogram!(ROUND_SAMPLES, Unit::Count, "Samples applied in one round");
+    describe_gauge!(
+        QUEUE_MESSAGES,
+        Unit::Count,
+        "Messages that wait for a space's writer"
+    );
+    describe_counter!(PUBLISHED_ESTIMATES, Unit::Count, "Estimates published");
+    describe_counter!(
+        HTTP_REQUESTS,
+        Unit::Count,
+        "HTTP requests, by route and status"
+    );
+    describe_histogram!(
+        HTTP_REQUEST_SECONDS,
+        Unit::Seconds,
+        "Time to the head of an answer"
+    );
+    describe_gauge!(HTTP_STREAMS, Unit::Count, "Event streams open now");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_counted_appears_with_its_description_and_buckets() {
+        let recorder = builder().expect("buckets are not empty").build_recorder();
+        let handle = recorder.handle();
+        metrics::with_local_recorder(&recorder, || {
+            describe();
+            metrics::counter!(APPLIED_SAMPLES, "space" => "lab").increment(3);
+            metrics::histogram!(COMMIT_SECONDS).record(0.004);
+            metrics::histogram!(ROUND_SAMPLES, "space" => "lab").record(20.0);
+        });
+        let text = handle.render();
+        for line in [
+            "# HELP cogmap_applied_samples_total Samples applied to a map",
+            "cogmap_applied_samples_total{space=\"lab\"} 3",
+            "cogmap_commit_seconds_bucket{le=\"0.005\"} 1",
+            "cogmap_commit_seconds_bucket{le=\"0.002\"} 0",
+            "cogmap_round_samples_bucket{space=\"lab\",le=\"64\"} 1",
+        ] {
+            assert!(text.contains(line), "{line} is not in:\n{text}");
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! The transport: Zenoh in and out. Nothing else in the service knows Zenoh.
+
+mod intake;
+mod outlet;
+mod queries;
+mod session;
+
+pub use intake::Intake;
+pub use outlet::ZenohOutlet;
+pub use session::{TransportError, TransportSettings, open};

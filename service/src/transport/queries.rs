@@ -1,0 +1,125 @@
+//! Queries over Zenoh: `cogmap/{space}/query/{verb}`, with the bodies of HTTP.
+
+use cogmap_proto::{Codec, Problem, RecallQuery, Verb, WatermarkQuery, query_key};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use tokio::runtime::Handle;
+use zenoh::Session;
+use zenoh::query::{Query, Queryable};
+
+use super::session::TransportError;
+use crate::answer;
+use crate::engine::Engine;
+
+/// Answers every verb for every space.
+pub(crate) async fn declare(
+    session: &Session,
+    engine: &Engine,
+) -> Result<Vec<Queryable<()>>, TransportError> {
+    let mut queryables = Vec::new();
+    for verb in [Verb::Recall, Verb::Watermark] {
+        let (engine, runtime) = (engine.clone(), Handle::current());
+        let queryable = session
+            .declare_queryable(query_key("*", verb.as_str()))
+            .complete(true)
+            // The callback runs on a receiving thread: the answer is made elsewhere.
+            .callback(move |query| {
+                let engine = engine.clone();
+                runtime.spawn(async move { reply(&engine, verb, query).await });
+            })
+            .await?;
+        queryables.push(queryable);
+    }
+    Ok(queryables)
+}
+
+async fn reply(engine: &Engine, verb: Verb, query: Query) {
+    let codec = query.encoding().map_or(Ok(Codec::Json), |encoding| {
+        Codec::of_encoding(&encoding.to_string())
+    });
+    let (codec, result) = match codec {
+        Ok(codec) => (codec, answer(engine, verb, &query, codec).await),
+        Err(error) => (
+            Codec::Json,
+            Err(problem("unsupported-encoding", 415, error.to_string())),
+        ),
+    };
+    let sent = match result {
+        Ok(bytes) => {
+            query
+                .reply(query.key_expr(), bytes)
+                .encoding(codec.encoding())
+                .await
+        }
+        Err(problem) => {
+            query
+                .reply_err(codec.encode(&problem))
+                .encoding(codec.encoding())
+                .await
+        }
+    };
+    if let Err(error) = sent {
+        tracing::debug!(%error, "answer a query");
+    }
+}
+
+async fn answer(
+    engine: &Engine,
+    verb: Verb,
+    query: &Query,
+    codec: Codec,
+) -> Result<Vec<u8>, Problem> {
+    let name = query
+        .key_expr()
+        .as_str()
+        .split('/')
+        .nth(1)
+        .unwrap_or_default();
+    let space = engine
+        .space(name)
+        .ok_or_else(|| problem("unknown-space", 404, format!("no space {name:?}")))?;
+    match verb {
+        Verb::Recall => {
+            let body: RecallQuery = body(query, codec)?;
+            let map = space
+                .snapshot()
+                .await
+                .map_err(|error| problem("unavailable", 503, error.to_string()))?;
+            let recalled = answer::recall(space.name(), &map, &body)
+                .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
+            Ok(encoded(codec, &recalled))
+        }
+        Verb::Watermark => {
+            let body: WatermarkQuery = body(query, codec)?;
+            let agent = &body.agent;
+            let desk = space
+                .agent(agent)
+                .ok_or_else(|| problem("unknown-agent", 404, format!("no agent {agent:?}")))?;
+            Ok(encoded(codec, &desk.watermark()))
+        }
+    }
+}
+
+fn body<T: DeserializeOwned>(query: &Query, codec: Codec) -> Result<T, Problem> {
+    let payload = query
+        .payload()
+        .map(|payload| payload.to_bytes())
+        .unwrap_or_default();
+    codec
+        .decode(&payload)
+        .map_err(|error| problem("malformed-body", 400, error.to_string()))
+}
+
+fn encoded<T: Serialize>(codec: Codec, message: &T) -> Vec<u8> {
+    codec.encode(message)
+}
+
+fn problem(kind: &str, status: u16, detail: String) -> Problem {
+    let title = kind.replace('-', " ");
+    Problem {
+        kind: format!("/problems/{kind}"),
+        title,
+        status,
+        detail,
+    }
+}
