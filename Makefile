@@ -1,0 +1,91 @@
+# What can be done with the project from a shell. `make test` is the whole gate: it needs Rust with
+# rustfmt and clippy, Python 3.9 or later, and the package indices of both; nothing else.
+
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+# Cargo uses all cores by itself, and its steps would only wait for one another.
+.NOTPARALLEL:
+
+PYTHON ?= python3
+VENV := $(CURDIR)/.venv
+TARGET := $(abspath $(or $(CARGO_TARGET_DIR),target))
+CLIENT := clients/python
+
+# The end-to-end tests of both languages start this binary.
+export COGMAP_BIN := $(TARGET)/debug/cogmap
+
+# Every step over the workspace names all of its targets, and so gets the same features of every
+# dependency: Zenoh is then built once, not once for each step.
+ALL := --workspace --all-targets
+
+# nextest runs the tests of all crates at once; without it, cargo's own runner does.
+ifneq ($(shell command -v cargo-nextest),)
+RUN_RUST_TESTS := cargo nextest run --workspace
+else
+RUN_RUST_TESTS := cargo test --workspace --lib --bins --tests
+endif
+
+.PHONY: help
+help: ## list the targets
+	@sed -nE 's/^([a-z-]+):.*## (.*)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
+
+# The steps are lines of one recipe, because their order matters: what fails fastest comes first,
+# and the summaries of the test runners come last.
+.PHONY: test
+test: ## the whole gate: format, lints, documentation, tests of Rust and Python
+	cargo fmt --all --check
+	cargo clippy $(ALL) -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --lib --examples
+	$(MAKE) --no-print-directory test-rust test-python
+
+.PHONY: test-rust
+test-rust: ## tests of Rust, the end-to-end tests among them
+	cargo build $(ALL)
+	cargo test --workspace --doc
+	$(RUN_RUST_TESTS)
+
+.PHONY: test-python
+test-python: $(VENV)/installed ## types and tests of the Python client, then the end-to-end tests in Python
+	cargo build $(ALL)
+	cd $(CLIENT) && $(VENV)/bin/mypy --strict
+	cd $(CLIENT) && $(VENV)/bin/pytest
+	$(if $(wildcard tests/python/test_*.py),$(VENV)/bin/pytest tests/python)
+
+# A venv is made anew when what it has to hold changes.
+$(VENV)/installed: $(CLIENT)/pyproject.toml
+	$(PYTHON) -m venv --clear $(VENV)
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check \
+	    --editable '$(CLIENT)[dev]' mypy pytest schemathesis
+	touch $@
+
+.PHONY: demo
+demo: release ## the service with a simulated team of robots; ARGS="--robots 8 --duration 30"
+	$(TARGET)/release/cogmap demo $(ARGS)
+
+.PHONY: serve
+serve: release ## the service; ARGS="--config service/cogmap.toml"
+	$(TARGET)/release/cogmap serve $(ARGS)
+
+.PHONY: bench
+bench: release ## the benchmarks, each beside its yardstick; ARGS="--json"
+	$(TARGET)/release/cogmap bench step $(ARGS)
+	$(TARGET)/release/cogmap bench ingest $(ARGS)
+	$(TARGET)/release/cogmap bench http $(ARGS)
+
+.PHONY: release
+release: ## the binary, optimised
+	cargo build --release --package cogmap --bin cogmap
+
+.PHONY: docs
+docs: ## documentation of the crates, in target/doc
+	cargo doc --workspace --no-deps --lib --examples
+
+.PHONY: fmt
+fmt: ## format the Rust code
+	cargo fmt --all
+
+.PHONY: clean
+clean: ## remove what was built
+	cargo clean
+	rm -rf $(VENV) $(CLIENT)/.mypy_cache $(CLIENT)/.pytest_cache
