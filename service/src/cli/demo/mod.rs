@@ -5,12 +5,13 @@ mod summary;
 mod team;
 
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use anyhow::Context;
 use clap::Args;
 use cogmap_client::Api;
-use cogmap_proto::Name;
+use cogmap_proto::{Name, SpaceSettings};
 
 use self::progress::Progress;
 use self::summary::Summary;
@@ -21,8 +22,6 @@ use crate::config::Config;
 use crate::metrics;
 use crate::service::Service;
 
-/// The demo's space.
-const SPACE: &str = "demo";
 /// Ports that the demo takes if nobody else has them, as they are easiest to remember.
 const HTTP_PORT: u16 = 8080;
 const ZENOH_PORT: u16 = 7447;
@@ -39,8 +38,25 @@ pub(super) struct DemoArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Directory of the store, kept afterwards; a temporary one, removed, when absent.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "connect")]
     data_dir: Option<PathBuf>,
+    /// Send only the robots, to the service at this Zenoh endpoint.
+    #[arg(long, value_name = "ENDPOINT", requires = "http")]
+    connect: Option<String>,
+    /// Base of that service's HTTP interface.
+    #[arg(long, value_name = "URL", requires = "connect")]
+    http: Option<String>,
+    /// Bearer token of that service's HTTP interface.
+    #[arg(
+        long,
+        env = "COGMAP_TOKEN",
+        value_name = "TOKEN",
+        hide_env_values = true
+    )]
+    token: Option<String>,
+    /// Space of the robots.
+    #[arg(long, default_value = "demo")]
+    space: Name,
     /// Print one JSON object at the end.
     #[arg(long)]
     json: bool,
@@ -51,7 +67,22 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         args.duration > 0.0 && args.duration < 1e6,
         "--duration is a positive number of seconds"
     );
-    let temporary = args.data_dir.is_none();
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()?;
+    let summary = match (&args.connect, &args.http) {
+        (Some(endpoint), Some(url)) => runtime.block_on(visit(args, endpoint, url))?,
+        _ => host(args, &runtime)?,
+    };
+    if args.json {
+        output::json(&summary)
+    } else {
+        summary.print()
+    }
+}
+
+/// Runs a service of its own for the robots.
+fn host(args: &DemoArgs, runtime: &tokio::runtime::Runtime) -> anyhow::Result<Summary> {
     let directory = args.data_dir.clone().unwrap_or_else(|| {
         std::env::temp_dir().join(format!("cogmap-demo-{}", std::process::id()))
     });
@@ -60,63 +91,63 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
     config.http.listen = ([127, 0, 0, 1], port(HTTP_PORT)?).into();
     let endpoint = format!("tcp/127.0.0.1:{}", port(ZENOH_PORT)?);
     config.zenoh.listen = vec![endpoint.clone()];
-    let name: Name = SPACE.parse().context("the demo's space")?;
-    config.spaces = [(name, cogmap_proto::SpaceSettings::default())].into();
+    config.spaces = [(args.space.clone(), SpaceSettings::default())].into();
     "warn".clone_into(&mut config.log.filter);
     output::start_log(&config.log);
-
     let prometheus = metrics::install()?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .enable_all()
-        .build()?;
-    let result = runtime.block_on(async {
+    let summary = runtime.block_on(async {
         let service = Service::start(&config, prometheus.clone()).await?;
         let url = format!("http://{}", service.address());
-        let robots = args.robots;
-        output::progress(&format!(
-            "{robots} robots in the obstacle world, over {endpoint}"
-        ));
-        output::progress(&format!("start page   {url}/"));
-        output::progress(&format!("HTTP API     {url}/docs"));
-        output::progress(&format!(
-            "try          curl {url}/v1/spaces/{SPACE}/agents/robot1"
-        ));
-        let stop = Stop::default();
-        let interrupted = stop.clone();
-        tokio::spawn(async move {
-            // Without signals the demo simply ends when its time is over.
-            if serve::interrupted().await.is_ok() {
-                interrupted.store(true, std::sync::atomic::Ordering::Relaxed);
-            }
-        });
-        let (robots, seed, counted) = (args.robots, args.seed, prometheus.clone());
-        let duration = Duration::from_secs_f64(args.duration);
-        let summary = tokio::task::spawn_blocking(move || -> anyhow::Result<Summary> {
-            let api = Api::new(&url, None);
-            wait_until_ready(&api)?;
-            let mut team = DemoTeam::connect(&endpoint, SPACE, robots, seed)?;
-            let progress = Progress::new(robots, duration);
-            team.drive(duration, &stop, &api, &progress)?;
-            progress.finish();
-            team.finish(&api, || metrics::total(&counted, metrics::DUPLICATE_SAMPLES))
-        })
-        .await?;
+        let summary = visit(args, &endpoint, &url).await;
         service.stop().await;
         summary
     });
-    if temporary {
+    if args.data_dir.is_none() {
         // Left-overs in the temporary directory are no failure of the demo.
         let _ = std::fs::remove_dir_all(&directory);
     }
-    let summary = result?;
-    if args.json {
-        output::json(&summary)
-    } else {
-        summary.print()
-    }
+    let mut summary = summary?;
+    summary.duplicates = Some(metrics::total(&prometheus, metrics::DUPLICATE_SAMPLES));
+    Ok(summary)
 }
 
-type Stop = std::sync::Arc<std::sync::atomic::AtomicBool>;
+/// Drives the robots against the service.
+async fn visit(args: &DemoArgs, endpoint: &str, url: &str) -> anyhow::Result<Summary> {
+    let (space, robots) = (args.space.as_str().to_owned(), args.robots);
+    output::progress(&format!(
+        "{robots} robots in the obstacle world, over {endpoint}"
+    ));
+    output::progress(&format!("start page   {url}/"));
+    output::progress(&format!("HTTP API     {url}/docs"));
+    output::progress(&format!(
+        "try          curl {url}/v1/spaces/{space}/agents/robot1"
+    ));
+    let stop = Stop::default();
+    let interrupted = stop.clone();
+    tokio::spawn(async move {
+        // Without signals the demo simply ends when its time is over.
+        if serve::interrupted().await.is_ok() {
+            interrupted.store(true, Ordering::Relaxed);
+        }
+    });
+    let (api, endpoint) = (Api::new(url, args.token.as_deref()), endpoint.to_owned());
+    let (seed, duration) = (args.seed, Duration::from_secs_f64(args.duration));
+    tokio::task::spawn_blocking(move || {
+        wait_until_ready(&api)?;
+        if api.space(&space).is_err() {
+            api.create_space(&space, &SpaceSettings::default())?;
+        }
+        let mut team = DemoTeam::connect(&endpoint, &space, robots, seed)?;
+        let progress = Progress::new(robots, duration);
+        team.drive(duration, &stop, &api, &progress)?;
+        progress.finish();
+        team.finish(&api)
+    })
+    .await?
+}
+
+/// Set when the demo is to end early.
+type Stop = Arc<AtomicBool>;
 
 /// The port if it is free, another free one otherwise.
 fn port(wanted: u16) -> std::io::Result<u16> {

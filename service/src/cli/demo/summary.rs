@@ -14,8 +14,8 @@ pub(super) struct Summary {
     pub(super) samples_applied: u64,
     pub(super) samples_durable: u64,
     pub(super) samples_resent: u64,
-    /// Samples that the service got twice, and applied once.
-    pub(super) duplicates: u64,
+    /// Samples that the demo's own service got twice, and applied once.
+    pub(super) duplicates: Option<u64>,
     /// Mean over the robots.
     pub(super) dead_reckoning_ate_rmse_m: f64,
     /// Mean over the robots.
@@ -70,13 +70,14 @@ impl Latency {
 impl Summary {
     pub(super) fn print(&self) -> anyhow::Result<()> {
         output::line(&format!(
-            "samples      {} sent, {} applied, {} durable, {} sent again, {} duplicates",
-            self.samples_sent,
-            self.samples_applied,
-            self.samples_durable,
-            self.samples_resent,
-            self.duplicates
+            "samples      {} sent, {} applied, {} durable, {} sent again",
+            self.samples_sent, self.samples_applied, self.samples_durable, self.samples_resent
         ))?;
+        if let Some(duplicates) = self.duplicates {
+            output::line(&format!(
+                "             {duplicates} received twice, applied once"
+            ))?;
+        }
         output::line(&format!(
             "memory       {} places, {} trips, {} landmarks",
             self.places, self.trips, self.landmarks

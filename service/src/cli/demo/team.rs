@@ -168,12 +168,8 @@ impl DemoTeam {
             .collect()
     }
 
-    /// Waits until everything is durable, and sums up. `duplicates` counts what the service got twice.
-    pub(super) fn finish(
-        self,
-        api: &Api,
-        duplicates: impl FnOnce() -> u64,
-    ) -> anyhow::Result<Summary> {
+    /// Waits until everything is durable, and sums up.
+    pub(super) fn finish(self, api: &Api) -> anyhow::Result<Summary> {
         let mut robots = Vec::new();
         let (mut sent, mut durable, mut applied, mut resent) = (0, 0, 0, 0);
         for robot in self.robots {
@@ -216,7 +212,7 @@ impl DemoTeam {
             samples_applied: applied,
             samples_durable: durable,
             samples_resent: resent,
-            duplicates: duplicates(),
+            duplicates: None,
             dead_reckoning_ate_rmse_m: mean(|robot| robot.dead_reckoning_ate_rmse_m),
             causal_ate_rmse_m: mean(|robot| robot.causal_ate_rmse_m),
             places: info.places,
