@@ -1,0 +1,261 @@
+//! The engine on a real store: whatever way samples arrive, the map is the same.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use cogmap_proto::{
+    Codec, Level, Marker, Relation, Sample, SampleBatch, SampleBody, Sighting, SkipReason,
+    SpaceSettings, StartPose, Target, Velocity,
+};
+use cognitive_map::CognitiveMap;
+use proptest::prelude::*;
+
+use super::{Engine, EngineSettings, Entry, Readiness, Silent, core_settings, records_of};
+use crate::store::FjallStore;
+
+const SPACE: &str = "lab";
+const AGENT: &str = "ada";
+const SESSION: u64 = 3;
+const SAMPLES: u64 = 240;
+/// Longest wait for a thread of the engine.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// A drive with everything in it, among it samples that make no sense.
+fn drive() -> Vec<Sample> {
+    (0..SAMPLES)
+        .map(|seq| {
+            let turn = if seq % 60 < 30 { 0.4 } else { -0.7 };
+            let body = match seq {
+                0 => SampleBody::StartPose(StartPose {
+                    translation_m: [1.0, -2.0, 0.5],
+                    rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+                    noise: None,
+                }),
+                50 => SampleBody::Velocity(Velocity {
+                    linear_m_s: [f64::NAN, 0.0, 0.0],
+                    angular_rad_s: [0.0; 3],
+                    duration_s: 0.1,
+                    noise: None,
+                }),
+                120 => SampleBody::Marker(Marker {
+                    label: "dock".into(),
+                    ends_trip: true,
+                }),
+                _ if seq % 17 == 0 => SampleBody::Sighting(Sighting {
+                    target: Target::Landmark(format!("post {}", seq % 3)),
+                    relation: Relation::Position {
+                        translation_m: [2.0, 1.0, 0.0],
+                        sd_m: [0.1; 3],
+                    },
+                }),
+                _ if seq % 11 == 0 => SampleBody::Level(Level {
+                    channel: "light".into(),
+                    value: 0.5,
+                    offset_m: [0.0; 3],
+                    normal: None,
+                }),
+                _ => SampleBody::Velocity(Velocity {
+                    linear_m_s: [1.0, 0.0, 0.1],
+                    angular_rad_s: [0.0, 0.1, turn],
+                    duration_s: 0.1,
+                    noise: None,
+                }),
+            };
+            // One stamp runs backwards.
+            let step = if seq == 90 { seq - 5 } else { seq };
+            let stamp_ns = i64::try_from(step).expect("a small number") * 100_000_000;
+            Sample { stamp_ns, body }
+        })
+        .collect()
+}
+
+fn open(directory: &Path, settings: EngineSettings) -> Engine {
+    let store = Arc::new(FjallStore::open(directory).expect("the store opens"));
+    let engine = Engine::open(store, settings, Arc::new(Silent)).expect("the engine opens");
+    let name = SPACE.parse().expect("a name");
+    engine
+        .create_space(&name, &SpaceSettings::default())
+        .expect("the space is there");
+    wait_for(|| engine.readiness() == Readiness::Ready);
+    engine
+}
+
+fn wait_for(condition: impl Fn() -> bool) {
+    let deadline = Instant::now() + PATIENCE;
+    while !condition() {
+        assert!(
+            Instant::now() < deadline,
+            "it did not happen in {PATIENCE:?}"
+        );
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn offer(engine: &Engine, first: u64, samples: &[Sample]) {
+    let batch = SampleBatch {
+        session: SESSION,
+        first_seq: first,
+        samples: samples.to_vec(),
+    };
+    engine.offer(
+        SPACE,
+        AGENT,
+        Codec::Postcard,
+        &Codec::Postcard.encode(&batch),
+    );
+}
+
+fn applied(engine: &Engine) -> u64 {
+    let space = engine.space(SPACE).expect("the space is there");
+    space
+        .agent(AGENT)
+        .map_or(0, |desk| desk.watermark().applied)
+}
+
+fn digest(engine: &Engine) -> String {
+    let space = engine.space(SPACE).expect("the space is there");
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .expect("a runtime");
+    runtime
+        .block_on(space.snapshot())
+        .expect("a snapshot")
+        .digest()
+        .to_string()
+}
+
+/// The digest after messages of the given (first, count), with restarts before some of them; what
+/// restarts made the engine forget is sent again at the end, as a client does.
+fn digest_after(messages: &[(usize, usize)], restarts: &[usize]) -> String {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let settings = EngineSettings {
+        gap_timeout: Duration::from_secs(3600),
+        checkpoint_interval: Duration::from_millis(1),
+        ..EngineSettings::default()
+    };
+    let drive = drive();
+    let mut engine = open(directory.path(), settings);
+    for (at, &(first, count)) in messages.iter().enumerate() {
+        if restarts.contains(&at) {
+            engine.shutdown();
+            drop(engine);
+            engine = open(directory.path(), settings);
+        }
+        offer(
+            &engine,
+            first as u64,
+            &drive[first..drive.len().min(first + count)],
+        );
+    }
+    offer(&engine, 0, &drive);
+    wait_for(|| applied(&engine) == SAMPLES);
+    let digest = digest(&engine);
+    engine.shutdown();
+    digest
+}
+
+/// What a plain fold over the drive gives, without engine and store.
+fn digest_of_fold() -> String {
+    let settings = core_settings(&SpaceSettings::default()).expect("the defaults are valid");
+    let mut map = CognitiveMap::new(settings);
+    let mut events = Vec::new();
+    let enrol = Entry::Enrol {
+        agent: 0,
+        name: AGENT.into(),
+    };
+    records_of(&enrol, |record| map.apply(&record, &mut events));
+    for (seq, sample) in (0..).zip(drive()) {
+        let skip = |reason| Entry::Skip {
+            agent: 0,
+            session: SESSION,
+            from: seq,
+            to: seq + 1,
+            reason,
+        };
+        let entry = match seq {
+            50 => skip(SkipReason::NumberOutOfRange),
+            90 => skip(SkipReason::TimeBackwards),
+            _ => {
+                let batch = SampleBatch {
+                    session: SESSION,
+                    first_seq: seq,
+                    samples: vec![sample],
+                };
+                Entry::Samples { agent: 0, batch }
+            }
+        };
+        records_of(&entry, |record| map.apply(&record, &mut events));
+    }
+    map.digest().to_string()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+
+    /// Any batching, order inside the window, duplication and restarts.
+    #[test]
+    fn any_way_of_arrival_gives_the_same_map(
+        starts in prop::collection::vec(0..240_usize, 5..40),
+        counts in prop::collection::vec(1..40_usize, 40),
+        restarts in prop::collection::vec(0..40_usize, 0..3),
+    ) {
+        let messages: Vec<_> = starts.into_iter().zip(counts).collect();
+        prop_assert_eq!(digest_after(&messages, &restarts), digest_of_fold());
+    }
+}
+
+#[test]
+fn samples_that_make_no_sense_are_named_in_the_watermark() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let engine = open(directory.path(), EngineSettings::default());
+    offer(&engine, 0, &drive());
+    wait_for(|| applied(&engine) == SAMPLES);
+    let desk = engine
+        .space(SPACE)
+        .and_then(|space| space.agent(AGENT))
+        .expect("the agent");
+    let rejected: Vec<_> = desk
+        .watermark()
+        .rejected
+        .iter()
+        .map(|rejection| (rejection.range.from, rejection.reason))
+        .collect();
+    assert_eq!(
+        rejected,
+        [
+            (50, SkipReason::NumberOutOfRange),
+            (90, SkipReason::TimeBackwards)
+        ]
+    );
+    engine.shutdown();
+}
+
+#[test]
+fn what_never_comes_is_lost_after_its_time_and_the_rest_goes_on() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let settings = EngineSettings {
+        gap_timeout: Duration::from_millis(50),
+        ..EngineSettings::default()
+    };
+    let engine = open(directory.path(), settings);
+    let drive = drive();
+    offer(&engine, 0, &drive[..10]);
+    offer(&engine, 20, &drive[20..30]);
+    wait_for(|| applied(&engine) == 30);
+    let desk = engine
+        .space(SPACE)
+        .and_then(|space| space.agent(AGENT))
+        .expect("the agent");
+    let watermark = desk.watermark();
+    assert_eq!(watermark.gap, None);
+    assert_eq!(watermark.rejected.len(), 1);
+    assert_eq!(
+        (
+            watermark.rejected[0].range.from,
+            watermark.rejected[0].range.to
+        ),
+        (10, 20)
+    );
+    engine.shutdown();
+}

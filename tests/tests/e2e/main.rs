@@ -1,0 +1,23 @@
+//! End to end, through the doors only: the process, Zenoh, HTTP, the command line.
+//!
+//! Two environment variables make the drills longer than the gate has time for:
+//! `COGMAP_DRILL_KILLS` (how often the service is killed under load; 4 when absent, 30 for the
+//! figure in the README) and `COGMAP_DRILL_PAUSE_S` (how long it is stopped; 3 s when absent).
+//! `COGMAP_TEST_SEED` repeats a failure.
+#![allow(clippy::unwrap_used)] // All of it is tests; clippy sees that only in test functions.
+
+// What the outside does to the service.
+mod bad_input; // what no client would send
+mod crash; // kill -9, and what recovery makes of it
+mod full_disk; // a disk that takes no more
+mod pause; // a process that stands still
+mod readers; // readers and senders at once
+
+// What the service does for the outside.
+mod cli; // the commands
+mod http; // samples in, answers out
+mod http_guard; // who is let in, and how the service goes
+mod http_ingest; // samples over HTTP alone
+mod zenoh; // estimates, watermarks, queries, events
+
+mod feeding; // a robot that keeps sending; what the drills compare
