@@ -18,6 +18,9 @@ pub const JSON: &str = "application/json";
 /// What all postcard encodings start with, whatever their version.
 const POSTCARD: &str = "application/vnd.cogmap.postcard";
 
+/// Room for a message of one sample, so that writing it allocates once.
+const ENCODED_BYTES: usize = 256;
+
 /// How a message is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Codec {
@@ -111,7 +114,10 @@ impl Codec {
     /// Never for the messages of this crate: they are plain data, and memory is the only sink.
     pub fn encode<T: Serialize>(self, message: &T) -> Vec<u8> {
         match self {
-            Self::Postcard => postcard::to_stdvec(message).expect("plain data encodes"),
+            Self::Postcard => {
+                let bytes = Vec::with_capacity(ENCODED_BYTES);
+                postcard::to_extend(message, bytes).expect("plain data encodes")
+            }
             Self::Cbor => {
                 let mut bytes = Vec::new();
                 ciborium::into_writer(message, &mut bytes).expect("plain data encodes");
@@ -124,8 +130,7 @@ impl Codec {
     /// Reads a message; bytes after it are an error.
     ///
     /// In CBOR and JSON a whole number may stand for a float (`1` for `1.0`). Floats come out of
-    /// postcard and CBOR as they went in, NaN included. JSON keeps 15 digits of them; the 16th and
-    /// 17th may change by a unit or two.
+    /// postcard and CBOR as they went in, NaN included; out of JSON, which has no NaN, too.
     ///
     /// # Errors
     /// The bytes are too long or not such a message.

@@ -21,6 +21,7 @@ mod event;
 mod key;
 pub mod limits;
 mod name;
+mod narrow;
 mod query;
 mod sample;
 mod settings;

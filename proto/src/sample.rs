@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::narrow;
+
 /// Consecutive samples of one agent: sample `i` of the batch has the number `first_seq + i`.
 ///
 /// An agent numbers its samples from 0 within a *session* (one run of the agent).
@@ -109,6 +111,7 @@ pub struct Descriptor {
     /// Name of the channel.
     pub channel: String,
     /// The vector, of 8 to 4096 numbers; normalised on receipt, so it must not be zero.
+    #[serde(deserialize_with = "narrow::vector")]
     pub vector: Vec<f32>,
 }
 

@@ -1,5 +1,7 @@
 //! Metrics: their names, their descriptions, and the recorder behind `/metrics`.
 
+use std::time::Duration;
+
 use metrics::{Unit, describe_counter, describe_gauge, describe_histogram};
 use metrics_exporter_prometheus::{BuildError, Matcher, PrometheusBuilder, PrometheusHandle};
 
@@ -51,6 +53,9 @@ pub const HTTP_REQUEST_SECONDS: &str = "cogmap_http_request_seconds";
 /// Event streams open now.
 pub const HTTP_STREAMS: &str = "cogmap_http_streams";
 
+/// How often histograms are tended.
+const UPKEEP_INTERVAL: Duration = Duration::from_secs(5);
+
 /// Bounds of the histograms of times \[s\]: from a motion step to a stalled disk.
 const SECONDS: [f64; 16] = [
     1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1.0, 3.0, 10.0,
@@ -67,6 +72,16 @@ pub fn install() -> Result<PrometheusHandle, BuildError> {
     let handle = builder()?.install_recorder()?;
     describe();
     Ok(handle)
+}
+
+/// Moves what histograms have recorded into their buckets from time to time. A scrape does that too;
+/// where nobody scrapes, the records would pile up.
+pub async fn upkeep(handle: PrometheusHandle) {
+    let mut ticks = tokio::time::interval(UPKEEP_INTERVAL);
+    loop {
+        ticks.tick().await;
+        handle.run_upkeep();
+    }
 }
 
 /// Sum of a counter over all its labels.

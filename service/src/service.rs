@@ -13,6 +13,7 @@ use zenoh::Session;
 use crate::config::{Config, ConfigError};
 use crate::engine::{Engine, Outlet, Silent, SpaceError};
 use crate::http;
+use crate::metrics;
 use crate::store::{FjallStore, StoreError};
 use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohOutlet};
 
@@ -28,6 +29,7 @@ pub struct Service {
     intake: Option<Intake>,
     stop_http: oneshot::Sender<()>,
     http: JoinHandle<std::io::Result<()>>,
+    upkeep: JoinHandle<()>,
 }
 
 /// Why the service does not start.
@@ -112,6 +114,7 @@ impl Service {
             Some(session) => Some(Intake::start(session, &engine).await?),
             None => None,
         };
+        let upkeep = tokio::spawn(metrics::upkeep(prometheus.clone()));
         let (stop_http, stopped) = oneshot::channel();
         let http = tokio::spawn(http::run(
             listener,
@@ -130,6 +133,7 @@ impl Service {
             intake,
             stop_http,
             http,
+            upkeep,
         })
     }
 
@@ -157,6 +161,7 @@ impl Service {
             Ok(Err(error)) => tracing::error!(%error, "http"),
             Err(error) => tracing::error!(%error, "the http task ended with a panic"),
         }
+        self.upkeep.abort();
         let engine = self.engine;
         if tokio::task::spawn_blocking(move || engine.shutdown())
             .await

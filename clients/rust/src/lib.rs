@@ -9,7 +9,7 @@
 //! use cogmap_client::Robot;
 //!
 //! # fn main() -> Result<(), cogmap_client::ClientError> {
-//! let robot = Robot::connect("tcp/127.0.0.1:7447", "demo", "ada")?;
+//! let robot = Robot::connect("tcp/127.0.0.1:7447", "default", "ada")?;
 //! robot.start_pose([0.0; 3], [0.0, 0.0, 0.0, 1.0])?;
 //! robot.velocity([0.5, 0.0, 0.0], [0.0, 0.0, 0.1], 0.1)?;
 //! robot.flush(Duration::from_secs(5))?;

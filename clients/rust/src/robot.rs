@@ -168,15 +168,18 @@ impl Robot {
             .map(|sample| self.check(sample))
             .collect::<Result<Vec<_>, _>>()?;
         let mut state = self.shared.lock();
+        self.check_session(&state)?;
+        let mut now = self.shared.now();
         let first_seq = state.window.next();
         for (taken, (sample, bytes)) in samples.into_iter().zip(sizes).enumerate() {
             if !state.window.has_room(bytes) {
                 state.window.hurry();
                 self.shared.sender_bell.notify_one();
+                state = self.room_for(state, bytes, taken)?;
+                now = self.shared.now();
             }
-            state = self.room_for(state, bytes, taken)?;
             state.last_stamp_ns = state.last_stamp_ns.max(sample.stamp_ns);
-            state.window.push(sample, bytes, self.shared.now());
+            state.window.push(sample, bytes, now);
         }
         state.window.hurry();
         drop(state);
@@ -229,13 +232,15 @@ impl Robot {
         bytes: usize,
         taken: usize,
     ) -> Result<MutexGuard<'a, State>, ClientError> {
-        let deadline = Instant::now() + self.send_timeout;
+        let mut deadline = None;
         loop {
             self.check_session(&state)?;
             if state.window.has_room(bytes) {
                 return Ok(state);
             }
-            let left = deadline.saturating_duration_since(Instant::now());
+            let now = Instant::now();
+            let deadline = *deadline.get_or_insert(now + self.send_timeout);
+            let left = deadline.saturating_duration_since(now);
             if left.is_zero() {
                 return Err(ClientError::WindowFull {
                     pending: state.window.pending(),

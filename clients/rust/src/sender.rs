@@ -19,6 +19,10 @@ const QUERY_TIMEOUT: Duration = Duration::from_secs(2);
 /// Longest sleep of the thread when nothing is due.
 const IDLE: Duration = Duration::from_secs(60);
 
+/// Most messages written under one lock. A put may wait for a slow link, and until then nothing that
+/// was heard in the meantime can change what goes out.
+const MESSAGES_AT_ONCE: usize = 16;
+
 /// What the thread works with.
 pub(crate) struct Sender {
     pub(crate) shared: Arc<Shared>,
@@ -33,7 +37,7 @@ pub(crate) struct Sender {
 
 /// What to do next, decided under the lock and done without it.
 enum Step {
-    Put(Vec<u8>),
+    Put,
     Ask,
     End,
 }
@@ -48,9 +52,10 @@ impl Sender {
 
     fn run(self) {
         self.await_service();
+        let mut messages = Vec::with_capacity(MESSAGES_AT_ONCE);
         loop {
-            match self.next_step() {
-                Step::Put(bytes) => self.put(bytes),
+            match self.next_step(&mut messages) {
+                Step::Put => self.put(&mut messages),
                 Step::Ask => self.ask(),
                 Step::End => break,
             }
@@ -79,7 +84,9 @@ impl Sender {
         }
     }
 
-    fn next_step(&self) -> Step {
+    /// Decides what is next. What is to be put is written into `messages`: all that is due, up to a
+    /// bound, so that a fast robot takes the lock once for many of them.
+    fn next_step(&self, messages: &mut Vec<Vec<u8>>) -> Step {
         let mut state = self.shared.lock();
         loop {
             if state.stop {
@@ -92,16 +99,21 @@ impl Sender {
                     state.counters.queries += 1;
                     return Step::Ask;
                 }
-                if let Some(run) = state.window.take(now) {
+                while messages.len() < MESSAGES_AT_ONCE
+                    && let Some(run) = state.window.take(now)
+                {
                     let samples = state.window.samples(run);
                     let bytes = batch::encode(self.session, run.first_seq, samples, self.codec);
+                    messages.push(bytes);
                     state.counters.batches += 1;
                     if run.repeated {
                         state.counters.samples_resent += run.len as u64;
                     } else {
                         state.counters.samples_sent += run.len as u64;
                     }
-                    return Step::Put(bytes);
+                }
+                if !messages.is_empty() {
+                    return Step::Put;
                 }
             }
             let due = state.window.wake_at().filter(|_| !over);
@@ -112,9 +124,11 @@ impl Sender {
         }
     }
 
-    fn put(&self, bytes: Vec<u8>) {
-        if self.publisher.put(bytes).wait().is_err() {
-            self.shared.lock().counters.puts_failed += 1;
+    fn put(&self, messages: &mut Vec<Vec<u8>>) {
+        for bytes in messages.drain(..) {
+            if self.publisher.put(bytes).wait().is_err() {
+                self.shared.lock().counters.puts_failed += 1;
+            }
         }
     }
 

@@ -1,6 +1,7 @@
 //! What the engine counts. Handles are taken once, so that counting costs one atomic addition.
 
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use cogmap_proto::{Codec, DecodeError, SkipReason};
 use cognitive_map::CognitiveMap;
@@ -8,6 +9,9 @@ use metrics::{Counter, Gauge, Histogram, counter, gauge, histogram};
 
 use super::sequencer::Offered;
 use crate::metrics as names;
+
+/// Least time between two log lines about spaces that do not exist.
+const NAMING_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Why a message is dropped whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +55,8 @@ pub(crate) struct IntakeCounters {
     messages: [Counter; 3],
     bytes: [Counter; 3],
     dropped: [Counter; Drop::ALL.len()],
+    /// When the log last named a space that does not exist.
+    named: Mutex<Option<Instant>>,
 }
 
 impl IntakeCounters {
@@ -61,6 +67,18 @@ impl IntakeCounters {
                 .map(|codec| counter!(names::RECEIVED_MESSAGES, "codec" => codec.name())),
             bytes: codecs.map(|codec| counter!(names::RECEIVED_BYTES, "codec" => codec.name())),
             dropped: dropped(),
+            named: Mutex::new(None),
+        }
+    }
+
+    /// Counts a message for a space that does not exist, and says so in the log now and then: whoever
+    /// misspelt a name looks there.
+    pub(crate) fn unknown_space(&self, space: &str) {
+        self.dropped(Drop::UnknownSpace);
+        let mut named = self.named.lock().unwrap_or_else(PoisonError::into_inner);
+        if named.is_none_or(|at| at.elapsed() >= NAMING_INTERVAL) {
+            *named = Some(Instant::now());
+            tracing::warn!(space, "samples for a space that does not exist are dropped");
         }
     }
 

@@ -18,6 +18,7 @@ mod fold;
 mod health;
 mod message;
 mod outlet;
+mod queue;
 mod readout;
 mod recovery;
 mod sequencer;
@@ -50,7 +51,7 @@ pub use trajectory::{Chunk, Recorder};
 use crate::store::{Store, StoreError};
 use counters::{Drop, IntakeCounters};
 use health::Health;
-use message::NotQueued;
+use queue::NotQueued;
 use space::Surroundings;
 
 /// The engine. Clones share it.
@@ -259,7 +260,7 @@ impl Engine {
         intake.received(codec, payload.len());
         let spaces = self.0.spaces.load();
         let Some(space) = spaces.get(space) else {
-            return intake.dropped(Drop::UnknownSpace);
+            return intake.unknown_space(space);
         };
         match space.offer(agent, codec, payload) {
             Ok(()) => {}

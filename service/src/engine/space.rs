@@ -15,8 +15,9 @@ use super::checkpointer::{Checkpointer, Job};
 use super::committer::Commit;
 use super::desk::AgentDesk;
 use super::health::Health;
-use super::message::{Body, Inbox, IngestError, Message, NotQueued, Queue, Samples, queue};
+use super::message::{IngestError, Request};
 use super::outlet::Outlet;
+use super::queue::{Inbox, NotQueued, Queue, queue};
 use super::recovery;
 use super::settings::EngineSettings;
 use super::trajectory;
@@ -176,8 +177,7 @@ impl Space {
         }
         let (wish, granted) = oneshot::channel();
         self.shared.wishes().push(wish);
-        // A full queue keeps the writer awake anyway.
-        let _ = self.queue.push(Message::Wake);
+        self.queue.call();
         granted
             .await
             .map_err(|_| Unavailable::Failed("the space is closing".to_owned()))
@@ -207,11 +207,7 @@ impl Space {
 
     /// Queues samples as they came over Zenoh.
     pub(crate) fn offer(&self, agent: &str, codec: Codec, payload: &[u8]) -> Result<(), NotQueued> {
-        let body = Body::Encoded(codec, payload.into());
-        self.queue.push(Message::Samples(Samples {
-            agent: agent.into(),
-            body,
-        }))
+        self.queue.push(agent, codec, payload)
     }
 
     /// Takes samples and answers when they are durable. Samples beyond a gap are not kept waiting:
@@ -230,17 +226,15 @@ impl Space {
             Err(Unavailable::Failed(detail)) => return Err(IngestError::Store(detail)),
         }
         let (reply, answer) = oneshot::channel();
-        let body = Body::Decoded(batch, reply);
-        let samples = Samples {
+        let request = Request {
             agent: agent.as_str().into(),
-            body,
+            batch,
+            reply,
         };
-        self.queue
-            .push(Message::Samples(samples))
-            .map_err(|error| match error {
-                NotQueued::Full => IngestError::Busy,
-                NotQueued::Closed => IngestError::Closed,
-            })?;
+        self.queue.request(request).map_err(|error| match error {
+            NotQueued::Full => IngestError::Busy,
+            NotQueued::Closed => IngestError::Closed,
+        })?;
         answer.await.unwrap_or(Err(IngestError::Closed))
     }
 
@@ -277,7 +271,7 @@ impl Space {
     /// Takes what is queued, checkpoints, and ends the thread.
     pub(crate) fn close(&self) {
         self.shared.closing.store(true, Ordering::Release);
-        let _ = self.queue.push(Message::Wake);
+        self.queue.call();
         let thread = self
             .thread
             .lock()
@@ -319,9 +313,9 @@ fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: 
             shared
                 .revision
                 .store(recovered.map.revision(), Ordering::Release);
-            let writer = Writer::new(Arc::clone(shared), inbox, commits, checkpointer, recovered);
+            let writer = Writer::new(Arc::clone(shared), commits, checkpointer, recovered);
             let _ = shared.loaded.set(Ok(()));
-            writer.run();
+            writer.run(inbox);
         }
         Err(error) => {
             tracing::error!(space = %shared.name, %error, "load space");

@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use axum::body::Bytes;
+use axum::body::{Body, Bytes};
 use axum::extract::{FromRequest, FromRequestParts, Path, Request};
 use axum::http::StatusCode;
 use axum::http::header::{CONTENT_TYPE, HeaderValue};
 use axum::http::request::Parts;
+use cogmap_proto::limits::MESSAGE_BYTES_MAX;
 use cogmap_proto::{Codec, Name};
+use http_body_util::Limited;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -234,7 +236,8 @@ pub(crate) fn must_be_json(media_type: Option<&HeaderValue>) -> Result<(), Probl
 
 /// The whole body.
 pub(crate) async fn whole_body(request: Request, service: &Service) -> Result<Bytes, Problem> {
-    Bytes::from_request(request, service)
+    let bounded = request.map(|body| Body::new(Limited::new(body, MESSAGE_BYTES_MAX)));
+    Bytes::from_request(bounded, service)
         .await
         .map_err(|rejection| {
             let kind = match rejection.status() {

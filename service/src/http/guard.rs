@@ -2,20 +2,23 @@
 
 use std::any::Any;
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::panic::AssertUnwindSafe;
+use std::pin::Pin;
 use std::sync::{Arc, OnceLock};
+use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 
 use axum::body::Body;
-use axum::extract::{MatchedPath, Request, State};
+use axum::extract::{MatchedPath, Request};
 use axum::http::header::AUTHORIZATION;
 use axum::http::{Response, StatusCode};
-use axum::middleware::Next;
 use axum::response::IntoResponse;
 use futures_util::FutureExt;
 use metrics::{Counter, Histogram, counter, histogram};
 use subtle::ConstantTimeEq;
-use tokio::sync::Semaphore;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tower::{Layer, Service};
 
 use super::problem::{Kind, Problem};
 use super::settings::HttpSettings;
@@ -35,10 +38,17 @@ const STATUSES: [u16; 17] = [
 #[derive(Clone)]
 pub(crate) struct Guard(Arc<Inner>);
 
+/// A handler behind the guard.
+#[derive(Clone)]
+pub(crate) struct Guarded<S> {
+    inner: S,
+    guard: Guard,
+}
+
 struct Inner {
     token: Option<Token>,
     timeout: Duration,
-    requests: Semaphore,
+    requests: Arc<Semaphore>,
     routes: BTreeMap<String, RouteMeters>,
     unmatched: RouteMeters,
 }
@@ -55,7 +65,7 @@ impl Guard {
         Self(Arc::new(Inner {
             token: settings.token.clone(),
             timeout: settings.request_timeout,
-            requests: Semaphore::new(settings.requests_max),
+            requests: Arc::new(Semaphore::new(settings.requests_max)),
             routes: routes
                 .map(|route| (route.clone(), RouteMeters::new(route)))
                 .collect(),
@@ -63,21 +73,29 @@ impl Guard {
         }))
     }
 
-    async fn answer(&self, request: Request, next: Next) -> Response<Body> {
-        let mut _permit = None;
-        if !OPEN_PATHS.contains(&request.uri().path()) {
-            if !self.admits(&request) {
-                let detail = "the header Authorization must be: Bearer, a space, the token";
-                return Problem::new(Kind::Unauthorized, detail).into_response();
-            }
-            match self.0.requests.try_acquire() {
-                Ok(permit) => _permit = Some(permit),
-                Err(_) => return Problem::new(Kind::Busy, "too much is under way").into_response(),
-            }
+    /// Lets a request in, with a permit where it needs one, or says why not.
+    fn admit(&self, request: &Request) -> Result<Option<OwnedSemaphorePermit>, Problem> {
+        if OPEN_PATHS.contains(&request.uri().path()) {
+            return Ok(None);
         }
-        let answer = AssertUnwindSafe(next.run(request)).catch_unwind();
+        if !self.knows(request) {
+            let detail = "the header Authorization must be: Bearer, a space, the token";
+            return Err(Problem::new(Kind::Unauthorized, detail));
+        }
+        match Arc::clone(&self.0.requests).try_acquire_owned() {
+            Ok(permit) => Ok(Some(permit)),
+            Err(_) => Err(Problem::new(Kind::Busy, "too much is under way")),
+        }
+    }
+
+    /// Waits for the answer of a handler, not for ever.
+    async fn answer(
+        &self,
+        answer: impl Future<Output = Result<Response<Body>, Infallible>>,
+    ) -> Response<Body> {
+        let answer = AssertUnwindSafe(answer).catch_unwind();
         match tokio::time::timeout(self.0.timeout, answer).await {
-            Ok(Ok(response)) => response,
+            Ok(Ok(Ok(response))) => response,
             Ok(Err(panic)) => {
                 tracing::error!(panic = words(&*panic), "a handler ended with a panic");
                 Problem::new(Kind::Internal, "a fault of the service; its log says more")
@@ -91,7 +109,7 @@ impl Guard {
     }
 
     /// Whether the request carries the token, if one is asked for.
-    fn admits(&self, request: &Request) -> bool {
+    fn knows(&self, request: &Request) -> bool {
         let Some(token) = &self.0.token else {
             return true;
         };
@@ -143,25 +161,54 @@ impl RouteMeters {
     }
 }
 
-/// The middleware.
-pub(crate) async fn guard(
-    State(guard): State<Guard>,
-    route: Option<MatchedPath>,
-    request: Request,
-    next: Next,
-) -> Response<Body> {
-    let start = Instant::now();
-    let traced = tracing::enabled!(tracing::Level::DEBUG)
-        .then(|| (request.method().clone(), request.uri().path().to_owned()));
-    let response = guard.answer(request, next).await;
-    let seconds = start.elapsed().as_secs_f64();
-    guard
-        .meters(route.as_ref())
-        .note(response.status(), seconds);
-    if let Some((method, path)) = traced {
-        tracing::debug!(%method, path, status = response.status().as_u16(), seconds, "answered");
+impl<S> Layer<S> for Guard {
+    type Service = Guarded<S>;
+
+    fn layer(&self, inner: S) -> Guarded<S> {
+        Guarded {
+            inner,
+            guard: self.clone(),
+        }
     }
-    response
+}
+
+impl<S> Service<Request> for Guarded<S>
+where
+    S: Service<Request, Response = Response<Body>, Error = Infallible>,
+    S::Future: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = Infallible;
+    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, Infallible>> + Send>>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+        self.inner.poll_ready(context)
+    }
+
+    fn call(&mut self, request: Request) -> Self::Future {
+        let start = Instant::now();
+        let traced = tracing::enabled!(tracing::Level::DEBUG)
+            .then(|| (request.method().clone(), request.uri().path().to_owned()));
+        let route = request.extensions().get::<MatchedPath>().cloned();
+        let guard = self.guard.clone();
+        let admitted = guard.admit(&request);
+        let admitted = admitted.map(|permit| (permit, self.inner.call(request)));
+        Box::pin(async move {
+            let response = match admitted {
+                Ok((_permit, answer)) => guard.answer(answer).await,
+                Err(refusal) => refusal.into_response(),
+            };
+            let seconds = start.elapsed().as_secs_f64();
+            guard
+                .meters(route.as_ref())
+                .note(response.status(), seconds);
+            if let Some((method, path)) = traced {
+                let status = response.status().as_u16();
+                tracing::debug!(%method, path, status, seconds, "answered");
+            }
+            Ok(response)
+        })
+    }
 }
 
 fn words(panic: &(dyn Any + Send)) -> &str {

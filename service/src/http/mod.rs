@@ -30,9 +30,6 @@ use std::future::{Future, IntoFuture};
 use std::io;
 
 use axum::Router;
-use axum::extract::DefaultBodyLimit;
-use axum::middleware;
-use cogmap_proto::limits::MESSAGE_BYTES_MAX;
 use metrics_exporter_prometheus::PrometheusHandle;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
@@ -44,9 +41,9 @@ pub use problem::{Kind, Problem};
 pub use settings::HttpSettings;
 
 use crate::engine::Engine;
-use guard::{Guard, guard};
+use guard::Guard;
 use listener::BoundedListener;
-use state::Service;
+use state::{Service, Shared};
 
 /// What the description says of the whole.
 #[derive(OpenApi)]
@@ -104,14 +101,15 @@ pub fn router(
     stopping: watch::Receiver<bool>,
 ) -> Router {
     let (described, paths) = described().split_for_parts();
-    let guarded = Guard::new(settings, paths.paths.paths.into_keys());
+    let guard = Guard::new(settings, paths.paths.paths.into_keys());
     described
         .merge(docs::routes(&openapi(settings.token.is_some())))
         .fallback(unknown_route)
         .method_not_allowed_fallback(method_not_allowed)
-        .layer(DefaultBodyLimit::max(MESSAGE_BYTES_MAX))
-        .layer(middleware::from_fn_with_state(guarded, guard))
-        .with_state(Service::new(engine, prometheus, settings, stopping))
+        .layer(guard)
+        .with_state(Service::new(Shared::new(
+            engine, prometheus, settings, stopping,
+        )))
 }
 
 async fn unknown_route() -> Problem {

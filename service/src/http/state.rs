@@ -8,9 +8,11 @@ use tokio::sync::{Semaphore, watch};
 use super::settings::HttpSettings;
 use crate::engine::Engine;
 
-/// What handlers share. Clones share it too.
-#[derive(Clone)]
-pub(crate) struct Service {
+/// The service, as handlers see it. One counted pointer, because each request clones it.
+pub(crate) type Service = Arc<Shared>;
+
+/// What handlers share.
+pub(crate) struct Shared {
     pub(crate) engine: Engine,
     pub(crate) prometheus: PrometheusHandle,
     /// One permit for each event stream.
@@ -19,7 +21,7 @@ pub(crate) struct Service {
     pub(crate) stopping: watch::Receiver<bool>,
 }
 
-impl Service {
+impl Shared {
     pub(crate) fn new(
         engine: Engine,
         prometheus: PrometheusHandle,

@@ -1,10 +1,12 @@
 //! Samples in.
 
 use std::borrow::Cow;
+use std::sync::LazyLock;
 
 use cogmap_proto::limits::MESSAGE_BYTES_MAX;
 use cogmap_proto::{Codec, DecodeError, Name, samples_key};
 use zenoh::Session;
+use zenoh::bytes::Encoding;
 use zenoh::pubsub::Subscriber;
 use zenoh::query::Queryable;
 use zenoh::sample::Sample;
@@ -49,10 +51,20 @@ fn take(engine: &Engine, sample: &Sample) {
     if bytes > MESSAGE_BYTES_MAX {
         return engine.refuse(&DecodeError::TooLong(bytes));
     }
-    // Almost every message has one of the encodings whose text Zenoh need not build.
-    match Codec::of_encoding(&Cow::from(sample.encoding())) {
+    match codec_of(sample.encoding()) {
         Ok(codec) => engine.offer(space, agent, codec, &sample.payload().to_bytes()),
         Err(error) => engine.refuse(&error),
+    }
+}
+
+/// The codec of a message. Almost all have one of the encodings that need no text to be built.
+fn codec_of(encoding: &Encoding) -> Result<Codec, DecodeError> {
+    static KNOWN: LazyLock<[(Encoding, Codec); 3]> = LazyLock::new(|| {
+        [Codec::Postcard, Codec::Cbor, Codec::Json].map(|codec| (codec.encoding().into(), codec))
+    });
+    match KNOWN.iter().find(|(known, _)| known == encoding) {
+        Some((_, codec)) => Ok(*codec),
+        None => Codec::of_encoding(&Cow::from(encoding)),
     }
 }
 

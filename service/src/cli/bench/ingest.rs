@@ -153,12 +153,12 @@ impl Bench {
             .context("start the publisher")
     }
 
-    /// Messages a second that a subscriber gets who only counts.
+    /// Messages a second that a subscriber gets who only counts; it subscribes as the service does.
     fn raw(&self, samples_per_message: usize, seconds: f64) -> anyhow::Result<f64> {
         let received = Arc::new(AtomicU64::new(0));
         let count = Arc::clone(&received);
         let space = format!("raw{samples_per_message}");
-        let key = raw_key(&space, "robot");
+        let key = raw_key("*", "*");
         let subscriber = self.session.declare_subscriber(key).callback(move |_| {
             count.fetch_add(1, Ordering::Relaxed);
         });

@@ -11,7 +11,7 @@ use crate::config::Token;
 /// A guarded router of handlers that go wrong.
 fn guarded(settings: &HttpSettings, entered: Arc<Notify>) -> Router {
     let routes = ["/panic", "/never", "/fine"];
-    let guarded = Guard::new(settings, routes.into_iter().map(str::to_owned));
+    let guard = Guard::new(settings, routes.into_iter().map(str::to_owned));
     Router::new()
         .route(
             "/panic",
@@ -19,7 +19,7 @@ fn guarded(settings: &HttpSettings, entered: Arc<Notify>) -> Router {
         )
         .route("/never", get(move || never(Arc::clone(&entered))))
         .route("/fine", get(|| async { "fine" }))
-        .layer(middleware::from_fn_with_state(guarded, guard))
+        .layer(guard)
 }
 
 /// Says that it has been entered, and stays.

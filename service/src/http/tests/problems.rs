@@ -1,5 +1,7 @@
 //! Every way to be refused is a problem document.
 
+use cogmap_proto::limits::MESSAGE_BYTES_MAX;
+
 use super::*;
 
 const JSON: &str = "application/json";

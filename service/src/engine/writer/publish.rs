@@ -1,0 +1,103 @@
+//! What leaves the writer at the end of a round.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use super::{AgentSlot, Writer};
+use crate::engine::committer::{Commit, Mark};
+use crate::engine::readout;
+
+impl Writer {
+    /// After a start: tells everyone where each agent stands.
+    pub(super) fn greet(&self) {
+        self.counters.sizes(&self.map, 0);
+        for slot in &self.agents {
+            if let Some(agent) = self.map.agent(slot.desk.id())
+                && let Some(readout) = readout::readout(&self.shared.name, agent, &self.map)
+            {
+                slot.desk.publish(readout);
+            }
+            self.remind(slot);
+        }
+    }
+
+    /// Publishes what the round brought about, and hands it to the committer.
+    pub(super) fn publish(&mut self) {
+        let space = &self.shared.name;
+        let mut commit = Commit {
+            space: Arc::clone(space),
+            samples: 0,
+            marks: Vec::new(),
+            answers: std::mem::take(&mut self.answers),
+        };
+        for slot in &mut self.agents {
+            if !slot.applied && !slot.remind {
+                continue;
+            }
+            let (applied, remind) = (
+                std::mem::take(&mut slot.applied),
+                std::mem::take(&mut slot.remind),
+            );
+            let Some(agent) = self.map.agent(slot.desk.id()) else {
+                continue;
+            };
+            let (session, next) = (agent.session(), agent.next_seq());
+            if applied {
+                if let Some(readout) = readout::readout(space, agent, &self.map) {
+                    let readout = slot.desk.publish(readout);
+                    self.shared.outlet.estimate(&readout.estimate);
+                }
+                commit.marks.push(Mark {
+                    desk: Arc::clone(&slot.desk),
+                    session,
+                    next,
+                });
+            }
+            let sequencer = &slot.sequencer;
+            let waiting = sequencer.waiting() as u64;
+            if sequencer.session() == session {
+                commit.samples +=
+                    slot.desk
+                        .marks()
+                        .applied(session, next, waiting, sequencer.gap());
+            } else {
+                let gap = sequencer.gap();
+                slot.desk
+                    .marks()
+                    .applied(sequencer.session(), sequencer.next(), waiting, gap);
+            }
+            if remind {
+                self.shared
+                    .outlet
+                    .watermark(space, slot.desk.name(), &slot.desk.watermark());
+            }
+        }
+        self.counters
+            .round(commit.samples, commit.marks.len() as u64);
+        self.shared
+            .revision
+            .store(self.map.revision(), Ordering::Release);
+        self.publish_events();
+        if !commit.marks.is_empty() || !commit.answers.is_empty() {
+            // The committer outlives the writers; without it nothing could be acknowledged anyway.
+            let _ = self.commits.send(commit);
+        }
+    }
+
+    fn publish_events(&mut self) {
+        for event in self.events.drain(..) {
+            if let Some(event) = readout::event(&self.shared.name, &self.map, &event) {
+                self.shared.outlet.event(&event);
+                // No one listening is no fault.
+                let _ = self.shared.events.send(Arc::new(event));
+            }
+        }
+    }
+
+    fn remind(&self, slot: &AgentSlot) {
+        let watermark = slot.desk.watermark();
+        self.shared
+            .outlet
+            .watermark(&self.shared.name, slot.desk.name(), &watermark);
+    }
+}
