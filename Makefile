@@ -49,8 +49,9 @@ test-rust: ## tests of Rust, the end-to-end tests among them
 test-python: $(VENV)/installed ## types and tests of the Python client, then the end-to-end tests in Python
 	cargo build $(ALL)
 	cd $(CLIENT) && $(VENV)/bin/mypy --strict
+	cd tests/python && $(VENV)/bin/mypy --strict .
 	cd $(CLIENT) && $(VENV)/bin/pytest
-	$(if $(wildcard tests/python/test_*.py),$(VENV)/bin/pytest tests/python)
+	$(VENV)/bin/pytest tests/python
 
 # A venv is made anew when what it has to hold changes.
 $(VENV)/installed: $(CLIENT)/pyproject.toml

@@ -6,7 +6,7 @@ import cogmap
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("--connect", default=cogmap.DEFAULT_ENDPOINT, help="Zenoh endpoint")
-parser.add_argument("--space", default="demo")
+parser.add_argument("--space", default="default")
 parser.add_argument("--agent", default="ada")
 args = parser.parse_args()
 

@@ -170,7 +170,12 @@ def main(arguments: Optional[List[str]] = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("directory", type=Path)
     parser.add_argument("--connect", default=cogmap.DEFAULT_ENDPOINT, help="Zenoh endpoint")
-    parser.add_argument("--space", default="demo")
+    parser.add_argument("--space", default="default")
+    parser.add_argument(
+        "--session",
+        type=int,
+        help="session of every robot; with 1, the map's digest is that of `cogmap replay`",
+    )
     parser.add_argument("--robots", type=int, nargs="*", help="numbers; all when absent")
     parser.add_argument("--limit", type=int, help="publish only this many samples")
     parser.add_argument(
@@ -197,6 +202,7 @@ def main(arguments: Optional[List[str]] = None) -> None:
             args.space,
             f"robot{number}",
             session=link,
+            session_id=args.session,
             batch_samples=1,
             window_samples=args.window,
             send_timeout_s=60.0,

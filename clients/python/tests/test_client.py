@@ -225,9 +225,11 @@ def test_export_is_the_file_as_it_came(server: Server, client: cogmap.Client) ->
     server.routes["GET /v1/spaces/lab/export"] = lambda request: (
         200,
         "text/plain",
-        request.query["format"].encode() + b"\x00",
+        json.dumps(request.query).encode() + b"\x00",
     )
-    assert client.export("lab", "g2o") == b"g2o\x00"
+    assert client.export("lab", "ply") == b'{"format": "ply"}\x00'
+    way = client.export("lab", "tum", agent="ada", session=7)
+    assert way == b'{"format": "tum", "agent": "ada", "session": "7"}\x00'
 
 
 def test_health_and_readiness_are_told_apart(server: Server, client: cogmap.Client) -> None:

@@ -10,7 +10,7 @@ fn main() -> Result<(), ClientError> {
     let endpoint = std::env::args().nth(1);
     let endpoint = endpoint.as_deref().unwrap_or("tcp/127.0.0.1:7447");
 
-    let robot = Robot::connect(endpoint, "demo", "ada")?;
+    let robot = Robot::connect(endpoint, "default", "ada")?;
     robot.start_pose([0.0; 3], [0.0, 0.0, 0.0, 1.0])?;
     robot.velocity([0.5, 0.0, 0.0], [0.0, 0.0, 0.1], 0.1)?; // m/s, rad/s, held for 0.1 s
     robot.flush(Duration::from_secs(5))?; // until it is on the service's disk

@@ -220,9 +220,25 @@ class Client:
             for data in data_fields(response):
                 yield decode(Event, data.encode(), JSON)
 
-    def export(self, space: str, format: str) -> bytes:
-        """A space as a file: `format` is one that the service knows, such as `json`, `tum` or `g2o`."""
-        return self._request("GET", _path(space, "export"), {"format": format}, accept="*/*")
+    def export(
+        self,
+        space: str,
+        format: str = "json",
+        *,
+        agent: Optional[str] = None,
+        session: Optional[int] = None,
+    ) -> bytes:
+        """A space as a file.
+
+        Args:
+            space: Name of the space.
+            format: `json` (the whole map), `ply` (the places as a point cloud) or `tum` (the causal
+                trajectory of an agent).
+            agent: Whose trajectory; `tum` needs it.
+            session: Which run of the agent; the current one when absent.
+        """
+        query: _Query = {"format": format, "agent": agent, "session": session}
+        return self._request("GET", _path(space, "export"), query, accept="*/*")
 
     # The service itself
 
