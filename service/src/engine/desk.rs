@@ -1,12 +1,13 @@
 //! The desk of an agent: what others may know of it without asking the writer.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use arc_swap::ArcSwapOption;
 use cogmap_proto::limits::WATERMARK_REJECTIONS_MAX;
 use cogmap_proto::{AgentDetail, Estimate, Rejection, SeqRange, StampedPose, Watermark};
 use cognitive_map::AgentId;
+use serde::Serialize;
 
 use super::trajectory::Recorder;
 
@@ -22,11 +23,29 @@ pub struct AgentDesk {
 }
 
 /// An agent after a group of its samples.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Readout {
     pub(crate) estimate: Estimate,
     pub(crate) odometry: StampedPose,
     pub(crate) travelled_m: f64,
+    /// Its part of the agent's JSON, once someone has asked for it.
+    json: OnceLock<Vec<u8>>,
+}
+
+/// The first fields of an [`AgentDetail`], which change with the readout only.
+#[derive(Serialize)]
+struct DetailHead<'a> {
+    name: &'a str,
+    estimate: Option<&'a Estimate>,
+    odometry: Option<&'a StampedPose>,
+}
+
+/// The other fields.
+#[derive(Serialize)]
+struct DetailTail {
+    watermark: Watermark,
+    lag_samples: u64,
+    travelled_m: f64,
 }
 
 /// How far an agent's samples have come.
@@ -90,20 +109,54 @@ impl AgentDesk {
     /// All that is known of it here.
     pub fn detail(&self) -> AgentDetail {
         let readout = self.readout.load();
-        let (watermark, lag_samples) = {
-            let marks = self.marks();
-            (
-                marks.watermark(),
-                marks.applied.saturating_sub(marks.durable) + marks.waiting,
-            )
-        };
+        let DetailTail {
+            watermark,
+            lag_samples,
+            travelled_m,
+        } = self.tail(readout.as_deref());
         AgentDetail {
             name: self.name.clone(),
             estimate: readout.as_ref().map(|readout| readout.estimate.clone()),
             odometry: readout.as_ref().map(|readout| readout.odometry),
             watermark,
             lag_samples,
-            travelled_m: readout.as_ref().map_or(0.0, |readout| readout.travelled_m),
+            travelled_m,
+        }
+    }
+
+    /// [`Self::detail`] as JSON. It is the question that is asked most, often many times between two
+    /// readouts, so what changes with the readout only is written once for each.
+    ///
+    /// # Panics
+    /// Never: an agent is plain data.
+    pub fn detail_json(&self) -> Vec<u8> {
+        let readout = self.readout.load();
+        let tail = serde_json::to_vec(&self.tail(readout.as_deref())).expect("plain data encodes");
+        let head = |readout: Option<&Readout>| {
+            let head = DetailHead {
+                name: &self.name,
+                estimate: readout.map(|readout| &readout.estimate),
+                odometry: readout.map(|readout| &readout.odometry),
+            };
+            serde_json::to_vec(&head).expect("plain data encodes")
+        };
+        let unread;
+        let head = if let Some(readout) = readout.as_deref() {
+            readout.json.get_or_init(|| head(Some(readout)))
+        } else {
+            unread = head(None);
+            &unread
+        };
+        // One object of the two: `{head` `,` `tail}`.
+        [&head[..head.len() - 1], b",", &tail[1..]].concat()
+    }
+
+    fn tail(&self, readout: Option<&Readout>) -> DetailTail {
+        let marks = self.marks();
+        DetailTail {
+            watermark: marks.watermark(),
+            lag_samples: marks.applied.saturating_sub(marks.durable) + marks.waiting,
+            travelled_m: readout.map_or(0.0, |readout| readout.travelled_m),
         }
     }
 
@@ -120,6 +173,17 @@ impl AgentDesk {
 
     pub(crate) fn recorder(&self) -> MutexGuard<'_, Recorder> {
         self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Readout {
+    pub(crate) fn new(estimate: Estimate, odometry: StampedPose, travelled_m: f64) -> Self {
+        Self {
+            estimate,
+            odometry,
+            travelled_m,
+            json: OnceLock::new(),
+        }
     }
 }
 

@@ -32,11 +32,8 @@ pub(crate) fn readout(space: &str, agent: &Agent, map: &CognitiveMap) -> Option<
         place,
         confidence,
     };
-    Some(Readout {
-        estimate,
-        odometry: stamped(stamp_ns, agent.odometry()),
-        travelled_m: agent.travelled_m(),
-    })
+    let odometry = stamped(stamp_ns, agent.odometry());
+    Some(Readout::new(estimate, odometry, agent.travelled_m()))
 }
 
 fn status(agent: &Agent, settings: &Settings) -> wire::Status {

@@ -259,3 +259,35 @@ fn what_never_comes_is_lost_after_its_time_and_the_rest_goes_on() {
     );
     engine.shutdown();
 }
+
+#[test]
+fn the_json_of_an_agent_is_that_of_its_detail_before_and_after_its_first_sample() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let engine = open(directory.path(), EngineSettings::default());
+    let space = engine.space(SPACE).expect("the space is there");
+    let drive = drive();
+    // The second time the stored part of the text is used; the third it is that of a new readout.
+    for (count, times) in [(0, 1), (1, 2), (240, 2)] {
+        if count == 0 {
+            // Beyond a gap: the agent is known, none of its samples is applied.
+            offer(&engine, 5, &drive[5..6]);
+        } else {
+            offer(&engine, 0, &drive[..count]);
+        }
+        wait_for(|| {
+            let watermark = space.agent(AGENT).map(|desk| desk.watermark());
+            watermark.is_some_and(|mark| {
+                mark.durable >= count as u64 && mark.gap.is_some() == (count < 5)
+            })
+        });
+        let desk = space.agent(AGENT).expect("the agent");
+        for _ in 0..times {
+            let detail = serde_json::to_vec(&desk.detail()).expect("plain data encodes");
+            assert_eq!(
+                String::from_utf8(desk.detail_json()),
+                String::from_utf8(detail)
+            );
+        }
+    }
+    engine.shutdown();
+}

@@ -56,7 +56,7 @@ pub(crate) async fn list(
         (status = 200, description = "The agent", body = AgentDetail),
         (status = 404, description = "There is no such space or agent")))]
 pub(crate) async fn get(AgentOfPath(_, desk): AgentOfPath, _: NoQuery) -> Response<Body> {
-    reply::json(&desk.detail())
+    reply::with_type("application/json", Body::from(desk.detail_json()))
 }
 
 /// The grid-cell state of an agent.
