@@ -61,6 +61,9 @@ pub enum DecodeError {
     /// Sequence numbers beyond what can be counted.
     #[error("the batch's sequence numbers run past the largest number")]
     SequenceOverflow,
+    /// The largest session: no later one could ever take over from it.
+    #[error("session {} leaves no number for a later one", u64::MAX)]
+    LastSession,
 }
 
 impl Codec {
@@ -173,7 +176,7 @@ impl SampleBatch {
     /// Checks the bounds of the batch as a whole.
     ///
     /// # Errors
-    /// It is empty, too large, or its sequence numbers overflow.
+    /// It is empty, too large, or its numbers leave none for what comes after it.
     pub fn check(&self) -> Result<(), DecodeError> {
         if self.samples.is_empty() {
             return Err(DecodeError::EmptyBatch);
@@ -181,9 +184,13 @@ impl SampleBatch {
         if self.samples.len() > BATCH_SAMPLES_MAX {
             return Err(DecodeError::TooManySamples(self.samples.len()));
         }
-        self.first_seq
-            .checked_add(self.samples.len() as u64)
-            .map(|_| ())
-            .ok_or(DecodeError::SequenceOverflow)
+        if self.session == u64::MAX {
+            return Err(DecodeError::LastSession);
+        }
+        match self.first_seq.checked_add(self.samples.len() as u64) {
+            // The number after the last sample, and one beyond it, can still be counted.
+            Some(end) if end < u64::MAX => Ok(()),
+            _ => Err(DecodeError::SequenceOverflow),
+        }
     }
 }

@@ -10,8 +10,8 @@ use crate::narrow;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct SampleBatch {
-    /// The run of the agent. A larger number takes over from a smaller one; by convention the
-    /// Unix time of the start \[ns\].
+    /// The run of the agent. A larger number takes over from a smaller one, so the largest of all
+    /// is refused; by convention the Unix time of the start \[ns\].
     pub session: u64,
     /// Sequence number of the first sample.
     pub first_seq: u64,

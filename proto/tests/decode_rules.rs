@@ -138,9 +138,25 @@ fn a_batch_is_bounded_in_samples() {
 fn sequence_numbers_do_not_overflow() {
     for codec in CODECS {
         let decode = |first_seq| codec.decode_batch(&codec.encode(&batch_of(first_seq, 2)));
-        assert_eq!(decode(u64::MAX - 2), Ok(batch_of(u64::MAX - 2, 2)));
+        assert_eq!(decode(u64::MAX - 3), Ok(batch_of(u64::MAX - 3, 2)));
+        assert_eq!(decode(u64::MAX - 2), Err(DecodeError::SequenceOverflow));
         assert_eq!(decode(u64::MAX - 1), Err(DecodeError::SequenceOverflow));
         assert_eq!(decode(u64::MAX), Err(DecodeError::SequenceOverflow));
+    }
+}
+
+#[test]
+fn the_largest_session_is_refused_because_none_could_follow() {
+    for codec in CODECS {
+        let decode = |session| {
+            let batch = SampleBatch {
+                session,
+                ..batch_of(0, 1)
+            };
+            codec.decode_batch(&codec.encode(&batch)).map(drop)
+        };
+        assert_eq!(decode(u64::MAX), Err(DecodeError::LastSession));
+        assert_eq!(decode(u64::MAX - 1), Ok(()));
     }
 }
 

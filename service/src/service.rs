@@ -85,6 +85,9 @@ impl Service {
         let address = config.http.listen;
         let of_http = |source| StartError::Http { address, source };
         let listener = TcpListener::bind(address).await.map_err(of_http)?;
+        if config.http.is_open() {
+            tracing::warn!(%address, "anyone who reaches this address can read and write: set http.token");
+        }
         let address = listener.local_addr().map_err(of_http)?;
 
         let session = match transport_settings(config) {
@@ -100,8 +103,12 @@ impl Service {
         };
         let engine = Engine::open(store, config.engine.settings(), outlet).map_err(of_store)?;
         for (name, settings) in &config.spaces {
-            if engine.space(name.as_str()).is_some() {
-                continue; // its settings were fixed when it was created
+            if let Some(space) = engine.space(name.as_str()) {
+                if space.settings() != settings {
+                    tracing::warn!(space = %name,
+                        "the settings given for the space are without effect: they were fixed when it was created");
+                }
+                continue;
             }
             engine
                 .create_space(name, settings)

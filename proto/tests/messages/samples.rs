@@ -170,8 +170,8 @@ fn extremes() -> SampleBatch {
         }),
     };
     SampleBatch {
-        session: u64::MAX,
-        first_seq: u64::MAX - 3,
+        session: u64::MAX - 1,
+        first_seq: u64::MAX - 4,
         samples: vec![
             level(i64::MIN, "a", 1e308),
             level(-1, "b", -1e308),

@@ -93,22 +93,19 @@ fn trajectory(source: &Source, agent: &str) -> anyhow::Result<()> {
                 {
                     known = Some(*id);
                 }
-                let Record::Sample {
-                    agent: id, session, ..
-                } = &record
-                else {
+                let Record::Sample { agent: id, .. } = &record else {
                     return;
                 };
                 if known != Some(*id) {
                     return;
                 }
-                if *session != recorder.session() {
-                    rows.clear(); // a newer session replaces the one before
-                }
                 let Some(of_map) = map.agent(*id) else { return };
-                if let Some(chunk) = recorder.note(&record, of_map, interval_ns)
-                    && chunk.session == *session
-                {
+                let before = recorder.session();
+                let full = recorder.note(&record, of_map, interval_ns);
+                // A session that has moved replaces the one before.
+                if recorder.session() != before {
+                    rows.clear();
+                } else if let Some(chunk) = full {
                     rows.extend(chunk.rows);
                 }
             });

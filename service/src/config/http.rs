@@ -16,7 +16,8 @@ use crate::http::HttpSettings;
 pub struct HttpConfig {
     /// Address and port; port 0 takes a free one.
     pub listen: SocketAddr,
-    /// Bearer token that every request but those for health must carry; absent, none is asked for.
+    /// Bearer token that every request but those for health and the pages must carry; absent, none is
+    /// asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub token: Option<Token>,
     /// File whose first line is the token, instead of `token`.
@@ -30,6 +31,8 @@ pub struct HttpConfig {
     pub streams_max: usize,
     /// Most connections; further ones wait in the system's queue.
     pub connections_max: usize,
+    /// A connection on which nothing passes for one to two times as long is closed \[s\].
+    pub idle_timeout_s: f64,
     /// Longest wait for open requests when the service stops \[s\].
     pub shutdown_timeout_s: f64,
 }
@@ -44,12 +47,18 @@ impl Default for HttpConfig {
             requests_max: 1024,
             streams_max: 256,
             connections_max: 4096,
+            idle_timeout_s: 60.0,
             shutdown_timeout_s: 5.0,
         }
     }
 }
 
 impl HttpConfig {
+    /// Whether others than this machine can use the interface without a token.
+    pub fn is_open(&self) -> bool {
+        self.token.is_none() && !self.listen.ip().is_loopback()
+    }
+
     /// What the HTTP interface itself needs to know. The times must have been checked.
     pub fn settings(&self) -> HttpSettings {
         HttpSettings {
@@ -58,6 +67,7 @@ impl HttpConfig {
             requests_max: self.requests_max,
             streams_max: self.streams_max,
             connections_max: self.connections_max,
+            idle_timeout: Duration::from_secs_f64(self.idle_timeout_s),
             shutdown_timeout: Duration::from_secs_f64(self.shutdown_timeout_s),
         }
     }
@@ -98,11 +108,17 @@ impl HttpConfig {
         }
         let times = [
             ("http.request_timeout_s", self.request_timeout_s),
+            ("http.idle_timeout_s", self.idle_timeout_s),
             ("http.shutdown_timeout_s", self.shutdown_timeout_s),
         ];
         for (key, value) in times {
             check(is_interval_s(value), key, &value, INTERVAL_S)?;
         }
-        Ok(())
+        check(
+            self.idle_timeout_s > self.request_timeout_s,
+            "http.idle_timeout_s",
+            &self.idle_timeout_s,
+            "above http.request_timeout_s",
+        )
     }
 }

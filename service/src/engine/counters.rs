@@ -10,8 +10,27 @@ use metrics::{Counter, Gauge, Histogram, counter, gauge, histogram};
 use super::sequencer::Offered;
 use crate::metrics as names;
 
-/// Least time between two log lines about spaces that do not exist.
-const NAMING_INTERVAL: Duration = Duration::from_secs(10);
+/// Least time between two log lines about the same kind of fault of a sender.
+const SAYING_INTERVAL: Duration = Duration::from_secs(10);
+
+/// When something was last said in the log that would otherwise be said for every message.
+struct Sparingly(Mutex<Option<Instant>>);
+
+impl Sparingly {
+    const fn new() -> Self {
+        Self(Mutex::new(None))
+    }
+
+    /// Whether it is time to say it again.
+    fn now(&self) -> bool {
+        let mut said = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let due = said.is_none_or(|at| at.elapsed() >= SAYING_INTERVAL);
+        if due {
+            *said = Some(Instant::now());
+        }
+        due
+    }
+}
 
 /// Why a message is dropped whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,8 +74,6 @@ pub(crate) struct IntakeCounters {
     messages: [Counter; 3],
     bytes: [Counter; 3],
     dropped: [Counter; Drop::ALL.len()],
-    /// When the log last named a space that does not exist.
-    named: Mutex<Option<Instant>>,
 }
 
 impl IntakeCounters {
@@ -67,17 +84,15 @@ impl IntakeCounters {
                 .map(|codec| counter!(names::RECEIVED_MESSAGES, "codec" => codec.name())),
             bytes: codecs.map(|codec| counter!(names::RECEIVED_BYTES, "codec" => codec.name())),
             dropped: dropped(),
-            named: Mutex::new(None),
         }
     }
 
     /// Counts a message for a space that does not exist, and says so in the log now and then: whoever
     /// misspelt a name looks there.
     pub(crate) fn unknown_space(&self, space: &str) {
+        static SAID: Sparingly = Sparingly::new();
         self.dropped(Drop::UnknownSpace);
-        let mut named = self.named.lock().unwrap_or_else(PoisonError::into_inner);
-        if named.is_none_or(|at| at.elapsed() >= NAMING_INTERVAL) {
-            *named = Some(Instant::now());
+        if SAID.now() {
             tracing::warn!(space, "samples for a space that does not exist are dropped");
         }
     }
@@ -164,6 +179,19 @@ impl SpaceCounters {
         self.abandoned.increment(samples as u64);
     }
 
+    /// Forgets the sizes of a space that is gone.
+    pub(crate) fn gone(&self) {
+        for gauge in [
+            &self.queue,
+            &self.agents,
+            &self.places,
+            &self.trips,
+            &self.landmarks,
+        ] {
+            gauge.set(0.0);
+        }
+    }
+
     /// Counts a round that applied samples.
     pub(crate) fn round(&self, samples: u64, estimates: u64) {
         if samples > 0 {
@@ -211,8 +239,12 @@ impl CommitCounters {
     }
 }
 
-/// Counts a message that cannot be read.
-pub(crate) fn undecodable(error: &DecodeError) {
+/// Counts a message that cannot be read, and says so in the log now and then.
+pub(crate) fn undecodable(key: &str, error: &DecodeError) {
+    static SAID: Sparingly = Sparingly::new();
+    if SAID.now() {
+        tracing::warn!(key, %error, "messages that cannot be read are dropped");
+    }
     let kind = match error {
         DecodeError::UnknownEncoding(_) => "unknown_encoding",
         DecodeError::UnsupportedVersion(_) => "unsupported_version",
@@ -221,6 +253,7 @@ pub(crate) fn undecodable(error: &DecodeError) {
         DecodeError::EmptyBatch => "empty_batch",
         DecodeError::TooManySamples(_) => "too_many_samples",
         DecodeError::SequenceOverflow => "sequence_overflow",
+        DecodeError::LastSession => "last_session",
     };
     counter!(names::DECODE_ERRORS, "kind" => kind).increment(1);
 }

@@ -188,24 +188,21 @@ impl Readout {
 }
 
 impl Marks {
-    /// Notes what has been applied; a new session starts the count anew. Returns how many samples
-    /// have been applied since the last note.
+    /// Notes what has been applied; a new session starts the count anew.
     pub(crate) fn applied(
         &mut self,
         session: u64,
         applied: u64,
         waiting: u64,
         gap: Option<SeqRange>,
-    ) -> u64 {
+    ) {
         if session != self.session {
             *self = Self {
                 session,
                 ..Self::default()
             };
         }
-        let news = applied.saturating_sub(self.applied);
         (self.applied, self.waiting, self.gap) = (applied, waiting, gap);
-        news
     }
 
     /// Notes a rejection; the oldest makes room.

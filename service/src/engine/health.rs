@@ -36,6 +36,17 @@ impl Health {
         self.failure.get().map(|failure| failure.detail.clone())
     }
 
+    /// The failure once more, if there was one.
+    pub(crate) fn error(&self) -> Option<StoreError> {
+        self.failure.get().map(|failure| {
+            if failure.disk_full {
+                StoreError::DiskFull
+            } else {
+                StoreError::Io(failure.detail.clone())
+            }
+        })
+    }
+
     /// What to answer whoever wants to write, if the store failed.
     pub(crate) fn refusal(&self) -> Option<IngestError> {
         self.failure.get().map(|failure| {

@@ -1,7 +1,9 @@
 //! Samples that someone waits for, and what the waiting can end with.
 
-use cogmap_proto::{IngestAnswer, SampleBatch};
+use cogmap_proto::{IngestAnswer, Sample, SampleBatch, SampleBody, Target};
 use tokio::sync::oneshot;
+
+use super::sequencer::Weight;
 
 /// Samples of an agent for whose durability someone waits.
 #[derive(Debug)]
@@ -50,4 +52,22 @@ pub enum IngestError {
     /// The space is closing.
     #[error("the space is closing")]
     Closed,
+}
+
+impl Weight for Sample {
+    fn bytes(&self) -> usize {
+        let beside = match &self.body {
+            SampleBody::Increment(_) | SampleBody::Velocity(_) | SampleBody::StartPose(_) => 0,
+            SampleBody::Level(level) => level.channel.len(),
+            SampleBody::Descriptor(descriptor) => {
+                descriptor.channel.len() + size_of_val(descriptor.vector.as_slice())
+            }
+            SampleBody::Sighting(sighting) => match &sighting.target {
+                Target::Landmark(label) | Target::Agent(label) => label.len(),
+                Target::OwnSample(_) => 0,
+            },
+            SampleBody::Marker(marker) => marker.label.len(),
+        };
+        size_of::<Self>() + beside
+    }
 }

@@ -245,6 +245,10 @@ impl Engine {
         let control = self.control();
         let around = control.around.as_ref().ok_or(SpaceError::Closed)?;
         let space = self.space(name).ok_or(SpaceError::Unknown)?;
+        // What cannot be deleted must not vanish until the next start.
+        if let Some(error) = self.0.health.error() {
+            return Err(error.into());
+        }
         self.0.spaces.rcu(|spaces| {
             let mut spaces = BTreeMap::clone(spaces);
             spaces.remove(name);
@@ -275,8 +279,8 @@ impl Engine {
     }
 
     /// Counts a message that cannot be read, whatever its space.
-    pub fn refuse(&self, error: &DecodeError) {
-        counters::undecodable(error);
+    pub fn refuse(&self, key: &str, error: &DecodeError) {
+        counters::undecodable(key, error);
     }
 
     /// Takes what is queued, makes it durable, checkpoints every space and ends all threads.

@@ -10,6 +10,7 @@ use std::time::Duration;
 use cogmap_proto::{Codec, Sample};
 
 use super::message::Request;
+use super::sequencer::Weight;
 
 /// A buffer that has grown beyond this is given back when little of it is used.
 const KEPT_BYTES: usize = 1 << 20;
@@ -286,7 +287,13 @@ impl Frames {
 }
 
 fn size_of_request(request: &Request) -> usize {
-    request.agent.len() + request.batch.samples.len() * size_of::<Sample>()
+    request.agent.len()
+        + request
+            .batch
+            .samples
+            .iter()
+            .map(Sample::bytes)
+            .sum::<usize>()
 }
 
 #[cfg(test)]

@@ -28,14 +28,17 @@ pub(crate) enum RecoveryError {
     Block { block: u64, error: CorruptBlock },
     #[error("block {0} of the journal is missing")]
     MissingBlock(u64),
+    #[error("the space is closing")]
+    Closing,
 }
 
-/// Loads a space.
+/// Loads a space, unless `closing` says that nobody wants it any more.
 pub(crate) fn recover(
     store: &dyn Store,
     space: SpaceNumber,
     settings: &Settings,
     interval_ns: i64,
+    closing: impl Fn() -> bool,
 ) -> Result<Recovered, RecoveryError> {
     let mut recovered = match load_checkpoint(store, space, settings)? {
         Some(recovered) => recovered,
@@ -48,6 +51,9 @@ pub(crate) fn recover(
     };
     let mut events = Vec::new();
     for block in store.journal(space, recovered.next_block) {
+        if closing() {
+            return Err(RecoveryError::Closing);
+        }
         let (number, bytes) = block?;
         if number != recovered.next_block {
             return Err(RecoveryError::MissingBlock(recovered.next_block));

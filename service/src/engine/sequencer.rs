@@ -17,8 +17,49 @@ pub(crate) struct Sequencer<T> {
     next: u64,
     /// Samples beyond a gap.
     waiting: BTreeMap<u64, T>,
+    /// What they take in memory.
+    waiting_bytes: usize,
+    /// The number after the last sample that was dropped beyond the window, while it is missing.
+    dropped_to: Option<u64>,
     /// When the present gap was first seen, or last became smaller.
     gap_since: Option<Instant>,
+}
+
+/// Something that waits, and what it takes.
+pub(crate) trait Weight {
+    /// Memory that it holds \[bytes\].
+    fn bytes(&self) -> usize;
+}
+
+/// How much may wait, or does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Window {
+    /// Samples, and how far ahead of the next one they may be.
+    pub(crate) samples: usize,
+    /// Memory \[bytes\].
+    pub(crate) bytes: usize,
+}
+
+impl Window {
+    /// Nothing.
+    pub(crate) const NONE: Self = Self {
+        samples: 0,
+        bytes: 0,
+    };
+
+    /// Counts anew what waits at one sequencer, where it was `before`.
+    pub(crate) fn recount(&mut self, before: Self, after: Self) {
+        self.samples = self.samples - before.samples + after.samples;
+        self.bytes = self.bytes - before.bytes + after.bytes;
+    }
+
+    /// What is left of it beside `used`.
+    pub(crate) fn beside(self, used: Self) -> Self {
+        Self {
+            samples: self.samples.saturating_sub(used.samples),
+            bytes: self.bytes.saturating_sub(used.bytes),
+        }
+    }
 }
 
 /// What became of a run of samples.
@@ -43,13 +84,15 @@ pub(crate) enum SessionOrder {
     Stale,
 }
 
-impl<T> Sequencer<T> {
+impl<T: Weight> Sequencer<T> {
     /// The sequencer of an agent whose next sample in order is `next`.
     pub(crate) fn new(session: u64, next: u64) -> Self {
         Self {
             session,
             next,
             waiting: BTreeMap::new(),
+            waiting_bytes: 0,
+            dropped_to: None,
             gap_since: None,
         }
     }
@@ -64,9 +107,12 @@ impl<T> Sequencer<T> {
         self.next
     }
 
-    /// Samples that wait for earlier ones.
-    pub(crate) fn waiting(&self) -> usize {
-        self.waiting.len()
+    /// The samples that wait for earlier ones.
+    pub(crate) fn waiting(&self) -> Window {
+        Window {
+            samples: self.waiting.len(),
+            bytes: self.waiting_bytes,
+        }
     }
 
     /// How `session` stands to the current one.
@@ -78,26 +124,27 @@ impl<T> Sequencer<T> {
         }
     }
 
-    /// Begins a newer session; what waited of the old one is gone. Returns how many waited.
-    pub(crate) fn begin(&mut self, session: u64) -> usize {
-        let dropped = self.waiting.len();
+    /// Begins a newer session; what waited of the old one is gone, and returned as a count.
+    pub(crate) fn begin(&mut self, session: u64) -> Window {
+        let dropped = self.waiting();
         *self = Self::new(session, 0);
         dropped
     }
 
-    /// The missing samples, if later ones wait for them.
+    /// The missing samples, if later ones wait for them or were dropped because too many would.
     pub(crate) fn gap(&self) -> Option<SeqRange> {
-        let (&first, _) = self.waiting.first_key_value()?;
+        let first = self.waiting.first_key_value().map(|(&first, _)| first);
+        let to = first.or(self.dropped_to)?;
         Some(SeqRange {
             from: self.next,
-            to: first,
+            to,
         })
     }
 
-    /// Whether a run of `count` samples from `first` on can be taken whole, as it is: it begins with
-    /// the next sample in order and nothing waits.
+    /// Whether a run of samples from `first` on can be taken whole, as it is: it begins with the next
+    /// sample in order and no gap is open.
     pub(crate) fn is_next(&self, first: u64) -> bool {
-        first == self.next && self.waiting.is_empty()
+        first == self.next && self.waiting.is_empty() && self.dropped_to.is_none()
     }
 
     /// Takes a run for which [`Sequencer::is_next`] holds.
@@ -110,23 +157,29 @@ impl<T> Sequencer<T> {
         &mut self,
         first: u64,
         items: impl IntoIterator<Item = T>,
-        window: usize,
+        window: Window,
         now: Instant,
         mut accept: impl FnMut(u64, T),
     ) -> Offered {
         let mut offered = Offered::default();
         let before = self.next;
         for (seq, item) in (first..).zip(items) {
+            let bytes = item.bytes();
             if seq < self.next || self.waiting.contains_key(&seq) {
                 offered.duplicates += 1;
             } else if seq == self.next {
                 self.next += 1;
                 accept(seq, item);
                 self.release(&mut accept);
-            } else if self.waiting.len() < window && seq - self.next < window as u64 {
+            } else if self.waiting.len() < window.samples
+                && seq - self.next < window.samples as u64
+                && self.waiting_bytes + bytes <= window.bytes
+            {
                 self.waiting.insert(seq, item);
+                self.waiting_bytes += bytes;
                 offered.reordered += 1;
             } else {
+                self.dropped_to = self.dropped_to.max(Some(seq + 1));
                 offered.beyond_window += 1;
             }
         }
@@ -163,6 +216,7 @@ impl<T> Sequencer<T> {
                 return;
             }
             let item = entry.remove();
+            self.waiting_bytes -= item.bytes();
             accept(self.next, item);
             self.next += 1;
         }
@@ -170,7 +224,8 @@ impl<T> Sequencer<T> {
 
     /// Restarts the wait when the gap is new or has moved.
     fn note_gap(&mut self, before: u64, now: Instant) {
-        if self.waiting.is_empty() {
+        self.dropped_to = self.dropped_to.filter(|&to| to > self.next);
+        if self.gap().is_none() {
             self.gap_since = None;
         } else if self.gap_since.is_none() || self.next != before {
             self.gap_since = Some(now);
@@ -183,7 +238,16 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const WINDOW: usize = 32;
+    const WINDOW: Window = Window {
+        samples: 32,
+        bytes: 32 * 8,
+    };
+
+    impl Weight for u64 {
+        fn bytes(&self) -> usize {
+            8
+        }
+    }
 
     fn offer(
         sequencer: &mut Sequencer<u64>,
@@ -255,10 +319,50 @@ mod tests {
     #[test]
     fn what_is_beyond_the_window_is_dropped_and_said() {
         let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
-        let offered = offer(&mut sequencer, 1, 2 * WINDOW as u64, &mut got);
-        assert_eq!(offered.reordered, WINDOW as u64 - 1);
-        assert_eq!(offered.beyond_window, WINDOW as u64 + 1);
-        assert_eq!(sequencer.waiting(), WINDOW - 1);
+        let offered = offer(&mut sequencer, 1, 64, &mut got);
+        assert_eq!((offered.reordered, offered.beyond_window), (31, 33));
+        let waiting = sequencer.waiting();
+        assert_eq!((waiting.samples, waiting.bytes), (31, 31 * 8));
+        assert_eq!(sequencer.gap(), Some(SeqRange { from: 0, to: 1 }));
+        // With the missing one, those that waited follow; those that were dropped are missing now.
+        offer(&mut sequencer, 0, 1, &mut got);
+        assert_eq!(sequencer.gap(), Some(SeqRange { from: 32, to: 65 }));
+        offer(&mut sequencer, 32, 33, &mut got);
+        assert_eq!(got, (0..65).collect::<Vec<_>>());
+        assert_eq!((sequencer.gap(), sequencer.waiting()), (None, Window::NONE));
+    }
+
+    #[test]
+    fn what_waits_is_bounded_in_bytes() {
+        let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
+        let window = Window {
+            bytes: 20,
+            ..WINDOW
+        };
+        let offered = sequencer.offer(1, [1, 2, 3], window, Instant::now(), |_, item| {
+            got.push(item);
+        });
+        assert_eq!((offered.reordered, offered.beyond_window), (2, 1));
+    }
+
+    #[test]
+    fn a_gap_wider_than_the_window_is_given_up_too() {
+        let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
+        let timeout = Duration::from_secs(10);
+        let start = Instant::now();
+        let at = |s| start + Duration::from_secs(s);
+        sequencer.offer(1000, [1000_u64], WINDOW, at(0), |_, item| got.push(item));
+        sequencer.offer(1001, [1001], WINDOW, at(5), |_, item| got.push(item));
+        assert_eq!(sequencer.waiting(), Window::NONE);
+        assert_eq!(sequencer.gap(), Some(SeqRange { from: 0, to: 1002 }));
+        let mut lost = None;
+        sequencer.give_up(timeout, at(9), |range| lost = Some(range), |_, _| {});
+        assert_eq!(lost, None);
+        sequencer.give_up(timeout, at(10), |range| lost = Some(range), |_, _| {});
+        assert_eq!(lost, Some(SeqRange { from: 0, to: 1002 }));
+        // From here on the stream is taken again.
+        offer(&mut sequencer, 1002, 3, &mut got);
+        assert_eq!((got, sequencer.gap()), (vec![1002, 1003, 1004], None));
     }
 
     #[test]
@@ -268,7 +372,7 @@ mod tests {
         assert_eq!(sequencer.order_of(6), SessionOrder::Stale);
         assert_eq!(sequencer.order_of(8), SessionOrder::Newer);
         offer(&mut sequencer, 42, 2, &mut Vec::new());
-        assert_eq!(sequencer.begin(8), 2);
+        assert_eq!(sequencer.begin(8).samples, 2);
         assert_eq!(
             (sequencer.session(), sequencer.next(), sequencer.gap()),
             (8, 0, None)

@@ -57,8 +57,14 @@ pub(crate) struct Shared {
     loaded: OnceLock<Result<(), String>>,
     agents: RwLock<BTreeMap<String, Arc<AgentDesk>>>,
     snapshot: ArcSwapOption<CognitiveMap>,
-    wishes: Mutex<Vec<oneshot::Sender<Arc<CognitiveMap>>>>,
+    /// Those who wait for a snapshot; none once the writer is gone.
+    wishes: Mutex<Option<Vec<Wish>>>,
+    /// Set when the writer ended although the space was not closing.
+    broken: AtomicBool,
 }
+
+/// Someone who waits for a snapshot.
+type Wish = oneshot::Sender<Arc<CognitiveMap>>;
 
 /// Why a space cannot be read now.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -119,7 +125,8 @@ impl Space {
             loaded: OnceLock::new(),
             agents: RwLock::default(),
             snapshot: ArcSwapOption::empty(),
-            wishes: Mutex::default(),
+            wishes: Mutex::new(Some(Vec::new())),
+            broken: AtomicBool::new(false),
         });
         let thread = {
             let (shared, around) = (Arc::clone(&shared), around.clone());
@@ -156,8 +163,11 @@ impl Space {
         self.shared.loaded.get().is_none()
     }
 
-    /// Why the map could not be loaded, if it could not.
+    /// Why the map could not be loaded or is not written any more, if so.
     pub fn failure(&self) -> Option<String> {
+        if self.shared.broken.load(Ordering::Acquire) {
+            return Some("the space's writer has failed; the log says more".to_owned());
+        }
         self.shared
             .loaded
             .get()
@@ -176,11 +186,16 @@ impl Space {
             return Ok(snapshot);
         }
         let (wish, granted) = oneshot::channel();
-        self.shared.wishes().push(wish);
+        match &mut *self.shared.wishes() {
+            Some(wishes) => wishes.push(wish),
+            // The writer is gone: nobody will grant it.
+            None => drop(wish),
+        }
         self.queue.call();
-        granted
-            .await
-            .map_err(|_| Unavailable::Failed("the space is closing".to_owned()))
+        granted.await.map_err(|_| {
+            let detail = self.failure();
+            Unavailable::Failed(detail.unwrap_or_else(|| "the space is closing".to_owned()))
+        })
     }
 
     /// An agent, by name.
@@ -285,11 +300,25 @@ impl Space {
     }
 
     fn available(&self) -> Result<(), Unavailable> {
-        match self.shared.loaded.get() {
-            None => Err(Unavailable::Recovering),
-            Some(Ok(())) => Ok(()),
-            Some(Err(detail)) => Err(Unavailable::Failed(detail.clone())),
+        match self.failure() {
+            Some(detail) => Err(Unavailable::Failed(detail)),
+            None if self.recovering() => Err(Unavailable::Recovering),
+            None => Ok(()),
         }
+    }
+}
+
+/// Stands for the writer's thread: when it ends, also by a panic, nobody waits for it any more.
+struct Presence<'a>(&'a Shared);
+
+impl Drop for Presence<'_> {
+    fn drop(&mut self) {
+        if !self.0.closing.load(Ordering::Acquire) {
+            self.0.broken.store(true, Ordering::Release);
+            tracing::error!(space = %self.0.name, "the space's writer has ended");
+        }
+        // Whoever waits learns it by the end of the channel.
+        *self.0.wishes() = None;
     }
 }
 
@@ -302,7 +331,8 @@ fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: 
         settings,
         ..
     } = around;
-    match recovery::recover(&*store, shared.number, core, shared.interval_ns) {
+    let closing = || shared.closing.load(Ordering::Acquire);
+    match recovery::recover(&*store, shared.number, core, shared.interval_ns, closing) {
         Ok(recovered) => {
             let progress = (recovered.checkpoint_revision, recovered.next_block);
             let interval = settings.checkpoint_interval;
@@ -314,11 +344,14 @@ fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: 
                 .revision
                 .store(recovered.map.revision(), Ordering::Release);
             let writer = Writer::new(Arc::clone(shared), commits, checkpointer, recovered);
+            let _present = Presence(shared);
             let _ = shared.loaded.set(Ok(()));
             writer.run(inbox);
         }
         Err(error) => {
-            tracing::error!(space = %shared.name, %error, "load space");
+            if !closing() {
+                tracing::error!(space = %shared.name, %error, "load space");
+            }
             let _ = shared.loaded.set(Err(error.to_string()));
         }
     }
@@ -333,7 +366,8 @@ impl Shared {
 
     /// Gives the map to all who wish for it: one copy for all, and copying is cheap.
     pub(crate) fn serve_snapshots(&self, map: &CognitiveMap) {
-        let wishes = std::mem::take(&mut *self.wishes());
+        let wishes = self.wishes().as_mut().map(std::mem::take);
+        let wishes = wishes.unwrap_or_default();
         if wishes.is_empty() {
             return;
         }
@@ -349,7 +383,7 @@ impl Shared {
         self.agents.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn wishes(&self) -> std::sync::MutexGuard<'_, Vec<oneshot::Sender<Arc<CognitiveMap>>>> {
+    fn wishes(&self) -> std::sync::MutexGuard<'_, Option<Vec<Wish>>> {
         self.wishes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

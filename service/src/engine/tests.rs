@@ -291,3 +291,21 @@ fn the_json_of_an_agent_is_that_of_its_detail_before_and_after_its_first_sample(
     }
     engine.shutdown();
 }
+
+#[test]
+fn a_space_that_is_gone_keeps_nobody_waiting() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let engine = open(directory.path(), EngineSettings::default());
+    let space = engine.space(SPACE).expect("the space is there");
+    engine.delete_space(SPACE).expect("it can be deleted");
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_time()
+        .build()
+        .expect("a runtime");
+    let snapshot =
+        runtime.block_on(async { tokio::time::timeout(PATIENCE, space.snapshot()).await });
+    snapshot
+        .expect("an answer comes")
+        .expect_err("there is no map any more");
+    engine.shutdown();
+}

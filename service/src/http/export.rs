@@ -56,7 +56,7 @@ pub(crate) struct ExportQuery {
 pub(crate) struct MapExport {
     /// The space.
     space: SpaceInfo,
-    /// Its agents, in the order of enrolment.
+    /// Its agents, by name, where they were when the request came.
     agents: Vec<AgentSummary>,
     /// Its places, by number.
     places: Vec<Place>,
@@ -100,23 +100,17 @@ pub(crate) async fn get(
     Ok(response)
 }
 
-/// A list of a map that can be written from any of its items on, as JSON.
-type Section = fn(&CognitiveMap, &Space, u32) -> Vec<String>;
+/// A list of an export that can be written from any of its items on, as JSON.
+type Section = fn(&CognitiveMap, &[AgentSummary], u32) -> Vec<String>;
 
 async fn map(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
     let info = answer::space_info(space.name(), space.settings(), &map);
     let head = format!("{{\"space\":{}", text(&info));
     let sections: [(&str, Section); 4] = [
-        ("agents", |_, space, first| {
-            let desks = space.agents_after(None, usize::MAX);
-            let desks = desks.iter().skip(first as usize).take(CHUNK_ITEMS);
-            desks
-                .map(|desk| {
-                    let (name, estimate) = (desk.name().to_owned(), desk.estimate());
-                    text(&AgentSummary { name, estimate })
-                })
-                .collect()
+        ("agents", |_, agents, first| {
+            let agents = agents.iter().skip(first as usize).take(CHUNK_ITEMS);
+            agents.map(text).collect()
         }),
         ("places", |map, _, first| {
             let places = map.places_from(PlaceId(first)).take(CHUNK_ITEMS);
@@ -137,11 +131,18 @@ async fn map(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
                 .collect()
         }),
     ];
-    let space = Arc::clone(space);
+    let desks = space.agents_after(None, usize::MAX);
+    let agents: Arc<[_]> = desks
+        .iter()
+        .map(|desk| AgentSummary {
+            name: desk.name().to_owned(),
+            estimate: desk.estimate(),
+        })
+        .collect();
     let lists = sections.into_iter().flat_map(move |(name, section)| {
-        let (map, space, mut first) = (Arc::clone(&map), Arc::clone(&space), 0);
+        let (map, agents, mut first) = (Arc::clone(&map), Arc::clone(&agents), 0);
         let items = std::iter::from_fn(move || {
-            let items = section(&map, &space, first);
+            let items = section(&map, &agents, first);
             if items.is_empty() {
                 return None;
             }

@@ -27,6 +27,9 @@ use crate::metrics::{HTTP_REQUEST_SECONDS, HTTP_REQUESTS};
 
 /// Paths that need no token and are answered however much is under way.
 const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
+/// Paths of pages, which hold nothing of any space: a browser has to load them before it can be given
+/// a token.
+const PAGES: [&str; 3] = ["/", "/openapi.json", "/docs"];
 /// Label of requests that no route matches.
 const UNMATCHED: &str = "unmatched";
 /// Statuses that have counters of their own.
@@ -78,7 +81,7 @@ impl Guard {
         if OPEN_PATHS.contains(&request.uri().path()) {
             return Ok(None);
         }
-        if !self.knows(request) {
+        if !self.knows(request) && !is_page(request) {
             let detail = "the header Authorization must be: Bearer, a space, the token";
             return Err(Problem::new(Kind::Unauthorized, detail));
         }
@@ -209,6 +212,12 @@ where
             Ok(response)
         })
     }
+}
+
+/// Whether a request is for one of the [`PAGES`], or what a page below `/docs/` needs.
+fn is_page(request: &Request) -> bool {
+    let path = request.uri().path();
+    PAGES.contains(&path) || path.starts_with("/docs/")
 }
 
 fn words(panic: &(dyn Any + Send)) -> &str {

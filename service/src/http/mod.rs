@@ -143,7 +143,7 @@ pub async fn run(
         shutdown.await;
         stop.send_replace(true);
     };
-    let listener = BoundedListener::new(listener, settings.connections_max);
+    let listener = BoundedListener::new(listener, settings.connections_max, settings.idle_timeout);
     let served = axum::serve(listener, router)
         .with_graceful_shutdown(signal)
         .into_future();

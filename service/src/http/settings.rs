@@ -17,6 +17,9 @@ pub struct HttpSettings {
     pub streams_max: usize,
     /// Most connections.
     pub connections_max: usize,
+    /// A connection on which nothing passes for twice this time is closed, and none sooner than after
+    /// this time.
+    pub idle_timeout: Duration,
     /// Longest wait for open requests when the service stops.
     pub shutdown_timeout: Duration,
 }

@@ -21,6 +21,8 @@ use crate::engine::{Space, Unavailable};
 const SET_UP_POLL: Duration = Duration::from_millis(1);
 
 /// The spaces.
+///
+/// Those that are still loading, or cannot be read, are not among them; `/readyz` names them.
 #[utoipa::path(get, path = "/v1/spaces", tag = "spaces", operation_id = "list_spaces",
     responses((status = 200, description = "All spaces, by name", body = SpaceList)))]
 pub(crate) async fn list(
@@ -29,7 +31,9 @@ pub(crate) async fn list(
 ) -> Result<Response<Body>, Problem> {
     let mut spaces = Vec::new();
     for space in service.engine.spaces() {
-        spaces.push(info(&space).await?);
+        if let Ok(info) = info(&space).await {
+            spaces.push(info);
+        }
     }
     Ok(reply::json(&SpaceList { spaces }))
 }

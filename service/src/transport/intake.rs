@@ -49,11 +49,11 @@ fn take(engine: &Engine, sample: &Sample) {
     };
     let bytes = sample.payload().len();
     if bytes > MESSAGE_BYTES_MAX {
-        return engine.refuse(&DecodeError::TooLong(bytes));
+        return engine.refuse(sample.key_expr().as_str(), &DecodeError::TooLong(bytes));
     }
     match codec_of(sample.encoding()) {
         Ok(codec) => engine.offer(space, agent, codec, &sample.payload().to_bytes()),
-        Err(error) => engine.refuse(&error),
+        Err(error) => engine.refuse(sample.key_expr().as_str(), &error),
     }
 }
 

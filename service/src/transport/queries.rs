@@ -1,9 +1,12 @@
 //! Queries over Zenoh: `cogmap/{space}/query/{verb}`, with the bodies of HTTP.
 
+use std::sync::Arc;
+
 use cogmap_proto::{Codec, Problem, RecallQuery, Verb, WatermarkQuery, query_key};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use zenoh::Session;
 use zenoh::query::{Query, Queryable};
 
@@ -11,21 +14,26 @@ use super::session::TransportError;
 use crate::answer;
 use crate::engine::Engine;
 
+/// Most queries under way; further ones are told to come back.
+const QUERIES_MAX: usize = 64;
+
 /// Answers every verb for every space.
 pub(crate) async fn declare(
     session: &Session,
     engine: &Engine,
 ) -> Result<Vec<Queryable<()>>, TransportError> {
     let mut queryables = Vec::new();
+    let room = Arc::new(Semaphore::new(QUERIES_MAX));
     for verb in [Verb::Recall, Verb::Watermark] {
-        let (engine, runtime) = (engine.clone(), Handle::current());
+        let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(&room));
         let queryable = session
             .declare_queryable(query_key("*", verb.as_str()))
             .complete(true)
             // The callback runs on a receiving thread: the answer is made elsewhere.
             .callback(move |query| {
                 let engine = engine.clone();
-                runtime.spawn(async move { reply(&engine, verb, query).await });
+                let permit = Arc::clone(&room).try_acquire_owned().ok();
+                runtime.spawn(async move { reply(&engine, verb, query, permit).await });
             })
             .await?;
         queryables.push(queryable);
@@ -33,11 +41,15 @@ pub(crate) async fn declare(
     Ok(queryables)
 }
 
-async fn reply(engine: &Engine, verb: Verb, query: Query) {
+async fn reply(engine: &Engine, verb: Verb, query: Query, permit: Option<OwnedSemaphorePermit>) {
     let codec = query.encoding().map_or(Ok(Codec::Json), |encoding| {
         Codec::of_encoding(&encoding.to_string())
     });
     let (codec, result) = match codec {
+        Ok(codec) if permit.is_none() => (
+            codec,
+            Err(problem("busy", 503, "too much is under way".to_owned())),
+        ),
         Ok(codec) => (codec, answer(engine, verb, &query, codec).await),
         Err(error) => (
             Codec::Json,
@@ -85,7 +97,11 @@ async fn answer(
                 .snapshot()
                 .await
                 .map_err(|error| problem("unavailable", 503, error.to_string()))?;
-            let recalled = answer::recall(space.name(), &map, &body)
+            // It may look at every place: not on a thread that others wait for.
+            let recall = move || answer::recall(space.name(), &map, &body);
+            let recalled = tokio::task::spawn_blocking(recall)
+                .await
+                .map_err(|error| problem("internal", 500, error.to_string()))?
                 .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
             Ok(encoded(codec, &recalled))
         }

@@ -31,23 +31,16 @@ const ROUTES: [(&str, &[&str]); 19] = [
 ];
 
 #[test]
-fn the_token_opens_everything_but_health_which_is_open() {
+fn the_token_opens_everything_but_health_and_the_pages_which_are_open() {
     let mut server = Server::start(&["http.token=s3cret"]);
     let (bare, wrong) = (server.http(), server.http().with_token("s3cre"));
     let with = server.http().with_token("s3cret");
-    for path in [
-        "/v1/spaces",
-        "/v1/spaces/default",
-        "/metrics",
-        "/docs/",
-        "/",
-        "/nothing",
-    ] {
+    for path in ["/v1/spaces", "/v1/spaces/default", "/metrics", "/nothing"] {
         bare.get(path).problem(401, "unauthorized");
         wrong.get(path).problem(401, "unauthorized");
         assert_ne!(with.get(path).status, 401, "{path}");
     }
-    for path in ["/healthz", "/readyz"] {
+    for path in ["/healthz", "/readyz", "/", "/docs/", "/openapi.json"] {
         assert_eq!(bare.get(path).status, 200, "{path}");
     }
     let samples = "/v1/spaces/default/agents/ada/samples";

@@ -2,25 +2,26 @@
 
 use std::time::Instant;
 
-use cogmap_proto::{Rejection, SampleBatch, SeqRange, SkipReason};
+use cogmap_proto::{Rejection, Sample, SampleBatch, SeqRange, SkipReason};
 use cognitive_map::{AgentId, Record};
 
-use super::{Pending, Writer};
+use super::Writer;
+use crate::decode;
 use crate::engine::block::Entry;
 use crate::engine::readout::{skip_reason, skip_reason_of_wire};
 
 impl Writer {
     /// Journals samples that are in order now, refusing those that make no sense.
-    pub(super) fn accept(&mut self, slot: usize, session: u64, accepted: Vec<(u64, Pending)>) {
+    pub(super) fn accept(&mut self, slot: usize, session: u64, accepted: Vec<(u64, Sample)>) {
         let agent = self.agents[slot].desk.id();
         let mut run = SampleBatch {
             session,
             first_seq: 0,
             samples: Vec::new(),
         };
-        for (seq, (wire, sample)) in accepted {
+        for (seq, wire) in accepted {
             let slot = &mut self.agents[slot];
-            let refusal = match sample {
+            let refusal = match decode::sample(&wire) {
                 Err(invalid) => skip_reason(cognitive_map::SkipReason::Invalid(invalid)),
                 Ok(sample) if sample.stamp_ns < slot.latest_ns => SkipReason::TimeBackwards,
                 Ok(sample) => {
@@ -109,7 +110,7 @@ impl Writer {
                     accepted.push((seq, pending));
                 },
             );
-            self.waiting = self.waiting + sequencer.waiting() - before;
+            self.waiting.recount(before, sequencer.waiting());
             if let Some(range) = lost {
                 let agent = self.agents[slot].desk.id();
                 tracing::warn!(space = %self.shared.name, agent = self.agents[slot].desk.name(),

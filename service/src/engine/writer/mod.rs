@@ -14,7 +14,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
-use cognitive_map::{CognitiveMap, Event, InvalidSample, Record, Sample};
+use cognitive_map::{CognitiveMap, Event, Record};
 
 use super::block::BlockWriter;
 use super::checkpointer::Checkpointer;
@@ -23,17 +23,23 @@ use super::counters::SpaceCounters;
 use super::desk::AgentDesk;
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
-use super::sequencer::Sequencer;
+use super::sequencer::{Sequencer, Window};
 use super::space::Shared;
 use super::trajectory;
 use crate::store::ChunkKey;
 
-/// Most messages of a round: it bounds how old an estimate can be when it leaves.
+/// Most messages of a round, and the number of records that ends it: they bound how old an estimate
+/// can be when it leaves, and how long a reader waits for a snapshot.
 const ROUND_MESSAGES_MAX: usize = 2048;
+const ROUND_RECORDS_MAX: usize = 16_384;
 /// How long a writer waits for a message before it looks after gaps and wishes.
 const PATIENCE: Duration = Duration::from_millis(100);
-/// Most samples of all agents that wait for earlier ones: a bound on memory, whoever sends.
-const WAITING_MAX: usize = 16_384;
+/// Most samples of all agents that wait for earlier ones, and the most memory that they take
+/// \[bytes\]: bounds whoever sends.
+const WAITING_MAX: Window = Window {
+    samples: 16_384,
+    bytes: 64 << 20,
+};
 
 /// The thread's state.
 pub(crate) struct Writer {
@@ -47,20 +53,22 @@ pub(crate) struct Writer {
     by_name: BTreeMap<Box<str>, usize>,
     next_block: u64,
     interval_ns: i64,
-    /// Samples of all agents that wait for earlier ones.
-    waiting: usize,
+    /// How many samples of all agents wait for earlier ones, and what they take.
+    waiting: Window,
 
     /// The round under way; emptied and used again.
     block: BlockWriter,
     records: Vec<Record>,
     answers: Vec<Answer>,
     events: Vec<Event>,
+    /// Samples that it has applied.
+    applied: u64,
 }
 
 /// What the writer knows of an agent beside the map: how its samples stand before the journal.
 struct AgentSlot {
     desk: Arc<AgentDesk>,
-    sequencer: Sequencer<Pending>,
+    sequencer: Sequencer<cogmap_proto::Sample>,
     /// Stamp of the latest accepted sample of the session.
     latest_ns: i64,
     /// Whether this round changed the agent in the map.
@@ -68,9 +76,6 @@ struct AgentSlot {
     /// Whether its watermark is to be sent although nothing new becomes durable.
     remind: bool,
 }
-
-/// A sample that came, and what it means.
-type Pending = (cogmap_proto::Sample, Result<Sample, InvalidSample>);
 
 impl Writer {
     pub(crate) fn new(
@@ -97,11 +102,12 @@ impl Writer {
             by_name: BTreeMap::new(),
             next_block,
             interval_ns,
-            waiting: 0,
+            waiting: Window::NONE,
             block: BlockWriter::new(),
             records: Vec::new(),
             answers: Vec::new(),
             events: Vec::new(),
+            applied: 0,
         };
         let mut recorders = recorders.into_iter();
         let known: Vec<_> = writer
@@ -148,6 +154,7 @@ impl Writer {
                 break;
             }
         }
+        self.counters.gone();
         self.checkpointer.finish(self.next_block, &self.map, || {
             self.agents
                 .iter()
@@ -166,6 +173,9 @@ impl Writer {
                 }) => self.receive(agent, codec, payload, now),
                 Some(Message::Request(request)) => self.receive_request(request, now),
                 None => break,
+            }
+            if self.records.len() >= ROUND_RECORDS_MAX {
+                break;
             }
         }
         self.finish_round();
@@ -199,6 +209,7 @@ impl Writer {
     fn apply(&mut self) {
         for record in &self.records {
             self.map.apply(record, &mut self.events);
+            self.applied += u64::from(matches!(record, Record::Sample { .. }));
             let (Record::Sample { agent, .. }
             | Record::Skip { agent, .. }
             | Record::Enrol { agent, .. }) = record;

@@ -26,7 +26,7 @@ impl Writer {
         let space = &self.shared.name;
         let mut commit = Commit {
             space: Arc::clone(space),
-            samples: 0,
+            samples: std::mem::take(&mut self.applied),
             marks: Vec::new(),
             answers: std::mem::take(&mut self.answers),
         };
@@ -54,18 +54,16 @@ impl Writer {
                 });
             }
             let sequencer = &slot.sequencer;
-            let waiting = sequencer.waiting() as u64;
-            if sequencer.session() == session {
-                commit.samples +=
-                    slot.desk
-                        .marks()
-                        .applied(session, next, waiting, sequencer.gap());
+            let waiting = sequencer.waiting().samples as u64;
+            // A session that has begun and has nothing applied yet is not the map's.
+            let (session, next) = if sequencer.session() == session {
+                (session, next)
             } else {
-                let gap = sequencer.gap();
-                slot.desk
-                    .marks()
-                    .applied(sequencer.session(), sequencer.next(), waiting, gap);
-            }
+                (sequencer.session(), sequencer.next())
+            };
+            slot.desk
+                .marks()
+                .applied(session, next, waiting, sequencer.gap());
             if remind {
                 self.shared
                     .outlet

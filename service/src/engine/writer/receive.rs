@@ -3,17 +3,17 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use cogmap_proto::{Codec, SampleBatch};
+use cogmap_proto::{Codec, Sample, SampleBatch};
 use cognitive_map::{AgentId, Label, Record};
 
-use super::{AgentSlot, Pending, WAITING_MAX, Writer};
+use super::{AgentSlot, WAITING_MAX, Writer};
 use crate::decode;
 use crate::engine::block::Entry;
 use crate::engine::committer::Answer;
 use crate::engine::counters::{self, Drop};
 use crate::engine::desk::AgentDesk;
 use crate::engine::message::{IngestError, Request};
-use crate::engine::sequencer::{Offered, Sequencer, SessionOrder};
+use crate::engine::sequencer::{Offered, Sequencer, SessionOrder, Window};
 use crate::engine::trajectory;
 
 impl Writer {
@@ -28,8 +28,8 @@ impl Writer {
                     .map(|slot| self.take(slot, batch, raw, now));
             }
             Err(error) => {
-                tracing::debug!(space = %self.shared.name, %agent, %error, "undecodable message");
-                counters::undecodable(&error);
+                let key = cogmap_proto::samples_key(&self.shared.name, agent);
+                counters::undecodable(&key, &error);
             }
         }
     }
@@ -96,9 +96,9 @@ impl Writer {
             }
             SessionOrder::Newer => {
                 let abandoned = sequencer.begin(batch.session);
-                self.waiting -= abandoned;
+                self.waiting.recount(abandoned, Window::NONE);
                 self.agents[slot].latest_ns = i64::MIN;
-                self.counters.abandoned(abandoned);
+                self.counters.abandoned(abandoned.samples);
             }
         }
         Ok(slot)
@@ -129,7 +129,7 @@ impl Writer {
     pub(super) fn seat(
         &mut self,
         desk: AgentDesk,
-        sequencer: Sequencer<Pending>,
+        sequencer: Sequencer<Sample>,
         latest_ns: i64,
     ) -> usize {
         let slot = self.agents.len();
@@ -155,19 +155,23 @@ impl Writer {
             return 0;
         }
         let session = batch.session;
-        let pending = batch.samples.into_iter().map(|wire| {
-            let sample = decode::sample(&wire);
-            (wire, sample)
-        });
         let mut accepted = Vec::new();
         let sequencer = &mut self.agents[slot].sequencer;
         let before = sequencer.waiting();
-        let room = WAITING_MAX.saturating_sub(self.waiting);
-        let window = self.shared.reorder_window.min(before + room);
-        let offered = sequencer.offer(batch.first_seq, pending, window, now, |seq, pending| {
-            accepted.push((seq, pending));
-        });
-        self.waiting = self.waiting + sequencer.waiting() - before;
+        // What others leave, and what is its own already.
+        let mut window = WAITING_MAX.beside(self.waiting);
+        window.recount(Window::NONE, before);
+        window.samples = window.samples.min(self.shared.reorder_window);
+        let offered = sequencer.offer(
+            batch.first_seq,
+            batch.samples,
+            window,
+            now,
+            |seq, sample| {
+                accepted.push((seq, sample));
+            },
+        );
+        self.waiting.recount(before, sequencer.waiting());
         self.counters.offered(&offered);
         self.agents[slot].remind |= offered != Offered::default();
         self.accept(slot, session, accepted);

@@ -91,7 +91,7 @@ async fn more_requests_than_the_bound_are_told_to_come_back() {
 }
 
 #[tokio::test]
-async fn a_token_is_asked_for_everywhere_but_for_health() {
+async fn a_token_is_asked_for_everywhere_but_for_health_and_pages() {
     let token = Some(Token::new("s3cret"));
     let rig = rig_with(
         &HttpSettings {
@@ -105,15 +105,14 @@ async fn a_token_is_asked_for_everywhere_but_for_health() {
         "/v1/spaces/void",
         "/metrics",
         "/nowhere",
-        "/docs/",
-        "/openapi.json",
     ] {
         let answer = rig.get(path).await;
         answer.problem(401, "unauthorized");
         assert_eq!(answer.header("www-authenticate"), "Bearer");
     }
-    assert_eq!(rig.get("/healthz").await.status, 200);
-    assert_eq!(rig.get("/readyz").await.status, 200);
+    for path in ["/healthz", "/readyz", "/", "/docs/", "/openapi.json"] {
+        assert_eq!(rig.get(path).await.status, 200, "{path}");
+    }
     for (authorization, status) in [
         ("Bearer s3cret", 200),
         ("bearer s3cret", 200),

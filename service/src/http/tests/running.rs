@@ -117,6 +117,35 @@ async fn a_client_that_stalls_does_not_hold_up_the_end() {
 }
 
 #[tokio::test]
+async fn a_connection_that_says_nothing_is_closed() {
+    let rig = rig();
+    let idle_timeout = Duration::from_millis(100);
+    let running = run_on(
+        &rig,
+        HttpSettings {
+            idle_timeout,
+            ..settings()
+        },
+    )
+    .await;
+    let mut silent = TcpStream::connect(running.address)
+        .await
+        .expect("it listens");
+    let mut halting = TcpStream::connect(running.address)
+        .await
+        .expect("it listens");
+    let part = b"GET /healthz HTTP/1.1\r\nhost";
+    halting.write_all(part).await.expect("sent");
+    for stream in [&mut silent, &mut halting] {
+        let mut rest = Vec::new();
+        let read = tokio::time::timeout(Duration::from_secs(10), stream.read_to_end(&mut rest));
+        // Closed, perhaps after an answer that says why.
+        let _ = read.await.expect("it is closed");
+    }
+    drop((running.stop, rig.stop.clone()));
+}
+
+#[tokio::test]
 async fn more_streams_than_the_bound_are_told_to_come_back() {
     let rig = rig();
     let running = run_on(
