@@ -127,15 +127,16 @@ def test_a_later_run_takes_over_and_the_earlier_one_is_told(service: Server) -> 
     }
 
 
-def test_a_second_run_with_the_same_session_number_is_told(service: Server) -> None:
+@pytest.mark.parametrize("count", [1, 1000], ids=["fewer", "more"])
+def test_a_second_run_with_the_same_session_number_is_told(service: Server, count: int) -> None:
     samples = list(itertools.islice(drive(seed=7), 300))
     with service.robot(AGENT, SESSION) as first:
         first.send(samples)
         first.flush(LONG_S)
     # For example a process that was started twice with a fixed number.
     with service.robot(AGENT, SESSION) as second:
-        second.start_pose([9, 9, 9])
         with pytest.raises(cogmap.SessionSuperseded, match="in use by another run"):
+            second.send(itertools.islice(drive(seed=8), count))
             second.flush(LONG_S)
     assert_all_there_once(service, 300)
     service.terminate()

@@ -45,6 +45,9 @@ class StandIn:
         self.loses: Callable[[int], bool] = lambda number: False
         self.publishes_watermarks = True
         self.answers_queries = True
+        #: Whether a query is held, without an answer and without an end.
+        self.delays_queries = False
+        self._held: List[zenoh.Query] = []
         self.queries = 0
         self._waiting: Dict[int, Sample] = {}
         self._arrived: queue.Queue[Optional[Tuple[str, bytes]]] = queue.Queue()
@@ -143,6 +146,10 @@ class StandIn:
         )
 
     def _answer(self, query: zenoh.Query) -> None:
+        if self.delays_queries:
+            self.queries += 1
+            self._held.append(query)
+            return
         with query:
             self.queries += 1
             if self.answers_queries:

@@ -51,13 +51,13 @@ pub enum ClientError {
         /// Samples of this call that were taken.
         taken: usize,
     },
-    /// Another run of the agent has a larger session number: this one is over. Its samples beyond
-    /// the last watermark are not acknowledged and never will be.
-    #[error("session {session} is superseded by session {by}")]
+    /// Another run of the agent has a larger session number, or the same one: this run is over. Its
+    /// samples beyond the last watermark are not acknowledged and never will be.
+    #[error("{}", superseded(*session, *by))]
     SessionSuperseded {
         /// This robot's session.
         session: u64,
-        /// The session that took over.
+        /// The session that took over; this robot's own number when another run uses it too.
         by: u64,
     },
     /// Not everything became durable in time. Nothing is lost: sending goes on.
@@ -69,4 +69,12 @@ pub enum ClientError {
     /// No estimate that includes all samples came in time. Sending goes on.
     #[error("no estimate that includes all samples came in time")]
     EstimateTimeout,
+}
+
+fn superseded(session: u64, by: u64) -> String {
+    if by == session {
+        format!("session {session} is in use by another run of the agent")
+    } else {
+        format!("session {session} was taken over by session {by}")
+    }
 }

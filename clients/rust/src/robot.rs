@@ -367,6 +367,7 @@ impl Drop for Robot {
         let deadline = Instant::now() + END_WAIT;
         let mut state = self.shared.lock();
         state.stop = true;
+        self.shared.set_over();
         // The callback may own what the caller wants back now; it is dropped outside the lock.
         let callback = state.on_estimate.take();
         self.shared.sender_bell.notify_one();

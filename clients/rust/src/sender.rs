@@ -1,6 +1,7 @@
 //! The one thread of a robot: it alone puts samples on Zenoh, so that they leave in order.
 
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -16,6 +17,8 @@ use crate::state::Shared;
 const MATCH_PAUSE: Duration = Duration::from_millis(10);
 /// How long a query for the watermark may take.
 const QUERY_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long the first batch waits for the watermark that the service has of this agent.
+const FIRST_ANSWER: Duration = Duration::from_millis(200);
 /// Longest sleep of the thread when nothing is due.
 const IDLE: Duration = Duration::from_secs(60);
 
@@ -52,11 +55,12 @@ impl Sender {
 
     fn run(self) {
         self.await_service();
+        self.await_first_answer();
         let mut messages = Vec::with_capacity(MESSAGES_AT_ONCE);
         loop {
             match self.next_step(&mut messages) {
                 Step::Put => self.put(&mut messages),
-                Step::Ask => self.ask(),
+                Step::Ask => drop(self.ask()),
                 Step::End => break,
             }
         }
@@ -82,6 +86,15 @@ impl Sender {
             }
             drop(Shared::wait(&self.shared.sender_bell, state, MATCH_PAUSE));
         }
+    }
+
+    /// Asks for the watermark before anything is sent: if the service has samples of this session
+    /// already, another run uses its number, and after the first put nobody could tell whose they
+    /// are. A bounded wait, because a robot may start before its service.
+    fn await_first_answer(&self) {
+        // Nothing to tell apart: with an answer, without one or too late, sending is next. What the
+        // answer says has gone to the state.
+        let _ = self.ask().recv_timeout(FIRST_ANSWER);
     }
 
     /// Decides what is next. What is to be put is written into `messages`: all that is due, up to a
@@ -126,18 +139,23 @@ impl Sender {
 
     fn put(&self, messages: &mut Vec<Vec<u8>>) {
         for bytes in messages.drain(..) {
+            if self.shared.is_over() {
+                break;
+            }
             if self.publisher.put(bytes).wait().is_err() {
                 self.shared.lock().counters.puts_failed += 1;
             }
         }
     }
 
-    /// Asks for the watermark; the answer comes to a callback. A failure needs no handling: the
-    /// window sends everything again when the answer stays away.
-    fn ask(&self) {
+    /// Asks for the watermark; the answer comes to a callback, and the receiver is told when it has
+    /// been taken in, or cut off when there is none. A failure needs no handling: the window sends
+    /// everything again when the answer stays away.
+    fn ask(&self) -> Receiver<()> {
         let query = WatermarkQuery {
             agent: self.agent.clone(),
         };
+        let (told, answered) = channel();
         let shared = Arc::clone(&self.shared);
         let asked = self
             .zenoh
@@ -149,8 +167,11 @@ impl Sender {
                 if let Ok(sample) = reply.result() {
                     shared.hear_watermark(sample);
                 }
+                // Nobody may wait for it.
+                let _ = told.send(());
             })
             .wait();
         drop(asked);
+        answered
     }
 }

@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -61,6 +62,9 @@ pub(crate) struct Shared {
     state: Mutex<State>,
     pub(crate) sender_bell: Condvar,
     pub(crate) caller_bell: Condvar,
+    /// Nothing goes out any more: the robot was dropped, or its session is over. Beside the lock,
+    /// because the sending thread looks at it before each put.
+    over: AtomicBool,
     started: Instant,
 }
 
@@ -89,6 +93,7 @@ impl Shared {
             }),
             sender_bell: Condvar::new(),
             caller_bell: Condvar::new(),
+            over: AtomicBool::new(false),
             started: Instant::now(),
         }
     }
@@ -96,6 +101,16 @@ impl Shared {
     /// The window's clock.
     pub(crate) fn now(&self) -> Duration {
         self.started.elapsed()
+    }
+
+    /// Whether nothing may go out any more.
+    pub(crate) fn is_over(&self) -> bool {
+        self.over.load(Ordering::Relaxed)
+    }
+
+    /// From now on nothing goes out.
+    pub(crate) fn set_over(&self) {
+        self.over.store(true, Ordering::Relaxed);
     }
 
     /// A panic elsewhere leaves the state whole, because every change to it is a plain assignment
@@ -123,11 +138,16 @@ impl Shared {
         let now = self.now();
         let mut state = self.lock();
         state.counters.watermarks += 1;
+        if state.superseded_by.is_some() && watermark.session <= state.session {
+            // Two runs share the number, so nobody knows which of them this is about.
+            return;
+        }
         match state.window.hear(&watermark, now) {
             Heard::Stale => return,
             Heard::TakenOver => {
                 let by = state.superseded_by.unwrap_or_default();
                 state.superseded_by = Some(by.max(watermark.session));
+                self.set_over();
             }
             Heard::Current => {
                 state.remember_rejections(&watermark.rejected);

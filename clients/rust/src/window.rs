@@ -4,6 +4,8 @@
 //! delay can be tested without a network. The rules:
 //!
 //! - A sample is held until a watermark covers it.
+//! - A watermark of this session that covers more than was sent is about another run's samples:
+//!   two runs use one session number, and this one is over.
 //! - A *gap* in a watermark is sent again at once, the same gap at most every [`GAP_INTERVAL`].
 //! - A watermark whose `applied` has fallen back tells of a restarted service: everything from
 //!   `durable` on is sent again.
@@ -62,7 +64,7 @@ pub(crate) enum Heard {
     Current,
     /// It is older than what is known, or of an earlier session.
     Stale,
-    /// A later session has taken over.
+    /// A later session has taken over, or another run uses this session's number.
     TakenOver,
 }
 
@@ -82,9 +84,6 @@ pub(crate) struct Window {
     held_bytes: usize,
     durable: u64,
     sent: u64,
-    /// Largest `durable` that a watermark told. It may lie beyond `sent` when a caller numbers
-    /// a session again from 0, for example to replay a log.
-    told: u64,
     applied: u64,
     unsent_bytes: usize,
     unsent_since: Duration,
@@ -116,7 +115,6 @@ impl Window {
             held_bytes: 0,
             durable: 0,
             sent: 0,
-            told: 0,
             applied: 0,
             unsent_bytes: 0,
             unsent_since: Duration::ZERO,
@@ -192,7 +190,6 @@ impl Window {
     /// The next batch to send, counted as sent. Repetitions come first, because later samples
     /// wait for them at the service. `None` when nothing is due.
     pub(crate) fn take(&mut self, now: Duration) -> Option<Run> {
-        self.advance(now);
         if let Some(range) = self.repeat.first().copied() {
             let most = self.limits.batch_samples.max(REPEAT_SAMPLES_MIN) as u64;
             let run = Run {
@@ -266,12 +263,17 @@ impl Window {
             Ordering::Less => return Heard::Stale,
             Ordering::Equal => {}
         }
+        // The service cannot have applied what this run never sent. `applied` moves before
+        // `durable`, so it tells first; taken as this run's own, the watermark would acknowledge
+        // samples that the service drops as duplicates.
+        if watermark.applied.max(watermark.durable) > self.sent {
+            return Heard::TakenOver;
+        }
         // What is on disk stays there, so a lower `durable` can only be an old message.
-        if watermark.durable < self.told {
+        if watermark.durable < self.durable {
             return Heard::Stale;
         }
-        self.told = watermark.durable;
-        self.advance(now);
+        self.advance(watermark.durable, now);
         let restarted = watermark.applied < self.applied;
         self.applied = watermark.applied;
         if restarted && self.restart_at.is_none_or(|at| now >= at + GAP_INTERVAL) {
@@ -307,8 +309,7 @@ impl Window {
     }
 
     /// Drops what the watermark covers.
-    fn advance(&mut self, now: Duration) {
-        let durable = self.told.min(self.sent);
+    fn advance(&mut self, durable: u64, now: Duration) {
         if durable <= self.durable {
             return;
         }
@@ -361,7 +362,6 @@ impl Window {
     /// Looks at the clock; schedules what has to be sent again. `true` says: ask the service for
     /// the watermark now.
     pub(crate) fn poll(&mut self, now: Duration) -> bool {
-        self.advance(now);
         if let Some(gap) = &self.gap
             && gap.again
             && now >= gap.repeated_at + GAP_INTERVAL

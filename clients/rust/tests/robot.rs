@@ -195,6 +195,41 @@ fn a_later_session_ends_an_earlier_one_with_a_typed_error() {
 }
 
 #[test]
+fn a_second_run_with_the_same_session_number_sends_nothing_and_is_told() {
+    let endpoint = free_endpoint();
+    let service = Service::start(&endpoint, "demo", "ada", Faults::default());
+    let shared = open_session(&[&endpoint], LONG).unwrap();
+    let connect = || {
+        Robot::builder("demo", "ada")
+            .zenoh_session(shared.clone())
+            .session(5)
+            .connect()
+            .unwrap()
+    };
+    let first = connect();
+    first.send_batch(levels(10)).unwrap();
+    first.close(LONG).unwrap();
+    for count in [1, 10, 500] {
+        let second = connect();
+        let told = second
+            .send_batch(levels(count))
+            .and_then(|_| second.flush(LONG));
+        let error = told.unwrap_err();
+        assert!(matches!(
+            error,
+            ClientError::SessionSuperseded { session: 5, by: 5 }
+        ));
+        assert!(error.to_string().contains("in use by another run"));
+        assert_eq!(second.counters().samples_sent, 0);
+        assert!(matches!(
+            second.close(LONG),
+            Err(ClientError::SessionSuperseded { .. })
+        ));
+    }
+    assert_eq!(service.journal(), levels(10));
+}
+
+#[test]
 fn a_full_window_refuses_after_the_timeout_and_says_how_far_it_came() {
     let endpoint = free_endpoint();
     let _router = service::router(&endpoint);

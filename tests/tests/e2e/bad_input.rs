@@ -322,6 +322,30 @@ fn of_two_senders_with_one_name_the_newer_session_wins() {
 }
 
 #[test]
+fn a_second_run_with_the_same_session_number_is_told_whether_it_sends_less_or_more() {
+    let server = Server::start(&[]);
+    let samples: Vec<_> = Drive::new(seed(15)).take(300).collect();
+    let first = server.robot("ada", 7);
+    first.send_batch(samples).unwrap();
+    first.close(LONG).unwrap();
+    for count in [1, 1000] {
+        let second = server.robot("ada", 7);
+        let others: Vec<_> = Drive::new(seed(16)).take(count).collect();
+        let told = second.send_batch(others).and_then(|_| second.flush(LONG));
+        let error = told.unwrap_err();
+        assert!(
+            matches!(error, ClientError::SessionSuperseded { session: 7, by: 7 }),
+            "{error}"
+        );
+        assert!(error.to_string().contains("in use by another run"));
+    }
+    // Nothing of them was taken for the first run's, and nothing was added to it.
+    assert_exactly_once(&server, "ada", 7, 300);
+    let metrics = server.metrics();
+    assert_eq!(metrics.sum("cogmap_duplicate_samples_total", &[]), 0);
+}
+
+#[test]
 fn a_robot_with_two_links_sends_everything_twice_and_counts_once() {
     let server = Server::start(&[]);
     let samples: Vec<_> = Drive::new(seed(14)).take(400).collect();

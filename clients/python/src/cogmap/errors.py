@@ -33,7 +33,8 @@ class WindowFull(CogmapError):
 
 
 class SessionSuperseded(CogmapError):
-    """Another run of the agent has taken over its name; what this one sends is ignored."""
+    """Another run of the agent has taken over its name, or uses this run's session number; what this one
+    sends is ignored."""
 
     def __init__(self, own: int, other: int) -> None:
         super().__init__(

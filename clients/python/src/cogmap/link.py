@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import threading
-from typing import Callable, Iterable, Union
+from typing import Any, Callable, Iterable, Union
 
 import zenoh
 
 from .errors import Timeout
+from .wire import CBOR, encode
 
 #: Where a Zenoh router listens unless told otherwise.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+#: How long a query may take [s].
+_QUERY_TIMEOUT_S = 2.0
 
 
 def open_session(
@@ -40,6 +43,23 @@ def has_subscriber(publisher: zenoh.Publisher) -> bool:
     status: object = publisher.matching_status
     # The type stubs of zenoh 1.10 say bool; what comes is an object, and that is always true.
     return bool(getattr(status, "matching", status))
+
+
+def ask(
+    session: zenoh.Session,
+    key: str,
+    body: Any,
+    hear_reply: Callable[[zenoh.Reply], None],
+    ended: Callable[[], None],
+) -> None:
+    """Asks without waiting: `hear_reply` gets each answer, and `ended` is called when no more come."""
+    session.get(
+        key,
+        zenoh.handlers.Callback(hear_reply, ended),
+        payload=encode(body),
+        encoding=CBOR,
+        timeout=_QUERY_TIMEOUT_S,
+    )
 
 
 def within(timeout_s: float, *actions: Callable[[], object]) -> bool:

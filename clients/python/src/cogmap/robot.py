@@ -5,21 +5,21 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections import deque
 from types import TracebackType
-from typing import Any, Callable, Deque, Dict, Iterable, List, Optional, Tuple, Type, Union
+from typing import Any, Callable, Dict, Iterable, List, Optional, Tuple, Type, Union
 
 import zenoh
 
 from .answer import Estimate, Rejection, Watermark
-from .errors import Closed, CogmapError, SessionSuperseded, Timeout, WindowFull, WireError
+from .errors import Closed, CogmapError, SessionSuperseded, Timeout, WindowFull
+from .inbox import Inbox
 from .key import check_name, durable_key, estimate_key, query_key, samples_key
-from .link import DEFAULT_ENDPOINT, has_subscriber, open_session, within
+from .link import DEFAULT_ENDPOINT, ask, has_subscriber, open_session, within
 from .query import WatermarkQuery
 from .sample import MotionNoise, Sample, SampleBody
 from .sampler import Sampler
 from .window import Window, WindowLimits
-from .wire import CBOR, MESSAGE_BYTES_MAX, decode, encode, encode_batch, encode_sample
+from .wire import CBOR, encode_batch, encode_sample
 
 _log = logging.getLogger("cogmap")
 
@@ -31,10 +31,8 @@ _WATERMARKS_WAITING_MAX = 256
 _REJECTIONS_MAX = 1024
 #: How often the arrival of the service is looked for [s].
 _MATCH_POLL_S = 0.01
-#: Room that a batch's own fields need in a message [bytes].
-_BATCH_HEAD_BYTES = 64
-
-_Incoming = Tuple[str, bytes]
+#: How long the first batch waits for the watermark that the service has of this agent [s].
+_FIRST_ANSWER_S = 0.2
 
 
 class Robot(Sampler):
@@ -114,10 +112,9 @@ class Robot(Sampler):
         self._stopped = False
         # Held while a batch is taken and put, so that batches leave in order.
         self._publishing = threading.Lock()
-        # Zenoh's callbacks only append here: they run on the thread that reads the network.
-        self._estimates_in: Deque[_Incoming] = deque(maxlen=_ESTIMATES_WAITING_MAX)
-        self._watermarks_in: Deque[_Incoming] = deque(maxlen=_WATERMARKS_WAITING_MAX)
         self._wake = threading.Event()
+        self._estimates_in = Inbox(Estimate, _ESTIMATES_WAITING_MAX, self._wake)
+        self._watermarks_in = Inbox(Watermark, _WATERMARKS_WAITING_MAX, self._wake)
 
         self._own_session = session is None
         self._zenoh = (
@@ -128,12 +125,8 @@ class Robot(Sampler):
             else session
         )
         self._subscribers: List[zenoh.Subscriber[None]] = [
-            self._zenoh.declare_subscriber(
-                estimate_key(space, agent), self._enqueue(self._estimates_in)
-            ),
-            self._zenoh.declare_subscriber(
-                durable_key(space, agent), self._enqueue(self._watermarks_in)
-            ),
+            self._zenoh.declare_subscriber(estimate_key(space, agent), self._estimates_in.hear),
+            self._zenoh.declare_subscriber(durable_key(space, agent), self._watermarks_in.hear),
         ]
         self._publisher = self._zenoh.declare_publisher(
             samples_key(space, agent),
@@ -159,7 +152,7 @@ class Robot(Sampler):
         accepted = 0
         deadline = time.monotonic() + self._send_timeout_s
         for sample in samples:
-            seq = self._append(sample, deadline, accepted)
+            seq = self._append(sample.body, sample.stamp_ns, deadline, accepted)
             first = seq if first is None else first
             accepted += 1
         if first is None:
@@ -168,30 +161,35 @@ class Robot(Sampler):
         return range(first, first + accepted)
 
     def _send(self, body: SampleBody, stamp_ns: Optional[int]) -> int:
-        if stamp_ns is None:
-            # The system's clock may be set back; stamps of a session may not.
-            with self._changed:
-                stamp_ns = max(time.time_ns(), self._last_stamp_ns)
-        return self._append(Sample(stamp_ns, body), time.monotonic() + self._send_timeout_s, 0)
+        return self._append(body, stamp_ns, time.monotonic() + self._send_timeout_s, 0)
 
-    def _append(self, sample: Sample, deadline: float, accepted: int) -> int:
-        data = encode_sample(sample)
-        if len(data) + _BATCH_HEAD_BYTES > MESSAGE_BYTES_MAX:
-            raise WireError(f"a sample of {len(data)} bytes does not fit a message")
+    def _append(
+        self, body: SampleBody, stamp_ns: Optional[int], deadline: float, accepted: int
+    ) -> int:
+        by_clock = stamp_ns is None
+        data = b"" if stamp_ns is None else encode_sample(Sample(stamp_ns, body))
         with self._changed:
-            self._check_open()
-            while not self._window.has_room(len(data)):
+            while True:
+                self._check_open()
+                if by_clock:
+                    # Stamped under the lock that numbers it, and again after each wait: a sample of
+                    # another thread that gets in between would else have the later stamp and the
+                    # earlier number. The system's clock may be set back; stamps of a session may not.
+                    stamp_ns = max(time.time_ns(), self._last_stamp_ns)
+                    data = encode_sample(Sample(stamp_ns, body))
+                if self._window.has_room(len(data)):
+                    break
                 self._window.hurry()
                 self._wake.set()
                 remaining = deadline - time.monotonic()
                 if remaining <= 0:
                     raise WindowFull(accepted, self._window.pending)
                 self._changed.wait(remaining)
-                self._check_open()
             now = time.monotonic()
             starts_batch = self._window.sent == self._window.next_seq
             seq = self._window.append(data, now)
-            self._last_stamp_ns = max(self._last_stamp_ns, sample.stamp_ns)
+            if stamp_ns is not None:
+                self._last_stamp_ns = max(self._last_stamp_ns, stamp_ns)
             due = self._window.ready(now)
         if due and self._may_send:
             # A full batch leaves on the caller's thread: a congested network slows the caller down.
@@ -277,8 +275,14 @@ class Robot(Sampler):
             if time.monotonic() >= deadline:
                 return False
             time.sleep(_MATCH_POLL_S)
-        self._may_send = True
-        return True
+        if threading.current_thread() is self._worker:
+            # Only the worker itself ends the wait below.
+            return True
+        with self._changed:
+            # Full batches leave on the caller's thread only from then on.
+            return self._changed.wait_for(
+                lambda: self._may_send or self._stopped, max(0.0, deadline - time.monotonic())
+            )
 
     def close(self, timeout_s: float = 5.0) -> None:
         """Flushes for at most `timeout_s`, then closes, also when that fails; a second call does
@@ -306,6 +310,7 @@ class Robot(Sampler):
     def _tear_down(self) -> None:
         with self._changed:
             self._stopped = True
+            self._changed.notify_all()
         self._wake.set()
         if threading.current_thread() is not self._worker:
             # A put may block for 5 s on a dead link; the thread is a daemon, so give up after that.
@@ -347,19 +352,6 @@ class Robot(Sampler):
 
     # The robot's own thread
 
-    def _enqueue(self, inbox: Deque[_Incoming]) -> Callable[[zenoh.Sample], None]:
-        def enqueue(sample: zenoh.Sample) -> None:
-            inbox.append((str(sample.encoding), sample.payload.to_bytes()))
-            self._wake.set()
-
-        return enqueue
-
-    def _enqueue_reply(self, reply: zenoh.Reply) -> None:
-        sample = reply.ok
-        if sample is not None:
-            self._watermarks_in.append((str(sample.encoding), sample.payload.to_bytes()))
-            self._wake.set()
-
     def _work(self) -> None:
         while True:
             self._wake.wait(self._idle_s())
@@ -367,14 +359,16 @@ class Robot(Sampler):
             if self._stopped:
                 return
             self._receive()
-            self._look_for_service()
             if not self._may_send:
-                continue
+                if not self._finds_service():
+                    continue
+                self._ask_first()
             self._pump()
             with self._changed:
                 ask = self._superseded_by is None and self._window.watch(time.monotonic())
             if ask:
-                self._ask_watermark()
+                _log.debug("no progress of %s: asking for the watermark", self.agent)
+                self._ask_watermark(threading.Event())
             self._pump()
 
     def _idle_s(self) -> Optional[float]:
@@ -386,15 +380,26 @@ class Robot(Sampler):
             at = self._window.wake_at()
         return None if at is None else max(0.0, at - time.monotonic())
 
-    def _look_for_service(self) -> None:
+    def _finds_service(self) -> bool:
         """A put before the subscriber is known is dropped on the way: so wait for it, but not for
         ever, since what is dropped is sent again."""
-        if not self._may_send:
-            try:
-                found = has_subscriber(self._publisher)
-            except zenoh.ZError:
-                found = False
-            self._may_send = found or time.monotonic() >= self._match_deadline
+        try:
+            found = has_subscriber(self._publisher)
+        except zenoh.ZError:
+            found = False
+        return found or time.monotonic() >= self._match_deadline
+
+    def _ask_first(self) -> None:
+        """Asks for the watermark before anything is sent, and waits for the answer, though not for
+        long: a robot may start before its service. If the service has samples of this session already,
+        another run uses its number, and after the first put nobody could tell whose they are."""
+        answered = threading.Event()
+        self._ask_watermark(answered)
+        answered.wait(_FIRST_ANSWER_S)
+        self._receive()
+        with self._changed:
+            self._may_send = True
+            self._changed.notify_all()
 
     def _pump(self) -> None:
         """Sends what is due."""
@@ -415,16 +420,11 @@ class Robot(Sampler):
                     _log.warning("put of %s: %s", self.agent, error)
                     return
 
-    def _ask_watermark(self) -> None:
-        _log.debug("no progress of %s: asking for the watermark", self.agent)
+    def _ask_watermark(self, ended: threading.Event) -> None:
+        """Asks for the watermark; `ended` is set when no further answer comes."""
         try:
-            self._zenoh.get(
-                query_key(self.space, "watermark"),
-                self._enqueue_reply,
-                payload=encode(WatermarkQuery(self.agent)),
-                encoding=CBOR,
-                timeout=2.0,
-            )
+            key, hear = query_key(self.space, "watermark"), self._watermarks_in.hear_reply
+            ask(self._zenoh, key, WatermarkQuery(self.agent), hear, ended.set)
         except zenoh.ZError as error:
             _log.warning("watermark query of %s: %s", self.agent, error)
 
@@ -433,38 +433,34 @@ class Robot(Sampler):
         with self._changed:
             callbacks = list(self._on_estimate)
         while self._estimates_in:
-            incoming = self._estimates_in.popleft()
-            if self._estimates_in and not callbacks:
+            if len(self._estimates_in) > 1 and not callbacks:
                 # Nobody asked for each one, and only the latest is kept: spare the decoding.
+                self._estimates_in.drop()
                 continue
-            estimate = self._decode(Estimate, incoming)
+            estimate = self._estimates_in.take()
             if estimate is not None and estimate.session == self.session_id:
                 with self._changed:
                     self._estimate = estimate
                     self._changed.notify_all()
                 _call(callbacks, estimate)
         while self._watermarks_in:
-            watermark = self._decode(Watermark, self._watermarks_in.popleft())
+            watermark = self._watermarks_in.take()
             if watermark is not None:
                 self._take_watermark(watermark)
-
-    def _decode(self, kind: Type[Any], incoming: _Incoming) -> Any:
-        encoding, data = incoming
-        try:
-            return decode(kind, data, encoding)
-        except WireError as error:
-            _log.warning("%s of %s: %s", kind.__name__.lower(), self.agent, error)
-            return None
 
     def _take_watermark(self, watermark: Watermark) -> None:
         if watermark.session < self.session_id:
             # An earlier run of this agent; ours has not arrived yet.
             return
         with self._changed:
-            # A run that numbers further than this one has sent is another run with our number.
-            if watermark.session > self.session_id or watermark.durable > self._window.sent:
-                self._superseded_by = watermark.session
+            # The service cannot have applied what this run never sent: that is of another run with our
+            # number. `applied` moves before `durable`, so it tells first.
+            foreign = max(watermark.applied, watermark.durable) > self._window.sent
+            if watermark.session > self.session_id or foreign:
+                self._superseded_by = max(watermark.session, self._superseded_by or 0)
                 self._changed.notify_all()
+            if self._superseded_by is not None:
+                # Two runs may share the number, so nobody knows which of them this is about.
                 return
             gap = None if watermark.gap is None else (watermark.gap.start, watermark.gap.stop)
             self._window.acknowledge(watermark.durable, watermark.applied, gap, time.monotonic())

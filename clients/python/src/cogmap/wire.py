@@ -29,6 +29,8 @@ JSON = "application/json"
 
 #: Longest message that the service takes [bytes].
 MESSAGE_BYTES_MAX = 1 << 20
+#: Room that a batch's own fields need in a message [bytes].
+_BATCH_HEAD_BYTES = 64
 #: Most samples in one batch.
 BATCH_SAMPLES_MAX = 4096
 
@@ -169,9 +171,12 @@ def encode(message: Any) -> bytes:
 def encode_sample(sample: Sample) -> bytes:
     """One sample as CBOR, to be put into batches by `encode_batch`."""
     try:
-        return encode(sample)
+        data = encode(sample)
     except (TypeError, ValueError, OverflowError) as error:
         raise WireError(f"sample cannot be written: {error}") from error
+    if len(data) + _BATCH_HEAD_BYTES > MESSAGE_BYTES_MAX:
+        raise WireError(f"a sample of {len(data)} bytes does not fit a message")
+    return data
 
 
 def encode_batch(session: int, first_seq: int, samples: Tuple[bytes, ...]) -> bytes:

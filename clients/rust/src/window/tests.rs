@@ -176,14 +176,27 @@ fn a_later_session_takes_over() {
 }
 
 #[test]
-fn a_session_that_is_sent_again_from_zero_is_covered_as_it_goes_out() {
+fn a_watermark_beyond_what_was_sent_is_of_another_run_with_this_number() {
     let mut window = window_sent(10);
-    window.hear(&watermark(1000, None), ms(1));
-    assert_eq!((window.durable(), window.pending()), (10, 0));
-    assert_eq!(window.push(sample(10), 10, ms(2)), 10);
-    window.hurry();
-    assert_eq!(take_all(&mut window, ms(2)), [(10, 11, false)]);
-    assert_eq!((window.durable(), window.pending()), (11, 0));
+    // Taken in, but not sent: no watermark of this run can cover it.
+    window.push(sample(10), 10, ms(1));
+    let mut applied = watermark(4, None);
+    applied.applied = 11;
+    for foreign in [applied, watermark(11, None), watermark(u64::MAX, None)] {
+        assert_eq!(window.hear(&foreign, ms(1)), Heard::TakenOver);
+        assert_eq!((window.durable(), window.pending()), (0, 11));
+    }
+    assert_eq!(window.hear(&watermark(10, None), ms(1)), Heard::Current);
+    assert_eq!((window.durable(), window.pending()), (10, 1));
+}
+
+#[test]
+fn before_the_first_sending_any_sample_of_this_session_is_of_another_run() {
+    let mut window = Window::new(SESSION, LIMITS);
+    window.push(sample(0), 10, ms(0));
+    assert_eq!(window.hear(&watermark(0, None), ms(1)), Heard::Current);
+    assert_eq!(window.hear(&watermark(1, None), ms(1)), Heard::TakenOver);
+    assert_eq!(window.pending(), 1);
 }
 
 #[test]

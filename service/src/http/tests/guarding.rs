@@ -100,12 +100,7 @@ async fn a_token_is_asked_for_everywhere_but_for_health_and_pages() {
         },
         EngineSettings::default(),
     );
-    for path in [
-        "/v1/spaces",
-        "/v1/spaces/void",
-        "/metrics",
-        "/nowhere",
-    ] {
+    for path in ["/v1/spaces", "/v1/spaces/void", "/metrics", "/nowhere"] {
         let answer = rig.get(path).await;
         answer.problem(401, "unauthorized");
         assert_eq!(answer.header("www-authenticate"), "Bearer");
