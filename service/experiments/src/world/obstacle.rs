@@ -4,7 +4,7 @@ use nalgebra::{Unit, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Edge of the cubic room, which spans `[0, SIDE_M]` on each axis \[m\].
+/// Edge of the cubic room with obstacles, which spans `[0, SIDE_M]` on each axis \[m\].
 pub const SIDE_M: f64 = 15.0;
 /// Number of cubes (seed paper, Section 4.2).
 const N_CUBES: usize = 50;
@@ -69,9 +69,10 @@ pub struct Beacon {
     pub position_m: Vector3<f64>,
 }
 
-/// The room with its cubes and beacons.
+/// A cubic room with its cubes and beacons.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObstacleWorld {
+    side_m: f64,
     cubes: Vec<Cube>,
     beacons: Vec<Beacon>,
 }
@@ -80,7 +81,7 @@ impl ObstacleWorld {
     /// The world of a seed. Equal seeds give equal worlds.
     pub fn new(seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let centre = Self::centre_m();
+        let centre = Vector3::repeat(SIDE_M / 2.0);
         let mut cubes = Vec::with_capacity(N_CUBES);
         while cubes.len() < N_CUBES {
             let edge_m = random.random_range(EDGE_M);
@@ -111,12 +112,30 @@ impl ObstacleWorld {
                 });
             }
         }
-        Self { cubes, beacons }
+        Self {
+            side_m: SIDE_M,
+            cubes,
+            beacons,
+        }
+    }
+
+    /// A room that spans `[0, side_m]` on each axis and holds nothing (seed paper, Section 4.1).
+    pub fn empty(side_m: f64) -> Self {
+        Self {
+            side_m,
+            cubes: Vec::new(),
+            beacons: Vec::new(),
+        }
+    }
+
+    /// Edge of the room \[m\].
+    pub fn side_m(&self) -> f64 {
+        self.side_m
     }
 
     /// The centre of the room \[m\].
-    pub fn centre_m() -> Vector3<f64> {
-        Vector3::repeat(SIDE_M / 2.0)
+    pub fn centre_m(&self) -> Vector3<f64> {
+        Vector3::repeat(self.side_m / 2.0)
     }
 
     /// The cubes.
@@ -131,7 +150,7 @@ impl ObstacleWorld {
 
     /// Whether a body which reaches `clearance_m` to every side fits at a position.
     pub fn is_free(&self, position_m: &Vector3<f64>, clearance_m: f64) -> bool {
-        let inside = clearance_m..=SIDE_M - clearance_m;
+        let inside = clearance_m..=self.side_m - clearance_m;
         position_m.iter().all(|x| inside.contains(x))
             && !self
                 .cubes
@@ -154,7 +173,7 @@ impl ObstacleWorld {
         // Along a wall the body never reaches it.
         let to_walls = (0..3).filter(|&axis| direction[axis] != 0.0).map(|axis| {
             let wall = if direction[axis] > 0.0 {
-                SIDE_M - clearance_m
+                self.side_m - clearance_m
             } else {
                 clearance_m
             };
@@ -196,10 +215,10 @@ mod tests {
             assert_eq!(world, ObstacleWorld::new(seed));
             assert_ne!(world, ObstacleWorld::new(seed + 1));
             assert_eq!(world.cubes().len(), 50);
-            assert!(world.is_free(&ObstacleWorld::centre_m(), CENTRE_CLEARANCE_M));
+            assert!(world.is_free(&world.centre_m(), CENTRE_CLEARANCE_M));
             for cube in world.cubes() {
                 assert!(EDGE_M.contains(&cube.edge_m));
-                let reach = (cube.centre_m - ObstacleWorld::centre_m()).amax() + cube.edge_m / 2.0;
+                let reach = (cube.centre_m - world.centre_m()).amax() + cube.edge_m / 2.0;
                 assert!(reach <= SIDE_M / 2.0 + 1e-12);
             }
             for beacon in world.beacons() {
@@ -219,6 +238,7 @@ mod tests {
             edge_m: 2.0,
         };
         let world = ObstacleWorld {
+            side_m: SIDE_M,
             cubes: vec![cube],
             beacons: Vec::new(),
         };

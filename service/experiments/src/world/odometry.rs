@@ -66,7 +66,7 @@ impl OdometryNoise {
 
     /// # Errors
     /// A deviation is negative, not finite or larger than one.
-    fn check(&self) -> Result<(), InvalidNoise> {
+    pub(crate) fn check(&self) -> Result<(), InvalidNoise> {
         let all = [
             self.translation_share,
             self.scale_bias,

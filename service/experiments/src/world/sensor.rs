@@ -64,27 +64,38 @@ impl Sensor {
         random: &mut ChaCha8Rng,
     ) -> Option<ReadingBody> {
         let eye = pose.translation.vector;
-        let line = target_m - eye;
-        let range_m = line.norm();
+        let range_m = (target_m - eye).norm();
         let in_reach = range_m <= self.range_max_m && range_m > 0.0;
         if !in_reach || !world.sees(&eye, target_m) || !random.random_bool(self.report_probability)
         {
             return None;
         }
+        Some(self.read(pose, target(), target_m, random))
+    }
+
+    /// What is read of a target from a true pose, noise and all, wherever it is.
+    pub(crate) fn read(
+        &self,
+        pose: &Isometry3<f64>,
+        target: ReadingTarget,
+        target_m: &Vector3<f64>,
+        random: &mut ChaCha8Rng,
+    ) -> ReadingBody {
+        let line = target_m - pose.translation.vector;
         let seen = pose.rotation.inverse() * line;
         let mut noisy = |value: f64, sd: f64| value + sd * random.sample::<f64, _>(StandardNormal);
-        let range_m = noisy(range_m, self.range_sd_m).max(0.0);
+        let range_m = noisy(line.norm(), self.range_sd_m).max(0.0);
         let azimuth = noisy(seen.y.atan2(seen.x), self.bearing_sd_rad);
         let elevation = noisy(seen.z.atan2(seen.x.hypot(seen.y)), self.bearing_sd_rad);
         let (azimuth_rad, elevation_rad) = folded(azimuth, elevation);
-        Some(ReadingBody::Sighting {
-            target: target(),
+        ReadingBody::Sighting {
+            target,
             range_m,
             azimuth_rad,
             elevation_rad,
             range_sd_m: self.range_sd_m,
             bearing_sd_rad: self.bearing_sd_rad,
-        })
+        }
     }
 }
 
@@ -130,7 +141,7 @@ mod tests {
             offset in prop::array::uniform3(-0.5..0.5_f64),
         ) {
             let world = ObstacleWorld::new(1);
-            let eye = ObstacleWorld::centre_m(); // 1 m around it is free
+            let eye = world.centre_m(); // 1 m around it is free
             let pose = Isometry3::new(eye, Vector3::from(turn));
             let target = eye + Vector3::from(offset);
             let sensor =

@@ -133,7 +133,7 @@ impl Team {
                 random
             });
             let walker = if robot == 1 {
-                Walker::new(&world, ObstacleWorld::centre_m(), walk)
+                Walker::new(&world, world.centre_m(), walk)
             } else {
                 Walker::at_random(&world, &taken_m, START_APART_M, walk)
             };

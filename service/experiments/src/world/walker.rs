@@ -6,7 +6,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::obstacle::{ObstacleWorld, SIDE_M};
+use super::obstacle::ObstacleWorld;
 use super::steering::{turn_towards, way_out};
 
 /// Length of a step \[m\].
@@ -80,7 +80,7 @@ impl Walker {
         mut random: ChaCha8Rng,
     ) -> Option<Self> {
         for _ in 0..START_TRIALS {
-            let position = Vector3::from_fn(|_, _| random.random_range(0.0..SIDE_M));
+            let position = Vector3::from_fn(|_, _| random.random_range(0.0..world.side_m()));
             if others_m
                 .iter()
                 .all(|other| (other - position).norm() >= apart_m)
@@ -159,12 +159,7 @@ mod tests {
     use super::*;
 
     fn walker(world: &ObstacleWorld, seed: u64) -> Walker {
-        Walker::new(
-            world,
-            ObstacleWorld::centre_m(),
-            ChaCha8Rng::seed_from_u64(seed),
-        )
-        .unwrap()
+        Walker::new(world, world.centre_m(), ChaCha8Rng::seed_from_u64(seed)).unwrap()
     }
 
     fn walks_without_touching(seed: u64, n_steps: u32) {
@@ -246,7 +241,7 @@ mod tests {
         let random = ChaCha8Rng::seed_from_u64(2);
         let inside = world.cubes()[0].centre_m;
         assert!(Walker::new(&world, inside, random.clone()).is_none());
-        let centre = ObstacleWorld::centre_m();
+        let centre = world.centre_m();
         let apart = Walker::at_random(&world, &[centre], 6.0, random.clone()).unwrap();
         assert!((apart.pose().translation.vector - centre).norm() >= 6.0);
         assert!(Walker::at_random(&world, &[centre], 15.0, random).is_none());
