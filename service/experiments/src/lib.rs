@@ -8,8 +8,9 @@
 //! | module | what |
 //! |---|---|
 //! | [`reading`] | one reading, and its way into the core |
-//! | [`world`] | the obstacle world of the seed paper and a team of robots that walk in it |
+//! | [`world`] | the rooms of the seed paper and a team of robots that walk in them |
 //! | [`mrclam`] | the UTIAS multi-robot data sets |
+//! | [`eval`] | the seed paper's experiments: protocols, measures, tables and figures |
 //! | [`metrics`] | the absolute trajectory error (ATE), alignment, dead reckoning |
 //! | [`tum`] | trajectories as text in the TUM format |
 //! | [`stamp`] | seconds in decimal to nanoseconds and back, exactly |
@@ -53,6 +54,7 @@
 //! Nothing here reads a clock or draws randomness that was not seeded. Only
 //! [`Mrclam::load`](mrclam::Mrclam::load) touches files.
 
+pub mod eval;
 pub mod metrics;
 pub mod mrclam;
 pub mod reading;
