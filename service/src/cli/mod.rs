@@ -3,6 +3,7 @@
 mod bench;
 mod check_config;
 mod demo;
+mod eval;
 mod export;
 mod output;
 mod replay;
@@ -12,6 +13,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
+use cogmap_experiments::eval::InvalidProtocol;
 
 use crate::config::{Config, ConfigError};
 
@@ -37,6 +39,9 @@ enum Command {
     /// Send a recorded data set through the map and measure the error.
     #[command(subcommand)]
     Replay(replay::ReplayCommand),
+    /// Run the seed paper's experiments: tables and figures, ours beside the paper's.
+    #[command(subcommand)]
+    Eval(eval::EvalCommand),
     /// Measure speed, each figure beside its yardstick.
     #[command(subcommand)]
     Bench(bench::BenchCommand),
@@ -90,13 +95,14 @@ pub fn main() -> ExitCode {
         Command::CheckConfig(args) => check_config::run(&args),
         Command::Export(command) => export::run(&command),
         Command::Replay(command) => replay::run(&command),
+        Command::Eval(command) => eval::run(&command),
         Command::Bench(command) => bench::run(&command),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             output::complain(&error);
-            let wrong_usage = error.downcast_ref::<ConfigError>().is_some();
+            let wrong_usage = error.is::<ConfigError>() || error.is::<InvalidProtocol>();
             ExitCode::from(if wrong_usage { 2 } else { 1 })
         }
     }

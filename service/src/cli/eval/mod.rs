@@ -1,0 +1,22 @@
+//! `cogmap eval`: the seed paper's experiments, ours beside the paper's.
+
+mod progress;
+mod room;
+
+use clap::Subcommand;
+use cogmap_experiments::eval::Environment;
+
+#[derive(Debug, Subcommand)]
+pub(in crate::cli) enum EvalCommand {
+    /// The first experiment: an empty room of 10 × 10 × 10 m, 100 steps.
+    Env1(room::RoomArgs),
+    /// The second experiment: a room of 15 × 15 × 15 m with 50 cubes, 1000 steps.
+    Env2(room::RoomArgs),
+}
+
+pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
+    match command {
+        EvalCommand::Env1(args) => room::run(Environment::GridAligned, args),
+        EvalCommand::Env2(args) => room::run(Environment::ObstacleRich, args),
+    }
+}
