@@ -83,13 +83,13 @@ impl Display for Table {
 fn write_table_1(f: &mut Formatter<'_>, report: &Report) -> fmt::Result {
     writeln!(
         f,
-        "\n{:<34} {:>13} {:>13}",
+        "\n{:<46} {:>13} {:>13}",
         "Table 1", "mean ATE [m]", "RMSE [m]"
     )?;
     for (system, mean, rmse) in PAPER_SLAM {
         writeln!(
             f,
-            "{:<34} {mean:>13} {rmse:>13}",
+            "{:<46} {mean:>13} {rmse:>13}",
             format!("{system} (as the paper states)")
         )?;
     }
@@ -97,7 +97,7 @@ fn write_table_1(f: &mut Formatter<'_>, report: &Report) -> fmt::Result {
         let (mean, rmse) = (paper.recall_ate_mean_m, paper.recall_ate_rmse_m);
         writeln!(
             f,
-            "{:<34} {mean:>13.2} {rmse:>13.2}",
+            "{:<46} {mean:>13.2} {rmse:>13.2}",
             "grid-place model, the paper's"
         )?;
     }
@@ -115,7 +115,7 @@ fn write_table_1(f: &mut Formatter<'_>, report: &Report) -> fmt::Result {
     ] {
         if let (Some(mean), Some(rmse)) = (report.mean(mean), report.mean(rmse)) {
             let (mean, rmse) = (significant(mean), significant(rmse));
-            writeln!(f, "{label:<34} {mean:>13} {rmse:>13}")?;
+            writeln!(f, "{label:<46} {mean:>13} {rmse:>13}")?;
         }
     }
     Ok(())

@@ -31,7 +31,7 @@ pub(in crate::cli) struct RoomArgs {
     /// What the agent perceives beside its own motion.
     #[arg(long, value_enum, default_value = "none")]
     percept: PerceptKind,
-    /// How far obstacles are sighted \[m\].
+    /// How far obstacles are sighted [m].
     #[arg(long, default_value_t = SightingSettings::default().range_max_m, value_name = "M")]
     sighting_range_m: f64,
     /// Obstacles are sighted at every step whose number divides by this.
@@ -47,23 +47,23 @@ pub(in crate::cli) struct RoomArgs {
     /// Standard deviation from which each run's constant scale error is drawn.
     #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
     scale_bias: f64,
-    /// Standard deviation of a step's rotation about each axis \[°\].
+    /// Standard deviation of a step's rotation about each axis [°].
     #[arg(long, default_value_t = 0.0, value_name = "DEG")]
     rotation_noise_deg: f64,
     /// Standard deviation from which each run's constant error of a step's rotation is drawn, about
-    /// each axis \[°\].
+    /// each axis [°].
     #[arg(long, default_value_t = 0.0, value_name = "DEG")]
     gyro_bias_deg: f64,
     /// Number of grid modules; the default of a space when absent.
     #[arg(long, value_name = "N")]
     grid_modules: Option<usize>,
-    /// Spacing of the finest grid module \[m\]; the default of a space when absent.
+    /// Spacing of the finest grid module [m]; the default of a space when absent.
     #[arg(long, value_name = "M")]
     grid_spacing_m: Option<f64>,
     /// Ratio of the spacings of neighbouring modules; the default of a space when absent.
     #[arg(long, value_name = "RATIO")]
     grid_ratio: Option<f64>,
-    /// Distance at which a place's confidence is one half \[m\]; the default of a space when absent.
+    /// Distance at which a place's confidence is one half [m]; the default of a space when absent.
     #[arg(long, value_name = "M")]
     field_radius_m: Option<f64>,
     /// Steps of 0.1 m in each run; the paper's number when absent.

@@ -26,10 +26,20 @@ pub(super) struct Chart {
     pub(super) name: &'static str,
     pub(super) title: &'static str,
     pub(super) y_label: &'static str,
-    /// End of the y axis; as the data need it when absent.
-    pub(super) y_max: Option<f64>,
+    pub(super) y_axis: YAxis,
     pub(super) lines: Vec<Line>,
     pub(super) marks: Vec<Mark>,
+}
+
+/// What a y axis spans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum YAxis {
+    /// From 0 as far as the data need it.
+    FromZero,
+    /// From 0 to 1.
+    Share,
+    /// From below the lowest value to 1, for scores that are all near it.
+    UpToOne,
 }
 
 /// A quantity as a line.
@@ -115,7 +125,11 @@ impl Chart {
             .map(|line| points(experiment, line.quantity))
             .collect();
         let steps = experiment.protocol.steps as f64;
-        let y_max = self.y_max.unwrap_or_else(|| self.top(&lines, steps));
+        let (y_min, y_max) = match self.y_axis {
+            YAxis::FromZero => (0.0, self.top(&lines, steps)),
+            YAxis::Share => (0.0, 1.0),
+            YAxis::UpToOne => (bottom(&lines), 1.0),
+        };
 
         let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
         root.fill(&WHITE)?;
@@ -130,7 +144,7 @@ impl Chart {
             .margin_top(8)
             .x_label_area_size(52)
             .y_label_area_size(78)
-            .build_cartesian_2d(0.0..steps, 0.0..y_max)?;
+            .build_cartesian_2d(0.0..steps, y_min..y_max)?;
         chart
             .configure_mesh()
             .x_desc("step of 0.1 m")
@@ -140,7 +154,7 @@ impl Chart {
             .x_labels(8)
             .y_labels(6)
             .x_label_formatter(&|x| format!("{x:.0}"))
-            .y_label_formatter(&|y| tick(*y, y_max))
+            .y_label_formatter(&|y| tick(*y, y_max - y_min))
             .light_line_style(TRANSPARENT)
             .bold_line_style(GRID)
             .axis_style(PALE_INK)
@@ -248,17 +262,21 @@ fn points(experiment: &Experiment, quantity: Quantity) -> Vec<Point> {
     (0..bins).filter_map(point).collect()
 }
 
-/// A number on the y axis, with as many decimals as the axis needs.
-fn tick(value: f64, max: f64) -> String {
-    if max >= 10.0 {
-        format!("{value:.0}")
-    } else if max >= 1.0 {
-        format!("{value:.1}")
-    } else if max >= 0.1 {
-        format!("{value:.2}")
-    } else if max >= 0.01 {
-        format!("{value:.3}")
-    } else {
-        format!("{value:.0e}")
-    }
+/// Start of a y axis that ends at 1 and shows all bands.
+fn bottom(lines: &[Vec<Point>]) -> f64 {
+    let lows = lines.iter().flatten().map(|(_, _, low, _)| *low);
+    let deficit = 1.0 - lows.fold(1.0, f64::min);
+    // The smallest span keeps the ticks of an axis without any deficit apart.
+    1.0 - (deficit * (1.0 + AIR)).max(1e-4)
+}
+
+/// A number on the y axis, with as many decimals as an axis of this span needs.
+fn tick(value: f64, span: f64) -> String {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 0 to 8"
+    )]
+    let decimals = (1.0 - span.log10().floor()).clamp(0.0, 8.0) as usize;
+    format!("{value:.decimals$}")
 }

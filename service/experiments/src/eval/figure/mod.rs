@@ -4,7 +4,7 @@ mod chart;
 mod colour;
 mod heat;
 
-use chart::{Chart, Line, Mark};
+use chart::{Chart, Line, Mark, YAxis};
 
 use super::experiment::Experiment;
 use super::protocol::PAPER_P_NEW;
@@ -97,6 +97,8 @@ pub fn figures(experiment: &Experiment) -> Result<Vec<Figure>, FigureError> {
                 per_step: PAPER_P_NEW,
                 label: paper_growth.clone(),
             }),
+            // In the frame of a room's corner all patterns point much the same way.
+            "interference-score" => chart.y_axis = YAxis::UpToOne,
             _ => {}
         }
     }
@@ -134,7 +136,7 @@ pub fn figures(experiment: &Experiment) -> Result<Vec<Figure>, FigureError> {
 /// A chart of a number from 0 to 1.
 fn score(name: &'static str, title: &'static str, y: &'static str, quantity: Quantity) -> Chart {
     Chart {
-        y_max: Some(1.0),
+        y_axis: YAxis::Share,
         ..count(name, title, y, quantity)
     }
 }
@@ -145,7 +147,7 @@ fn count(name: &'static str, title: &'static str, y: &'static str, quantity: Qua
         name,
         title,
         y_label: y,
-        y_max: None,
+        y_axis: YAxis::FromZero,
         lines: vec![Line::banded(quantity, "mean, and 10 % to 90 % of the runs")],
         marks: Vec::new(),
     }
@@ -176,7 +178,7 @@ fn errors(experiment: &Experiment) -> Chart {
         name: "error-over-time",
         title: "Absolute trajectory error",
         y_label: "distance from the true position [m]",
-        y_max: None,
+        y_axis: YAxis::FromZero,
         lines,
         marks: marks.collect(),
     }
