@@ -262,9 +262,13 @@ fn points(experiment: &Experiment, quantity: Quantity) -> Vec<Point> {
     (0..bins).filter_map(point).collect()
 }
 
-/// Start of a y axis that ends at 1 and shows all bands.
+/// Start of a y axis that ends at 1 and shows all lines and bands.
 fn bottom(lines: &[Vec<Point>]) -> f64 {
-    let lows = lines.iter().flatten().map(|(_, _, low, _)| *low);
+    // A few outliers may pull the mean below the band.
+    let lows = lines
+        .iter()
+        .flatten()
+        .map(|(_, mean, low, _)| low.min(*mean));
     let deficit = 1.0 - lows.fold(1.0, f64::min);
     // The smallest span keeps the ticks of an axis without any deficit apart.
     1.0 - (deficit * (1.0 + AIR)).max(1e-4)

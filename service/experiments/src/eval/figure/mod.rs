@@ -106,7 +106,7 @@ pub fn figures(experiment: &Experiment) -> Result<Vec<Figure>, FigureError> {
         lines: vec![
             Line::banded(
                 Quantity::PredictionError,
-                "recalled place, before the step is learned",
+                "recalled place before the step is learned, mean and 10 % to 90 % of the runs",
             ),
             Line::plain(Quantity::OracleError, "nearest stored place, after it"),
         ],
