@@ -15,6 +15,7 @@ mod readers; // readers and senders at once
 
 // What the service does for the outside.
 mod cli; // the commands
+mod eval; // the experiments
 mod http; // samples in, answers out
 mod http_guard; // who is let in, and how the service goes
 mod http_ingest; // samples over HTTP alone

@@ -1,0 +1,46 @@
+//! `cogmap eval`: the experiments of the paper from the command line.
+
+use cogmap_tests::run;
+
+#[test]
+fn an_experiment_is_the_same_on_any_number_of_threads() {
+    let figures = |threads| {
+        let arguments = ["--runs", "3", "--json", "--threads", threads];
+        let finished = run(&[&["eval", "env1"][..], &arguments].concat());
+        finished.text().to_owned()
+    };
+    let alone = figures("1");
+    assert_eq!(alone, figures("2"));
+    let report: serde_json::Value = serde_json::from_str(&alone).unwrap();
+    let mean = |measure: &str| report[measure]["mean"].as_f64().unwrap();
+    // The nearest stored place is as near as recall can come, and without noise nothing drifts.
+    assert!(
+        mean("oracle_ate_mean_m") <= mean("recall_ate_mean_m"),
+        "{alone}"
+    );
+    assert!(mean("causal_ate_rmse_m") < 1e-9, "{alone}");
+}
+
+#[test]
+fn figures_and_trajectories_are_written() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().to_str().unwrap();
+    let finished = run(&["eval", "env2", "--runs", "1", "--steps", "50", "--out", out]);
+    assert!(
+        finished.text().contains("0.42"),
+        "the paper's figure is beside ours"
+    );
+    let names = std::fs::read_dir(directory.path()).unwrap();
+    let names: Vec<_> = names
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    for kind in [".svg", ".json", ".tum"] {
+        assert!(names.iter().any(|name| name.ends_with(kind)), "{names:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_measured_yet_is_refused() {
+    let refused = run(&["eval", "env2", "--percept", "descriptor"]);
+    assert_eq!(refused.code(), 2, "{refused:?}");
+}
