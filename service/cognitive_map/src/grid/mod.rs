@@ -11,6 +11,7 @@
 
 mod code;
 pub mod decode;
+mod explain;
 pub mod heading;
 mod lattice;
 mod module;
@@ -18,11 +19,13 @@ mod modules;
 pub mod octant;
 mod phase;
 pub mod population;
+mod reduction;
 pub mod similarity;
 mod state;
 
 pub use code::{GridCode, InvalidCode, PartialCode};
 pub use decode::{Decoded, decode, unique_range_m};
+pub(crate) use explain::{Ball, Explainer, Extent, Search};
 pub use lattice::Lattice;
 pub use module::ModuleState;
 pub use modules::GridModules;

@@ -14,14 +14,26 @@ const CELLS_PER_AXIS_MAX: i64 = 8;
 /// Index of a cell along x, y, z.
 type Cell = [i64; 3];
 
+/// A place in a cell.
+///
+/// The position is rounded, and tells which places need not be looked at: most of the time of a search
+/// goes into waiting for memory, and the places themselves lie all over it.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    /// Which of the cells in the shard, almost surely: bits of the cell's hash.
+    tag: u32,
+    place: PlaceId,
+    near: [f32; 3],
+}
+
 /// Places by the cells that they lie in.
-type Shard = Arc<Vec<(Cell, PlaceId)>>;
+type Shard = Arc<Vec<Entry>>;
 
 /// The cells that hold places. A clone shares everything until one of both changes.
 #[derive(Clone, Debug)]
 pub(super) struct SpatialIndex {
     cell_edge_m: f64,
-    /// Always 4096; each is sorted, so the places of one cell lie side by side, lowest id first.
+    /// Always 4096; each is sorted by tag and place, so the places of one cell lie side by side.
     shards: Arc<Vec<Shard>>,
 }
 
@@ -36,11 +48,19 @@ impl SpatialIndex {
 
     /// Adds a place.
     pub(super) fn insert(&mut self, place: PlaceId, position: &Point3<f64>) {
-        let cell = self.cell(position.coords.into());
-        let shard = &mut Arc::make_mut(&mut self.shards)[shard_of(cell)];
+        let (shard, tag) = hash(self.cell(position.coords.into()));
+        let shard = &mut Arc::make_mut(&mut self.shards)[shard];
         let shard = Arc::make_mut(shard);
-        let slot = shard.partition_point(|entry| *entry < (cell, place));
-        shard.insert(slot, (cell, place));
+        let slot = shard.partition_point(|entry| (entry.tag, entry.place) < (tag, place));
+        let near = rounded(position);
+        shard.insert(slot, Entry { tag, place, near });
+    }
+
+    /// Bytes of memory that the entries take, reserved ones included.
+    pub(super) fn bytes(&self) -> usize {
+        let shards = self.shards.iter();
+        let entries: usize = shards.map(|shard| shard.capacity()).sum();
+        entries * size_of::<Entry>() + SHARDS * (size_of::<Shard>() + size_of::<Vec<Entry>>() + 16)
     }
 
     /// The cells that a ball touches: lowest and highest index along each axis. None when they are
@@ -54,57 +74,48 @@ impl SpatialIndex {
         few.then_some((low, high))
     }
 
-    /// The places of all cells that a ball touches, in no particular order. None when those are so
-    /// many that a scan over all places is simpler.
-    pub(super) fn near(
-        &self,
-        centre: &Point3<f64>,
-        radius_m: f64,
-    ) -> Option<impl Iterator<Item = PlaceId>> {
-        let (low, high) = self.range(centre, radius_m)?;
-        Some(cells(low, high).flat_map(|cell| self.in_cell(cell)))
-    }
-
-    /// The place nearest to a point, of those within `reach_m`, with its squared distance \[m²\]; of
-    /// equally near ones the lowest id. `reach_m` is at most a few cells' edges.
-    pub(super) fn nearest(
+    /// Calls `visit` with every place that may lie within a distance of `point`, the squared one given
+    /// as `limit` \[m²\]; `visit` returns the limit for what is left, which must not grow. Places somewhat
+    /// beyond it are visited too, and a place is rarely visited twice. False when the ball is so large
+    /// that a scan over all places is simpler; then none was visited.
+    pub(super) fn search(
         &self,
         point: &Point3<f64>,
-        reach_m: f64,
-        squared_distance: impl Fn(PlaceId) -> f64,
-    ) -> Option<(PlaceId, f64)> {
-        let (low, high) = self.range(point, reach_m)?;
-        let mut best: Option<(f64, PlaceId)> = None;
-        let mut limit = reach_m * reach_m;
-        let mut visit = |cell: Cell, limit: &mut f64| {
-            for place in self.in_cell(cell) {
-                let squared = squared_distance(place);
-                let nearer = best.is_none_or(|best| (squared, place) < best);
-                if squared <= *limit && nearer {
-                    best = Some((squared, place));
-                    *limit = squared;
+        limit: f64,
+        mut visit: impl FnMut(PlaceId) -> f64,
+    ) -> bool {
+        let Some((low, high)) = self.range(point, limit.sqrt()) else {
+            return false;
+        };
+        let mut limit = limit;
+        let mut of_cell = |cell: Cell, limit: &mut f64| {
+            for entry in self.in_cell(cell) {
+                // Not a number means too far away for this arithmetic, so such places are visited.
+                let beyond = least_distance_squared(entry, point) > *limit;
+                if !beyond {
+                    *limit = visit(entry.place);
                 }
             }
         };
         // Most often the nearest place lies in the point's own cell, and rules the others out.
         let own = self.cell(point.coords.into());
-        visit(own, &mut limit);
+        of_cell(own, &mut limit);
         for cell in cells(low, high) {
             if cell != own && self.cell_distance_squared(cell, point) <= limit {
-                visit(cell, &mut limit);
+                of_cell(cell, &mut limit);
             }
         }
-        best.map(|(squared, place)| (place, squared))
+        true
     }
 
-    /// The places in a cell.
-    fn in_cell(&self, cell: Cell) -> impl Iterator<Item = PlaceId> {
-        let shard = &self.shards[shard_of(cell)];
-        let start = shard.partition_point(|(key, _)| *key < cell);
+    /// The entries of a cell, and perhaps those of another one that has the same tag.
+    fn in_cell(&self, cell: Cell) -> impl Iterator<Item = &Entry> {
+        let (shard, tag) = hash(cell);
+        let shard = &self.shards[shard];
+        let start = first_of(shard, tag);
         shard[start..]
             .iter()
-            .take_while(move |(key, _)| *key == cell)
-            .map(|&(_, place)| place)
+            .take_while(move |entry| entry.tag == tag)
     }
 
     /// The cell of a position. Positions beyond 2⁶³ cells share the outermost ones.
@@ -127,6 +138,50 @@ impl SpatialIndex {
     }
 }
 
+/// Index of the first entry with a tag, or where it would be.
+///
+/// Tags are hashes, so the one looked for is near its share of the way; from there the search goes
+/// outwards in doubled steps. That touches less memory than halving the whole shard.
+fn first_of(shard: &[Entry], tag: u32) -> usize {
+    let below = |index: usize| shard[index].tag < tag;
+    let share = (shard.len() as u64 * u64::from(tag)) >> 32;
+    let guess = usize::try_from(share).expect("less than a length");
+    let (mut low, mut high) = (guess, guess);
+    let mut step = 1;
+    // Everything before `low` is below the tag, nothing from `high` on is.
+    while low > 0 && !below(low - 1) {
+        high = low - 1;
+        low = low.saturating_sub(step);
+        step *= 2;
+    }
+    let mut step = 1;
+    while high < shard.len() && below(high) {
+        low = high + 1;
+        high = (high + step).min(shard.len());
+        step *= 2;
+    }
+    low + shard[low..high].partition_point(|entry| entry.tag < tag)
+}
+
+/// Lower bound of the squared distance between a point and an entry's place \[m²\].
+fn least_distance_squared(entry: &Entry, point: &Point3<f64>) -> f64 {
+    let mut squared = 0.0;
+    let mut slack = 0.0;
+    for (near, x) in entry.near.into_iter().zip(point.iter()) {
+        let near = f64::from(near);
+        squared += (near - x) * (near - x);
+        // A float is rounded by at most 2⁻²⁴ of itself, or by 2⁻¹⁵⁰ near zero.
+        slack += near.abs() * f64::from(f32::EPSILON) + f64::from(f32::MIN_POSITIVE);
+    }
+    (squared.sqrt() - slack).max(0.0).powi(2)
+}
+
+/// A position, rounded.
+#[expect(clippy::cast_possible_truncation, reason = "rounds, as documented")]
+fn rounded(position: &Point3<f64>) -> [f32; 3] {
+    [position.x, position.y, position.z].map(|x| x as f32)
+}
+
 /// The cells from `low` to `high` along each axis.
 fn cells(low: Cell, high: Cell) -> impl Iterator<Item = Cell> {
     (low[0]..=high[0]).flat_map(move |i| {
@@ -134,8 +189,9 @@ fn cells(low: Cell, high: Cell) -> impl Iterator<Item = Cell> {
     })
 }
 
-/// The shard of a cell.
-fn shard_of(cell: Cell) -> usize {
+/// The shard of a cell, and its tag there.
+#[expect(clippy::cast_possible_truncation, reason = "takes some of the bits")]
+fn hash(cell: Cell) -> (usize, u32) {
     // One multiplication per axis, by odd constants of no structure; the upper bits are well mixed.
     let hash = [
         0x9e37_79b9_7f4a_7c15_u64,
@@ -149,5 +205,6 @@ fn shard_of(cell: Cell) -> usize {
             .wrapping_mul(factor)
             .rotate_left(29)
     });
-    usize::try_from(hash.wrapping_mul(0x9fb2_1c65_1e98_df25) >> 52).expect("12 bits")
+    let hash = hash.wrapping_mul(0x9fb2_1c65_1e98_df25);
+    ((hash >> 52) as usize, (hash >> 20) as u32)
 }
