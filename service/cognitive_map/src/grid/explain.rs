@@ -35,8 +35,6 @@ const DIMENSIONS_MAX: usize = 3 * MODULES_MAX;
 const BOX_SHARE: f64 = 0.006;
 /// Rounding of phases, lattices and distances is far below this \[spacings²\].
 const SLACK: f64 = 1e-6;
-/// What is added to the tolerance of the modules for that of the box and for rounding.
-const ADDED: f64 = BOX_SHARE + SLACK;
 /// The smallest half edge of a box, as a power of two in finest spacings.
 const LEVEL_MIN: i32 = -4;
 /// Beyond this many finest spacings from the origin of `map` phases lose more digits than [`SLACK`] allows.
@@ -66,6 +64,8 @@ struct JointLattice {
     modules: Vec<usize>,
     /// Σ 1/sₘ² \[1/m²\].
     stiffness: f64,
+    /// The weights w of the box \[1/m²\].
+    box_weight: Vector3<f64>,
     /// Row i: what each module's point \[m\] adds to coordinate i, in units of the i-th diagonal.
     coordinates: Vec<Vec<Vector3<f64>>>,
     /// Row i, column j > i: coordinate i of basis vector j, in units of the i-th diagonal.
@@ -78,16 +78,15 @@ struct JointLattice {
     moves: Vec<Vector3<f64>>,
 }
 
-/// A ball that holds the positions which one choice of the modules' points explains.
+/// The positions which one choice of the modules' points explains.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ball {
-    /// Its centre.
+    /// The position that is explained best.
     pub(crate) centre: Point3<f64>,
-    /// The tolerance that it was found with.
+    /// The tolerance that the ball was found with.
     pub(crate) tolerance: f64,
-    /// Squared distance of the lattice point: what of the tolerance, and of what is added to it, is used
-    /// up at the centre.
-    cost: f64,
+    /// Σ |y − pₘ|²/sₘ² at the centre.
+    misfit: f64,
     /// Σ 1/sₘ² \[1/m²\].
     stiffness: f64,
 }
@@ -103,8 +102,9 @@ pub(crate) enum Search {
 
 impl Ball {
     /// Squared radius \[m²\] of the ball that holds what is within a tolerance; negative when nothing is.
+    /// The sum of squares rises from the centre by `|y − centre|²` Σ 1/sₘ².
     pub(crate) fn squared_radius_m2(&self, tolerance: f64) -> f64 {
-        (tolerance + ADDED - self.cost) / self.stiffness
+        (tolerance + SLACK - self.misfit) / self.stiffness
     }
 }
 
@@ -175,9 +175,10 @@ impl Explainer {
     /// explanations tend to come first. Gives up after `steps_max` steps of some 20 ns.
     ///
     /// Nothing within tolerance is missed: dₘ(y) is the distance to some point pₘ(kₘ), so (k, y) has a
-    /// squared distance of at most tolerance + η. That of (k, ·) is least at the y* of k and rises from
-    /// there by at least `|y − y*|²` Σ 1/sₘ². Hence k lies in the enumerated ball, and y in the visited one.
-    /// With more modules than take part, those that do have a sum that is smaller still.
+    /// squared distance of at most tolerance + η, and that of k, which is the least over y, is no larger:
+    /// k is enumerated. From k follows the position that the modules alone explain best, without the
+    /// box, and around it the ball that holds y. With more modules than take part, those that do have a
+    /// sum that is smaller still.
     pub(crate) fn explain(
         &self,
         modules: &GridModules,
@@ -294,6 +295,7 @@ impl JointLattice {
         });
         Some(Box::new(Self {
             stiffness,
+            box_weight,
             coordinates,
             triangle,
             diagonal_squared,
@@ -322,9 +324,9 @@ impl JointLattice {
                 .map(|(row, point)| row.dot(point))
                 .sum();
         }
+        // The position relative to the centre, if all whole coordinates are zero.
         let start = self.weights.iter().zip(points);
-        let start = start.map(|(weight, point)| weight * point);
-        let start = centre + start.sum::<Vector3<f64>>();
+        let start: Vector3<f64> = start.map(|(weight, point)| weight * point).sum();
 
         // Whole coordinate, middle, next step and cost of what comes after, for each depth.
         let mut whole = [0.0; DIMENSIONS_MAX];
@@ -338,7 +340,7 @@ impl JointLattice {
         for _ in 0..steps_max {
             let off = whole[depth] - middle[depth];
             let cost = after[depth] + self.diagonal_squared[depth] * off * off;
-            if cost <= tolerance + ADDED {
+            if cost <= tolerance + BOX_SHARE + SLACK {
                 if depth > 0 {
                     depth -= 1;
                     after[depth] = cost;
@@ -352,16 +354,14 @@ impl JointLattice {
                     (whole[depth], step[depth]) = outwards(middle[depth]);
                     continue;
                 }
-                let shift: Vector3<f64> = self
-                    .moves
-                    .iter()
-                    .zip(&whole)
-                    .map(|(by, times)| by * *times)
-                    .sum();
+                let moved = self.moves.iter().zip(&whole).map(|(by, times)| by * *times);
+                let within_box = start + moved.sum::<Vector3<f64>>();
+                // Without the box's pull the modules' best position lies a little farther out.
+                let pull = self.box_weight.component_mul(&within_box);
                 let ball = Ball {
-                    centre: start + shift,
+                    centre: centre + within_box + pull / self.stiffness,
                     tolerance,
-                    cost,
+                    misfit: cost - within_box.dot(&pull) - pull.norm_squared() / self.stiffness,
                     stiffness: self.stiffness,
                 };
                 tolerance = visit(&ball).min(tolerance);
@@ -382,4 +382,104 @@ impl JointLattice {
 fn outwards(middle: f64) -> (f64, f64) {
     let whole = middle.round();
     (whole, if middle < whole { -1.0 } else { 1.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Phase;
+    use crate::settings::{Settings, SettingsValues};
+    use proptest::prelude::*;
+
+    fn modules_of(grid_modules: usize, grid_ratio: f64) -> GridModules {
+        let values = SettingsValues {
+            grid_modules,
+            grid_ratio,
+            ..SettingsValues::default()
+        };
+        GridModules::new(&Settings::new(values).unwrap())
+    }
+
+    /// Boxes of all shapes, some far from the origin, and a position in each.
+    fn boxes() -> impl Strategy<Value = (Extent, Point3<f64>)> {
+        let centre = prop_oneof![Just(0.0), -1e3..1e3f64, -1e5..1e5f64];
+        let half = prop_oneof![Just(0.0), 0.01..1.0f64, 1.0..40.0f64, 40.0..2000.0f64];
+        let axis = (centre, half, -1.0..1.0f64);
+        prop::array::uniform3(axis).prop_map(|axes| {
+            let centre = Point3::from(axes.map(|axis| axis.0));
+            let half = Vector3::from(axes.map(|axis| axis.1));
+            let mut extent = Extent::of(&(centre - half));
+            extent.include(&(centre + half));
+            let at = centre + half.component_mul(&Vector3::from(axes.map(|axis| axis.2)));
+            (extent, at)
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+
+        /// Whatever the box, the modules that are known and the noise: the position that a code was
+        /// made at lies in one of the balls, at the very tolerance that it needs.
+        #[test]
+        fn no_explanation_is_missed(
+            (extent, position) in boxes(),
+            grid_modules in 2usize..10,
+            grid_ratio in 1.1..2.5f64,
+            known in prop::collection::vec(prop::bool::weighted(0.7), 10),
+            noise in prop::collection::vec(prop::array::uniform3(-1.0..1.0f64), 10),
+            scale in prop::sample::select(vec![0.0, 0.01, 0.05, 0.1]),
+        ) {
+            let modules = modules_of(grid_modules, grid_ratio);
+            let spacing_m = modules.lattices()[0].spacing_m();
+            let code = modules.code_at(&position);
+            let mut misfit = 0.0;
+            let mut phases = Vec::new();
+            for (module, phase) in code.phases().iter().enumerate() {
+                let noisy = Phase::wrap(phase.turns() + Vector3::from(noise[module]) * scale);
+                if known[module] {
+                    let lattice = &modules.lattices()[module];
+                    let off = lattice.torus_distance_m(phase, &noisy) / lattice.spacing_m();
+                    misfit += off * off;
+                }
+                phases.push(known[module].then_some(noisy));
+            }
+            let n_known = phases.iter().take(CANDIDATES_MAX).flatten().count();
+            prop_assume!(n_known >= MODULES_MIN);
+            let code = PartialCode::new(&modules, phases).unwrap();
+            let explainer = Explainer::new(&extent, spacing_m, grid_modules);
+            let mut found = false;
+            let search = explainer.explain(&modules, &code, &extent, misfit, 100_000, |ball| {
+                let squared = (ball.centre - position).norm_squared();
+                found |= squared <= ball.squared_radius_m2(ball.tolerance);
+                ball.tolerance
+            });
+            prop_assert!(found || search == Search::GivenUp);
+            // Codes that say enough are never given up.
+            let tells = n_known >= 5 && scale < 0.06;
+            let world_is_small = extent.levels(spacing_m).into_iter().all(|level| level <= 6);
+            prop_assert!(found || !(tells && world_is_small));
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_explained_is_given_up() {
+        let modules = modules_of(5, 1.5);
+        let code = modules.code_at(&Point3::origin());
+        let one = vec![None, None, Some(code.phases()[2]), None, None];
+        let one = PartialCode::new(&modules, one).unwrap();
+        let code = PartialCode::from(&code);
+        let near = Extent::of(&Point3::origin());
+        let mut far = near;
+        far.include(&Point3::new(1e9, f64::INFINITY, 0.0));
+        let explain = |extent: &Extent, code: &PartialCode, steps_max| {
+            let explainer = Explainer::new(extent, 1.0, 5);
+            explainer.explain(&modules, code, extent, 0.01, steps_max, |ball| {
+                ball.tolerance
+            })
+        };
+        assert_eq!(explain(&near, &code, 1000), Search::Complete);
+        assert_eq!(explain(&near, &code, 3), Search::GivenUp, "too few steps");
+        assert_eq!(explain(&near, &one, 1000), Search::GivenUp, "one module");
+        assert_eq!(explain(&far, &code, 1000), Search::GivenUp, "too far away");
+    }
 }

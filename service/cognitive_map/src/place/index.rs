@@ -6,8 +6,14 @@ use nalgebra::Point3;
 
 use super::PlaceId;
 
-/// Number of shards. A place's insertion after a snapshot copies one shard, i.e. one in 4096 entries.
-const SHARDS: usize = 4096;
+/// Bits of the number of shards at first, when they are more, and at most. A place's insertion after a
+/// snapshot copies one shard, which is one in 4096 entries of a large index; a small one with as many
+/// shards would take more memory than its places.
+const SHARD_BITS_MIN: u32 = 6;
+const SHARD_BITS_STEP: u32 = 3;
+const SHARD_BITS_MAX: u32 = 12;
+/// Places per shard at which it is worth having more of them, counted in the larger number.
+const PLACES_PER_SHARD: usize = 4;
 /// A search over more cells than this along any axis is left to a scan.
 const CELLS_PER_AXIS_MAX: i64 = 8;
 
@@ -33,8 +39,10 @@ type Shard = Arc<Vec<Entry>>;
 #[derive(Clone, Debug)]
 pub(super) struct SpatialIndex {
     cell_edge_m: f64,
-    /// Always 4096; each is sorted by tag and place, so the places of one cell lie side by side.
+    /// 2^bits of them; each is sorted by tag and place, so the places of one cell lie side by side.
     shards: Arc<Vec<Shard>>,
+    shard_bits: u32,
+    places: usize,
 }
 
 impl SpatialIndex {
@@ -42,13 +50,21 @@ impl SpatialIndex {
     pub(super) fn new(cell_edge_m: f64) -> Self {
         Self {
             cell_edge_m,
-            shards: Arc::new(vec![Arc::default(); SHARDS]),
+            shards: Arc::new(vec![Arc::default(); 1 << SHARD_BITS_MIN]),
+            shard_bits: SHARD_BITS_MIN,
+            places: 0,
         }
     }
 
     /// Adds a place.
     pub(super) fn insert(&mut self, place: PlaceId, position: &Point3<f64>) {
-        let (shard, tag) = hash(self.cell(position.coords.into()));
+        self.places += 1;
+        if self.shard_bits < SHARD_BITS_MAX
+            && self.places >= PLACES_PER_SHARD << (self.shard_bits + SHARD_BITS_STEP)
+        {
+            self.split();
+        }
+        let (shard, tag) = self.slot(self.cell(position.coords.into()));
         let shard = &mut Arc::make_mut(&mut self.shards)[shard];
         let shard = Arc::make_mut(shard);
         let slot = shard.partition_point(|entry| (entry.tag, entry.place) < (tag, place));
@@ -56,11 +72,24 @@ impl SpatialIndex {
         shard.insert(slot, Entry { tag, place, near });
     }
 
-    /// Bytes of memory that the entries take, reserved ones included.
+    /// Splits every shard into eight. That happens twice in the life of an index, while it is small.
+    fn split(&mut self) {
+        self.shard_bits += SHARD_BITS_STEP;
+        let mut shards = vec![Vec::new(); 1 << self.shard_bits];
+        for entry in self.shards.iter().flat_map(|shard| shard.iter()) {
+            // Shards follow the upper bits of the tag, so the order of the entries stays.
+            shards[self.shard_of(entry.tag)].push(*entry);
+        }
+        let shards = shards.into_iter().map(Arc::new);
+        self.shards = Arc::new(shards.collect());
+    }
+
+    /// Bytes of memory that it takes, reserved ones included.
     pub(super) fn bytes(&self) -> usize {
         let shards = self.shards.iter();
         let entries: usize = shards.map(|shard| shard.capacity()).sum();
-        entries * size_of::<Entry>() + SHARDS * (size_of::<Shard>() + size_of::<Vec<Entry>>() + 16)
+        let shard = size_of::<Shard>() + size_of::<Vec<Entry>>() + 2 * size_of::<usize>();
+        entries * size_of::<Entry>() + self.shards.len() * shard
     }
 
     /// The cells that a ball touches: lowest and highest index along each axis. None when they are
@@ -88,34 +117,57 @@ impl SpatialIndex {
             return false;
         };
         let mut limit = limit;
-        let mut of_cell = |cell: Cell, limit: &mut f64| {
-            for entry in self.in_cell(cell) {
+        // Most often the nearest place lies in the point's own cell, and rules the others out. To look
+        // at a place costs more than to pass over many entries, so the nearest comes first.
+        let own = self.cell(point.coords.into());
+        let entries = self.entries(own);
+        let distances = entries
+            .iter()
+            .map(|entry| least_distance_squared(entry, point));
+        let first = distances
+            .enumerate()
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(index, _)| index);
+        let first = first.and_then(|index| entries.get(index));
+        if let Some(first) = first {
+            limit = visit(first.place);
+        }
+        let mut of_cell = |entries: &[Entry], limit: &mut f64| {
+            for entry in entries {
                 // Not a number means too far away for this arithmetic, so such places are visited.
                 let beyond = least_distance_squared(entry, point) > *limit;
-                if !beyond {
+                if !beyond && first.is_none_or(|first| first.place != entry.place) {
                     *limit = visit(entry.place);
                 }
             }
         };
-        // Most often the nearest place lies in the point's own cell, and rules the others out.
-        let own = self.cell(point.coords.into());
-        of_cell(own, &mut limit);
+        of_cell(entries, &mut limit);
         for cell in cells(low, high) {
             if cell != own && self.cell_distance_squared(cell, point) <= limit {
-                of_cell(cell, &mut limit);
+                of_cell(self.entries(cell), &mut limit);
             }
         }
         true
     }
 
     /// The entries of a cell, and perhaps those of another one that has the same tag.
-    fn in_cell(&self, cell: Cell) -> impl Iterator<Item = &Entry> {
-        let (shard, tag) = hash(cell);
+    fn entries(&self, cell: Cell) -> &[Entry] {
+        let (shard, tag) = self.slot(cell);
         let shard = &self.shards[shard];
-        let start = first_of(shard, tag);
-        shard[start..]
-            .iter()
-            .take_while(move |entry| entry.tag == tag)
+        let rest = &shard[first_of(shard, tag, self.shard_bits)..];
+        let end = rest.iter().position(|entry| entry.tag != tag);
+        &rest[..end.unwrap_or(rest.len())]
+    }
+
+    /// The shard of a cell, and its tag there.
+    fn slot(&self, cell: Cell) -> (usize, u32) {
+        let tag = tag(cell);
+        (self.shard_of(tag), tag)
+    }
+
+    /// The shard of a tag: its upper bits.
+    fn shard_of(&self, tag: u32) -> usize {
+        (tag >> (u32::BITS - self.shard_bits)) as usize
     }
 
     /// The cell of a position. Positions beyond 2⁶³ cells share the outermost ones.
@@ -142,9 +194,10 @@ impl SpatialIndex {
 ///
 /// Tags are hashes, so the one looked for is near its share of the way; from there the search goes
 /// outwards in doubled steps. That touches less memory than halving the whole shard.
-fn first_of(shard: &[Entry], tag: u32) -> usize {
+fn first_of(shard: &[Entry], tag: u32, shard_bits: u32) -> usize {
     let below = |index: usize| shard[index].tag < tag;
-    let share = (shard.len() as u64 * u64::from(tag)) >> 32;
+    // The upper bits are those of the shard.
+    let share = (shard.len() as u64 * u64::from(tag << shard_bits)) >> u32::BITS;
     let guess = usize::try_from(share).expect("less than a length");
     let (mut low, mut high) = (guess, guess);
     let mut step = 1;
@@ -189,9 +242,8 @@ fn cells(low: Cell, high: Cell) -> impl Iterator<Item = Cell> {
     })
 }
 
-/// The shard of a cell, and its tag there.
-#[expect(clippy::cast_possible_truncation, reason = "takes some of the bits")]
-fn hash(cell: Cell) -> (usize, u32) {
+/// The tag of a cell: a hash.
+fn tag(cell: Cell) -> u32 {
     // One multiplication per axis, by odd constants of no structure; the upper bits are well mixed.
     let hash = [
         0x9e37_79b9_7f4a_7c15_u64,
@@ -205,6 +257,5 @@ fn hash(cell: Cell) -> (usize, u32) {
             .wrapping_mul(factor)
             .rotate_left(29)
     });
-    let hash = hash.wrapping_mul(0x9fb2_1c65_1e98_df25);
-    ((hash >> 52) as usize, (hash >> 20) as u32)
+    (hash.wrapping_mul(0x9fb2_1c65_1e98_df25) >> 32) as u32
 }

@@ -113,12 +113,13 @@ impl PlaceMap {
             .explainer
             .explain(modules, code, tolerance, steps_max, |ball| {
                 let mut left = ball.tolerance;
-                searched &=
-                    self.index
-                        .search(&ball.centre, ball.squared_radius_m2(left), |place| {
-                            left = visit(place).min(left);
-                            ball.squared_radius_m2(left)
-                        });
+                let squared = ball.squared_radius_m2(left);
+                if squared >= 0.0 {
+                    searched &= self.index.search(&ball.centre, squared, |place| {
+                        left = visit(place).min(left);
+                        ball.squared_radius_m2(left)
+                    });
+                }
                 left
             });
         if searched { search } else { Search::GivenUp }

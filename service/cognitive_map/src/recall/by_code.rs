@@ -143,7 +143,7 @@ impl<'a> CodeRecall<'a> {
     /// Calls `visit` with every place whose cosine is `least` or more, and with some others, perhaps
     /// more than once. `visit` returns the least cosine that is of interest from then on. False when
     /// not all were visited, as that would have been more work than a scan.
-    fn search(&self, least: f64, mut visit: impl FnMut(&Place, PlaceId) -> f64) -> bool {
+    pub(super) fn search(&self, least: f64, mut visit: impl FnMut(&Place, PlaceId) -> f64) -> bool {
         if self.cue.known() as f64 * (1.0 - least) > DEFICIT_MAX + 1e-9 {
             return false;
         }

@@ -2,6 +2,8 @@
 
 mod best;
 mod by_code;
+#[cfg(test)]
+mod tests;
 
 use std::cmp::Ordering;
 
