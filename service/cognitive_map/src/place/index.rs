@@ -242,7 +242,8 @@ fn cells(low: Cell, high: Cell) -> impl Iterator<Item = Cell> {
     })
 }
 
-/// The tag of a cell: a hash.
+/// The tag of a cell: the hash of its block of 2 × 2 × 2 cells, and in the lowest bits which of them it
+/// is. Neighbours are thus often side by side in memory, and a ball seldom touches more than one block.
 fn tag(cell: Cell) -> u32 {
     // One multiplication per axis, by odd constants of no structure; the upper bits are well mixed.
     let hash = [
@@ -253,9 +254,12 @@ fn tag(cell: Cell) -> u32 {
     .into_iter()
     .zip(cell)
     .fold(0u64, |hash, (factor, index)| {
-        (hash ^ index.cast_unsigned())
+        (hash ^ (index >> 1).cast_unsigned())
             .wrapping_mul(factor)
             .rotate_left(29)
     });
-    (hash.wrapping_mul(0x9fb2_1c65_1e98_df25) >> 32) as u32
+    let block = (hash.wrapping_mul(0x9fb2_1c65_1e98_df25) >> 32) as u32;
+    cell.into_iter().fold(block >> 3, |tag, index| {
+        (tag << 1) | u32::from(index & 1 == 1)
+    })
 }
