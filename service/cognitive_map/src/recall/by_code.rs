@@ -7,8 +7,8 @@ use crate::grid::{PartialCode, Search};
 use crate::place::{Place, PlaceId, confidence};
 
 /// How much the terms of the known modules may together lack of their number while a search is worth
-/// trying. At 0.75 no more than one module can be wholly wrong.
-const DEFICIT_MAX: f64 = 0.75;
+/// trying. At one and more a module may be wholly wrong, and the search has no bound.
+const DEFICIT_MAX: f64 = 0.9;
 /// Steps of a search over and above one for every [`PLACES_PER_STEP`] places. One takes about as long as
 /// comparing one place, so a search that is given up adds a little to the scan that follows.
 const STEPS_MIN: u64 = 400;
