@@ -3,8 +3,8 @@
 use cogmap_proto::{
     AgentDetail, AgentPage, AgentSummary, GridModuleState, GridState, IngestAnswer, Landmark,
     LandmarkPage, Leg, NoiseSettings, Place, PlacePage, Problem, RecallAnswer, RecalledPlace,
-    Recruitment, Rivals, SpaceInfo, SpaceList, SpaceSettings, StampedPose, Status, Trajectory, Trip,
-    TripDetail, TripPage,
+    Recruitment, Rivals, SpaceInfo, SpaceList, SpaceSettings, StampedPose, Status, Trajectory,
+    Trip, TripDetail, TripPage,
 };
 
 use super::Visit;

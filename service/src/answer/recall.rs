@@ -92,10 +92,7 @@ pub fn recall(
     query: &RecallQuery,
 ) -> Result<wire::RecallAnswer, InvalidQuery> {
     let cue = cue(map, query)?;
-    let recalled = cue
-        .as_ref()
-        .map(|cue| map.recall(cue))
-        .unwrap_or_default();
+    let recalled = cue.as_ref().map(|cue| map.recall(cue)).unwrap_or_default();
     let rivals = cue
         .zip(recalled.first())
         .and_then(|(cue, best)| map.rivals(&cue, best))
