@@ -12,6 +12,7 @@
 mod code;
 pub mod decode;
 mod explain;
+mod extent;
 pub mod heading;
 mod lattice;
 mod module;
@@ -25,7 +26,8 @@ mod state;
 
 pub use code::{GridCode, InvalidCode, PartialCode};
 pub use decode::{Decoded, decode, unique_range_m};
-pub(crate) use explain::{Ball, Explainer, Extent, Search};
+pub(crate) use explain::{Ball, Explainer, Search};
+pub(crate) use extent::Extent;
 pub use lattice::Lattice;
 pub use module::ModuleState;
 pub use modules::GridModules;
