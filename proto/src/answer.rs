@@ -220,6 +220,25 @@ pub struct RecallAnswer {
     pub map_revision: u64,
     /// The places, best first.
     pub places: Vec<RecalledPlace>,
+    /// Other places that answer the code nearly as well as the first one; absent when there are none,
+    /// without a code, or with a position beside it.
+    #[serde(default)]
+    pub rivals: Option<Rivals>,
+}
+
+/// The places that answer a code nearly as well as the best one: more than a field radius from it, with
+/// a cosine at most 0.05 lower.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Rivals {
+    /// How many there are.
+    pub count: u64,
+    /// Identifier of the best of them.
+    pub place: u64,
+    /// Its cosine.
+    pub cosine: f64,
+    /// Its distance from the first place \[m\].
+    pub distance_m: f64,
 }
 
 /// A place and how well it answers the cue.

@@ -29,7 +29,7 @@ mod watermark;
 
 pub use answer::{
     AgentDetail, AgentPage, AgentSummary, GridModuleState, GridState, IngestAnswer, Landmark,
-    LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer, RecalledPlace, SpaceInfo,
+    LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer, RecalledPlace, Rivals, SpaceInfo,
     SpaceList, StampedPose, Trajectory, Trip, TripDetail, TripPage,
 };
 pub use codec::{CBOR, Codec, DecodeError, JSON, POSTCARD_V1};

@@ -3,8 +3,8 @@
 use cogmap_proto::{
     AgentDetail, AgentPage, AgentSummary, GridModuleState, GridState, IngestAnswer, Landmark,
     LandmarkPage, Leg, NoiseSettings, Place, PlacePage, Problem, RecallAnswer, RecalledPlace,
-    Recruitment, SpaceInfo, SpaceList, SpaceSettings, StampedPose, Status, Trajectory, Trip,
-    TripDetail, TripPage,
+    Recruitment, Rivals, SpaceInfo, SpaceList, SpaceSettings, StampedPose, Status, Trajectory,
+    Trip, TripDetail, TripPage,
 };
 
 use super::Visit;
@@ -201,6 +201,12 @@ fn recalled() -> RecallAnswer {
         frame: "map".to_owned(),
         map_revision: 4_711,
         places: vec![best],
+        rivals: Some(Rivals {
+            count: 2,
+            place: 17,
+            cosine: 0.90625,
+            distance_m: 31.5,
+        }),
     }
 }
 
@@ -213,6 +219,7 @@ fn recalled_without_cue() -> RecallAnswer {
     };
     RecallAnswer {
         places: vec![latest],
+        rivals: None,
         ..recalled()
     }
 }

@@ -24,7 +24,7 @@ pub use digest::{Digest, InvalidDigest};
 pub use event::{Event, EventKind};
 pub use landmark::{Landmark, LandmarkId};
 pub use place::{Place, PlaceId};
-pub use recall::{RecallCue, Recalled};
+pub use recall::{RecallCue, Recalled, Rivals};
 pub use record::{AgentId, Record, SkipReason};
 pub use sample::{
     Descriptor, InvalidSample, Label, Level, Marker, Motion, PoseNoise, RangeBearing, Relation,

@@ -52,6 +52,13 @@ impl<T, const N: usize> PagedVec<T, N> {
         self.len
     }
 
+    /// Bytes of memory that it takes, reserved ones included, without what the items own.
+    pub(crate) fn bytes(&self) -> usize {
+        let items: usize = self.pages.iter().map(|page| page.items.capacity()).sum();
+        let page = size_of::<Page<T>>() + size_of::<Arc<Page<T>>>() + 16;
+        items * size_of::<T>() + self.pages.capacity() * page
+    }
+
     /// The item at an index.
     pub(crate) fn get(&self, index: usize) -> Option<&T> {
         self.pages.get(index / N)?.items.get(index % N)

@@ -91,9 +91,17 @@ pub fn recall(
     map: &CognitiveMap,
     query: &RecallQuery,
 ) -> Result<wire::RecallAnswer, InvalidQuery> {
-    let recalled = cue(map, query)?
-        .map(|cue| map.recall(&cue))
-        .unwrap_or_default();
+    let cue = cue(map, query)?;
+    let recalled = cue.as_ref().map(|cue| map.recall(cue)).unwrap_or_default();
+    let rivals = cue
+        .zip(recalled.first())
+        .and_then(|(cue, best)| map.rivals(&cue, best))
+        .map(|rivals| wire::Rivals {
+            count: rivals.count as u64,
+            place: rivals.place.0.into(),
+            cosine: rivals.cosine,
+            distance_m: rivals.distance_m,
+        });
     let places = recalled.into_iter().filter_map(|recalled| {
         Some(wire::RecalledPlace {
             place: place(map, recalled.place, map.place(recalled.place)?),
@@ -107,6 +115,7 @@ pub fn recall(
         frame: FRAME.to_owned(),
         map_revision: map.revision(),
         places: places.collect(),
+        rivals,
     })
 }
 

@@ -327,6 +327,20 @@ class RecalledPlace:
 
 
 @dataclass(frozen=True)
+class Rivals:
+    """Places that answer a code nearly as well as the best one: more than a field radius from it,
+    with a cosine at most 0.05 lower."""
+
+    count: int
+    #: Identifier of the best of them.
+    place: int
+    #: Its cosine.
+    cosine: float
+    #: Its distance from the first place [m].
+    distance_m: float
+
+
+@dataclass(frozen=True)
 class RecallAnswer:
     """Places that answer a cue."""
 
@@ -335,6 +349,8 @@ class RecallAnswer:
     map_revision: int
     #: The places, best first.
     places: Tuple[RecalledPlace, ...]
+    #: Other places that answer the code nearly as well; absent when there are none.
+    rivals: Optional[Rivals] = None
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ use crate::digest::Digest;
 use crate::grid::GridModules;
 use crate::landmark::{Landmark, LandmarkId};
 use crate::place::{Place, PlaceId};
-use crate::recall::{self, RecallCue, Recalled};
+use crate::recall::{self, RecallCue, Recalled, Rivals};
 use crate::record::AgentId;
 use crate::settings::Settings;
 use crate::state::{State, StateWriter};
@@ -66,6 +66,11 @@ impl CognitiveMap {
         self.places.places().len()
     }
 
+    /// Bytes of memory that the places and all that finds them take, reserved ones included.
+    pub fn place_bytes(&self) -> usize {
+        self.places.bytes()
+    }
+
     /// The places, in the order of recruitment.
     pub fn places(&self) -> impl Iterator<Item = (PlaceId, &Place)> {
         self.places_from(PlaceId(0))
@@ -91,10 +96,18 @@ impl CognitiveMap {
 
     /// The places that answer a cue, best first, equally good ones by identifier. Exact.
     ///
-    /// By position the nearest come first. By code all places are compared. By both the confidences
-    /// are multiplied. Without a cue the place visited last comes first.
+    /// By position the nearest come first, by code the most alike. By both the confidences are
+    /// multiplied. Without a cue the place visited last comes first. The cost is said at
+    /// [`RecallCue`].
     pub fn recall(&self, cue: &RecallCue) -> Vec<Recalled> {
         recall::recall(cue, &self.places, &self.modules, &self.settings)
+    }
+
+    /// The places elsewhere that answer a cue nearly as well as `best` does, the first of its answers.
+    ///
+    /// `None` when the answer is unambiguous, and for cues that hold no code, or a position as well.
+    pub fn rivals(&self, cue: &RecallCue, best: &Recalled) -> Option<Rivals> {
+        recall::rivals(cue, best, &self.places, &self.modules, &self.settings)
     }
 
     /// Number of trips.

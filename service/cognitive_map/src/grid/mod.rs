@@ -11,6 +11,8 @@
 
 mod code;
 pub mod decode;
+mod explain;
+mod extent;
 pub mod heading;
 mod lattice;
 mod module;
@@ -18,11 +20,14 @@ mod modules;
 pub mod octant;
 mod phase;
 pub mod population;
+mod reduction;
 pub mod similarity;
 mod state;
 
 pub use code::{GridCode, InvalidCode, PartialCode};
 pub use decode::{Decoded, decode, unique_range_m};
+pub(crate) use explain::{Ball, Explainer, Search};
+pub(crate) use extent::Extent;
 pub use lattice::Lattice;
 pub use module::ModuleState;
 pub use modules::GridModules;

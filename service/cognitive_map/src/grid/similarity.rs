@@ -1,8 +1,13 @@
 //! How alike two grid codes or two populations are.
 
+use nalgebra::{Point3, Vector3};
+
 use super::lattice::{shortest_turns, turns_norm_squared};
 use super::population::TUNING_WIDTH;
-use super::{GridCode, GridModules, PartialCode};
+use super::{GridCode, GridModules, Lattice, PartialCode};
+
+/// Newton steps at most; from 0 to anywhere that matters takes fewer than ten.
+const NEWTON_STEPS: u32 = 50;
 
 /// Cosine similarity of two activation vectors of equal length (seed Eqs. 5, 6 and 10), in \[−1, 1\];
 /// 0 when either is zero.
@@ -73,12 +78,104 @@ pub fn kernel(modules: &GridModules, cue: &PartialCode, code: &GridCode) -> f64 
     let modules = modules.lattices().len();
     for (cue, phase) in cue.phases().iter().zip(code.phases()).take(modules) {
         let Some(cue) = cue else { continue };
-        // In units of the spacing, so that the spacing itself falls out of d/σ.
-        let distance_squared = turns_norm_squared(&shortest_turns(&(cue.turns() - phase.turns())));
-        sum += (-distance_squared / (4.0 * TUNING_WIDTH * TUNING_WIDTH)).exp();
+        sum += module_kernel(cue.turns(), phase.turns());
         known += 1.0;
     }
     if known > 0.0 { sum / known } else { 0.0 }
+}
+
+/// What one module adds to [`kernel`].
+fn module_kernel(cue: &Vector3<f64>, phase: &Vector3<f64>) -> f64 {
+    // In units of the spacing, so that the spacing itself falls out of d/σ.
+    let distance_squared = turns_norm_squared(&shortest_turns(&(cue - phase)));
+    (-distance_squared / (4.0 * TUNING_WIDTH * TUNING_WIDTH)).exp()
+}
+
+/// A partly known code, ready to be compared with the codes of many positions.
+#[derive(Debug)]
+pub(crate) struct CodeCue<'a> {
+    known: Vec<(&'a Lattice, Vector3<f64>)>,
+}
+
+impl<'a> CodeCue<'a> {
+    /// The known modules of a code.
+    pub(crate) fn new(modules: &'a GridModules, code: &PartialCode) -> Self {
+        let modules = modules.lattices().iter().zip(code.phases());
+        let known =
+            modules.filter_map(|(lattice, phase)| Some((lattice, *phase.as_ref()?.turns())));
+        Self {
+            known: known.collect(),
+        }
+    }
+
+    /// Number of known modules.
+    pub(crate) fn known(&self) -> usize {
+        self.known.len()
+    }
+
+    /// [`kernel`] of the code and the code of a position, to the last bit; `None` when it is below
+    /// `least`, which is found out early.
+    pub(crate) fn kernel_at(&self, position: &Point3<f64>, least: f64) -> Option<f64> {
+        let known = self.known.len() as f64;
+        let mut sum = 0.0;
+        let mut left = known;
+        for (lattice, cue) in &self.known {
+            sum += module_kernel(cue, lattice.locate(position).1.turns());
+            left -= 1.0;
+            // No module adds more than one; the slack is far above what rounding changes.
+            if sum + left < least * known - 1e-9 {
+                return None;
+            }
+        }
+        let kernel = if known > 0.0 { sum / known } else { 0.0 };
+        (kernel >= least).then_some(kernel)
+    }
+
+    /// The largest Σ dₘ² over the known modules, dₘ torus distance in spacings, at which [`kernel`] can
+    /// still be `least`; `None` when codes can be arbitrarily far apart in one module then.
+    ///
+    /// With modules adding qₘ = exp(−dₘ²/4σ²) and a deficit ε = Σ (1 − qₘ) = known · (1 − least), Σ dₘ² =
+    /// −4σ² Σ ln qₘ. As −ln is convex, that is largest when one module has the whole deficit:
+    ///
+    /// ```text
+    /// Σ dₘ² ≤ −4σ² ln(1 − ε)        ε < 1
+    /// ```
+    pub(crate) fn tolerance(&self, least: f64) -> Option<f64> {
+        let deficit = self.known.len() as f64 * (1.0 - least) + 1e-9;
+        (deficit < 1.0).then(|| -4.0 * TUNING_WIDTH * TUNING_WIDTH * (1.0 - deficit.max(0.0)).ln())
+    }
+
+    /// The distance \[m\] at which two codes are on average as alike as `kernel` says, i.e. the d with
+    ///
+    /// ```text
+    /// mean over known m of exp(−d² / (4 σₘ²)) = kernel
+    /// ```
+    ///
+    /// at most `far_m`. The logarithm of the left side is a convex and falling function of d², so
+    /// Newton's method started at 0 comes to the root from the left and never passes it.
+    pub(crate) fn mean_distance_m(&self, kernel: f64, far_m: f64) -> f64 {
+        let far = far_m * far_m;
+        let goal = kernel.ln();
+        let mut squared = 0.0_f64;
+        for _ in 0..NEWTON_STEPS {
+            let mut sum = 0.0;
+            let mut slope = 0.0;
+            for (lattice, _) in &self.known {
+                let rate = (2.0 * TUNING_WIDTH * lattice.spacing_m()).powi(-2);
+                let answer = (-squared * rate).exp();
+                sum += answer;
+                slope += rate * answer;
+            }
+            let step = ((sum / self.known.len() as f64).ln() - goal) * sum / slope;
+            squared += step.max(0.0);
+            // Written so that a step that is not a number ends it, too.
+            let goes_on = step > 1e-12 * squared && squared < far;
+            if !goes_on {
+                break;
+            }
+        }
+        squared.min(far).sqrt()
+    }
 }
 
 /// Σ aᵢ bᵢ, in order.

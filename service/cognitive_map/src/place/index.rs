@@ -6,23 +6,43 @@ use nalgebra::Point3;
 
 use super::PlaceId;
 
-/// Number of shards. A place's insertion after a snapshot copies one shard, i.e. one in 4096 entries.
-const SHARDS: usize = 4096;
+/// Bits of the number of shards at first, when they are more, and at most. A place's insertion after a
+/// snapshot copies one shard, which is one in 4096 entries of a large index; a small one with as many
+/// shards would take more memory than its places.
+const SHARD_BITS_MIN: u32 = 6;
+const SHARD_BITS_STEP: u32 = 3;
+const SHARD_BITS_MAX: u32 = 12;
+/// Places per shard at which it is worth having more of them, counted in the larger number.
+const PLACES_PER_SHARD: usize = 4;
 /// A search over more cells than this along any axis is left to a scan.
 const CELLS_PER_AXIS_MAX: i64 = 8;
 
 /// Index of a cell along x, y, z.
 type Cell = [i64; 3];
 
+/// A place in a cell.
+///
+/// The position is rounded, and tells which places need not be looked at: most of the time of a search
+/// goes into waiting for memory, and the places themselves lie all over it.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    /// Which of the cells in the shard, almost surely: bits of the cell's hash.
+    tag: u32,
+    place: PlaceId,
+    near: [f32; 3],
+}
+
 /// Places by the cells that they lie in.
-type Shard = Arc<Vec<(Cell, PlaceId)>>;
+type Shard = Arc<Vec<Entry>>;
 
 /// The cells that hold places. A clone shares everything until one of both changes.
 #[derive(Clone, Debug)]
 pub(super) struct SpatialIndex {
     cell_edge_m: f64,
-    /// Always 4096; each is sorted, so the places of one cell lie side by side, lowest id first.
+    /// 2^bits of them; each is sorted by tag and place, so the places of one cell lie side by side.
     shards: Arc<Vec<Shard>>,
+    shard_bits: u32,
+    places: usize,
 }
 
 impl SpatialIndex {
@@ -30,17 +50,46 @@ impl SpatialIndex {
     pub(super) fn new(cell_edge_m: f64) -> Self {
         Self {
             cell_edge_m,
-            shards: Arc::new(vec![Arc::default(); SHARDS]),
+            shards: Arc::new(vec![Arc::default(); 1 << SHARD_BITS_MIN]),
+            shard_bits: SHARD_BITS_MIN,
+            places: 0,
         }
     }
 
     /// Adds a place.
     pub(super) fn insert(&mut self, place: PlaceId, position: &Point3<f64>) {
-        let cell = self.cell(position.coords.into());
-        let shard = &mut Arc::make_mut(&mut self.shards)[shard_of(cell)];
+        self.places += 1;
+        if self.shard_bits < SHARD_BITS_MAX
+            && self.places >= PLACES_PER_SHARD << (self.shard_bits + SHARD_BITS_STEP)
+        {
+            self.split();
+        }
+        let (shard, tag) = self.slot(self.cell(position.coords.into()));
+        let shard = &mut Arc::make_mut(&mut self.shards)[shard];
         let shard = Arc::make_mut(shard);
-        let slot = shard.partition_point(|entry| *entry < (cell, place));
-        shard.insert(slot, (cell, place));
+        let slot = shard.partition_point(|entry| (entry.tag, entry.place) < (tag, place));
+        let near = rounded(position);
+        shard.insert(slot, Entry { tag, place, near });
+    }
+
+    /// Splits every shard into eight. That happens twice in the life of an index, while it is small.
+    fn split(&mut self) {
+        self.shard_bits += SHARD_BITS_STEP;
+        let mut shards = vec![Vec::new(); 1 << self.shard_bits];
+        for entry in self.shards.iter().flat_map(|shard| shard.iter()) {
+            // Shards follow the upper bits of the tag, so the order of the entries stays.
+            shards[self.shard_of(entry.tag)].push(*entry);
+        }
+        let shards = shards.into_iter().map(Arc::new);
+        self.shards = Arc::new(shards.collect());
+    }
+
+    /// Bytes of memory that it takes, reserved ones included.
+    pub(super) fn bytes(&self) -> usize {
+        let shards = self.shards.iter();
+        let entries: usize = shards.map(|shard| shard.capacity()).sum();
+        let shard = size_of::<Shard>() + size_of::<Vec<Entry>>() + 2 * size_of::<usize>();
+        entries * size_of::<Entry>() + self.shards.len() * shard
     }
 
     /// The cells that a ball touches: lowest and highest index along each axis. None when they are
@@ -54,57 +103,71 @@ impl SpatialIndex {
         few.then_some((low, high))
     }
 
-    /// The places of all cells that a ball touches, in no particular order. None when those are so
-    /// many that a scan over all places is simpler.
-    pub(super) fn near(
-        &self,
-        centre: &Point3<f64>,
-        radius_m: f64,
-    ) -> Option<impl Iterator<Item = PlaceId>> {
-        let (low, high) = self.range(centre, radius_m)?;
-        Some(cells(low, high).flat_map(|cell| self.in_cell(cell)))
-    }
-
-    /// The place nearest to a point, of those within `reach_m`, with its squared distance \[m²\]; of
-    /// equally near ones the lowest id. `reach_m` is at most a few cells' edges.
-    pub(super) fn nearest(
+    /// Calls `visit` with every place that may lie within a distance of `point`, the squared one given
+    /// as `limit` \[m²\]; `visit` returns the limit for what is left, which must not grow. Places somewhat
+    /// beyond it are visited too, and a place is rarely visited twice. False when the ball is so large
+    /// that a scan over all places is simpler; then none was visited.
+    pub(super) fn search(
         &self,
         point: &Point3<f64>,
-        reach_m: f64,
-        squared_distance: impl Fn(PlaceId) -> f64,
-    ) -> Option<(PlaceId, f64)> {
-        let (low, high) = self.range(point, reach_m)?;
-        let mut best: Option<(f64, PlaceId)> = None;
-        let mut limit = reach_m * reach_m;
-        let mut visit = |cell: Cell, limit: &mut f64| {
-            for place in self.in_cell(cell) {
-                let squared = squared_distance(place);
-                let nearer = best.is_none_or(|best| (squared, place) < best);
-                if squared <= *limit && nearer {
-                    best = Some((squared, place));
-                    *limit = squared;
+        limit: f64,
+        mut visit: impl FnMut(PlaceId) -> f64,
+    ) -> bool {
+        let Some((low, high)) = self.range(point, limit.sqrt()) else {
+            return false;
+        };
+        let mut limit = limit;
+        // Most often the nearest place lies in the point's own cell, and rules the others out. To look
+        // at a place costs more than to pass over many entries, so the nearest comes first.
+        let own = self.cell(point.coords.into());
+        let entries = self.entries(own);
+        let distances = entries
+            .iter()
+            .map(|entry| least_distance_squared(entry, point));
+        let first = distances
+            .enumerate()
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(index, _)| index);
+        let first = first.and_then(|index| entries.get(index));
+        if let Some(first) = first {
+            limit = visit(first.place);
+        }
+        let mut of_cell = |entries: &[Entry], limit: &mut f64| {
+            for entry in entries {
+                // Not a number means too far away for this arithmetic, so such places are visited.
+                let beyond = least_distance_squared(entry, point) > *limit;
+                if !beyond && first.is_none_or(|first| first.place != entry.place) {
+                    *limit = visit(entry.place);
                 }
             }
         };
-        // Most often the nearest place lies in the point's own cell, and rules the others out.
-        let own = self.cell(point.coords.into());
-        visit(own, &mut limit);
+        of_cell(entries, &mut limit);
         for cell in cells(low, high) {
             if cell != own && self.cell_distance_squared(cell, point) <= limit {
-                visit(cell, &mut limit);
+                of_cell(self.entries(cell), &mut limit);
             }
         }
-        best.map(|(squared, place)| (place, squared))
+        true
     }
 
-    /// The places in a cell.
-    fn in_cell(&self, cell: Cell) -> impl Iterator<Item = PlaceId> {
-        let shard = &self.shards[shard_of(cell)];
-        let start = shard.partition_point(|(key, _)| *key < cell);
-        shard[start..]
-            .iter()
-            .take_while(move |(key, _)| *key == cell)
-            .map(|&(_, place)| place)
+    /// The entries of a cell, and perhaps those of another one that has the same tag.
+    fn entries(&self, cell: Cell) -> &[Entry] {
+        let (shard, tag) = self.slot(cell);
+        let shard = &self.shards[shard];
+        let rest = &shard[first_of(shard, tag, self.shard_bits)..];
+        let end = rest.iter().position(|entry| entry.tag != tag);
+        &rest[..end.unwrap_or(rest.len())]
+    }
+
+    /// The shard of a cell, and its tag there.
+    fn slot(&self, cell: Cell) -> (usize, u32) {
+        let tag = tag(cell);
+        (self.shard_of(tag), tag)
+    }
+
+    /// The shard of a tag: its upper bits.
+    fn shard_of(&self, tag: u32) -> usize {
+        (tag >> (u32::BITS - self.shard_bits)) as usize
     }
 
     /// The cell of a position. Positions beyond 2⁶³ cells share the outermost ones.
@@ -127,6 +190,51 @@ impl SpatialIndex {
     }
 }
 
+/// Index of the first entry with a tag, or where it would be.
+///
+/// Tags are hashes, so the one looked for is near its share of the way; from there the search goes
+/// outwards in doubled steps. That touches less memory than halving the whole shard.
+fn first_of(shard: &[Entry], tag: u32, shard_bits: u32) -> usize {
+    let below = |index: usize| shard[index].tag < tag;
+    // The upper bits are those of the shard.
+    let share = (shard.len() as u64 * u64::from(tag << shard_bits)) >> u32::BITS;
+    let guess = usize::try_from(share).expect("less than a length");
+    let (mut low, mut high) = (guess, guess);
+    let mut step = 1;
+    // Everything before `low` is below the tag, nothing from `high` on is.
+    while low > 0 && !below(low - 1) {
+        high = low - 1;
+        low = low.saturating_sub(step);
+        step *= 2;
+    }
+    let mut step = 1;
+    while high < shard.len() && below(high) {
+        low = high + 1;
+        high = (high + step).min(shard.len());
+        step *= 2;
+    }
+    low + shard[low..high].partition_point(|entry| entry.tag < tag)
+}
+
+/// Lower bound of the squared distance between a point and an entry's place \[m²\].
+fn least_distance_squared(entry: &Entry, point: &Point3<f64>) -> f64 {
+    let mut squared = 0.0;
+    let mut slack = 0.0;
+    for (near, x) in entry.near.into_iter().zip(point.iter()) {
+        let near = f64::from(near);
+        squared += (near - x) * (near - x);
+        // A float is rounded by at most 2⁻²⁴ of itself, or by 2⁻¹⁵⁰ near zero.
+        slack += near.abs() * f64::from(f32::EPSILON) + f64::from(f32::MIN_POSITIVE);
+    }
+    (squared.sqrt() - slack).max(0.0).powi(2)
+}
+
+/// A position, rounded.
+#[expect(clippy::cast_possible_truncation, reason = "rounds, as documented")]
+fn rounded(position: &Point3<f64>) -> [f32; 3] {
+    [position.x, position.y, position.z].map(|x| x as f32)
+}
+
 /// The cells from `low` to `high` along each axis.
 fn cells(low: Cell, high: Cell) -> impl Iterator<Item = Cell> {
     (low[0]..=high[0]).flat_map(move |i| {
@@ -134,8 +242,9 @@ fn cells(low: Cell, high: Cell) -> impl Iterator<Item = Cell> {
     })
 }
 
-/// The shard of a cell.
-fn shard_of(cell: Cell) -> usize {
+/// The tag of a cell: the hash of its block of 2 × 2 × 2 cells, and in the lowest bits which of them it
+/// is. Neighbours are thus often side by side in memory, and a ball seldom touches more than one block.
+fn tag(cell: Cell) -> u32 {
     // One multiplication per axis, by odd constants of no structure; the upper bits are well mixed.
     let hash = [
         0x9e37_79b9_7f4a_7c15_u64,
@@ -145,9 +254,12 @@ fn shard_of(cell: Cell) -> usize {
     .into_iter()
     .zip(cell)
     .fold(0u64, |hash, (factor, index)| {
-        (hash ^ index.cast_unsigned())
+        (hash ^ (index >> 1).cast_unsigned())
             .wrapping_mul(factor)
             .rotate_left(29)
     });
-    usize::try_from(hash.wrapping_mul(0x9fb2_1c65_1e98_df25) >> 52).expect("12 bits")
+    let block = (hash.wrapping_mul(0x9fb2_1c65_1e98_df25) >> 32) as u32;
+    cell.into_iter().fold(block >> 3, |tag, index| {
+        (tag << 1) | u32::from(index & 1 == 1)
+    })
 }

@@ -2,8 +2,10 @@
 
 use nalgebra::Point3;
 
+use super::explainer::PlaceExplainer;
 use super::index::SpatialIndex;
 use super::{Place, PlaceId};
+use crate::grid::{GridModules, PartialCode, Search};
 use crate::paged::PagedVec;
 use crate::settings::Settings;
 use crate::state::CorruptState;
@@ -19,6 +21,7 @@ pub(crate) struct PlaceMap {
     places: PagedVec<Place, PAGE>,
     index: SpatialIndex,
     reach_m: f64,
+    explainer: PlaceExplainer,
 }
 
 impl PlaceMap {
@@ -29,6 +32,7 @@ impl PlaceMap {
             places: PagedVec::default(),
             index: SpatialIndex::new(reach_m),
             reach_m,
+            explainer: PlaceExplainer::new(settings),
         }
     }
 
@@ -46,8 +50,14 @@ impl PlaceMap {
     pub(crate) fn recruit(&mut self, place: Place, revision: u64) -> Option<PlaceId> {
         let id = PlaceId(u32::try_from(self.places.len()).ok()?);
         self.index.insert(id, place.position());
+        self.explainer.include(place.position());
         self.places.push(place, revision);
         Some(id)
+    }
+
+    /// Bytes of memory that the places and what finds them take, reserved ones included.
+    pub(crate) fn bytes(&self) -> usize {
+        self.places.bytes() + self.index.bytes()
     }
 
     /// An agent came to a place.
@@ -57,6 +67,11 @@ impl PlaceMap {
         }
     }
 
+    /// A place answers up to this distance \[m\].
+    pub(crate) fn reach_m(&self) -> f64 {
+        self.reach_m
+    }
+
     /// The place that answers strongest at a position, with its distance \[m\]: the nearest one
     /// within two field radii, the lowest id of equally near ones.
     ///
@@ -64,10 +79,50 @@ impl PlaceMap {
     /// the cosine of two codes of the same reference grid point falls with the distance between
     /// them, so the most similar place is the nearest one.
     pub(crate) fn winner(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
-        let winner = self
-            .index
-            .nearest(position, self.reach_m, |id| self.squared(id, position));
-        winner.map(|(id, squared)| (id, squared.sqrt()))
+        let mut best: Option<(f64, PlaceId)> = None;
+        let mut limit = self.reach_m * self.reach_m;
+        self.index.search(position, limit, |place| {
+            let squared = self.squared(place, position);
+            if squared <= limit && best.is_none_or(|best| (squared, place) < best) {
+                best = Some((squared, place));
+                limit = squared;
+            }
+            limit
+        });
+        best.map(|(squared, place)| (place, squared.sqrt()))
+    }
+
+    /// Calls `visit` with every place, perhaps more than once, whose code is within tolerance of a code:
+    ///
+    /// ```text
+    /// Σ over known m of dₘ² ≤ tolerance        dₘ torus distance in spacings
+    /// ```
+    ///
+    /// and with some others. `visit` returns the tolerance for what is left, which must not grow. See
+    /// [`Explainer::explain`]. When the search is given up, some places have been visited and others not.
+    pub(crate) fn explain(
+        &self,
+        modules: &GridModules,
+        code: &PartialCode,
+        tolerance: f64,
+        steps_max: u64,
+        mut visit: impl FnMut(PlaceId) -> f64,
+    ) -> Search {
+        let mut searched = true;
+        let search = self
+            .explainer
+            .explain(modules, code, tolerance, steps_max, |ball| {
+                let mut left = ball.tolerance;
+                let squared = ball.squared_radius_m2(left);
+                if squared >= 0.0 {
+                    searched &= self.index.search(&ball.centre, squared, |place| {
+                        left = visit(place).min(left);
+                        ball.squared_radius_m2(left)
+                    });
+                }
+                left
+            });
+        if searched { search } else { Search::GivenUp }
     }
 
     /// The place nearest to a position, however far, with its distance \[m\].
@@ -88,11 +143,23 @@ impl PlaceMap {
                 found.push((id, squared.sqrt()));
             }
         };
-        match self.index.near(position, radius_m) {
-            Some(near) => near.for_each(&mut check),
-            None => self.ids().for_each(&mut check),
+        let limit = radius_m * radius_m;
+        let searched = self.index.search(position, limit, |place| {
+            check(place);
+            limit
+        });
+        if searched {
+            found.sort_unstable_by_key(|(place, _)| *place);
+            found.dedup_by_key(|(place, _)| *place);
+        } else {
+            self.ids().for_each(&mut check);
         }
         found
+    }
+
+    /// The places, in the order of recruitment.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (PlaceId, &Place)> {
+        (0..).map(PlaceId).zip(self.places.iter())
     }
 
     /// All identifiers.
@@ -116,6 +183,7 @@ impl PlaceMap {
             .zip(self.places.iter_from(first as usize))
         {
             self.index.insert(id, place.position());
+            self.explainer.include(place.position());
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Places: where the team has been.
 
+mod explainer;
 mod index;
 mod map;
 
@@ -18,7 +19,7 @@ pub struct PlaceId(pub u32);
 /// A place cell.
 ///
 /// Its grid code follows from its position and is not stored: a place takes about 150 bytes, its
-/// entry in the spatial index included.
+/// entry in the spatial index included; recall by code needs no other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Place {
     position: Point3<f64>,

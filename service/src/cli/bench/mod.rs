@@ -4,6 +4,7 @@ mod http;
 mod ingest;
 mod load;
 mod quantile;
+mod recall;
 mod step;
 
 pub(super) use self::quantile::quantile;
@@ -15,6 +16,8 @@ use clap::Subcommand;
 pub(in crate::cli) enum BenchCommand {
     /// A motion step through the map, at different numbers of places.
     Step(step::StepArgs),
+    /// Recall of places by a grid code, at different numbers of places.
+    Recall(recall::RecallArgs),
     /// Samples that become durable, beside the raw rate of the same messages.
     Ingest(ingest::IngestArgs),
     /// Answers to "where is this agent" while samples come in, beside a bare handler.
@@ -27,6 +30,7 @@ pub(in crate::cli) enum BenchCommand {
 pub(super) fn run(command: &BenchCommand) -> anyhow::Result<()> {
     match command {
         BenchCommand::Step(args) => step::run(args),
+        BenchCommand::Recall(args) => recall::run(args),
         BenchCommand::Ingest(args) => ingest::run(args),
         BenchCommand::Http(args) => http::run(args),
         BenchCommand::Load(args) => load::run(args),

@@ -1,19 +1,37 @@
 //! Recall: which places answer a cue.
 
+mod best;
+mod by_code;
+#[cfg(test)]
+mod tests;
+
 use std::cmp::Ordering;
 
 use nalgebra::Point3;
 
-use crate::grid::population::TUNING_WIDTH;
-use crate::grid::{GridModules, PartialCode, similarity};
+use crate::grid::similarity::CodeCue;
+use crate::grid::{GridModules, PartialCode};
 use crate::place::{Place, PlaceId, PlaceMap, confidence};
 use crate::record::AgentId;
 use crate::settings::Settings;
 
-/// Halvings of the interval in which a kernel's distance is sought: to 1e-12 of its length.
-const BISECTIONS: u32 = 40;
+use by_code::CodeRecall;
+pub use by_code::Rivals;
+
+/// Balls around a position in which its nearest places are sought before all places are looked at, in
+/// reaches of a place.
+const BALLS: [f64; 3] = [1.0, 2.0, 3.5];
 
 /// What to recall places by. `position` and `code` rank the places; the other fields filter.
+///
+/// The answer is exact, and its cost is as follows, where n is the number of places.
+///
+/// - By `position`: free of n when the places asked for lie within seven field radii, else O(n).
+/// - By `code`: free of n when the least alike place of the answer is still much like the cue, so that
+///   few positions of the world could be meant: the terms of the known modules may together lack 0.9,
+///   which with five known modules is a cosine of 0.82, and the code of a position a quarter of the
+///   finest spacing away. Else O(n): for a `limit` of many places, a code of nowhere, or very few modules.
+/// - By both, or by neither: O(n).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecallCue {
     /// A position in `map` \[m\].
@@ -50,9 +68,8 @@ pub struct Recalled {
 
 /// The places that answer a cue, best first, equally good ones by identifier. Exact.
 ///
-/// By position the nearest come first, found through the spatial index where `radius_m` is a few
-/// field radii, by a scan otherwise. By code all places are compared. By both the confidences are
-/// multiplied, as those of two independent witnesses. Without a cue the place visited last comes first.
+/// By position the nearest come first, by code the most alike. By both the confidences are multiplied,
+/// as those of two independent witnesses. Without a cue the place visited last comes first.
 pub(crate) fn recall(
     cue: &RecallCue,
     places: &PlaceMap,
@@ -73,6 +90,29 @@ pub(crate) fn recall(
     }
 }
 
+/// The places elsewhere that answer a cue with a code nearly as well as its best answer does. Exact.
+///
+/// `None` when there is no such place, no code in the cue, or a position in it, which settles what a
+/// code leaves open.
+pub(crate) fn rivals(
+    cue: &RecallCue,
+    best: &Recalled,
+    places: &PlaceMap,
+    modules: &GridModules,
+    settings: &Settings,
+) -> Option<Rivals> {
+    let asked = Asked {
+        cue,
+        places,
+        modules,
+        settings,
+    };
+    let (None, Some(code)) = (&cue.position, &cue.code) else {
+        return None;
+    };
+    CodeRecall::new(&asked, code).rivals(best.place, best.cosine?)
+}
+
 /// A cue and what it is put to.
 struct Asked<'a> {
     cue: &'a RecallCue,
@@ -84,8 +124,9 @@ struct Asked<'a> {
 impl Asked<'_> {
     /// Ranked by distance.
     fn by_position(&self, position: &Point3<f64>) -> Vec<Recalled> {
-        let ranked = self.best(self.with_distances(position), f64::total_cmp);
+        let ranked = self.best(self.nearest(position), f64::total_cmp);
         let code = PartialCode::from(&self.modules.code_at(position));
+        let code = CodeCue::new(self.modules, &code);
         let recalled = ranked.into_iter().map(|(place, distance_m)| Recalled {
             place,
             cosine: self.kernel(&code, place),
@@ -97,14 +138,11 @@ impl Asked<'_> {
 
     /// Ranked by the codes' similarity.
     fn by_code(&self, code: &PartialCode) -> Vec<Recalled> {
-        let all = self
-            .all()
-            .filter_map(|place| Some((place, self.kernel(code, place)?)));
-        let ranked = self.best(all.collect(), |a, b| b.total_cmp(a));
-        let recalled = ranked.into_iter().map(|(place, cosine)| Recalled {
+        let code = CodeRecall::new(self, code);
+        let recalled = code.best().into_iter().map(|(place, cosine)| Recalled {
             place,
             cosine: Some(cosine),
-            confidence: Some(self.code_confidence(code, cosine)),
+            confidence: Some(code.confidence(cosine)),
             distance_m: None,
         });
         recalled.collect()
@@ -112,13 +150,14 @@ impl Asked<'_> {
 
     /// Ranked by the product of both confidences, and where both have faded to nothing by distance.
     fn by_both(&self, position: &Point3<f64>, code: &PartialCode) -> Vec<Recalled> {
+        let by_code = CodeRecall::new(self, code);
         let near = self
             .with_distances(position)
             .into_iter()
             .filter_map(|(place, distance_m)| {
-                let cosine = self.kernel(code, place)?;
+                let cosine = self.kernel(&by_code.cue, place)?;
                 let by_distance = confidence(distance_m, self.settings.field_radius_m);
-                let confidence = by_distance * self.code_confidence(code, cosine);
+                let confidence = by_distance * by_code.confidence(cosine);
                 Some((place, (confidence, distance_m, cosine)))
             });
         let ranked = self.best(near.collect(), |a, b| {
@@ -164,22 +203,42 @@ impl Asked<'_> {
         near
     }
 
+    /// The places that pass the filters with their distances \[m\], the nearest ones at least, as many
+    /// as the answer may hold.
+    fn nearest(&self, position: &Point3<f64>) -> Vec<(PlaceId, f64)> {
+        let radius_m = self.cue.radius_m.unwrap_or(f64::INFINITY);
+        for reaches in BALLS {
+            let ball_m = reaches * self.places.reach_m();
+            if ball_m >= radius_m {
+                break;
+            }
+            let mut near = self.places.within(position, ball_m);
+            near.retain(|&(id, _)| self.passes(id));
+            if near.len() >= self.cue.limit {
+                return near; // whatever is not in the ball is farther away
+            }
+        }
+        self.with_distances(position)
+    }
+
     /// Whether a place passes the filters on founder and time.
     fn passes(&self, place: PlaceId) -> bool {
-        let passes = |place: &Place| {
-            self.cue
-                .founder
-                .is_none_or(|founder| place.founder() == founder)
-                && self
-                    .cue
-                    .since_ns
-                    .is_none_or(|since| place.last_stamp_ns() >= since)
-                && self
-                    .cue
-                    .until_ns
-                    .is_none_or(|until| place.first_stamp_ns() < until)
-        };
-        self.places.get(place).is_some_and(passes)
+        self.places
+            .get(place)
+            .is_some_and(|place| self.admits(place))
+    }
+
+    /// Whether a place passes the filters on founder and time.
+    fn admits(&self, place: &Place) -> bool {
+        let RecallCue {
+            founder,
+            since_ns,
+            until_ns,
+            ..
+        } = self.cue;
+        founder.is_none_or(|founder| place.founder() == founder)
+            && since_ns.is_none_or(|since| place.last_stamp_ns() >= since)
+            && until_ns.is_none_or(|until| place.first_stamp_ns() < until)
     }
 
     /// The best places, as many as asked for, in order; equal scores by identifier.
@@ -201,46 +260,7 @@ impl Asked<'_> {
     }
 
     /// Similarity of a code and a place's code.
-    fn kernel(&self, code: &PartialCode, place: PlaceId) -> Option<f64> {
-        let place = self.places.get(place)?;
-        Some(similarity::kernel(
-            self.modules,
-            code,
-            &place.code(self.modules),
-        ))
-    }
-
-    /// Confidence of a code's similarity: that of the distance d for which the known modules answer
-    /// as much on average,
-    ///
-    /// ```text
-    /// mean over known m of exp(−d² / (4 σ_m²)) = similarity
-    /// ```
-    ///
-    /// The left side falls from 1 to 0 as d grows, so d is unique; it is found by bisection.
-    fn code_confidence(&self, code: &PartialCode, similarity: f64) -> f64 {
-        let known = code.phases().iter().zip(self.modules.lattices());
-        let widths_m = known.filter_map(|(phase, lattice)| {
-            phase.as_ref().map(|_| TUNING_WIDTH * lattice.spacing_m())
-        });
-        let widths_m: Vec<f64> = widths_m.collect();
-        let answer = |distance_m: f64| {
-            let of = |width_m: &f64| (-(distance_m / (2.0 * width_m)).powi(2)).exp();
-            widths_m.iter().map(of).sum::<f64>() / widths_m.len() as f64
-        };
-        // Beyond five field radii the confidence is below 1e-7: as good as none.
-        let (mut near, mut far) = (0.0, 5.0 * self.settings.field_radius_m);
-        if answer(far) >= similarity {
-            return 0.0;
-        }
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * (near + far);
-            if answer(middle) > similarity {
-                near = middle;
-            } else {
-                far = middle;
-            }
-        }
-        confidence(near, self.settings.field_radius_m)
+    fn kernel(&self, code: &CodeCue<'_>, place: PlaceId) -> Option<f64> {
+        code.kernel_at(self.places.get(place)?.position(), 0.0)
     }
 }
