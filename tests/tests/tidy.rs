@@ -24,7 +24,7 @@ const NOT_OURS: [&str; 13] = [
 ];
 
 /// What stands at the top of the project.
-const TOP: [&str; 16] = [
+const TOP: [&str; 17] = [
     ".ci",
     ".gitattributes",
     ".gitignore",
@@ -38,6 +38,7 @@ const TOP: [&str; 16] = [
     "clients",
     "clippy.toml",
     "docker",
+    "docs",
     "proto",
     "service",
     "tests",

@@ -210,8 +210,9 @@ fn constrain(schemas: &mut Value) {
     );
     merge(
         &mut batch["first_seq"],
-        &json!({ "maximum": u64::MAX - BATCH_SAMPLES_MAX as u64 }),
+        &json!({ "maximum": u64::MAX - 1 - BATCH_SAMPLES_MAX as u64 }),
     );
+    merge(&mut batch["session"], &json!({ "maximum": u64::MAX - 1 }));
     let share = json!({ "minimum": 0.0, "maximum": 1.0 });
     let noise = &mut schemas["NoiseSettings"]["properties"];
     for (_, field) in entries(noise) {
