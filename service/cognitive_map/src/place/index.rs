@@ -121,30 +121,41 @@ impl SpatialIndex {
         // at a place costs more than to pass over many entries, so the nearest comes first.
         let own = self.cell(point.coords.into());
         let entries = self.entries(own);
-        let distances = entries
+        let first = entries
             .iter()
-            .map(|entry| least_distance_squared(entry, point));
-        let first = distances
-            .enumerate()
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(index, _)| index);
-        let first = first.and_then(|index| entries.get(index));
+            .min_by(|a, b| distance_squared(a, point).total_cmp(&distance_squared(b, point)));
         if let Some(first) = first {
             limit = visit(first.place);
         }
+        let mut reach = limit.sqrt();
         let mut of_cell = |entries: &[Entry], limit: &mut f64| {
             for entry in entries {
                 // Not a number means too far away for this arithmetic, so such places are visited.
-                let beyond = least_distance_squared(entry, point) > *limit;
+                let beyond = is_beyond(entry, point, reach);
                 if !beyond && first.is_none_or(|first| first.place != entry.place) {
                     *limit = visit(entry.place);
+                    reach = limit.sqrt();
                 }
             }
         };
         of_cell(entries, &mut limit);
-        for cell in cells(low, high) {
-            if cell != own && self.cell_distance_squared(cell, point) <= limit {
-                of_cell(self.entries(cell), &mut limit);
+        for i in low[0]..=high[0] {
+            let along_x = self.outside_squared(i, point.x);
+            if along_x > limit {
+                continue;
+            }
+            for j in low[1]..=high[1] {
+                let along_xy = along_x + self.outside_squared(j, point.y);
+                if along_xy > limit {
+                    continue;
+                }
+                for k in low[2]..=high[2] {
+                    let cell = [i, j, k];
+                    let distance_squared = along_xy + self.outside_squared(k, point.z);
+                    if cell != own && distance_squared <= limit {
+                        of_cell(self.entries(cell), &mut limit);
+                    }
+                }
             }
         }
         true
@@ -176,17 +187,14 @@ impl SpatialIndex {
         position.map(|x| (x / self.cell_edge_m).floor() as i64)
     }
 
-    /// Lower bound of the squared distance from a point to anything in a cell \[m²\].
-    fn cell_distance_squared(&self, cell: Cell, point: &Point3<f64>) -> f64 {
-        let mut sum = 0.0;
-        for (index, &x) in cell.into_iter().zip(point.iter()) {
-            let low = index as f64 * self.cell_edge_m;
-            let outside = (low - x).max(x - (low + self.cell_edge_m)).max(0.0);
-            // The cell's bounds are rounded, by less than this.
-            let slack = 4.0 * f64::EPSILON * (x.abs() + self.cell_edge_m);
-            sum += (outside - slack).max(0.0).powi(2);
-        }
-        sum
+    /// Lower bound of the squared distance along one axis from a coordinate to anything in the cells of an
+    /// index \[m²\].
+    fn outside_squared(&self, index: i64, x: f64) -> f64 {
+        let low = index as f64 * self.cell_edge_m;
+        let outside = (low - x).max(x - (low + self.cell_edge_m)).max(0.0);
+        // The cells' bounds are rounded, by less than this.
+        let slack = 4.0 * f64::EPSILON * (x.abs() + self.cell_edge_m);
+        (outside - slack).max(0.0).powi(2)
     }
 }
 
@@ -216,30 +224,30 @@ fn first_of(shard: &[Entry], tag: u32, shard_bits: u32) -> usize {
     low + shard[low..high].partition_point(|entry| entry.tag < tag)
 }
 
-/// Lower bound of the squared distance between a point and an entry's place \[m²\].
-fn least_distance_squared(entry: &Entry, point: &Point3<f64>) -> f64 {
+/// Squared distance between a point and an entry's rounded position \[m²\].
+fn distance_squared(entry: &Entry, point: &Point3<f64>) -> f64 {
     let mut squared = 0.0;
-    let mut slack = 0.0;
     for (near, x) in entry.near.into_iter().zip(point.iter()) {
         let near = f64::from(near);
         squared += (near - x) * (near - x);
-        // A float is rounded by at most 2⁻²⁴ of itself, or by 2⁻¹⁵⁰ near zero.
-        slack += near.abs() * f64::from(f32::EPSILON) + f64::from(f32::MIN_POSITIVE);
     }
-    (squared.sqrt() - slack).max(0.0).powi(2)
+    squared
+}
+
+/// Whether an entry's place is surely farther from a point than `reach_m`.
+fn is_beyond(entry: &Entry, point: &Point3<f64>, reach_m: f64) -> bool {
+    let mut slack = 0.0;
+    for near in entry.near {
+        // A float is rounded by at most 2⁻²⁴ of itself, or by 2⁻¹⁵⁰ near zero.
+        slack += f64::from(near.abs()) * f64::from(f32::EPSILON) + f64::from(f32::MIN_POSITIVE);
+    }
+    distance_squared(entry, point) > (reach_m + slack) * (reach_m + slack)
 }
 
 /// A position, rounded.
 #[expect(clippy::cast_possible_truncation, reason = "rounds, as documented")]
 fn rounded(position: &Point3<f64>) -> [f32; 3] {
     [position.x, position.y, position.z].map(|x| x as f32)
-}
-
-/// The cells from `low` to `high` along each axis.
-fn cells(low: Cell, high: Cell) -> impl Iterator<Item = Cell> {
-    (low[0]..=high[0]).flat_map(move |i| {
-        (low[1]..=high[1]).flat_map(move |j| (low[2]..=high[2]).map(move |k| [i, j, k]))
-    })
 }
 
 /// The tag of a cell: the hash of its block of 2 × 2 × 2 cells, and in the lowest bits which of them it
