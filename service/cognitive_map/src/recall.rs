@@ -1,11 +1,14 @@
 //! Recall: which places answer a cue.
 
+mod percept;
+
 use std::cmp::Ordering;
 
 use nalgebra::Point3;
 
 use crate::grid::population::TUNING_WIDTH;
 use crate::grid::{GridModules, PartialCode, similarity};
+use crate::percept::{PerceptCue, PerceptMap};
 use crate::place::{Place, PlaceId, PlaceMap, confidence};
 use crate::record::AgentId;
 use crate::settings::Settings;
@@ -13,13 +16,15 @@ use crate::settings::Settings;
 /// Halvings of the interval in which a kernel's distance is sought: to 1e-12 of its length.
 const BISECTIONS: u32 = 40;
 
-/// What to recall places by. `position` and `code` rank the places; the other fields filter.
+/// What to recall places by. `position`, `code` and `percept` rank the places; the other fields filter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecallCue {
     /// A position in `map` \[m\].
     pub position: Option<Point3<f64>>,
     /// A grid code, perhaps with erased modules.
     pub code: Option<PartialCode>,
+    /// A percept: only places that remember something of its channel answer.
+    pub percept: Option<PerceptCue>,
     /// Only places within this distance of `position` \[m\]; without a position it has no effect.
     pub radius_m: Option<f64>,
     /// Only places that this agent founded.
@@ -42,20 +47,26 @@ pub struct Recalled {
     pub cosine: Option<f64>,
     /// Confidence, in \[0, 1\] (seed Eq. 8); `None` without a cue. By position it follows from the
     /// distance; by code from the distance at which two codes are on average as alike as the cue and
-    /// the place's code; by both it is the product of the two.
+    /// the place's code; by a percept it is `percept_match`, at least 0; by several the product.
     pub confidence: Option<f64>,
     /// Distance from `position` \[m\]; `None` without it.
     pub distance_m: Option<f64>,
+    /// How well the percept fits what the place remembers; `None` without one. For a descriptor the
+    /// cosine. For a level its likelihood: the density of a normal distribution with the place's
+    /// mean and deviation, as a part of the highest density that there could be on the channel.
+    pub percept_match: Option<f64>,
 }
 
 /// The places that answer a cue, best first, equally good ones by identifier. Exact.
 ///
 /// By position the nearest come first, found through the spatial index where `radius_m` is a few
 /// field radii, by a scan otherwise. By code all places are compared. By both the confidences are
-/// multiplied, as those of two independent witnesses. Without a cue the place visited last comes first.
+/// multiplied, as those of two independent witnesses, and so it is with a percept, by which only
+/// places answer that remember something of its channel. Without a cue the place visited last comes first.
 pub(crate) fn recall(
     cue: &RecallCue,
     places: &PlaceMap,
+    percepts: &PerceptMap,
     modules: &GridModules,
     settings: &Settings,
 ) -> Vec<Recalled> {
@@ -65,6 +76,9 @@ pub(crate) fn recall(
         modules,
         settings,
     };
+    if let Some(percept) = &cue.percept {
+        return asked.by_percept(percepts.matches(percept));
+    }
     match (&cue.position, &cue.code) {
         (Some(position), None) => asked.by_position(position),
         (None, Some(code)) => asked.by_code(code),
@@ -91,6 +105,7 @@ impl Asked<'_> {
             cosine: self.kernel(&code, place),
             confidence: Some(confidence(distance_m, self.settings.field_radius_m)),
             distance_m: Some(distance_m),
+            percept_match: None,
         });
         recalled.collect()
     }
@@ -106,6 +121,7 @@ impl Asked<'_> {
             cosine: Some(cosine),
             confidence: Some(self.code_confidence(code, cosine)),
             distance_m: None,
+            percept_match: None,
         });
         recalled.collect()
     }
@@ -131,6 +147,7 @@ impl Asked<'_> {
                 cosine: Some(cosine),
                 confidence: Some(confidence),
                 distance_m: Some(distance_m),
+                percept_match: None,
             });
         recalled.collect()
     }
@@ -146,6 +163,7 @@ impl Asked<'_> {
             cosine: None,
             confidence: None,
             distance_m: None,
+            percept_match: None,
         });
         recalled.collect()
     }

@@ -74,6 +74,7 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<Option<RecallCue>,
     Ok(Some(RecallCue {
         position,
         code,
+        percept: None,
         radius_m: query.radius_m,
         founder,
         since_ns: query.since_ns,

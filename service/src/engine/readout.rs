@@ -44,10 +44,11 @@ fn status(agent: &Agent, settings: &Settings) -> wire::Status {
     }
 }
 
-/// The published form of an event; cell crossings stay inside, there are too many.
+/// The published form of an event; cell crossings and compared percepts stay inside, there are too
+/// many.
 pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wire::Event> {
     let kind = match &event.kind {
-        EventKind::CellEntered { .. } => return None,
+        EventKind::CellEntered { .. } | EventKind::PerceptCompared { .. } => return None,
         EventKind::AgentEnrolled => wire::EventKind::AgentEnrolled {},
         EventKind::SessionStarted { session } => {
             wire::EventKind::SessionStarted { session: *session }

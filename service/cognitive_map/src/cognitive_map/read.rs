@@ -8,6 +8,7 @@ use crate::agent::Agent;
 use crate::digest::Digest;
 use crate::grid::GridModules;
 use crate::landmark::{Landmark, LandmarkId};
+use crate::percept::{Channel, ChannelId, Remembered};
 use crate::place::{Place, PlaceId};
 use crate::recall::{self, RecallCue, Recalled};
 use crate::record::AgentId;
@@ -43,6 +44,7 @@ impl CognitiveMap {
         self.places.places().write_digests(&mut out);
         self.trips.write_digests(&mut out);
         self.landmarks.landmarks().write_digests(&mut out);
+        self.percepts.write_digests(&mut out);
         out.digest()
     }
 
@@ -91,10 +93,32 @@ impl CognitiveMap {
 
     /// The places that answer a cue, best first, equally good ones by identifier. Exact.
     ///
-    /// By position the nearest come first. By code all places are compared. By both the confidences
-    /// are multiplied. Without a cue the place visited last comes first.
+    /// By position the nearest come first. By code all places are compared. By a percept all places
+    /// that remember something of its channel are, and no others answer. By several of them the
+    /// confidences are multiplied. Without a cue the place visited last comes first.
     pub fn recall(&self, cue: &RecallCue) -> Vec<Recalled> {
-        recall::recall(cue, &self.places, &self.modules, &self.settings)
+        recall::recall(
+            cue,
+            &self.places,
+            &self.percepts,
+            &self.modules,
+            &self.settings,
+        )
+    }
+
+    /// The channels of percepts, in the order in which places first remembered something of them.
+    pub fn channels(&self) -> impl Iterator<Item = (ChannelId, &Channel)> {
+        (0..).map(ChannelId).zip(self.percepts.channels().iter())
+    }
+
+    /// A channel.
+    pub fn channel(&self, channel: ChannelId) -> Option<&Channel> {
+        self.percepts.channels().get(channel.0.into())
+    }
+
+    /// What a place remembers of what was felt and seen there, channel by channel.
+    pub fn remembered(&self, place: PlaceId) -> impl Iterator<Item = Remembered> {
+        self.percepts.of_place(place)
     }
 
     /// Number of trips.

@@ -1,0 +1,82 @@
+//! Recall by a percept, alone or together with a position and a code.
+
+use std::cmp::Ordering;
+
+use crate::grid::PartialCode;
+use crate::place::{PlaceId, confidence};
+
+use super::{Asked, Recalled};
+
+/// How well a place answers.
+struct Fit {
+    confidence: f64,
+    matching: f64,
+    distance_m: Option<f64>,
+    cosine: Option<f64>,
+}
+
+impl Asked<'_> {
+    /// Of the places that remember something of the percept's channel, ranked by the product of all
+    /// confidences, and where they have faded to nothing by how well the percept fits, then by
+    /// distance. `matches` are those places and how well it fits each of them.
+    pub(super) fn by_percept(&self, matches: Vec<(PlaceId, f64)>) -> Vec<Recalled> {
+        let fits = matches
+            .into_iter()
+            .filter(|&(place, _)| self.passes(place))
+            .filter_map(|(place, matching)| Some((place, self.fit(place, matching)?)));
+        let ranked = self.best(fits.collect(), better);
+        let code = self.cue.code.clone().or_else(|| {
+            let position = self.cue.position.as_ref()?;
+            Some(PartialCode::from(&self.modules.code_at(position)))
+        });
+        let recalled = ranked.into_iter().map(|(place, fit)| Recalled {
+            place,
+            cosine: fit.cosine.or_else(|| self.kernel(code.as_ref()?, place)),
+            confidence: Some(fit.confidence),
+            distance_m: fit.distance_m,
+            percept_match: Some(fit.matching),
+        });
+        recalled.collect()
+    }
+
+    /// How well a place answers the whole cue; none if it lies beyond the radius.
+    fn fit(&self, place: PlaceId, matching: f64) -> Option<Fit> {
+        // A descriptor that points away speaks against the place, no more than an unrelated one.
+        let mut product = matching.max(0.0);
+        let mut distance_m = None;
+        if let Some(position) = &self.cue.position {
+            let squared = (self.places.get(place)?.position() - position).norm_squared();
+            if self
+                .cue
+                .radius_m
+                .is_some_and(|radius_m| squared > radius_m * radius_m)
+            {
+                return None;
+            }
+            let distance = squared.sqrt();
+            product *= confidence(distance, self.settings.field_radius_m);
+            distance_m = Some(distance);
+        }
+        let mut cosine = None;
+        if let Some(code) = &self.cue.code {
+            let kernel = self.kernel(code, place)?;
+            product *= self.code_confidence(code, kernel);
+            cosine = Some(kernel);
+        }
+        Some(Fit {
+            confidence: product,
+            matching,
+            distance_m,
+            cosine,
+        })
+    }
+}
+
+/// The better fit first.
+fn better(a: &Fit, b: &Fit) -> Ordering {
+    let distance_m = |fit: &Fit| fit.distance_m.unwrap_or(0.0);
+    b.confidence
+        .total_cmp(&a.confidence)
+        .then_with(|| b.matching.total_cmp(&a.matching))
+        .then_with(|| distance_m(a).total_cmp(&distance_m(b)))
+}
