@@ -492,3 +492,18 @@ fn a_moved_start_pose_is_where_percepts_are_learned() {
     assert!(remembered(&map, 0).is_empty());
     assert_eq!(mean_and_sd(&remembered(&map, 1)[0]), (2.0, 0.0));
 }
+
+#[test]
+fn what_places_remember_is_part_of_the_digest() {
+    let digest = |percept: SampleBody| {
+        let (mut map, mut robot) = at_first_place();
+        robot.sample(&mut map, percept);
+        map.digest()
+    };
+    let levels = |value| digest(level("touch", value, [0.0; 3]));
+    assert_eq!(levels(1.0), levels(1.0));
+    assert_ne!(levels(1.0), levels(1.0 + f64::EPSILON));
+    assert_ne!(levels(1.0), digest(level("light", 1.0, [0.0; 3])));
+    let views = |k| digest(descriptor("camera", &axis(k)));
+    assert_ne!(views(0), views(1));
+}
