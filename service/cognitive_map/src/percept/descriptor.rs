@@ -65,6 +65,11 @@ impl DescriptorMemory {
         }
     }
 
+    /// Number of places that remember something.
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
     /// The blocks.
     pub(super) fn blocks(&self) -> &PagedVec<Block, 1> {
         &self.blocks

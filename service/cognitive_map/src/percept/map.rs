@@ -128,7 +128,9 @@ impl PerceptMap {
                 .likelihoods(*value, channel.level_sd_floor())
                 .collect(),
             (PerceptCue::Descriptor(descriptor), Memory::Descriptors(memory), _) => {
-                memory.cosines(descriptor.vector()).collect()
+                let mut found = Vec::with_capacity(memory.len());
+                found.extend(memory.cosines(descriptor.vector()));
+                found
             }
             _ => Vec::new(),
         }

@@ -19,10 +19,17 @@ impl Asked<'_> {
     /// Of the places that remember something of the percept's channel, ranked by the product of all
     /// confidences, and where they have faded to nothing by how well the percept fits, then by
     /// distance. `matches` are those places and how well it fits each of them.
-    pub(super) fn by_percept(&self, matches: Vec<(PlaceId, f64)>) -> Vec<Recalled> {
+    pub(super) fn by_percept(&self, mut matches: Vec<(PlaceId, f64)>) -> Vec<Recalled> {
+        let cue = self.cue;
+        // Looking at every place costs as much as the search among descriptors itself.
+        if cue.founder.is_some() || cue.since_ns.is_some() || cue.until_ns.is_some() {
+            matches.retain(|&(place, _)| self.passes(place));
+        }
+        if cue.position.is_none() && cue.code.is_none() {
+            matches = self.best(matches, |a, b| b.total_cmp(a));
+        }
         let fits = matches
             .into_iter()
-            .filter(|&(place, _)| self.passes(place))
             .filter_map(|(place, matching)| Some((place, self.fit(place, matching)?)));
         let ranked = self.best(fits.collect(), better);
         let code = self.cue.code.clone().or_else(|| {
