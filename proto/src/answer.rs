@@ -253,6 +253,9 @@ pub struct RecalledPlace {
     pub confidence: Option<f64>,
     /// Distance from `position_m` \[m\]; absent without it.
     pub distance_m: Option<f64>,
+    /// How well the percept fits what the place remembers; absent without one. For a descriptor the
+    /// cosine; for a level its likelihood, as a part of the highest that there could be.
+    pub percept_match: Option<f64>,
 }
 
 /// A trip in a list.

@@ -81,6 +81,31 @@ pub enum EventKind {
         /// Its label.
         label: String,
     },
+    /// A percept was far from what its place remembers of the channel.
+    PerceptSurprising {
+        /// The place.
+        place: u64,
+        /// Name of the channel.
+        channel: String,
+        /// What kind of percept it was.
+        percept: PerceptKind,
+        /// Number of percepts that taught what to expect, 3 at least.
+        percepts: u64,
+        /// How far it was from that: for a level in standard deviations, above 4; for a descriptor
+        /// one minus the cosine, above 0.5.
+        surprise: f64,
+    },
+}
+
+/// What kind of percept a channel carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum PerceptKind {
+    /// Scalars.
+    Level,
+    /// Unit vectors.
+    Descriptor,
 }
 
 /// Why a trip ended.

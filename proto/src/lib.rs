@@ -22,6 +22,7 @@ mod key;
 pub mod limits;
 mod name;
 mod narrow;
+mod predict;
 mod query;
 mod sample;
 mod settings;
@@ -34,10 +35,11 @@ pub use answer::{
 };
 pub use codec::{CBOR, Codec, DecodeError, JSON, POSTCARD_V1};
 pub use estimate::{Estimate, Status};
-pub use event::{Event, EventKind, TripEnd};
+pub use event::{Event, EventKind, PerceptKind, TripEnd};
 pub use key::{AgentKey, KeyError, durable_key, estimate_key, events_key, query_key, samples_key};
 pub use name::{Name, NameError};
-pub use query::{RecallQuery, Verb, WatermarkQuery};
+pub use predict::{ExpectedPercept, MotionBody, PredictAnswer, PredictQuery, PredictedPercept};
+pub use query::{PerceptCue, RecallQuery, Verb, WatermarkQuery};
 pub use sample::{
     Descriptor, Increment, Level, Marker, MotionNoise, Relation, Sample, SampleBatch, SampleBody,
     Sighting, StartPose, Target, Velocity,

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::sample::{Descriptor, Level};
+
 /// Queries that a space answers on `cogmap/{space}/query/{verb}`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verb {
@@ -9,6 +11,8 @@ pub enum Verb {
     Recall,
     /// [`WatermarkQuery`] → [`crate::Watermark`].
     Watermark,
+    /// [`crate::PredictQuery`] → [`crate::PredictAnswer`].
+    Predict,
 }
 
 impl Verb {
@@ -17,6 +21,7 @@ impl Verb {
         match self {
             Self::Recall => "recall",
             Self::Watermark => "watermark",
+            Self::Predict => "predict",
         }
     }
 }
@@ -30,8 +35,8 @@ pub struct WatermarkQuery {
     pub agent: String,
 }
 
-/// Asks for places. At least one of `position_m` and `code` is the cue that ranks them; the other
-/// fields filter. Without a cue the latest places come first.
+/// Asks for places. `position_m`, `code` and `percept` are cues, alone or together, and rank them; the
+/// other fields filter. Without a cue the latest places come first.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -50,4 +55,17 @@ pub struct RecallQuery {
     pub until_ns: Option<i64>,
     /// Most places in the answer, 1 to 1000; 10 when absent.
     pub limit: Option<u32>,
+    /// Cue: a percept. Only places that remember something of its channel answer.
+    pub percept: Option<PerceptCue>,
+}
+
+/// A percept to recall places by, as in a sample.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum PerceptCue {
+    /// A level; its `offset_m` and `normal` say nothing here.
+    Level(Level),
+    /// A descriptor.
+    Descriptor(Descriptor),
 }

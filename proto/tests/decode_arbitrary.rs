@@ -8,8 +8,9 @@ use std::fmt::Debug;
 
 use cogmap_proto::{
     AgentDetail, AgentPage, Codec, DecodeError, Estimate, Event, GridState, IngestAnswer,
-    LandmarkPage, Name, PlacePage, Problem, RecallAnswer, RecallQuery, SampleBatch, SpaceList,
-    SpaceSettings, Trajectory, TripDetail, TripPage, Watermark, WatermarkQuery,
+    LandmarkPage, Name, PlacePage, PredictAnswer, PredictQuery, Problem, RecallAnswer, RecallQuery,
+    SampleBatch, SpaceList, SpaceSettings, Trajectory, TripDetail, TripPage, Watermark,
+    WatermarkQuery,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -33,6 +34,8 @@ fn decode_as_everything(bytes: &[u8]) {
     decode_as::<LandmarkPage>(bytes);
     decode_as::<Name>(bytes);
     decode_as::<PlacePage>(bytes);
+    decode_as::<PredictAnswer>(bytes);
+    decode_as::<PredictQuery>(bytes);
     decode_as::<Problem>(bytes);
     decode_as::<RecallAnswer>(bytes);
     decode_as::<RecallQuery>(bytes);

@@ -61,6 +61,7 @@ proptest! {
             events_key(&space),
             query_key(&space, Verb::Recall.as_str()),
             query_key(&space, Verb::Watermark.as_str()),
+            query_key(&space, Verb::Predict.as_str()),
         ];
         for key in others {
             prop_assert_eq!(key.parse::<AgentKey>(), Err(KeyError::Shape));

@@ -1,9 +1,10 @@
-//! From wire samples to samples that make sense: the only place that refuses them.
+//! From wire samples to samples that make sense: the only place that refuses them. Questions that hold
+//! a motion or a percept are read by the same rules.
 
 use cogmap_proto as wire;
 use cognitive_map::{
-    Descriptor, InvalidSample, Label, Level, Marker, Motion, PoseNoise, RangeBearing, Relation,
-    RelativePose, RelativePosition, Sample, SampleBody, Sighting, StartPose, Target,
+    Descriptor, InvalidSample, Label, Level, Marker, Motion, PerceptCue, PoseNoise, RangeBearing,
+    Relation, RelativePose, RelativePosition, Sample, SampleBody, Sighting, StartPose, Target,
 };
 
 /// Reads one sample.
@@ -12,27 +13,15 @@ use cognitive_map::{
 /// Says why the sample makes no sense.
 pub fn sample(sample: &wire::Sample) -> Result<Sample, InvalidSample> {
     let body = match &sample.body {
-        wire::SampleBody::Increment(increment) => SampleBody::Motion(Motion::from_increment(
-            increment.translation_m,
-            increment.rotation_xyzw,
-            noise(increment.noise)?,
-        )?),
-        wire::SampleBody::Velocity(velocity) => SampleBody::Motion(Motion::from_velocity(
-            velocity.linear_m_s,
-            velocity.angular_rad_s,
-            velocity.duration_s,
-            noise(velocity.noise)?,
-        )?),
+        wire::SampleBody::Increment(body) => SampleBody::Motion(increment(body)?),
+        wire::SampleBody::Velocity(body) => SampleBody::Motion(velocity(body)?),
         wire::SampleBody::Level(level) => SampleBody::Level(Level::new(
             Label::new(&level.channel)?,
             level.value,
             level.offset_m,
             level.normal,
         )?),
-        wire::SampleBody::Descriptor(descriptor) => SampleBody::Descriptor(Descriptor::new(
-            Label::new(&descriptor.channel)?,
-            &descriptor.vector,
-        )?),
+        wire::SampleBody::Descriptor(body) => SampleBody::Descriptor(descriptor(body)?),
         wire::SampleBody::Sighting(sighting) => SampleBody::Sighting(Sighting {
             target: target(&sighting.target)?,
             relation: relation(&sighting.relation)?,
@@ -51,6 +40,53 @@ pub fn sample(sample: &wire::Sample) -> Result<Sample, InvalidSample> {
         stamp_ns: sample.stamp_ns,
         body,
     })
+}
+
+/// Reads a motion that is asked about.
+///
+/// # Errors
+/// Says why it makes no sense.
+pub fn motion(motion: &wire::MotionBody) -> Result<Motion, InvalidSample> {
+    match motion {
+        wire::MotionBody::Increment(body) => increment(body),
+        wire::MotionBody::Velocity(body) => velocity(body),
+    }
+}
+
+/// Reads a percept that is a cue.
+///
+/// # Errors
+/// Says why it makes no sense.
+pub fn percept(cue: &wire::PerceptCue) -> Result<PerceptCue, InvalidSample> {
+    Ok(match cue {
+        wire::PerceptCue::Level(level) => {
+            let channel = Label::new(&level.channel)?;
+            let value = level.value;
+            if !value.is_finite() {
+                return Err(InvalidSample::NumberOutOfRange);
+            }
+            PerceptCue::Level { channel, value }
+        }
+        wire::PerceptCue::Descriptor(body) => PerceptCue::Descriptor(descriptor(body)?),
+    })
+}
+
+fn increment(body: &wire::Increment) -> Result<Motion, InvalidSample> {
+    let noise = noise(body.noise)?;
+    Motion::from_increment(body.translation_m, body.rotation_xyzw, noise)
+}
+
+fn velocity(body: &wire::Velocity) -> Result<Motion, InvalidSample> {
+    Motion::from_velocity(
+        body.linear_m_s,
+        body.angular_rad_s,
+        body.duration_s,
+        noise(body.noise)?,
+    )
+}
+
+fn descriptor(body: &wire::Descriptor) -> Result<Descriptor, InvalidSample> {
+    Descriptor::new(Label::new(&body.channel)?, &body.vector)
 }
 
 fn noise(noise: Option<wire::MotionNoise>) -> Result<Option<PoseNoise>, InvalidSample> {

@@ -40,6 +40,11 @@ pub const PLACES: &str = "cogmap_places";
 pub const TRIPS: &str = "cogmap_trips";
 /// Landmarks of a space; label `space`.
 pub const LANDMARKS: &str = "cogmap_landmarks";
+/// How far levels were from what their places had learned, in standard deviations; label `space`.
+pub const LEVEL_SURPRISE: &str = "cogmap_level_surprise_deviations";
+/// How far descriptors were from what their places had learned, as one minus the cosine; label
+/// `space`.
+pub const DESCRIPTOR_SURPRISE: &str = "cogmap_descriptor_surprise";
 /// Samples applied in one round of a writer; label `space`.
 pub const ROUND_SAMPLES: &str = "cogmap_round_samples";
 /// Messages that wait for a space's writer; label `space`.
@@ -62,6 +67,11 @@ const SECONDS: [f64; 16] = [
 ];
 /// Bounds of the histograms of sample counts.
 const COUNTS: [f64; 8] = [1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0, 16384.0];
+
+/// Bounds of the histogram of deviations.
+const DEVIATIONS: [f64; 10] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0, 30.0];
+/// Bounds of the histogram of one minus the cosine.
+const DISTANCES: [f64; 9] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0];
 
 /// Installs the recorder of the process and describes the metrics. What was counted before is lost,
 /// so this comes first.
@@ -97,6 +107,8 @@ pub fn total(handle: &PrometheusHandle, counter: &str) -> u64 {
 fn builder() -> Result<PrometheusBuilder, BuildError> {
     PrometheusBuilder::new()
         .set_buckets_for_metric(Matcher::Suffix("_seconds".to_owned()), &SECONDS)?
+        .set_buckets_for_metric(Matcher::Full(LEVEL_SURPRISE.to_owned()), &DEVIATIONS)?
+        .set_buckets_for_metric(Matcher::Full(DESCRIPTOR_SURPRISE.to_owned()), &DISTANCES)?
         .set_buckets_for_metric(Matcher::Full(ROUND_SAMPLES.to_owned()), &COUNTS)
 }
 
@@ -143,6 +155,16 @@ fn describe() {
     describe_gauge!(PLACES, Unit::Count, "Places of a space");
     describe_gauge!(TRIPS, Unit::Count, "Trips of a space");
     describe_gauge!(LANDMARKS, Unit::Count, "Landmarks of a space");
+    describe_histogram!(
+        LEVEL_SURPRISE,
+        Unit::Count,
+        "Distance of levels from what was expected, in standard deviations"
+    );
+    describe_histogram!(
+        DESCRIPTOR_SURPRISE,
+        Unit::Count,
+        "Distance of descriptors from what was expected, as one minus the cosine"
+    );
     describe_histogram!(ROUND_SAMPLES, Unit::Count, "Samples applied in one round");
     describe_gauge!(
         QUEUE_MESSAGES,

@@ -11,7 +11,7 @@ import cbor2
 import pytest
 
 import cogmap
-from cogmap.query import RecallQuery, WatermarkQuery
+from cogmap.query import PredictQuery, RecallQuery, WatermarkQuery
 from cogmap.wire import CBOR, JSON, decode, encode, encode_batch, encode_sample, from_wire, to_wire
 
 GOLDEN = Path(__file__).resolve().parents[3] / "proto" / "golden"
@@ -27,6 +27,8 @@ TYPES: Dict[str, type] = {
     "ingest_answer": cogmap.IngestAnswer,
     "landmark_page": cogmap.LandmarkPage,
     "place_page": cogmap.PlacePage,
+    "predict_answer": cogmap.PredictAnswer,
+    "predict_query": PredictQuery,
     "recall_answer": cogmap.RecallAnswer,
     "recall_query": RecallQuery,
     "space_list": cogmap.SpaceList,

@@ -5,8 +5,9 @@ use std::time::Duration;
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
     AgentDetail, AgentPage, AgentSummary, Codec, GridState, IngestAnswer, Landmark, LandmarkPage,
-    Name, NameError, Place, PlacePage, Problem, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo,
-    SpaceList, SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
+    Name, NameError, Place, PlacePage, PredictAnswer, PredictQuery, Problem, RecallAnswer,
+    RecallQuery, SampleBatch, SpaceInfo, SpaceList, SpaceSettings, Trajectory, Trip, TripDetail,
+    TripPage,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -206,6 +207,23 @@ impl Api {
     /// See [`ApiError`].
     pub fn recall(&self, space: &str, query: &RecallQuery) -> Result<RecallAnswer, ApiError> {
         self.send(Method::POST, &path(space, "/recall")?, &json(query))
+    }
+
+    /// What an agent would feel after a motion from where it is now.
+    ///
+    /// # Errors
+    /// See [`ApiError`]. An agent that is not placed is a conflict (409).
+    pub fn predict(
+        &self,
+        space: &str,
+        agent: &str,
+        query: &PredictQuery,
+    ) -> Result<PredictAnswer, ApiError> {
+        self.send(
+            Method::POST,
+            &agent_path(space, agent, "/predict")?,
+            &json(query),
+        )
     }
 
     /// All places of a space, by id.

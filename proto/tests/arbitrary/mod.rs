@@ -1,9 +1,9 @@
 //! Arbitrary messages, from a strategy for their floats.
 
 use cogmap_proto::{
-    Descriptor, Estimate, Event, EventKind, Increment, Level, Marker, MotionNoise, RecallQuery,
-    Rejection, Relation, Sample, SampleBatch, SampleBody, SeqRange, Sighting, SkipReason,
-    StartPose, Status, Target, TripEnd, Velocity, Watermark,
+    Descriptor, Estimate, Event, EventKind, Increment, Level, Marker, MotionNoise, PerceptCue,
+    PerceptKind, RecallQuery, Rejection, Relation, Sample, SampleBatch, SampleBody, SeqRange,
+    Sighting, SkipReason, StartPose, Status, Target, TripEnd, Velocity, Watermark,
 };
 use proptest::array::{uniform3, uniform4, uniform21};
 use proptest::collection::vec;
@@ -237,6 +237,15 @@ pub(crate) fn events(floats: &Floats) -> impl Strategy<Value = Event> + use<> {
             (number(), number(), reasons())
                 .prop_map(|(from, to, reason)| EventKind::SamplesSkipped { from, to, reason }),
             any::<String>().prop_map(|label| EventKind::MarkerPassed { label }),
+            (number(), any::<String>(), number(), floats.clone()).prop_map(
+                |(place, channel, percepts, surprise)| EventKind::PerceptSurprising {
+                    place,
+                    channel,
+                    percept: PerceptKind::Descriptor,
+                    percepts,
+                    surprise
+                }
+            ),
         ];
     (
         any::<String>(),
@@ -256,6 +265,14 @@ pub(crate) fn events(floats: &Floats) -> impl Strategy<Value = Event> + use<> {
 
 pub(crate) fn recall_queries(floats: &Floats) -> impl Strategy<Value = RecallQuery> + use<> {
     let three = || option::of(uniform3(floats.clone()));
+    let percept = (any::<String>(), floats.clone()).prop_map(|(channel, value)| {
+        PerceptCue::Level(Level {
+            channel,
+            value,
+            offset_m: [0.0; 3],
+            normal: None,
+        })
+    });
     (
         three(),
         option::of(vec(three(), 0..17)),
@@ -264,9 +281,10 @@ pub(crate) fn recall_queries(floats: &Floats) -> impl Strategy<Value = RecallQue
         option::of(any::<i64>()),
         option::of(any::<i64>()),
         option::of(any::<u32>()),
+        option::of(percept),
     )
         .prop_map(
-            |(position_m, code, radius_m, agent, since_ns, until_ns, limit)| RecallQuery {
+            |(position_m, code, radius_m, agent, since_ns, until_ns, limit, percept)| RecallQuery {
                 position_m,
                 code,
                 radius_m,
@@ -274,6 +292,7 @@ pub(crate) fn recall_queries(floats: &Floats) -> impl Strategy<Value = RecallQue
                 since_ns,
                 until_ns,
                 limit,
+                percept,
             },
         )
 }

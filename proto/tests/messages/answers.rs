@@ -1,10 +1,10 @@
 //! Answers of the HTTP interface, and the settings of a space.
 
 use cogmap_proto::{
-    AgentDetail, AgentPage, AgentSummary, GridModuleState, GridState, IngestAnswer, Landmark,
-    LandmarkPage, Leg, NoiseSettings, Place, PlacePage, Problem, RecallAnswer, RecalledPlace,
-    Recruitment, Rivals, SpaceInfo, SpaceList, SpaceSettings, StampedPose, Status, Trajectory,
-    Trip, TripDetail, TripPage,
+    AgentDetail, AgentPage, AgentSummary, ExpectedPercept, GridModuleState, GridState,
+    IngestAnswer, Landmark, LandmarkPage, Leg, NoiseSettings, Place, PlacePage, PredictAnswer,
+    PredictedPercept, Problem, RecallAnswer, RecalledPlace, Recruitment, Rivals, SpaceInfo,
+    SpaceList, SpaceSettings, StampedPose, Status, Trajectory, Trip, TripDetail, TripPage,
 };
 
 use super::Visit;
@@ -29,6 +29,8 @@ pub(super) fn each(visit: &mut impl Visit) {
     visit.message("place_page", &places());
     visit.message("recall_answer", &recalled());
     visit.message("recall_answer_without_cue", &recalled_without_cue());
+    visit.message("predict_answer", &predicted());
+    visit.message("predict_answer_nowhere", &predicted_nowhere());
     visit.message("trip_page", &trips());
     visit.message("trip_detail", &trip_detail());
     visit.message("landmark_page", &landmarks());
@@ -195,6 +197,7 @@ fn recalled() -> RecallAnswer {
         cosine: Some(0.9375),
         confidence: Some(0.875),
         distance_m: Some(0.25),
+        percept_match: Some(0.96875),
     };
     RecallAnswer {
         space: "lab".to_owned(),
@@ -216,11 +219,57 @@ fn recalled_without_cue() -> RecallAnswer {
         cosine: None,
         confidence: None,
         distance_m: None,
+        percept_match: None,
     };
     RecallAnswer {
         places: vec![latest],
         rivals: None,
         ..recalled()
+    }
+}
+
+fn predicted() -> PredictAnswer {
+    PredictAnswer {
+        space: "lab".to_owned(),
+        agent: "robot-1".to_owned(),
+        frame: "map".to_owned(),
+        map_revision: 4_711,
+        translation_m: [12.5, -7.25, 0.1],
+        rotation_xyzw: [0.0, 0.0, 0.6, 0.8],
+        place: Some(3),
+        confidence: 0.875,
+        percepts: vec![
+            PredictedPercept {
+                channel: "touch".to_owned(),
+                expected: ExpectedPercept::Level {
+                    mean: 0.75,
+                    sd: 0.125,
+                },
+                place: 4,
+                confidence: 0.625,
+                percepts: 9,
+                strength: 7.5,
+            },
+            PredictedPercept {
+                channel: "camera".to_owned(),
+                expected: ExpectedPercept::Descriptor {
+                    vector: vec![0.5, -0.5, 0.25, 0.0, 0.625, -0.125, 0.1875, 0.0],
+                },
+                place: 3,
+                confidence: 0.875,
+                percepts: 2,
+                strength: 1.5,
+            },
+        ],
+    }
+}
+
+fn predicted_nowhere() -> PredictAnswer {
+    PredictAnswer {
+        place: None,
+        confidence: 0.0,
+        percepts: Vec::new(),
+        ..predicted()
     }
 }
 

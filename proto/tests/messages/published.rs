@@ -1,7 +1,8 @@
 //! What the service publishes, and the bodies of queries.
 
 use cogmap_proto::{
-    Estimate, Event, EventKind, RecallQuery, Rejection, SeqRange, SkipReason, Status, TripEnd,
+    Descriptor, Estimate, Event, EventKind, Increment, Level, MotionBody, PerceptCue, PerceptKind,
+    PredictQuery, RecallQuery, Rejection, SeqRange, SkipReason, Status, TripEnd, Velocity,
     Watermark, WatermarkQuery,
 };
 
@@ -45,6 +46,21 @@ pub(super) fn each(visit: &mut impl Visit) {
     }
     visit.message("recall_query_empty", &RecallQuery::default());
     visit.message("recall_query_full", &recall_query());
+    let level = PerceptCue::Level(Level {
+        channel: "touch".to_owned(),
+        value: 0.75,
+        offset_m: [0.0; 3],
+        normal: None,
+    });
+    visit.message(
+        "recall_query_level",
+        &RecallQuery {
+            percept: Some(level),
+            ..RecallQuery::default()
+        },
+    );
+    visit.message("predict_query_increment", &predict_query());
+    visit.message("predict_query_velocity", &predict_query_by_velocity());
     visit.message(
         "watermark_query",
         &WatermarkQuery {
@@ -110,7 +126,7 @@ fn event(kind: EventKind) -> Event {
     }
 }
 
-fn event_kinds() -> [(&'static str, EventKind); 9] {
+fn event_kinds() -> [(&'static str, EventKind); 11] {
     let session = 1_800_000_000_000_000_000;
     let landmark = "porte 3, étage α".to_owned();
     [
@@ -160,6 +176,26 @@ fn event_kinds() -> [(&'static str, EventKind); 9] {
                 label: "lap 1".to_owned(),
             },
         ),
+        (
+            "percept_surprising_level",
+            EventKind::PerceptSurprising {
+                place: 3,
+                channel: "touch".to_owned(),
+                percept: PerceptKind::Level,
+                percepts: 9,
+                surprise: 6.5,
+            },
+        ),
+        (
+            "percept_surprising_descriptor",
+            EventKind::PerceptSurprising {
+                place: 3,
+                channel: "camera".to_owned(),
+                percept: PerceptKind::Descriptor,
+                percepts: 4,
+                surprise: 0.875,
+            },
+        ),
     ]
 }
 
@@ -176,5 +212,36 @@ fn recall_query() -> RecallQuery {
         since_ns: Some(1_800_000_000_000_000_000),
         until_ns: Some(-1),
         limit: Some(20),
+        percept: Some(PerceptCue::Descriptor(Descriptor {
+            channel: "camera".to_owned(),
+            vector: vec![0.5, -0.5, 0.25, 0.0, 1.0, -0.125, 0.75, 0.0],
+        })),
+    }
+}
+
+fn predict_query() -> PredictQuery {
+    PredictQuery {
+        agent: Some("robot-1".to_owned()),
+        motion: MotionBody::Increment(Increment {
+            translation_m: [0.5, 0.25, 0.0],
+            rotation_xyzw: [0.0, 0.0, 0.6, 0.8],
+            noise: None,
+        }),
+        offset_m: [0.25, 0.0, 0.125],
+        channel: Some("touch".to_owned()),
+    }
+}
+
+fn predict_query_by_velocity() -> PredictQuery {
+    PredictQuery {
+        agent: None,
+        motion: MotionBody::Velocity(Velocity {
+            linear_m_s: [1.5, 0.0, 0.0],
+            angular_rad_s: [0.0, 0.0, 0.25],
+            duration_s: 2.0,
+            noise: None,
+        }),
+        offset_m: [0.0; 3],
+        channel: None,
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 
 use crate::landmark::LandmarkId;
+use crate::percept::ChannelId;
 use crate::place::PlaceId;
 use crate::record::{AgentId, SkipReason};
 use crate::sample::Label;
@@ -85,5 +86,17 @@ pub enum EventKind {
     MarkerPassed {
         /// Its label.
         label: Label,
+    },
+    /// A percept was felt where a place remembers its channel; before the place learned from it.
+    PerceptCompared {
+        /// The place.
+        place: PlaceId,
+        /// The channel.
+        channel: ChannelId,
+        /// Number of percepts that taught what to expect.
+        percepts: u64,
+        /// How far it was from that: for a level in deviations, of which the channel's floor is the
+        /// least; for a descriptor one minus the cosine, 0 to 2.
+        surprise: f64,
     },
 }

@@ -3,6 +3,7 @@
 mod grid;
 mod landmark;
 mod place;
+mod predict;
 mod recall;
 mod space;
 mod trip;
@@ -10,6 +11,7 @@ mod trip;
 pub use grid::grid_state;
 pub use landmark::landmark;
 pub use place::place;
+pub use predict::{InvalidPrediction, predict};
 pub use recall::{InvalidQuery, cue, recall};
 pub use space::space_info;
 pub use trip::{leg, trip, trip_detail};

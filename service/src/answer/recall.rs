@@ -4,10 +4,11 @@ use cogmap_proto as wire;
 use cogmap_proto::limits::{METRES_MAX, PAGE_ITEMS_MAX};
 use cogmap_proto::{Name, NameError, RecallQuery};
 use cognitive_map::grid::{InvalidCode, PartialCode, Phase};
-use cognitive_map::{AgentId, CognitiveMap, RecallCue};
+use cognitive_map::{AgentId, CognitiveMap, InvalidSample, RecallCue};
 use nalgebra::{Point3, Vector3};
 
 use super::{FRAME, place};
+use crate::decode;
 
 /// Places of an answer when the query names no limit.
 const LIMIT_DEFAULT: u32 = 10;
@@ -33,6 +34,9 @@ pub enum InvalidQuery {
     /// The agent's name is none.
     #[error("agent: {0}")]
     Agent(#[from] NameError),
+    /// The percept makes no sense.
+    #[error("percept: {0}")]
+    Percept(InvalidSample),
     /// The limit is out of range.
     #[error("limit must be 1 to {PAGE_ITEMS_MAX}")]
     Limit,
@@ -59,6 +63,8 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<Option<RecallCue>,
         .as_deref()
         .map(|phases| code(map, phases))
         .transpose()?;
+    let percept = query.percept.as_ref().map(decode::percept).transpose();
+    let percept = percept.map_err(InvalidQuery::Percept)?;
     let limit = query.limit.unwrap_or(LIMIT_DEFAULT) as usize;
     if !(1..=PAGE_ITEMS_MAX).contains(&limit) {
         return Err(InvalidQuery::Limit);
@@ -74,6 +80,7 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<Option<RecallCue>,
     Ok(Some(RecallCue {
         position,
         code,
+        percept,
         radius_m: query.radius_m,
         founder,
         since_ns: query.since_ns,
@@ -108,6 +115,7 @@ pub fn recall(
             cosine: recalled.cosine,
             confidence: recalled.confidence,
             distance_m: recalled.distance_m,
+            percept_match: recalled.percept_match,
         })
     });
     Ok(wire::RecallAnswer {

@@ -1,9 +1,10 @@
-//! Answers about a small map: one agent that drove ten metres along x and saw a post.
+//! Answers about a small map: one agent that drove ten metres along x, saw a post, and felt and saw
+//! something where it stopped.
 
-use cogmap_proto::RecallQuery;
+use cogmap_proto::{ExpectedPercept, Increment, MotionBody, PerceptCue, PredictQuery, RecallQuery};
 use cognitive_map::{
-    AgentId, CognitiveMap, Label, Motion, PlaceId, Record, Relation, RelativePosition, Sample,
-    SampleBody, Settings, Sighting, Target, TripId,
+    AgentId, CognitiveMap, Descriptor, Label, Level, Motion, PlaceId, Record, Relation,
+    RelativePosition, Sample, SampleBody, Settings, Sighting, Target, TripId,
 };
 
 use super::*;
@@ -23,8 +24,16 @@ fn map() -> CognitiveMap {
         },
         &mut events,
     );
-    for seq in 0..102 {
-        let body = if seq == 101 {
+    let felt = [
+        SampleBody::Level(Level::new(label("touch"), 3.0, [0.0; 3], None).expect("a level")),
+        SampleBody::Level(Level::new(label("touch"), 5.0, [0.0; 3], None).expect("a level")),
+        SampleBody::Descriptor(Descriptor::new(label("camera"), &[1.0; 16]).expect("a direction")),
+    ];
+    for seq in 0..105 {
+        let percept = usize::try_from(seq).expect("small").checked_sub(102);
+        let body = if let Some(percept) = percept {
+            felt[percept].clone()
+        } else if seq == 101 {
             SampleBody::Sighting(Sighting {
                 target: Target::Landmark(label("post")),
                 relation: Relation::Position(
@@ -284,4 +293,141 @@ fn senseless_queries_are_refused_by_the_rule_that_they_break() {
             .to_string();
         assert!(error.contains(part), "{query:?}: {error}");
     }
+}
+
+fn level_cue(channel: &str, value: f64) -> PerceptCue {
+    PerceptCue::Level(cogmap_proto::Level {
+        channel: channel.to_owned(),
+        value,
+        offset_m: [0.0; 3],
+        normal: None,
+    })
+}
+
+#[test]
+fn a_percept_recalls_the_place_where_it_was_felt() {
+    let map = map();
+    let descriptor = PerceptCue::Descriptor(cogmap_proto::Descriptor {
+        channel: "camera".to_owned(),
+        vector: vec![2.0; 16],
+    });
+    for percept in [level_cue("touch", 4.0), descriptor] {
+        let query = RecallQuery {
+            percept: Some(percept),
+            ..RecallQuery::default()
+        };
+        let answer = recall("lab", &map, &query).expect("a legal query");
+        let [found] = &answer.places[..] else {
+            panic!("one place has felt something: {answer:?}");
+        };
+        assert!((found.place.translation_m[0] - 10.0).abs() < 0.25);
+        assert!(found.percept_match.expect("there is a percept") > 0.0);
+        assert_eq!((found.cosine, found.distance_m), (None, None));
+    }
+}
+
+#[test]
+fn percepts_that_make_no_sense_are_refused() {
+    let short = PerceptCue::Descriptor(cogmap_proto::Descriptor {
+        channel: "camera".to_owned(),
+        vector: vec![1.0; 7],
+    });
+    for percept in [level_cue("", 1.0), level_cue("touch", f64::NAN), short] {
+        let query = RecallQuery {
+            percept: Some(percept),
+            ..RecallQuery::default()
+        };
+        let refused = recall("lab", &map(), &query).expect_err("no percept");
+        assert!(matches!(refused, InvalidQuery::Percept(_)), "{refused}");
+    }
+}
+
+fn question(ahead_m: f64) -> PredictQuery {
+    PredictQuery {
+        agent: None,
+        motion: MotionBody::Increment(Increment {
+            translation_m: [ahead_m, 0.0, 0.0],
+            rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+            noise: None,
+        }),
+        offset_m: [0.0; 3],
+        channel: None,
+    }
+}
+
+#[test]
+fn what_was_felt_here_is_expected_here() {
+    let map = map();
+    let answer = predict("lab", &map, AgentId(0), &question(0.0)).expect("a legal query");
+    assert_eq!(
+        (
+            answer.space.as_str(),
+            answer.agent.as_str(),
+            answer.frame.as_str()
+        ),
+        ("lab", "rover", "map")
+    );
+    assert!((answer.translation_m[0] - 10.0).abs() < 1e-9);
+    let [touch, camera] = &answer.percepts[..] else {
+        panic!("two channels: {answer:?}");
+    };
+    assert_eq!(
+        (touch.channel.as_str(), camera.channel.as_str()),
+        ("touch", "camera")
+    );
+    let ExpectedPercept::Level { mean, sd } = touch.expected else {
+        panic!("a level: {touch:?}");
+    };
+    assert!((mean - 4.0).abs() < 1e-12 && (sd - 1.0).abs() < 1e-12);
+    assert_eq!((touch.percepts, camera.percepts), (2, 1));
+    assert_eq!(
+        (Some(touch.place), touch.confidence),
+        (answer.place, answer.confidence)
+    );
+    let ExpectedPercept::Descriptor { vector } = &camera.expected else {
+        panic!("a descriptor: {camera:?}");
+    };
+    assert!(vector.iter().all(|x| (x - 0.25).abs() < 1e-6), "{vector:?}");
+
+    let query = PredictQuery {
+        channel: Some("camera".to_owned()),
+        ..question(0.0)
+    };
+    let answer = predict("lab", &map, AgentId(0), &query).expect("a legal query");
+    assert_eq!(&answer.percepts, std::slice::from_ref(camera));
+    let nowhere = predict("lab", &map, AgentId(0), &question(5.0)).expect("a legal query");
+    assert_eq!(
+        (nowhere.place, nowhere.confidence, nowhere.percepts.len()),
+        (None, 0.0, 0)
+    );
+}
+
+#[test]
+fn predictions_that_make_no_sense_are_refused() {
+    let mut map = map();
+    let refused = |map: &CognitiveMap, agent, query: &PredictQuery| {
+        predict("lab", map, AgentId(agent), query).expect_err("no sense")
+    };
+    let infinite = refused(&map, 0, &question(f64::INFINITY));
+    assert!(
+        matches!(infinite, InvalidPrediction::Motion(_)),
+        "{infinite}"
+    );
+    let mut query = question(0.0);
+    query.offset_m[1] = f64::NAN;
+    assert_eq!(refused(&map, 0, &query), InvalidPrediction::Offset);
+    query = question(0.0);
+    query.channel = Some(String::new());
+    let unnamed = refused(&map, 0, &query);
+    assert!(
+        matches!(unnamed, InvalidPrediction::Channel(_)),
+        "{unnamed}"
+    );
+
+    let (agent, name) = (AgentId(1), label("late"));
+    map.apply(&Record::Enrol { agent, name }, &mut Vec::new());
+    assert_eq!(
+        refused(&map, 1, &question(0.0)),
+        InvalidPrediction::NotPlaced
+    );
 }

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use cogmap_proto::{Codec, DecodeError, SkipReason};
-use cognitive_map::CognitiveMap;
+use cognitive_map::{ChannelKind, CognitiveMap, Event, EventKind};
 use metrics::{Counter, Gauge, Histogram, counter, gauge, histogram};
 
 use super::sequencer::Offered;
@@ -118,6 +118,8 @@ pub(crate) struct SpaceCounters {
     abandoned: Counter,
     journal_bytes: Counter,
     round_samples: Histogram,
+    level_surprise: Histogram,
+    descriptor_surprise: Histogram,
     published: Counter,
     queue: Gauge,
     agents: Gauge,
@@ -139,6 +141,8 @@ impl SpaceCounters {
             abandoned: counter!(names::ABANDONED_SAMPLES, "space" => label()),
             journal_bytes: counter!(names::JOURNAL_BYTES, "space" => label()),
             round_samples: histogram!(names::ROUND_SAMPLES, "space" => label()),
+            level_surprise: histogram!(names::LEVEL_SURPRISE, "space" => label()),
+            descriptor_surprise: histogram!(names::DESCRIPTOR_SURPRISE, "space" => label()),
             published: counter!(names::PUBLISHED_ESTIMATES, "space" => label()),
             queue: gauge!(names::QUEUE_MESSAGES, "space" => label()),
             agents: gauge!(names::AGENTS, "space" => label()),
@@ -198,6 +202,21 @@ impl SpaceCounters {
             self.applied.increment(samples);
             self.round_samples.record(samples as f64);
             self.published.increment(estimates);
+        }
+    }
+
+    /// Records how far a percept was from what was expected, if that is what the event tells.
+    pub(crate) fn event(&self, map: &CognitiveMap, event: &Event) {
+        if let EventKind::PerceptCompared {
+            channel, surprise, ..
+        } = &event.kind
+            && let Some(channel) = map.channel(*channel)
+        {
+            let histogram = match channel.kind() {
+                ChannelKind::Level => &self.level_surprise,
+                ChannelKind::Descriptor { .. } => &self.descriptor_surprise,
+            };
+            histogram.record(*surprise);
         }
     }
 

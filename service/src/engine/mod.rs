@@ -24,6 +24,7 @@ mod recovery;
 mod sequencer;
 mod settings;
 mod space;
+mod surprise;
 mod trajectory;
 mod writer;
 

@@ -2,10 +2,12 @@
 
 use cogmap_proto as wire;
 use cognitive_map::{
-    Agent, CognitiveMap, Event, EventKind, InvalidSample, Settings, SkipReason, Status, TripEnd,
+    Agent, ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, Settings, SkipReason,
+    Status, TripEnd,
 };
 
 use super::desk::Readout;
+use super::surprise::is_surprising;
 use super::trajectory::stamped;
 
 /// What is published of an agent; nothing before its first sample.
@@ -44,7 +46,8 @@ fn status(agent: &Agent, settings: &Settings) -> wire::Status {
     }
 }
 
-/// The published form of an event; cell crossings stay inside, there are too many.
+/// The published form of an event; cell crossings stay inside, there are too many, and so do
+/// percepts that are as expected.
 pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wire::Event> {
     let kind = match &event.kind {
         EventKind::CellEntered { .. } => return None,
@@ -80,6 +83,27 @@ pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wi
         EventKind::MarkerPassed { label } => wire::EventKind::MarkerPassed {
             label: label.as_str().to_owned(),
         },
+        EventKind::PerceptCompared {
+            place,
+            channel,
+            percepts,
+            surprise,
+        } => {
+            let channel = map.channel(*channel)?;
+            if !is_surprising(channel.kind(), *percepts, *surprise) {
+                return None;
+            }
+            wire::EventKind::PerceptSurprising {
+                place: place.0.into(),
+                channel: channel.label().as_str().to_owned(),
+                percept: match channel.kind() {
+                    ChannelKind::Level => wire::PerceptKind::Level,
+                    ChannelKind::Descriptor { .. } => wire::PerceptKind::Descriptor,
+                },
+                percepts: *percepts,
+                surprise: *surprise,
+            }
+        }
     };
     Some(wire::Event {
         space: space.to_owned(),
@@ -131,4 +155,63 @@ pub(crate) fn skip_reason_of_wire(reason: wire::SkipReason) -> SkipReason {
         wire::SkipReason::InvalidNormal => InvalidSample::InvalidNormal,
     };
     SkipReason::Invalid(invalid)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cognitive_map::{
+        AgentId, Label, Level, Motion, Record, Sample, SampleBody, SettingsValues,
+    };
+
+    /// An agent that stands still and feels these values.
+    fn told(values: &[f64]) -> Vec<wire::Event> {
+        let label = |text| Label::new(text).expect("a label");
+        let settings = Settings::new(SettingsValues::default()).expect("defaults are valid");
+        let mut map = CognitiveMap::new(settings);
+        let (agent, name) = (AgentId(0), label("rover"));
+        let mut events = Vec::new();
+        map.apply(&Record::Enrol { agent, name }, &mut events);
+        let still = Motion::from_increment([0.0; 3], [0.0, 0.0, 0.0, 1.0], None);
+        let felt = values.iter().map(|&value| {
+            let level = Level::new(label("touch"), value, [0.0; 3], None);
+            SampleBody::Level(level.expect("a level"))
+        });
+        let bodies = std::iter::once(SampleBody::Motion(still.expect("a motion"))).chain(felt);
+        for (seq, body) in (0..).zip(bodies) {
+            let sample = Sample { stamp_ns: 0, body };
+            let record = Record::Sample {
+                agent,
+                session: 1,
+                seq,
+                sample,
+            };
+            map.apply(&record, &mut events);
+        }
+        let told = events.iter().filter_map(|one| event("lab", &map, one));
+        told.filter(|told| matches!(told.kind, wire::EventKind::PerceptSurprising { .. }))
+            .collect()
+    }
+
+    #[test]
+    fn only_what_surprises_is_told() {
+        assert_eq!(told(&[1.0, 9.0]), [], "too little was learned");
+        assert_eq!(told(&[1.0, 2.0, 3.0, 4.0]), []);
+        let [surprise] = &told(&[1.0, 2.0, 3.0, 20.0, 3.0])[..] else {
+            panic!("one surprise");
+        };
+        let wire::EventKind::PerceptSurprising {
+            place,
+            channel,
+            percept,
+            percepts,
+            surprise,
+        } = &surprise.kind
+        else {
+            panic!("a surprise");
+        };
+        assert_eq!((*place, channel.as_str(), *percepts), (0, "touch", 3));
+        assert_eq!(*percept, wire::PerceptKind::Level);
+        assert!((surprise - 18.0 / (2.0f64 / 3.0).sqrt()).abs() < 1e-9);
+    }
 }

@@ -16,6 +16,7 @@ mod listener;
 mod openapi;
 mod page;
 mod places;
+mod predict;
 mod problem;
 mod recall;
 mod reply;
@@ -54,7 +55,7 @@ use state::{Service, Shared};
     tags(
         (name = "spaces", description = "Spaces, their events and exports"),
         (name = "agents", description = "Where agents are, where they were, and their samples"),
-        (name = "memory", description = "Places, trips and landmarks"),
+        (name = "memory", description = "Places, percepts, trips and landmarks"),
         (name = "service", description = "Health and metrics")),
     components(schemas(cogmap_proto::Problem)))]
 struct Description;
@@ -69,6 +70,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(trajectory::get))
         .routes(routes!(samples::post))
         .routes(routes!(recall::post))
+        .routes(routes!(predict::post))
         .routes(routes!(places::list))
         .routes(routes!(places::get))
         .routes(routes!(trips::list))

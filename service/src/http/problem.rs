@@ -7,7 +7,7 @@ use axum::response::IntoResponse;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::answer::InvalidQuery;
+use crate::answer::{InvalidPrediction, InvalidQuery};
 use crate::engine::{IngestError, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
 
@@ -56,6 +56,8 @@ pub enum Kind {
     InvalidSettings,
     /// A query that makes no sense.
     InvalidQuery,
+    /// It is not known where the agent stands in the map.
+    NotPlaced,
     /// A fault of the service.
     Internal,
     /// The store does not work; the service must be looked after.
@@ -124,6 +126,7 @@ impl Kind {
             Self::UnsupportedMediaType => ("unsupported-media-type", S::UNSUPPORTED_MEDIA_TYPE),
             Self::InvalidSettings => ("invalid-settings", S::UNPROCESSABLE_ENTITY),
             Self::InvalidQuery => ("invalid-query", S::UNPROCESSABLE_ENTITY),
+            Self::NotPlaced => ("not-placed", S::CONFLICT),
             Self::Internal => ("internal", S::INTERNAL_SERVER_ERROR),
             Self::StoreFailed => ("store-failed", S::INTERNAL_SERVER_ERROR),
             Self::Busy => ("busy", S::SERVICE_UNAVAILABLE),
@@ -218,6 +221,16 @@ impl From<Unavailable> for Problem {
 impl From<InvalidQuery> for Problem {
     fn from(error: InvalidQuery) -> Self {
         Self::new(Kind::InvalidQuery, error.to_string())
+    }
+}
+
+impl From<InvalidPrediction> for Problem {
+    fn from(error: InvalidPrediction) -> Self {
+        let kind = match &error {
+            InvalidPrediction::NotPlaced => Kind::NotPlaced,
+            _ => Kind::InvalidQuery,
+        };
+        Self::new(kind, error.to_string())
     }
 }
 

@@ -9,7 +9,7 @@ use super::problem::Problem;
 use super::reply;
 use crate::answer;
 
-/// Recall places by position, by grid code or by both; filtered by agent and time.
+/// Recall places by position, grid code and percept, alone or together; filtered by agent and time.
 #[utoipa::path(post, path = "/v1/spaces/{space}/recall", tag = "memory", operation_id = "recall",
     params(SpaceParam), request_body = RecallQuery,
     responses(
@@ -22,7 +22,7 @@ pub(crate) async fn post(
     Json(query): Json<RecallQuery>,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    // A cue by code is compared with every place: work for a thread that may be busy.
+    // A cue by code or percept is compared with every place: work for a thread that may be busy.
     let answered = tokio::task::spawn_blocking(move || {
         answer::recall(space.name(), &map, &query).map(|answer| reply::json(&answer))
     });

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cogmap_proto::{Codec, Problem, RecallQuery, Verb, WatermarkQuery, query_key};
+use cogmap_proto::{Codec, PredictQuery, Problem, RecallQuery, Verb, WatermarkQuery, query_key};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
@@ -11,7 +11,7 @@ use zenoh::Session;
 use zenoh::query::{Query, Queryable};
 
 use super::session::TransportError;
-use crate::answer;
+use crate::answer::{self, InvalidPrediction};
 use crate::engine::Engine;
 
 /// Most queries under way; further ones are told to come back.
@@ -24,7 +24,7 @@ pub(crate) async fn declare(
 ) -> Result<Vec<Queryable<()>>, TransportError> {
     let mut queryables = Vec::new();
     let room = Arc::new(Semaphore::new(QUERIES_MAX));
-    for verb in [Verb::Recall, Verb::Watermark] {
+    for verb in [Verb::Recall, Verb::Watermark, Verb::Predict] {
         let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(&room));
         let queryable = session
             .declare_queryable(query_key("*", verb.as_str()))
@@ -113,6 +113,23 @@ async fn answer(
                 .ok_or_else(|| problem("unknown-agent", 404, format!("no agent {agent:?}")))?;
             Ok(encoded(codec, &desk.watermark()))
         }
+        Verb::Predict => {
+            let body: PredictQuery = body(query, codec)?;
+            let agent = body
+                .agent
+                .as_deref()
+                .ok_or_else(|| unpredictable(&InvalidPrediction::NoAgent))?;
+            let desk = space
+                .agent(agent)
+                .ok_or_else(|| problem("unknown-agent", 404, format!("no agent {agent:?}")))?;
+            let map = space
+                .snapshot()
+                .await
+                .map_err(|error| problem("unavailable", 503, error.to_string()))?;
+            let predicted = answer::predict(space.name(), &map, desk.id(), &body);
+            let predicted = predicted.map_err(|error| unpredictable(&error))?;
+            Ok(encoded(codec, &predicted))
+        }
     }
 }
 
@@ -128,6 +145,13 @@ fn body<T: DeserializeOwned>(query: &Query, codec: Codec) -> Result<T, Problem> 
 
 fn encoded<T: Serialize>(codec: Codec, message: &T) -> Vec<u8> {
     codec.encode(message)
+}
+
+fn unpredictable(error: &InvalidPrediction) -> Problem {
+    match error {
+        InvalidPrediction::NotPlaced => problem("not-placed", 409, error.to_string()),
+        _ => problem("invalid-query", 422, error.to_string()),
+    }
 }
 
 fn problem(kind: &str, status: u16, detail: String) -> Problem {

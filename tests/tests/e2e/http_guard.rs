@@ -8,7 +8,7 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 19] = [
+const ROUTES: [(&str, &[&str]); 20] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
@@ -17,6 +17,7 @@ const ROUTES: [(&str, &[&str]); 19] = [
     ("/v1/spaces/{space}/agents", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/grid", &["get"]),
+    ("/v1/spaces/{space}/agents/{agent}/predict", &["post"]),
     ("/v1/spaces/{space}/agents/{agent}/samples", &["post"]),
     ("/v1/spaces/{space}/agents/{agent}/trajectory", &["get"]),
     ("/v1/spaces/{space}/events", &["get"]),

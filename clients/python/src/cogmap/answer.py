@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar, Dict, Optional, Tuple
+from typing import ClassVar, Dict, Optional, Tuple, Union
 
 from .settings import SpaceSettings
 from .vector import Quaternion, Vec3
@@ -324,6 +324,9 @@ class RecalledPlace:
     confidence: Optional[float] = None
     #: Distance from the cue's position [m]; absent without one.
     distance_m: Optional[float] = None
+    #: How well the percept fits what the place remembers; absent without one. For a descriptor the
+    #: cosine; for a level its likelihood, as a part of the highest that there could be.
+    percept_match: Optional[float] = None
 
 
 @dataclass(frozen=True)
@@ -351,6 +354,61 @@ class RecallAnswer:
     places: Tuple[RecalledPlace, ...]
     #: Other places that answer the code nearly as well; absent when there are none.
     rivals: Optional[Rivals] = None
+
+
+@dataclass(frozen=True)
+class ExpectedLevel:
+    """A level that is expected."""
+
+    TAG: ClassVar[str] = "level"
+    #: Mean, in the channel's own unit.
+    mean: float
+    #: Standard deviation of single values; 0 after the first one.
+    sd: float
+
+
+@dataclass(frozen=True)
+class ExpectedDescriptor:
+    """A descriptor that is expected."""
+
+    TAG: ClassVar[str] = "descriptor"
+    #: Mean direction, a unit vector; all zeros if what was seen cancels out.
+    vector: Tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class PredictedPercept:
+    """A percept that is expected."""
+
+    #: Name of the channel.
+    channel: str
+    expected: Union[ExpectedLevel, ExpectedDescriptor]
+    #: The place that remembers it: the one that answers where the sensor will be.
+    place: int
+    #: That place's confidence, in [0, 1].
+    confidence: float
+    #: Number of percepts that it has learned from.
+    percepts: int
+    #: Strength of the association: the sum of the place's confidences when they were felt.
+    strength: float
+
+
+@dataclass(frozen=True)
+class PredictAnswer:
+    """Where a motion would lead, and what is expected there."""
+
+    space: str
+    agent: str
+    frame: str
+    map_revision: int
+    translation_m: Vec3
+    rotation_xyzw: Quaternion
+    #: The place that answers there, if one does.
+    place: Optional[int]
+    #: Its confidence, in [0, 1], over the positions to which the motion may lead; 0 without a place.
+    confidence: float
+    #: What is expected there, in the order of the channels; empty where no place answers.
+    percepts: Tuple[PredictedPercept, ...]
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from .answer import (
     LandmarkPage,
     Place,
     PlacePage,
+    PredictAnswer,
     RecallAnswer,
     SpaceInfo,
     SpaceList,
@@ -30,7 +31,7 @@ from .answer import (
 )
 from .errors import ApiError
 from .event import Event
-from .query import RecallQuery
+from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
 from .sample import SampleBatch
 from .settings import SpaceSettings
 from .sse import data_fields
@@ -148,9 +149,10 @@ class Client:
         since_ns: Optional[int] = None,
         until_ns: Optional[int] = None,
         limit: Optional[int] = None,
+        percept: Optional[PerceptCue] = None,
     ) -> RecallAnswer:
         """Places that answer a cue, best first: a position [m], a grid code (a phase per module, `None`
-        for an erased one), or both. The other arguments filter: places within `radius_m` of the
+        for an erased one), a percept (`Level` or `Descriptor`), or several of them. The other arguments filter: places within `radius_m` of the
         position, founded by `agent`, visited from `since_ns` on, founded before `until_ns`."""
         query = RecallQuery(
             position_m=None if position_m is None else vec3("position_m", position_m),
@@ -162,10 +164,27 @@ class Client:
             since_ns=since_ns,
             until_ns=until_ns,
             limit=limit,
+            percept=percept,
         )
         body = {name: value for name, value in to_wire(query).items() if value is not None}
         path = _path(space, "recall")
         return self._send(RecallAnswer, "POST", path, JSON, json.dumps(body).encode())
+
+    def predict(
+        self,
+        space: str,
+        agent: str,
+        motion: MotionBody,
+        *,
+        offset_m: Iterable[float] = (0.0, 0.0, 0.0),
+        channel: Optional[str] = None,
+    ) -> PredictAnswer:
+        """What an agent would feel after a motion (`Increment` or `Velocity`) from where it is now.
+        Levels are those of a sensor at `offset_m` in the body frame [m]. With `channel` only what is
+        felt on that one."""
+        query = PredictQuery(None, motion, vec3("offset_m", offset_m), channel)
+        path = _path(space, "agents", agent, "predict")
+        return self._send(PredictAnswer, "POST", path, JSON, json.dumps(to_wire(query)).encode())
 
     def places(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Place]:
         """All places of a space, by id. `filters` are passed on as query parameters."""

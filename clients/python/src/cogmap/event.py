@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any, ClassVar, Dict, Union
 
 from .answer import SkipReason, TripEnd
@@ -93,6 +94,38 @@ class MarkerPassed:
     label: str
 
 
+class PerceptKind(str, Enum):
+    """What kind of percept a channel carries."""
+
+    #: Scalars.
+    LEVEL = "level"
+    #: Unit vectors.
+    DESCRIPTOR = "descriptor"
+    #: A kind that this version of the package does not know.
+    UNKNOWN = "unknown"
+
+    @classmethod
+    def _missing_(cls, value: object) -> PerceptKind:
+        return cls.UNKNOWN
+
+
+@dataclass(frozen=True)
+class PerceptSurprising:
+    """A percept was far from what its place remembers of the channel."""
+
+    TAG: ClassVar[str] = "percept_surprising"
+    place: int
+    #: Name of the channel.
+    channel: str
+    #: What kind of percept it was.
+    percept: PerceptKind
+    #: Number of percepts that taught what to expect, 3 at least.
+    percepts: int
+    #: How far it was from that: for a level in standard deviations, above 4; for a descriptor one
+    #: minus the cosine, above 0.5.
+    surprise: float
+
+
 @dataclass(frozen=True)
 class UnknownKind:
     """Something that this version of the package has no word for."""
@@ -113,6 +146,7 @@ EventKind = Union[
     LandmarkLearned,
     SamplesSkipped,
     MarkerPassed,
+    PerceptSurprising,
     UnknownKind,
 ]
 

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Optional, Tuple, Union
 
+from .sample import Descriptor, Increment, Level, Velocity
 from .vector import Vec3, vec3
+
+#: A percept to recall places by; a level's `offset_m` and `normal` say nothing there.
+PerceptCue = Union[Level, Descriptor]
+#: A motion that is asked about.
+MotionBody = Union[Increment, Velocity]
 
 
 @dataclass(frozen=True)
@@ -17,8 +23,8 @@ class WatermarkQuery:
 
 @dataclass(frozen=True)
 class RecallQuery:
-    """Asks for places. `position_m` and `code` are the cues that rank them, the other fields filter;
-    without a cue the latest places come first."""
+    """Asks for places. `position_m`, `code` and `percept` are the cues that rank them, the other fields
+    filter; without a cue the latest places come first."""
 
     #: Cue: a position in `map` [m].
     position_m: Optional[Vec3] = None
@@ -34,6 +40,8 @@ class RecallQuery:
     until_ns: Optional[int] = None
     #: Most places in the answer, 1 to 1000; 10 when absent.
     limit: Optional[int] = None
+    #: Cue: a percept. Only places that remember something of its channel answer.
+    percept: Optional[PerceptCue] = None
 
     def __post_init__(self) -> None:
         if self.position_m is not None:
@@ -43,3 +51,20 @@ class RecallQuery:
             object.__setattr__(self, "code", code)
         if self.radius_m is not None:
             object.__setattr__(self, "radius_m", float(self.radius_m))
+
+
+@dataclass(frozen=True)
+class PredictQuery:
+    """Asks what an agent would feel if it moved so."""
+
+    #: The agent. Over HTTP it is in the path, and absent here or the same.
+    agent: Optional[str]
+    #: The motion, from where the agent is now.
+    motion: MotionBody
+    #: Where the sensor of levels sits in the body frame [m]; descriptors are seen at the body.
+    offset_m: Vec3 = (0.0, 0.0, 0.0)
+    #: Only what is felt on this channel.
+    channel: Optional[str] = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "offset_m", vec3("offset_m", self.offset_m))

@@ -112,6 +112,20 @@ impl Body {
         Step { path_m, noise_sd }
     }
 
+    /// The body after a motion that begins at a pose known without error: its covariance is that of
+    /// the motion alone.
+    pub(crate) fn after(
+        &self,
+        motion: &Motion,
+        settings: &Settings,
+        modules: &GridModules,
+    ) -> Self {
+        let mut body = self.clone();
+        body.covariance = PoseCovariance::zero();
+        body.step(motion, settings, modules, |_, _| {});
+        body
+    }
+
     /// Puts the body where it was told that it stands.
     pub(crate) fn place(&mut self, start: &StartPose, modules: &GridModules) {
         self.in_map = *start.pose();

@@ -176,7 +176,8 @@ impl Agent {
         self.sightings
     }
 
-    /// Levels and descriptors so far, of all sessions; they are counted and stay in the journal.
+    /// Levels and descriptors so far, of all sessions. Those felt where a place answers teach it; the
+    /// others are counted and stay in the journal.
     pub fn percepts(&self) -> u64 {
         self.percepts
     }

@@ -8,6 +8,9 @@
 //! 3     page                      up to 16 trips, without their legs
 //! 4     trip · 64 + page          up to 16 legs
 //! 5     page                      up to 64 landmarks
+//! 6     page                      up to 8 channels of percepts
+//! 7     channel · 2²⁶ + page      up to 64 places' memories of a channel of levels
+//! 8     channel · 2²⁶ + page      up to 16 KiB of places' memories of a channel of descriptors
 //! ```
 //!
 //! A page is a count (u16) and its items one after the other, little endian, floats as their bits. A
@@ -20,12 +23,13 @@ use super::CognitiveMap;
 use super::header::{Header, digest_of};
 use crate::digest::Digest;
 use crate::paged::write_page;
+use crate::percept::CHANNEL_PAGES_MAX;
 use crate::settings::Settings;
 use crate::state::{CorruptState, State, StateReader, StateWriter};
 use crate::trip::LEG_PAGES_MAX;
 
-/// Version of the layout above.
-const VERSION: u16 = 1;
+/// Version of the layout above. Version 1 had no percepts.
+const VERSION: u16 = 2;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;
@@ -33,6 +37,9 @@ const PLACES: u8 = 2;
 const TRIPS: u8 = 3;
 const LEGS: u8 = 4;
 const LANDMARKS: u8 = 5;
+const CHANNELS: u8 = 6;
+const LEVELS: u8 = 7;
+const DESCRIPTORS: u8 = 8;
 
 /// One page of a checkpoint. A later page of the same kind and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -85,6 +92,9 @@ impl CognitiveMap {
         let places = self.places.places().changed_pages(since);
         let trips = self.trips.changed_pages(since);
         let landmarks = self.landmarks.landmarks().changed_pages(since);
+        let channels = self.percepts.channels().changed_pages(since);
+        let levels = self.percepts.changed_levels(since);
+        let descriptors = self.percepts.changed_descriptors(since);
         // A leg is appended to its trip, so legs change only where their trip does.
         let legs = self
             .trips
@@ -101,6 +111,15 @@ impl CognitiveMap {
             .chain(trips.map(|(page, _, items)| of_items(TRIPS, page, items)))
             .chain(legs)
             .chain(landmarks.map(|(page, _, items)| of_items(LANDMARKS, page, items)))
+            .chain(channels.map(|(page, _, items)| of_items(CHANNELS, page, items)))
+            .chain(
+                levels.map(|(channel, page, items)| {
+                    of_items(LEVELS, channel_page(channel, page), items)
+                }),
+            )
+            .chain(descriptors.map(|(channel, page, items)| {
+                of_items(DESCRIPTORS, channel_page(channel, page), items)
+            }))
     }
 
     /// The map of a checkpoint. It has the digest of the map that wrote it, and goes on like it.
@@ -131,11 +150,12 @@ impl CognitiveMap {
         let mut trips = Vec::new();
         let mut expected = 0;
         for ((kind, index), bytes) in pages {
-            // Pages of a kind must follow one another; those of legs begin anew with each trip.
-            let first = if kind == LEGS {
-                index % LEG_PAGES_MAX == 0
-            } else {
-                index == 0
+            // Pages of a kind must follow one another; those of legs begin anew with each trip, those
+            // of memories with each channel.
+            let first = match kind {
+                LEGS => index % LEG_PAGES_MAX == 0,
+                LEVELS | DESCRIPTORS => index % CHANNEL_PAGES_MAX == 0,
+                _ => index == 0,
             };
             let next = if first { index } else { expected };
             let restored = if index == next {
@@ -189,6 +209,12 @@ impl CognitiveMap {
                     .push_leg_page(bytes, revision)
             }
             LANDMARKS => self.landmarks.push_page(bytes, revision),
+            CHANNELS => self.percepts.push_channels(bytes, revision),
+            LEVELS | DESCRIPTORS => {
+                let channel = (index / CHANNEL_PAGES_MAX) as usize;
+                let levels = kind == LEVELS;
+                self.percepts.push_memory(channel, levels, bytes, revision)
+            }
             _ => Err(CorruptState::Invalid),
         }
     }
@@ -226,7 +252,7 @@ impl CognitiveMap {
                     .legs()
                     .all(|leg| (leg.from().0 as usize) < places && (leg.to().0 as usize) < places)
         });
-        agents && founders && trips
+        agents && founders && trips && self.percepts.knows_only(places)
     }
 }
 
@@ -245,6 +271,12 @@ fn of_items<T: State>(kind: u8, index: usize, items: &[T]) -> CheckpointPage {
 /// Index of a page of a trip's legs; the number of trips is bounded so that it fits.
 fn leg_page(trip: usize, page: usize) -> usize {
     trip * LEG_PAGES_MAX as usize + page
+}
+
+/// Index of a page of a channel's memory; the numbers of channels and of their pages are bounded so
+/// that it fits.
+fn channel_page(channel: usize, page: usize) -> usize {
+    channel * CHANNEL_PAGES_MAX as usize + page
 }
 
 /// Reads the header and the map's digest after it.

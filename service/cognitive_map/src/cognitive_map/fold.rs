@@ -5,6 +5,7 @@ use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
 use crate::landmark::{Landmark, LandmarkMap, seen};
 use crate::paged::PagedVec;
+use crate::percept::PerceptMap;
 use crate::place::PlaceMap;
 use crate::record::{AgentId, SkipReason};
 use crate::sample::{Label, Marker, Relation, Sample, SampleBody, Sighting, StartPose, Target};
@@ -22,6 +23,7 @@ pub(super) struct Fold<'a> {
     pub(super) places: &'a mut PlaceMap,
     pub(super) trips: &'a mut PagedVec<Trip, TRIP_PAGE>,
     pub(super) landmarks: &'a mut LandmarkMap,
+    pub(super) percepts: &'a mut PerceptMap,
     pub(super) agent_id: AgentId,
     pub(super) agent: &'a mut Agent,
     /// Stamp of the events.
@@ -77,7 +79,8 @@ impl Fold<'_> {
         }
         match &sample.body {
             SampleBody::Motion(motion) => return self.motion(seq, motion),
-            SampleBody::Level(_) | SampleBody::Descriptor(_) => self.agent.percepts += 1,
+            SampleBody::Level(level) => self.level(level),
+            SampleBody::Descriptor(descriptor) => self.descriptor(descriptor),
             SampleBody::Sighting(sighting) => self.sighting(sighting),
             SampleBody::StartPose(start) => self.start_pose(start),
             SampleBody::Marker(marker) => self.marker(marker),

@@ -15,6 +15,7 @@ pub(super) struct Header {
     places: u64,
     trips: u64,
     landmarks: u64,
+    channels: u64,
 }
 
 state_of_struct!(Header {
@@ -24,7 +25,8 @@ state_of_struct!(Header {
     agents,
     places,
     trips,
-    landmarks
+    landmarks,
+    channels
 });
 
 impl Header {
@@ -38,6 +40,7 @@ impl Header {
             places: map.places.places().len() as u64,
             trips: map.trips.len() as u64,
             landmarks: map.landmarks.landmarks().len() as u64,
+            channels: map.percepts.channels().len() as u64,
         }
     }
 }

@@ -1,20 +1,24 @@
 //! The cognitive map of a space: everything that is derived from its journal.
 
 mod checkpoint;
+mod feel;
 mod fold;
 mod header;
 mod motion;
+mod predict;
 mod read;
 
 use std::sync::Arc;
 
 pub use checkpoint::{CheckpointPage, CorruptCheckpoint};
+pub use predict::{Predicted, Prediction};
 
 use crate::agent::Agent;
 use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
 use crate::landmark::LandmarkMap;
 use crate::paged::PagedVec;
+use crate::percept::PerceptMap;
 use crate::place::PlaceMap;
 use crate::record::{AgentId, Record, SkipReason};
 use crate::settings::Settings;
@@ -44,6 +48,7 @@ pub struct CognitiveMap {
     places: PlaceMap,
     trips: PagedVec<Trip, TRIP_PAGE>,
     landmarks: LandmarkMap,
+    percepts: PerceptMap,
 }
 
 impl CognitiveMap {
@@ -58,6 +63,7 @@ impl CognitiveMap {
             agents: PagedVec::default(),
             trips: PagedVec::default(),
             landmarks: LandmarkMap::default(),
+            percepts: PerceptMap::default(),
         }
     }
 
@@ -141,6 +147,7 @@ impl CognitiveMap {
             places: &mut self.places,
             trips: &mut self.trips,
             landmarks: &mut self.landmarks,
+            percepts: &mut self.percepts,
             agent_id,
             stamp_ns: agent.stamp_ns.unwrap_or(0),
             agent,

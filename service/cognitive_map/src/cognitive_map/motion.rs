@@ -14,7 +14,7 @@ use crate::trip::{LegUnderWay, TRIPS_MAX, Trip, TripEnd, TripId, interval_s};
 /// changes by at most a tenth over that distance, and a robot at rest asks nothing.
 const ASK_PER_FIELD_RADIUS: f64 = 0.125;
 /// A place answers from this confidence on.
-const ANSWER_MIN: f64 = 0.5;
+pub(super) const ANSWER_MIN: f64 = 0.5;
 
 impl Fold<'_> {
     /// The body moved.

@@ -8,6 +8,7 @@ use crate::agent::Agent;
 use crate::digest::Digest;
 use crate::grid::GridModules;
 use crate::landmark::{Landmark, LandmarkId};
+use crate::percept::{Channel, ChannelId, Remembered};
 use crate::place::{Place, PlaceId};
 use crate::recall::{self, RecallCue, Recalled, Rivals};
 use crate::record::AgentId;
@@ -43,6 +44,7 @@ impl CognitiveMap {
         self.places.places().write_digests(&mut out);
         self.trips.write_digests(&mut out);
         self.landmarks.landmarks().write_digests(&mut out);
+        self.percepts.write_digests(&mut out);
         out.digest()
     }
 
@@ -96,16 +98,38 @@ impl CognitiveMap {
 
     /// The places that answer a cue, best first, equally good ones by identifier. Exact.
     ///
-    /// By position the nearest come first, by code the most alike. By both the confidences are
-    /// multiplied. Without a cue the place visited last comes first. The cost is said at
-    /// [`RecallCue`].
+    /// By position the nearest come first, by code the most alike, by a percept the places whose memory
+    /// it fits best, and no others answer. By several of them the confidences are multiplied. Without
+    /// a cue the place visited last comes first. The cost is said at [`RecallCue`].
     pub fn recall(&self, cue: &RecallCue) -> Vec<Recalled> {
-        recall::recall(cue, &self.places, &self.modules, &self.settings)
+        recall::recall(
+            cue,
+            &self.places,
+            &self.percepts,
+            &self.modules,
+            &self.settings,
+        )
+    }
+
+    /// The channels of percepts, in the order in which places first remembered something of them.
+    pub fn channels(&self) -> impl Iterator<Item = (ChannelId, &Channel)> {
+        (0..).map(ChannelId).zip(self.percepts.channels().iter())
+    }
+
+    /// A channel.
+    pub fn channel(&self, channel: ChannelId) -> Option<&Channel> {
+        self.percepts.channels().get(channel.0.into())
+    }
+
+    /// What a place remembers of what was felt and seen there, channel by channel.
+    pub fn remembered(&self, place: PlaceId) -> impl Iterator<Item = Remembered> {
+        self.percepts.of_place(place)
     }
 
     /// The places elsewhere that answer a cue nearly as well as `best` does, the first of its answers.
     ///
-    /// `None` when the answer is unambiguous, and for cues that hold no code, or a position as well.
+    /// `None` when the answer is unambiguous, and for cues that hold no code, or a position or a percept
+    /// as well.
     pub fn rivals(&self, cue: &RecallCue, best: &Recalled) -> Option<Rivals> {
         recall::rivals(cue, best, &self.places, &self.modules, &self.settings)
     }

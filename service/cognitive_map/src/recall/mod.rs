@@ -2,6 +2,7 @@
 
 mod best;
 mod by_code;
+mod by_percept;
 #[cfg(test)]
 mod tests;
 
@@ -11,6 +12,7 @@ use nalgebra::Point3;
 
 use crate::grid::similarity::CodeCue;
 use crate::grid::{GridModules, PartialCode};
+use crate::percept::{PerceptCue, PerceptMap};
 use crate::place::{Place, PlaceId, PlaceMap, confidence};
 use crate::record::AgentId;
 use crate::settings::Settings;
@@ -22,7 +24,8 @@ pub use by_code::Rivals;
 /// reaches of a place.
 const BALLS: [f64; 3] = [1.0, 2.0, 3.5];
 
-/// What to recall places by. `position` and `code` rank the places; the other fields filter.
+/// What to recall places by. `position`, `code` and `percept` rank the places; the other fields
+/// filter.
 ///
 /// The answer is exact, and its cost is as follows, where n is the number of places.
 ///
@@ -31,13 +34,16 @@ const BALLS: [f64; 3] = [1.0, 2.0, 3.5];
 ///   few positions of the world could be meant: the terms of the known modules may together lack 0.9,
 ///   which with five known modules is a cosine of 0.82, and the code of a position a quarter of the
 ///   finest spacing away. Else O(n): for a `limit` of many places, a code of nowhere, or very few modules.
-/// - By both, or by neither: O(n).
+/// - By a percept: O(n), for a descriptor in the time of one pass over the descriptors of its channel.
+/// - By several, or by none: O(n).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecallCue {
     /// A position in `map` \[m\].
     pub position: Option<Point3<f64>>,
     /// A grid code, perhaps with erased modules.
     pub code: Option<PartialCode>,
+    /// A percept: only places that remember something of its channel answer.
+    pub percept: Option<PerceptCue>,
     /// Only places within this distance of `position` \[m\]; without a position it has no effect.
     pub radius_m: Option<f64>,
     /// Only places that this agent founded.
@@ -60,19 +66,25 @@ pub struct Recalled {
     pub cosine: Option<f64>,
     /// Confidence, in \[0, 1\] (seed Eq. 8); `None` without a cue. By position it follows from the
     /// distance; by code from the distance at which two codes are on average as alike as the cue and
-    /// the place's code; by both it is the product of the two.
+    /// the place's code; by a percept it is `percept_match`, at least 0; by several the product.
     pub confidence: Option<f64>,
     /// Distance from `position` \[m\]; `None` without it.
     pub distance_m: Option<f64>,
+    /// How well the percept fits what the place remembers; `None` without one. For a descriptor the
+    /// cosine. For a level its likelihood: the density of a normal distribution with the place's
+    /// mean and deviation, as a part of the highest density that there could be on the channel.
+    pub percept_match: Option<f64>,
 }
 
 /// The places that answer a cue, best first, equally good ones by identifier. Exact.
 ///
 /// By position the nearest come first, by code the most alike. By both the confidences are multiplied,
-/// as those of two independent witnesses. Without a cue the place visited last comes first.
+/// as those of two independent witnesses, and so it is with a percept, by which only places answer that
+/// remember something of its channel. Without a cue the place visited last comes first.
 pub(crate) fn recall(
     cue: &RecallCue,
     places: &PlaceMap,
+    percepts: &PerceptMap,
     modules: &GridModules,
     settings: &Settings,
 ) -> Vec<Recalled> {
@@ -82,6 +94,9 @@ pub(crate) fn recall(
         modules,
         settings,
     };
+    if let Some(percept) = &cue.percept {
+        return asked.by_percept(percepts.matches(percept));
+    }
     match (&cue.position, &cue.code) {
         (Some(position), None) => asked.by_position(position),
         (None, Some(code)) => asked.by_code(code),
@@ -92,8 +107,8 @@ pub(crate) fn recall(
 
 /// The places elsewhere that answer a cue with a code nearly as well as its best answer does. Exact.
 ///
-/// `None` when there is no such place, no code in the cue, or a position in it, which settles what a
-/// code leaves open.
+/// `None` when there is no such place, no code in the cue, or a position or a percept in it, which
+/// settles what a code leaves open.
 pub(crate) fn rivals(
     cue: &RecallCue,
     best: &Recalled,
@@ -107,7 +122,7 @@ pub(crate) fn rivals(
         modules,
         settings,
     };
-    let (None, Some(code)) = (&cue.position, &cue.code) else {
+    let (None, None, Some(code)) = (&cue.position, &cue.percept, &cue.code) else {
         return None;
     };
     CodeRecall::new(&asked, code).rivals(best.place, best.cosine?)
@@ -132,6 +147,7 @@ impl Asked<'_> {
             cosine: self.kernel(&code, place),
             confidence: Some(confidence(distance_m, self.settings.field_radius_m)),
             distance_m: Some(distance_m),
+            percept_match: None,
         });
         recalled.collect()
     }
@@ -144,6 +160,7 @@ impl Asked<'_> {
             cosine: Some(cosine),
             confidence: Some(code.confidence(cosine)),
             distance_m: None,
+            percept_match: None,
         });
         recalled.collect()
     }
@@ -170,6 +187,7 @@ impl Asked<'_> {
                 cosine: Some(cosine),
                 confidence: Some(confidence),
                 distance_m: Some(distance_m),
+                percept_match: None,
             });
         recalled.collect()
     }
@@ -185,6 +203,7 @@ impl Asked<'_> {
             cosine: None,
             confidence: None,
             distance_m: None,
+            percept_match: None,
         });
         recalled.collect()
     }

@@ -31,7 +31,8 @@ impl World {
     }
 
     fn recall(&self, cue: &RecallCue) -> Vec<Recalled> {
-        recall(cue, &self.places, &self.modules, &self.settings)
+        let percepts = PerceptMap::default();
+        recall(cue, &self.places, &percepts, &self.modules, &self.settings)
     }
 
     fn rivals(&self, cue: &RecallCue, best: &Recalled) -> Option<Rivals> {
@@ -77,6 +78,7 @@ fn cue(code: PartialCode, limit: usize) -> RecallCue {
     RecallCue {
         position: None,
         code: Some(code),
+        percept: None,
         radius_m: None,
         founder: None,
         since_ns: None,

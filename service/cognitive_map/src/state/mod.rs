@@ -111,6 +111,16 @@ macro_rules! state_of_integer {
 }
 state_of_integer!(u8, u16, u32, u64, u128, i64);
 
+impl State for f32 {
+    fn write(&self, out: &mut StateWriter) {
+        self.to_bits().write(out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        Ok(Self::from_bits(State::read(input)?))
+    }
+}
+
 impl State for f64 {
     fn write(&self, out: &mut StateWriter) {
         self.to_bits().write(out);

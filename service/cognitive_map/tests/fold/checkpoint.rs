@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use cognitive_map::{CheckpointPage, CognitiveMap, CorruptCheckpoint, Settings};
 use proptest::prelude::*;
 
-use crate::journal::{Robot, any_settings, journals, run, settings, sighting};
+use crate::journal::{Robot, any_settings, descriptor, journals, level, run, settings, sighting};
 
 type Store = BTreeMap<(u8, u32), Vec<u8>>;
 
@@ -36,9 +36,18 @@ fn rich_map() -> CognitiveMap {
             robot.go(&mut map, [0.3, 0.0, 0.0], [0.0; 3]);
             let label = format!("landmark-{row}-{}", step % 20);
             robot.sample(&mut map, sighting(&label, [1.0, 2.0, 0.0], 0.1));
+            robot.sample(&mut map, level("touch", f64::from(step), [0.0; 3]));
+            let view: Vec<f32> = (0i16..32)
+                .map(|k| f32::from(k % 7 - i16::try_from(row).unwrap()))
+                .collect();
+            robot.sample(&mut map, descriptor("camera", &view));
         }
     }
     assert!(map.place_count() > 64 && map.landmark_count() > 64 && map.trip_count() >= 6);
+    let remembering = map
+        .places()
+        .filter(|(place, _)| map.remembered(*place).count() == 2);
+    assert!(remembering.count() > 64);
     map
 }
 
@@ -77,7 +86,7 @@ proptest! {
     #[test]
     fn arbitrary_pages_are_refused(
         noise in prop::collection::vec(
-            (0u8..7, prop_oneof![0u32..3, any::<u32>()], prop::collection::vec(any::<u8>(), 0..99)),
+            (0u8..10, prop_oneof![0u32..3, any::<u32>()], prop::collection::vec(any::<u8>(), 0..99)),
             0..9,
         ),
         with_header in any::<bool>(),
@@ -156,8 +165,8 @@ fn only_what_changed_is_saved_again() {
     let mut robot = Robot {
         id: cognitive_map::AgentId(0),
         session: 1,
-        seq: 121,
-        stamp_ns: 12_100_000_000,
+        seq: 241,
+        stamp_ns: 24_100_000_000,
     };
     robot.sample(&mut map, crate::journal::marker("here", false));
     let kinds: Vec<_> = map
@@ -180,9 +189,9 @@ fn wrong_headers_are_told_apart() {
         CognitiveMap::restore(Settings::default(), pages[1..].to_vec()).unwrap_err(),
         CorruptCheckpoint::NoHeader
     );
-    pages[0].bytes[0] = 2;
+    pages[0].bytes[0] = 1;
     assert_eq!(
         CognitiveMap::restore(Settings::default(), pages).unwrap_err(),
-        CorruptCheckpoint::UnknownVersion { found: 2 }
+        CorruptCheckpoint::UnknownVersion { found: 1 }
     );
 }

@@ -58,6 +58,14 @@ pub(crate) fn marker(text: &str, ends_trip: bool) -> SampleBody {
     })
 }
 
+pub(crate) fn level(channel: &str, value: f64, offset_m: [f64; 3]) -> SampleBody {
+    SampleBody::Level(Level::new(label(channel), value, offset_m, None).unwrap())
+}
+
+pub(crate) fn descriptor(channel: &str, vector: &[f32]) -> SampleBody {
+    SampleBody::Descriptor(Descriptor::new(label(channel), vector).unwrap())
+}
+
 /// An agent that writes its samples straight into a map, ten a second.
 pub(crate) struct Robot {
     pub(crate) id: AgentId,
@@ -315,11 +323,16 @@ fn bodies() -> impl Strategy<Value = SampleBody> {
         .prop_map(|t| Motion::from_increment(t, xyzw([0.0; 3]), None).unwrap());
     let velocity = (prop::array::uniform3(-1.0..1.0f64), turn(), 0.0..0.5f64)
         .prop_map(|(v, w, s)| Motion::from_velocity(v, w, s, None).unwrap());
-    let level = (any::<i16>(), prop::array::uniform3(-1.0..1.0f64)).prop_map(|(value, offset)| {
-        Level::new(label("touch"), value.into(), offset, None).unwrap()
+    let value = prop_oneof![9 => any::<i16>().prop_map(f64::from), 1 => -f64::MAX..f64::MAX];
+    let offset = prop_oneof![Just([0.0; 3]), prop::array::uniform3(-1.0..1.0f64)];
+    let level = ("(touch|light)", value, offset)
+        .prop_map(|(channel, value, offset)| level(&channel, value, offset));
+    // Two sorts of camera, and one that shares its channel's label with levels.
+    let vector = prop::collection::vec(-1.0..1.0f32, 8..10);
+    let descriptor = ("(camera|light)", vector).prop_map(|(channel, mut vector)| {
+        vector[0] += 2.0; // never the zero vector
+        descriptor(&channel, &vector)
     });
-    let descriptor = prop::collection::vec(0.1..1.0f32, 8..10)
-        .prop_map(|vector| Descriptor::new(label("camera"), &vector).unwrap());
     let start =
         (prop::array::uniform3(-2.0..2.0f64), turn(), 0.0..1.0f64).prop_map(|(t, r, sd)| {
             StartPose::new(t, xyzw(r), PoseNoise::new([sd; 3], [sd; 3]).unwrap()).unwrap()
@@ -330,8 +343,8 @@ fn bodies() -> impl Strategy<Value = SampleBody> {
         5 => velocity.prop_map(SampleBody::Motion),
         2 => still.prop_map(SampleBody::Motion),
         1 => far.prop_map(SampleBody::Motion),
-        1 => level.prop_map(SampleBody::Level),
-        1 => descriptor.prop_map(SampleBody::Descriptor),
+        5 => level,
+        5 => descriptor,
         4 => sightings().prop_map(SampleBody::Sighting),
         1 => start.prop_map(SampleBody::StartPose),
         1 => marker,

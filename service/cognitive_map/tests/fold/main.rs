@@ -10,6 +10,7 @@ mod determinism; // the same records, the same map
 mod journal; // arbitrary journals, and a robot to write readable ones
 mod landmarks; // what sightings teach
 mod motion; // path integration against closed forms
+mod percepts; // what places learn of percepts, and what they predict
 mod places; // recruitment, revisits
 mod recall; // recall against an exhaustive scan
 mod trips; // legs, and every way a trip ends

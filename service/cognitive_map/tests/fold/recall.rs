@@ -26,6 +26,7 @@ fn cue() -> RecallCue {
     RecallCue {
         position: None,
         code: None,
+        percept: None,
         radius_m: None,
         founder: None,
         since_ns: None,
@@ -59,6 +60,7 @@ fn cues() -> impl Strategy<Value = RecallCue> {
                 RecallCue {
                     position,
                     code,
+                    percept: None,
                     radius_m,
                     founder,
                     since_ns,

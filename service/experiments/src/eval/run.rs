@@ -315,6 +315,7 @@ fn recall(map: &CognitiveMap, code: &GridCode, limit: usize) -> Vec<Recalled> {
     map.recall(&RecallCue {
         position: None,
         code: Some(PartialCode::from(code)),
+        percept: None,
         radius_m: None,
         founder: None,
         since_ns: None,

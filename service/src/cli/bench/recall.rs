@@ -181,6 +181,7 @@ impl Memory {
         let cue = RecallCue {
             position: None,
             code: Some(code),
+            percept: None,
             radius_m: None,
             founder: None,
             since_ns: None,

@@ -84,6 +84,7 @@ impl Writer {
 
     fn publish_events(&mut self) {
         for event in self.events.drain(..) {
+            self.counters.event(&self.map, &event);
             if let Some(event) = readout::event(&self.shared.name, &self.map, &event) {
                 self.shared.outlet.event(&event);
                 // No one listening is no fault.
