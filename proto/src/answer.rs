@@ -140,6 +140,9 @@ pub struct GridModuleState {
     pub phase: [f64; 3],
     /// Activation of the module's cells, in \[0, 1\].
     pub activation: Vec<f64>,
+    /// Activation by the octant model at the agent's position (seed Algorithm 1), in \[0, 1\]: cells as
+    /// wide, high and deep as the spacing, σ a sixth of it, cut-off radius the spacing.
+    pub octant_activation: f64,
 }
 
 /// A trajectory.

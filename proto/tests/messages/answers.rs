@@ -134,6 +134,7 @@ fn grid() -> GridState {
         reference_m: [8.0, -7.0, 0.0],
         phase: [0.25, 0.5, 0.875],
         activation: vec![0.0, 0.125, 1.0],
+        octant_activation: 0.625,
     };
     GridState {
         agent: "robot-1".to_owned(),

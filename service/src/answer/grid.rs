@@ -2,9 +2,10 @@
 
 use cogmap_proto as wire;
 use cognitive_map::grid::heading::heading_rad;
-use cognitive_map::grid::population::{activation, interference_pattern};
+use cognitive_map::grid::octant_activation;
+use cognitive_map::grid::population::{TUNING_WIDTH, activation, interference_pattern};
 use cognitive_map::{Agent, CognitiveMap};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 /// The grid state of an agent; nothing before its first sample.
 pub fn grid_state(map: &CognitiveMap, agent: &Agent) -> Option<wire::GridState> {
@@ -28,6 +29,7 @@ pub fn grid_state(map: &CognitiveMap, agent: &Agent) -> Option<wire::GridState> 
                     .into(),
                 phase: (*state.phase.turns()).into(),
                 activation: activation(lattice, &state.phase).to_vec(),
+                octant_activation: octants(&believed, lattice.spacing_m()),
             })
             .collect(),
         decoded_m: agent.grid().decode(modules).coords.into(),
@@ -37,4 +39,10 @@ pub fn grid_state(map: &CognitiveMap, agent: &Agent) -> Option<wire::GridState> 
         turning_rad: agent.turning_rad(),
         heading_rad: heading_rad(&agent.pose().rotation),
     })
+}
+
+/// The octant model's activation at a position \[m\], tuned as the module's cells are.
+fn octants(position: &Point3<f64>, spacing_m: f64) -> f64 {
+    let cell_m = Vector3::repeat(spacing_m);
+    octant_activation(position, &cell_m, TUNING_WIDTH * spacing_m, spacing_m).activation
 }

@@ -281,6 +281,9 @@ fn trips_landmarks_and_the_grid_agree_with_the_way() {
         grid.heading_rad
     );
     for (module, step) in grid.modules.iter().zip(0..) {
+        // At the origin each of the eight centres is half a cell's diagonal away: √3/2 spacings, or
+        // 3√3 times a sixth.
+        assert!((module.octant_activation - (-13.5_f64).exp()).abs() < 1e-9);
         let spacing_m = settings.grid_spacing_m * settings.grid_ratio.powi(step);
         assert!((module.spacing_m - spacing_m).abs() < EXACT_M);
         assert!(module.phase.iter().all(|turn| (0.0..1.0).contains(turn)));

@@ -19,6 +19,7 @@ mod eval; // the experiments
 mod http; // samples in, answers out
 mod http_guard; // who is let in, and how the service goes
 mod http_ingest; // samples over HTTP alone
+mod percepts; // what was felt and seen, recalled and predicted
 mod zenoh; // estimates, watermarks, queries, events
 
 mod feeding; // a robot that keeps sending; what the drills compare

@@ -242,6 +242,8 @@ class GridModuleState:
     phase: Vec3
     #: Activation of the module's cells, in [0, 1].
     activation: Tuple[float, ...]
+    #: Activation by the octant model at the agent's position (seed Algorithm 1), in [0, 1].
+    octant_activation: float
 
 
 @dataclass(frozen=True)
