@@ -464,3 +464,29 @@ fn links_between_documents_lead_somewhere() {
     }
     assert_none(&found, "Correct the link, or write what it promises.");
 }
+
+#[test]
+fn the_page_of_the_model_names_what_is_there() {
+    let sources = sources();
+    let page = read("docs/model.md");
+    let rows = page.lines().filter(|line| line.starts_with("| "));
+    let (mut found, mut named) = (Vec::new(), 0);
+    for cells in rows.map(|row| row.split('|').skip(2).take(2)) {
+        // Each of the two cells names a file and an item in it, in back quotes.
+        for cell in cells.filter(|cell| cell.contains('`')) {
+            let mut names = cell.split('`').skip(1).step_by(2);
+            let (Some(file), Some(item)) = (names.next(), names.next()) else {
+                found.push(format!("{cell}: no file and item"));
+                continue;
+            };
+            named += 1;
+            let end = format!("/{file}");
+            let mut files = sources.iter().filter(|source| source.path.ends_with(&end));
+            if !files.any(|source| source.text.contains(item)) {
+                found.push(format!("{file}: {item}"));
+            }
+        }
+    }
+    assert!(named > 40, "only {named} items were understood");
+    assert_none(&found, "Name where it is now.");
+}
