@@ -1,8 +1,8 @@
 //! Readings: what a sensor gives, in plain numbers, before anything has judged them.
 
 use cognitive_map::{
-    InvalidSample, Label, Level, Motion, PoseNoise, RangeBearing, Relation, Sample, SampleBody,
-    Sighting, StartPose, Target,
+    Descriptor, InvalidSample, Label, Level, Motion, PoseNoise, RangeBearing, Relation, Sample,
+    SampleBody, Sighting, StartPose, Target,
 };
 
 /// One reading of one robot.
@@ -59,6 +59,13 @@ pub enum ReadingBody {
         channel: String,
         /// Value, in the channel's unit.
         value: f64,
+    },
+    /// A view on a channel, from the body's origin.
+    Descriptor {
+        /// Channel.
+        channel: String,
+        /// The vector, of any length but zero.
+        vector: Vec<f32>,
     },
 }
 
@@ -138,6 +145,9 @@ fn body(body: &ReadingBody) -> Result<SampleBody, InvalidSample> {
         )?),
         ReadingBody::Level { channel, value } => {
             SampleBody::Level(Level::new(Label::new(channel)?, *value, [0.0; 3], None)?)
+        }
+        ReadingBody::Descriptor { channel, vector } => {
+            SampleBody::Descriptor(Descriptor::new(Label::new(channel)?, vector)?)
         }
     })
 }

@@ -40,7 +40,12 @@ fn figures_and_trajectories_are_written() {
 }
 
 #[test]
-fn what_cannot_be_measured_yet_is_refused() {
-    let refused = run(&["eval", "env2", "--percept", "descriptor"]);
+fn views_are_measured_and_what_makes_no_sense_is_refused() {
+    let views = ["eval", "env1", "--percept", "descriptor", "--runs", "2"];
+    let report = run(&[&views[..], &["--json"]].concat()).json();
+    let error_m = report["view_recall_ate_mean_m"]["mean"].as_f64().unwrap();
+    // A view recalls a place in the same part of the room, a step or two of a short walk away.
+    assert!((0.0..2.0).contains(&error_m), "{report}");
+    let refused = run(&[&views[..], &["--percept-noise", "2"]].concat());
     assert_eq!(refused.code(), 2, "{refused:?}");
 }

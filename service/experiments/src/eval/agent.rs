@@ -4,15 +4,17 @@ use nalgebra::Isometry3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::protocol::{Percept, Protocol, SightingSettings, Walk};
+use super::protocol::{Percept, Protocol, SightingSettings, ViewSettings, Walk};
 use crate::reading::{Reading, ReadingBody, ReadingTarget};
-use crate::world::{ObstacleWorld, Odometer, PureWalker, Sensor, Step, Walker};
+use crate::world::{ObstacleWorld, Odometer, PureWalker, Scenery, Sensor, Step, Walker};
 
 /// Time of a step: 10 Hz, which makes 1 m/s.
 const STEP_NS: i64 = 100_000_000;
 /// Standard deviation of azimuth and elevation as a multiple of the range's share: one degree at
 /// five percent \[rad\].
 const BEARING_PER_NOISE_RAD: f64 = std::f64::consts::PI / 180.0 / 0.05;
+/// Channel of views.
+const CHANNEL: &str = "view";
 
 /// A body that walks in either way.
 #[derive(Clone, Debug)]
@@ -26,6 +28,7 @@ enum Body {
 #[derive(Clone, Debug)]
 pub(super) struct Agent {
     world: ObstacleWorld,
+    scenery: Scenery,
     body: Body,
     odometer: Odometer,
     percept: Percept,
@@ -49,6 +52,7 @@ impl Agent {
         };
         Some(Self {
             world,
+            scenery: Scenery::new(seed),
             body,
             odometer: Odometer::new(protocol.odometry, stream(2)).ok()?,
             percept: protocol.percept,
@@ -98,12 +102,29 @@ impl Agent {
         self.steps += 1;
         let stamp_ns = self.stamp_ns();
         let mut readings = vec![self.odometer.read(&step, stamp_ns, STEP_NS as f64 * 1e-9)];
-        if let Percept::Sightings(settings) = self.percept
-            && self.steps.is_multiple_of(settings.every)
-        {
-            self.look(&settings, &mut readings);
+        match self.percept {
+            Percept::Descriptor(views) if self.steps.is_multiple_of(views.every) => {
+                readings.push(self.view(&views));
+            }
+            Percept::Sightings(sightings) if self.steps.is_multiple_of(sightings.every) => {
+                self.look(&sightings, &mut readings);
+            }
+            _ => {}
         }
         readings
+    }
+
+    /// Sees the room.
+    fn view(&mut self, settings: &ViewSettings) -> Reading {
+        let from_m = self.pose().translation.vector;
+        let vector = self.scenery.view(&from_m, settings.noise, &mut self.eyes);
+        Reading {
+            stamp_ns: self.stamp_ns(),
+            body: ReadingBody::Descriptor {
+                channel: CHANNEL.to_owned(),
+                vector,
+            },
+        }
     }
 
     /// Sights every obstacle within range.

@@ -40,7 +40,7 @@ const SHOWN_HIGH: &str = "\"high\"";
 const SILENT: &str = "";
 
 /// All figures of merit, in the order of the table.
-pub const MEASURES: [Measure; 25] = {
+pub const MEASURES: [Measure; 28] = {
     use Over::{End, Max, Mean, Rmse};
     use Quantity as Q;
     [
@@ -196,6 +196,27 @@ pub const MEASURES: [Measure; 25] = {
             "steps that ended at a known location",
             Q::Revisits,
             End,
+            [SILENT; 2],
+        ),
+        of_steps(
+            "view_recall_ate_mean_m",
+            "recall by a view alone, mean ATE [m]",
+            Q::ViewRecallError,
+            Mean,
+            [SILENT; 2],
+        ),
+        of_steps(
+            "view_recall_ate_rmse_m",
+            "recall by a view alone, RMSE [m]",
+            Q::ViewRecallError,
+            Rmse,
+            [SILENT; 2],
+        ),
+        of_steps(
+            "view_surprise_mean",
+            "surprise of views, 1 - cosine, mean",
+            Q::ViewSurprise,
+            Mean,
             [SILENT; 2],
         ),
         of_steps(

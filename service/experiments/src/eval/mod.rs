@@ -54,7 +54,9 @@ pub use environment::Environment;
 pub use experiment::{Experiment, ExperimentError};
 pub use figure::{Figure, FigureError, figures};
 pub use measure::{MEASURES, Measure};
-pub use protocol::{InvalidProtocol, PAPER_P_NEW, Percept, Protocol, SightingSettings, Walk};
+pub use protocol::{
+    InvalidProtocol, PAPER_P_NEW, Percept, Protocol, SightingSettings, ViewSettings, Walk,
+};
 pub use quantity::Quantity;
 pub use report::{PaperAte, Report};
 pub use run::{Path, RunError};

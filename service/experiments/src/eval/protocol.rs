@@ -24,12 +24,21 @@ pub enum Walk {
 pub enum Percept {
     /// Nothing.
     None,
-    /// Views. The map counts descriptors and uses none, so that there is nothing to test by them
-    /// and such a protocol is refused.
-    Descriptor,
+    /// Views of the room ([`crate::world::Scenery`]). Places remember them, and each recalls a place;
+    /// the map does not correct poses by them.
+    Descriptor(ViewSettings),
     /// The centres of obstacles, as landmarks. The map learns where they are; it does not correct
     /// poses by them.
     Sightings(SightingSettings),
+}
+
+/// How the room is seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewSettings {
+    /// The room is seen at every step whose number divides by this.
+    pub every: u64,
+    /// Length of a view's noise, as a share of the view's own.
+    pub noise: f64,
 }
 
 /// How obstacles are sighted: from any side, and through each other.
@@ -84,11 +93,9 @@ pub enum InvalidProtocol {
     /// A noise is none.
     #[error("odometry noise must be from 0 to 1 (share of a step, radians a step)")]
     Odometry,
-    /// Percepts that the map does not use.
-    #[error(
-        "the map does not use descriptors yet, so that --percept descriptor would change nothing"
-    )]
-    Descriptor,
+    /// Views that make no sense.
+    #[error("views need an interval of at least one step and a noise from 0 to 1")]
+    View,
     /// Sightings without anything to sight.
     #[error("there are no obstacles to sight in env1")]
     NothingToSight,
@@ -128,8 +135,10 @@ impl Protocol {
         if self.odometry.check().is_err() {
             return Err(InvalidProtocol::Odometry);
         }
-        if self.percept == Percept::Descriptor {
-            return Err(InvalidProtocol::Descriptor);
+        if let Percept::Descriptor(views) = &self.percept
+            && (!(0.0..=1.0).contains(&views.noise) || views.every == 0)
+        {
+            return Err(InvalidProtocol::View);
         }
         if let Percept::Sightings(sightings) = &self.percept {
             if self.environment == Environment::GridAligned {

@@ -51,11 +51,16 @@ pub enum Quantity {
     Revisits,
     /// Landmarks in memory.
     Landmarks,
+    /// Distance from p of the place that a view recalls by itself, before it is learned \[m\].
+    ViewRecallError,
+    /// How far a view is from what the place there remembers, before it is learned: one minus the
+    /// cosine.
+    ViewSurprise,
 }
 
 impl Quantity {
     /// All of them, in the order of their declaration.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::RecallError,
         Self::OracleError,
         Self::PredictionError,
@@ -73,6 +78,8 @@ impl Quantity {
         Self::UniqueLocations,
         Self::Revisits,
         Self::Landmarks,
+        Self::ViewRecallError,
+        Self::ViewSurprise,
     ];
 
     /// Its position in [`Quantity::ALL`].

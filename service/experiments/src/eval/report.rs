@@ -97,7 +97,7 @@ impl Report {
             field_radius_m: protocol.settings.field_radius_m,
             percept: match protocol.percept {
                 Percept::None => "none",
-                Percept::Descriptor => "descriptor",
+                Percept::Descriptor(_) => "descriptor",
                 Percept::Sightings(_) => "sightings",
             },
             translation_noise: protocol.odometry.translation_share,

@@ -6,8 +6,8 @@ use cognitive_map::grid::population::{TUNING_WIDTH, interference_pattern, popula
 use cognitive_map::grid::similarity::{cosine, exponential_confidence};
 use cognitive_map::grid::{GridCode, GridModules, PartialCode, decode};
 use cognitive_map::{
-    AgentId, CognitiveMap, Event, InvalidSample, Label, PlaceId, RecallCue, Recalled, Record,
-    Sample,
+    AgentId, CognitiveMap, Descriptor, Event, EventKind, InvalidSample, Label, PerceptCue, PlaceId,
+    RecallCue, Recalled, Record, Sample,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -18,7 +18,7 @@ use super::quantity::{Each, Quantity};
 use super::tally::Tally;
 use super::territory::Territory;
 use crate::metrics::{DeadReckoning, StampedPose};
-use crate::reading::Reading;
+use crate::reading::{Reading, ReadingBody};
 use crate::world::Cube;
 
 /// The only agent of a map.
@@ -191,14 +191,23 @@ impl Trial {
     /// Makes a step and measures.
     fn step(&mut self, path: Option<&mut Path>) -> Result<Each<Option<f64>>, RunError> {
         let places_before = self.map.place_count();
+        let mut values = Each::default();
         let mut events = Vec::new();
         for reading in self.agent.step() {
+            if let ReadingBody::Descriptor { channel, vector } = &reading.body {
+                let view = Descriptor::new(Label::new(channel)?, vector)?;
+                self.measure_view(view, &mut values);
+            }
             self.apply(&reading, &mut events)?;
         }
         self.steps += 1;
         let pose = self.agent.pose();
         let truth_m = pose.translation.vector;
-        let mut values = Each::default();
+        let surprises = events.iter().filter_map(|event| match event.kind {
+            EventKind::PerceptCompared { surprise, .. } => Some(surprise),
+            _ => None,
+        });
+        values[Quantity::ViewSurprise] = surprises.last();
         self.measure_pose(&truth_m, &mut values);
         let winner = self.measure_recall(&truth_m, places_before, &mut values);
         self.measure_memory(&truth_m, &mut values);
@@ -267,6 +276,18 @@ impl Trial {
         Some(winner.place)
     }
 
+    /// How far the place lies that a view recalls by itself, before the map learns the view.
+    fn measure_view(&self, view: Descriptor, values: &mut Each<Option<f64>>) {
+        let recalled = self.map.recall(&RecallCue {
+            percept: Some(PerceptCue::Descriptor(view)),
+            ..nothing(1)
+        });
+        let truth_m = self.agent.pose().translation.vector;
+        values[Quantity::ViewRecallError] = recalled
+            .first()
+            .and_then(|recalled| self.distance_m(recalled.place, &truth_m));
+    }
+
     /// How much the memory holds.
     fn measure_memory(&mut self, truth_m: &Vector3<f64>, values: &mut Each<Option<f64>>) {
         self.territory.visit(truth_m);
@@ -313,15 +334,23 @@ impl Trial {
 /// The places that a grid code recalls, best first, and nothing but the code.
 fn recall(map: &CognitiveMap, code: &GridCode, limit: usize) -> Vec<Recalled> {
     map.recall(&RecallCue {
-        position: None,
         code: Some(PartialCode::from(code)),
+        ..nothing(limit)
+    })
+}
+
+/// A cue that says nothing.
+fn nothing(limit: usize) -> RecallCue {
+    RecallCue {
+        position: None,
+        code: None,
         percept: None,
         radius_m: None,
         founder: None,
         since_ns: None,
         until_ns: None,
         limit,
-    })
+    }
 }
 
 /// σ of seed Eq. 9 that makes exp(−d/σ) one half for the cosine distance d that codes a field radius

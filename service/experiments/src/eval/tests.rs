@@ -235,6 +235,25 @@ fn sighted_obstacles_become_landmarks() {
 }
 
 #[test]
+fn views_recall_places_that_are_near() {
+    let of = |noise, recruitment| {
+        let mut protocol = Protocol::of_paper(Environment::ObstacleRich);
+        protocol.percept = Percept::Descriptor(ViewSettings { every: 5, noise });
+        protocol.settings.recruitment = recruitment;
+        Report::of(&experiment(&protocol, 3, 2))
+    };
+    let report = of(0.0, Recruitment::Novelty);
+    let error_m = |report: &Report| report.mean("view_recall_ate_mean_m").unwrap();
+    // Most steps of a random walk lead back to where something has been seen before.
+    assert!(error_m(&report) < 0.5, "{report:?}");
+    assert!(report.mean("view_surprise_mean").unwrap() < 0.1);
+    let noisy = of(0.5, Recruitment::Novelty);
+    assert!(error_m(&noisy) > error_m(&report));
+    let surprise = noisy.mean("view_surprise_mean").unwrap();
+    assert!(surprise > report.mean("view_surprise_mean").unwrap());
+}
+
+#[test]
 fn senseless_protocols_are_refused() {
     let paper = Protocol::of_paper(Environment::GridAligned);
     let refused = |protocol: &Protocol| protocol.check().unwrap_err();
@@ -249,11 +268,13 @@ fn senseless_protocols_are_refused() {
         ..paper.clone()
     };
     assert_eq!(refused(&blind), InvalidProtocol::NothingToSight);
-    let seeing = Protocol {
-        percept: Percept::Descriptor,
-        ..paper.clone()
-    };
-    assert_eq!(refused(&seeing), InvalidProtocol::Descriptor);
+    for (every, noise) in [(0, 0.1), (5, 1.5), (5, f64::NAN)] {
+        let seeing = Protocol {
+            percept: Percept::Descriptor(ViewSettings { every, noise }),
+            ..paper.clone()
+        };
+        assert_eq!(refused(&seeing), InvalidProtocol::View);
+    }
     let never = Protocol {
         environment: Environment::ObstacleRich,
         percept: Percept::Sightings(SightingSettings {

@@ -20,6 +20,7 @@
 mod obstacle;
 mod odometry;
 mod pure_walk;
+mod scenery;
 mod sensor;
 mod steering;
 mod team;
@@ -28,6 +29,7 @@ mod walker;
 pub use obstacle::{Beacon, Cube, ObstacleWorld, SIDE_M};
 pub use odometry::{InvalidNoise, Odometer, OdometryNoise};
 pub use pure_walk::PureWalker;
+pub use scenery::Scenery;
 pub use sensor::{InvalidSensor, Sensor};
 pub use team::{InvalidTeam, RobotTick, StartKnowledge, Team, TeamSettings};
 pub use walker::{BODY_RADIUS_M, STEP_M, Step, Walker};

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use cogmap_experiments::eval::{
-    Environment, Experiment, PAPER_P_NEW, Percept, Protocol, Report, SightingSettings, Table, Walk,
-    figures,
+    Environment, Experiment, PAPER_P_NEW, Percept, Protocol, Report, SightingSettings, Table,
+    ViewSettings, Walk, figures,
 };
 use cogmap_experiments::metrics::StampedPose;
 use cogmap_experiments::tum::write_tum;
@@ -34,11 +34,11 @@ pub(in crate::cli) struct RoomArgs {
     /// How far obstacles are sighted [m].
     #[arg(long, default_value_t = SightingSettings::default().range_max_m, value_name = "M")]
     sighting_range_m: f64,
-    /// Obstacles are sighted at every step whose number divides by this.
+    /// Obstacles are sighted, and the room seen, at every step whose number divides by this.
     #[arg(long, default_value_t = SightingSettings::default().every, value_name = "STEPS")]
     sighting_every: u64,
     /// Standard deviation of a sighting's distance, as a share of it; directions have one of 1° at
-    /// 0.05, and in proportion.
+    /// 0.05, and in proportion. Of a view, length of its noise as a share of its own.
     #[arg(long, default_value_t = SightingSettings::default().noise, value_name = "SHARE")]
     percept_noise: f64,
     /// Standard deviation of odometry along each axis, as a share of the step.
@@ -107,7 +107,7 @@ enum WalkKind {
 enum PerceptKind {
     /// Nothing.
     None,
-    /// Views. The map does not use them yet, so that they are refused.
+    /// Views of the room, which places remember and are recalled by. They do not correct poses yet.
     Descriptor,
     /// The centres of obstacles, as landmarks (env2). They do not correct poses yet.
     Sightings,
@@ -161,7 +161,10 @@ fn protocol(environment: Environment, args: &RoomArgs) -> Protocol {
         },
         percept: match args.percept {
             PerceptKind::None => Percept::None,
-            PerceptKind::Descriptor => Percept::Descriptor,
+            PerceptKind::Descriptor => Percept::Descriptor(ViewSettings {
+                every: args.sighting_every,
+                noise: args.percept_noise,
+            }),
             PerceptKind::Sightings => Percept::Sightings(SightingSettings {
                 range_max_m: args.sighting_range_m,
                 every: args.sighting_every,

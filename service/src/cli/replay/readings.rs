@@ -2,7 +2,8 @@
 
 use cogmap_experiments::reading::{Reading, ReadingBody, ReadingTarget};
 use cogmap_proto::{
-    Level, MotionNoise, Relation, Sample, SampleBody, Sighting, StartPose, Target, Velocity,
+    Descriptor, Level, MotionNoise, Relation, Sample, SampleBody, Sighting, StartPose, Target,
+    Velocity,
 };
 
 /// The sample that a robot would send for a reading.
@@ -58,6 +59,10 @@ pub(in crate::cli) fn sample_of(reading: &Reading) -> Sample {
             value: *value,
             offset_m: [0.0; 3],
             normal: None,
+        }),
+        ReadingBody::Descriptor { channel, vector } => SampleBody::Descriptor(Descriptor {
+            channel: channel.clone(),
+            vector: vector.clone(),
         }),
     };
     Sample {
