@@ -3,7 +3,8 @@
 
 The judge is `GridScorer` of NeuralPlayground: it rotates a rate map's autocorrelation, and subtracts
 the largest correlation at 30°, 90° and 150° from the smallest at 60° and 120°. Every module is asked
-for more than 1 in its layers; the program ends with 1 where that fails.
+for more than 1 in its hexagonal layers, and for less than 0 where the same fields lie in squares; the
+program ends with 1 where that fails.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ import rate_map
 from grid import Floats, Grid
 from service import BINARY, service
 
-#: What is asked of every module in its layers.
-_ASKED = 1.0
+#: What the gridness of every module's layers has to be above, and that of its squares below.
+_HEXAGONS_ABOVE = 1.0
+_SQUARES_BELOW = 0.0
 #: Edge of a rate map in spacings: a whole number of fields along it, and more than the ring of six
 #: around the middle that the judge looks at.
 _EDGE_SPACINGS = 4.0
@@ -78,18 +80,27 @@ def main() -> int:
             name = f"module-{slice_.module}-{slice_.kind}.csv"
             np.savetxt(args.out / name, rates, fmt="%.6f", delimiter=",")
 
-    layers = [verdict.gridness for verdict in verdicts if verdict.slice == "layer"]
-    passed = all(gridness is not None and gridness > _ASKED for gridness in layers)
+    passed = all(map(_holds, verdicts))
     report = {
         "cell": args.cell,
         "bins": args.bins,
         "edge_spacings": _EDGE_SPACINGS,
-        "asked": _ASKED,
+        "hexagons_above": _HEXAGONS_ABOVE,
+        "squares_below": _SQUARES_BELOW,
         "passed": passed,
         "verdicts": [asdict(verdict) for verdict in verdicts],
     }
     print(json.dumps(report) if args.json else _text(report))
     return 0 if passed else 1
+
+
+def _holds(verdict: Verdict) -> bool:
+    """Whether a rate map has what is asked of its slice; nothing is, where the cut is oblique."""
+    if verdict.slice == "layer":
+        return verdict.gridness is not None and verdict.gridness > _HEXAGONS_ABOVE
+    if verdict.slice == "square":
+        return verdict.gridness is not None and verdict.gridness < _SQUARES_BELOW
+    return True
 
 
 def _judge(rates: Floats, spacing_m: float) -> Tuple[Optional[float], Optional[float]]:
@@ -123,8 +134,11 @@ def _text(report: Dict[str, Any]) -> str:
             f"{module:>6}  {verdict['spacing_m']:>11.3f}  {verdict['slice']:<10}{gridness:>10}"
             f"{judged_m:>20}"
         )
-    words = "every layer has" if report["passed"] else "NOT every layer has"
-    lines.append(f"{words} a gridness above {report['asked']:g}")
+    words = "Asked and found" if report["passed"] else "Asked, but NOT found"
+    lines.append(
+        f"{words}: above {report['hexagons_above']:g} in every layer, below "
+        f"{report['squares_below']:g} in every square."
+    )
     return "\n".join(lines)
 
 

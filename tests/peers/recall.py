@@ -66,6 +66,8 @@ def main() -> int:
     parser.add_argument("--places", type=_numbers, default=sizes, help="numbers of places: 1000,…")
     parser.add_argument("--queries", type=int, default=2_000, help="queries at each number")
     parser.add_argument("--ef-search", type=_numbers, default=[16, 64, 256], help="of HNSW")
+    most = "leave HNSW out above this number of places: building it takes minutes from 100,000 on"
+    parser.add_argument("--hnsw-most", type=int, default=sys.maxsize, help=most)
     parser.add_argument("--rounds", type=int, default=20, help="cogmap's, of 1,000 queries")
     parser.add_argument("--seed", type=int, default=1, help="of places and queries")
     parser.add_argument("--patience", type=float, default=20.0, help="most time for one row [s]")
@@ -170,9 +172,11 @@ def _compare(
 
     scanned = index.flat(codes, queries, args.patience)
     yield row(scanned, scanned.winners)
-    for measured in index.hnsw(codes, queries, args.ef_search, args.patience):
-        yield row(measured, scanned.winners)
     yield row(index.tree(drawn.places, drawn.queries, args.patience), None)
+    if size <= args.hnsw_most:
+        _progress(f"building HNSW of {size} places")
+        for measured in index.hnsw(codes, queries, args.ef_search, args.patience):
+            yield row(measured, scanned.winners)
 
 
 def _quantile(values: Floats, q: float) -> float:
