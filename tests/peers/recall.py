@@ -37,7 +37,8 @@ _CHECKED_PLACES = 500
 
 @dataclass(frozen=True)
 class Row:
-    """One way to find places, at one number of them."""
+    """One way to find places, at one number of them. Times are elapsed ones of cogmap, as the benchmark
+    tells them, and processor times of its peers."""
 
     places: int
     name: str
@@ -45,7 +46,7 @@ class Row:
     us_p99: float
     #: `us_p50` over that of cogmap at the same number of places.
     times_cogmap: float
-    #: Of one question when all are asked in one call; there is no such call to cogmap.
+    #: Mean time of one question when all are asked in one call; cogmap has no such call.
     us_in_batch: Optional[float]
     #: Single questions that were timed.
     asked: int
