@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -28,6 +29,8 @@ def service(binary: Path) -> Iterator[Server]:
     Args:
         binary: The program `cogmap`.
     """
+    # A comparison that is told to end takes what it has started with it.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     # Where the end-to-end tests look for it.
     os.environ["COGMAP_BIN"] = str(binary)
     with tempfile.TemporaryDirectory(prefix="cogmap-peers-") as home:
