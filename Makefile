@@ -11,6 +11,7 @@ PYTHON ?= python3
 VENV := $(CURDIR)/.venv
 TARGET := $(abspath $(or $(CARGO_TARGET_DIR),target))
 CLIENT := clients/python
+PEERS := tests/peers
 
 # The end-to-end tests of both languages start this binary.
 export COGMAP_BIN := $(TARGET)/debug/cogmap
@@ -75,6 +76,21 @@ bench: release ## the benchmarks, each beside its yardstick; ARGS="--json"
 	$(TARGET)/release/cogmap bench ingest $(ARGS)
 	$(TARGET)/release/cogmap bench http $(ARGS)
 
+# Peers are large packages, so they have a venv of their own and no part in the gate.
+.PHONY: peers
+peers: release $(PEERS)/.venv/installed ## cogmap beside its peers in the same run, for minutes; ARGS="--json"
+	cd $(PEERS) && .venv/bin/mypy .
+	$(PEERS)/.venv/bin/python $(PEERS)/recall.py --binary $(TARGET)/release/cogmap $(ARGS)
+	$(PEERS)/.venv/bin/python $(PEERS)/gridness.py --binary $(TARGET)/release/cogmap $(ARGS)
+
+$(PEERS)/.venv/installed: $(PEERS)/requirements.txt $(PEERS)/judge.txt $(CLIENT)/pyproject.toml
+	$(PYTHON) -m venv --clear $(PEERS)/.venv
+	$(PEERS)/.venv/bin/pip install --quiet --disable-pip-version-check \
+	    --requirement $(PEERS)/requirements.txt --editable $(CLIENT)
+	$(PEERS)/.venv/bin/pip install --quiet --disable-pip-version-check \
+	    --no-deps --requirement $(PEERS)/judge.txt
+	touch $@
+
 .PHONY: release
 release: ## the binary, optimised
 	cargo build --release --package cogmap --bin cogmap
@@ -90,4 +106,4 @@ fmt: ## format the Rust code
 .PHONY: clean
 clean: ## remove what was built
 	cargo clean
-	rm -rf $(VENV) $(CLIENT)/.mypy_cache $(CLIENT)/.pytest_cache
+	rm -rf $(VENV) $(PEERS)/.venv $(PEERS)/.mypy_cache $(CLIENT)/.mypy_cache $(CLIENT)/.pytest_cache

@@ -46,6 +46,11 @@ pub(in crate::cli) struct RecallArgs {
 struct Report {
     /// What a query is.
     query: &'static str,
+    /// Density of the places: with the seed, it says where they lie.
+    places_per_m3: f64,
+    /// Standard deviation of a query's position from the stored one, along each axis.
+    jitter_m: f64,
+    seed: u64,
     rows: Vec<Row>,
 }
 
@@ -86,6 +91,9 @@ pub(super) fn run(args: &RecallArgs) -> anyhow::Result<()> {
     if args.json {
         return output::json(&Report {
             query: "whole code of a stored position, shifted by 5 cm (sd) along each axis",
+            places_per_m3: PLACES_PER_M3,
+            jitter_m: JITTER_M,
+            seed: args.seed,
             rows,
         });
     }
