@@ -73,6 +73,7 @@ serve: release ## the service; ARGS="--config service/cogmap.toml"
 bench: release ## the benchmarks, each beside its yardstick; ARGS="--json"
 	$(TARGET)/release/cogmap bench step $(ARGS)
 	$(TARGET)/release/cogmap bench recall $(ARGS)
+	$(TARGET)/release/cogmap bench descriptors $(ARGS)
 	$(TARGET)/release/cogmap bench ingest $(ARGS)
 	$(TARGET)/release/cogmap bench http $(ARGS)
 

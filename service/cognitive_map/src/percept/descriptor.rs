@@ -1,9 +1,11 @@
 //! What places remember of a channel of descriptors, laid out for a scan.
 //!
 //! Directions lie one behind the other in blocks of 16 KiB. A search multiplies the cue with every
-//! one of them: exact, the same on every run, and as fast as memory is read.
+//! one of them: exact, the same on every run, and as fast as memory is read. Where there are so many
+//! that this takes long, the cue is compared with sketches first, and multiplied with the nearest.
 
 use super::level::next_slot;
+use super::sketch::{Sketcher, Sketches};
 use super::slots::Slots;
 use crate::paged::PagedVec;
 use crate::place::PlaceId;
@@ -52,6 +54,9 @@ pub(super) struct DescriptorMemory {
     blocks: PagedVec<Block, 1>,
     len: usize,
     slots: Slots,
+    sketcher: Sketcher,
+    /// Of the sums, by slot. They follow from them.
+    sketches: Sketches,
 }
 
 impl DescriptorMemory {
@@ -62,6 +67,8 @@ impl DescriptorMemory {
             blocks: PagedVec::default(),
             len: 0,
             slots: Slots::default(),
+            sketcher: Sketcher::new(dimension.into()),
+            sketches: Sketches::default(),
         }
     }
 
@@ -126,6 +133,8 @@ impl DescriptorMemory {
             block.push(place);
         }
         block.strengthen(slot % rows, vector, weight);
+        let sketch = self.sketcher.sketch(block.sum(slot % rows));
+        self.sketches.set(slot, sketch);
         true
     }
 
@@ -144,6 +153,22 @@ impl DescriptorMemory {
         })
     }
 
+    /// As [`Self::cosines`], of the `count` places whose sketches are nearest to the cue's, and of those
+    /// that are equally near.
+    pub(super) fn cosines_of_nearest<'a>(
+        &'a self,
+        vector: &'a [f32],
+        count: usize,
+    ) -> impl Iterator<Item = (PlaceId, f64)> + 'a {
+        let rows = rows_per_block(self.dimension);
+        let cue = self.sketcher.sketch(vector);
+        let near = self.sketches.nearest(&cue, self.len, count);
+        near.into_iter().filter_map(move |slot| {
+            let (block, row) = (self.blocks.get(slot / rows)?, slot % rows);
+            Some((block.traces.get(row)?.place, block.cosine(row, vector)))
+        })
+    }
+
     /// Appends a checkpoint's page. A place that comes twice is refused.
     pub(super) fn push_page(&mut self, bytes: &[u8], revision: u64) -> Result<(), CorruptState> {
         let rows = rows_per_block(self.dimension);
@@ -156,12 +181,14 @@ impl DescriptorMemory {
         if block.dimension != self.dimension || block.traces.is_empty() {
             return Err(CorruptState::Invalid);
         }
-        for trace in &block.traces {
+        for (row, trace) in block.traces.iter().enumerate() {
             let slot = next_slot(self.len, usize::MAX).ok_or(CorruptState::Invalid)?;
             if self.slots.get(trace.place).is_some() {
                 return Err(CorruptState::Invalid);
             }
             self.slots.set(trace.place, slot);
+            let sketch = self.sketcher.sketch(block.sum(row));
+            self.sketches.set(slot as usize, sketch);
             self.len += 1;
         }
         Ok(())

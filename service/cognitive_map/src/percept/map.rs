@@ -17,6 +17,12 @@ pub(crate) const CHANNEL_PAGE: usize = 8;
 /// Most pages of a channel's memory: what the index of a checkpoint's page leaves room for. At least
 /// 6·10⁷ places can remember something of a channel.
 pub(crate) const CHANNEL_PAGES_MAX: u32 = 1 << 26;
+/// Up to so many descriptors of a channel are all compared with a cue.
+const SCAN_MAX: usize = 100_000;
+/// Beyond that, so many for each place of the answer, and these at least.
+const CANDIDATES_PER_ANSWER: usize = 64;
+/// See [`CANDIDATES_PER_ANSWER`].
+const CANDIDATES_MIN: usize = 2048;
 
 /// What places remember of what was felt and seen. A clone shares all pages.
 #[derive(Clone, Debug, Default)]
@@ -115,7 +121,11 @@ impl PerceptMap {
 
     /// The places that remember something of the cue's channel, and how well each fits the cue: for
     /// a level its likelihood, for a descriptor the cosine.
-    pub(crate) fn matches(&self, cue: &PerceptCue) -> Vec<(PlaceId, f64)> {
+    ///
+    /// Where only the best `few` matter and a channel has more than [`SCAN_MAX`] descriptors, places are
+    /// left out whose sketches are far from the cue's: the answer is then one to count on, and no
+    /// longer a certain one.
+    pub(crate) fn matches(&self, cue: &PerceptCue, few: Option<usize>) -> Vec<(PlaceId, f64)> {
         let (label, kind) = match cue {
             PerceptCue::Level { channel, .. } => (channel, ChannelKind::Level),
             PerceptCue::Descriptor(descriptor) => (descriptor.channel(), kind_of(descriptor)),
@@ -128,9 +138,19 @@ impl PerceptMap {
                 .likelihoods(*value, channel.level_sd_floor())
                 .collect(),
             (PerceptCue::Descriptor(descriptor), Memory::Descriptors(memory), _) => {
-                let mut found = Vec::with_capacity(memory.len());
-                found.extend(memory.cosines(descriptor.vector()));
-                found
+                let vector = descriptor.vector();
+                match few {
+                    Some(few) if memory.len() > SCAN_MAX => {
+                        let count = few.saturating_mul(CANDIDATES_PER_ANSWER);
+                        let count = count.max(CANDIDATES_MIN);
+                        memory.cosines_of_nearest(vector, count).collect()
+                    }
+                    _ => {
+                        let mut found = Vec::with_capacity(memory.len());
+                        found.extend(memory.cosines(vector));
+                        found
+                    }
+                }
             }
             _ => Vec::new(),
         }

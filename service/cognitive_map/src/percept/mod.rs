@@ -10,6 +10,7 @@ mod descriptor;
 mod level;
 mod map;
 mod moments;
+mod sketch;
 mod slots;
 
 pub use channel::{Channel, ChannelId, ChannelKind};

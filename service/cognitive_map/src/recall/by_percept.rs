@@ -7,7 +7,7 @@ use crate::grid::similarity::CodeCue;
 use crate::place::{PlaceId, confidence};
 
 use super::by_code::CodeRecall;
-use super::{Asked, Recalled};
+use super::{Asked, RecallCue, Recalled};
 
 /// How well a place answers.
 struct Fit {
@@ -18,6 +18,24 @@ struct Fit {
 }
 
 impl Asked<'_> {
+    /// How many of the percept's best matches decide the answer; unknown where the best by the percept
+    /// alone may be left out, or beaten by others.
+    pub(super) fn few_by_percept(&self) -> Option<usize> {
+        let RecallCue {
+            position: None,
+            code: None,
+            founder: None,
+            since_ns: None,
+            until_ns: None,
+            limit,
+            ..
+        } = self.cue
+        else {
+            return None;
+        };
+        Some(*limit)
+    }
+
     /// Of the places that remember something of the percept's channel, ranked by the product of all
     /// confidences, and where they have faded to nothing by how well the percept fits, then by
     /// distance. `matches` are those places and how well it fits each of them.

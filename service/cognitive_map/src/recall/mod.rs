@@ -95,7 +95,7 @@ pub(crate) fn recall(
         settings,
     };
     if let Some(percept) = &cue.percept {
-        return asked.by_percept(percepts.matches(percept));
+        return asked.by_percept(percepts.matches(percept, asked.few_by_percept()));
     }
     match (&cue.position, &cue.code) {
         (Some(position), None) => asked.by_position(position),

@@ -15,6 +15,8 @@ const STEP_NS: i64 = 100_000_000;
 const BEARING_PER_NOISE_RAD: f64 = std::f64::consts::PI / 180.0 / 0.05;
 /// Channel of views.
 const CHANNEL: &str = "view";
+/// Numbers of a view.
+const VIEW_NUMBERS: usize = 64;
 
 /// A body that walks in either way.
 #[derive(Clone, Debug)]
@@ -52,7 +54,7 @@ impl Agent {
         };
         Some(Self {
             world,
-            scenery: Scenery::new(seed),
+            scenery: Scenery::new(seed, VIEW_NUMBERS),
             body,
             odometer: Odometer::new(protocol.odometry, stream(2)).ok()?,
             percept: protocol.percept,

@@ -203,11 +203,11 @@ impl Trial {
         self.steps += 1;
         let pose = self.agent.pose();
         let truth_m = pose.translation.vector;
-        let surprises = events.iter().filter_map(|event| match event.kind {
+        let mut surprises = events.iter().filter_map(|event| match event.kind {
             EventKind::PerceptCompared { surprise, .. } => Some(surprise),
             _ => None,
         });
-        values[Quantity::ViewSurprise] = surprises.last();
+        values[Quantity::ViewSurprise] = surprises.next_back();
         self.measure_pose(&truth_m, &mut values);
         let winner = self.measure_recall(&truth_m, places_before, &mut values);
         self.measure_memory(&truth_m, &mut values);

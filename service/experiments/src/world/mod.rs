@@ -17,6 +17,7 @@
 //!   beyond its place memory; robots that are to keep their drift bounded need some.
 //! - **Noise**: the paper names none for its odometry; see [`OdometryNoise`].
 
+mod eye;
 mod obstacle;
 mod odometry;
 mod pure_walk;
@@ -26,6 +27,7 @@ mod steering;
 mod team;
 mod walker;
 
+pub use eye::Eye;
 pub use obstacle::{Beacon, Cube, ObstacleWorld, SIDE_M};
 pub use odometry::{InvalidNoise, Odometer, OdometryNoise};
 pub use pure_walk::PureWalker;

@@ -7,8 +7,6 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// Numbers of a view.
-const DIMENSION: usize = 64;
 /// How far one must go for a view to be another: at this distance two have a cosine of 0.6 \[m\].
 const CORRELATION_M: f64 = 1.0;
 
@@ -17,7 +15,7 @@ const CORRELATION_M: f64 = 1.0;
 /// A view has cos(wᵢ·x + bᵢ) as its numbers, with wᵢ normal of deviation 1/ℓ along each axis and bᵢ
 /// uniform, so that the cosine of two views is exp(−|Δx|²/2ℓ²) on average over the features: random
 /// Fourier features of a Gaussian kernel (Rahimi & Recht 2007). Views of places far apart are
-/// unrelated, up to a cosine of 1/√64 by chance. They do not depend on the direction of looking, as
+/// unrelated, up to a cosine of 1/√n by chance, where n is the number of numbers. They do not depend on the direction of looking, as
 /// those of an eye that looks to every side.
 #[derive(Clone, Debug)]
 pub struct Scenery {
@@ -25,12 +23,12 @@ pub struct Scenery {
 }
 
 impl Scenery {
-    /// The scenery of a seed.
-    pub fn new(seed: u64) -> Self {
+    /// The scenery of a seed, in views of so many numbers.
+    pub fn new(seed: u64, dimension: usize) -> Self {
         // Obstacles have stream 0 of the same seed, and agents have theirs.
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(u64::MAX);
-        let features = (0..DIMENSION).map(|_| {
+        let features = (0..dimension).map(|_| {
             let wave = normal(&mut random) / CORRELATION_M;
             (wave, random.random_range(0.0..TAU))
         });
@@ -41,7 +39,7 @@ impl Scenery {
 
     /// The view from a position \[m\], with noise of a length that is on average `noise` of the view's.
     pub fn view(&self, from_m: &Vector3<f64>, noise: f64, random: &mut impl Rng) -> Vec<f32> {
-        // Half of the squares of cosines is their mean, so a view is about √32 long.
+        // Half of the squares of cosines is their mean, so a view of n numbers is about √(n/2) long.
         let sd = noise / std::f64::consts::SQRT_2;
         let feature = |(wave, shift): &(Vector3<f64>, f64)| (wave.dot(from_m) + shift).cos();
         let seen = self.features.iter().map(|each| {
@@ -71,7 +69,10 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut mean = |apart_m: f64, noise: f64, other: bool| {
             let cosines = (0..400).map(|seed| {
-                let (here, there) = (Scenery::new(seed), Scenery::new(seed + u64::from(other)));
+                let (here, there) = (
+                    Scenery::new(seed, 64),
+                    Scenery::new(seed + u64::from(other), 64),
+                );
                 let from = normal(&mut random) * 5.0;
                 let to = from + normal(&mut random).normalize() * apart_m;
                 let view = here.view(&from, 0.0, &mut random);

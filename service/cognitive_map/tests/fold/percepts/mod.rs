@@ -1,5 +1,6 @@
 //! What places learn of percepts, and how percepts recall them.
 
+mod many;
 mod prediction;
 
 use cognitive_map::{
@@ -9,7 +10,7 @@ use cognitive_map::{
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use crate::journal::{Robot, descriptor, label, level, start_pose};
+use crate::journal::{Robot, descriptor, label, level, settings, start_pose};
 
 /// A robot at the origin, where the first place is.
 fn at_first_place() -> (CognitiveMap, Robot) {
