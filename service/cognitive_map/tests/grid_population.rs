@@ -63,7 +63,7 @@ fn a_cell_fires_fully_at_its_preferred_phase_and_by_equation_1_beside_it() {
 
 #[test]
 fn the_kernel_is_the_cosine_of_activations_to_a_tenth() {
-    // Measured over these pairs: 0.085 at most. Documented at `kernel`.
+    // Documented at `kernel`.
     let modules = modules();
     let mut random = Seeded(3);
     let mut worst = 0.0_f64;

@@ -3,12 +3,9 @@
 use std::time::Instant;
 
 use clap::Args;
-use cognitive_map::grid::{PartialCode, similarity};
-use cognitive_map::{
-    AgentId, CognitiveMap, Label, Motion, PlaceId, PoseNoise, RecallCue, Record, Sample,
-    SampleBody, Settings, StartPose,
-};
-use nalgebra::{Point3, Vector3};
+use cogmap_experiments::eval::code::{CueSource, Damage, DrawnCue, survey};
+use cognitive_map::grid::similarity;
+use cognitive_map::{CognitiveMap, Settings, SettingsValues};
 use serde::Serialize;
 
 use super::quantile::quantile;
@@ -19,8 +16,6 @@ use crate::cli::output;
 const QUERIES_OF_ROUND: usize = 1_000;
 /// Queries compared with a scan over all places, at each number of places.
 const SCANNED: usize = 50;
-/// Places per cubic metre: a million fill a cube of 50 m.
-const PLACES_PER_M3: f64 = 8.0;
 /// Standard deviation of a query's position from the stored one, along each axis.
 const JITTER_M: f64 = 0.05;
 /// An answer farther away than this is another place's.
@@ -29,11 +24,21 @@ const FAR_M: f64 = 0.5;
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RecallArgs {
     /// Numbers of places.
-    #[arg(long, value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000, 1_000_000])]
+    #[arg(long, value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000, 1_000_000],
+        value_parser = clap::value_parser!(u64).range(1..))]
     places: Vec<u64>,
     /// Rounds of 1,000 recalls at each number.
     #[arg(long, default_value_t = 20)]
     rounds: u64,
+    /// Number of grid modules; the default of a space when absent.
+    #[arg(long, value_name = "N")]
+    grid_modules: Option<usize>,
+    /// Spacing of the finest grid module [m]; the default of a space when absent.
+    #[arg(long, value_name = "M")]
+    grid_spacing_m: Option<f64>,
+    /// Ratio of the spacings of neighbouring modules; the default of a space when absent.
+    #[arg(long, value_name = "RATIO")]
+    grid_ratio: Option<f64>,
     /// Seed of places and queries.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -66,10 +71,17 @@ struct Row {
 }
 
 pub(super) fn run(args: &RecallArgs) -> anyhow::Result<()> {
+    let default = SettingsValues::default();
+    let settings = Settings::new(SettingsValues {
+        grid_modules: args.grid_modules.unwrap_or(default.grid_modules),
+        grid_spacing_m: args.grid_spacing_m.unwrap_or(default.grid_spacing_m),
+        grid_ratio: args.grid_ratio.unwrap_or(default.grid_ratio),
+        ..default
+    })?;
     let mut memories = Vec::new();
     for &places in &args.places {
         output::progress(&format!("building a map of {places} places"));
-        memories.push(Memory::of(places, args.seed)?);
+        memories.push(Memory::of(places, settings.clone(), args.seed)?);
     }
     for memory in &mut memories {
         let places = memory.map.place_count();
@@ -111,7 +123,8 @@ pub(super) fn run(args: &RecallArgs) -> anyhow::Result<()> {
 /// A map and what was measured on it.
 struct Memory {
     map: CognitiveMap,
-    random: Random,
+    cues: CueSource,
+    damage: Damage,
     build_s: f64,
     load_s: f64,
     times_us: Vec<f64>,
@@ -122,41 +135,20 @@ struct Memory {
 impl Memory {
     /// A map of places all over a cube, at a density that does not depend on their number. They are
     /// recruited by the rule of novelty, so no two are closer than a field radius.
-    fn of(places: u64, seed: u64) -> anyhow::Result<Self> {
-        let mut random = Random(seed);
-        let edge_m = (places as f64 / PLACES_PER_M3).cbrt();
-        let upright = [0.0, 0.0, 0.0, 1.0];
-        let still = Motion::from_increment([0.0; 3], upright, None)?;
+    fn of(places: u64, settings: Settings, seed: u64) -> anyhow::Result<Self> {
         let start = Instant::now();
-        let mut map = CognitiveMap::new(Settings::default());
-        let (agent, mut seq) = (AgentId(0), 0);
-        let mut events = Vec::new();
-        let name = Label::new("surveyor")?;
-        map.apply(&Record::Enrol { agent, name }, &mut events);
-        while (map.place_count() as u64) < places {
-            let position = [(); 3].map(|()| (random.uniform() - 0.5) * edge_m);
-            let put = StartPose::new(position, upright, PoseNoise::none())?;
-            for body in [SampleBody::StartPose(put), SampleBody::Motion(still)] {
-                let stamp_ns = i64::try_from(seq).unwrap_or(i64::MAX);
-                let sample = Sample { stamp_ns, body };
-                let record = Record::Sample {
-                    agent,
-                    session: 1,
-                    seq,
-                    sample,
-                };
-                map.apply(&record, &mut events);
-                seq += 1;
-            }
-            events.clear();
-        }
+        let map = survey(places, settings.clone(), seed)?;
         let build_s = start.elapsed().as_secs_f64();
         let pages: Vec<_> = map.checkpoint(0).collect();
         let start = Instant::now();
-        let map = CognitiveMap::restore(Settings::default(), pages)?;
+        let map = CognitiveMap::restore(settings, pages)?;
         Ok(Self {
             map,
-            random,
+            cues: CueSource::new(seed, 0),
+            damage: Damage {
+                jitter_m: JITTER_M,
+                ..Damage::default()
+            },
             build_s,
             load_s: start.elapsed().as_secs_f64(),
             times_us: Vec::new(),
@@ -166,34 +158,15 @@ impl Memory {
     }
 
     /// A query, and the position that its code is of.
-    fn query(&mut self) -> (RecallCue, Point3<f64>) {
-        let places = self.map.place_count() as f64;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a share of a count is an identifier"
-        )]
-        let place = PlaceId((self.random.uniform() * places) as u32);
-        let place = self.map.place(place).expect("identifiers count up from 0");
-        let shift = Vector3::from_fn(|_, _| self.random.normal() * JITTER_M);
-        let position = place.position() + shift;
-        let code = PartialCode::from(&self.map.modules().code_at(&position));
-        let cue = RecallCue {
-            position: None,
-            code: Some(code),
-            radius_m: None,
-            founder: None,
-            since_ns: None,
-            until_ns: None,
-            limit: 1,
-        };
-        (cue, position)
+    fn query(&mut self) -> DrawnCue {
+        let drawn = self.cues.draw(&self.map, &self.damage);
+        drawn.expect("there are places, and no module is erased")
     }
 
     /// Compares answers with those of a scan over all places.
     fn compare_with_scan(&mut self) {
         for _ in 0..SCANNED {
-            let (cue, _) = self.query();
+            let DrawnCue { cue, .. } = self.query();
             let code = cue.code.as_ref().expect("queries have a code");
             let modules = self.map.modules();
             let scored = self.map.places().map(|(id, place)| {
@@ -211,7 +184,7 @@ impl Memory {
     /// Recalls many times and notes how long each took.
     fn round(&mut self) {
         let queries: Vec<_> = (0..QUERIES_OF_ROUND).map(|_| self.query()).collect();
-        for (cue, position) in queries {
+        for DrawnCue { cue, position } in queries {
             let start = Instant::now();
             let answer = self.map.recall(&cue);
             let elapsed = start.elapsed();
@@ -235,25 +208,5 @@ impl Memory {
             build_s: self.build_s,
             load_s: self.load_s,
         }
-    }
-}
-
-/// A seeded source of random numbers (`SplitMix64`).
-struct Random(u64);
-
-impl Random {
-    /// Uniform in \[0, 1).
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Standard normal (Box & Muller 1958).
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
 }
