@@ -253,7 +253,8 @@ proptest! {
         let corner = modules.lattices()[module].basis() * Vector3::from(cells.map(f64::from));
         let position = Point3::from(corner.add_scalar(side));
         let code = PartialCode::from(&modules.code_at(&position));
-        let found = decode(&modules, &code, None, 20.0);
+        let near = position + Vector3::new(7.0, -5.0, 3.0);
+        let found = decode(&modules, &code, Some(near), 20.0);
         prop_assert!((found.position - position).norm() < 1e-9);
     }
 }

@@ -102,11 +102,11 @@ mod tests {
         }
     }
 
-    /// One module: Q = s² χ²₃ and a ball of volume 4π/3 Q^1.5 in a torus of 1/√2; E χ³ = 8/√(2π).
+    /// One module: Q = s² χ²₃ and a ball of volume 4π/3 Q^1.5 in a torus of 1/√2; E χ³ = 8 √(2/π).
     #[test]
     fn the_share_for_one_module_is_that_by_hand() {
         let s = 0.01_f64;
-        let by_hand = 2.0_f64.sqrt() * 4.0 / 3.0 * PI * s.powi(3) * 8.0 / (2.0 * PI).sqrt();
+        let by_hand = 2.0_f64.sqrt() * 4.0 / 3.0 * PI * s.powi(3) * 8.0 * (2.0 / PI).sqrt();
         assert!((share_better(1, s) / by_hand - 1.0).abs() < 1e-12);
     }
 }
