@@ -65,9 +65,9 @@ impl Default for SpaceSettings {
     fn default() -> Self {
         Self {
             seed: 0,
-            grid_modules: 5,
-            grid_spacing_m: 1.0,
-            grid_ratio: std::f64::consts::SQRT_2,
+            grid_modules: 6,
+            grid_spacing_m: 1.2,
+            grid_ratio: 1.618,
             field_radius_m: 0.25,
             recruitment: Recruitment::Novelty {},
             odometry_noise: NoiseSettings::default(),

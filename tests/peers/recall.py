@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Recall of places by grid code: `cogmap bench recall` beside FAISS and a k-d tree.
 
-The peers hold the same places as the benchmark and are asked with queries from its random stream, in
-the same run, with one thread each. FAISS gets the activations of all grid cells as vectors; the k-d
+The peers hold the places of the benchmark and are asked the queries of its last round, in the same
+run, with one thread each. FAISS gets the activations of all grid cells as vectors; the k-d
 tree gets the positions themselves. Before anything is measured, codes and places are compared with
 those of a running service.
 """
@@ -15,6 +15,7 @@ import argparse
 import json
 import subprocess
 import sys
+import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Optional
@@ -65,7 +66,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     sizes = [1_000, 10_000, 100_000]
     parser.add_argument("--places", type=_numbers, default=sizes, help="numbers of places: 1000,…")
-    parser.add_argument("--queries", type=int, default=2_000, help="queries at each number")
     parser.add_argument("--ef-search", type=_numbers, default=[16, 64, 256], help="of HNSW")
     most = "leave HNSW out above this number of places: building it takes minutes from 100,000 on"
     parser.add_argument("--hnsw-most", type=int, default=sys.maxsize, help=most)
@@ -77,22 +77,22 @@ def main() -> int:
     args = parser.parse_args()
     faiss.omp_set_num_threads(1)
 
-    # The benchmark's own account of what it draws, from a run that costs nothing.
-    bench = _bench(args, 1000, 1)
-    law = {name: bench[name] for name in ("places_per_m3", "jitter_m", "seed")}
-    with service(args.binary) as server:
+    with tempfile.TemporaryDirectory() as name, service(args.binary) as server:
+        directory = Path(name)
+        bench = _bench(args, _CHECKED_PLACES, 1, directory)
         client = server.client()
         settings = client.create_space("codes").settings
-        law["radius_m"] = settings.field_radius_m
         grid = Grid.read(client, "codes")
-        edge_m = (max(args.places) / law["places_per_m3"]) ** (1 / 3)
+        # A cube as large as that of the most places.
+        drawn = places.read(directory, _CHECKED_PLACES)
+        edge_m = float(np.ptp(drawn.places)) * (max(args.places) / _CHECKED_PLACES) ** (1 / 3)
         worst = grid.check(client, "codes", edge_m, _CHECKED_CODES)
-        places.check(client, "places", places.draw(_CHECKED_PLACES, 1, **law))
+        places.check(client, "places", drawn)
     _progress(f"codes as the service answers them, to {worst:.0e}; places as it founds them")
 
     rows = []
     for size in args.places:
-        for row in _compare(args, grid, law, size):
+        for row in _compare(args, grid, size):
             _progress(_line(row))
             rows.append(row)
     report = {
@@ -117,22 +117,20 @@ def _numbers(text: str) -> List[int]:
     return [int(number) for number in text.split(",")]
 
 
-def _bench(args: argparse.Namespace, size: int, rounds: int) -> Dict[str, Any]:
-    """The report of `cogmap bench recall`."""
+def _bench(args: argparse.Namespace, size: int, rounds: int, out: Path) -> Dict[str, Any]:
+    """The report of `cogmap bench recall`, which writes places and queries into `out`."""
     command = [args.binary, "bench", "recall", "--json", "--places", size, "--rounds", rounds]
-    command += ["--seed", args.seed]
+    command += ["--seed", args.seed, "--out", out]
     done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, check=True)
     report: Dict[str, Any] = json.loads(done.stdout)
-    if "places_per_m3" not in report:
-        raise SystemExit(f"{args.binary} does not tell how it draws places: build it anew")
     return report
 
 
-def _compare(
-    args: argparse.Namespace, grid: Grid, law: Dict[str, Any], size: int
-) -> Iterator[Row]:
+def _compare(args: argparse.Namespace, grid: Grid, size: int) -> Iterator[Row]:
     """All ways at one number of places, cogmap first."""
-    ours = _bench(args, size, args.rounds)["rows"][0]
+    with tempfile.TemporaryDirectory() as name:
+        ours = _bench(args, size, args.rounds, Path(name))["rows"][0]
+        drawn = places.read(Path(name), size)
     yield Row(
         size,
         "cogmap",
@@ -147,8 +145,6 @@ def _compare(
         ours["bytes_per_place"],
         ours["build_s"],
     )
-    _progress(f"drawing {size} places")
-    drawn = places.draw(size, args.queries, **law)
     codes, queries = grid.codes(drawn.places), grid.codes(drawn.queries)
 
     nearest = cKDTree(drawn.places).query(drawn.queries)[1]

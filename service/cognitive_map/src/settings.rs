@@ -16,7 +16,7 @@ pub struct SettingsValues {
     pub grid_modules: usize,
     /// Spacing of the finest grid module \[m\].
     pub grid_spacing_m: f64,
-    /// Ratio of the spacings of neighbouring modules, above 1 (√2 in rats: Stensola et al. 2012).
+    /// Ratio of the spacings of neighbouring modules, above 1 (1.4 to 1.7 in rats: Stensola et al. 2012).
     pub grid_ratio: f64,
     /// Distance at which a place's confidence has fallen to one half \[m\].
     pub field_radius_m: f64,
@@ -65,9 +65,9 @@ impl Default for SettingsValues {
     fn default() -> Self {
         Self {
             seed: 0,
-            grid_modules: 5,
-            grid_spacing_m: 1.0,
-            grid_ratio: std::f64::consts::SQRT_2,
+            grid_modules: 6,
+            grid_spacing_m: 1.2,
+            grid_ratio: 1.618,
             field_radius_m: 0.25,
             recruitment: Recruitment::Novelty,
             translation_sd_per_sqrt_m: 0.02,

@@ -73,24 +73,24 @@ fn noisy_codes_give_the_position_to_a_tenth_of_the_spacing() {
         let found = decode(&modules, &code, Some(near), 8.0);
         assert!(!found.ambiguous);
         assert!((found.position - position).norm() < 0.1);
-        // √3 · 0.02 turns at 12 of 15 degrees of freedom, on the scale of √(5/Σ 1/spacing²) = 1.61 m.
+        // √3 · 0.02 turns at 15 of 18 degrees of freedom, on the scale of √(6/Σ 1/spacing²) = 2.31 m.
         assert!(
-            found.residual_m > 0.01 && found.residual_m < 0.1,
+            found.residual_m > 0.015 && found.residual_m < 0.15,
             "{}",
             found.residual_m
         );
         sum_squared += (found.position - position).norm_squared();
     }
-    // Least squares leaves 0.02 √(3 / Σ 1/spacing²) = 0.025 m if all is well.
-    assert!((sum_squared / 100.0_f64).sqrt() < 0.03);
+    // Least squares leaves 0.02 √(3 / Σ 1/spacing²) = 0.033 m if all is well.
+    assert!((sum_squared / 100.0_f64).sqrt() < 0.038);
 }
 
 #[test]
-fn any_two_of_five_modules_can_be_missing() {
+fn any_two_modules_can_be_missing() {
     let modules = modules();
     let mut random = Seeded(12);
-    for first in 0..5 {
-        for second in first + 1..5 {
+    for first in 0..6 {
+        for second in first + 1..6 {
             for _ in 0..10 {
                 let near = Point3::from(random_vector(&mut random) * 50.0);
                 let away = random_vector(&mut random).normalize() * (5.0 * random.uniform());
@@ -112,7 +112,7 @@ fn any_two_of_five_modules_can_be_missing() {
 fn nothing_on_a_fine_grid_explains_the_code_better() {
     let modules = modules();
     let mut random = Seeded(13);
-    for erased in [&[][..], &[4], &[0, 2], &[2, 3, 4], &[0, 1, 2, 3]] {
+    for erased in [&[][..], &[5], &[0, 2], &[2, 3, 4, 5], &[0, 1, 2, 3, 4]] {
         let position = Point3::from(random_vector(&mut random) * 0.3);
         let code = noisy_code(&modules, &position, 0.02, erased, &mut random).unwrap();
         let found = decode(&modules, &code, None, 1.5);
@@ -144,11 +144,11 @@ fn one_module_alone_is_ambiguous_beyond_its_cell() {
     let modules = modules();
     let position = Point3::new(0.2, -0.1, 0.3);
     let mut random = Seeded(14);
-    let code = noisy_code(&modules, &position, 0.0, &[0, 1, 2, 3], &mut random).unwrap();
+    let code = noisy_code(&modules, &position, 0.0, &[0, 1, 2, 3, 4], &mut random).unwrap();
     let inside = decode(&modules, &code, None, 1.0);
     assert!(!inside.ambiguous);
     assert!((inside.position - position).norm() < 1e-12);
-    let beyond = decode(&modules, &code, None, 6.0);
+    let beyond = decode(&modules, &code, None, 15.0);
     assert!(beyond.ambiguous);
     assert_eq!(beyond.residual_m, 0.0);
 }
@@ -222,7 +222,7 @@ fn range_grows_with_modules_and_falls_with_noise() {
     assert_eq!(unique_range_m(&modules, 0.0), f64::INFINITY);
     assert_eq!(
         unique_range_m(&modules, 1.0),
-        0.5 * modules.lattices()[4].spacing_m()
+        0.5 * modules.lattices()[5].spacing_m()
     );
     // One module repeats at its spacing, whatever the noise.
     let alone = unique_range_m(&modules_of(1, 1.5), 0.0);
@@ -246,14 +246,15 @@ proptest! {
     #[test]
     fn positions_beside_a_cell_wall_are_no_exception(
         cells in prop::array::uniform3(-2_i32..2),
-        module in 0_usize..5,
+        module in 0_usize..6,
         side in -1e-9..1e-9,
     ) {
         let modules = modules();
         let corner = modules.lattices()[module].basis() * Vector3::from(cells.map(f64::from));
         let position = Point3::from(corner.add_scalar(side));
         let code = PartialCode::from(&modules.code_at(&position));
-        let found = decode(&modules, &code, None, 20.0);
+        let near = position + Vector3::new(7.0, -5.0, 3.0);
+        let found = decode(&modules, &code, Some(near), 20.0);
         prop_assert!((found.position - position).norm() < 1e-9);
     }
 }

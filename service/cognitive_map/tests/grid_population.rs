@@ -63,7 +63,7 @@ fn a_cell_fires_fully_at_its_preferred_phase_and_by_equation_1_beside_it() {
 
 #[test]
 fn the_kernel_is_the_cosine_of_activations_to_a_tenth() {
-    // Measured over these pairs: 0.085 at most. Documented at `kernel`.
+    // Documented at `kernel`.
     let modules = modules();
     let mut random = Seeded(3);
     let mut worst = 0.0_f64;
@@ -95,13 +95,13 @@ fn the_normalised_interference_pattern_tells_the_position() {
         let exact_belief = interference_pattern(&modules, &code, &position)
             .normalised()
             .unwrap();
-        assert!((exact_belief - position).norm() < 0.012);
-        // A belief that is a fifth of the finest spacing off is drawn to a quarter of its error.
+        assert!((exact_belief - position).norm() < 0.04);
+        // A belief that is a sixth of the finest spacing off is drawn to less than half of its error.
         let belief = position + random_direction(&mut random) * 0.2;
         let corrected = interference_pattern(&modules, &code, &belief)
             .normalised()
             .unwrap();
-        assert!((corrected - position).norm() < 0.05);
+        assert!((corrected - position).norm() < 0.09);
     }
 }
 
@@ -122,7 +122,7 @@ proptest! {
     fn activations_are_rates(position in point(100.0)) {
         let modules = modules();
         let population = population_vector(&modules, &modules.code_at(&position));
-        prop_assert_eq!(population.len(), 5 * CELLS_PER_MODULE);
+        prop_assert_eq!(population.len(), 6 * CELLS_PER_MODULE);
         prop_assert!(population.iter().all(|rate| (0.0..=1.0).contains(rate)));
         for module in population.chunks(CELLS_PER_MODULE) {
             // The deepest hole between preferred phases is √2 σ from the nearest ones.

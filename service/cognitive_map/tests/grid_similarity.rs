@@ -65,15 +65,15 @@ fn a_partial_code_fits_its_space() {
     assert_eq!(
         wrong,
         Err(InvalidCode::WrongModuleCount {
-            expected: 5,
+            expected: 6,
             given: 4
         })
     );
     assert_eq!(
-        PartialCode::new(&modules, vec![None; 5]),
+        PartialCode::new(&modules, vec![None; 6]),
         Err(InvalidCode::Empty)
     );
-    assert!(PartialCode::new(&modules, vec![None, None, Some(phase), None, None]).is_ok());
+    assert!(PartialCode::new(&modules, vec![None, None, Some(phase), None, None, None]).is_ok());
 }
 
 proptest! {
@@ -116,10 +116,10 @@ proptest! {
     }
 
     #[test]
-    fn erased_modules_do_not_count(a in point(10.0), b in point(10.0), known in 0_usize..5) {
+    fn erased_modules_do_not_count(a in point(10.0), b in point(10.0), known in 0_usize..6) {
         let modules = modules();
         let (a, b) = (modules.code_at(&a), modules.code_at(&b));
-        let mut phases = vec![None; 5];
+        let mut phases = vec![None; 6];
         phases[known] = Some(a.phases()[known]);
         let cue = PartialCode::new(&modules, phases).unwrap();
         let lattice = &modules.lattices()[known];

@@ -48,10 +48,13 @@ fn spacings_grow_by_the_ratio() {
         .iter()
         .map(Lattice::spacing_m)
         .collect::<Vec<_>>();
-    for (spacing, expected) in spacings
-        .iter()
-        .zip([1.0, 2.0_f64.sqrt(), 2.0, 8.0_f64.sqrt(), 4.0])
-    {
+    for (spacing, expected) in spacings.iter().zip([
+        1.2,
+        1.9416,
+        3.141_508_8,
+        5.082_961_238_4,
+        8.224_231_283_731_2,
+    ]) {
         assert!((spacing - expected).abs() < 1e-14);
     }
 }

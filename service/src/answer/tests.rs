@@ -123,7 +123,7 @@ fn the_grid_state_decodes_to_where_the_agent_is() {
         "{:?}",
         state.interference_m
     );
-    assert_eq!(state.modules.len(), 5);
+    assert_eq!(state.modules.len(), 6);
     assert!((state.displacement_m - 0.1).abs() < 1e-9);
     assert!(state.heading_rad.abs() < 1e-9);
     let finest = &state.modules[0];
@@ -282,10 +282,10 @@ fn senseless_queries_are_refused_by_the_rule_that_they_break() {
             },
             "agent",
         ),
-        (code(&[Some([1.0, 0.0, 0.0]); 5]), "phases"),
-        (code(&[Some([0.0, -0.1, 0.0]); 5]), "phases"),
+        (code(&[Some([1.0, 0.0, 0.0]); 6]), "phases"),
+        (code(&[Some([0.0, -0.1, 0.0]); 6]), "phases"),
         (code(&[Some([0.5; 3]); 4]), "4 modules"),
-        (code(&[None; 5]), "no module"),
+        (code(&[None; 6]), "no module"),
     ];
     for (query, part) in cases {
         let error = recall("lab", &map, &query)

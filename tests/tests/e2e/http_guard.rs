@@ -100,7 +100,7 @@ fn spaces_come_and_go_and_keep_their_settings() {
     let settings = json!({"seed": 5, "field_radius_m": 0.5});
     let made = http.put_json("/v1/spaces/lab", &settings).json(201);
     assert_eq!(made["settings"]["field_radius_m"], 0.5);
-    assert_eq!(made["settings"]["grid_modules"], 5);
+    assert_eq!(made["settings"]["grid_modules"], 6);
     http.put_json("/v1/spaces/lab", &settings).json(200);
     http.put_json("/v1/spaces/lab", &json!({}))
         .problem(409, "other-settings");

@@ -33,6 +33,8 @@ const CANDIDATES_MAX: usize = 8;
 const MODULES_MIN: usize = 2;
 /// Numbers that an enumeration is over: three of each module.
 const DIMENSIONS_MAX: usize = 3 * MODULES_MAX;
+/// Sums are taken in so many parts at once: each waits for nothing but its own last addition.
+const LANES: usize = 4;
 /// The share η of the box in the squared distance. As much as a quarter to a half of a typical tolerance
 /// makes the ball that has to be searched smallest.
 const BOX_SHARE: f64 = 0.006;
@@ -48,6 +50,11 @@ pub(crate) struct Explainer {
     lattices: Box<[OnceLock<Option<Box<JointLattice>>>]>,
 }
 
+/// A number for each dimension, filled up with zeros to whole lanes.
+type Row = [f64; DIMENSIONS_MAX.next_multiple_of(LANES)];
+/// A [`Row`] of zeros.
+const ZEROS: Row = [0.0; DIMENSIONS_MAX.next_multiple_of(LANES)];
+
 /// The lattice of all known modules' points together.
 #[derive(Debug)]
 struct JointLattice {
@@ -57,16 +64,18 @@ struct JointLattice {
     stiffness: f64,
     /// The weights w of the box \[1/m²\].
     box_weight: Vector3<f64>,
-    /// Row i: what each module's point \[m\] adds to coordinate i, in units of the i-th diagonal.
-    coordinates: Vec<Vec<Vector3<f64>>>,
-    /// Row i, column j > i: coordinate i of basis vector j, in units of the i-th diagonal.
-    triangle: Vec<[f64; DIMENSIONS_MAX]>,
+    /// Row i: what the modules' points \[m\], one after the other, add to coordinate i, in units of the
+    /// i-th diagonal.
+    coordinates: Vec<Row>,
+    /// Row i, column j > i: coordinate i of basis vector j, in units of the i-th diagonal; the other
+    /// columns are zero.
+    triangle: Vec<Row>,
     /// Squares of the diagonal: coordinate i of basis vector i.
-    diagonal_squared: [f64; DIMENSIONS_MAX],
+    diagonal_squared: Row,
     /// What each module's point adds to the position.
     weights: Vec<Matrix3<f64>>,
-    /// By how much each basis vector moves the position \[m\].
-    moves: Vec<Vector3<f64>>,
+    /// By how much each basis vector moves the position along x, y and z \[m\].
+    moves: [Row; 3],
 }
 
 /// The positions which one choice of the modules' points explains.
@@ -158,15 +167,15 @@ impl Explainer {
             return Search::GivenUp;
         };
         let centre = extent.centre();
-        let mut points = [Vector3::zeros(); MODULES_MAX];
-        for (point, &module) in points.iter_mut().zip(&lattice.modules) {
+        let mut points = ZEROS;
+        for (point, &module) in points.chunks_exact_mut(3).zip(&lattice.modules) {
             let Some(phase) = code.phases()[module] else {
                 return Search::GivenUp; // cannot be: the subset is that of the known modules
             };
-            *point = modules.lattices()[module].basis() * phase.turns() - centre.coords;
+            let at = modules.lattices()[module].basis() * phase.turns() - centre.coords;
+            point.copy_from_slice(at.as_slice());
         }
-        let points = &points[..lattice.modules.len()];
-        lattice.enumerate(points, &centre, tolerance, steps_max, visit)
+        lattice.enumerate(&points, &centre, tolerance, steps_max, visit)
     }
 }
 
@@ -222,36 +231,40 @@ impl JointLattice {
 
         let n = given.len();
         let mut triangle = Vec::with_capacity(n);
-        let mut diagonal_squared = [0.0; DIMENSIONS_MAX];
+        let mut diagonal_squared = ZEROS;
         let mut coordinates = Vec::with_capacity(n);
         for (i, direction) in reduced.directions.iter().enumerate() {
             let diagonal = dot(direction, &reduced.vectors[i]);
             diagonal_squared[i] = diagonal * diagonal;
-            let mut row = [0.0; DIMENSIONS_MAX];
+            let mut row = ZEROS;
             for (entry, vector) in row.iter_mut().zip(&reduced.vectors).skip(i + 1) {
                 *entry = dot(direction, vector) / diagonal;
             }
             triangle.push(row);
-            let unit = |axis: usize| Vector3::ith(axis, 1.0);
-            let of_module = |module: usize| {
-                Vector3::from_fn(|axis, _| dot(direction, &shifted(module, &unit(axis))) / diagonal)
-            };
-            coordinates.push((0..members.len()).map(of_module).collect());
+            let mut row = ZEROS;
+            for (entry, (module, axis)) in row.iter_mut().zip(axes()) {
+                *entry = dot(direction, &shifted(module, &Vector3::ith(axis, 1.0))) / diagonal;
+            }
+            coordinates.push(row);
         }
-        let moves = reduced.coefficients.iter().map(|coefficients| {
+        let mut moves = [ZEROS; 3];
+        for (j, coefficients) in reduced.coefficients.iter().enumerate() {
             let shifts = axes().zip(coefficients);
             let shifts = shifts.map(|((module, axis), times)| {
                 weights[module] * lattices[module].basis().column(axis) * *times
             });
-            shifts.sum::<Vector3<f64>>()
-        });
+            let by: Vector3<f64> = shifts.sum();
+            for (row, by) in moves.iter_mut().zip(by.iter()) {
+                row[j] = *by;
+            }
+        }
         Some(Box::new(Self {
             stiffness,
             box_weight,
             coordinates,
             triangle,
             diagonal_squared,
-            moves: moves.collect(),
+            moves,
             weights,
             modules: members,
         }))
@@ -261,30 +274,27 @@ impl JointLattice {
     /// coordinate from its middle outwards. `points` are relative to `centre`.
     fn enumerate(
         &self,
-        points: &[Vector3<f64>],
+        points: &Row,
         centre: &Point3<f64>,
         tolerance: f64,
         steps_max: u64,
         mut visit: impl FnMut(&Ball) -> f64,
     ) -> Search {
         let n = self.triangle.len();
-        let mut target = [0.0; DIMENSIONS_MAX];
+        let mut target = ZEROS;
         for (target, row) in target.iter_mut().zip(&self.coordinates) {
-            *target = row
-                .iter()
-                .zip(points)
-                .map(|(row, point)| row.dot(point))
-                .sum();
+            *target = row_dot(row, points);
         }
         // The position relative to the centre, if all whole coordinates are zero.
-        let start = self.weights.iter().zip(points);
-        let start: Vector3<f64> = start.map(|(weight, point)| weight * point).sum();
+        let start = self.weights.iter().zip(points.chunks_exact(3));
+        let start = start.map(|(weight, point)| weight * Vector3::from_column_slice(point));
+        let start: Vector3<f64> = start.sum();
 
         // Whole coordinate, middle, next step and cost of what comes after, for each depth.
-        let mut whole = [0.0; DIMENSIONS_MAX];
-        let mut middle = [0.0; DIMENSIONS_MAX];
-        let mut step = [0.0; DIMENSIONS_MAX];
-        let mut after = [0.0; DIMENSIONS_MAX];
+        let mut whole = ZEROS;
+        let mut middle = ZEROS;
+        let mut step = ZEROS;
+        let mut after = ZEROS;
         let mut tolerance = tolerance;
         let mut depth = n - 1;
         middle[depth] = -target[depth];
@@ -296,18 +306,13 @@ impl JointLattice {
                 if depth > 0 {
                     depth -= 1;
                     after[depth] = cost;
-                    let row = &self.triangle[depth][depth + 1..n];
-                    let shift: f64 = row
-                        .iter()
-                        .zip(&whole[depth + 1..n])
-                        .map(|(r, x)| r * x)
-                        .sum();
+                    let shift = row_dot(&self.triangle[depth], &whole);
                     middle[depth] = -(target[depth] + shift);
                     (whole[depth], step[depth]) = outwards(middle[depth]);
                     continue;
                 }
-                let moved = self.moves.iter().zip(&whole).map(|(by, times)| by * *times);
-                let within_box = start + moved.sum::<Vector3<f64>>();
+                let moved = Vector3::from_fn(|axis, _| row_dot(&self.moves[axis], &whole));
+                let within_box = start + moved;
                 // Without the box's pull the modules' best position lies a little farther out.
                 let pull = self.box_weight.component_mul(&within_box);
                 let ball = Ball {
@@ -328,6 +333,17 @@ impl JointLattice {
         }
         Search::GivenUp
     }
+}
+
+/// Σ aᵢ bᵢ.
+fn row_dot(a: &Row, b: &Row) -> f64 {
+    let mut parts = [0.0; LANES];
+    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        for lane in 0..LANES {
+            parts[lane] += a[lane] * b[lane];
+        }
+    }
+    (parts[0] + parts[1]) + (parts[2] + parts[3])
 }
 
 /// The whole number nearest to a middle, and the step to the next nearest one.

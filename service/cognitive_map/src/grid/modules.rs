@@ -12,7 +12,7 @@ const TURNS: [[f64; 4]; 2] = [[5.0, -1.0, 0.0, -1.0], [4.0, 0.0, -1.0, 2.0]];
 ///
 /// Module m has spacing d₀ rᵐ and orientation Aᵐ Bᵐ, where A and B are two fixed rotations. They were
 /// found by a search over small whole quaternions for the largest angle between the axes (the directions
-/// to the twelve nearest lattice points) of any two modules: 15° with 5 modules, 3.7° with 16. There are
+/// to the twelve nearest lattice points) of any two modules: 10° with 6 modules, 3.7° with 16. There are
 /// two of them because the powers of one rotation would leave its own axis where it is, and along that
 /// direction all modules would see the same lattice, only scaled.
 ///

@@ -153,9 +153,9 @@ proptest! {
         chosen in any::<prop::sample::Index>(),
         shift in prop::array::uniform3(-1.0..1.0f64),
         reach_m in prop::sample::select(vec![0.0, 0.05, 0.2, 5.0]),
-        noise in prop::array::uniform5(prop::array::uniform3(-1.0..1.0f64)),
+        noise in prop::array::uniform6(prop::array::uniform3(-1.0..1.0f64)),
         sd in prop::sample::select(vec![0.0, 0.02, 0.08, 0.5]),
-        known in prop::array::uniform5(prop::bool::weighted(0.8)),
+        known in prop::array::uniform6(prop::bool::weighted(0.8)),
         limit in prop::sample::select(vec![1usize, 1, 2, 5, 40, 1000]),
         founder in prop::option::weighted(0.3, 0u32..3),
         since_ns in prop::option::weighted(0.3, 0i64..300),
@@ -201,13 +201,13 @@ fn crowded() -> (World, Vec<Point3<f64>>) {
     (World::of(positions.iter().copied()), positions)
 }
 
-const WHOLE: [bool; 5] = [true; 5];
+const WHOLE: [bool; 6] = [true; 6];
 
 #[test]
 fn the_right_place_of_a_hundred_thousand_wins_by_a_damaged_code() {
     let (world, positions) = crowded();
     let mut random = Seeded(1 << 32);
-    let still = [[0.0; 3]; 5];
+    let still = [[0.0; 3]; 6];
     let mut right = 0;
     for _ in 0..1000 {
         let id = random.index(positions.len());
@@ -216,7 +216,7 @@ fn the_right_place_of_a_hundred_thousand_wins_by_a_damaged_code() {
         right += u32::from(best.place.0 as usize == id);
     }
     assert!(right >= 990, "{right} of 1000 right with 5 % noise");
-    for first in 0..5 {
+    for first in 0..6 {
         for second in 0..first {
             let mut known = WHOLE;
             (known[first], known[second]) = (false, false);
@@ -240,7 +240,7 @@ fn the_work_does_not_grow_with_the_number_of_places() {
         let id = random.index(2000);
         let at = positions[id] + Vector3::from(random.vector(0.05));
         for (world, count) in [&few, &crowded].into_iter().zip(&mut looked_at) {
-            let cue = cue(world.code(&at, &[[0.0; 3]; 5], &WHOLE), 1);
+            let cue = cue(world.code(&at, &[[0.0; 3]; 6], &WHOLE), 1);
             let asked = Asked {
                 cue: &cue,
                 places: &world.places,
@@ -266,15 +266,16 @@ fn two_places_with_one_code_are_rivals() {
     // One known module: its lattice repeats one basis vector on.
     let modules = GridModules::new(&Settings::default());
     let here = Point3::new(0.3, -0.2, 0.1);
-    let there = here + modules.lattices()[4].basis().column(0);
+    let there = here + modules.lattices()[5].basis().column(0);
     let world = World::of([here, there, Point3::new(0.5, 0.9, 0.0)]);
-    let alone = [false, false, false, false, true];
-    let ambiguous = cue(world.code(&here, &[[0.0; 3]; 5], &alone), 1);
+    let alone = [false, false, false, false, false, true];
+    let ambiguous = cue(world.code(&here, &[[0.0; 3]; 6], &alone), 1);
     let best = world.recall(&ambiguous)[0];
     let rivals = world.rivals(&ambiguous, &best).unwrap();
     assert_eq!(rivals.count, 1);
-    assert!((rivals.distance_m - 4.0).abs() < 1e-9, "{rivals:?}");
-    let whole = cue(world.code(&here, &[[0.0; 3]; 5], &WHOLE), 1);
+    let spacing_m = modules.lattices()[5].spacing_m();
+    assert!((rivals.distance_m - spacing_m).abs() < 1e-9, "{rivals:?}");
+    let whole = cue(world.code(&here, &[[0.0; 3]; 6], &WHOLE), 1);
     let best = world.recall(&whole)[0];
     assert_eq!(
         (best.place, world.rivals(&whole, &best)),

@@ -39,7 +39,7 @@ fn cues() -> impl Strategy<Value = RecallCue> {
     let position = prop::array::uniform3(-3.0..3.0f64).prop_map(Point3::from);
     // As many modules as the default settings have; at least the first one is known.
     let phase = || prop::array::uniform3(0.0..1.0f64).prop_map(|turns| Phase::wrap(turns.into()));
-    let code = (phase(), prop::collection::vec(prop::option::of(phase()), 4));
+    let code = (phase(), prop::collection::vec(prop::option::of(phase()), 5));
     let stamp = || prop::option::of((0i64..60).prop_map(|tenths| tenths * 100_000_000));
     (
         prop::option::of(position),

@@ -36,6 +36,7 @@
 //! ```
 
 mod agent;
+pub mod code;
 mod curve;
 mod environment;
 mod experiment;

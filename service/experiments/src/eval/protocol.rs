@@ -104,6 +104,15 @@ pub enum InvalidProtocol {
         "sightings need a range above 0 m, an interval of at least one step and a noise from 0 to 1"
     )]
     Sighting,
+    /// No places, or too many.
+    #[error("a code is measured on 1 to 5000000 places")]
+    Places,
+    /// No cues.
+    #[error("a code is measured by one query at least")]
+    Queries,
+    /// A noise or jitter that is none.
+    #[error("phase noise is above 0 and at most 1 turn, a jitter from 0 to 1000 m")]
+    Damage,
 }
 
 impl Protocol {

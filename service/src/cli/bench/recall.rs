@@ -1,14 +1,16 @@
 //! `cogmap bench recall`.
 
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use anyhow::Context;
 use clap::Args;
-use cognitive_map::grid::{PartialCode, similarity};
-use cognitive_map::{
-    AgentId, CognitiveMap, Label, Motion, PlaceId, PoseNoise, RecallCue, Record, Sample,
-    SampleBody, Settings, StartPose,
-};
-use nalgebra::{Point3, Vector3};
+use cogmap_experiments::eval::code::{CueSource, Damage, DrawnCue, survey};
+use cognitive_map::grid::similarity;
+use cognitive_map::{CognitiveMap, Settings, SettingsValues};
+use nalgebra::Point3;
 use serde::Serialize;
 
 use super::quantile::quantile;
@@ -19,8 +21,6 @@ use crate::cli::output;
 const QUERIES_OF_ROUND: usize = 1_000;
 /// Queries compared with a scan over all places, at each number of places.
 const SCANNED: usize = 50;
-/// Places per cubic metre: a million fill a cube of 50 m.
-const PLACES_PER_M3: f64 = 8.0;
 /// Standard deviation of a query's position from the stored one, along each axis.
 const JITTER_M: f64 = 0.05;
 /// An answer farther away than this is another place's.
@@ -29,14 +29,28 @@ const FAR_M: f64 = 0.5;
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RecallArgs {
     /// Numbers of places.
-    #[arg(long, value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000, 1_000_000])]
+    #[arg(long, value_delimiter = ',', default_values_t = [1_000, 10_000, 100_000, 1_000_000],
+        value_parser = clap::value_parser!(u64).range(1..))]
     places: Vec<u64>,
     /// Rounds of 1,000 recalls at each number.
     #[arg(long, default_value_t = 20)]
     rounds: u64,
+    /// Number of grid modules; the default of a space when absent.
+    #[arg(long, value_name = "N")]
+    grid_modules: Option<usize>,
+    /// Spacing of the finest grid module [m]; the default of a space when absent.
+    #[arg(long, value_name = "M")]
+    grid_spacing_m: Option<f64>,
+    /// Ratio of the spacings of neighbouring modules; the default of a space when absent.
+    #[arg(long, value_name = "RATIO")]
+    grid_ratio: Option<f64>,
     /// Seed of places and queries.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Write where the places and the queries of the last round are [m] into this directory, for other
+    /// programs to be asked the same: places-N.csv and queries-N.csv at each number N of places.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -46,10 +60,6 @@ pub(in crate::cli) struct RecallArgs {
 struct Report {
     /// What a query is.
     query: &'static str,
-    /// Density of the places: with the seed, it says where they lie.
-    places_per_m3: f64,
-    /// Standard deviation of a query's position from the stored one, along each axis.
-    jitter_m: f64,
     seed: u64,
     rows: Vec<Row>,
 }
@@ -71,10 +81,17 @@ struct Row {
 }
 
 pub(super) fn run(args: &RecallArgs) -> anyhow::Result<()> {
+    let default = SettingsValues::default();
+    let settings = Settings::new(SettingsValues {
+        grid_modules: args.grid_modules.unwrap_or(default.grid_modules),
+        grid_spacing_m: args.grid_spacing_m.unwrap_or(default.grid_spacing_m),
+        grid_ratio: args.grid_ratio.unwrap_or(default.grid_ratio),
+        ..default
+    })?;
     let mut memories = Vec::new();
     for &places in &args.places {
         output::progress(&format!("building a map of {places} places"));
-        memories.push(Memory::of(places, args.seed)?);
+        memories.push(Memory::of(places, settings.clone(), args.seed)?);
     }
     for memory in &mut memories {
         let places = memory.map.place_count();
@@ -87,12 +104,17 @@ pub(super) fn run(args: &RecallArgs) -> anyhow::Result<()> {
             memory.round();
         }
     }
+    if let Some(directory) = &args.out {
+        for memory in &memories {
+            memory
+                .write(directory)
+                .with_context(|| format!("write into {}", directory.display()))?;
+        }
+    }
     let rows: Vec<_> = memories.iter_mut().map(Memory::row).collect();
     if args.json {
         return output::json(&Report {
             query: "whole code of a stored position, shifted by 5 cm (sd) along each axis",
-            places_per_m3: PLACES_PER_M3,
-            jitter_m: JITTER_M,
             seed: args.seed,
             rows,
         });
@@ -119,10 +141,13 @@ pub(super) fn run(args: &RecallArgs) -> anyhow::Result<()> {
 /// A map and what was measured on it.
 struct Memory {
     map: CognitiveMap,
-    random: Random,
+    cues: CueSource,
+    damage: Damage,
     build_s: f64,
     load_s: f64,
     times_us: Vec<f64>,
+    /// Positions of the latest round's queries.
+    asked: Vec<Point3<f64>>,
     beyond_half_m: u64,
     agreed: usize,
 }
@@ -130,79 +155,39 @@ struct Memory {
 impl Memory {
     /// A map of places all over a cube, at a density that does not depend on their number. They are
     /// recruited by the rule of novelty, so no two are closer than a field radius.
-    fn of(places: u64, seed: u64) -> anyhow::Result<Self> {
-        let mut random = Random(seed);
-        let edge_m = (places as f64 / PLACES_PER_M3).cbrt();
-        let upright = [0.0, 0.0, 0.0, 1.0];
-        let still = Motion::from_increment([0.0; 3], upright, None)?;
+    fn of(places: u64, settings: Settings, seed: u64) -> anyhow::Result<Self> {
         let start = Instant::now();
-        let mut map = CognitiveMap::new(Settings::default());
-        let (agent, mut seq) = (AgentId(0), 0);
-        let mut events = Vec::new();
-        let name = Label::new("surveyor")?;
-        map.apply(&Record::Enrol { agent, name }, &mut events);
-        while (map.place_count() as u64) < places {
-            let position = [(); 3].map(|()| (random.uniform() - 0.5) * edge_m);
-            let put = StartPose::new(position, upright, PoseNoise::none())?;
-            for body in [SampleBody::StartPose(put), SampleBody::Motion(still)] {
-                let stamp_ns = i64::try_from(seq).unwrap_or(i64::MAX);
-                let sample = Sample { stamp_ns, body };
-                let record = Record::Sample {
-                    agent,
-                    session: 1,
-                    seq,
-                    sample,
-                };
-                map.apply(&record, &mut events);
-                seq += 1;
-            }
-            events.clear();
-        }
+        let map = survey(places, settings.clone(), seed)?;
         let build_s = start.elapsed().as_secs_f64();
         let pages: Vec<_> = map.checkpoint(0).collect();
         let start = Instant::now();
-        let map = CognitiveMap::restore(Settings::default(), pages)?;
+        let map = CognitiveMap::restore(settings, pages)?;
         Ok(Self {
             map,
-            random,
+            cues: CueSource::new(seed, 0),
+            damage: Damage {
+                jitter_m: JITTER_M,
+                ..Damage::default()
+            },
             build_s,
             load_s: start.elapsed().as_secs_f64(),
             times_us: Vec::new(),
+            asked: Vec::new(),
             beyond_half_m: 0,
             agreed: 0,
         })
     }
 
     /// A query, and the position that its code is of.
-    fn query(&mut self) -> (RecallCue, Point3<f64>) {
-        let places = self.map.place_count() as f64;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a share of a count is an identifier"
-        )]
-        let place = PlaceId((self.random.uniform() * places) as u32);
-        let place = self.map.place(place).expect("identifiers count up from 0");
-        let shift = Vector3::from_fn(|_, _| self.random.normal() * JITTER_M);
-        let position = place.position() + shift;
-        let code = PartialCode::from(&self.map.modules().code_at(&position));
-        let cue = RecallCue {
-            position: None,
-            code: Some(code),
-            percept: None,
-            radius_m: None,
-            founder: None,
-            since_ns: None,
-            until_ns: None,
-            limit: 1,
-        };
-        (cue, position)
+    fn query(&mut self) -> DrawnCue {
+        let drawn = self.cues.draw(&self.map, &self.damage);
+        drawn.expect("there are places, and no module is erased")
     }
 
     /// Compares answers with those of a scan over all places.
     fn compare_with_scan(&mut self) {
         for _ in 0..SCANNED {
-            let (cue, _) = self.query();
+            let DrawnCue { cue, .. } = self.query();
             let code = cue.code.as_ref().expect("queries have a code");
             let modules = self.map.modules();
             let scored = self.map.places().map(|(id, place)| {
@@ -220,7 +205,8 @@ impl Memory {
     /// Recalls many times and notes how long each took.
     fn round(&mut self) {
         let queries: Vec<_> = (0..QUERIES_OF_ROUND).map(|_| self.query()).collect();
-        for (cue, position) in queries {
+        self.asked = queries.iter().map(|query| query.position).collect();
+        for DrawnCue { cue, position } in queries {
             let start = Instant::now();
             let answer = self.map.recall(&cue);
             let elapsed = start.elapsed();
@@ -231,6 +217,24 @@ impl Memory {
                 .is_some_and(|place| (place.position() - position).norm() <= FAR_M);
             self.beyond_half_m += u64::from(!near);
         }
+    }
+
+    /// Writes where places and queries are.
+    fn write(&self, directory: &Path) -> std::io::Result<()> {
+        std::fs::create_dir_all(directory)?;
+        let places = self.map.place_count();
+        let write = |name: &str, positions: &mut dyn Iterator<Item = Point3<f64>>| {
+            let file = File::create(directory.join(format!("{name}-{places}.csv")))?;
+            let mut file = BufWriter::new(file);
+            writeln!(file, "x_m,y_m,z_m")?;
+            for at in positions {
+                writeln!(file, "{},{},{}", at.x, at.y, at.z)?;
+            }
+            file.flush()
+        };
+        let positions = self.map.places().map(|(_, place)| *place.position());
+        write("places", &mut { positions })?;
+        write("queries", &mut self.asked.iter().copied())
     }
 
     fn row(&mut self) -> Row {
@@ -244,25 +248,5 @@ impl Memory {
             build_s: self.build_s,
             load_s: self.load_s,
         }
-    }
-}
-
-/// A seeded source of random numbers (`SplitMix64`).
-struct Random(u64);
-
-impl Random {
-    /// Uniform in \[0, 1).
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Standard normal (Box & Muller 1958).
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
 }

@@ -1,5 +1,6 @@
-//! `cogmap eval`: the seed paper's experiments, ours beside the paper's.
+//! `cogmap eval`: the seed paper's experiments, ours beside the paper's, and what a grid code tells.
 
+mod code;
 mod progress;
 mod room;
 
@@ -12,11 +13,14 @@ pub(in crate::cli) enum EvalCommand {
     Env1(room::RoomArgs),
     /// The second experiment: a room of 15 × 15 × 15 m with 50 cubes, 1000 steps.
     Env2(room::RoomArgs),
+    /// How well a grid code tells places apart: whole, beside the place, noisy, with modules erased.
+    Code(code::CodeArgs),
 }
 
 pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
     match command {
         EvalCommand::Env1(args) => room::run(Environment::GridAligned, args),
         EvalCommand::Env2(args) => room::run(Environment::ObstacleRich, args),
+        EvalCommand::Code(args) => code::run(args),
     }
 }

@@ -13,22 +13,25 @@ const LINES: u64 = 10;
 /// A bar in a terminal, a line now and then elsewhere.
 pub(super) struct Progress {
     bar: Option<ProgressBar>,
+    /// What is counted.
+    what: &'static str,
     steps: u64,
     walked: AtomicU64,
 }
 
 impl Progress {
-    /// Of so many steps in all.
-    pub(super) fn new(steps: u64) -> Self {
+    /// Of so many steps in all, or of whatever is counted.
+    pub(super) fn new(steps: u64, what: &'static str) -> Self {
         let bar = stderr().is_terminal().then(|| {
             let style = ProgressStyle::with_template(
-                "[{bar:40}] {human_pos} of {human_len} steps, {eta} left",
+                "[{bar:40}] {human_pos} of {human_len} {msg}, {eta} left",
             )
             .unwrap_or_else(|_| ProgressStyle::default_bar());
-            ProgressBar::new(steps).with_style(style)
+            ProgressBar::new(steps).with_style(style).with_message(what)
         });
         Self {
             bar,
+            what,
             steps,
             walked: AtomicU64::new(0),
         }
@@ -44,7 +47,8 @@ impl Progress {
         let part =
             |walked: u64| u128::from(walked) * u128::from(LINES) / u128::from(self.steps.max(1));
         if part(before + steps) > part(before) {
-            output::progress(&format!("{} of {} steps", before + steps, self.steps));
+            let (done, all, what) = (before + steps, self.steps, self.what);
+            output::progress(&format!("{done} of {all} {what}"));
         }
     }
 

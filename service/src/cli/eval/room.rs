@@ -120,7 +120,7 @@ pub(super) fn run(environment: Environment, args: &RoomArgs) -> anyhow::Result<(
         .threads
         .or_else(|| std::thread::available_parallelism().ok())
         .unwrap_or(NonZeroUsize::MIN);
-    let progress = Progress::new(protocol.steps.saturating_mul(u64::from(args.runs)));
+    let progress = Progress::new(protocol.steps.saturating_mul(u64::from(args.runs)), "steps");
     let walked = |steps| progress.add(steps);
     let experiment = Experiment::run(&protocol, args.runs, args.seed, threads, &walked)?;
     progress.finish();

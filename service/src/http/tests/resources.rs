@@ -35,7 +35,7 @@ async fn a_space_is_created_once_found_again_and_deleted() {
         (&"new".into(), &7.into())
     );
     assert_eq!(
-        info["settings"]["grid_modules"], 5,
+        info["settings"]["grid_modules"], 6,
         "the other fields have their defaults"
     );
     assert!(
@@ -127,7 +127,7 @@ async fn an_agent_is_where_it_went() {
         (&"rover".into(), &Value::Null)
     );
     let grid = rig.get("/v1/spaces/lab/agents/rover/grid").await.good();
-    assert_eq!(grid["modules"].as_array().map(Vec::len), Some(5));
+    assert_eq!(grid["modules"].as_array().map(Vec::len), Some(6));
     assert!(
         (grid["decoded_m"][0].as_f64().expect("a number") - 5.0).abs() < 1e-6,
         "{grid}"
