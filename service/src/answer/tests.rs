@@ -79,7 +79,7 @@ fn a_place_is_told_with_its_position_code_and_founder() {
         x.abs() + y.abs() + z.abs() < 1e-12 && (w - 1.0).abs() < 1e-12,
         "{told:?}"
     );
-    assert_eq!(told.code.len(), 5);
+    assert_eq!(told.code.len(), 6);
     assert!(
         told.code
             .iter()
@@ -105,7 +105,7 @@ fn a_trip_leads_from_place_to_place() {
     }
     let first = detail.legs.first().expect("a leg");
     assert!(first.translation_m[0] > 0.0 && first.length_m >= first.translation_m[0] - 1e-9);
-    assert_eq!(first.phase_displacement.len(), 5);
+    assert_eq!(first.phase_displacement.len(), 6);
     assert!((1..=8).contains(&first.octant));
 }
 
