@@ -10,7 +10,6 @@ mod descriptor;
 mod level;
 mod map;
 mod moments;
-mod slots;
 
 pub use channel::{Channel, ChannelId, ChannelKind};
 pub(crate) use map::{CHANNEL_PAGES_MAX, Compared, PerceptMap};

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use super::by_code::CodeRecall;
 use super::*;
 use crate::grid::{Phase, similarity};
+use crate::strength::Clock;
 
 /// A space with places at these positions, founded by two agents in turn, one a second.
 struct World {
@@ -20,7 +21,8 @@ impl World {
         let mut places = PlaceMap::new(&settings);
         for (position, stamp) in positions.into_iter().zip(0u32..) {
             let (rotation, sd_m) = (UnitQuaternion::identity(), Vector3::zeros());
-            let place = Place::found(position, rotation, sd_m, AgentId(stamp % 2), stamp.into());
+            let (founder, now) = (AgentId(stamp % 2), Clock::at(1, &settings));
+            let place = Place::found(position, rotation, sd_m, founder, stamp.into(), now);
             places.recruit(place, 1).unwrap();
         }
         Self {

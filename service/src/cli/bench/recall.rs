@@ -6,7 +6,7 @@ use clap::Args;
 use cognitive_map::grid::{PartialCode, similarity};
 use cognitive_map::{
     AgentId, CognitiveMap, Label, Motion, PlaceId, PoseNoise, RecallCue, Record, Sample,
-    SampleBody, Settings, StartPose,
+    SampleBody, Settings, SettingsValues, StartPose,
 };
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
@@ -128,7 +128,11 @@ impl Memory {
         let upright = [0.0, 0.0, 0.0, 1.0];
         let still = Motion::from_increment([0.0; 3], upright, None)?;
         let start = Instant::now();
-        let mut map = CognitiveMap::new(Settings::default());
+        let settings = Settings::new(SettingsValues {
+            places_max: u32::MAX,
+            ..SettingsValues::default()
+        })?;
+        let mut map = CognitiveMap::new(settings.clone());
         let (agent, mut seq) = (AgentId(0), 0);
         let mut events = Vec::new();
         let name = Label::new("surveyor")?;
@@ -153,7 +157,7 @@ impl Memory {
         let build_s = start.elapsed().as_secs_f64();
         let pages: Vec<_> = map.checkpoint(0).collect();
         let start = Instant::now();
-        let map = CognitiveMap::restore(Settings::default(), pages)?;
+        let map = CognitiveMap::restore(settings, pages)?;
         Ok(Self {
             map,
             random,
