@@ -183,7 +183,10 @@ fn event_kinds() -> [(&'static str, EventKind); 13] {
                 translation_m: [-0.5, 2.25, 0.0],
             },
         ),
-        ("trip_forgotten", EventKind::TripForgotten { trip: 2, legs: 14 }),
+        (
+            "trip_forgotten",
+            EventKind::TripForgotten { trip: 2, legs: 14 },
+        ),
         (
             "percept_surprising_level",
             EventKind::PerceptSurprising {

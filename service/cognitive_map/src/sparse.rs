@@ -160,7 +160,9 @@ impl<T, const N: usize> SparseVec<T, N> {
     /// The items of a page, with their indices.
     pub(crate) fn iter_page(&self, page: usize) -> impl Iterator<Item = (usize, &T)> {
         let found = self.page(page);
-        found.into_iter().flat_map(move |items| items.iter(page * N))
+        found
+            .into_iter()
+            .flat_map(move |items| items.iter(page * N))
     }
 
     /// The pages that changed after a revision, with their indices; those that lost their last item
@@ -211,7 +213,9 @@ impl<T, const N: usize> SparseVec<T, N> {
                 Slot::Live(chunk) => &chunk[..],
                 Slot::Gone(_) => &[],
             };
-            let pages = (at * CHUNK..).zip(pages).skip_while(move |(page, _)| *page < start);
+            let pages = (at * CHUNK..)
+                .zip(pages)
+                .skip_while(move |(page, _)| *page < start);
             pages.filter_map(|(at, page)| match page {
                 Slot::Live(page) => Some((at, &**page)),
                 Slot::Gone(_) => None,

@@ -88,7 +88,9 @@ pub(crate) async fn get(
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    let id = u32::try_from(id).map(PlaceId).map_err(|_| unknown("place"))?;
+    let id = u32::try_from(id)
+        .map(PlaceId)
+        .map_err(|_| unknown("place"))?;
     match map.place(id) {
         Some(place) => Ok(reply::json(&answer::place(&map, id, place))),
         None if map.is_forgotten_place(id) => Err(forgotten("place")),

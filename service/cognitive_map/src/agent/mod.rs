@@ -89,7 +89,10 @@ impl Agent {
     /// under way started from.
     pub(crate) fn holds(&self) -> [Option<PlaceId>; 2] {
         let leg = self.recorder.leg.as_ref();
-        [self.place.map(|(place, _)| place), leg.map(LegUnderWay::from)]
+        [
+            self.place.map(|(place, _)| place),
+            leg.map(LegUnderWay::from),
+        ]
     }
 
     /// Name.

@@ -81,7 +81,8 @@ impl PlaceMap {
         self.index.insert(id, place.position());
         self.places.push(place, revision);
         self.include(id, &alone);
-        self.explainer.fit(self.summaries.of_all().map(|all| all.extent));
+        self.explainer
+            .fit(self.summaries.of_all().map(|all| all.extent));
         Some(id)
     }
 
@@ -95,7 +96,8 @@ impl PlaceMap {
         let place = self.places.remove(id.0 as usize, revision)?;
         self.index.remove(id, place.position());
         self.summarise(id);
-        self.explainer.fit(self.summaries.of_all().map(|all| all.extent));
+        self.explainer
+            .fit(self.summaries.of_all().map(|all| all.extent));
         Some(place)
     }
 
@@ -298,7 +300,8 @@ impl PlaceMap {
             self.index.insert(id, place.position());
         }
         self.summarise(PlaceId(u32::try_from(page * PAGE).expect("checked above")));
-        self.explainer.fit(self.summaries.of_all().map(|all| all.extent));
+        self.explainer
+            .fit(self.summaries.of_all().map(|all| all.extent));
         Ok(())
     }
 

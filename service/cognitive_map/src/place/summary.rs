@@ -28,7 +28,11 @@ impl Summary for PlaceSummary {
     fn merge(&mut self, other: &Self) {
         self.extent.merge(&other.extent);
         self.weakest = match (self.weakest, other.weakest) {
-            (Some(a), Some(b)) => Some(if a.0.cmp(b.0).then(a.1.cmp(&b.1)).is_le() { a } else { b }),
+            (Some(a), Some(b)) => Some(if a.0.cmp(b.0).then(a.1.cmp(&b.1)).is_le() {
+                a
+            } else {
+                b
+            }),
             (a, b) => a.or(b),
         };
     }

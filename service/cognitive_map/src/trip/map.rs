@@ -92,7 +92,13 @@ impl TripMap {
     }
 
     /// Appends a leg that ended at `stamp_ns`; answers whether no more legs fit.
-    pub(crate) fn push_leg(&mut self, trip: TripId, leg: Leg, stamp_ns: i64, revision: u64) -> bool {
+    pub(crate) fn push_leg(
+        &mut self,
+        trip: TripId,
+        leg: Leg,
+        stamp_ns: i64,
+        revision: u64,
+    ) -> bool {
         let Some(record) = self.trips.get_mut(trip.0 as usize, revision) else {
             return false;
         };

@@ -217,7 +217,11 @@ fn memory_and_checkpoints_stay_flat() {
             .filter(|(id, _)| map.remembered(*id).count() == 2)
             .count();
         assert_eq!(remembering, 50);
-        assert_eq!(map.remembered(PlaceId(0)).count(), 0, "forgotten with its place");
+        assert_eq!(
+            map.remembered(PlaceId(0)).count(),
+            0,
+            "forgotten with its place"
+        );
         sizes.push((map.memory_bytes(), stored.values().sum::<usize>()));
     }
     assert_eq!(map.places_recruited(), 10_000);
@@ -297,7 +301,11 @@ fn held_places_stay_even_if_there_is_no_room() {
         let (place, _) = place(&map, robot).unwrap();
         assert!(map.place(place).is_some());
     }
-    assert_eq!(place(&map, &robots[4]), None, "there is no room for a fifth");
+    assert_eq!(
+        place(&map, &robots[4]),
+        None,
+        "there is no room for a fifth"
+    );
     // One leaves for good; its place goes when the fifth moves.
     robots[0].sample(&mut map, start_pose([50.0, 0.0, 0.0], [0.0; 3]));
     let events = robots[4].go(&mut map, [0.1, 0.0, 0.0], [0.0; 3]);
