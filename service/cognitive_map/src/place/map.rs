@@ -373,6 +373,42 @@ mod tests {
             prop_assert_eq!(within, all.filter(|(_, d)| *d <= radius_m).collect::<Vec<_>>());
         }
 
+        /// Of all places only those of even numbers stay, and then everything is asked again; those that
+        /// are held never count as the weakest.
+        #[test]
+        fn forgotten_places_answer_nothing(
+            positions in prop::collection::vec(point(), 1..150),
+            held in prop::collection::vec(0u32..150, 0..20),
+            query in point(),
+        ) {
+            let mut map = map_of(&positions);
+            for id in &held {
+                map.hold(PlaceId(*id));
+            }
+            let all: Vec<_> = map.ids().collect();
+            for id in all.iter().filter(|id| id.0 % 2 == 1) {
+                prop_assert_eq!(map.forget(*id, 2).unwrap().position(), &positions[id.0 as usize]);
+                prop_assert!(map.forget(*id, 2).is_none() && map.is_forgotten(*id));
+            }
+            let left: Vec<_> = all.into_iter().filter(|id| id.0 % 2 == 0).collect();
+            prop_assert_eq!(map.ids().collect::<Vec<_>>(), left.clone());
+            let distance = |id: PlaceId| (positions[id.0 as usize] - query).norm();
+            let nearest = left.iter().map(|id| (distance(*id), *id));
+            let nearest = nearest.min_by(|a, b| a.partial_cmp(b).unwrap()).map(|(d, id)| (id, d));
+            prop_assert_eq!(map.nearest(&query), nearest);
+            prop_assert_eq!(map.winner(&query), nearest.filter(|(_, d)| *d <= 0.5));
+            // All are equally strong.
+            let free = left.iter().copied().find(|id| !held.contains(&id.0));
+            prop_assert_eq!(map.weakest(), free);
+            for id in &held {
+                map.release(PlaceId(*id));
+            }
+            prop_assert_eq!(map.weakest(), left.first().copied());
+            map.visit(PlaceId(0), 0, Clock::at(1, &Settings::default()), 3);
+            let second = left.get(1).or(left.first());
+            prop_assert_eq!(map.weakest().as_ref(), second);
+        }
+
         #[test]
         fn a_snapshot_keeps_its_places(
             positions in prop::collection::vec(point(), 1..100),

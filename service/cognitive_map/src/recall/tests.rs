@@ -32,6 +32,17 @@ impl World {
         }
     }
 
+    /// Forgets the places of these indices, one after the other.
+    fn without(mut self, forgotten: &[prop::sample::Index]) -> Self {
+        for index in forgotten {
+            let left: Vec<_> = self.places.ids().collect();
+            if let Some(id) = left.get(index.index(left.len().max(1))) {
+                self.places.forget(*id, 2).unwrap();
+            }
+        }
+        self
+    }
+
     fn recall(&self, cue: &RecallCue) -> Vec<Recalled> {
         let percepts = PerceptMap::default();
         recall(cue, &self.places, &percepts, &self.modules, &self.settings)
@@ -162,10 +173,11 @@ proptest! {
         founder in prop::option::weighted(0.3, 0u32..3),
         since_ns in prop::option::weighted(0.3, 0i64..300),
         until_ns in prop::option::weighted(0.3, 0i64..300),
+        forgotten in prop::collection::vec(any::<prop::sample::Index>(), 0..200),
     ) {
         prop_assume!(known.contains(&true));
         let at = chosen.get(&positions) + Vector3::from(shift) * reach_m;
-        let world = World::of(positions);
+        let world = World::of(positions).without(&forgotten);
         let code = world.code(&at, &noise.map(|noise| noise.map(|x| x * sd)), &known);
         let cue = RecallCue { founder: founder.map(AgentId), since_ns, until_ns, ..cue(code, limit) };
         let scan = world.scan(&cue);
