@@ -195,6 +195,9 @@ pub struct Place {
     pub first_stamp_ns: i64,
     /// Stamp of the latest visit \[ns\].
     pub last_stamp_ns: i64,
+    /// Strength: the founding and each visit count one when they happen, and half as much after every
+    /// half-life. The weakest place goes when there would be more than `places_max`.
+    pub strength: f64,
 }
 
 /// One page of places.
@@ -281,6 +284,10 @@ pub struct Trip {
     pub leg_count: u64,
     /// Length of its path \[m\].
     pub length_m: f64,
+    /// Strength: its recording counts one when it begins, so does travelling all of it again, and each
+    /// half as much after every half-life. The weakest trip goes when there would be more legs than
+    /// `legs_max`.
+    pub strength: f64,
 }
 
 /// A trip with its legs.
@@ -307,9 +314,9 @@ pub struct TripPage {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Leg {
-    /// Place at its start.
+    /// Place at its start; it may have been forgotten since.
     pub from: u64,
-    /// Place at its end.
+    /// Place at its end; it may have been forgotten since.
     pub to: u64,
     /// Displacement, in the body frame at the start \[m\].
     pub translation_m: [f64; 3],

@@ -95,6 +95,22 @@ pub enum EventKind {
         /// one minus the cosine, above 0.5.
         surprise: f64,
     },
+    /// A place was forgotten: there was no room for the one recruited next. Its number is not given
+    /// to another one.
+    PlaceForgotten {
+        /// The place.
+        place: u64,
+        /// Its position in `map` \[m\].
+        translation_m: [f64; 3],
+    },
+    /// A trip was forgotten: there was no room for the leg recorded next. Its number is not given to
+    /// another one.
+    TripForgotten {
+        /// The trip.
+        trip: u64,
+        /// Its number of legs.
+        legs: u64,
+    },
 }
 
 /// What kind of percept a channel carries.
@@ -121,7 +137,8 @@ pub enum TripEnd {
     SessionEnd,
     /// A marker said so.
     Marker,
-    /// The trip reached the longest allowed number of legs; the next one continues it.
+    /// The trip reached the longest allowed number of legs, or trips under way filled the space's
+    /// budget of legs; the next one continues it.
     Full,
     /// The agent was told where it stands, which breaks the thread of motion.
     StartPose,

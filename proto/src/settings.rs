@@ -29,6 +29,13 @@ pub struct SpaceSettings {
     pub trip_stillness_s: f64,
     /// No sample for this long, on the sensor's clock, ends a trip \[s\].
     pub trip_gap_s: f64,
+    /// Most places, at least 2: for one more, the weakest is forgotten.
+    pub places_max: u32,
+    /// Most legs of all trips together, at least 1: for one more, the weakest trip is forgotten.
+    pub legs_max: u32,
+    /// After this many samples of the space, by whichever agent, a use counts half as much for the
+    /// strength of a place or trip.
+    pub strength_half_life_samples: u32,
     /// Closest two poses of a stored trajectory \[s\]: at most this often a row is kept.
     pub trajectory_interval_s: f64,
 }
@@ -75,6 +82,9 @@ impl Default for SpaceSettings {
             lost_sd_m: 5.0,
             trip_stillness_s: 5.0,
             trip_gap_s: 2.0,
+            places_max: 65_536,
+            legs_max: 65_536,
+            strength_half_life_samples: 1_000_000,
             trajectory_interval_s: 0.005,
         }
     }

@@ -38,6 +38,10 @@ pub const AGENTS: &str = "cogmap_agents";
 pub const PLACES: &str = "cogmap_places";
 /// Trips of a space; label `space`.
 pub const TRIPS: &str = "cogmap_trips";
+/// Places forgotten because there was no room for another one; label `space`.
+pub const FORGOTTEN_PLACES: &str = "cogmap_forgotten_places_total";
+/// Trips forgotten because there was no room for another leg; label `space`.
+pub const FORGOTTEN_TRIPS: &str = "cogmap_forgotten_trips_total";
 /// Landmarks of a space; label `space`.
 pub const LANDMARKS: &str = "cogmap_landmarks";
 /// How far levels were from what their places had learned, in standard deviations; label `space`.
@@ -154,6 +158,16 @@ fn describe() {
     describe_gauge!(AGENTS, Unit::Count, "Agents of a space");
     describe_gauge!(PLACES, Unit::Count, "Places of a space");
     describe_gauge!(TRIPS, Unit::Count, "Trips of a space");
+    describe_counter!(
+        FORGOTTEN_PLACES,
+        Unit::Count,
+        "Places forgotten to make room for others"
+    );
+    describe_counter!(
+        FORGOTTEN_TRIPS,
+        Unit::Count,
+        "Trips forgotten to make room for legs of others"
+    );
     describe_gauge!(LANDMARKS, Unit::Count, "Landmarks of a space");
     describe_histogram!(
         LEVEL_SURPRISE,

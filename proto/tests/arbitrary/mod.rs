@@ -237,6 +237,11 @@ pub(crate) fn events(floats: &Floats) -> impl Strategy<Value = Event> + use<> {
             (number(), number(), reasons())
                 .prop_map(|(from, to, reason)| EventKind::SamplesSkipped { from, to, reason }),
             any::<String>().prop_map(|label| EventKind::MarkerPassed { label }),
+            (number(), three()).prop_map(|(place, translation_m)| EventKind::PlaceForgotten {
+                place,
+                translation_m
+            }),
+            (number(), number()).prop_map(|(trip, legs)| EventKind::TripForgotten { trip, legs }),
             (number(), any::<String>(), number(), floats.clone()).prop_map(
                 |(place, channel, percepts, surprise)| EventKind::PerceptSurprising {
                     place,

@@ -62,6 +62,9 @@ fn bernoulli() -> SpaceSettings {
         lost_sd_m: 6.0,
         trip_stillness_s: 7.0,
         trip_gap_s: 3.0,
+        places_max: 100_000,
+        legs_max: 1_000_000,
+        strength_half_life_samples: 360_000,
         trajectory_interval_s: 0.25,
     }
 }
@@ -180,6 +183,7 @@ fn place() -> Place {
         founder: "robot-1".to_owned(),
         first_stamp_ns: 1_800_000_000_510_000_000,
         last_stamp_ns: 1_800_000_000_610_000_000,
+        strength: 1.75,
     }
 }
 
@@ -284,6 +288,7 @@ fn trip() -> Trip {
         ended: None,
         leg_count: 1,
         length_m: 0.75,
+        strength: 0.625,
     }
 }
 

@@ -126,7 +126,7 @@ fn event(kind: EventKind) -> Event {
     }
 }
 
-fn event_kinds() -> [(&'static str, EventKind); 11] {
+fn event_kinds() -> [(&'static str, EventKind); 13] {
     let session = 1_800_000_000_000_000_000;
     let landmark = "porte 3, étage α".to_owned();
     [
@@ -175,6 +175,17 @@ fn event_kinds() -> [(&'static str, EventKind); 11] {
             EventKind::MarkerPassed {
                 label: "lap 1".to_owned(),
             },
+        ),
+        (
+            "place_forgotten",
+            EventKind::PlaceForgotten {
+                place: 1,
+                translation_m: [-0.5, 2.25, 0.0],
+            },
+        ),
+        (
+            "trip_forgotten",
+            EventKind::TripForgotten { trip: 2, legs: 14 },
         ),
         (
             "percept_surprising_level",

@@ -87,6 +87,20 @@ pub enum EventKind {
         /// Its label.
         label: Label,
     },
+    /// A place was forgotten, because there was no room for the one recruited next.
+    PlaceForgotten {
+        /// The place.
+        place: PlaceId,
+        /// Its position in `map` \[m\].
+        position: Point3<f64>,
+    },
+    /// A trip was forgotten, because there was no room for the leg recorded next.
+    TripForgotten {
+        /// The trip.
+        trip: TripId,
+        /// Its number of legs.
+        legs: usize,
+    },
     /// A percept was felt where a place remembers its channel; before the place learned from it.
     PerceptCompared {
         /// The place.

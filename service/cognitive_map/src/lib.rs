@@ -16,7 +16,10 @@ mod recall;
 mod record;
 mod sample;
 mod settings;
+mod sparse;
 mod state;
+mod strength;
+mod summary;
 mod trip;
 
 pub use agent::{Agent, Status};

@@ -11,7 +11,7 @@ use crate::state::{CorruptState, State, StateReader, StateWriter};
 /// change of any page also copies the list of pages.
 #[derive(Clone, Debug)]
 pub(crate) struct PagedVec<T, const N: usize> {
-    /// All pages but the last are full.
+    /// All pages are full but the last one that holds something, and empty behind it.
     pages: Arc<Vec<Arc<Page<T>>>>,
     len: usize,
 }
@@ -52,6 +52,11 @@ impl<T, const N: usize> PagedVec<T, N> {
         self.len
     }
 
+    /// Number of pages.
+    pub(crate) fn page_count(&self) -> usize {
+        self.pages.len()
+    }
+
     /// Bytes of memory that it takes, reserved ones included, without what the items own.
     pub(crate) fn bytes(&self) -> usize {
         let items: usize = self.pages.iter().map(|page| page.items.capacity()).sum();
@@ -88,18 +93,30 @@ impl<T: Clone, const N: usize> PagedVec<T, N> {
     /// Appends an item.
     pub(crate) fn push(&mut self, item: T, revision: u64) {
         let pages = Arc::make_mut(&mut self.pages);
-        if self.len.is_multiple_of(N) {
+        if self.len / N == pages.len() {
             pages.push(Arc::new(Page {
                 items: Vec::new(),
                 changed: 0,
                 digest: OnceLock::new(),
             }));
         }
-        let page = pages.last_mut().expect("a page with room was made above");
-        let page = Arc::make_mut(page);
+        let page = Arc::make_mut(&mut pages[self.len / N]);
         page.items.push(item);
         page.touch(revision);
         self.len += 1;
+    }
+
+    /// Removes the last item. The page that it leaves empty stays, and says in a checkpoint that it is.
+    pub(crate) fn pop(&mut self, revision: u64) -> Option<T> {
+        let last = self.len.checked_sub(1)?;
+        let page = Arc::make_mut(&mut Arc::make_mut(&mut self.pages)[last / N]);
+        page.touch(revision);
+        self.len = last;
+        let item = page.items.pop();
+        if page.items.is_empty() {
+            page.items = Vec::new();
+        }
+        item
     }
 
     /// The item at an index, to be changed.
@@ -118,7 +135,7 @@ impl<T: State, const N: usize> PagedVec<T, N> {
     /// Writes the digest of each page; only pages that changed since the last time are hashed anew.
     pub(crate) fn write_digests(&self, out: &mut StateWriter) {
         (self.len as u64).write(out);
-        for page in self.pages.iter() {
+        for page in &self.pages[..self.len.div_ceil(N)] {
             page.digest().0.write(out);
         }
     }
@@ -158,8 +175,11 @@ impl<T: State> Page<T> {
     }
 }
 
-/// Writes the items of a page.
+/// Writes the items of a page; nothing if there are none.
 pub(crate) fn write_page<T: State>(items: &[T], out: &mut StateWriter) {
+    if items.is_empty() {
+        return;
+    }
     u16::try_from(items.len())
         .expect("pages are far shorter than 65536 items")
         .write(out);
@@ -189,11 +209,11 @@ mod tests {
     }
 
     proptest! {
-        /// Against a plain vector; `Some(i)` changes an item, `None` appends one, and the snapshot
-        /// taken on the way must stay as it was.
+        /// Against a plain vector; `Some(i)` changes an item or, beyond 40, removes the last one, `None`
+        /// appends one, and the snapshot taken on the way must stay as it was.
         #[test]
         fn behaves_like_a_vector(
-            steps in prop::collection::vec(prop::option::of(0usize..40), 0..60),
+            steps in prop::collection::vec(prop::option::of(0usize..60), 0..60),
             snapshot_at in 0usize..60,
         ) {
             let mut plain = Vec::new();
@@ -208,6 +228,7 @@ mod tests {
                         plain.push(revision);
                         paged.push(revision, revision);
                     }
+                    Some(40..) => prop_assert_eq!(paged.pop(revision), plain.pop()),
                     Some(index) => {
                         let before = digest(&paged);
                         let item = paged.get_mut(*index, revision);

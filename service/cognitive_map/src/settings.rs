@@ -36,6 +36,12 @@ pub struct SettingsValues {
     pub trip_stillness_s: f64,
     /// No sample for this long, on the sensor's clock, ends a trip \[s\].
     pub trip_gap_s: f64,
+    /// Most places: for one more, the weakest is forgotten.
+    pub places_max: u32,
+    /// Most legs of all trips together: for one more, the weakest trip is forgotten.
+    pub legs_max: u32,
+    /// After this many records of the space, a use counts half as much for the strength of a memory.
+    pub strength_half_life_samples: u32,
 }
 
 /// When a place cell is recruited.
@@ -77,6 +83,9 @@ impl Default for SettingsValues {
             lost_sd_m: 5.0,
             trip_stillness_s: 5.0,
             trip_gap_s: 2.0,
+            places_max: 65_536,
+            legs_max: 65_536,
+            strength_half_life_samples: 1_000_000,
         }
     }
 }
@@ -129,6 +138,11 @@ impl Settings {
         check(lost, "lost_sd_m", "above localized_sd_m")?;
         check(positive(v.trip_stillness_s), "trip_stillness_s", "positive")?;
         check(positive(v.trip_gap_s), "trip_gap_s", "positive")?;
+        // The place that a leg starts from is held while the next one is recruited.
+        check(v.places_max >= 2, "places_max", "at least 2")?;
+        check(v.legs_max >= 1, "legs_max", "at least 1")?;
+        let half_life = v.strength_half_life_samples >= 1;
+        check(half_life, "strength_half_life_samples", "at least 1")?;
         Ok(Self(values))
     }
 }

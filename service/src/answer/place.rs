@@ -20,6 +20,7 @@ pub fn place(map: &CognitiveMap, id: PlaceId, place: &Place) -> wire::Place {
         founder: agent_name(map, place.founder()),
         first_stamp_ns: place.first_stamp_ns(),
         last_stamp_ns: place.last_stamp_ns(),
+        strength: map.place_strength(id),
     }
 }
 

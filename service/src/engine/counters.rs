@@ -126,6 +126,8 @@ pub(crate) struct SpaceCounters {
     places: Gauge,
     trips: Gauge,
     landmarks: Gauge,
+    forgotten_places: Counter,
+    forgotten_trips: Counter,
 }
 
 impl SpaceCounters {
@@ -149,6 +151,8 @@ impl SpaceCounters {
             places: gauge!(names::PLACES, "space" => label()),
             trips: gauge!(names::TRIPS, "space" => label()),
             landmarks: gauge!(names::LANDMARKS, "space" => label()),
+            forgotten_places: counter!(names::FORGOTTEN_PLACES, "space" => label()),
+            forgotten_trips: counter!(names::FORGOTTEN_TRIPS, "space" => label()),
         }
     }
 
@@ -205,18 +209,24 @@ impl SpaceCounters {
         }
     }
 
-    /// Records how far a percept was from what was expected, if that is what the event tells.
+    /// Counts what was forgotten, and records how far a percept was from what was expected.
     pub(crate) fn event(&self, map: &CognitiveMap, event: &Event) {
-        if let EventKind::PerceptCompared {
-            channel, surprise, ..
-        } = &event.kind
-            && let Some(channel) = map.channel(*channel)
-        {
-            let histogram = match channel.kind() {
-                ChannelKind::Level => &self.level_surprise,
-                ChannelKind::Descriptor { .. } => &self.descriptor_surprise,
-            };
-            histogram.record(*surprise);
+        match &event.kind {
+            EventKind::PlaceForgotten { .. } => self.forgotten_places.increment(1),
+            EventKind::TripForgotten { .. } => self.forgotten_trips.increment(1),
+            EventKind::PerceptCompared {
+                channel, surprise, ..
+            } => {
+                let Some(channel) = map.channel(*channel) else {
+                    return;
+                };
+                let histogram = match channel.kind() {
+                    ChannelKind::Level => &self.level_surprise,
+                    ChannelKind::Descriptor { .. } => &self.descriptor_surprise,
+                };
+                histogram.record(*surprise);
+            }
+            _ => {}
         }
     }
 

@@ -42,6 +42,9 @@ pub fn core_settings(settings: &SpaceSettings) -> Result<cognitive_map::Settings
         lost_sd_m: settings.lost_sd_m,
         trip_stillness_s: settings.trip_stillness_s,
         trip_gap_s: settings.trip_gap_s,
+        places_max: settings.places_max,
+        legs_max: settings.legs_max,
+        strength_half_life_samples: settings.strength_half_life_samples,
     })
 }
 

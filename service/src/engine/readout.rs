@@ -80,6 +80,14 @@ pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wi
             to: *to,
             reason: skip_reason(*reason),
         },
+        EventKind::PlaceForgotten { place, position } => wire::EventKind::PlaceForgotten {
+            place: place.0.into(),
+            translation_m: position.coords.into(),
+        },
+        EventKind::TripForgotten { trip, legs } => wire::EventKind::TripForgotten {
+            trip: trip.0.into(),
+            legs: *legs as u64,
+        },
         EventKind::MarkerPassed { label } => wire::EventKind::MarkerPassed {
             label: label.as_str().to_owned(),
         },

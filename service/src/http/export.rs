@@ -100,8 +100,8 @@ pub(crate) async fn get(
     Ok(response)
 }
 
-/// A list of an export that can be written from any of its items on, as JSON.
-type Section = fn(&CognitiveMap, &[AgentSummary], u32) -> Vec<String>;
+/// A list of an export that can be written from any of its items on: their numbers, and them as JSON.
+type Section = fn(&CognitiveMap, &[AgentSummary], u32) -> Vec<(u32, String)>;
 
 async fn map(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
@@ -109,25 +109,28 @@ async fn map(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
     let head = format!("{{\"space\":{}", text(&info));
     let sections: [(&str, Section); 4] = [
         ("agents", |_, agents, first| {
-            let agents = agents.iter().skip(first as usize).take(CHUNK_ITEMS);
-            agents.map(text).collect()
+            let agents = (0..).zip(agents.iter()).skip(first as usize);
+            agents
+                .take(CHUNK_ITEMS)
+                .map(|(at, agent)| (at, text(agent)))
+                .collect()
         }),
         ("places", |map, _, first| {
             let places = map.places_from(PlaceId(first)).take(CHUNK_ITEMS);
             places
-                .map(|(id, place)| text(&answer::place(map, id, place)))
+                .map(|(id, place)| (id.0, text(&answer::place(map, id, place))))
                 .collect()
         }),
         ("trips", |map, _, first| {
             // A trip has up to a thousand legs.
             let trips = map.trips_from(TripId(first)).take(1);
             trips
-                .map(|(id, trip)| text(&answer::trip_detail(map, id, trip)))
+                .map(|(id, trip)| (id.0, text(&answer::trip_detail(map, id, trip))))
                 .collect()
         }),
         ("landmarks", |map, _, first| {
             let ids = (first..).take(CHUNK_ITEMS).map(LandmarkId);
-            ids.map_while(|id| Some(text(&answer::landmark(map.landmark(id)?))))
+            ids.map_while(|id| Some((id.0, text(&answer::landmark(map.landmark(id)?)))))
                 .collect()
         }),
     ];
@@ -140,15 +143,16 @@ async fn map(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
         })
         .collect();
     let lists = sections.into_iter().flat_map(move |(name, section)| {
-        let (map, agents, mut first) = (Arc::clone(&map), Arc::clone(&agents), 0);
+        let (map, agents) = (Arc::clone(&map), Arc::clone(&agents));
+        let (mut first, mut separator) = (Some(0), "");
         let items = std::iter::from_fn(move || {
-            let items = section(&map, &agents, first);
-            if items.is_empty() {
-                return None;
-            }
-            let separator = if first == 0 { "" } else { "," };
-            first += u32::try_from(items.len()).ok()?;
-            Some(format!("{separator}{}", items.join(",")))
+            let (numbers, items): (Vec<_>, Vec<_>) =
+                section(&map, &agents, first?).into_iter().unzip();
+            // Numbers have gaps where something was forgotten.
+            first = numbers.last()?.checked_add(1);
+            let written = format!("{separator}{}", items.join(","));
+            separator = ",";
+            Some(written)
         });
         let open = std::iter::once(format!(",\"{name}\":["));
         open.chain(items).chain(std::iter::once("]".to_owned()))

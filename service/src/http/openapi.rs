@@ -244,6 +244,10 @@ fn constrain(schemas: &mut Value) {
         &mut settings["grid_ratio"],
         &json!({ "exclusiveMinimum": 1.0, "maximum": 10.0 }),
     );
+    merge(&mut settings["places_max"], &json!({ "minimum": 2 }));
+    for field in ["legs_max", "strength_half_life_samples"] {
+        merge(&mut settings[field], &json!({ "minimum": 1 }));
+    }
     let interval = json!({ "minimum": 0.001, "maximum": 3600.0 });
     merge(&mut settings["trajectory_interval_s"], &interval);
 }

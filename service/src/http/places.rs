@@ -81,19 +81,21 @@ pub(crate) async fn list(
     params(IdParams),
     responses(
         (status = 200, description = "The place", body = Place),
-        (status = 404, description = "There is no such space or place")))]
+        (status = 404, description = "There is no such space or place"),
+        (status = 410, description = "The place has been forgotten")))]
 pub(crate) async fn get(
     MemoryOfPath(space, id): MemoryOfPath,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    let id = u32::try_from(id).map(PlaceId);
-    let found = id
-        .ok()
-        .and_then(|id| Some(answer::place(&map, id, map.place(id)?)));
-    found
-        .map(|place| reply::json(&place))
-        .ok_or_else(|| unknown("place"))
+    let id = u32::try_from(id)
+        .map(PlaceId)
+        .map_err(|_| unknown("place"))?;
+    match map.place(id) {
+        Some(place) => Ok(reply::json(&answer::place(&map, id, place))),
+        None if map.is_forgotten_place(id) => Err(forgotten("place")),
+        None => Err(unknown("place")),
+    }
 }
 
 /// The space that the path names, and the number of a memory that may be there or not.
@@ -114,6 +116,12 @@ impl FromRequestParts<Service> for MemoryOfPath {
 /// There is no such memory.
 pub(crate) fn unknown(what: &str) -> Problem {
     Problem::new(Kind::UnknownMemory, format!("the space has no such {what}"))
+}
+
+/// There was such a memory.
+pub(crate) fn forgotten(what: &str) -> Problem {
+    let detail = format!("the space has forgotten this {what} to make room for others");
+    Problem::new(Kind::ForgottenMemory, detail)
 }
 
 fn corner<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; 3]>, D::Error> {

@@ -36,6 +36,8 @@ pub enum Kind {
     UnknownAgent,
     /// There is no such place, trip or landmark.
     UnknownMemory,
+    /// The place or trip has been forgotten.
+    ForgottenMemory,
     /// The path does not take this method.
     MethodNotAllowed,
     /// Samples before those of the request are missing.
@@ -116,6 +118,7 @@ impl Kind {
             Self::UnknownSpace => ("unknown-space", S::NOT_FOUND),
             Self::UnknownAgent => ("unknown-agent", S::NOT_FOUND),
             Self::UnknownMemory => ("unknown-memory", S::NOT_FOUND),
+            Self::ForgottenMemory => ("forgotten-memory", S::GONE),
             Self::MethodNotAllowed => ("method-not-allowed", S::METHOD_NOT_ALLOWED),
             Self::SequenceGap => ("sequence-gap", S::CONFLICT),
             Self::StaleSession => ("stale-session", S::CONFLICT),

@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam};
 use super::page;
-use super::places::{MemoryOfPath, unknown};
+use super::places::{MemoryOfPath, forgotten, unknown};
 use super::problem::Problem;
 use super::reply;
 use crate::answer;
@@ -69,17 +69,17 @@ pub(crate) async fn list(
     params(IdParams),
     responses(
         (status = 200, description = "The trip", body = TripDetail),
-        (status = 404, description = "There is no such space or trip")))]
+        (status = 404, description = "There is no such space or trip"),
+        (status = 410, description = "The trip has been forgotten")))]
 pub(crate) async fn get(
     MemoryOfPath(space, id): MemoryOfPath,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    let id = u32::try_from(id).map(TripId);
-    let found = id
-        .ok()
-        .and_then(|id| Some(answer::trip_detail(&map, id, map.trip(id)?)));
-    found
-        .map(|trip| reply::json(&trip))
-        .ok_or_else(|| unknown("trip"))
+    let id = u32::try_from(id).map(TripId).map_err(|_| unknown("trip"))?;
+    match map.trip(id) {
+        Some(trip) => Ok(reply::json(&answer::trip_detail(&map, id, trip))),
+        None if map.is_forgotten_trip(id) => Err(forgotten("trip")),
+        None => Err(unknown("trip")),
+    }
 }

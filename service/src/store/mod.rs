@@ -91,7 +91,8 @@ pub trait Store: std::fmt::Debug + Send + Sync + 'static {
     fn journal(&self, space: SpaceNumber, from: u64) -> Blocks<'_>;
 
     /// Writes, in one atomic step, the pages that changed since the checkpoint before, the state of
-    /// the trajectory recorders, and up to where in the journal they reach.
+    /// the trajectory recorders, and up to where in the journal they reach. A page of no bytes removes
+    /// what is stored of it.
     ///
     /// # Errors
     /// The store cannot be written.

@@ -303,6 +303,8 @@ class Place:
     founder: str
     first_stamp_ns: int
     last_stamp_ns: int
+    #: The founding and each visit count one when they happen, and half as much after every half-life.
+    strength: float
 
 
 @dataclass(frozen=True)
@@ -428,15 +430,18 @@ class Trip:
     leg_count: int
     #: Length of its path [m].
     length_m: float
+    #: The recording and travelling it again count one when they happen, and half as much after every
+    #: half-life.
+    strength: float
 
 
 @dataclass(frozen=True)
 class Leg:
     """The way from one place to the next, as motion measured it."""
 
-    #: Place at its start.
+    #: Place at its start; it may have been forgotten since.
     start: int
-    #: Place at its end.
+    #: Place at its end; it may have been forgotten since.
     end: int
     #: Displacement, in the body frame at the start [m].
     translation_m: Vec3

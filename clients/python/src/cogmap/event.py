@@ -127,6 +127,26 @@ class PerceptSurprising:
 
 
 @dataclass(frozen=True)
+class PlaceForgotten:
+    """A place was forgotten: there was no room for the one recruited next."""
+
+    TAG: ClassVar[str] = "place_forgotten"
+    place: int
+    #: Its position in `map` [m].
+    translation_m: Vec3
+
+
+@dataclass(frozen=True)
+class TripForgotten:
+    """A trip was forgotten: there was no room for the leg recorded next."""
+
+    TAG: ClassVar[str] = "trip_forgotten"
+    trip: int
+    #: Its number of legs.
+    legs: int
+
+
+@dataclass(frozen=True)
 class UnknownKind:
     """Something that this version of the package has no word for."""
 
@@ -147,6 +167,8 @@ EventKind = Union[
     SamplesSkipped,
     MarkerPassed,
     PerceptSurprising,
+    PlaceForgotten,
+    TripForgotten,
     UnknownKind,
 ]
 

@@ -67,5 +67,12 @@ class SpaceSettings:
     trip_stillness_s: float
     #: No sample for this long, on the sensor's clock, ends a trip [s].
     trip_gap_s: float
+    #: Most places: for one more, the weakest is forgotten.
+    places_max: int
+    #: Most legs of all trips together: for one more, the weakest trip is forgotten.
+    legs_max: int
+    #: After this many samples of the space, a use counts half as much for the strength of a place or
+    #: trip.
+    strength_half_life_samples: int
     #: Closest two poses of a stored trajectory [s].
     trajectory_interval_s: float

@@ -14,7 +14,7 @@ use crate::place::PlaceId;
 use crate::sample::Label;
 use crate::settings::Settings;
 use crate::state::state_of_struct;
-use crate::trip::{Recorder, TripId};
+use crate::trip::{LegUnderWay, Recorder, TripId};
 
 /// An agent of a space.
 ///
@@ -36,7 +36,7 @@ pub struct Agent {
     pub(crate) still_since: Option<(Point3<f64>, i64)>,
     /// The place that answered, and its confidence.
     pub(crate) place: Option<(PlaceId, f64)>,
-    /// The place entered last; `None` once no place answers any more.
+    /// The place entered last; `None` once no place answers any more. It may have been forgotten.
     pub(crate) entered: Option<PlaceId>,
     pub(crate) recorder: Recorder,
     pub(crate) sightings: u64,
@@ -83,6 +83,16 @@ impl Agent {
     pub(crate) fn awaits(&self, session: u64, to: u64) -> bool {
         self.session
             .is_none_or(|own| session > own || (session == own && to > self.next_seq))
+    }
+
+    /// The places that must not be forgotten: the one that answers here, and the one that the leg
+    /// under way started from.
+    pub(crate) fn holds(&self) -> [Option<PlaceId>; 2] {
+        let leg = self.recorder.leg.as_ref();
+        [
+            self.place.map(|(place, _)| place),
+            leg.map(LegUnderWay::from),
+        ]
     }
 
     /// Name.

@@ -13,23 +13,29 @@
 //! 8     channel · 2²⁶ + page      up to 16 KiB of places' memories of a channel of descriptors
 //! ```
 //!
-//! A page is a count (u16) and its items one after the other, little endian, floats as their bits. A
-//! checkpoint since an earlier one has only the pages that changed in between; laid over the earlier
-//! ones by kind and index, they are the whole again. Indices are rebuilt, not stored.
+//! A page is a count (u16) and its items one after the other, little endian, floats as their bits. Where
+//! items can be missing (places, trips, memories of levels), a mask (u64) of those that are there
+//! stands for the count. A checkpoint since an earlier one has only the pages that changed in between;
+//! laid over the earlier ones by kind and index, they are the whole again. A page of no bytes says that
+//! there is no such page any more. Indices are rebuilt, not stored.
 
 use std::collections::BTreeMap;
 
 use super::CognitiveMap;
 use super::header::{Header, digest_of};
+use crate::agent::Agent;
 use crate::digest::Digest;
 use crate::paged::write_page;
 use crate::percept::CHANNEL_PAGES_MAX;
+use crate::place::PlaceId;
+use crate::record::AgentId;
 use crate::settings::Settings;
+use crate::sparse::PageItems;
 use crate::state::{CorruptState, State, StateReader, StateWriter};
 use crate::trip::LEG_PAGES_MAX;
 
-/// Version of the layout above. Version 1 had no percepts.
-const VERSION: u16 = 2;
+/// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps.
+const VERSION: u16 = 3;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;
@@ -48,7 +54,7 @@ pub struct CheckpointPage {
     pub kind: u8,
     /// Which of its kind it is.
     pub index: u32,
-    /// The bytes.
+    /// The bytes; none where an earlier page is no more. A store may remove it then.
     pub bytes: Vec<u8>,
 }
 
@@ -91,32 +97,21 @@ impl CognitiveMap {
         let agents = self.agents.changed_pages(since);
         let places = self.places.places().changed_pages(since);
         let trips = self.trips.changed_pages(since);
+        let legs = self.trips.changed_legs(since);
         let landmarks = self.landmarks.landmarks().changed_pages(since);
         let channels = self.percepts.channels().changed_pages(since);
         let levels = self.percepts.changed_levels(since);
         let descriptors = self.percepts.changed_descriptors(since);
-        // A leg is appended to its trip, so legs change only where their trip does.
-        let legs = self
-            .trips
-            .changed_pages(since)
-            .flat_map(move |(_, first, trips)| {
-                (first..).zip(trips).flat_map(move |(trip, record)| {
-                    let pages = record.changed_legs(since);
-                    pages.map(move |(page, legs)| of_items(LEGS, leg_page(trip, page), legs))
-                })
-            });
         std::iter::once(self.header_page())
             .chain(agents.map(|(page, _, items)| of_items(AGENTS, page, items)))
-            .chain(places.map(|(page, _, items)| of_items(PLACES, page, items)))
-            .chain(trips.map(|(page, _, items)| of_items(TRIPS, page, items)))
-            .chain(legs)
+            .chain(places.map(|(page, items)| of_sparse(PLACES, page, &items)))
+            .chain(trips.map(|(page, items)| of_sparse(TRIPS, page, &items)))
+            .chain(legs.map(|(trip, page, items)| of_items(LEGS, leg_page(trip, page), items)))
             .chain(landmarks.map(|(page, _, items)| of_items(LANDMARKS, page, items)))
             .chain(channels.map(|(page, _, items)| of_items(CHANNELS, page, items)))
-            .chain(
-                levels.map(|(channel, page, items)| {
-                    of_items(LEVELS, channel_page(channel, page), items)
-                }),
-            )
+            .chain(levels.map(|(channel, page, items)| {
+                of_sparse(LEVELS, channel_page(channel, page), &items)
+            }))
             .chain(descriptors.map(|(channel, page, items)| {
                 of_items(DESCRIPTORS, channel_page(channel, page), items)
             }))
@@ -137,6 +132,7 @@ impl CognitiveMap {
             .into_iter()
             .map(|page| ((page.kind, page.index), page.bytes))
             .collect();
+        pages.retain(|_, bytes| !bytes.is_empty());
         let header = pages
             .remove(&(HEADER, 0))
             .ok_or(CorruptCheckpoint::NoHeader)?;
@@ -147,14 +143,19 @@ impl CognitiveMap {
         let mut map = Self::new(settings);
         map.revision = header.revision;
         map.framed = header.framed;
+        // A map of more would have had a page for each 64 of them, and its digest is another one.
+        let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
+        map.places.skip_to(count(header.places));
+        map.trips.skip_to(count(header.trips));
         let mut trips = Vec::new();
         let mut expected = 0;
         for ((kind, index), bytes) in pages {
-            // Pages of a kind must follow one another; those of legs begin anew with each trip, those
-            // of memories with each channel.
+            // Pages of a kind without gaps must follow one another; those of legs begin anew with each
+            // trip, those of descriptors with each channel.
             let first = match kind {
+                PLACES | TRIPS | LEVELS => true,
                 LEGS => index % LEG_PAGES_MAX == 0,
-                LEVELS | DESCRIPTORS => index % CHANNEL_PAGES_MAX == 0,
+                DESCRIPTORS => index % CHANNEL_PAGES_MAX == 0,
                 _ => index == 0,
             };
             let next = if first { index } else { expected };
@@ -171,12 +172,16 @@ impl CognitiveMap {
         }
         // A trip's page repeats the digests of its legs, which are read from their own pages.
         let again = map.trips.changed_pages(0);
-        let again = again.map(|(page, _, items)| of_items(TRIPS, page, items).bytes);
+        let again = again.map(|(page, items)| of_sparse(TRIPS, page, &items).bytes);
         if !again.eq(trips) {
             return Err(CorruptCheckpoint::DigestMismatch);
         }
         if !map.refers_to_what_is_there() || map.digest() != digest {
             return Err(CorruptCheckpoint::DigestMismatch);
+        }
+        map.trips.summarise_all();
+        for place in map.agents.iter().flat_map(Agent::holds).flatten() {
+            map.places.hold(place);
         }
         Ok(map)
     }
@@ -194,65 +199,56 @@ impl CognitiveMap {
         }
     }
 
-    /// Appends a page.
+    /// Adds a page.
     fn restore_page(&mut self, kind: u8, index: u32, bytes: &[u8]) -> Result<(), CorruptState> {
         let revision = self.revision;
         match kind {
             AGENTS => self.agents.push_page(bytes, revision),
-            PLACES => self.places.push_page(bytes, revision),
-            TRIPS => self.trips.push_page(bytes, revision),
+            PLACES => self.places.restore_page(index as usize, bytes, revision),
+            TRIPS => self.trips.restore_page(index as usize, bytes, revision),
             LEGS => {
-                let trip = self
-                    .trips
-                    .get_mut((index / LEG_PAGES_MAX) as usize, revision);
-                trip.ok_or(CorruptState::Invalid)?
-                    .push_leg_page(bytes, revision)
+                let trip = (index / LEG_PAGES_MAX) as usize;
+                self.trips.restore_legs(trip, bytes, revision)
             }
             LANDMARKS => self.landmarks.push_page(bytes, revision),
             CHANNELS => self.percepts.push_channels(bytes, revision),
             LEVELS | DESCRIPTORS => {
                 let channel = (index / CHANNEL_PAGES_MAX) as usize;
+                let page = (index % CHANNEL_PAGES_MAX) as usize;
                 let levels = kind == LEVELS;
-                self.percepts.push_memory(channel, levels, bytes, revision)
+                self.percepts
+                    .restore_memory(channel, page, levels, bytes, revision)
             }
             _ => Err(CorruptState::Invalid),
         }
     }
 
-    /// Whether all identifiers lead somewhere. The digest finds damage; this finds pages that were
-    /// made up.
+    /// Whether all identifiers lead somewhere, those that may be of forgotten places and trips included.
+    /// The digest finds damage; this finds pages that were made up.
     fn refers_to_what_is_there(&self) -> bool {
-        let places = self.places.places().len();
+        let (recruited, recorded) = (self.places_recruited(), self.trips.recorded());
+        let is_there = |place| self.places.get(place).is_some();
+        let was_there = |place: PlaceId| (place.0 as usize) < recruited;
+        let is_agent = |agent: AgentId| (agent.0 as usize) < self.agents.len();
         let agents = self.agents.iter().all(|agent| {
             agent.body.fits(&self.modules)
-                && agent
-                    .place
-                    .is_none_or(|(place, _)| (place.0 as usize) < places)
-                && agent
-                    .entered
-                    .is_none_or(|place| (place.0 as usize) < places)
-                && agent
-                    .recorder
-                    .leg
-                    .as_ref()
-                    .is_none_or(|leg| (leg.from().0 as usize) < places)
+                && agent.holds().into_iter().flatten().all(is_there)
+                && agent.entered.is_none_or(was_there)
                 && agent
                     .recorder
                     .trip
-                    .is_none_or(|trip| (trip.0 as usize) < self.trips.len())
+                    .is_none_or(|trip| self.trips.get(trip).is_some())
         });
-        let founders = self
-            .places
-            .places()
-            .iter()
-            .all(|place| (place.founder().0 as usize) < self.agents.len());
-        let trips = self.trips.iter().all(|trip| {
-            (trip.agent().0 as usize) < self.agents.len()
+        let places = self.places().all(|(_, place)| {
+            is_agent(place.founder()) && place.trip.is_none_or(|trip| (trip.0 as usize) < recorded)
+        });
+        let trips = self.trips().all(|(_, trip)| {
+            is_agent(trip.agent())
                 && trip
                     .legs()
-                    .all(|leg| (leg.from().0 as usize) < places && (leg.to().0 as usize) < places)
+                    .all(|leg| was_there(leg.from()) && was_there(leg.to()))
         });
-        agents && founders && trips && self.percepts.knows_only(places)
+        agents && places && trips && self.percepts.knows_only(is_there)
     }
 }
 
@@ -260,10 +256,21 @@ impl CognitiveMap {
 fn of_items<T: State>(kind: u8, index: usize, items: &[T]) -> CheckpointPage {
     let mut out = StateWriter::default();
     write_page(items, &mut out);
-    let index = u32::try_from(index).expect("2³² items have fewer pages");
+    page_of(kind, index, out)
+}
+
+/// A page of items that may be missing.
+fn of_sparse<T: State>(kind: u8, index: usize, items: &PageItems<'_, T>) -> CheckpointPage {
+    let mut out = StateWriter::default();
+    items.write(&mut out);
+    page_of(kind, index, out)
+}
+
+/// A page of bytes.
+fn page_of(kind: u8, index: usize, out: StateWriter) -> CheckpointPage {
     CheckpointPage {
         kind,
-        index,
+        index: u32::try_from(index).expect("2³² items have fewer pages"),
         bytes: out.into_bytes(),
     }
 }

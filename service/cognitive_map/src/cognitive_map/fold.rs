@@ -4,28 +4,29 @@ use crate::agent::{Agent, Body};
 use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
 use crate::landmark::{Landmark, LandmarkMap, seen};
-use crate::paged::PagedVec;
 use crate::percept::PerceptMap;
-use crate::place::PlaceMap;
+use crate::place::{PlaceId, PlaceMap};
 use crate::record::{AgentId, SkipReason};
 use crate::sample::{Label, Marker, Relation, Sample, SampleBody, Sighting, StartPose, Target};
 use crate::settings::Settings;
-use crate::trip::{Trip, TripEnd, interval_s};
-
-use super::TRIP_PAGE;
+use crate::strength::Clock;
+use crate::trip::{TripEnd, TripMap, interval_s};
 
 /// The map, open for one record of one agent.
 pub(super) struct Fold<'a> {
     pub(super) settings: &'a Settings,
     pub(super) modules: &'a GridModules,
     pub(super) revision: u64,
+    pub(super) now: Clock,
     pub(super) framed: &'a mut bool,
     pub(super) places: &'a mut PlaceMap,
-    pub(super) trips: &'a mut PagedVec<Trip, TRIP_PAGE>,
+    pub(super) trips: &'a mut TripMap,
     pub(super) landmarks: &'a mut LandmarkMap,
     pub(super) percepts: &'a mut PerceptMap,
     pub(super) agent_id: AgentId,
     pub(super) agent: &'a mut Agent,
+    /// The places that are held for the agent.
+    pub(super) held: [Option<PlaceId>; 2],
     /// Stamp of the events.
     pub(super) stamp_ns: i64,
     pub(super) events: &'a mut Vec<Event>,
@@ -161,12 +162,24 @@ impl Fold<'_> {
         let Some(trip) = self.agent.recorder.trip.take() else {
             return;
         };
-        let Some(record) = self.trips.get_mut(trip.0 as usize, self.revision) else {
-            return;
-        };
-        record.end(reason);
-        let legs = record.leg_count();
-        self.emit(EventKind::TripEnded { trip, legs, reason });
+        if let Some(legs) = self.trips.end(trip, reason, self.revision) {
+            self.emit(EventKind::TripEnded { trip, legs, reason });
+        }
+    }
+
+    /// Holds the places that the agent needs now, and releases those that it no longer does.
+    pub(super) fn hold(&mut self) {
+        let needed = self.agent.holds();
+        if needed == self.held {
+            return; // as most often
+        }
+        for place in needed.into_iter().flatten() {
+            self.places.hold(place);
+        }
+        for place in self.held.into_iter().flatten() {
+            self.places.release(place);
+        }
+        self.held = needed;
     }
 
     /// Appends an event.

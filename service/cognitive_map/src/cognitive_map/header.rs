@@ -12,8 +12,9 @@ pub(super) struct Header {
     pub(super) revision: u64,
     pub(super) framed: bool,
     agents: u64,
-    places: u64,
-    trips: u64,
+    /// How many there have been, forgotten ones included; of trips too.
+    pub(super) places: u64,
+    pub(super) trips: u64,
     landmarks: u64,
     channels: u64,
 }
@@ -37,8 +38,8 @@ impl Header {
             revision: map.revision,
             framed: map.framed,
             agents: map.agents.len() as u64,
-            places: map.places.places().len() as u64,
-            trips: map.trips.len() as u64,
+            places: map.places.places().next_index() as u64,
+            trips: map.trips.recorded() as u64,
             landmarks: map.landmarks.landmarks().len() as u64,
             channels: map.percepts.channels().len() as u64,
         }
@@ -62,6 +63,9 @@ pub(super) fn digest_of(settings: &Settings) -> Digest {
         lost_sd_m,
         trip_stillness_s,
         trip_gap_s,
+        places_max,
+        legs_max,
+        strength_half_life_samples,
     } = &**settings;
     let mut out = StateWriter::default();
     seed.write(&mut out);
@@ -83,6 +87,9 @@ pub(super) fn digest_of(settings: &Settings) -> Digest {
         trip_stillness_s,
         trip_gap_s,
     ] {
+        value.write(&mut out);
+    }
+    for value in [places_max, legs_max, strength_half_life_samples] {
         value.write(&mut out);
     }
     out.digest()

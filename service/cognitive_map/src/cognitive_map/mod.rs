@@ -3,6 +3,7 @@
 mod checkpoint;
 mod feel;
 mod fold;
+mod forget;
 mod header;
 mod motion;
 mod predict;
@@ -22,14 +23,13 @@ use crate::percept::PerceptMap;
 use crate::place::PlaceMap;
 use crate::record::{AgentId, Record, SkipReason};
 use crate::settings::Settings;
-use crate::trip::Trip;
+use crate::strength::Clock;
+use crate::trip::TripMap;
 
 use fold::Fold;
 
 /// Agents per page: few, because the agents change with every sample.
 const AGENT_PAGE: usize = 4;
-/// Trips per page.
-const TRIP_PAGE: usize = 16;
 
 /// The cognitive map of a space, a fold over its journal: [`CognitiveMap::apply`] is the only way to
 /// change it, and the same records in the same order give the same map, bit by bit.
@@ -46,7 +46,7 @@ pub struct CognitiveMap {
     framed: bool,
     agents: PagedVec<Agent, AGENT_PAGE>,
     places: PlaceMap,
-    trips: PagedVec<Trip, TRIP_PAGE>,
+    trips: TripMap,
     landmarks: LandmarkMap,
     percepts: PerceptMap,
 }
@@ -61,7 +61,7 @@ impl CognitiveMap {
             revision: 0,
             framed: false,
             agents: PagedVec::default(),
-            trips: PagedVec::default(),
+            trips: TripMap::default(),
             landmarks: LandmarkMap::default(),
             percepts: PerceptMap::default(),
         }
@@ -104,6 +104,7 @@ impl CognitiveMap {
                 fold.enter_session(*session, Some(sample.stamp_ns));
                 fold.skip(*seq, SkipReason::Lost);
                 fold.sample(*seq, sample);
+                fold.hold();
             }
             Record::Skip {
                 agent,
@@ -121,6 +122,7 @@ impl CognitiveMap {
                 fold.enter_session(*session, None);
                 fold.skip(*from, SkipReason::Lost);
                 fold.skip(*to, *reason);
+                fold.hold();
             }
         }
     }
@@ -143,12 +145,14 @@ impl CognitiveMap {
             settings: &self.settings,
             modules: &self.modules,
             revision: self.revision,
+            now: Clock::at(self.revision, &self.settings),
             framed: &mut self.framed,
             places: &mut self.places,
             trips: &mut self.trips,
             landmarks: &mut self.landmarks,
             percepts: &mut self.percepts,
             agent_id,
+            held: agent.holds(),
             stamp_ns: agent.stamp_ns.unwrap_or(0),
             agent,
             events,

@@ -8,7 +8,7 @@ use crate::place::{Place, PlaceId, confidence};
 use crate::random;
 use crate::sample::Motion;
 use crate::settings::Recruitment;
-use crate::trip::{LegUnderWay, TRIPS_MAX, Trip, TripEnd, TripId, interval_s};
+use crate::trip::{Leg, LegUnderWay, Trip, TripEnd, TripId, interval_s};
 
 /// The places are asked again when the agent has moved by this part of a field radius. Confidence
 /// changes by at most a tenth over that distance, and a robot at rest asks nothing.
@@ -107,7 +107,8 @@ impl Fold<'_> {
             Some((place, confidence)) if confidence >= ANSWER_MIN => {
                 if self.agent.entered != Some(place) {
                     self.agent.entered = Some(place);
-                    self.places.visit(place, self.stamp_ns, self.revision);
+                    self.places
+                        .visit(place, self.stamp_ns, self.now, self.revision);
                     self.emit(EventKind::PlaceEntered { place, confidence });
                 }
                 self.arrive(place);
@@ -119,8 +120,15 @@ impl Fold<'_> {
         }
     }
 
-    /// Recruits a place cell where the agent stands.
+    /// Recruits a place cell where the agent stands. None when there is no room for it: other agents
+    /// hold all places, or there are no more identifiers.
     fn recruit(&mut self, position: &Point3<f64>) -> Option<PlaceId> {
+        // The place that answers too weakly is not held any more.
+        self.agent.place = None;
+        self.hold();
+        if !self.make_room_for_place() {
+            return None;
+        }
         let rotation = self.agent.body.in_map().rotation;
         let covariance = self.agent.body.covariance().in_map_axes(&rotation);
         let position_sd_m = covariance
@@ -128,7 +136,14 @@ impl Fold<'_> {
             .fixed_rows::<3>(0)
             .map(|x| x.max(0.0).sqrt());
         let (founder, stamp_ns) = (self.agent_id, self.stamp_ns);
-        let place = Place::found(*position, rotation, position_sd_m, founder, stamp_ns);
+        let place = Place::found(
+            *position,
+            rotation,
+            position_sd_m,
+            founder,
+            stamp_ns,
+            self.now,
+        );
         let place = self.places.recruit(place, self.revision)?;
         self.emit(EventKind::PlaceRecruited {
             place,
@@ -146,14 +161,7 @@ impl Fold<'_> {
                 let body = &self.agent.body;
                 let done = leg.finish(place, self.stamp_ns, body.in_odom(), body.in_map());
                 let start_stamp_ns = leg.start_stamp_ns();
-                if let Some(trip) = self.trip_under_way(start_stamp_ns)
-                    && let Some(record) = self.trips.get_mut(trip.0 as usize, self.revision)
-                {
-                    record.push(done, self.stamp_ns, self.revision);
-                    if record.is_full() {
-                        self.close_trip(TripEnd::Full);
-                    }
-                }
+                self.record(done, start_stamp_ns);
             }
             None => {}
         }
@@ -162,16 +170,52 @@ impl Fold<'_> {
         self.agent.recorder.leg = Some(leg);
     }
 
-    /// The trip under way, or a new one. None when there are as many as a space can hold.
+    /// Appends a leg to the trip under way, or to a new one.
+    fn record(&mut self, leg: Leg, start_stamp_ns: i64) {
+        let ends = [leg.from(), leg.to()];
+        self.travel_again(ends);
+        if !self.make_room_for_leg() {
+            return;
+        }
+        let Some(trip) = self.trip_under_way(start_stamp_ns) else {
+            return;
+        };
+        let full = self.trips.push_leg(trip, leg, self.stamp_ns, self.revision);
+        for place in ends {
+            if self.trip_through(place).is_none() {
+                self.places.set_trip(place, trip, self.revision);
+            }
+        }
+        if full {
+            self.close_trip(TripEnd::Full);
+        }
+    }
+
+    /// A leg between two places that the same earlier trip leads through is that trip's, travelled again.
+    fn travel_again(&mut self, [from, to]: [PlaceId; 2]) {
+        let earlier = self.trip_through(from);
+        if let Some(trip) = earlier
+            && earlier == self.trip_through(to)
+            && earlier != self.agent.recorder.trip
+        {
+            self.trips.travel_again(trip, self.now, self.revision);
+        }
+    }
+
+    /// The trip that is known to lead through a place.
+    fn trip_through(&self, place: PlaceId) -> Option<TripId> {
+        let trip = self.places.get(place)?.trip?;
+        self.trips.get(trip).map(|_| trip)
+    }
+
+    /// The trip under way, or a new one. None when there have been as many as a space can have.
     fn trip_under_way(&mut self, start_stamp_ns: i64) -> Option<TripId> {
         if self.agent.recorder.trip.is_none() {
-            let id = u32::try_from(self.trips.len())
-                .ok()
-                .filter(|&id| id < TRIPS_MAX)?;
-            let trip = Trip::new(self.agent_id, self.agent.session(), start_stamp_ns);
-            self.trips.push(trip, self.revision);
-            self.agent.recorder.trip = Some(TripId(id));
-            self.emit(EventKind::TripStarted { trip: TripId(id) });
+            let session = self.agent.session();
+            let trip = Trip::new(self.agent_id, session, start_stamp_ns, self.now);
+            let trip = self.trips.begin(trip, self.revision)?;
+            self.agent.recorder.trip = Some(trip);
+            self.emit(EventKind::TripStarted { trip });
         }
         self.agent.recorder.trip
     }

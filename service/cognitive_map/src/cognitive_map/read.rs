@@ -14,6 +14,7 @@ use crate::recall::{self, RecallCue, Recalled, Rivals};
 use crate::record::AgentId;
 use crate::settings::Settings;
 use crate::state::{State, StateWriter};
+use crate::strength::Clock;
 use crate::trip::{Trip, TripId};
 
 impl CognitiveMap {
@@ -65,12 +66,35 @@ impl CognitiveMap {
 
     /// Number of places.
     pub fn place_count(&self) -> usize {
-        self.places.places().len()
+        self.places.len()
     }
 
     /// Bytes of memory that the places and all that finds them take, reserved ones included.
     pub fn place_bytes(&self) -> usize {
         self.places.bytes()
+    }
+
+    /// Bytes of memory that places, trips and what is remembered of percepts take, reserved ones
+    /// included: all that budgets bound.
+    pub fn memory_bytes(&self) -> usize {
+        self.places.bytes() + self.trips.bytes() + self.percepts.bytes()
+    }
+
+    /// Number of places ever recruited, forgotten ones included: the identifier of the next one.
+    pub fn places_recruited(&self) -> usize {
+        self.places.places().next_index()
+    }
+
+    /// Whether there was such a place that has been forgotten.
+    pub fn is_forgotten_place(&self, place: PlaceId) -> bool {
+        self.places.is_forgotten(place)
+    }
+
+    /// Strength of a place: its founding and each visit count one when they happen, and half as much
+    /// after every half-life. 0 for a place that is not there.
+    pub fn place_strength(&self, place: PlaceId) -> f64 {
+        let place = self.places.get(place);
+        place.map_or(0.0, |place| place.strength.now(self.clock()))
     }
 
     /// The places, in the order of recruitment.
@@ -80,9 +104,7 @@ impl CognitiveMap {
 
     /// The places from one on, in the order of recruitment.
     pub fn places_from(&self, first: PlaceId) -> impl Iterator<Item = (PlaceId, &Place)> {
-        (first.0..)
-            .map(PlaceId)
-            .zip(self.places.places().iter_from(first.0 as usize))
+        self.places.iter_from(first)
     }
 
     /// A place.
@@ -146,14 +168,40 @@ impl CognitiveMap {
 
     /// The trips from one on, in the order of recording.
     pub fn trips_from(&self, first: TripId) -> impl Iterator<Item = (TripId, &Trip)> {
-        (first.0..)
-            .map(TripId)
-            .zip(self.trips.iter_from(first.0 as usize))
+        self.trips.iter_from(first)
     }
 
     /// A trip.
     pub fn trip(&self, trip: TripId) -> Option<&Trip> {
-        self.trips.get(trip.0 as usize)
+        self.trips.get(trip)
+    }
+
+    /// Number of trips ever recorded, forgotten ones included: the identifier of the next one.
+    pub fn trips_recorded(&self) -> usize {
+        self.trips.recorded()
+    }
+
+    /// Number of legs of all trips.
+    pub fn leg_count(&self) -> usize {
+        self.trips.legs()
+    }
+
+    /// Whether there was such a trip that has been forgotten.
+    pub fn is_forgotten_trip(&self, trip: TripId) -> bool {
+        self.trips.is_forgotten(trip)
+    }
+
+    /// Strength of a trip: its recording counts one when it begins, and so does travelling all of it
+    /// again, part by part; and each half as much after every half-life. 0 for a trip that is not
+    /// there.
+    pub fn trip_strength(&self, trip: TripId) -> f64 {
+        let trip = self.trips.get(trip);
+        trip.map_or(0.0, |trip| trip.strength.now(self.clock()))
+    }
+
+    /// The space's clock.
+    fn clock(&self) -> Clock {
+        Clock::at(self.revision, &self.settings)
     }
 
     /// Number of landmarks.

@@ -29,6 +29,12 @@ impl Extent {
         self.high = self.high.sup(position);
     }
 
+    /// Grows to hold another box.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.include(&other.low);
+        self.include(&other.high);
+    }
+
     /// Its centre.
     pub(super) fn centre(&self) -> Point3<f64> {
         nalgebra::center(&self.low, &self.high)

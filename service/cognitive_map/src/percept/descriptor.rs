@@ -4,11 +4,10 @@
 //! one of them: exact, the same on every run, and as fast as memory is read. Where there are so many
 //! that this takes long, the cue is compared with sketches first, and multiplied with the nearest.
 
-use super::level::next_slot;
 use super::sketch::{Sketcher, Sketches};
-use super::slots::Slots;
 use crate::paged::PagedVec;
 use crate::place::PlaceId;
+use crate::sparse::SparseVec;
 use crate::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
 /// Numbers in a block: a change after a snapshot copies one block.
@@ -46,14 +45,16 @@ pub(crate) struct Block {
     scales: Vec<f32>,
 }
 
-/// What all places remember of the channel, in the order in which they first did.
+/// What all places remember of the channel, in the order in which they first did, as long as none is
+/// forgotten: then the last one takes its row.
 #[derive(Clone, Debug)]
 pub(super) struct DescriptorMemory {
     dimension: usize,
     /// All blocks but the last are full. A block is a page of its own.
     blocks: PagedVec<Block, 1>,
     len: usize,
-    slots: Slots,
+    /// The slot of each place: its block's index times the rows of a block, plus its row.
+    slots: SparseVec<u32, 64>,
     sketcher: Sketcher,
     /// Of the sums, by slot. They follow from them.
     sketches: Sketches,
@@ -66,7 +67,7 @@ impl DescriptorMemory {
             dimension: dimension.into(),
             blocks: PagedVec::default(),
             len: 0,
-            slots: Slots::default(),
+            slots: SparseVec::default(),
             sketcher: Sketcher::new(dimension.into()),
             sketches: Sketches::default(),
         }
@@ -112,7 +113,7 @@ impl DescriptorMemory {
         revision: u64,
     ) -> bool {
         let rows = rows_per_block(self.dimension);
-        let slot = if let Some(slot) = self.slots.get(place) {
+        let slot = if let Some(slot) = self.slot_of(place) {
             slot
         } else {
             let slots_max = blocks_max.saturating_mul(rows);
@@ -123,7 +124,7 @@ impl DescriptorMemory {
                 self.blocks.push(Block::new(self.dimension), revision);
             }
             self.len += 1;
-            self.slots.set(place, slot);
+            self.slots.insert(place.0 as usize, slot, 0);
             slot as usize
         };
         let Some(block) = self.blocks.get_mut(slot / rows, revision) else {
@@ -136,6 +137,50 @@ impl DescriptorMemory {
         let sketch = self.sketcher.sketch(block.sum(slot % rows));
         self.sketches.set(slot, sketch);
         true
+    }
+
+    /// Forgets what a place remembers. The last trace takes its row, so that no gap is scanned.
+    pub(super) fn forget(&mut self, place: PlaceId, revision: u64) {
+        let Some(slot) = self.slots.remove(place.0 as usize, 0) else {
+            return;
+        };
+        let rows = rows_per_block(self.dimension);
+        let last_slot = self.len - 1;
+        let last_block = last_slot / rows;
+        let Some((trace, sum)) = self
+            .blocks
+            .get_mut(last_block, revision)
+            .and_then(Block::pop)
+        else {
+            return;
+        };
+        self.len = last_slot;
+        if last_slot.is_multiple_of(rows) {
+            self.blocks.pop(revision);
+        }
+        if slot as usize != last_slot {
+            self.slots.insert(trace.place.0 as usize, slot, 0);
+            let slot = slot as usize;
+            if let Some(block) = self.blocks.get_mut(slot / rows, revision) {
+                block.replace(slot % rows, trace, &sum);
+            }
+            self.sketches.set(slot, self.sketcher.sketch(&sum));
+        }
+    }
+
+    /// Whether a place remembers anything.
+    pub(super) fn remembers(&self, place: PlaceId) -> bool {
+        self.slot_of(place).is_some()
+    }
+
+    /// Bytes of memory that it takes, reserved ones included.
+    pub(super) fn bytes(&self) -> usize {
+        let numbers = size_of::<f32>();
+        let blocks = self.blocks.iter().map(|block| {
+            block.traces.capacity() * size_of::<DescriptorTrace>()
+                + (block.sums.capacity() + block.scales.capacity()) * numbers
+        });
+        blocks.sum::<usize>() + self.blocks.bytes() + self.slots.bytes() + self.sketches.bytes()
     }
 
     /// Cosine of a unit vector and what each place remembers, in \[−1, 1\].
@@ -183,10 +228,10 @@ impl DescriptorMemory {
         }
         for (row, trace) in block.traces.iter().enumerate() {
             let slot = next_slot(self.len, usize::MAX).ok_or(CorruptState::Invalid)?;
-            if self.slots.get(trace.place).is_some() {
+            if self.slots.get(trace.place.0 as usize).is_some() {
                 return Err(CorruptState::Invalid);
             }
-            self.slots.set(trace.place, slot);
+            self.slots.insert(trace.place.0 as usize, slot, 0);
             let sketch = self.sketcher.sketch(block.sum(row));
             self.sketches.set(slot as usize, sketch);
             self.len += 1;
@@ -194,9 +239,14 @@ impl DescriptorMemory {
         Ok(())
     }
 
+    /// The slot of a place's trace.
+    fn slot_of(&self, place: PlaceId) -> Option<usize> {
+        self.slots.get(place.0 as usize).map(|&slot| slot as usize)
+    }
+
     /// Where a place's trace lies.
     fn row_of(&self, place: PlaceId) -> Option<(&Block, usize)> {
-        let slot = self.slots.get(place)?;
+        let slot = self.slot_of(place)?;
         let rows = rows_per_block(self.dimension);
         Some((self.blocks.get(slot / rows)?, slot % rows))
     }
@@ -222,6 +272,21 @@ impl Block {
         });
         self.sums.resize(self.sums.len() + self.dimension, 0.0);
         self.scales.push(0.0);
+    }
+
+    /// Removes the last trace and its sum.
+    fn pop(&mut self) -> Option<(DescriptorTrace, Vec<f32>)> {
+        let trace = self.traces.pop()?;
+        self.scales.pop();
+        let sum = self.sums.split_off(self.sums.len() - self.dimension);
+        Some((trace, sum))
+    }
+
+    /// Puts a trace and its sum into a row, in the place of what is there.
+    fn replace(&mut self, row: usize, trace: DescriptorTrace, sum: &[f32]) {
+        self.traces[row] = trace;
+        self.sums[row * self.dimension..][..self.dimension].copy_from_slice(sum);
+        self.scales[row] = scale(sum);
     }
 
     /// Adds a descriptor to a sum.
@@ -286,6 +351,12 @@ impl State for Block {
         }
         Ok(block)
     }
+}
+
+/// The slot after `len` others, if there may be one.
+fn next_slot(len: usize, slots_max: usize) -> Option<u32> {
+    let slot = u32::try_from(len).ok();
+    slot.filter(|_| len < slots_max)
 }
 
 /// Traces that fit a block.

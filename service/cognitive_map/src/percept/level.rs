@@ -1,64 +1,50 @@
 //! What places remember of a channel of levels.
 
 use super::moments::Moments;
-use super::slots::Slots;
-use crate::paged::PagedVec;
 use crate::place::PlaceId;
-use crate::state::{CorruptState, state_of_struct};
+use crate::sparse::SparseVec;
+use crate::state::CorruptState;
 
-/// Traces per page.
-pub(super) const PAGE: usize = 64;
+/// Places per page.
+const PAGE: usize = 64;
 
-/// What a place remembers of the channel.
-#[derive(Clone, Debug)]
-pub(crate) struct LevelTrace {
-    pub(super) place: PlaceId,
-    pub(super) levels: Moments,
-}
-
-state_of_struct!(LevelTrace { place, levels });
-
-/// What all places remember of the channel, in the order in which they first did.
+/// What all places remember of the channel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LevelMemory {
-    traces: PagedVec<LevelTrace, PAGE>,
-    slots: Slots,
+    traces: SparseVec<Moments, PAGE>,
 }
 
 impl LevelMemory {
-    /// The traces.
-    pub(super) fn traces(&self) -> &PagedVec<LevelTrace, PAGE> {
+    /// What places remember, by the identifier of the place.
+    pub(super) fn traces(&self) -> &SparseVec<Moments, PAGE> {
         &self.traces
     }
 
-    /// What a place remembers.
-    pub(super) fn get(&self, place: PlaceId) -> Option<&LevelTrace> {
-        self.traces.get(self.slots.get(place)?)
+    /// The places that remember something.
+    pub(super) fn places(&self) -> impl Iterator<Item = PlaceId> {
+        self.traces.iter().map(|(place, _)| id_of(place))
     }
 
-    /// Strengthens the association of a place and a level. Of more than `traces_max` places nothing
-    /// is remembered.
-    pub(super) fn strengthen(
-        &mut self,
-        place: PlaceId,
-        value: f64,
-        weight: f64,
-        traces_max: usize,
-        revision: u64,
-    ) -> bool {
-        let slot = self.slots.get(place);
-        if let Some(trace) = slot.and_then(|slot| self.traces.get_mut(slot, revision)) {
-            trace.levels.add(value, weight);
-            return true;
+    /// What a place remembers.
+    pub(super) fn get(&self, place: PlaceId) -> Option<&Moments> {
+        self.traces.get(place.0 as usize)
+    }
+
+    /// Strengthens the association of a place and a level.
+    pub(super) fn strengthen(&mut self, place: PlaceId, value: f64, weight: f64, revision: u64) {
+        let place = place.0 as usize;
+        if let Some(levels) = self.traces.get_mut(place, revision) {
+            levels.add(value, weight);
+            return;
         }
-        let Some(slot) = next_slot(self.traces.len(), traces_max) else {
-            return false;
-        };
         let mut levels = Moments::default();
         levels.add(value, weight);
-        self.traces.push(LevelTrace { place, levels }, revision);
-        self.slots.set(place, slot);
-        true
+        self.traces.insert(place, levels, revision);
+    }
+
+    /// Forgets what a place remembers.
+    pub(super) fn forget(&mut self, place: PlaceId, revision: u64) {
+        self.traces.remove(place.0 as usize, revision);
     }
 
     /// How likely each place makes a level: the density of a normal distribution there, as a part of
@@ -72,42 +58,35 @@ impl LevelMemory {
         value: f64,
         sd_floor: f64,
     ) -> impl Iterator<Item = (PlaceId, f64)> {
-        self.traces.iter().map(move |trace| {
-            let sd = trace.levels.sd().max(sd_floor);
-            let deviations = (value - trace.levels.mean()) / sd;
+        self.traces.iter().map(move |(place, levels)| {
+            let sd = levels.sd().max(sd_floor);
+            let deviations = (value - levels.mean()) / sd;
             let likelihood = sd_floor / sd * (-0.5 * deviations * deviations).exp();
-            (trace.place, likelihood)
+            (id_of(place), likelihood)
         })
     }
 
-    /// Appends a checkpoint's page. A place that comes twice is refused.
-    pub(super) fn push_page(&mut self, bytes: &[u8], revision: u64) -> Result<(), CorruptState> {
-        let start = self.traces.len();
-        self.traces.push_page(bytes, revision)?;
-        for (slot, trace) in (start..).zip(self.traces.iter_from(start)) {
-            let slot = next_slot(slot, usize::MAX).ok_or(CorruptState::Invalid)?;
-            if self.slots.get(trace.place).is_some() {
-                return Err(CorruptState::Invalid);
-            }
-            self.slots.set(trace.place, slot);
-        }
-        Ok(())
+    /// Adds a checkpoint's page.
+    pub(super) fn restore_page(
+        &mut self,
+        page: usize,
+        bytes: &[u8],
+        revision: u64,
+    ) -> Result<(), CorruptState> {
+        self.traces.restore_page(page, bytes, revision)
     }
 }
 
-/// The slot after `len` others, if there may be one.
-pub(super) fn next_slot(len: usize, slots_max: usize) -> Option<u32> {
-    let slot = u32::try_from(len).ok().filter(|&slot| slot < u32::MAX);
-    slot.filter(|_| len < slots_max)
+/// The place of an index, which is its identifier; a checkpoint's page index leaves no room for more.
+fn id_of(index: usize) -> PlaceId {
+    PlaceId(u32::try_from(index).expect("places have identifiers of 32 bits"))
 }
 
 /// The largest level that places remember, in either direction. Squares of deviations of larger ones
 /// would leave the numbers.
 pub(super) const LEVEL_MAX: f64 = 1e100;
 
-impl LevelTrace {
-    /// Distance of a level from what is expected, in deviations; `sd_floor` is the least deviation.
-    pub(super) fn surprise(&self, value: f64, sd_floor: f64) -> f64 {
-        (value - self.levels.mean()).abs() / self.levels.sd().max(sd_floor)
-    }
+/// Distance of a level from what is expected, in deviations; `sd_floor` is the least deviation.
+pub(super) fn surprise(levels: &Moments, value: f64, sd_floor: f64) -> f64 {
+    (value - levels.mean()).abs() / levels.sd().max(sd_floor)
 }

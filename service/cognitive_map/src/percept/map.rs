@@ -3,19 +3,22 @@
 use std::sync::Arc;
 
 use super::descriptor::{Block, DescriptorMemory};
-use super::level::{LEVEL_MAX, LevelMemory, LevelTrace, PAGE};
+use super::level::{LEVEL_MAX, LevelMemory, surprise};
+use super::moments::Moments;
 use super::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
 use crate::paged::PagedVec;
 use crate::place::PlaceId;
 use crate::sample::{Descriptor, Label};
+use crate::sparse::PageItems;
 use crate::state::{CorruptState, StateWriter};
 
 /// Most channels of a space. What is felt on further ones is counted and stays in the journal.
 const CHANNELS_MAX: usize = 64;
 /// Channels per page.
 pub(crate) const CHANNEL_PAGE: usize = 8;
-/// Most pages of a channel's memory: what the index of a checkpoint's page leaves room for. At least
-/// 6·10⁷ places can remember something of a channel.
+/// Most pages of a channel's memory: what the index of a checkpoint's page leaves room for. That is a
+/// page for every 64 places that there can ever be, and at least 6·10⁷ places can remember something
+/// of a channel of descriptors.
 pub(crate) const CHANNEL_PAGES_MAX: u32 = 1 << 26;
 /// Up to so many descriptors of a channel are all compared with a cue.
 const SCAN_MAX: usize = 100_000;
@@ -75,15 +78,13 @@ impl PerceptMap {
         let Some(Memory::Levels(memory)) = Arc::make_mut(&mut self.memories).get_mut(index) else {
             return None;
         };
-        let compared = memory.get(place).map(|trace| Compared {
+        let compared = memory.get(place).map(|levels| Compared {
             channel,
-            percepts: trace.levels.count(),
-            surprise: trace.surprise(value, record.level_sd_floor()),
+            percepts: levels.count(),
+            surprise: surprise(levels, value, record.level_sd_floor()),
         });
-        let traces_max = (CHANNEL_PAGES_MAX as usize).saturating_mul(PAGE);
-        if memory.strengthen(place, value, weight, traces_max, revision) {
-            record.levels.add(value, weight);
-        }
+        memory.strengthen(place, value, weight, revision);
+        record.levels.add(value, weight);
         compared
     }
 
@@ -156,27 +157,52 @@ impl PerceptMap {
         }
     }
 
-    /// Whether all places that remember something are among the first `places`.
-    pub(crate) fn knows_only(&self, places: usize) -> bool {
-        let known = |place: PlaceId| (place.0 as usize) < places;
+    /// Forgets what a place remembers. What its percepts taught of their channels stays.
+    pub(crate) fn forget(&mut self, place: PlaceId, revision: u64) {
+        let remembers = |memory: &Memory| match memory {
+            Memory::Levels(memory) => memory.get(place).is_some(),
+            Memory::Descriptors(memory) => memory.remembers(place),
+        };
+        if !self.memories.iter().any(remembers) {
+            return; // before the memories are copied for nothing
+        }
+        for memory in Arc::make_mut(&mut self.memories) {
+            match memory {
+                Memory::Levels(memory) => memory.forget(place, revision),
+                Memory::Descriptors(memory) => memory.forget(place, revision),
+            }
+        }
+    }
+
+    /// Whether all places that remember something are `known`.
+    pub(crate) fn knows_only(&self, known: impl Fn(PlaceId) -> bool) -> bool {
         self.memories.iter().all(|memory| match memory {
-            Memory::Levels(memory) => memory.traces().iter().all(|trace| known(trace.place)),
+            Memory::Levels(memory) => memory.places().all(&known),
             Memory::Descriptors(memory) => memory.traces().all(|trace| known(trace.place)),
         })
     }
 
-    /// The pages of levels that changed after a revision: channel, page, traces.
+    /// Bytes of memory that what places remember takes, reserved ones included.
+    pub(crate) fn bytes(&self) -> usize {
+        let memories = self.memories.iter().map(|memory| match memory {
+            Memory::Levels(memory) => memory.traces().bytes(),
+            Memory::Descriptors(memory) => memory.bytes(),
+        });
+        memories.sum::<usize>() + self.channels.bytes()
+    }
+
+    /// The pages of levels that changed after a revision: channel, page, what places remember.
     pub(crate) fn changed_levels(
         &self,
         since: u64,
-    ) -> impl Iterator<Item = (usize, usize, &[LevelTrace])> {
+    ) -> impl Iterator<Item = (usize, usize, PageItems<'_, Moments>)> {
         let memories = self.memories.iter().enumerate();
         memories.flat_map(move |(channel, memory)| {
             let Memory::Levels(memory) = memory else {
                 return None.into_iter().flatten();
             };
             let pages = memory.traces().changed_pages(since);
-            Some(pages.map(move |(page, _, traces)| (channel, page, traces)))
+            Some(pages.map(move |(page, items)| (channel, page, items)))
                 .into_iter()
                 .flatten()
         })
@@ -232,16 +258,17 @@ impl PerceptMap {
         Ok(())
     }
 
-    /// Appends a checkpoint's page of what places remember of a channel.
-    pub(crate) fn push_memory(
+    /// Adds a checkpoint's page of what places remember of a channel.
+    pub(crate) fn restore_memory(
         &mut self,
         channel: usize,
+        page: usize,
         levels: bool,
         bytes: &[u8],
         revision: u64,
     ) -> Result<(), CorruptState> {
         match (Arc::make_mut(&mut self.memories).get_mut(channel), levels) {
-            (Some(Memory::Levels(memory)), true) => memory.push_page(bytes, revision),
+            (Some(Memory::Levels(memory)), true) => memory.restore_page(page, bytes, revision),
             (Some(Memory::Descriptors(memory)), false) => memory.push_page(bytes, revision),
             _ => Err(CorruptState::Invalid),
         }
@@ -283,7 +310,7 @@ impl Memory {
     fn recall(&self, channel: ChannelId, place: PlaceId) -> Option<Remembered> {
         let (percepts, strength, expected) = match self {
             Self::Levels(memory) => {
-                let levels = &memory.get(place)?.levels;
+                let levels = memory.get(place)?;
                 let (mean, sd) = (levels.mean(), levels.sd());
                 let expected = Expected::Level { mean, sd };
                 (levels.count(), levels.weight(), expected)

@@ -11,7 +11,6 @@ mod level;
 mod map;
 mod moments;
 mod sketch;
-mod slots;
 
 pub use channel::{Channel, ChannelId, ChannelKind};
 pub(crate) use map::{CHANNEL_PAGES_MAX, Compared, PerceptMap};

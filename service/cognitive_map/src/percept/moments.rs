@@ -11,7 +11,7 @@ use crate::state::state_of_struct;
 ///
 /// The order of the values does not matter but for rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Moments {
+pub(crate) struct Moments {
     count: u64,
     weight: f64,
     mean: f64,

@@ -75,6 +75,12 @@ impl Sketches {
         Arc::make_mut(&mut pages[slot / PAGE])[slot % PAGE] = sketch;
     }
 
+    /// Bytes of memory that they take, reserved ones included.
+    pub(super) fn bytes(&self) -> usize {
+        self.0.capacity() * size_of::<Arc<[Sketch; PAGE]>>()
+            + self.0.len() * size_of::<[Sketch; PAGE]>()
+    }
+
     /// The slots, of the first `len`, whose sketches are nearest to a cue's: `count` or, as equally near
     /// ones are all taken, more; in order.
     pub(super) fn nearest(&self, cue: &Sketch, len: usize, count: usize) -> Vec<usize> {

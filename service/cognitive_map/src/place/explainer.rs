@@ -2,15 +2,13 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
-
 use crate::grid::{Ball, Explainer, Extent, GridModules, PartialCode, Search};
 use crate::settings::Settings;
 
 /// The box that all places lie in, and what explains codes in boxes of its size.
 ///
-/// It grows with the places. For the explainer its edges are rounded up to powers of two, so that a
-/// growing world seldom needs another one.
+/// It grows and shrinks with the places. For the explainer its edges are rounded up to powers of two,
+/// so that a growing world seldom needs another one.
 #[derive(Clone, Debug)]
 pub(super) struct PlaceExplainer {
     /// None as long as there is no place.
@@ -29,14 +27,12 @@ impl PlaceExplainer {
         }
     }
 
-    /// A place has come.
-    pub(super) fn include(&mut self, position: &Point3<f64>) {
-        let known = self.fitted.as_ref().map(|(extent, _)| *extent);
-        let mut extent = known.unwrap_or_else(|| Extent::of(position));
-        extent.include(position);
-        if known == Some(extent) {
-            return; // as most often
-        }
+    /// Fits the box of all places; none if there is no place.
+    pub(super) fn fit(&mut self, extent: Option<Extent>) {
+        let Some(extent) = extent else {
+            self.fitted = None;
+            return;
+        };
         match &mut self.fitted {
             Some((known, explainer)) if explainer.serves(&extent, self.finest_spacing_m) => {
                 *known = extent;

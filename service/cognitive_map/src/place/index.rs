@@ -72,6 +72,20 @@ impl SpatialIndex {
         shard.insert(slot, Entry { tag, place, near });
     }
 
+    /// Removes a place that was added at this position.
+    pub(super) fn remove(&mut self, place: PlaceId, position: &Point3<f64>) {
+        let (shard, tag) = self.slot(self.cell(position.coords.into()));
+        let slot = self.shards[shard]
+            .binary_search_by_key(&(tag, place), |entry| (entry.tag, entry.place));
+        let Ok(slot) = slot else { return };
+        self.places -= 1;
+        let shard = Arc::make_mut(&mut Arc::make_mut(&mut self.shards)[shard]);
+        shard.remove(slot);
+        if shard.len() * 2 <= shard.capacity() {
+            shard.shrink_to_fit();
+        }
+    }
+
     /// Splits every shard into eight. That happens twice in the life of an index, while it is small.
     fn split(&mut self) {
         self.shard_bits += SHARD_BITS_STEP;

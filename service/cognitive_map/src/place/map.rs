@@ -1,14 +1,21 @@
 //! The places of a space and the way to the nearest of them.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use nalgebra::Point3;
 
 use super::explainer::PlaceExplainer;
 use super::index::SpatialIndex;
+use super::summary::PlaceSummary;
 use super::{Place, PlaceId};
 use crate::grid::{GridModules, PartialCode, Search};
-use crate::paged::PagedVec;
 use crate::settings::Settings;
+use crate::sparse::SparseVec;
 use crate::state::CorruptState;
+use crate::strength::Clock;
+use crate::summary::{Summary, SummaryTree, merged};
+use crate::trip::TripId;
 
 /// Places per page: small enough to copy one for each change after a snapshot.
 const PAGE: usize = 64;
@@ -18,10 +25,14 @@ const REACH_IN_FIELD_RADII: f64 = 2.0;
 /// All places, in the order of recruitment.
 #[derive(Clone, Debug)]
 pub(crate) struct PlaceMap {
-    places: PagedVec<Place, PAGE>,
+    places: SparseVec<Place, PAGE>,
     index: SpatialIndex,
     reach_m: f64,
     explainer: PlaceExplainer,
+    /// Of the places page by page.
+    summaries: SummaryTree<PlaceSummary>,
+    /// How many agents hold a place, where any does: at most two places for each agent.
+    held: Arc<BTreeMap<PlaceId, u32>>,
 }
 
 impl PlaceMap {
@@ -29,15 +40,17 @@ impl PlaceMap {
     pub(crate) fn new(settings: &Settings) -> Self {
         let reach_m = REACH_IN_FIELD_RADII * settings.field_radius_m;
         Self {
-            places: PagedVec::default(),
+            places: SparseVec::default(),
             index: SpatialIndex::new(reach_m),
             reach_m,
             explainer: PlaceExplainer::new(settings),
+            summaries: SummaryTree::default(),
+            held: Arc::default(),
         }
     }
 
-    /// The places.
-    pub(crate) fn places(&self) -> &PagedVec<Place, PAGE> {
+    /// The places by identifier.
+    pub(crate) fn places(&self) -> &SparseVec<Place, PAGE> {
         &self.places
     }
 
@@ -46,25 +59,118 @@ impl PlaceMap {
         self.places.get(place.0 as usize)
     }
 
-    /// Adds a place. None when there are 2³² already.
+    /// Number of places.
+    pub(crate) fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Whether there was such a place that has been forgotten.
+    pub(crate) fn is_forgotten(&self, place: PlaceId) -> bool {
+        (place.0 as usize) < self.places.next_index() && self.get(place).is_none()
+    }
+
+    /// Whether there is an identifier for one more place: 2³² have not been given out.
+    pub(crate) fn has_identifiers(&self) -> bool {
+        u32::try_from(self.places.next_index()).is_ok()
+    }
+
+    /// Adds a place. None when there have been 2³² already.
     pub(crate) fn recruit(&mut self, place: Place, revision: u64) -> Option<PlaceId> {
-        let id = PlaceId(u32::try_from(self.places.len()).ok()?);
+        let id = PlaceId(u32::try_from(self.places.next_index()).ok()?);
+        let alone = PlaceSummary::of(id, &place, false);
         self.index.insert(id, place.position());
-        self.explainer.include(place.position());
         self.places.push(place, revision);
+        self.include(id, &alone);
+        self.explainer
+            .fit(self.summaries.of_all().map(|all| all.extent));
         Some(id)
+    }
+
+    /// The weakest place that no agent holds, the lowest identifier of equally weak ones.
+    pub(crate) fn weakest(&self) -> Option<PlaceId> {
+        self.summaries.of_all()?.weakest.map(|(_, id)| id)
+    }
+
+    /// Removes a place that no agent holds.
+    pub(crate) fn forget(&mut self, id: PlaceId, revision: u64) -> Option<Place> {
+        let place = self.places.remove(id.0 as usize, revision)?;
+        self.index.remove(id, place.position());
+        self.summarise(id);
+        self.explainer
+            .fit(self.summaries.of_all().map(|all| all.extent));
+        Some(place)
+    }
+
+    /// An agent holds a place: it cannot be the weakest until all who hold it have released it.
+    pub(crate) fn hold(&mut self, place: PlaceId) {
+        let holders = Arc::make_mut(&mut self.held).entry(place).or_default();
+        *holders += 1;
+        if *holders == 1 && self.is_weakest_of_page(place) {
+            self.summarise(place);
+        }
+    }
+
+    /// An agent releases a place that it holds.
+    pub(crate) fn release(&mut self, id: PlaceId) {
+        let held = Arc::make_mut(&mut self.held);
+        match held.get_mut(&id) {
+            Some(holders) if *holders > 1 => *holders -= 1,
+            Some(_) => {
+                held.remove(&id);
+                if let Some(place) = self.get(id) {
+                    let alone = PlaceSummary::of(id, place, false);
+                    self.include(id, &alone);
+                }
+            }
+            None => {}
+        }
     }
 
     /// Bytes of memory that the places and what finds them take, reserved ones included.
     pub(crate) fn bytes(&self) -> usize {
-        self.places.bytes() + self.index.bytes()
+        self.places.bytes() + self.index.bytes() + self.summaries.bytes()
     }
 
     /// An agent came to a place.
-    pub(crate) fn visit(&mut self, place: PlaceId, stamp_ns: i64, revision: u64) {
-        if let Some(place) = self.places.get_mut(place.0 as usize, revision) {
-            place.visit(stamp_ns);
+    pub(crate) fn visit(&mut self, id: PlaceId, stamp_ns: i64, now: Clock, revision: u64) {
+        if let Some(place) = self.places.get_mut(id.0 as usize, revision) {
+            place.visit(stamp_ns, now);
+            // A use makes stronger, so nothing changes but for the weakest.
+            if self.is_weakest_of_page(id) {
+                self.summarise(id);
+            }
         }
+    }
+
+    /// Notes the trip that leads through a place.
+    pub(crate) fn set_trip(&mut self, id: PlaceId, trip: TripId, revision: u64) {
+        if let Some(place) = self.places.get_mut(id.0 as usize, revision) {
+            place.trip = Some(trip);
+        }
+    }
+
+    /// Whether a place is the weakest of its page.
+    fn is_weakest_of_page(&self, id: PlaceId) -> bool {
+        let page = self.summaries.of_group(id.0 as usize / PAGE);
+        page.is_some_and(|page| page.weakest.is_some_and(|(_, weakest)| weakest == id))
+    }
+
+    /// A place of a page is added to the page's summary.
+    fn include(&mut self, id: PlaceId, alone: &PlaceSummary) {
+        let page = id.0 as usize / PAGE;
+        let mut summary = self.summaries.of_group(page).unwrap_or(alone).clone();
+        summary.merge(alone);
+        self.summaries.set(page, Some(summary));
+    }
+
+    /// Summarises the page of a place anew.
+    fn summarise(&mut self, id: PlaceId) {
+        let page = id.0 as usize / PAGE;
+        let places = numbered(self.places.iter_page(page));
+        let summaries: Vec<_> = places
+            .map(|(id, place)| PlaceSummary::of(id, place, self.held.contains_key(&id)))
+            .collect();
+        self.summaries.set(page, merged(summaries.iter()));
     }
 
     /// A place answers up to this distance \[m\].
@@ -159,12 +265,17 @@ impl PlaceMap {
 
     /// The places, in the order of recruitment.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (PlaceId, &Place)> {
-        (0..).map(PlaceId).zip(self.places.iter())
+        self.iter_from(PlaceId(0))
+    }
+
+    /// The places from an identifier on, in the order of recruitment.
+    pub(crate) fn iter_from(&self, first: PlaceId) -> impl Iterator<Item = (PlaceId, &Place)> {
+        numbered(self.places.iter_from(first.0 as usize))
     }
 
     /// All identifiers.
-    pub(crate) fn ids(&self) -> impl Iterator<Item = PlaceId> + use<> {
-        (0..u32::try_from(self.places.len()).unwrap_or(u32::MAX)).map(PlaceId)
+    pub(crate) fn ids(&self) -> impl Iterator<Item = PlaceId> {
+        self.iter().map(|(id, _)| id)
     }
 
     /// Squared distance of a place from a position \[m²\].
@@ -174,19 +285,40 @@ impl PlaceMap {
         })
     }
 
-    /// Appends a checkpoint's page of places.
-    pub(crate) fn push_page(&mut self, bytes: &[u8], revision: u64) -> Result<(), CorruptState> {
-        let first = u32::try_from(self.places.len()).map_err(|_| CorruptState::Invalid)?;
-        self.places.push_page(bytes, revision)?;
-        for (id, place) in (first..)
-            .map(PlaceId)
-            .zip(self.places.iter_from(first as usize))
-        {
-            self.index.insert(id, place.position());
-            self.explainer.include(place.position());
+    /// Adds a checkpoint's page of places.
+    pub(crate) fn restore_page(
+        &mut self,
+        page: usize,
+        bytes: &[u8],
+        revision: u64,
+    ) -> Result<(), CorruptState> {
+        if u32::try_from(page * PAGE + PAGE - 1).is_err() {
+            return Err(CorruptState::Invalid);
         }
+        self.places.restore_page(page, bytes, revision)?;
+        for (id, place) in numbered(self.places.iter_page(page)) {
+            self.index.insert(id, place.position());
+        }
+        self.summarise(PlaceId(u32::try_from(page * PAGE).expect("checked above")));
+        self.explainer
+            .fit(self.summaries.of_all().map(|all| all.extent));
         Ok(())
     }
+
+    /// Sets how many places there have been; fewer than there are have no effect.
+    pub(crate) fn skip_to(&mut self, recruited: usize) {
+        self.places.skip_to(recruited);
+    }
+}
+
+/// Places by identifier, which fits by construction.
+fn numbered<'a>(
+    places: impl Iterator<Item = (usize, &'a Place)>,
+) -> impl Iterator<Item = (PlaceId, &'a Place)> {
+    places.map(|(index, place)| {
+        let id = u32::try_from(index).expect("identifiers are given out as 32 bits");
+        (PlaceId(id), place)
+    })
 }
 
 #[cfg(test)]
@@ -196,12 +328,16 @@ mod tests {
     use nalgebra::{UnitQuaternion, Vector3};
     use proptest::prelude::*;
 
+    fn founded(position: Point3<f64>, revision: u64) -> Place {
+        let now = Clock::at(revision, &Settings::default());
+        let rotation = UnitQuaternion::identity();
+        Place::found(position, rotation, Vector3::zeros(), AgentId(0), 0, now)
+    }
+
     fn map_of(positions: &[Point3<f64>]) -> PlaceMap {
         let mut map = PlaceMap::new(&Settings::default());
         for &position in positions {
-            let rotation = UnitQuaternion::identity();
-            let place = Place::found(position, rotation, Vector3::zeros(), AgentId(0), 0);
-            map.recruit(place, 1).unwrap();
+            map.recruit(founded(position, 0), 1).unwrap();
         }
         map
     }
@@ -237,6 +373,43 @@ mod tests {
             prop_assert_eq!(within, all.filter(|(_, d)| *d <= radius_m).collect::<Vec<_>>());
         }
 
+        /// Of all places only those of even numbers stay, and then everything is asked again; those that
+        /// are held never count as the weakest.
+        #[test]
+        fn forgotten_places_answer_nothing(
+            positions in prop::collection::vec(point(), 1..150),
+            held in prop::collection::vec(0u32..150, 0..20),
+            query in point(),
+        ) {
+            let mut map = map_of(&positions);
+            for id in &held {
+                map.hold(PlaceId(*id));
+            }
+            let all: Vec<_> = map.ids().collect();
+            for id in all.iter().filter(|id| id.0 % 2 == 1) {
+                let forgotten = map.forget(*id, 2).unwrap();
+                prop_assert_eq!(forgotten.position(), &positions[id.0 as usize]);
+                prop_assert!(map.forget(*id, 2).is_none() && map.is_forgotten(*id));
+            }
+            let left: Vec<_> = all.into_iter().filter(|id| id.0 % 2 == 0).collect();
+            prop_assert_eq!(map.ids().collect::<Vec<_>>(), left.clone());
+            let distance = |id: PlaceId| (positions[id.0 as usize] - query).norm();
+            let nearest = left.iter().map(|id| (distance(*id), *id));
+            let nearest = nearest.min_by(|a, b| a.partial_cmp(b).unwrap()).map(|(d, id)| (id, d));
+            prop_assert_eq!(map.nearest(&query), nearest);
+            prop_assert_eq!(map.winner(&query), nearest.filter(|(_, d)| *d <= 0.5));
+            // All are equally strong.
+            let free = left.iter().copied().find(|id| !held.contains(&id.0));
+            prop_assert_eq!(map.weakest(), free);
+            for id in &held {
+                map.release(PlaceId(*id));
+            }
+            prop_assert_eq!(map.weakest(), left.first().copied());
+            map.visit(PlaceId(0), 0, Clock::at(1, &Settings::default()), 3);
+            let second = left.get(1).or(left.first()).copied();
+            prop_assert_eq!(map.weakest(), second);
+        }
+
         #[test]
         fn a_snapshot_keeps_its_places(
             positions in prop::collection::vec(point(), 1..100),
@@ -245,9 +418,7 @@ mod tests {
             let mut map = map_of(&positions);
             let snapshot = map.clone();
             for position in &later {
-                let rotation = UnitQuaternion::identity();
-                let place = Place::found(*position, rotation, Vector3::zeros(), AgentId(0), 0);
-                map.recruit(place, 2).unwrap();
+                map.recruit(founded(*position, 0), 2).unwrap();
             }
             let near = snapshot.within(&positions[0], 1e3);
             prop_assert!(near.iter().all(|(id, _)| (id.0 as usize) < positions.len()));

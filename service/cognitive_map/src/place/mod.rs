@@ -3,6 +3,7 @@
 mod explainer;
 mod index;
 mod map;
+mod summary;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
@@ -11,14 +12,17 @@ pub(crate) use map::PlaceMap;
 use crate::grid::{GridCode, GridModules};
 use crate::record::AgentId;
 use crate::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use crate::strength::{Clock, Strength};
+use crate::trip::TripId;
 
-/// A place, counted from 0 in the order of recruitment.
+/// A place, counted from 0 in the order of recruitment. The number of a forgotten place is not given
+/// to another one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PlaceId(pub u32);
 
 /// A place cell.
 ///
-/// Its grid code follows from its position and is not stored: a place takes about 150 bytes, its
+/// Its grid code follows from its position and is not stored: a place takes about 170 bytes, its
 /// entry in the spatial index included; recall by code needs no other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Place {
@@ -29,6 +33,9 @@ pub struct Place {
     first_stamp_ns: i64,
     last_stamp_ns: i64,
     founder: AgentId,
+    /// The first trip with a leg from or to here, or a later one if that has been forgotten.
+    pub(crate) trip: Option<TripId>,
+    pub(crate) strength: Strength,
 }
 
 state_of_struct!(Place {
@@ -39,6 +46,8 @@ state_of_struct!(Place {
     first_stamp_ns,
     last_stamp_ns,
     founder,
+    trip,
+    strength,
 });
 
 impl Place {
@@ -49,6 +58,7 @@ impl Place {
         position_sd_m: Vector3<f64>,
         founder: AgentId,
         stamp_ns: i64,
+        now: Clock,
     ) -> Self {
         Self {
             position,
@@ -58,12 +68,15 @@ impl Place {
             first_stamp_ns: stamp_ns,
             last_stamp_ns: stamp_ns,
             founder,
+            trip: None,
+            strength: Strength::new(now),
         }
     }
 
     /// An agent came here.
-    pub(crate) fn visit(&mut self, stamp_ns: i64) {
+    pub(crate) fn visit(&mut self, stamp_ns: i64, now: Clock) {
         self.visits += 1;
+        self.strength.used(now, 1.0);
         // The clocks of two agents may differ, so a later visit may carry an earlier stamp.
         self.last_stamp_ns = self.last_stamp_ns.max(stamp_ns);
     }

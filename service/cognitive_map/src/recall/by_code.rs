@@ -61,7 +61,7 @@ impl<'a> CodeRecall<'a> {
     /// the answer is then full, all others are worse than its last place; if it is not, a scan follows.
     pub(super) fn best(&self) -> Vec<(PlaceId, f64)> {
         let limit = self.asked.cue.limit;
-        let places = self.asked.places.places().len();
+        let places = self.asked.places.len();
         if limit == 0 {
             return Vec::new();
         }
@@ -151,7 +151,7 @@ impl<'a> CodeRecall<'a> {
             return false;
         };
         let places = self.asked.places;
-        let steps_max = STEPS_MIN + places.places().len() as u64 / PLACES_PER_STEP;
+        let steps_max = STEPS_MIN + places.len() as u64 / PLACES_PER_STEP;
         let mut left = (least, tolerance);
         let search = places.explain(self.asked.modules, self.code, tolerance, steps_max, |id| {
             if let Some(place) = places.get(id) {

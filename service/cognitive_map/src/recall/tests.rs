@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use super::by_code::CodeRecall;
 use super::*;
 use crate::grid::{Phase, similarity};
+use crate::strength::Clock;
 
 /// A space with places at these positions, founded by two agents in turn, one a second.
 struct World {
@@ -20,7 +21,8 @@ impl World {
         let mut places = PlaceMap::new(&settings);
         for (position, stamp) in positions.into_iter().zip(0u32..) {
             let (rotation, sd_m) = (UnitQuaternion::identity(), Vector3::zeros());
-            let place = Place::found(position, rotation, sd_m, AgentId(stamp % 2), stamp.into());
+            let (founder, now) = (AgentId(stamp % 2), Clock::at(1, &settings));
+            let place = Place::found(position, rotation, sd_m, founder, stamp.into(), now);
             places.recruit(place, 1).unwrap();
         }
         Self {
@@ -28,6 +30,17 @@ impl World {
             settings,
             places,
         }
+    }
+
+    /// Forgets the places of these indices, one after the other.
+    fn without(mut self, forgotten: &[prop::sample::Index]) -> Self {
+        for index in forgotten {
+            let left: Vec<_> = self.places.ids().collect();
+            if let Some(id) = left.get(index.index(left.len().max(1))) {
+                self.places.forget(*id, 2).unwrap();
+            }
+        }
+        self
     }
 
     fn recall(&self, cue: &RecallCue) -> Vec<Recalled> {
@@ -160,10 +173,11 @@ proptest! {
         founder in prop::option::weighted(0.3, 0u32..3),
         since_ns in prop::option::weighted(0.3, 0i64..300),
         until_ns in prop::option::weighted(0.3, 0i64..300),
+        forgotten in prop::collection::vec(any::<prop::sample::Index>(), 0..200),
     ) {
         prop_assume!(known.contains(&true));
         let at = chosen.get(&positions) + Vector3::from(shift) * reach_m;
-        let world = World::of(positions);
+        let world = World::of(positions).without(&forgotten);
         let code = world.code(&at, &noise.map(|noise| noise.map(|x| x * sd)), &known);
         let cue = RecallCue { founder: founder.map(AgentId), since_ns, until_ns, ..cue(code, limit) };
         let scan = world.scan(&cue);

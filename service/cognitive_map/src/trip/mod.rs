@@ -1,14 +1,17 @@
 //! Trips: the ways the team has gone.
 
 mod leg;
+mod map;
 mod recorder;
 
 pub use leg::Leg;
+pub(crate) use map::TripMap;
 pub(crate) use recorder::{LegUnderWay, Recorder, interval_s};
 
 use crate::paged::PagedVec;
 use crate::record::AgentId;
 use crate::state::{CorruptState, State, StateReader, StateWriter};
+use crate::strength::{Clock, Strength};
 
 /// Most legs of a trip; a longer way is recorded as several trips. It bounds what one answer holds.
 pub(crate) const LEGS_MAX: usize = 1024;
@@ -21,7 +24,8 @@ pub(crate) const TRIPS_MAX: u32 = u32::MAX / LEG_PAGES_MAX;
 
 const _: () = assert!(LEG_PAGE * LEG_PAGES_MAX as usize == LEGS_MAX);
 
-/// A trip, counted from 0 in the order of recording.
+/// A trip, counted from 0 in the order of recording. The number of a forgotten trip is not given to
+/// another one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TripId(pub u32);
 
@@ -36,7 +40,8 @@ pub enum TripEnd {
     SessionEnd,
     /// A marker said so.
     Marker,
-    /// The trip reached the longest allowed number of legs; the next one goes on from there.
+    /// The trip reached the longest allowed number of legs, or trips under way filled the space's
+    /// budget of legs; the next one goes on from there.
     Full,
     /// The agent was told where it stands, which breaks the thread of motion.
     StartPose,
@@ -54,12 +59,13 @@ pub struct Trip {
     end_stamp_ns: i64,
     ended: Option<TripEnd>,
     length_m: f64,
+    pub(crate) strength: Strength,
     legs: PagedVec<Leg, LEG_PAGE>,
 }
 
 impl Trip {
     /// A trip of no legs yet.
-    pub(crate) fn new(agent: AgentId, session: u64, start_stamp_ns: i64) -> Self {
+    pub(crate) fn new(agent: AgentId, session: u64, start_stamp_ns: i64, now: Clock) -> Self {
         Self {
             agent,
             session,
@@ -67,6 +73,7 @@ impl Trip {
             end_stamp_ns: start_stamp_ns,
             ended: None,
             length_m: 0.0,
+            strength: Strength::new(now),
             legs: PagedVec::default(),
         }
     }
@@ -133,13 +140,6 @@ impl Trip {
         self.legs.iter()
     }
 
-    /// The pages of legs that changed after a revision, with their indices.
-    pub(crate) fn changed_legs(&self, since: u64) -> impl Iterator<Item = (usize, &[Leg])> {
-        self.legs
-            .changed_pages(since)
-            .map(|(page, _, legs)| (page, legs))
-    }
-
     /// Appends a checkpoint's page of legs.
     pub(crate) fn push_leg_page(
         &mut self,
@@ -162,6 +162,7 @@ impl State for Trip {
         self.end_stamp_ns.write(out);
         self.ended.write(out);
         self.length_m.write(out);
+        self.strength.write(out);
         self.legs.write_digests(out);
     }
 
@@ -173,6 +174,7 @@ impl State for Trip {
             end_stamp_ns: State::read(input)?,
             ended: State::read(input)?,
             length_m: State::read(input)?,
+            strength: State::read(input)?,
             legs: PagedVec::default(),
         };
         // The digests of the legs are passed over: the map's digest is compared in the end.

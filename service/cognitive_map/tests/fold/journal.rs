@@ -252,19 +252,33 @@ pub(crate) fn journals() -> impl Strategy<Value = Vec<Record>> {
     })
 }
 
-/// Settings of either kind of recruitment.
+/// Settings of either kind of recruitment, with budgets that are hit and others that are not.
 pub(crate) fn any_settings() -> impl Strategy<Value = Settings> {
     let recruitment = prop_oneof![
         Just(Recruitment::Novelty),
         (0.0..=1.0).prop_map(|probability| Recruitment::Bernoulli { probability }),
     ];
-    (any::<u64>(), 1usize..=6, recruitment).prop_map(|(seed, grid_modules, recruitment)| {
-        settings(|values| {
-            values.seed = seed;
-            values.grid_modules = grid_modules;
-            values.recruitment = recruitment;
+    let places_max = prop::sample::select(vec![2, 3, 8, 2048]);
+    let legs_max = prop::sample::select(vec![1, 2, 9, 65_536]);
+    let half_life = prop::sample::select(vec![1, 20, 1_000_000]);
+    (
+        any::<u64>(),
+        1usize..=6,
+        recruitment,
+        (places_max, legs_max, half_life),
+    )
+        .prop_map(|(seed, grid_modules, recruitment, budget)| {
+            settings(|values| {
+                values.seed = seed;
+                values.grid_modules = grid_modules;
+                values.recruitment = recruitment;
+                (
+                    values.places_max,
+                    values.legs_max,
+                    values.strength_half_life_samples,
+                ) = budget;
+            })
         })
-    })
 }
 
 fn entries() -> impl Strategy<Value = Entry> {

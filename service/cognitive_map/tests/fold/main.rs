@@ -5,6 +5,7 @@
     reason = "clippy knows test functions, but not what they call"
 )]
 
+mod budgets; // what is forgotten, and when
 mod checkpoint; // pages out and in, damaged ones too
 mod determinism; // the same records, the same map
 mod journal; // arbitrary journals, and a robot to write readable ones

@@ -280,7 +280,10 @@ fn a_session_goes_on_where_the_one_before_ended() {
 
 #[test]
 fn a_thousand_agents_do_not_disturb_each_other() {
-    let mut map = CognitiveMap::new(settings(|values| values.grid_modules = 2));
+    let mut map = CognitiveMap::new(settings(|values| {
+        values.grid_modules = 2;
+        values.places_max = 100_000;
+    }));
     let mut robots: Vec<_> = (0..1_000).map(|_| Robot::enrol(&mut map)).collect();
     for round in 0..12 {
         for (row, robot) in robots.iter_mut().enumerate() {

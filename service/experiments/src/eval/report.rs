@@ -36,7 +36,9 @@ pub struct Report {
     pub grid_ratio: f64,
     /// Radius of a place's field \[m\].
     pub field_radius_m: f64,
-    /// `none` or `sightings`.
+    /// Most places in memory.
+    pub places_max: u32,
+    /// `none`, `descriptor` or `sightings`.
     pub percept: &'static str,
     /// Odometry noise, as a share of a step.
     pub translation_noise: f64,
@@ -95,6 +97,7 @@ impl Report {
             grid_spacing_m: protocol.settings.grid_spacing_m,
             grid_ratio: protocol.settings.grid_ratio,
             field_radius_m: protocol.settings.field_radius_m,
+            places_max: protocol.settings.places_max,
             percept: match protocol.percept {
                 Percept::None => "none",
                 Percept::Descriptor(_) => "descriptor",

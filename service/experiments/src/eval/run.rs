@@ -190,7 +190,7 @@ impl Trial {
 
     /// Makes a step and measures.
     fn step(&mut self, path: Option<&mut Path>) -> Result<Each<Option<f64>>, RunError> {
-        let places_before = self.map.place_count();
+        let places_before = self.map.places_recruited();
         let mut values = Each::default();
         let mut events = Vec::new();
         for reading in self.agent.step() {

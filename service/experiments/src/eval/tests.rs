@@ -53,6 +53,20 @@ fn without_noise_every_estimate_of_the_pose_is_exact() {
 }
 
 #[test]
+fn a_budget_makes_the_number_of_places_level() {
+    for walk in [Walk::Pure, Walk::Persistent] {
+        let mut protocol = novelty(Environment::GridAligned);
+        (protocol.walk, protocol.steps) = (walk, 2000);
+        let unbounded = Run::new(&protocol, 1, Keep::Path, |_| {}).unwrap();
+        assert!(unbounded.growth_last_quarter.unwrap() > 0.1);
+        protocol.settings.places_max = 100;
+        let bounded = Run::new(&protocol, 1, Keep::Path, |_| {}).unwrap();
+        assert!(bounded.growth_last_quarter.unwrap().abs() < f64::EPSILON);
+        assert_eq!(bounded.path.unwrap().places_m.len(), 100);
+    }
+}
+
+#[test]
 fn no_recall_is_nearer_than_the_nearest_place_at_any_step() {
     for protocol in [
         Protocol::of_paper(Environment::ObstacleRich),

@@ -6,7 +6,7 @@ use clap::Args;
 use cogmap_experiments::world::{Eye, Scenery};
 use cognitive_map::{
     AgentId, CognitiveMap, Descriptor, Label, Motion, PerceptCue, PlaceId, PoseNoise, RecallCue,
-    Record, Sample, SampleBody, Settings, StartPose,
+    Record, Sample, SampleBody, Settings, SettingsValues, StartPose,
 };
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -100,7 +100,10 @@ impl Gallery {
     fn new(args: &DescriptorsArgs, places: u32) -> anyhow::Result<Self> {
         let scenery = Scenery::new(args.seed, args.dimension.into());
         let mut eye = Eye::new(scenery.clone(), 0.0, args.seed);
-        let mut map = CognitiveMap::new(Settings::default());
+        let mut map = CognitiveMap::new(Settings::new(SettingsValues {
+            places_max: u32::MAX,
+            ..SettingsValues::default()
+        })?);
         let (agent, mut seq) = (AgentId(0), 0);
         let mut events = Vec::new();
         let name = Label::new("surveyor")?;

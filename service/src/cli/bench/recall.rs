@@ -86,6 +86,7 @@ pub(super) fn run(args: &RecallArgs) -> anyhow::Result<()> {
         grid_modules: args.grid_modules.unwrap_or(default.grid_modules),
         grid_spacing_m: args.grid_spacing_m.unwrap_or(default.grid_spacing_m),
         grid_ratio: args.grid_ratio.unwrap_or(default.grid_ratio),
+        places_max: u32::MAX,
         ..default
     })?;
     let mut memories = Vec::new();

@@ -5,7 +5,7 @@ use std::time::Instant;
 use clap::Args;
 use cognitive_map::{
     AgentId, CognitiveMap, Label, Motion, PoseNoise, Record, Sample, SampleBody, Settings,
-    StartPose,
+    SettingsValues, StartPose,
 };
 use serde::Serialize;
 
@@ -95,7 +95,10 @@ impl Walk {
     /// A map whose places were recruited by driving along rows, so that it is what a robot would
     /// have made: a square with a place about every field radius.
     fn among(places: u64) -> anyhow::Result<Self> {
-        let settings = Settings::default();
+        let settings = Settings::new(SettingsValues {
+            places_max: u32::MAX,
+            ..SettingsValues::default()
+        })?;
         let spacing_m = 1.2 * settings.field_radius_m;
         let mut walk = Self {
             map: CognitiveMap::new(settings),

@@ -206,7 +206,11 @@ impl Store for FjallStore {
         let mut batch = self.database.batch();
         for page in &changed.pages {
             let key = keys::page(space, page.kind, page.index);
-            batch.insert(&self.entities, key, page.bytes.as_slice());
+            if page.bytes.is_empty() {
+                batch.remove(&self.entities, key);
+            } else {
+                batch.insert(&self.entities, key, page.bytes.as_slice());
+            }
         }
         let value = keys::checkpoint_value(changed.next_block, &changed.recorders);
         batch.insert(&self.checkpoint, keys::checkpoint(space), value);

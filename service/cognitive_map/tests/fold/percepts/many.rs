@@ -30,7 +30,10 @@ fn view(place: u32) -> [f32; DIMENSION] {
 #[test]
 fn one_of_very_many_places_is_recalled_by_what_was_seen_there() {
     // Places as close as they may be, so that a small map has many.
-    let mut map = CognitiveMap::new(settings(|settings| settings.field_radius_m = 0.001));
+    let mut map = CognitiveMap::new(settings(|settings| {
+        settings.field_radius_m = 0.001;
+        settings.places_max = u32::MAX;
+    }));
     let mut robot = Robot::enrol(&mut map);
     let places = SCANNED_MAX + 500;
     for place in 0..places {

@@ -56,8 +56,11 @@ impl CodeProtocol {
         Ok(())
     }
 
-    /// The settings of the map.
+    /// The settings of the map, which forgets nothing.
     pub(super) fn map_settings(&self) -> Result<Settings, InvalidProtocol> {
-        Ok(Settings::new(self.settings.clone())?)
+        Ok(Settings::new(SettingsValues {
+            places_max: u32::MAX,
+            ..self.settings.clone()
+        })?)
     }
 }

@@ -14,7 +14,8 @@ const EDGE_PER_PLACE: f64 = 2.0;
 const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
 /// A map of so many places all over a cube around the origin, at a density that does not depend on
-/// their number. With settings that recruit by novelty, no two are closer than a field radius.
+/// their number. With settings that recruit by novelty, no two are closer than a field radius. More
+/// places than the settings' budget are recruited, but not all kept.
 ///
 /// # Errors
 /// None; the samples that it makes are valid.
@@ -27,7 +28,7 @@ pub fn survey(places: u64, settings: Settings, seed: u64) -> Result<CognitiveMap
     let mut events = Vec::new();
     let name = Label::new("surveyor")?;
     map.apply(&Record::Enrol { agent, name }, &mut events);
-    while (map.place_count() as u64) < places {
+    while (map.places_recruited() as u64) < places {
         let position = [(); 3].map(|()| (random.random::<f64>() - 0.5) * edge_m);
         let put = StartPose::new(position, UPRIGHT, PoseNoise::none())?;
         for body in [SampleBody::StartPose(put), SampleBody::Motion(still)] {
