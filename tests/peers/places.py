@@ -25,8 +25,12 @@ class Drawn:
 
 def read(directory: Path, size: int) -> Drawn:
     """What `cogmap bench recall --out` wrote at one number of places."""
-    load = lambda name: np.loadtxt(directory / f"{name}-{size}.csv", delimiter=",", skiprows=1, ndmin=2)
-    return Drawn(load("places"), load("queries"))
+    return Drawn(*(_positions(directory / f"{name}-{size}.csv") for name in ("places", "queries")))
+
+
+def _positions(file: Path) -> Floats:
+    positions: Floats = np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2)
+    return positions
 
 
 def check(client: cogmap.Client, space: str, drawn: Drawn) -> None:
