@@ -362,8 +362,11 @@ mod tests {
         ) {
             let map = map_of(&positions);
             let distance = |position: &Point3<f64>| (position - query).norm();
-            let nearest = (0u32..).zip(&positions).map(|(id, p)| (distance(p), PlaceId(id)));
-            let nearest = nearest.min_by(|a, b| a.partial_cmp(b).unwrap()).map(|(d, id)| (id, d));
+            // By squares: far away the roots of different squares may be equal.
+            let squared = |position: &Point3<f64>| (position - query).norm_squared();
+            let nearest = (0u32..).zip(&positions).map(|(id, p)| (squared(p), PlaceId(id)));
+            let nearest = nearest.min_by(|a, b| a.partial_cmp(b).unwrap());
+            let nearest = nearest.map(|(squared, id)| (id, squared.sqrt()));
             prop_assert_eq!(map.nearest(&query), nearest);
             prop_assert_eq!(map.winner(&query), nearest.filter(|(_, d)| *d <= 0.5));
 
@@ -393,9 +396,10 @@ mod tests {
             }
             let left: Vec<_> = all.into_iter().filter(|id| id.0 % 2 == 0).collect();
             prop_assert_eq!(map.ids().collect::<Vec<_>>(), left.clone());
-            let distance = |id: PlaceId| (positions[id.0 as usize] - query).norm();
-            let nearest = left.iter().map(|id| (distance(*id), *id));
-            let nearest = nearest.min_by(|a, b| a.partial_cmp(b).unwrap()).map(|(d, id)| (id, d));
+            let squared = |id: PlaceId| (positions[id.0 as usize] - query).norm_squared();
+            let nearest = left.iter().map(|id| (squared(*id), *id));
+            let nearest = nearest.min_by(|a, b| a.partial_cmp(b).unwrap());
+            let nearest = nearest.map(|(squared, id)| (id, squared.sqrt()));
             prop_assert_eq!(map.nearest(&query), nearest);
             prop_assert_eq!(map.winner(&query), nearest.filter(|(_, d)| *d <= 0.5));
             // All are equally strong.
