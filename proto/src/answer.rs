@@ -253,7 +253,7 @@ pub struct Rivals {
 pub struct RecalledPlace {
     /// The place.
     pub place: Place,
-    /// Cosine of the cue's and the place's activation (seed Eq. 5); absent without a cue.
+    /// Cosine of the cue's and the place's activation (seed Eq. 5); absent without a position or code.
     pub cosine: Option<f64>,
     /// Confidence (seed Eq. 8), in \[0, 1\]; absent without a cue.
     pub confidence: Option<f64>,

@@ -232,12 +232,12 @@ impl CognitiveMap {
         let is_agent = |agent: AgentId| (agent.0 as usize) < self.agents.len();
         let agents = self.agents.iter().all(|agent| {
             agent.body.fits(&self.modules)
-                && agent.holds().into_iter().flatten().all(is_there)
+                && agent.holds().into_iter().flatten().all(was_there)
                 && agent.entered.is_none_or(was_there)
                 && agent
                     .recorder
                     .trip
-                    .is_none_or(|trip| self.trips.get(trip).is_some())
+                    .is_none_or(|trip| (trip.0 as usize) < recorded)
         });
         let places = self.places().all(|(_, place)| {
             is_agent(place.founder()) && place.trip.is_none_or(|trip| (trip.0 as usize) < recorded)

@@ -33,6 +33,21 @@ pub(super) struct Fold<'a> {
 }
 
 impl Fold<'_> {
+    /// Lets go of a place and a trip that have been forgotten since the agent's record before this.
+    pub(super) fn notice_what_is_gone(&mut self) {
+        if let Some((place, _)) = self.agent.place
+            && self.places.get(place).is_none()
+        {
+            self.agent.place = None;
+            self.agent.asked_at = None;
+        }
+        if let Some(trip) = self.agent.recorder.trip
+            && self.trips.get(trip).is_none()
+        {
+            self.agent.recorder.trip = None;
+        }
+    }
+
     /// Begins a session if it is a new one. `stamp_ns` is that of the sample that begins it.
     pub(super) fn enter_session(&mut self, session: u64, stamp_ns: Option<i64>) {
         if self.agent.session == Some(session) {

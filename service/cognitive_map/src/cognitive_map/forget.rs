@@ -5,8 +5,10 @@ use crate::event::EventKind;
 use crate::trip::TripEnd;
 
 impl Fold<'_> {
-    /// Makes room for one more place: forgets the weakest that no agent holds, if there are as many as
-    /// there may be. False when all are held, or there are no more identifiers.
+    /// Makes room for one more place, if there are as many as there may be: forgets the weakest that no
+    /// agent holds, and where all are held, the weakest that this agent does not. Agents may have gone
+    /// for good without a word, and must not take the memory with them. False when this agent holds all,
+    /// or there are no more identifiers.
     pub(super) fn make_room_for_place(&mut self) -> bool {
         if !self.places.has_identifiers() {
             return false;
@@ -14,7 +16,8 @@ impl Fold<'_> {
         if self.places.len() < self.settings.places_max as usize {
             return true;
         }
-        let Some(place) = self.places.weakest() else {
+        let weakest = self.places.weakest();
+        let Some(place) = weakest.or_else(|| self.places.weakest_held(self.held)) else {
             return false;
         };
         let Some(forgotten) = self.places.forget(place, self.revision) else {
@@ -26,20 +29,20 @@ impl Fold<'_> {
         true
     }
 
-    /// Makes room for one more leg: forgets the weakest trip, if there are as many legs as there may be.
-    ///
-    /// A trip under way is never forgotten. Where no other is left, the agent's own ends and goes, and
-    /// the leg begins another one. False when even so there is no room: other agents' trips take all.
+    /// Makes room for one more leg, if there are as many as there may be: forgets the weakest trip that
+    /// has ended, and where none has, the one under way that began first. That is this agent's own, which
+    /// ends then, or that of an agent that may have gone for good without a word. False without any trip.
     pub(super) fn make_room_for_leg(&mut self) -> bool {
         if self.trips.legs() < self.settings.legs_max as usize {
             return true;
         }
-        if self.trips.weakest().is_none() {
-            self.close_trip(TripEnd::Full);
-        }
-        let Some(trip) = self.trips.weakest() else {
+        let weakest = self.trips.weakest();
+        let Some(trip) = weakest.or_else(|| self.trips.first_under_way()) else {
             return false;
         };
+        if self.agent.recorder.trip == Some(trip) {
+            self.close_trip(TripEnd::Full);
+        }
         let Some(forgotten) = self.trips.forget(trip, self.revision) else {
             return false;
         };

@@ -101,6 +101,7 @@ impl CognitiveMap {
                 let Some(mut fold) = self.fold(*agent, *session, next_seq, events) else {
                     return;
                 };
+                fold.notice_what_is_gone();
                 fold.enter_session(*session, Some(sample.stamp_ns));
                 fold.skip(*seq, SkipReason::Lost);
                 fold.sample(*seq, sample);
@@ -119,6 +120,7 @@ impl CognitiveMap {
                 let Some(mut fold) = self.fold(*agent, *session, *to, events) else {
                     return;
                 };
+                fold.notice_what_is_gone();
                 fold.enter_session(*session, None);
                 fold.skip(*from, SkipReason::Lost);
                 fold.skip(*to, *reason);

@@ -118,7 +118,8 @@ impl CognitiveMap {
         self.places.nearest(position)
     }
 
-    /// The places that answer a cue, best first, equally good ones by identifier. Exact.
+    /// The places that answer a cue, best first, equally good ones by identifier. Exact where
+    /// [`RecallCue`] says so.
     ///
     /// By position the nearest come first, by code the most alike, by a percept the places whose memory
     /// it fits best, and no others answer. By several of them the confidences are multiplied. Without

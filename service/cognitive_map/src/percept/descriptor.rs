@@ -270,6 +270,11 @@ impl Block {
             count: 0,
             weight: 0.0,
         });
+        if self.sums.is_empty() {
+            // What doubling would reserve beyond a full block is never used.
+            self.sums
+                .reserve_exact(rows_per_block(self.dimension) * self.dimension);
+        }
         self.sums.resize(self.sums.len() + self.dimension, 0.0);
         self.scales.push(0.0);
     }

@@ -84,7 +84,7 @@ impl PerceptMap {
             surprise: surprise(levels, value, record.level_sd_floor()),
         });
         memory.strengthen(place, value, weight, revision);
-        record.levels.add(value, weight);
+        record.learn_level(value, weight);
         compared
     }
 

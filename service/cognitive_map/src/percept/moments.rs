@@ -35,6 +35,12 @@ impl Moments {
         self.squares += weight * off * (value - self.mean);
     }
 
+    /// Lets all values so far count so much less: `keep` in \(0, 1\].
+    pub(super) fn fade(&mut self, keep: f64) {
+        self.weight *= keep;
+        self.squares *= keep;
+    }
+
     /// Number of values.
     pub(super) fn count(&self) -> u64 {
         self.count

@@ -31,7 +31,8 @@ pub(crate) struct PlaceMap {
     explainer: PlaceExplainer,
     /// Of the places page by page.
     summaries: SummaryTree<PlaceSummary>,
-    /// How many agents hold a place, where any does: at most two places for each agent.
+    /// How many agents hold a place, where any does: at most two places for each agent. Some may have
+    /// been forgotten since.
     held: Arc<BTreeMap<PlaceId, u32>>,
 }
 
@@ -91,7 +92,17 @@ impl PlaceMap {
         self.summaries.of_all()?.weakest.map(|(_, id)| id)
     }
 
-    /// Removes a place that no agent holds.
+    /// The weakest place that some agent holds, without `except`, the lowest identifier of equally weak
+    /// ones. Looks at all that are held.
+    pub(crate) fn weakest_held(&self, except: [Option<PlaceId>; 2]) -> Option<PlaceId> {
+        let held = self.held.keys().copied();
+        let held = held.filter(|id| !except.contains(&Some(*id)));
+        let strengths = held.filter_map(|id| Some((self.get(id)?.strength, id)));
+        let weakest = strengths.min_by(|a, b| a.0.cmp(b.0).then(a.1.cmp(&b.1)));
+        weakest.map(|(_, id)| id)
+    }
+
+    /// Removes a place. Agents that hold it will notice.
     pub(crate) fn forget(&mut self, id: PlaceId, revision: u64) -> Option<Place> {
         let place = self.places.remove(id.0 as usize, revision)?;
         self.index.remove(id, place.position());

@@ -27,7 +27,8 @@ const BALLS: [f64; 3] = [1.0, 2.0, 3.5];
 /// What to recall places by. `position`, `code` and `percept` rank the places; the other fields
 /// filter.
 ///
-/// The answer is exact, and its cost is as follows, where n is the number of places.
+/// The answer is exact, but for a descriptor alone among more than 10⁵ of its channel, which asks their
+/// sketches first. Its cost is as follows, where n is the number of places.
 ///
 /// - By `position`: free of n when the places asked for lie within seven field radii, else O(n).
 /// - By `code`: free of n when the least alike place of the answer is still much like the cue, so that
@@ -77,7 +78,7 @@ pub struct Recalled {
     pub percept_match: Option<f64>,
 }
 
-/// The places that answer a cue, best first, equally good ones by identifier. Exact.
+/// The places that answer a cue, best first, equally good ones by identifier.
 ///
 /// By position the nearest come first, by code the most alike. By both the confidences are multiplied,
 /// as those of two independent witnesses, and so it is with a percept, by which only places answer that

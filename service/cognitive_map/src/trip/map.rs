@@ -1,5 +1,8 @@
 //! The trips of a space, and which of them may go first.
 
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
 use super::{Leg, TRIPS_MAX, Trip, TripEnd, TripId};
 use crate::sparse::{PageItems, SparseVec};
 use crate::state::{CorruptState, StateWriter};
@@ -20,6 +23,8 @@ pub(crate) struct TripMap {
     legs: usize,
     /// Of the trips that have ended, page by page.
     summaries: SummaryTree<Weakest>,
+    /// The trips under way: at most one for each agent.
+    under_way: Arc<BTreeSet<TripId>>,
     /// The trips forgotten last, oldest first.
     forgotten: SparseVec<Forgotten, 64>,
 }
@@ -88,6 +93,7 @@ impl TripMap {
             return None;
         }
         self.trips.push(trip, revision);
+        Arc::make_mut(&mut self.under_way).insert(TripId(id));
         Some(TripId(id))
     }
 
@@ -111,6 +117,7 @@ impl TripMap {
     pub(crate) fn end(&mut self, trip: TripId, reason: TripEnd, revision: u64) -> Option<usize> {
         let record = self.trips.get_mut(trip.0 as usize, revision)?;
         record.end(reason);
+        Arc::make_mut(&mut self.under_way).remove(&trip);
         let legs = record.leg_count();
         self.summarise(trip);
         Some(legs)
@@ -130,11 +137,19 @@ impl TripMap {
         self.summaries.of_all().map(|weakest| weakest.1)
     }
 
-    /// Removes a trip.
+    /// The trip under way that began first.
+    pub(crate) fn first_under_way(&self) -> Option<TripId> {
+        self.under_way.first().copied()
+    }
+
+    /// Removes a trip. The agent that is under way on it will notice.
     pub(crate) fn forget(&mut self, trip: TripId, revision: u64) -> Option<Trip> {
         let index = trip.0 as usize;
         let record = self.trips.remove(index, revision)?;
         self.legs -= record.leg_count();
+        if record.ended.is_none() {
+            Arc::make_mut(&mut self.under_way).remove(&trip);
+        }
         self.summarise(trip);
         if self.forgotten.len() >= FORGOTTEN_MAX {
             let oldest = self.forgotten.next_index() - self.forgotten.len();
@@ -231,6 +246,9 @@ impl TripMap {
         for first in pages {
             self.summarise(first);
         }
+        let under_way = self.iter_from(TripId(0));
+        let under_way = under_way.filter(|(_, trip)| trip.ended.is_none());
+        self.under_way = Arc::new(under_way.map(|(id, _)| id).collect());
     }
 }
 

@@ -289,29 +289,68 @@ fn a_trip_under_way_is_never_forgotten() {
     assert!(map.trips_recorded() >= 18, "{}", map.trips_recorded());
 }
 
-/// As many robots at rest as there may be places: nobody loses the place where it stands.
+/// As many robots at rest as there may be places: nobody loses the place where it stands to a robot
+/// that finds another one free, and the next robot takes the weakest.
 #[test]
-fn held_places_stay_even_if_there_is_no_room() {
+fn a_held_place_goes_only_where_all_are_held() {
     let (mut map, first) = small(|values| values.places_max = 4);
     let mut robots = vec![first];
     robots.extend((1..5).map(|_| Robot::enrol(&mut map)));
-    for (x, robot) in (0i32..).zip(&mut robots) {
+    for (x, robot) in (0i32..).zip(&mut robots[..4]) {
         robot.sample(&mut map, start_pose([f64::from(x), 0.0, 0.0], [0.0; 3]));
         robot.go(&mut map, [0.0; 3], [0.0; 3]);
     }
     let place = |map: &CognitiveMap, robot: &Robot| map.agent(robot.id).unwrap().place();
     for robot in &robots[..4] {
-        let (place, _) = place(&map, robot).unwrap();
-        assert!(map.place(place).is_some());
+        assert!(map.place(place(&map, robot).unwrap().0).is_some());
     }
-    assert_eq!(
-        place(&map, &robots[4]),
-        None,
-        "there is no room for a fifth"
-    );
-    // One leaves for good; its place goes when the fifth moves.
-    robots[0].sample(&mut map, start_pose([50.0, 0.0, 0.0], [0.0; 3]));
-    let events = robots[4].go(&mut map, [0.1, 0.0, 0.0], [0.0; 3]);
+    robots[4].sample(&mut map, start_pose([9.0, 0.0, 0.0], [0.0; 3]));
+    let events = robots[4].go(&mut map, [0.0; 3], [0.0; 3]);
     assert_eq!(forgotten(&events), [PlaceId(0)]);
-    assert!(place(&map, &robots[4]).is_some());
+    // Whoever stood there finds out with its next sample, and takes the weakest in turn.
+    let events = robots[0].go(&mut map, [0.0; 3], [0.0; 3]);
+    assert_eq!(forgotten(&events), [PlaceId(1)]);
+    assert!(map.place(place(&map, &robots[0]).unwrap().0).is_some());
+    assert_eq!(map.place_count(), 4);
+}
+
+/// Robots that fall silent for good, each in a place and on a trip of its own, leave room for the others.
+#[test]
+fn silent_robots_do_not_take_the_memory_with_them() {
+    let (mut map, mut alive) = small(|values| {
+        values.places_max = 16;
+        values.legs_max = 40;
+    });
+    for gone in 0..20 {
+        let mut robot = Robot::enrol(&mut map);
+        let start = [f64::from(gone) * 10.0, 50.0, 0.0];
+        robot.sample(&mut map, start_pose(start, [0.0; 3]));
+        for _ in 0..12 {
+            robot.go(&mut map, [0.3, 0.0, 0.0], [0.0; 3]);
+        }
+    }
+    alive.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
+    let mut ended = 0;
+    for step in 0..400 {
+        let events = alive.go(&mut map, [0.3, 0.0, 0.0], [0.0; 3]);
+        let is_end = |event: &&EventKind| matches!(event, EventKind::TripEnded { .. });
+        ended += events.iter().filter(is_end).count();
+        assert!(map.place_count() <= 16 && map.leg_count() <= 40);
+        if step > 100 {
+            let agent = map.agent(alive.id).unwrap();
+            assert!(agent.place().is_some(), "step {step}");
+            assert!(agent.trip().is_none_or(|trip| map.trip(trip).is_some()));
+        }
+    }
+    // All legs are now of the one who still travels.
+    assert!(map.trips().all(|(_, trip)| trip.agent() == alive.id));
+    assert!(
+        map.leg_count() > 30 && ended > 5,
+        "{} legs, {ended} ended",
+        map.leg_count()
+    );
+    // And what the map has become can be written down and read again.
+    let pages: Vec<_> = map.checkpoint(0).collect();
+    let again = CognitiveMap::restore(map.settings().clone(), pages).unwrap();
+    assert_eq!(again.digest(), map.digest());
 }

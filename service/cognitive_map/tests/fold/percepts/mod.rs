@@ -219,6 +219,33 @@ fn surprise_is_the_distance_from_what_was_learned() {
     assert!((surprise - (1.0 + 2.0 / 5.0f64.sqrt())).abs() < 1e-6);
 }
 
+/// A sensor that once says nonsense must not blunt its channel.
+#[test]
+fn one_bad_reading_does_not_spoil_a_channel() {
+    for nonsense in [3.4e38, -9999.0, 1e29] {
+        let (mut map, mut robot) = at_first_place();
+        for place in 0..1000 {
+            let value = if place == 100 {
+                nonsense
+            } else {
+                f64::from(place % 40)
+            };
+            robot.sample(&mut map, level("touch", value, [0.0; 3]));
+            robot.ahead(&mut map, 0.5, 1);
+        }
+        let best = &map.recall(&level_cue("touch", 7.0))[0];
+        assert!((mean_and_sd(&remembered(&map, best.place.0)[0]).0 - 7.0).abs() < 1e-9);
+        // The place of a 39 is surprised by a 0.
+        robot.ahead(&mut map, -0.5, 1);
+        let mut events = Vec::new();
+        for _ in 0..5 {
+            robot.sample(&mut map, level("touch", 39.0, [0.0; 3]));
+        }
+        events.extend(robot.sample(&mut map, level("touch", 0.0, [0.0; 3])));
+        assert!(surprises(&events)[0] > 10.0, "{nonsense}: {events:?}");
+    }
+}
+
 #[test]
 fn recall_by_a_level_prefers_where_it_is_likely() {
     let (mut map, mut robot) = at_first_place();
