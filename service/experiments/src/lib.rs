@@ -55,6 +55,7 @@
 //! [`Mrclam::load`](mrclam::Mrclam::load) touches files.
 
 pub mod eval;
+pub mod g2o;
 pub mod metrics;
 pub mod mrclam;
 pub mod reading;

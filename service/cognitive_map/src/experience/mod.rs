@@ -1,0 +1,19 @@
+//! The experience map: nodes, what was measured between them, and the places that fit it best.
+
+mod elimination;
+mod equations;
+mod information;
+mod kernel;
+mod linearisation;
+mod link;
+mod map;
+mod node;
+mod relaxation;
+mod rotation_first;
+
+pub use information::{InvalidInformation, PoseInformation, PositionInformation};
+pub use kernel::{InvalidScale, Kernel, Scale};
+pub use link::{Link, LinkId, SightingTarget};
+pub use map::{ExperienceMap, InvalidLink};
+pub use node::{Freedom, PointId, PoseId};
+pub use relaxation::{RelaxationSettings, Relaxed, Start};
