@@ -60,5 +60,6 @@ pub mod metrics;
 pub mod mrclam;
 pub mod reading;
 pub mod stamp;
+pub mod tuc;
 pub mod tum;
 pub mod world;

@@ -66,4 +66,12 @@ impl Kernel {
             }
         }
     }
+
+    /// k² of a kernel that a graduated relaxation widens.
+    pub(super) fn graduated_square(self) -> Option<f64> {
+        match self {
+            Self::GemanMcClure(Scale(k)) => Some(k * k),
+            Self::Gaussian | Self::Huber(_) | Self::Cauchy(_) => None,
+        }
+    }
 }

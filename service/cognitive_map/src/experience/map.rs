@@ -16,6 +16,8 @@ pub struct ExperienceMap {
     pub(super) links: Vec<LinkSlot>,
     /// For each node its links and the nodes at their other ends; the node itself if there is none.
     pub(super) links_of: Vec<Vec<(u32, u32)>>,
+    /// Nodes whose links have changed since someone last asked.
+    touched: Vec<u32>,
 }
 
 /// A link and how it counts.
@@ -71,6 +73,7 @@ impl ExperienceMap {
         if joins_two {
             self.links_of[to as usize].push((id, from));
         }
+        self.touched.extend([from, to]);
         self.links.push(LinkSlot {
             link,
             kernel,
@@ -81,12 +84,12 @@ impl ExperienceMap {
 
     /// Makes a link say nothing.
     pub fn switch_off(&mut self, link: LinkId) {
-        self.links[link.0 as usize].is_on = false;
+        self.switch(link, false);
     }
 
     /// Makes a link count again.
     pub fn switch_on(&mut self, link: LinkId) {
-        self.links[link.0 as usize].is_on = true;
+        self.switch(link, true);
     }
 
     /// Where a pose is.
@@ -133,6 +136,18 @@ impl ExperienceMap {
             sum += slot.kernel.cost_and_weight(s, widening).0;
         }
         sum
+    }
+
+    /// Nodes whose links have changed since the last call.
+    pub(super) fn take_touched(&mut self) -> Vec<u32> {
+        std::mem::take(&mut self.touched)
+    }
+
+    fn switch(&mut self, link: LinkId, is_on: bool) {
+        let slot = &mut self.links[link.0 as usize];
+        slot.is_on = is_on;
+        let (from, to) = slot.link.nodes();
+        self.touched.extend([from, to]);
     }
 
     fn add_node(&mut self, node: Node) -> u32 {

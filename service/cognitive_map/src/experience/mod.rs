@@ -1,7 +1,9 @@
 //! The experience map: nodes, what was measured between them, and the places that fit it best.
 
+mod descent;
 mod elimination;
 mod equations;
+mod incremental;
 mod information;
 mod kernel;
 mod linearisation;
@@ -11,9 +13,10 @@ mod node;
 mod relaxation;
 mod rotation_first;
 
+pub use incremental::{IncrementalRelaxation, IncrementalSettings, Updated};
 pub use information::{InvalidInformation, PoseInformation, PositionInformation};
 pub use kernel::{InvalidScale, Kernel, Scale};
 pub use link::{Link, LinkId, SightingTarget};
 pub use map::{ExperienceMap, InvalidLink};
 pub use node::{Freedom, PointId, PoseId};
-pub use relaxation::{RelaxationSettings, Relaxed, Start};
+pub use relaxation::{Graduation, RelaxationSettings, Relaxed, Start};

@@ -76,20 +76,28 @@ impl Node {
         self.is_point
     }
 
-    /// The node's pose `from` after a motion by its unknowns: T exp(ξ), or p + ρ for a point.
-    pub(super) fn moved(&self, from: &Isometry3<f64>, unknowns: &[f64]) -> Isometry3<f64> {
+    /// The translation part \[m\] and the rotation part \[rad\] of a motion by its unknowns.
+    pub(super) fn motion(&self, unknowns: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
         let mut twist = Vector6::zeros();
         for (&axis, unknown) in self.axes.iter().zip(unknowns) {
             twist[axis] = *unknown;
         }
-        let linear: Vector3<f64> = twist.fixed_rows::<3>(0).into_owned();
+        (
+            twist.fixed_rows::<3>(0).into_owned(),
+            twist.fixed_rows::<3>(3).into_owned(),
+        )
+    }
+
+    /// The node's pose `from` after a motion by its unknowns: T exp(ξ), or p + ρ for a point.
+    pub(super) fn moved(&self, from: &Isometry3<f64>, unknowns: &[f64]) -> Isometry3<f64> {
+        let (linear, angular) = self.motion(unknowns);
         if self.is_point {
             return Isometry3::from_parts(
                 Translation3::from(from.translation.vector + linear),
                 from.rotation,
             );
         }
-        let mut moved = from * se3::exp(&linear, &twist.fixed_rows::<3>(3).into_owned());
+        let mut moved = from * se3::exp(&linear, &angular);
         // Products of unit quaternions drift away from length one.
         moved.rotation.renormalize_fast();
         moved

@@ -29,7 +29,7 @@ pub(super) struct Clique {
     pub(super) n_frontal: usize,
     /// First row of each variable, and behind the last one the number of rows without right-hand sides.
     pub(super) starts: Vec<usize>,
-    /// Column-major, see [`dense`].
+    /// Column-major, see [`dense`]; empty while there are no numbers.
     pub(super) entries: Vec<f64>,
     pub(super) ld: usize,
 }
@@ -56,7 +56,7 @@ impl Clique {
             variables,
             n_frontal,
             starts,
-            entries: vec![0.0; ld * n_rows],
+            entries: Vec::new(),
             ld,
         }
     }
@@ -77,6 +77,12 @@ impl Clique {
     /// Number of rows without right-hand sides.
     pub(super) fn n_rows(&self) -> usize {
         self.starts[self.variables.len()]
+    }
+
+    /// Makes all numbers zero.
+    pub(super) fn clear(&mut self) {
+        self.entries.clear();
+        self.entries.resize(self.ld * self.n_rows(), 0.0);
     }
 
     /// Factors the assembled front. Returns the number of directions about which it says nothing.

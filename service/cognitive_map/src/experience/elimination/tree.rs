@@ -117,6 +117,11 @@ impl CliqueTree {
         self.local.resize(n, NOWHERE);
     }
 
+    /// Numbers of cliques are below this.
+    pub(crate) fn n_ids(&self) -> usize {
+        self.cliques.len()
+    }
+
     /// All cliques, children before parents.
     pub(crate) fn all(&self) -> Vec<u32> {
         let mut found = Vec::with_capacity(self.cliques.len());
@@ -246,7 +251,7 @@ impl CliqueTree {
         let mut n_fixed = 0;
         for &id in cliques {
             let mut clique = self.cliques[id as usize].take().expect("cliques live");
-            clique.entries.fill(0.0);
+            clique.clear();
             for (place, &variable) in clique.variables.iter().enumerate() {
                 self.local[variable as usize] = number(place);
             }

@@ -1,0 +1,142 @@
+//! A data set as an experience map.
+
+use std::collections::BTreeMap;
+
+use cognitive_map::experience::{
+    ExperienceMap, Freedom, Kernel, Link, LinkId, PoseId, PoseInformation, RelaxationSettings,
+};
+use cognitive_map::geometry::PoseCovariance;
+use nalgebra::{Isometry3, Matrix6};
+
+use super::data_set::{Match, Tuc};
+use crate::metrics::StampedPose;
+
+/// How far apart two samples may be that were taken at the same place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MatchNoise {
+    /// Standard deviation along each axis \[m\].
+    pub position_sd_m: f64,
+    /// Standard deviation of the heading \[rad\].
+    pub heading_sd_rad: f64,
+    /// How a match that does not fit counts.
+    pub kernel: Kernel,
+}
+
+/// A map with a node at every matched moment and at the first, odometry from each to the next, and the matches.
+#[derive(Clone, Debug)]
+pub struct MatchedMap {
+    /// The map.
+    pub map: ExperienceMap,
+    /// The links of the matches, in their order.
+    pub matches: Vec<LinkId>,
+    /// Node and odometry since, for every step.
+    steps: Vec<(i64, PoseId, Isometry3<f64>)>,
+}
+
+impl MatchedMap {
+    /// Of a data set with these matches, which need not be its own. A moment is put at the step next to it.
+    pub fn new(set: &Tuc, matches: &[Match], noise: &MatchNoise) -> Self {
+        let step_at = |stamp_ns: i64| {
+            let after = set.steps.partition_point(|step| step.stamp_ns < stamp_ns);
+            let distance = |step: &usize| set.steps[*step].stamp_ns.abs_diff(stamp_ns);
+            let candidates = after.saturating_sub(1)..(after + 1).min(set.steps.len());
+            candidates.min_by_key(distance).expect("a set has odometry")
+        };
+        let mut node_at: BTreeMap<usize, Option<PoseId>> = BTreeMap::new();
+        for place_match in matches {
+            node_at.insert(step_at(place_match.earlier_ns), None);
+            node_at.insert(step_at(place_match.later_ns), None);
+        }
+        let mut map = ExperienceMap::new();
+        let mut steps = Vec::with_capacity(set.steps.len());
+        let mut node = map.add_pose(Isometry3::identity(), Freedom::Held);
+        let (mut since, mut covariance) = (Isometry3::identity(), PoseCovariance::zero());
+        for (index, step) in set.steps.iter().enumerate() {
+            since *= step.motion;
+            covariance = covariance.after_motion(&step.motion, &step.noise_sd);
+            if let Some(found) = node_at.get_mut(&index) {
+                if index > 0 {
+                    let next = map.add_pose(map.pose(node) * since, Freedom::Planar);
+                    let link = Link::Between {
+                        from: node,
+                        to: next,
+                        transform: since,
+                        information: planar_information(covariance.matrix()),
+                    };
+                    map.add_link(link, Kernel::Gaussian)
+                        .expect("two nodes of the map");
+                    node = next;
+                    (since, covariance) = (Isometry3::identity(), PoseCovariance::zero());
+                }
+                *found = Some(node);
+            }
+            steps.push((step.stamp_ns, node, since));
+        }
+        let node_of = |stamp_ns| node_at[&step_at(stamp_ns)].expect("the walk passed every step");
+        let mut variances = Matrix6::zeros();
+        for (axis, sd) in [
+            (0, noise.position_sd_m),
+            (1, noise.position_sd_m),
+            (5, noise.heading_sd_rad),
+        ] {
+            variances[(axis, axis)] = sd * sd;
+        }
+        let information = planar_information(&variances);
+        let mut links = Vec::with_capacity(matches.len());
+        for place_match in matches {
+            let (from, to) = (
+                node_of(place_match.earlier_ns),
+                node_of(place_match.later_ns),
+            );
+            let link = Link::Between {
+                from,
+                to,
+                transform: Isometry3::identity(),
+                information,
+            };
+            // Two moments next to the same step are one node, and say nothing.
+            if let Ok(id) = map.add_link(link, noise.kernel) {
+                links.push(id);
+            }
+        }
+        Self {
+            map,
+            matches: links,
+            steps,
+        }
+    }
+
+    /// Relaxes the map and gives the pose at every step.
+    pub fn relaxed(&mut self, settings: &RelaxationSettings) -> Vec<StampedPose> {
+        self.map.relax(settings);
+        self.trajectory()
+    }
+
+    /// The pose at every step.
+    pub fn trajectory(&self) -> Vec<StampedPose> {
+        let pose = |&(stamp_ns, node, since): &(i64, PoseId, Isometry3<f64>)| StampedPose {
+            stamp_ns,
+            pose: self.map.pose(node) * since,
+        };
+        self.steps.iter().map(pose).collect()
+    }
+}
+
+/// The inverse of the planar part of a covariance, and nothing about the other directions.
+fn planar_information(covariance: &Matrix6<f64>) -> PoseInformation {
+    let axes = [0, 1, 5];
+    // A robot said to move without any error still has a micrometre and a microradian of it.
+    let planar = nalgebra::Matrix3::from_fn(|r, c| covariance[(axes[r], axes[c])])
+        + nalgebra::Matrix3::identity() * 1e-12;
+    let inverse = planar
+        .cholesky()
+        .expect("the diagonal is above zero")
+        .inverse();
+    let mut matrix = Matrix6::zeros();
+    for (r, &row) in axes.iter().enumerate() {
+        for (c, &column) in axes.iter().enumerate() {
+            matrix[(row, column)] = 0.5 * (inverse[(r, c)] + inverse[(c, r)]);
+        }
+    }
+    PoseInformation::new(&matrix).expect("an inverse of a positive matrix is positive")
+}
