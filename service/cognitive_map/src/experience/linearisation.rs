@@ -217,3 +217,6 @@ fn corner(block: &Matrix3<f64>) -> Matrix6<f64> {
 fn top(part: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(part.x, part.y, part.z, 0.0, 0.0, 0.0)
 }
+
+#[cfg(test)]
+mod tests;

@@ -71,6 +71,9 @@ pub struct Relaxed {
 /// By how much the kernels are narrowed in each step.
 const NARROWING: f64 = 1.4;
 
+/// A decrease of χ² that is none: where everything fits, χ² itself is rounding.
+const NEGLIGIBLE: f64 = 1e-12;
+
 /// Shorter steps tried in place of one that made things worse.
 const TRIALS_MAX: usize = 16;
 
@@ -120,7 +123,8 @@ impl ExperienceMap {
             let is_final = descent.widening <= 1.0;
             let step = descent.step();
             report.n_undetermined = step.n_undetermined;
-            report.has_converged = is_final && step.expected <= settings.tolerance * step.cost;
+            let negligible = NEGLIGIBLE.max(settings.tolerance * step.cost);
+            report.has_converged = is_final && step.expected <= negligible;
             if is_final && step.decrease <= 0.0 {
                 break;
             }

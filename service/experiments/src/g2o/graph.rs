@@ -5,10 +5,11 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use cognitive_map::experience::{ExperienceMap, Freedom, Kernel, Link, PoseId, PoseInformation};
+use cognitive_map::experience::{ExperienceMap, Freedom, Kernel, PoseId, PoseInformation};
 use nalgebra::Isometry3;
 
 use super::error::G2oError;
+use super::feed::Feed;
 use super::parse::parse;
 
 /// One measured relative pose.
@@ -96,28 +97,12 @@ impl PoseGraph {
         }
     }
 
-    /// The graph as an experience map, with every edge taken as right and the first pose held, and the node of each id.
+    /// The graph as an experience map, with every edge taken as right, the first pose held and the others where odometry
+    /// puts them; and the node of each id.
     pub fn experience_map(&self) -> (ExperienceMap, BTreeMap<u64, PoseId>) {
         let mut map = ExperienceMap::new();
-        let mut nodes = BTreeMap::new();
-        for (&id, pose) in &self.poses {
-            let freedom = if nodes.is_empty() {
-                Freedom::Held
-            } else {
-                self.freedom()
-            };
-            nodes.insert(id, map.add_pose(*pose, freedom));
-        }
-        for edge in &self.edges {
-            let link = Link::Between {
-                from: nodes[&edge.from],
-                to: nodes[&edge.to],
-                transform: edge.transform,
-                information: edge.information,
-            };
-            map.add_link(link, Kernel::Gaussian)
-                .expect("the edge's ends are two nodes of the map");
-        }
-        (map, nodes)
+        let mut feed = Feed::new(self, Kernel::Gaussian);
+        while feed.step(&mut map).is_some() {}
+        (map, feed.nodes().clone())
     }
 }

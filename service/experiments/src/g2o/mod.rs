@@ -14,10 +14,12 @@
 //! optimization". A file is planar or spatial, not both.
 
 mod error;
+mod feed;
 mod graph;
 mod parse;
 
 pub use error::{G2oError, LineReason};
+pub use feed::Feed;
 pub use graph::{Edge, PoseGraph};
 
 #[cfg(test)]

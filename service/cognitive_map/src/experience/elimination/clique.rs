@@ -79,6 +79,11 @@ impl Clique {
         self.starts[self.variables.len()]
     }
 
+    /// A diagonal entry of L₁₁.
+    pub(super) fn pivot(&self, k: usize) -> f64 {
+        self.entries[k * self.ld + k]
+    }
+
     /// Makes all numbers zero.
     pub(super) fn clear(&mut self) {
         self.entries.clear();

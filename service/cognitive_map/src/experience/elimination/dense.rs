@@ -21,7 +21,7 @@ const COLUMNS_MIN: usize = 8;
 const NOISE: f64 = 1e-13;
 
 /// What a pivot that is only noise becomes. The solution then does not move along it.
-const FIXED: f64 = 1e150;
+pub(super) const FIXED: f64 = 1e150;
 
 /// The leading dimension for this many rows.
 pub(super) fn leading_dimension(n_rows: usize) -> usize {

@@ -28,6 +28,26 @@ pub(crate) trait Equations {
     fn add(&self, link: u32, front: &mut Front<'_>);
 }
 
+/// Which part of the unknowns to solve for.
+pub(crate) trait Part {
+    /// Whether a clique with this separator belongs to it.
+    fn wants(&mut self, clique: u32, separator: &[u32]) -> bool;
+
+    /// Takes the unknowns of a variable that was solved for.
+    fn solved(&mut self, variable: u32, unknowns: &[f64]);
+}
+
+/// All of them.
+struct Everything;
+
+impl Part for Everything {
+    fn wants(&mut self, _clique: u32, _separator: &[u32]) -> bool {
+        true
+    }
+
+    fn solved(&mut self, _variable: u32, _unknowns: &[f64]) {}
+}
+
 /// A Cholesky factor as a tree of dense cliques (multifrontal: Duff & Reid 1983; as the Bayes tree of a map: Kaess
 /// et al. 2012).
 ///
@@ -294,23 +314,17 @@ impl CliqueTree {
     /// Solves for all unknowns: those of a variable stand at [`slot`] of it.
     pub(crate) fn solve(&self) -> Vec<f64> {
         let mut solution = vec![0.0; slot(self.home.len(), 0, self.n_right)];
-        self.solve_where(&mut solution, |_, _| true, |_, _, _| ());
+        self.solve_where(&mut solution, &mut Everything);
         solution
     }
 
-    /// Solves from the roots on down for the cliques that `wants` names, and passes by what lies below the
-    /// others. `solved` is told of every variable: its old and new unknowns.
-    pub(crate) fn solve_where(
-        &self,
-        solution: &mut [f64],
-        mut wants: impl FnMut(u32, &[u32]) -> bool,
-        mut solved: impl FnMut(u32, &[f64], &[f64]),
-    ) {
+    /// Solves from the roots on down for the cliques that `part` wants, and passes by what lies below the others.
+    pub(crate) fn solve_where(&self, solution: &mut [f64], part: &mut impl Part) {
         let mut x = Vec::new();
         let mut open = self.roots.clone();
         while let Some(id) = open.pop() {
             let clique = self.clique(id);
-            if !wants(id, clique.separator()) {
+            if !part.wants(id, clique.separator()) {
                 continue;
             }
             for right in 0..self.n_right {
@@ -324,8 +338,8 @@ impl CliqueTree {
                 for (&variable, rows) in clique.frontal().iter().zip(clique.starts.windows(2)) {
                     let to = slot(variable as usize, right, self.n_right);
                     let slots = &mut solution[to..to + rows[1] - rows[0]];
-                    solved(variable, slots, &x[rows[0]..rows[1]]);
                     slots.copy_from_slice(&x[rows[0]..rows[1]]);
+                    part.solved(variable, slots);
                 }
             }
             open.extend_from_slice(&clique.children);
@@ -340,7 +354,15 @@ impl CliqueTree {
             .sum()
     }
 
-    fn clique(&self, id: u32) -> &Clique {
+    /// The clique in which a variable is frontal, if the tree has the variable.
+    pub(super) fn home_of(&self, variable: u32) -> Option<u32> {
+        self.home
+            .get(variable as usize)
+            .copied()
+            .filter(|&home| home != NOWHERE)
+    }
+
+    pub(super) fn clique(&self, id: u32) -> &Clique {
         self.cliques[id as usize]
             .as_ref()
             .expect("the tree names living cliques only")
