@@ -157,7 +157,7 @@ impl IncrementalRelaxation {
             poses: &self.linearised_at,
             widening: 1.0,
         };
-        let built = self.tree.restructure(&equations, gap, |node| {
+        let built = self.tree.restructure(&equations, &gap, |node| {
             node as usize >= known || touched.binary_search(&node).is_ok()
         });
         self.tree.refactor(&equations, &built);

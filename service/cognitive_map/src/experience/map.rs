@@ -68,7 +68,7 @@ impl ExperienceMap {
         if joins_two && from == to {
             return Err(InvalidLink::Loop);
         }
-        let id = u32::try_from(self.links.len()).expect("fewer than 2³² links");
+        let id = number(self.links.len());
         self.links_of[from as usize].push((id, to));
         if joins_two {
             self.links_of[to as usize].push((id, from));
@@ -151,9 +151,14 @@ impl ExperienceMap {
     }
 
     fn add_node(&mut self, node: Node) -> u32 {
-        let id = u32::try_from(self.nodes.len()).expect("fewer than 2³² nodes");
+        let id = number(self.nodes.len());
         self.nodes.push(node);
         self.links_of.push(Vec::new());
         id
     }
+}
+
+/// The number of the node or link that comes next. Memory ends long before the numbers do.
+fn number(count: usize) -> u32 {
+    u32::try_from(count).expect("fewer than 2³² nodes and links")
 }

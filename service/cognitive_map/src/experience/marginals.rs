@@ -53,8 +53,8 @@ impl Marginals<'_> {
         Some((block + block.transpose()) * 0.5)
     }
 
-    /// Covariance of the relative pose T_from⁻¹ T_to = (…) exp(ξ), with what the two poses' errors have in common: what a
-    /// match between them is to be judged by. `None` if the links leave one of them free.
+    /// Covariance of the pose of `to` in the frame of `from`, with what the errors of the two have in common: what a match
+    /// between them is to be judged by. `None` if the links leave one of them free.
     ///
     /// ```text
     /// ξ = ξ_to − Ad(T_to⁻¹ T_from) ξ_from

@@ -32,7 +32,7 @@ fn doubted(
         map.add_link(world.link(index, &nodes), kernel).unwrap();
     }
     let mut random = Noise(77);
-    let mut any = || ((random.next() + 1.0) * ROUND as f64) as usize;
+    let mut any = || random.index(2 * ROUND);
     let mut false_links = Vec::new();
     while false_links.len() < n_false {
         let (from, to) = (any(), any());

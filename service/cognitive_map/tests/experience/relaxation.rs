@@ -217,7 +217,7 @@ fn the_same_map_relaxes_to_the_same_bits() {
 #[test]
 fn an_empty_map_and_a_map_without_links_relax() {
     let mut map = ExperienceMap::new();
-    assert_eq!(map.relax(&from(Start::RotationFirst)).chi_squared, 0.0);
+    assert!(map.relax(&from(Start::RotationFirst)).chi_squared.abs() < 1e-15);
     let node = map.add_pose(Isometry3::identity(), Freedom::Planar);
     assert!(map.relax(&from(Start::RotationFirst)).has_converged);
     assert_eq!(map.pose(node), &Isometry3::identity());

@@ -57,21 +57,27 @@ impl<'a> Feed<'a> {
         let node = map.add_pose(start, freedom);
         self.nodes.insert(id, node);
         for edge in arriving {
-            let link = Link::Between {
-                from: self.nodes[&edge.from],
-                to: self.nodes[&edge.to],
-                transform: edge.transform,
-                information: edge.information,
-            };
-            let kernel = if edge.is_odometry() {
-                Kernel::Gaussian
-            } else {
-                self.loop_kernel
-            };
-            self.links
-                .push(map.add_link(link, kernel).expect("two nodes of the map"));
+            self.add_edge(edge, map);
         }
         Some(node)
+    }
+
+    fn add_edge(&mut self, edge: &Edge, map: &mut ExperienceMap) {
+        let link = Link::Between {
+            from: self.nodes[&edge.from],
+            to: self.nodes[&edge.to],
+            transform: edge.transform,
+            information: edge.information,
+        };
+        let kernel = if edge.is_odometry() {
+            Kernel::Gaussian
+        } else {
+            self.loop_kernel
+        };
+        let id = map
+            .add_link(link, kernel)
+            .expect("an edge has two ends, and both are there");
+        self.links.push(id);
     }
 
     /// The nodes that are there, by id.

@@ -14,7 +14,7 @@ const PLANAR_AXES: [usize; 3] = [0, 1, 5];
 /// One line.
 enum Entry {
     Vertex(u64, Isometry3<f64>),
-    Edge(Edge),
+    Edge(Box<Edge>),
 }
 
 /// The graph of a text, with the poses and edges that have a line.
@@ -42,7 +42,7 @@ pub(super) fn parse(text: &str) -> Result<PoseGraph, G2oError> {
             Entry::Vertex(id, pose) => {
                 poses.insert(id, pose);
             }
-            Entry::Edge(edge) => edges.push(edge),
+            Entry::Edge(edge) => edges.push(*edge),
         }
     }
     if edges.is_empty() {
@@ -73,13 +73,13 @@ fn entry(columns: &[&str]) -> Result<(bool, Entry), LineReason> {
             let numbers = numbers::<9>(columns, 3)?;
             let transform = planar_pose(&numbers);
             let edge = edge(columns, transform, &PLANAR_AXES, &numbers[3..])?;
-            Ok((true, Entry::Edge(edge)))
+            Ok((true, Entry::Edge(Box::new(edge))))
         }
         "EDGE_SE3:QUAT" => {
             let numbers = numbers::<28>(columns, 3)?;
             let transform = spatial_pose(&numbers)?;
             let edge = edge(columns, transform, &[0, 1, 2, 3, 4, 5], &numbers[7..])?;
-            Ok((false, Entry::Edge(edge)))
+            Ok((false, Entry::Edge(Box::new(edge))))
         }
         other => Err(LineReason::Kind(other.to_owned())),
     }

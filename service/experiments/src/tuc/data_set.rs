@@ -34,8 +34,8 @@ pub struct Match {
 /// A data set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tuc {
-    pub(super) steps: Vec<OdometryStep>,
-    pub(super) matches: Vec<Match>,
+    steps: Vec<OdometryStep>,
+    matches: Vec<Match>,
     truth: Trajectory,
 }
 
@@ -149,6 +149,14 @@ impl Tuc {
     /// Odometry in order of time. The first step has no motion: it says where the robot's clock began.
     pub fn steps(&self) -> &[OdometryStep] {
         &self.steps
+    }
+
+    /// The step that ended next to a moment; of two equally near ones the earlier.
+    pub(super) fn step_at(&self, stamp_ns: i64) -> usize {
+        let after = self.steps.partition_point(|step| step.stamp_ns < stamp_ns);
+        let candidates = after.saturating_sub(1)..(after + 1).min(self.steps.len());
+        let nearest = candidates.min_by_key(|&step| self.steps[step].stamp_ns.abs_diff(stamp_ns));
+        nearest.expect("a set has odometry")
     }
 
     /// Place matches in the order of the file.

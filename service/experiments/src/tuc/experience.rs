@@ -1,6 +1,6 @@
 //! A data set as an experience map.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use cognitive_map::experience::{
     ExperienceMap, Freedom, Kernel, Link, LinkId, PoseId, PoseInformation, RelaxationSettings,
@@ -30,49 +30,20 @@ pub struct MatchedMap {
     /// The links of the matches, in their order.
     pub matches: Vec<LinkId>,
     /// Node and odometry since, for every step.
-    steps: Vec<(i64, PoseId, Isometry3<f64>)>,
+    steps: Vec<WalkedStep>,
 }
+
+/// When a step ended, the last node until then, and the odometry since that node.
+type WalkedStep = (i64, PoseId, Isometry3<f64>);
 
 impl MatchedMap {
     /// Of a data set with these matches, which need not be its own. A moment is put at the step next to it.
     pub fn new(set: &Tuc, matches: &[Match], noise: &MatchNoise) -> Self {
-        let step_at = |stamp_ns: i64| {
-            let after = set.steps.partition_point(|step| step.stamp_ns < stamp_ns);
-            let distance = |step: &usize| set.steps[*step].stamp_ns.abs_diff(stamp_ns);
-            let candidates = after.saturating_sub(1)..(after + 1).min(set.steps.len());
-            candidates.min_by_key(distance).expect("a set has odometry")
-        };
-        let mut node_at: BTreeMap<usize, Option<PoseId>> = BTreeMap::new();
-        for place_match in matches {
-            node_at.insert(step_at(place_match.earlier_ns), None);
-            node_at.insert(step_at(place_match.later_ns), None);
-        }
-        let mut map = ExperienceMap::new();
-        let mut steps = Vec::with_capacity(set.steps.len());
-        let mut node = map.add_pose(Isometry3::identity(), Freedom::Held);
-        let (mut since, mut covariance) = (Isometry3::identity(), PoseCovariance::zero());
-        for (index, step) in set.steps.iter().enumerate() {
-            since *= step.motion;
-            covariance = covariance.after_motion(&step.motion, &step.noise_sd);
-            if let Some(found) = node_at.get_mut(&index) {
-                if index > 0 {
-                    let next = map.add_pose(map.pose(node) * since, Freedom::Planar);
-                    let link = Link::Between {
-                        from: node,
-                        to: next,
-                        transform: since,
-                        information: planar_information(covariance.matrix()),
-                    };
-                    map.add_link(link, Kernel::Gaussian)
-                        .expect("two nodes of the map");
-                    node = next;
-                    (since, covariance) = (Isometry3::identity(), PoseCovariance::zero());
-                }
-                *found = Some(node);
-            }
-            steps.push((step.stamp_ns, node, since));
-        }
-        let node_of = |stamp_ns| node_at[&step_at(stamp_ns)].expect("the walk passed every step");
+        let moments = matches
+            .iter()
+            .flat_map(|found| [found.earlier_ns, found.later_ns]);
+        let wanted: BTreeSet<usize> = moments.map(|moment_ns| set.step_at(moment_ns)).collect();
+        let (mut map, steps) = walk(set, &wanted);
         let mut variances = Matrix6::zeros();
         for (axis, sd) in [
             (0, noise.position_sd_m),
@@ -83,14 +54,10 @@ impl MatchedMap {
         }
         let information = planar_information(&variances);
         let mut links = Vec::with_capacity(matches.len());
-        for place_match in matches {
-            let (from, to) = (
-                node_of(place_match.earlier_ns),
-                node_of(place_match.later_ns),
-            );
+        for found in matches {
             let link = Link::Between {
-                from,
-                to,
+                from: steps[set.step_at(found.earlier_ns)].1,
+                to: steps[set.step_at(found.later_ns)].1,
                 transform: Isometry3::identity(),
                 information,
             };
@@ -114,12 +81,39 @@ impl MatchedMap {
 
     /// The pose at every step.
     pub fn trajectory(&self) -> Vec<StampedPose> {
-        let pose = |&(stamp_ns, node, since): &(i64, PoseId, Isometry3<f64>)| StampedPose {
+        let pose = |&(stamp_ns, node, since): &WalkedStep| StampedPose {
             stamp_ns,
             pose: self.map.pose(node) * since,
         };
         self.steps.iter().map(pose).collect()
     }
+}
+
+/// A map of the odometry alone, with a node at the first step and at each that is wanted.
+fn walk(set: &Tuc, wanted: &BTreeSet<usize>) -> (ExperienceMap, Vec<WalkedStep>) {
+    let mut map = ExperienceMap::new();
+    let mut steps = Vec::with_capacity(set.steps().len());
+    let mut node = map.add_pose(Isometry3::identity(), Freedom::Held);
+    let (mut since, mut covariance) = (Isometry3::identity(), PoseCovariance::zero());
+    for (index, step) in set.steps().iter().enumerate() {
+        since *= step.motion;
+        covariance = covariance.after_motion(&step.motion, &step.noise_sd);
+        if index > 0 && wanted.contains(&index) {
+            let next = map.add_pose(map.pose(node) * since, Freedom::Planar);
+            let link = Link::Between {
+                from: node,
+                to: next,
+                transform: since,
+                information: planar_information(covariance.matrix()),
+            };
+            map.add_link(link, Kernel::Gaussian)
+                .expect("two nodes of the map");
+            node = next;
+            (since, covariance) = (Isometry3::identity(), PoseCovariance::zero());
+        }
+        steps.push((step.stamp_ns, node, since));
+    }
+    (map, steps)
 }
 
 /// The inverse of the planar part of a covariance, and nothing about the other directions.

@@ -1,5 +1,7 @@
 //! The format, and a map that false matches do not bend.
 
+use std::f64::consts::TAU;
+
 use cognitive_map::experience::{Graduation, Kernel, RelaxationSettings, Scale};
 use nalgebra::Vector3;
 
@@ -71,26 +73,26 @@ fn a_bad_line_is_named() {
 
 /// Four rounds on a circle, with a gyroscope that drifts, matched at every quarter of a round.
 fn rounds() -> Tuc {
+    use std::fmt::Write as _;
+
     let (mut input, mut truth) = (String::new(), String::new());
     let n = 4 * 100;
+    let turn_s = TAU / 10.0;
     for k in 0..=n {
         let t = format_seconds(i64::from(k) * 100_000_000);
-        let angle = f64::from(k) * std::f64::consts::TAU / 100.0;
+        let angle = f64::from(k) * TAU / 100.0;
         let (speed, turn) = if k == 0 {
             (0.0, 0.0)
         } else {
-            (6.283_185, 0.628_318_5 + 0.006)
+            (10.0 * turn_s, turn_s + 0.006)
         };
-        input += &format!("odom2 {t} {speed} 0 {turn} 0.0025 0.0025 0.0001\n");
-        truth += &format!(
-            "point2 {t} {} {} 0 0 0 0\n",
-            10.0 * angle.sin(),
-            -10.0 * angle.cos()
-        );
+        writeln!(input, "odom2 {t} {speed} 0 {turn} 0.0025 0.0025 0.0001").unwrap();
+        let (x, y) = (10.0 * angle.sin(), -10.0 * angle.cos());
+        writeln!(truth, "point2 {t} {x} {y} 0 0 0 0").unwrap();
     }
     for k in (100..=n).step_by(25) {
         let (later, earlier) = (f64::from(k) * 0.1, f64::from(k - 100) * 0.1);
-        input += &format!("loop {later} {earlier} 0.5\n");
+        writeln!(input, "loop {later} {earlier} 0.5").unwrap();
     }
     Tuc::read(&input, &truth).unwrap()
 }
@@ -111,8 +113,8 @@ fn more_false_matches_than_true_ones_do_not_bend_the_map() {
         });
     }
     let noise = MatchNoise {
-        position_sd_m: 0.5,
-        heading_sd_rad: 0.2,
+        position_sd_m: 0.05,
+        heading_sd_rad: 0.02,
         kernel: Kernel::GemanMcClure(Scale::new(3.0).unwrap()),
     };
     let ate_m = |matches: &[Match]| {

@@ -74,8 +74,7 @@ fn factor_columns(
         let (pivots, later) = matrix[..to * ld].split_at_mut((k + 1) * ld);
         let pivot_column = &mut pivots[k * ld..];
         let pivot = pivot_column[k];
-        // Also true of a pivot that is not a number.
-        let is_noise = !(pivot > NOISE * diagonal[k]) || diagonal[k] <= 0.0;
+        let is_noise = pivot.is_nan() || pivot <= NOISE * diagonal[k].max(0.0);
         let first = k / LANES * LANES;
         if is_noise {
             *n_fixed += 1;
@@ -128,6 +127,10 @@ fn subtract_products(
 }
 
 /// As [`subtract_products`], for `N` columns from `j` on.
+#[expect(
+    clippy::inline_always,
+    reason = "only what is inlined into the dispatched closure is compiled for the vectors that it chose"
+)]
 #[inline(always)]
 fn subtract_tile<const N: usize>(done: &[f64], tile: &mut [f64], ld: usize, j: usize) {
     for row in (j / LANES * LANES..ld).step_by(LANES) {

@@ -95,7 +95,7 @@ impl CliqueTree {
         let mut tree = Self::new(E::N_RIGHT);
         let mut gap = Gap::default();
         tree.enter(n, &mut gap);
-        tree.restructure(equations, gap, |_| false);
+        tree.restructure(equations, &gap, |_| false);
         tree
     }
 
@@ -193,7 +193,7 @@ impl CliqueTree {
     pub(crate) fn restructure<E: Equations>(
         &mut self,
         equations: &E,
-        gap: Gap,
+        gap: &Gap,
         is_last: impl Fn(u32) -> bool,
     ) -> Vec<u32> {
         for (place, &variable) in gap.variables.iter().enumerate() {
