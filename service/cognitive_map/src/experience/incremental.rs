@@ -59,7 +59,8 @@ pub struct Updated {
 /// have moved too far from where they last were. The newest nodes are eliminated last, so that the next ones meet few
 /// cliques.
 ///
-/// It belongs to one map. After [`ExperienceMap::relax`] a new one is to be begun.
+/// A link's kernel is weighed where the link is linearised, and no kernel is graduated: what is doubtful is better left out
+/// until a whole relaxation has judged it. It belongs to one map; after [`ExperienceMap::relax`] a new one is to be begun.
 #[derive(Clone, Debug)]
 pub struct IncrementalRelaxation {
     settings: IncrementalSettings,

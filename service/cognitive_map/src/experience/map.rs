@@ -55,6 +55,18 @@ impl ExperienceMap {
         PointId(self.add_node(Node::point(point, freedom)))
     }
 
+    /// Puts a pose somewhere else and says how it may move from now on: so a frame that has turned out to lie in another is
+    /// carried there and its origin set free. An [`IncrementalRelaxation`](super::IncrementalRelaxation) does not take
+    /// notice of it; a new one is to be begun.
+    pub fn place_pose(&mut self, id: PoseId, pose: Isometry3<f64>, freedom: Freedom) {
+        self.nodes[id.0 as usize] = Node::pose(pose, freedom);
+    }
+
+    /// As [`place_pose`](Self::place_pose), for a point.
+    pub fn place_point(&mut self, id: PointId, point: Point3<f64>, freedom: Freedom) {
+        self.nodes[id.0 as usize] = Node::point(point, freedom);
+    }
+
     /// Adds a link.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use cognitive_map::experience::{
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::worlds::{Noise, Rounds, distance, position_information};
+use crate::worlds::{Noise, ROUND, Rounds, distance, position_information};
 
 const BOTH: [Freedom; 2] = [Freedom::Planar, Freedom::Full];
 
@@ -193,6 +193,53 @@ fn what_nothing_ties_to_the_map_keeps_its_place() {
     assert_eq!(report.n_undetermined, 12);
     assert!(distance(&map, &nodes, &world.truth) < 1e-6);
     assert_eq!(map.pose(alone), &Isometry3::translation(5.0, 6.0, 7.0));
+}
+
+/// The second round begins in a frame of its own, and is carried into that of the first when one step between them is known.
+#[test]
+fn frames_merge() {
+    let own_frame = Isometry3::new(Vector3::new(50.0, -20.0, 5.0), Vector3::new(1.0, 2.0, -0.5));
+    for freedom in BOTH {
+        let own_frame = if freedom == Freedom::Full {
+            own_frame
+        } else {
+            Isometry3::translation(9.0, 8.0, 0.0)
+        };
+        let world = Rounds::new(12, freedom, 0.0);
+        let mut map = ExperienceMap::new();
+        let mut nodes = Vec::new();
+        for (k, pose) in world.truth.iter().enumerate() {
+            let is_origin = k == 0 || k == ROUND;
+            let pose = if k < ROUND { *pose } else { own_frame * pose };
+            nodes.push(map.add_pose(pose, if is_origin { Freedom::Held } else { freedom }));
+        }
+        let between = |link: usize| {
+            let (from, to, _) = world.measured[link];
+            from < ROUND && to >= ROUND
+        };
+        for link in (0..world.measured.len()).filter(|&link| !between(link)) {
+            map.add_link(world.link(link, &nodes), Kernel::Gaussian)
+                .unwrap();
+        }
+        assert!(map.relax(&from(Start::Here)).chi_squared < 1e-9);
+
+        let step = world
+            .measured
+            .iter()
+            .find(|measured| measured.1 == ROUND)
+            .unwrap();
+        let origin = map.pose(nodes[step.0]) * step.2;
+        let carry = origin * map.pose(nodes[ROUND]).inverse();
+        for &node in &nodes[ROUND..] {
+            map.place_pose(node, carry * map.pose(node), freedom);
+        }
+        for link in (0..world.measured.len()).filter(|&link| between(link)) {
+            map.add_link(world.link(link, &nodes), Kernel::Gaussian)
+                .unwrap();
+        }
+        assert!(map.relax(&from(Start::Here)).chi_squared < 1e-9);
+        assert!(distance(&map, &nodes, &world.truth) < 1e-6);
+    }
 }
 
 #[test]
