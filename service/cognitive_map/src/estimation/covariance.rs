@@ -32,17 +32,13 @@ pub(super) struct Projection<const M: usize> {
 }
 
 impl JointCovariance {
-    /// Of stored entries, row by row; `None` unless there are `dim`² of them.
-    pub(super) fn from_entries(dim: usize, entries: Vec<f64>) -> Option<Self> {
-        (dim.checked_mul(dim) == Some(entries.len())).then(|| Self { dim, entries: Arc::new(entries) })
-    }
-
     /// Number of components.
     pub(super) fn dim(&self) -> usize {
         self.dim
     }
 
     /// All entries, row by row.
+    #[cfg(test)]
     pub(super) fn entries(&self) -> &[f64] {
         &self.entries
     }
@@ -216,7 +212,10 @@ impl JointCovariance {
                 *entry += factor * value;
             }
         }
-        for (index, target) in Arc::make_mut(&mut self.entries).chunks_exact_mut(dim).enumerate() {
+        for (index, target) in Arc::make_mut(&mut self.entries)
+            .chunks_exact_mut(dim)
+            .enumerate()
+        {
             for row in &rows {
                 let factor = row[index];
                 if factor != 0.0 {
@@ -249,7 +248,10 @@ impl JointCovariance {
                 }
             }
         }
-        for (index, target) in Arc::make_mut(&mut self.entries).chunks_exact_mut(dim).enumerate() {
+        for (index, target) in Arc::make_mut(&mut self.entries)
+            .chunks_exact_mut(dim)
+            .enumerate()
+        {
             for (lever, row) in levers.iter().zip(&rows) {
                 let (by_lever, by_row) = (lever[index], row[index]);
                 for ((entry, row), lever) in target.iter_mut().zip(row).zip(lever) {
@@ -269,12 +271,24 @@ impl JointCovariance {
     }
 
     /// Adds to `width` components from `offset` on a linear function of six others: x ← x + J y.
-    pub(super) fn add(&mut self, offset: usize, width: usize, source: usize, by: &SMatrix<f64, 6, 6>) {
+    pub(super) fn add(
+        &mut self,
+        offset: usize,
+        width: usize,
+        source: usize,
+        by: &SMatrix<f64, 6, 6>,
+    ) {
         let (dim, entries) = (self.dim, Arc::make_mut(&mut self.entries));
         for pass in 0..2 {
             for row in 0..width {
                 for column in 0..dim {
-                    let at = |own: usize| if pass == 0 { own * dim + column } else { column * dim + own };
+                    let at = |own: usize| {
+                        if pass == 0 {
+                            own * dim + column
+                        } else {
+                            column * dim + own
+                        }
+                    };
                     let added: f64 = (0..6).map(|k| by[(row, k)] * entries[at(source + k)]).sum();
                     entries[at(offset + row)] += added;
                 }

@@ -18,6 +18,8 @@ const PENDING_MAX: usize = 64;
 const PATIENCE_NS: i64 = 2_000_000_000;
 /// Sightings between agents of different frames that are remembered.
 const MEETINGS_MAX: usize = 64;
+/// Least distance of the places where an agent was seen, for two sightings to count as two \[m\].
+const MEETING_APART_M: f64 = 0.2;
 /// Longest interval between two motions over which a bias counts \[s\].
 const DURATION_S_MAX: f64 = 10.0;
 
@@ -266,9 +268,13 @@ impl Estimator {
         };
         let mover = |frame: usize, index: usize| &self.frames[frame].members[index].mover;
         // The observer itself may not have moved up to its sighting: then it is where it was.
-        let own = mover(frame, observer).history.motion_since(pending.stamp_ns);
+        let own = mover(frame, observer)
+            .history
+            .motion_since(pending.stamp_ns);
         let back = own.unwrap_or_else(Isometry3::identity);
-        let others = mover(target_frame, target).history.motion_since(pending.stamp_ns);
+        let others = mover(target_frame, target)
+            .history
+            .motion_since(pending.stamp_ns);
         let Some(target_back) = others else {
             return; // too long ago
         };
@@ -290,17 +296,26 @@ impl Estimator {
         let lasting = self.parameters.lasting_range_error * point.norm();
         let observer_pose = mover(frame, observer).pose * back.inverse();
         let target_pose = mover(target_frame, target).pose * target_back.inverse();
-        if self.meetings.len() >= MEETINGS_MAX {
-            self.meetings.remove(0);
-        }
-        self.meetings.push(Meeting {
+        let meeting = Meeting {
             frames: [frame, target_frame],
             points: [
                 observer_pose * Point3::from(point),
                 target_pose.translation.vector.into(),
             ],
             variance: noise.trace() / 3.0 + lasting * lasting / 2.0,
-        });
+        };
+        // Sightings from one place share their error, and say nothing about how the frames are turned.
+        let is_elsewhere = |other: &Meeting| {
+            other.frames != meeting.frames
+                || (other.points[1] - meeting.points[1]).norm() >= MEETING_APART_M
+        };
+        if !self.meetings.iter().all(is_elsewhere) {
+            return;
+        }
+        if self.meetings.len() >= MEETINGS_MAX {
+            self.meetings.remove(0);
+        }
+        self.meetings.push(meeting);
         self.merge_with(pending.observer, None);
     }
 
@@ -308,12 +323,19 @@ impl Estimator {
     /// a landmark, or of another agent.
     fn merge_with(&mut self, agent: u32, label: Option<&Label>) {
         let own = self.seats[agent as usize].frame;
-        if self.frames.iter().filter(|frame| !frame.members.is_empty()).count() < 2 {
+        if self
+            .frames
+            .iter()
+            .filter(|frame| !frame.members.is_empty())
+            .count()
+            < 2
+        {
             return;
         }
         for other in 0..self.frames.len() {
             let knows = |frame: &Frame| label.is_none_or(|label| frame.marks.contains_key(label));
-            if other == own || self.frames[other].members.is_empty() || !knows(&self.frames[other]) {
+            if other == own || self.frames[other].members.is_empty() || !knows(&self.frames[other])
+            {
                 continue;
             }
             let (older, newer) = (own.min(other), own.max(other));

@@ -157,7 +157,8 @@ impl Frame {
                 member.mover.covariance[(k, k)] += sd * sd;
             }
         }
-        self.covariance.set_diagonal(member.offset, &member.mover.covariance);
+        self.covariance
+            .set_diagonal(member.offset, &member.mover.covariance);
     }
 
     /// Corrects everything by what an observer's sighting tells, and carries the errors over to the
@@ -170,7 +171,12 @@ impl Frame {
     /// would feign knowledge of the whole map's direction (Huang, Mourikis & Roumeliotis 2010).
     pub(super) fn correct(&mut self, index: usize, correction: &[f64]) {
         let observer = &self.members[index];
-        let world = observer.mover.pose.rotation.to_rotation_matrix().into_inner();
+        let world = observer
+            .mover
+            .pose
+            .rotation
+            .to_rotation_matrix()
+            .into_inner();
         let source = observer.offset + 3;
         let mut levers: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; correction.len()]);
         let mut lever = |offset: usize, matrix: Matrix3<f64>| {
@@ -185,7 +191,11 @@ impl Frame {
             let before = member.mover.pose;
             member.mover.correct(&error);
             let moved = member.mover.pose.translation.vector - before.translation.vector;
-            let to_body = before.rotation.to_rotation_matrix().into_inner().transpose();
+            let to_body = before
+                .rotation
+                .to_rotation_matrix()
+                .into_inner()
+                .transpose();
             lever(member.offset, -(to_body * moved.cross_matrix() * world));
         }
         for mark in self.marks.values_mut() {
@@ -203,8 +213,12 @@ impl Frame {
 /// Derivative of d = Rᵀ (p − x) by the error of the observer's pose: | −I  d× |.
 pub(super) fn point_by_pose(point: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
     let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
-    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-Matrix3::identity());
-    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&point.cross_matrix());
+    jacobian
+        .fixed_view_mut::<3, 3>(0, 0)
+        .copy_from(&-Matrix3::identity());
+    jacobian
+        .fixed_view_mut::<3, 3>(0, 3)
+        .copy_from(&point.cross_matrix());
     jacobian
 }
 

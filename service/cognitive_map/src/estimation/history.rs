@@ -35,11 +35,6 @@ impl History {
         *self = Self::default();
     }
 
-    /// Stamp of the latest motion \[ns\].
-    pub(super) fn stamp_ns(&self) -> Option<i64> {
-        self.latest.map(|(stamp, _)| stamp)
-    }
-
     /// Motion from an instant until the latest one; `None` when the instant is too long ago or not
     /// yet over.
     pub(super) fn motion_since(&self, stamp_ns: i64) -> Option<Isometry3<f64>> {
@@ -50,7 +45,9 @@ impl History {
         if stamp_ns > last_ns {
             return None;
         }
-        let after = self.instants.partition_point(|&(stamp, _)| stamp <= stamp_ns);
+        let after = self
+            .instants
+            .partition_point(|&(stamp, _)| stamp <= stamp_ns);
         let (start_ns, start) = *self.instants.get(after.checked_sub(1)?)?;
         let (end_ns, end) = self.instants.get(after).copied().unwrap_or((last_ns, last));
         if start_ns == stamp_ns || end_ns <= start_ns {

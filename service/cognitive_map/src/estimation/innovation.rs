@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3};
 
 use crate::geometry::se3;
-use crate::sample::{RangeBearing, RelativePosition, Relation};
+use crate::sample::{RangeBearing, Relation, RelativePosition};
 
 /// Shortest distance at which a direction means something \[m\].
 const DISTANCE_MIN_M: f64 = 0.02;
@@ -81,8 +81,11 @@ impl PointInnovation {
         let by_azimuth = (left * ahead - forward * aside) / (level * level);
         let by_elevation = (up * level - (forward * ahead + left * aside) * (above / level))
             / (distance_m * distance_m);
-        let by_point =
-            Matrix3::from_rows(&[by_range.transpose(), by_azimuth.transpose(), by_elevation.transpose()]);
+        let by_point = Matrix3::from_rows(&[
+            by_range.transpose(),
+            by_azimuth.transpose(),
+            by_elevation.transpose(),
+        ]);
         let bearing = seen.bearing_sd_rad();
         // Azimuth turns the direction by cos ε of it; overhead the second order is left.
         let across = bearing * cos_elevation.hypot(bearing.min(1.0));

@@ -33,7 +33,7 @@ impl Frame {
 
     /// Lays a newer frame into this one. Landmarks known in both become one.
     ///
-    /// With the newer frame's pose T in this one, whose error is τ, a body's error gains Ad(T_b⁻¹) τ and
+    /// With the newer frame's pose T in this one, whose error is τ, a body's error gains `Ad(T_b⁻¹) τ` and
     /// a landmark's error δ becomes R (δ + ρ − l × φ). The landmarks known in both then say how T really
     /// lies, so that its covariance need only be wide.
     pub(super) fn merge(&mut self, mut newer: Self, tie: &Tie, parameters: &Parameters) {
@@ -58,14 +58,17 @@ impl Frame {
         for (label, mut mark) in std::mem::take(&mut newer.marks) {
             mark.offset += start;
             let mut by_tie = Matrix6::zeros();
-            by_tie.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
+            by_tie
+                .fixed_view_mut::<3, 3>(0, 0)
+                .copy_from(&Matrix3::identity());
             let lever = -mark.position.coords.cross_matrix();
             by_tie.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
             self.covariance.add(mark.offset, 3, tau, &by_tie);
             let own = self.covariance.block::<3, 3>(mark.offset, mark.offset);
             let turned = rotation * own * rotation.transpose();
             let turned = (turned + turned.transpose()) * 0.5;
-            self.covariance.transform::<3>(mark.offset, &rotation, &turned);
+            self.covariance
+                .transform::<3>(mark.offset, &rotation, &turned);
             mark.position = tie.pose * mark.position;
             mark.used = self.sightings;
             mark.number = self.numbered;

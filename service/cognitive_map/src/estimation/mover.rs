@@ -51,7 +51,11 @@ pub(super) struct Mover {
 
 impl Mover {
     /// A body at a pose whose error has this covariance.
-    pub(super) fn new(pose: Isometry3<f64>, covariance: &Matrix6<f64>, parameters: &Parameters) -> Self {
+    pub(super) fn new(
+        pose: Isometry3<f64>,
+        covariance: &Matrix6<f64>,
+        parameters: &Parameters,
+    ) -> Self {
         let mut mover = Self {
             pose,
             calibration: Calibration::default(),
@@ -62,7 +66,10 @@ impl Mover {
             history: History::default(),
             is_planar: true,
         };
-        mover.covariance.fixed_view_mut::<6, 6>(0, 0).copy_from(covariance);
+        mover
+            .covariance
+            .fixed_view_mut::<6, 6>(0, 0)
+            .copy_from(covariance);
         let sd = parameters.calibration_sd();
         for (k, sd) in sd.iter().enumerate() {
             mover.covariance[(POSE + k, POSE + k)] = sd * sd;
@@ -75,8 +82,12 @@ impl Mover {
         self.pose = pose;
         let calibration: SMatrix<f64, 5, 5> = self.covariance.fixed_view::<5, 5>(6, 6).into_owned();
         self.covariance = BodyCovariance::zeros();
-        self.covariance.fixed_view_mut::<6, 6>(0, 0).copy_from(covariance);
-        self.covariance.fixed_view_mut::<5, 5>(6, 6).copy_from(&calibration);
+        self.covariance
+            .fixed_view_mut::<6, 6>(0, 0)
+            .copy_from(covariance);
+        self.covariance
+            .fixed_view_mut::<5, 5>(6, 6)
+            .copy_from(&calibration);
         self.flush();
         self
     }
@@ -125,8 +136,12 @@ impl Mover {
         let matrix = rotation.to_rotation_matrix().into_inner();
         let inverse = matrix.transpose();
         let mut by_calibration = Tail::zeros();
-        by_calibration.fixed_view_mut::<3, 1>(0, 0).copy_from(&-(inverse * lengths));
-        by_calibration.fixed_view_mut::<3, 1>(3, 1).copy_from(&-angles);
+        by_calibration
+            .fixed_view_mut::<3, 1>(0, 0)
+            .copy_from(&-(inverse * lengths));
+        by_calibration
+            .fixed_view_mut::<3, 1>(3, 1)
+            .copy_from(&-angles);
         for axis in 0..3 {
             by_calibration[(3 + axis, 2 + axis)] = -time[axis];
         }
@@ -136,7 +151,11 @@ impl Mover {
         let path_m = lengths.norm();
         let angle_rad = angles.norm();
         self.propagate(&increment, &by_calibration, &variance);
-        let wander = parameters.calibration_wander(path_m, angle_rad, if is_rest { 0.0 } else { duration_s });
+        let wander = parameters.calibration_wander(
+            path_m,
+            angle_rad,
+            if is_rest { 0.0 } else { duration_s },
+        );
         for (k, variance) in wander.iter().enumerate() {
             // Out of the plane a planar robot learns nothing, and so forgets nothing.
             if k < 2 || free[k - 2] > 0.0 {
@@ -154,7 +173,12 @@ impl Mover {
     }
 
     /// Moves the covariance and the tail.
-    fn propagate(&mut self, increment: &Isometry3<f64>, by_calibration: &Tail, variance: &Vector6<f64>) {
+    fn propagate(
+        &mut self,
+        increment: &Isometry3<f64>,
+        by_calibration: &Tail,
+        variance: &Vector6<f64>,
+    ) {
         let pose: Matrix6<f64> = self.covariance.fixed_view::<6, 6>(0, 0).into_owned();
         let cross: Tail = self.covariance.fixed_view::<6, 5>(0, 6).into_owned();
         let own: SMatrix<f64, 5, 5> = self.covariance.fixed_view::<5, 5>(6, 6).into_owned();
@@ -189,7 +213,9 @@ impl Mover {
         let mut transition = BodyCovariance::identity();
         let back = se3::adjoint(&self.since_flush.inverse());
         transition.fixed_view_mut::<6, 6>(0, 0).copy_from(&back);
-        transition.fixed_view_mut::<6, 5>(0, 6).copy_from(&self.tail);
+        transition
+            .fixed_view_mut::<6, 5>(0, 6)
+            .copy_from(&self.tail);
         self.tail = Tail::zeros();
         self.since_flush = Isometry3::identity();
         self.is_stale = false;
@@ -216,7 +242,11 @@ struct Shift {
 
 impl Shift {
     fn of_inverse(increment: &Isometry3<f64>) -> Self {
-        let inverse = increment.rotation.to_rotation_matrix().into_inner().transpose();
+        let inverse = increment
+            .rotation
+            .to_rotation_matrix()
+            .into_inner()
+            .transpose();
         let lever = -(inverse * increment.translation.vector.cross_matrix());
         Self { inverse, lever }
     }
@@ -228,7 +258,9 @@ impl Shift {
         product
             .fixed_view_mut::<3, C>(0, 0)
             .copy_from(&(self.inverse * upper + self.lever * lower));
-        product.fixed_view_mut::<3, C>(3, 0).copy_from(&(self.inverse * lower));
+        product
+            .fixed_view_mut::<3, C>(3, 0)
+            .copy_from(&(self.inverse * lower));
         product
     }
 }

@@ -78,7 +78,11 @@ impl Sensor {
         let most = LASTING_OVER_STATED_MAX.powi(2) * stated[0];
         let range = stated[0] + self.correlation() * lasting.min(most);
         let [by_range, by_bearing] = self.scales;
-        Vector3::new(range * by_range, stated[1] * by_bearing, stated[2] * by_bearing)
+        Vector3::new(
+            range * by_range,
+            stated[1] * by_bearing,
+            stated[2] * by_bearing,
+        )
     }
 
     /// Correlation of successive errors of distance of one target, from 0 to 1.
@@ -103,7 +107,9 @@ impl Sensor {
                 continue;
             }
             let expected = variance[k] / self.scales[k];
-            let squared = innovation.residual[k].powi(2).min(9.0 * (variance[k] + spread[k]));
+            let squared = innovation.residual[k]
+                .powi(2)
+                .min(9.0 * (variance[k] + spread[k]));
             let ratio = (squared - spread[k]) / expected;
             let (scale, count) = (&mut self.scales[k], &mut self.counts[k]);
             *count = (*count + 1.0).min(MEMORY_SIGHTINGS);
@@ -144,7 +150,13 @@ mod tests {
         for k in 0..3000 {
             let seen = innovation(4.0 + error(k));
             let variance = sensor.variance(&seen, &parameters);
-            sensor.note(Seen::Mark(0), i64::from(k) * 1_000_000_000, &seen, &Vector3::zeros(), &variance);
+            sensor.note(
+                Seen::Mark(0),
+                i64::from(k) * 1_000_000_000,
+                &seen,
+                &Vector3::zeros(),
+                &variance,
+            );
         }
         sensor.variance(&innovation(4.0), &parameters)[0]
     }
@@ -156,9 +168,9 @@ mod tests {
     }
 
     #[test]
-    fn errors_that_last_count_with_the_distance() {
+    fn errors_that_last_count_up_to_three_times_what_is_stated() {
         let variance = learned(|_| 0.1);
-        assert!((variance / (0.01 + 0.16) - 1.0).abs() < 0.1, "{variance}");
+        assert!((variance / (0.01 + 0.09) - 1.0).abs() < 0.1, "{variance}");
     }
 
     #[test]

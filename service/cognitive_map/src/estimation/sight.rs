@@ -1,6 +1,6 @@
 //! What a sighting does to a frame.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector};
 
 use super::covariance::Block;
 use super::frame::{Frame, MARK_DIM, Mark, Member, point_by_pose, symmetric};
@@ -8,12 +8,12 @@ use super::innovation::{PointInnovation, pose_innovation, seen_at};
 use super::parameters::Parameters;
 use super::sensor::Seen;
 use crate::geometry::se3;
-use crate::sample::{Label, RelativePose, Relation};
+use crate::sample::{Label, Relation, RelativePose};
 
 /// An agent whose sightings were refused this often in a row is not where it should be.
 const REFUSED_TO_WIDEN: u32 = 8;
 /// By how much its pose then becomes less certain \[m, rad\].
-const WIDENED: (f64, f64) = (0.3, 0.2);
+const WIDENED: (f64, f64) = (1.0, 0.5);
 /// A landmark whose sightings were refused this often in a row, by agents that are where they should
 /// be, was moved or was never there.
 const REFUSED_TO_FORGET: u32 = 8;
@@ -61,7 +61,12 @@ impl Frame {
         let Some(innovation) = PointInnovation::new(glance.relation, &expected) else {
             return Verdict::Refused;
         };
-        let to_body = side.pose.rotation.to_rotation_matrix().into_inner().transpose();
+        let to_body = side
+            .pose
+            .rotation
+            .to_rotation_matrix()
+            .into_inner()
+            .transpose();
         let blocks = [
             side.block(&(innovation.by_point * point_by_pose(&expected))),
             point_block(mark.offset, &(innovation.by_point * to_body)),
@@ -222,7 +227,10 @@ impl Frame {
             .component_mul(&innovation.residual)
             .component_div(&(spread + variance));
         // A square that is not a number is refused, too.
-        if !squares.iter().all(|square| square.sqrt() <= parameters.gate) {
+        if !squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.gate)
+        {
             member.refused += 1;
             return Verdict::Refused;
         }
@@ -231,7 +239,8 @@ impl Frame {
             .sensor
             .note(seen, glance.stamp_ns, innovation, &spread, &variance);
         // A planar robot's elevations are no measurements.
-        let is_flat = member.mover.is_planar && innovation.is_polar && innovation.residual[2] == 0.0;
+        let is_flat =
+            member.mover.is_planar && innovation.is_polar && innovation.residual[2] == 0.0;
         let components: usize = if is_flat { 2 } else { 3 };
         let nis = squares.iter().take(components).sum();
         for (variance, square) in variance.iter_mut().zip(squares.iter()) {
@@ -264,7 +273,10 @@ impl Frame {
             .component_div(&(spread + variance));
         let parameters = glance.parameters;
         let member = &mut self.members[glance.observer];
-        if !squares.iter().all(|square| square.sqrt() <= parameters.gate) {
+        if !squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.gate)
+        {
             member.refused += 1;
             return Verdict::Refused;
         }

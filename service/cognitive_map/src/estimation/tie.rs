@@ -37,7 +37,11 @@ pub(super) struct Tie {
 /// Finds the motion, if enough points agree on one (weighted least squares after Horn 1987, weights
 /// after Cauchy). Between planar frames only a motion in the plane is sought.
 pub(super) fn tie(pairs: &[Pair], is_planar: bool) -> Option<Tie> {
-    let points_min = if is_planar { POINTS_MIN.0 } else { POINTS_MIN.1 };
+    let points_min = if is_planar {
+        POINTS_MIN.0
+    } else {
+        POINTS_MIN.1
+    };
     if pairs.len() < points_min {
         return None;
     }
@@ -123,13 +127,20 @@ fn fit(pairs: &[Pair], weights: &[f64], is_planar: bool) -> Option<Isometry3<f64
         shift.z = 0.0;
     }
     let pose = Isometry3::from_parts(Translation3::from(shift), rotation);
-    let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+    let numbers = pose
+        .translation
+        .vector
+        .iter()
+        .chain(pose.rotation.coords.iter());
     numbers.copied().all(f64::is_finite).then_some(pose)
 }
 
 /// Weighted mean.
 fn centre(points: impl Iterator<Item = Vector3<f64>>, weights: &[f64]) -> Vector3<f64> {
-    let sum: Vector3<f64> = points.zip(weights).map(|(point, &weight)| point * weight).sum();
+    let sum: Vector3<f64> = points
+        .zip(weights)
+        .map(|(point, &weight)| point * weight)
+        .sum();
     sum / weights.iter().sum::<f64>()
 }
 
@@ -147,8 +158,13 @@ mod tests {
         points.iter().map(pair).collect()
     }
 
-    const FLOOR: [[f64; 3]; 5] =
-        [[0.0, 0.0, 0.0], [3.0, 0.5, 0.0], [1.0, 4.0, 0.0], [-2.0, 2.0, 0.0], [-1.0, -3.0, 0.0]];
+    const FLOOR: [[f64; 3]; 5] = [
+        [0.0, 0.0, 0.0],
+        [3.0, 0.5, 0.0],
+        [1.0, 4.0, 0.0],
+        [-2.0, 2.0, 0.0],
+        [-1.0, -3.0, 0.0],
+    ];
 
     proptest! {
         #[test]
@@ -179,7 +195,12 @@ mod tests {
     fn too_little_ties_nothing() {
         let pose = Isometry3::translation(1.0, 2.0, 0.0);
         assert_eq!(tie(&pairs(&pose, &FLOOR[..2]), true), None);
-        assert_eq!(tie(&pairs(&pose, &FLOOR), false), None, "flat points leave no doubt only in the plane");
+        let line = [0.0, 1.0, 2.0, 3.0, 4.0].map(|x| [x, 2.0 * x, -x]);
+        assert_eq!(
+            tie(&pairs(&pose, &line), false),
+            None,
+            "it may turn about itself"
+        );
         let close: Vec<_> = FLOOR.iter().map(|point| point.map(|x| 0.02 * x)).collect();
         assert_eq!(tie(&pairs(&pose, &close), true), None);
         let mut contradictory = pairs(&pose, &FLOOR);
