@@ -186,6 +186,7 @@ impl Frame {
                 }
             }
         };
+        let mut turns = Vec::with_capacity(self.members.len());
         for member in &mut self.members {
             let error = SVector::from_fn(|k, _| correction[member.offset + k]);
             let before = member.mover.pose;
@@ -197,6 +198,7 @@ impl Frame {
                 .into_inner()
                 .transpose();
             lever(member.offset, -(to_body * moved.cross_matrix() * world));
+            turns.push(member.mover.pose.rotation.inverse() * before.rotation);
         }
         for mark in self.marks.values_mut() {
             let moved = Vector3::from_fn(|k, _| correction[mark.offset + k]);
@@ -204,7 +206,15 @@ impl Frame {
             lever(mark.offset, -(moved.cross_matrix() * world));
         }
         self.covariance.shear(source, &levers);
-        for member in &mut self.members {
+        // Errors of a body are stated along its axes, which a correction has turned.
+        for (member, turn) in self.members.iter_mut().zip(turns) {
+            let turn = turn.to_rotation_matrix().into_inner();
+            let mut axes = SMatrix::<f64, BODY_DIM, BODY_DIM>::identity();
+            axes.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+            axes.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+            let own = self.covariance.block(member.offset, member.offset);
+            let own = axes * own * axes.transpose();
+            self.covariance.transform(member.offset, &axes, &own);
             member.mover.covariance = self.covariance.block(member.offset, member.offset);
         }
     }

@@ -13,7 +13,7 @@
 //! ```
 //!
 //! - **Consistency.** Errors are carried over to the corrected estimate as those of the right-invariant
-//!   filter (see [`frame`]).
+//!   filter.
 //! - **Cost.** Between sightings an agent keeps its own covariance and its transition only, so that a
 //!   motion costs the same in every map. A sighting costs the square of the number of components, which
 //!   is bounded by the number of agents and of landmarks held jointly; more landmarks lie dormant.
