@@ -1,5 +1,7 @@
 //! The pure core of cogmap: a cognitive map as a deterministic fold over a journal of samples.
 
+pub mod estimation;
+pub mod experience;
 pub mod geometry;
 pub mod grid;
 

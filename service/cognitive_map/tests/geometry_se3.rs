@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use cognitive_map::geometry::se3;
+use cognitive_map::geometry::{log_jacobian, se3};
 use nalgebra::{Isometry3, Matrix4, Vector3};
 use proptest::prelude::*;
 
@@ -159,5 +159,27 @@ proptest! {
         let (first, second) = (se3::exp(&a, &b), se3::exp(&c, &d));
         let product = se3::adjoint(&first) * se3::adjoint(&second);
         prop_assert!((se3::adjoint(&(first * second)) - product).norm() < 1e-11);
+    }
+
+    #[test]
+    fn the_jacobian_of_log_is_its_difference_quotient(
+        linear in vector(10.0),
+        angular in angular().prop_filter("log jumps at half a turn", |turn| turn.norm() < 3.1),
+    ) {
+        let motion = se3::exp(&linear, &angular);
+        let jacobian = log_jacobian(&linear, &angular);
+        for axis in 0..6 {
+            let step = 1e-5;
+            let logarithm = |share: f64| {
+                let mut twist = nalgebra::Vector6::zeros();
+                twist[axis] = share;
+                let turn = twist.fixed_rows::<3>(3).into_owned();
+                let (rho, phi) = se3::log(&(motion * se3::exp(&twist.fixed_rows::<3>(0).into(), &turn)));
+                nalgebra::Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
+            };
+            let quotient = (logarithm(step) - logarithm(-step)) / (2.0 * step);
+            let error = (quotient - jacobian.column(axis)).norm();
+            prop_assert!(error < 1e-7 * (1.0 + quotient.norm()), "{axis}: {error}");
+        }
     }
 }

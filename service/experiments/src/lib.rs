@@ -10,6 +10,8 @@
 //! | [`reading`] | one reading, and its way into the core |
 //! | [`world`] | the rooms of the seed paper and a team of robots that walk in them |
 //! | [`mrclam`] | the UTIAS multi-robot data sets |
+//! | [`g2o`] | pose graphs |
+//! | [`tuc`] | the TUC data sets: odometry and place matches, many of them false |
 //! | [`eval`] | the seed paper's experiments: protocols, measures, tables and figures |
 //! | [`metrics`] | the absolute trajectory error (ATE), alignment, dead reckoning |
 //! | [`tum`] | trajectories as text in the TUM format |
@@ -52,12 +54,14 @@
 //! ```
 //!
 //! Nothing here reads a clock or draws randomness that was not seeded. Only
-//! [`Mrclam::load`](mrclam::Mrclam::load) touches files.
+//! the functions called `load` touch files.
 
 pub mod eval;
+pub mod g2o;
 pub mod metrics;
 pub mod mrclam;
 pub mod reading;
 pub mod stamp;
+pub mod tuc;
 pub mod tum;
 pub mod world;

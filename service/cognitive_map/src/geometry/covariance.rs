@@ -19,6 +19,11 @@ impl PoseCovariance {
         Self(Matrix6::from_diagonal(&sd.component_mul(sd)))
     }
 
+    /// Of a symmetric matrix.
+    pub(crate) fn from_matrix(matrix: &Matrix6<f64>) -> Self {
+        Self(*matrix)
+    }
+
     /// From a stored matrix; its upper triangle counts.
     pub fn from_upper_triangle(entries: &[f64; 21]) -> Self {
         let mut matrix = Matrix6::zeros();

@@ -2,5 +2,7 @@
 
 mod covariance;
 pub mod se3;
+mod se3_jacobian;
 
 pub use covariance::{PoseCovariance, upper_triangle};
+pub use se3_jacobian::log_jacobian;

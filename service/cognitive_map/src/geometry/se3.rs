@@ -14,7 +14,7 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// Angle below which the coefficients come from power series \[rad\].
-const SERIES_BELOW_RAD: f64 = 0.5;
+pub(super) const SERIES_BELOW_RAD: f64 = 0.5;
 
 /// The screw motion that the twist (`linear` = ρ \[m\], `angular` = φ \[rad\]) traces in unit time.
 ///
@@ -93,7 +93,7 @@ pub fn adjoint(motion: &Isometry3<f64>) -> Matrix6<f64> {
 }
 
 /// Coefficients of (θ − sin θ)/θ³ in powers of θ²: (−1)ᵏ / (2k + 3)!.
-const THETA_MINUS_SIN: [f64; 7] = [
+pub(super) const THETA_MINUS_SIN: [f64; 7] = [
     1.0 / 6.0,
     -1.0 / 120.0,
     1.0 / 5_040.0,
@@ -104,7 +104,7 @@ const THETA_MINUS_SIN: [f64; 7] = [
 ];
 
 /// Coefficients of (1 − (θ/2) cot(θ/2))/θ² in powers of θ²: |B₂ₖ| / (2k)!, B the Bernoulli numbers.
-const HALF_ANGLE_COTANGENT: [f64; 7] = [
+pub(super) const HALF_ANGLE_COTANGENT: [f64; 7] = [
     1.0 / 12.0,
     1.0 / 720.0,
     1.0 / 30_240.0,
@@ -115,7 +115,7 @@ const HALF_ANGLE_COTANGENT: [f64; 7] = [
 ];
 
 /// Σ coefficients\[k\] xᵏ.
-fn polynomial(x: f64, coefficients: &[f64; 7]) -> f64 {
+pub(super) fn polynomial(x: f64, coefficients: &[f64; 7]) -> f64 {
     coefficients
         .iter()
         .rev()

@@ -1,0 +1,304 @@
+//! The joint covariance of everything in a frame, as one dense symmetric matrix.
+
+use std::sync::Arc;
+
+use nalgebra::{SMatrix, SVector};
+
+/// A covariance of any dimension, exactly symmetric, row by row. A clone shares the entries.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct JointCovariance {
+    dim: usize,
+    entries: Arc<Vec<f64>>,
+}
+
+/// The part of a measurement's Jacobian that belongs to neighbouring components of the state.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block<const M: usize> {
+    /// First component.
+    pub(super) offset: usize,
+    /// Number of components, at most 6.
+    pub(super) width: usize,
+    /// The Jacobian; columns from `width` on do not count.
+    pub(super) jacobian: SMatrix<f64, M, 6>,
+}
+
+/// What a measurement would do: H P, and S = H P Hᵀ without the measurement's own noise.
+#[derive(Clone, Debug)]
+pub(super) struct Projection<const M: usize> {
+    /// H P, one row of the state's dimension for each row of the measurement.
+    rows: [Vec<f64>; M],
+    /// H P Hᵀ.
+    pub(super) spread: SMatrix<f64, M, M>,
+}
+
+impl JointCovariance {
+    /// Number of components.
+    pub(super) fn dim(&self) -> usize {
+        self.dim
+    }
+
+    /// All entries, row by row.
+    #[cfg(test)]
+    pub(super) fn entries(&self) -> &[f64] {
+        &self.entries
+    }
+
+    /// A row.
+    fn row(&self, row: usize) -> &[f64] {
+        &self.entries[row * self.dim..(row + 1) * self.dim]
+    }
+
+    /// The block of `R` rows and `C` columns that begins at a cell.
+    pub(super) fn block<const R: usize, const C: usize>(
+        &self,
+        row: usize,
+        column: usize,
+    ) -> SMatrix<f64, R, C> {
+        SMatrix::from_fn(|r, c| self.entries[(row + r) * self.dim + column + c])
+    }
+
+    /// Replaces the symmetric block on the diagonal that begins at `offset`.
+    pub(super) fn set_diagonal<const N: usize>(
+        &mut self,
+        offset: usize,
+        block: &SMatrix<f64, N, N>,
+    ) {
+        let (dim, entries) = (self.dim, Arc::make_mut(&mut self.entries));
+        for row in 0..N {
+            for column in 0..N {
+                let (low, high) = (row.min(column), row.max(column));
+                entries[(offset + row) * dim + offset + column] = block[(low, high)];
+            }
+        }
+    }
+
+    /// Makes room for `width` more components, uncorrelated and without variance; answers where.
+    pub(super) fn grow(&mut self, width: usize) -> usize {
+        let (old, new) = (self.dim, self.dim + width);
+        let mut entries = vec![0.0; new * new];
+        for row in 0..old {
+            entries[row * new..row * new + old].copy_from_slice(self.row(row));
+        }
+        self.entries = Arc::new(entries);
+        self.dim = new;
+        old
+    }
+
+    /// Appends y = J x + n, where x are `width` components from `offset` on; answers where y begins.
+    pub(super) fn append<const K: usize>(
+        &mut self,
+        blocks: &[Block<K>],
+        noise: &SMatrix<f64, K, K>,
+    ) -> usize {
+        let projection = self.project(blocks);
+        let at = self.grow(K);
+        let (dim, entries) = (self.dim, Arc::make_mut(&mut self.entries));
+        for (k, row) in projection.rows.iter().enumerate() {
+            for (other, &value) in row.iter().enumerate() {
+                entries[(at + k) * dim + other] = value;
+                entries[other * dim + at + k] = value;
+            }
+        }
+        self.set_diagonal(at, &(projection.spread + noise));
+        at
+    }
+
+    /// Drops `width` components from `offset` on; those behind move up.
+    pub(super) fn remove(&mut self, offset: usize, width: usize) {
+        let kept = |index: &usize| !(offset..offset + width).contains(index);
+        let new = self.dim - width;
+        let mut entries = Vec::with_capacity(new * new);
+        for row in (0..self.dim).filter(kept) {
+            let row = self.row(row);
+            entries.extend_from_slice(&row[..offset]);
+            entries.extend_from_slice(&row[offset + width..]);
+        }
+        self.entries = Arc::new(entries);
+        self.dim = new;
+    }
+
+    /// Replaces components by a linear function of themselves, x ← F x, in all cross terms; the block
+    /// on the diagonal becomes `own`.
+    pub(super) fn transform<const N: usize>(
+        &mut self,
+        offset: usize,
+        transition: &SMatrix<f64, N, N>,
+        own: &SMatrix<f64, N, N>,
+    ) {
+        let (dim, entries) = (self.dim, Arc::make_mut(&mut self.entries));
+        let behind = offset + N;
+        for column in (0..offset).chain(behind..dim) {
+            let before = SVector::<f64, N>::from_fn(|k, _| entries[column * dim + offset + k]);
+            let after = transition * before;
+            for k in 0..N {
+                entries[column * dim + offset + k] = after[k];
+                entries[(offset + k) * dim + column] = after[k];
+            }
+        }
+        self.set_diagonal(offset, own);
+    }
+
+    /// Projects the covariance onto a measurement with Jacobian H.
+    pub(super) fn project<const M: usize>(&self, blocks: &[Block<M>]) -> Projection<M> {
+        let mut rows = std::array::from_fn(|_| vec![0.0; self.dim]);
+        for block in blocks {
+            for column in 0..block.width {
+                let source = self.row(block.offset + column);
+                for (k, row) in rows.iter_mut().enumerate() {
+                    let factor = block.jacobian[(k, column)];
+                    if factor != 0.0 {
+                        for (entry, value) in row.iter_mut().zip(source) {
+                            *entry += factor * value;
+                        }
+                    }
+                }
+            }
+        }
+        let mut spread = SMatrix::<f64, M, M>::zeros();
+        for block in blocks {
+            for (k, row) in rows.iter().enumerate() {
+                for column in 0..block.width {
+                    let value = row[block.offset + column];
+                    for other in 0..M {
+                        spread[(k, other)] += block.jacobian[(other, column)] * value;
+                    }
+                }
+            }
+        }
+        let spread = (spread + spread.transpose()) * 0.5;
+        Projection { rows, spread }
+    }
+
+    /// Takes in a measurement with this innovation, whose covariance is S; answers the correction of
+    /// the state, or `None` when S is not positive definite.
+    ///
+    /// ```text
+    /// S = L Lᵀ      W = P Hᵀ L⁻ᵀ      δ = W L⁻¹ ν      P ← P − W Wᵀ
+    /// ```
+    ///
+    /// Each entry of W Wᵀ is the same sum as its mirror image, so that P stays exactly symmetric.
+    pub(super) fn update<const M: usize>(
+        &mut self,
+        projection: Projection<M>,
+        innovation: &SVector<f64, M>,
+        innovation_covariance: &SMatrix<f64, M, M>,
+    ) -> Option<Vec<f64>> {
+        let lower = innovation_covariance.cholesky()?.unpack();
+        let mut rows = projection.rows;
+        let mut whitened = *innovation;
+        for k in 0..M {
+            let (done, rest) = rows.split_at_mut(k);
+            let row = &mut rest[0];
+            for (j, earlier) in done.iter().enumerate() {
+                let factor = lower[(k, j)];
+                for (entry, value) in row.iter_mut().zip(earlier) {
+                    *entry -= factor * value;
+                }
+                whitened[k] -= factor * whitened[j];
+            }
+            let inverse = lower[(k, k)].recip();
+            for entry in row.iter_mut() {
+                *entry *= inverse;
+            }
+            whitened[k] *= inverse;
+        }
+        if !whitened.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let dim = self.dim;
+        let mut correction = vec![0.0; dim];
+        for (row, factor) in rows.iter().zip(whitened.iter()) {
+            for (entry, value) in correction.iter_mut().zip(row) {
+                *entry += factor * value;
+            }
+        }
+        for (index, target) in Arc::make_mut(&mut self.entries)
+            .chunks_exact_mut(dim)
+            .enumerate()
+        {
+            for row in &rows {
+                let factor = row[index];
+                if factor != 0.0 {
+                    for (entry, value) in target.iter_mut().zip(row) {
+                        *entry -= factor * value;
+                    }
+                }
+            }
+        }
+        Some(correction)
+    }
+
+    /// Lets three components from `source` on act on all others: P ← (I + E) P (I + E)ᵀ, where column k
+    /// of E at `source` is `levers[k]`, which is zero at the three components themselves.
+    ///
+    /// ```text
+    /// P ← P + V W + Wᵀ Vᵀ      W = U + ½ P_ss Vᵀ
+    /// ```
+    ///
+    /// with the levers V and the three rows U of P. Mirrored entries are the same sums.
+    pub(super) fn shear(&mut self, source: usize, levers: &[Vec<f64>; 3]) {
+        let dim = self.dim;
+        let own: SMatrix<f64, 3, 3> = self.block(source, source);
+        let mut rows: [Vec<f64>; 3] = std::array::from_fn(|k| self.row(source + k).to_vec());
+        for (k, row) in rows.iter_mut().enumerate() {
+            for (other, lever) in levers.iter().enumerate() {
+                let half = 0.5 * own[(k, other)];
+                for (entry, value) in row.iter_mut().zip(lever) {
+                    *entry += half * value;
+                }
+            }
+        }
+        for (index, target) in Arc::make_mut(&mut self.entries)
+            .chunks_exact_mut(dim)
+            .enumerate()
+        {
+            for (lever, row) in levers.iter().zip(&rows) {
+                let (by_lever, by_row) = (lever[index], row[index]);
+                for ((entry, row), lever) in target.iter_mut().zip(row).zip(lever) {
+                    *entry += by_lever * row + by_row * lever;
+                }
+            }
+        }
+    }
+
+    /// Lays another covariance over the diagonal from `offset` on.
+    pub(super) fn place(&mut self, offset: usize, other: &Self) {
+        let (dim, entries) = (self.dim, Arc::make_mut(&mut self.entries));
+        for row in 0..other.dim {
+            let start = (offset + row) * dim + offset;
+            entries[start..start + other.dim].copy_from_slice(other.row(row));
+        }
+    }
+
+    /// Adds to `width` components from `offset` on a linear function of six others: x ← x + J y.
+    pub(super) fn add(
+        &mut self,
+        offset: usize,
+        width: usize,
+        source: usize,
+        by: &SMatrix<f64, 6, 6>,
+    ) {
+        let (dim, entries) = (self.dim, Arc::make_mut(&mut self.entries));
+        for pass in 0..2 {
+            for row in 0..width {
+                for column in 0..dim {
+                    let at = |own: usize| {
+                        if pass == 0 {
+                            own * dim + column
+                        } else {
+                            column * dim + own
+                        }
+                    };
+                    let added: f64 = (0..6).map(|k| by[(row, k)] * entries[at(source + k)]).sum();
+                    entries[at(offset + row)] += added;
+                }
+            }
+        }
+        for row in 0..width {
+            for column in 0..row {
+                entries[(offset + row) * dim + offset + column] =
+                    entries[(offset + column) * dim + offset + row];
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Two frames become one.
+
+use std::collections::btree_map::Entry;
+
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
+
+use super::covariance::Block;
+use super::frame::{Frame, MARK_DIM, Mark};
+use super::parameters::Parameters;
+use super::sight::point_block;
+use super::tie::{Pair, Tie};
+use crate::geometry::se3;
+use crate::sample::Label;
+
+/// Variance of the distance between the two estimates of one landmark, beside their own \[m²\].
+const SAME_VARIANCE_M2: f64 = 1e-4;
+
+impl Frame {
+    /// The landmarks known in both frames.
+    pub(super) fn shared(&self, newer: &Self) -> Vec<Pair> {
+        let pair = |(label, mark): (&Label, &Mark)| {
+            let other = newer.marks.get(label)?;
+            let spread = self.mark_covariance(mark).trace() + newer.mark_covariance(other).trace();
+            let variance = spread / 3.0 + SAME_VARIANCE_M2;
+            Some(Pair {
+                older: mark.position,
+                newer: other.position,
+                variance,
+            })
+        };
+        self.marks.iter().filter_map(pair).collect()
+    }
+
+    /// Lays a newer frame into this one. Landmarks known in both become one.
+    ///
+    /// With the newer frame's pose T in this one, whose error is τ, a body's error gains `Ad(T_b⁻¹) τ` and
+    /// a landmark's error δ becomes R (δ + ρ − l × φ). The landmarks known in both then say how T really
+    /// lies, so that its covariance need only be wide.
+    pub(super) fn merge(&mut self, mut newer: Self, tie: &Tie, parameters: &Parameters) {
+        self.flush();
+        newer.flush();
+        let start = self.covariance.grow(newer.covariance.dim());
+        self.covariance.place(start, &newer.covariance);
+        let tau = self.covariance.grow(6);
+        self.covariance.set_diagonal::<6>(tau, &tie.covariance);
+        let rotation = tie.pose.rotation.to_rotation_matrix().into_inner();
+        let newcomers = self.members.len();
+        for mut member in std::mem::take(&mut newer.members) {
+            member.offset += start;
+            let by_tie = se3::adjoint(&member.mover.pose.inverse());
+            self.covariance.add(member.offset, 6, tau, &by_tie);
+            member.mover.pose = tie.pose * member.mover.pose;
+            // Numbers of landmarks change.
+            member.sensor.latest.clear();
+            self.members.push(member);
+        }
+        let mut twins = Vec::new();
+        for (label, mut mark) in std::mem::take(&mut newer.marks) {
+            mark.offset += start;
+            let mut by_tie = Matrix6::zeros();
+            by_tie
+                .fixed_view_mut::<3, 3>(0, 0)
+                .copy_from(&Matrix3::identity());
+            let lever = -mark.position.coords.cross_matrix();
+            by_tie.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+            self.covariance.add(mark.offset, 3, tau, &by_tie);
+            let own = self.covariance.block::<3, 3>(mark.offset, mark.offset);
+            let turned = rotation * own * rotation.transpose();
+            let turned = (turned + turned.transpose()) * 0.5;
+            self.covariance
+                .transform::<3>(mark.offset, &rotation, &turned);
+            mark.position = tie.pose * mark.position;
+            mark.used = self.sightings;
+            mark.number = self.numbered;
+            self.numbered += 1;
+            match self.marks.entry(label) {
+                Entry::Occupied(entry) => twins.push((entry.key().clone(), mark)),
+                Entry::Vacant(entry) => {
+                    entry.insert(mark);
+                }
+            }
+        }
+        for member in &mut self.members[newcomers..] {
+            member.mover.covariance = self.covariance.block(member.offset, member.offset);
+        }
+        for index in 0..twins.len() {
+            self.equate(&mut twins, index, parameters);
+        }
+        // From the end, so that the offsets of the others stay as they are.
+        twins.sort_by_key(|(_, twin)| std::cmp::Reverse(twin.offset));
+        self.drop_components(tau, 6);
+        for (_, twin) in twins {
+            self.drop_components(twin.offset, MARK_DIM);
+        }
+        self.make_room();
+    }
+
+    /// Two landmarks are one.
+    fn equate(&mut self, twins: &mut [(Label, Mark)], index: usize, parameters: &Parameters) {
+        let (label, other) = &twins[index];
+        let Some(one) = self.marks.get(label) else {
+            return;
+        };
+        let blocks: [Block<3>; 2] = [
+            point_block(one.offset, &Matrix3::identity()),
+            point_block(other.offset, &-Matrix3::identity()),
+        ];
+        let innovation = other.position - one.position;
+        let projection = self.covariance.project(&blocks);
+        let mut variance = SMatrix::<f64, 3, 1>::repeat(SAME_VARIANCE_M2);
+        for k in 0..3 {
+            let expected = projection.spread[(k, k)] + variance[k];
+            let square = innovation[k] * innovation[k] / expected;
+            // A contradiction counts little: the points do not agree, or the label is not one landmark's.
+            variance[k] += expected * (square / parameters.soft.powi(2) - 1.0).max(0.0);
+        }
+        let s = projection.spread + Matrix3::from_diagonal(&variance);
+        if let Some(correction) = self.covariance.update(projection, &innovation, &s) {
+            self.correct(0, &correction);
+            for (_, twin) in twins {
+                twin.position += Vector3::from_fn(|k, _| correction[twin.offset + k]);
+            }
+        }
+    }
+}

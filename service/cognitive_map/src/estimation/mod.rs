@@ -1,0 +1,42 @@
+//! The live joint estimate of agents and landmarks.
+//!
+//! One error state holds the poses of all agents of a frame, what their odometry gets wrong all the
+//! time, and the positions of the landmarks that they see, with all correlations. Motion moves one
+//! agent's part of it; a sighting corrects everything that is correlated with what it shows.
+//!
+//! ```text
+//! agent      ξ 6     pose T = T̂ exp(ξ)                   landmark   δ 3   l = l̂ + δ
+//!            c 5     relative error of lengths, of angles; bias about the body axes
+//!
+//! motion     ξ ← Ad(Δ⁻¹) ξ + B c + n     Δ = what odometry read, corrected by ĉ
+//! sighting   ν = z − h(x̂)     S = H P Hᵀ + R     δx = P Hᵀ S⁻¹ ν     P ← P − P Hᵀ S⁻¹ H P
+//! ```
+//!
+//! - **Consistency.** Errors are carried over to the corrected estimate as those of the right-invariant
+//!   filter.
+//! - **Cost.** Between sightings an agent keeps its own covariance and its transition only, so that a
+//!   motion costs the same in every map. A sighting costs the square of the number of components, which
+//!   is bounded by the number of agents and of landmarks held jointly; more landmarks lie dormant.
+//! - **Doubt.** Components far from what is expected lose weight, sightings farther off are refused; an
+//!   agent whose sightings are refused again and again searches farther around, and a landmark that only
+//!   contradicts is forgotten. The noise of each agent's sensor is learned, upwards from what it states.
+//! - **Frames.** Agents whose place in the map is unknown have frames of their own until enough points
+//!   are known in both.
+
+mod covariance;
+mod estimator;
+mod frame;
+mod history;
+mod innovation;
+mod merge;
+mod mover;
+mod parameters;
+mod sensor;
+mod sight;
+mod tie;
+
+pub use estimator::{Estimator, Evidence};
+pub use parameters::Parameters;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,341 @@
+//! What a sighting does to a frame.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector};
+
+use super::covariance::Block;
+use super::frame::{Frame, MARK_DIM, Mark, Member, point_by_pose, symmetric};
+use super::innovation::{PointInnovation, pose_innovation, seen_at};
+use super::parameters::Parameters;
+use super::sensor::Seen;
+use crate::geometry::se3;
+use crate::sample::{Label, Relation, RelativePose};
+
+/// An agent whose sightings were refused this often in a row is not where it should be.
+const REFUSED_TO_WIDEN: u32 = 8;
+/// By how much its pose then becomes less certain \[m, rad\].
+const WIDENED: (f64, f64) = (1.0, 0.5);
+/// A landmark whose sightings were refused this often in a row, by agents that are where they should
+/// be, was moved or was never there.
+const REFUSED_TO_FORGET: u32 = 8;
+/// Least variance of a component that a dormant landmark gains \[m²\].
+const GAIN_MIN_M2: f64 = 1e-9;
+
+/// What became of a sighting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Verdict {
+    /// The target is new.
+    Learned,
+    /// It counted: normalised innovation squared, before any weighting, and number of components.
+    Accepted {
+        /// Normalised innovation squared.
+        nis: f64,
+        /// Number of components.
+        components: u32,
+    },
+    /// It did not.
+    Refused,
+}
+
+/// A sighting of a frame's member: who, how it moved since, when, and what it saw.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Glance<'a> {
+    /// Index of the observer among the members.
+    pub(super) observer: usize,
+    /// The observer's motion since then.
+    pub(super) back: &'a Isometry3<f64>,
+    pub(super) stamp_ns: i64,
+    pub(super) relation: &'a Relation,
+    pub(super) parameters: &'a Parameters,
+}
+
+impl Frame {
+    /// A landmark was seen.
+    pub(super) fn see_mark(&mut self, glance: &Glance<'_>, label: &Label) -> Verdict {
+        self.flush();
+        self.sightings += 1;
+        let side = Side::new(&self.members[glance.observer], glance.back);
+        let Some(mark) = self.marks.get(label) else {
+            return self.learn(glance, label);
+        };
+        let expected = side.pose.inverse_transform_point(&mark.position).coords;
+        let Some(innovation) = PointInnovation::new(glance.relation, &expected) else {
+            return Verdict::Refused;
+        };
+        let to_body = side
+            .pose
+            .rotation
+            .to_rotation_matrix()
+            .into_inner()
+            .transpose();
+        let blocks = [
+            side.block(&(innovation.by_point * point_by_pose(&expected))),
+            point_block(mark.offset, &(innovation.by_point * to_body)),
+        ];
+        let verdict = self.take_in(glance, &blocks, &innovation, Seen::Mark(mark.number));
+        let observer_refused = self.members[glance.observer].refused;
+        let sightings = self.sightings;
+        if let Some(mark) = self.marks.get_mut(label) {
+            mark.used = sightings;
+            mark.refused = match verdict {
+                Verdict::Refused => mark.refused + 1,
+                _ => 0,
+            };
+            // Of an agent that contradicts everything, the landmark is not to blame.
+            if mark.refused >= REFUSED_TO_FORGET && observer_refused < REFUSED_TO_WIDEN / 2 {
+                self.forget(label);
+            }
+        }
+        self.recover(glance.observer);
+        verdict
+    }
+
+    /// Another member was seen, which has moved by `back` since.
+    pub(super) fn see_member(
+        &mut self,
+        glance: &Glance<'_>,
+        target: usize,
+        back: &Isometry3<f64>,
+    ) -> Verdict {
+        self.flush();
+        self.sightings += 1;
+        let side = Side::new(&self.members[glance.observer], glance.back);
+        let other = Side::new(&self.members[target], back);
+        let verdict = if let Relation::Pose(seen) = glance.relation {
+            self.see_pose(glance, &side, &other, seen)
+        } else {
+            let expected = side.pose.inv_mul(&other.pose).translation.vector;
+            let Some(innovation) = PointInnovation::new(glance.relation, &expected) else {
+                return Verdict::Refused;
+            };
+            let relative = side.pose.rotation.inverse() * other.pose.rotation;
+            let turn = relative.to_rotation_matrix().into_inner();
+            let mut by_target = SMatrix::<f64, 3, 6>::zeros();
+            by_target
+                .fixed_view_mut::<3, 3>(0, 0)
+                .copy_from(&(innovation.by_point * turn));
+            let blocks = [
+                side.block(&(innovation.by_point * point_by_pose(&expected))),
+                other.block(&by_target),
+            ];
+            let seen = Seen::Agent(self.members[target].agent);
+            self.take_in(glance, &blocks, &innovation, seen)
+        };
+        self.recover(glance.observer);
+        verdict
+    }
+
+    /// A landmark that is not among those estimated jointly.
+    fn learn(&mut self, glance: &Glance<'_>, label: &Label) -> Verdict {
+        self.make_room();
+        let member = &self.members[glance.observer];
+        let side = Side::new(member, glance.back);
+        let (point, stated) = seen_at(glance.relation);
+        let noise = PointInnovation::new(glance.relation, &point).and_then(|innovation| {
+            let variance = member.sensor.variance(&innovation, glance.parameters);
+            let inverse = innovation.by_point.try_inverse()?;
+            Some(inverse * Matrix3::from_diagonal(&variance) * inverse.transpose())
+        });
+        let world = side.pose.rotation.to_rotation_matrix().into_inner();
+        let noise = world * noise.unwrap_or(stated) * world.transpose();
+        let by_pose = -(world * point_by_pose(&point));
+        let offset = self
+            .covariance
+            .append(&[side.block(&by_pose)], &symmetric(&noise));
+        let mark = Mark {
+            number: self.numbered,
+            position: side.pose * Point3::from(point),
+            offset,
+            used: self.sightings,
+            refused: 0,
+        };
+        self.numbered += 1;
+        self.marks.insert(label.clone(), mark);
+        match self.dormant.remove(label) {
+            None => Verdict::Learned,
+            Some((position, covariance)) => {
+                self.recall(glance.observer, offset, &position, &covariance)
+            }
+        }
+    }
+
+    /// A landmark came back whose earlier estimate may be correlated with everything.
+    ///
+    /// Its own estimate becomes the covariance intersection (Julier & Uhlmann 1997) of the new and the
+    /// old one, with the weight ½; what it gains by that is passed on to the rest:
+    ///
+    /// ```text
+    /// R⁻¹ = ½ (Σ_old⁻¹ − Σ_new⁻¹), as far as that is positive
+    /// ```
+    fn recall(
+        &mut self,
+        observer: usize,
+        offset: usize,
+        position: &Point3<f64>,
+        covariance: &Matrix3<f64>,
+    ) -> Verdict {
+        let accepted = Verdict::Accepted {
+            nis: 0.0,
+            components: 0,
+        };
+        let own: Matrix3<f64> = self.covariance.block(offset, offset);
+        let inverses = own.try_inverse().zip(covariance.try_inverse());
+        let Some((own_information, old_information)) = inverses else {
+            return accepted;
+        };
+        let gain = symmetric(&((old_information - own_information) * 0.5)).symmetric_eigen();
+        let variances = gain
+            .eigenvalues
+            .map(|information| 1.0 / information.clamp(GAIN_MIN_M2, 1.0 / GAIN_MIN_M2));
+        let axes = gain.eigenvectors;
+        let block = point_block(offset, &axes.transpose());
+        let projection = self.covariance.project(&[block]);
+        let here = self.marks.values().find(|mark| mark.offset == offset);
+        let Some(here) = here.map(|mark| mark.position) else {
+            return accepted;
+        };
+        let innovation = axes.transpose() * (position - here);
+        let spread = projection.spread;
+        let far = (0..3).any(|k| {
+            let expected = spread[(k, k)] + 2.0 * covariance.trace();
+            innovation[k] * innovation[k] > 36.0 * expected
+        });
+        if far {
+            return Verdict::Refused;
+        }
+        let s = spread + Matrix3::from_diagonal(&variances);
+        if let Some(correction) = self.covariance.update(projection, &innovation, &s) {
+            self.correct(observer, &correction);
+        }
+        accepted
+    }
+
+    /// Weighs an innovation and takes it in.
+    fn take_in(
+        &mut self,
+        glance: &Glance<'_>,
+        blocks: &[Block<3>],
+        innovation: &PointInnovation,
+        seen: Seen,
+    ) -> Verdict {
+        let parameters = glance.parameters;
+        let projection = self.covariance.project(blocks);
+        let member = &mut self.members[glance.observer];
+        let mut variance = member.sensor.variance(innovation, parameters);
+        let spread = projection.spread.diagonal();
+        let squares = innovation
+            .residual
+            .component_mul(&innovation.residual)
+            .component_div(&(spread + variance));
+        // A square that is not a number is refused, too.
+        if !squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.gate)
+        {
+            member.refused += 1;
+            return Verdict::Refused;
+        }
+        member.refused = 0;
+        member
+            .sensor
+            .note(seen, glance.stamp_ns, innovation, &spread, &variance);
+        // A planar robot's elevations are no measurements.
+        let is_flat =
+            member.mover.is_planar && innovation.is_polar && innovation.residual[2] == 0.0;
+        let components: usize = if is_flat { 2 } else { 3 };
+        let nis = squares.iter().take(components).sum();
+        for (variance, square) in variance.iter_mut().zip(squares.iter()) {
+            *variance *= (square / parameters.soft.powi(2)).max(1.0);
+        }
+        let s = projection.spread + Matrix3::from_diagonal(&variance);
+        let update = self.covariance.update(projection, &innovation.residual, &s);
+        if let Some(correction) = update {
+            self.correct(glance.observer, &correction);
+        }
+        let components = if is_flat { 2 } else { 3 };
+        Verdict::Accepted { nis, components }
+    }
+
+    /// A full pose of another member was seen.
+    fn see_pose(
+        &mut self,
+        glance: &Glance<'_>,
+        side: &Side,
+        other: &Side,
+        seen: &RelativePose,
+    ) -> Verdict {
+        let (residual, by_observer, by_target, variance) =
+            pose_innovation(seen, &side.pose, &other.pose);
+        let blocks = [side.block(&by_observer), other.block(&by_target)];
+        let projection = self.covariance.project(&blocks);
+        let spread: SVector<f64, 6> = projection.spread.diagonal();
+        let squares = residual
+            .component_mul(&residual)
+            .component_div(&(spread + variance));
+        let parameters = glance.parameters;
+        let member = &mut self.members[glance.observer];
+        if !squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.gate)
+        {
+            member.refused += 1;
+            return Verdict::Refused;
+        }
+        member.refused = 0;
+        let factors = squares.map(|square| (square / parameters.soft.powi(2)).max(1.0));
+        let weighted = variance.component_mul(&factors);
+        let s = projection.spread + SMatrix::from_diagonal(&weighted);
+        if let Some(correction) = self.covariance.update(projection, &residual, &s) {
+            self.correct(glance.observer, &correction);
+        }
+        Verdict::Accepted {
+            nis: squares.sum(),
+            components: 6,
+        }
+    }
+
+    /// Lets an agent whose sightings contradict the estimate search farther around.
+    fn recover(&mut self, observer: usize) {
+        if self.members[observer].refused >= REFUSED_TO_WIDEN {
+            self.members[observer].refused = 0;
+            self.widen(observer, WIDENED.0, WIDENED.1);
+        }
+    }
+}
+
+/// A member at an instant.
+#[derive(Clone, Debug)]
+struct Side {
+    pose: Isometry3<f64>,
+    /// The pose's error now by that then.
+    by_now: Matrix6<f64>,
+    offset: usize,
+}
+
+impl Side {
+    fn new(member: &Member, back: &Isometry3<f64>) -> Self {
+        Self {
+            pose: member.mover.pose * back.inverse(),
+            by_now: se3::adjoint(back),
+            offset: member.offset,
+        }
+    }
+
+    fn block<const M: usize>(&self, jacobian: &SMatrix<f64, M, 6>) -> Block<M> {
+        Block {
+            offset: self.offset,
+            width: 6,
+            jacobian: jacobian * self.by_now,
+        }
+    }
+}
+
+/// The part of a Jacobian that belongs to a landmark.
+pub(super) fn point_block(offset: usize, jacobian: &Matrix3<f64>) -> Block<3> {
+    let mut wide = SMatrix::<f64, 3, 6>::zeros();
+    wide.fixed_view_mut::<3, 3>(0, 0).copy_from(jacobian);
+    Block {
+        offset,
+        width: MARK_DIM,
+        jacobian: wide,
+    }
+}

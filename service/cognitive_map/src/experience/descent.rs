@@ -1,0 +1,130 @@
+//! Shorter steps, where the full one leads too far.
+
+use nalgebra::Vector6;
+
+use super::elimination::slot;
+use super::equations::NormalEquations;
+
+/// The step along the steepest descent, and the scale in which steps are measured.
+///
+/// With the gradient g and the curvatures D² = diag H, the step is −τ D⁻² g with the τ at which the cost's second-order
+/// model is least. Lengths are |D δ|: so metres and radians compare by what they cost.
+#[derive(Debug)]
+pub(super) struct SteepestDescent {
+    gradient: Vec<f64>,
+    /// D².
+    curvature: Vec<f64>,
+    step: Vec<f64>,
+}
+
+impl SteepestDescent {
+    /// At the poses of the equations.
+    pub(super) fn new(equations: &NormalEquations<'_>) -> Self {
+        let n = slot(equations.map.nodes.len(), 0, 1);
+        let (mut gradient, mut curvature) = (vec![0.0; n], vec![0.0; n]);
+        equations.for_each_link(|from, to, blocks| {
+            equations.gather(to, &blocks.to_gradient, &mut gradient);
+            equations.gather(to, &blocks.to_to.diagonal(), &mut curvature);
+            equations.gather(from, &blocks.from_gradient, &mut gradient);
+            equations.gather(from, &blocks.from_from.diagonal(), &mut curvature);
+        });
+        let direction: Vec<f64> = gradient
+            .iter()
+            .zip(&curvature)
+            .map(|(g, c)| if *c > 0.0 { -g / c } else { 0.0 })
+            .collect();
+        let slope: f64 = -dot(&gradient, &direction);
+        let curved = quadratic_form(equations, &direction);
+        let stride = if curved > 0.0 { slope / curved } else { 0.0 };
+        let step = direction.into_iter().map(|along| along * stride).collect();
+        Self {
+            gradient,
+            curvature,
+            step,
+        }
+    }
+
+    /// |D δ|.
+    pub(super) fn length(&self, step: &[f64]) -> f64 {
+        step.iter()
+            .zip(&self.curvature)
+            .map(|(x, c)| x * x * c)
+            .sum::<f64>()
+            .sqrt()
+    }
+
+    /// The step within `radius` on the way along the steepest descent and then on to the `newton` step, and by how much it
+    /// is expected to lower the cost.
+    pub(super) fn dogleg(
+        &self,
+        equations: &NormalEquations<'_>,
+        newton: &[f64],
+        radius: f64,
+    ) -> (Vec<f64>, f64) {
+        let steepest_length = self.length(&self.step);
+        let step: Vec<f64> = if self.length(newton) <= radius {
+            newton.to_vec()
+        } else if steepest_length >= radius {
+            self.step
+                .iter()
+                .map(|along| along * (radius / steepest_length))
+                .collect()
+        } else {
+            // |D (s + β (n − s))|² = r², a quadratic equation for β in [0, 1].
+            let rest: Vec<f64> = newton.iter().zip(&self.step).map(|(n, s)| n - s).collect();
+            let weigh = |a: &[f64], b: &[f64]| -> f64 {
+                a.iter()
+                    .zip(b)
+                    .zip(&self.curvature)
+                    .map(|((a, b), c)| a * b * c)
+                    .sum()
+            };
+            let (square, mixed) = (weigh(&rest, &rest), weigh(&self.step, &rest));
+            let missing = radius * radius - steepest_length * steepest_length;
+            let share = missing / (mixed + (mixed * mixed + square * missing).sqrt());
+            self.step
+                .iter()
+                .zip(&rest)
+                .map(|(s, rest)| s + share * rest)
+                .collect()
+        };
+        let expected = -2.0 * dot(&self.gradient, &step) - quadratic_form(equations, &step);
+        (step, expected)
+    }
+}
+
+/// δᵀ H δ.
+fn quadratic_form(equations: &NormalEquations<'_>, step: &[f64]) -> f64 {
+    let mut sum = 0.0;
+    equations.for_each_link(|from, to, blocks| {
+        let (from_step, to_step) = (equations.twist(from, step), equations.twist(to, step));
+        sum += to_step.dot(&(blocks.to_to * to_step));
+        sum += 2.0 * to_step.dot(&(blocks.to_from * from_step));
+        sum += from_step.dot(&(blocks.from_from * from_step));
+    });
+    sum
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl NormalEquations<'_> {
+    /// The unknowns of a node in their places in a twist.
+    fn twist(&self, node: u32, step: &[f64]) -> Vector6<f64> {
+        let mut twist = Vector6::zeros();
+        let axes = self.map.nodes[node as usize].axes();
+        for (&axis, unknown) in axes.iter().zip(&step[slot(node as usize, 0, 1)..]) {
+            twist[axis] = *unknown;
+        }
+        twist
+    }
+
+    /// Adds the components that are unknowns of a node to those of all nodes.
+    fn gather(&self, node: u32, twist: &Vector6<f64>, sums: &mut [f64]) {
+        let axes = self.map.nodes[node as usize].axes();
+        for (&axis, sum) in axes.iter().zip(&mut sums[slot(node as usize, 0, 1)..]) {
+            *sum += twist[axis];
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! In which order variables are eliminated, and the cliques that this gives.
+//!
+//! Approximate minimum degree on a quotient graph (Amestoy, Davis & Duff 1996): an eliminated variable lives on
+//! as an *element*, the set of variables that its elimination has tied together, so the graph never grows.
+//! What the elimination of a pivot ties together is exactly its column of the factor; the cliques therefore
+//! come out of the ordering itself, without a symbolic factorisation behind it.
+
+/// What is to be ordered: variables 0, 1, … and what ties them together.
+#[derive(Debug, Default)]
+pub(super) struct Problem {
+    /// For each variable those that share a link with it; repetitions and the variable itself do no harm.
+    pub(super) adjacent: Vec<Vec<u32>>,
+    /// Sets of variables that earlier eliminations have tied together: what stays of a part already factored.
+    pub(super) elements: Vec<Vec<u32>>,
+    /// Variables that are to come after all others.
+    pub(super) last: Vec<bool>,
+}
+
+/// Variables that are eliminated together.
+#[derive(Debug, Default)]
+pub(super) struct Stage {
+    /// The variables, in the order of their elimination.
+    pub(super) frontal: Vec<u32>,
+    /// Later variables that they are tied to.
+    pub(super) separator: Vec<u32>,
+    /// Elements of the problem that are used up here.
+    pub(super) elements: Vec<u32>,
+    /// The stage that takes what this one leaves, by index; `None` at a root.
+    pub(super) parent: Option<usize>,
+}
+
+/// Orders the variables of a problem. Stages come children before parents.
+pub(super) fn order(problem: Problem) -> Vec<Stage> {
+    let n_given = problem.elements.len();
+    let mut quotient = Quotient::new(problem);
+    let mut stages: Vec<Stage> = Vec::new();
+    while let Some(pivot) = quotient.next_pivot() {
+        let mut stage = Stage::default();
+        for element in quotient.eliminate(pivot) {
+            match element.checked_sub(n_given) {
+                None => stage.elements.push(index(element)),
+                Some(child) => stages[child].parent = Some(stages.len()),
+            }
+        }
+        let element = quotient
+            .elements
+            .last()
+            .expect("the pivot has just left one");
+        for &group in element {
+            stage
+                .separator
+                .extend_from_slice(&quotient.groups[group as usize].members);
+        }
+        stage.frontal = std::mem::take(&mut quotient.groups[pivot].members);
+        stages.push(stage);
+        quotient.merge_indistinguishable();
+    }
+    stages
+}
+
+/// A variable of the quotient graph, standing for all variables that became indistinguishable from it.
+#[derive(Debug, Default)]
+struct Group {
+    /// Empty once it is eliminated, or has become part of another group.
+    members: Vec<u32>,
+    /// Other groups tied to it by a link, ascending; those gone are removed now and then.
+    variables: Vec<u32>,
+    /// Elements that it belongs to, ascending.
+    elements: Vec<usize>,
+    /// An upper bound of the number of variables tied to it.
+    degree: usize,
+    is_last: bool,
+}
+
+/// The state of the elimination.
+struct Quotient {
+    groups: Vec<Group>,
+    /// Groups of each element, first those of the problem, then one for each pivot; empty once used up.
+    elements: Vec<Vec<u32>>,
+    /// Number of variables of each element.
+    sizes: Vec<usize>,
+    /// How many of an element's variables lie outside the newest element, and when that was counted.
+    outside: Vec<(usize, usize)>,
+    /// The step at which a group was last seen.
+    seen: Vec<usize>,
+    step: usize,
+    /// Groups by degree; an entry whose group has another degree by now, or is gone, is stale.
+    buckets: Vec<Vec<u32>>,
+    least_degree: usize,
+    last_are_open: bool,
+}
+
+impl Quotient {
+    fn new(problem: Problem) -> Self {
+        let n = problem.adjacent.len();
+        let mut groups: Vec<Group> = Vec::with_capacity(n);
+        for ((mut variables, is_last), own) in
+            problem.adjacent.into_iter().zip(problem.last).zip(0..)
+        {
+            variables.sort_unstable();
+            variables.dedup();
+            variables.retain(|&other| other != own);
+            let (members, degree) = (vec![own], variables.len());
+            groups.push(Group {
+                members,
+                variables,
+                degree,
+                is_last,
+                elements: Vec::new(),
+            });
+        }
+        let sizes: Vec<usize> = problem.elements.iter().map(Vec::len).collect();
+        for (element, (variables, size)) in problem.elements.iter().zip(&sizes).enumerate() {
+            for &variable in variables {
+                let group = &mut groups[variable as usize];
+                group.elements.push(element);
+                group.degree = (group.degree + size - 1).min(n - 1);
+            }
+        }
+        let mut quotient = Self {
+            outside: vec![(0, 0); sizes.len()],
+            sizes,
+            elements: problem.elements,
+            seen: vec![0; n],
+            step: 0,
+            buckets: vec![Vec::new(); n],
+            least_degree: n,
+            last_are_open: false,
+            groups,
+        };
+        for group in (0..n).rev() {
+            quotient.offer(group);
+        }
+        quotient
+    }
+
+    /// Puts a group where its degree says.
+    fn offer(&mut self, group: usize) {
+        let Group {
+            degree, is_last, ..
+        } = self.groups[group];
+        if !is_last || self.last_are_open {
+            self.buckets[degree].push(index(group));
+            self.least_degree = self.least_degree.min(degree);
+        }
+    }
+
+    /// A group of least degree.
+    fn next_pivot(&mut self) -> Option<usize> {
+        loop {
+            while self.least_degree < self.buckets.len() {
+                while let Some(group) = self.buckets[self.least_degree].pop() {
+                    let Group {
+                        members, degree, ..
+                    } = &self.groups[group as usize];
+                    if !members.is_empty() && *degree == self.least_degree {
+                        return Some(group as usize);
+                    }
+                }
+                self.least_degree += 1;
+            }
+            if self.last_are_open {
+                return None;
+            }
+            self.last_are_open = true;
+            for group in (0..self.groups.len()).rev() {
+                if self.groups[group].is_last {
+                    self.offer(group);
+                }
+            }
+        }
+    }
+
+    /// Replaces a pivot by the element of all that it is tied to. Returns the elements used up by that.
+    fn eliminate(&mut self, pivot: usize) -> Vec<usize> {
+        self.step += 1;
+        let step = self.step;
+        self.seen[pivot] = step;
+        let variables = std::mem::take(&mut self.groups[pivot].variables);
+        let mut used_up = std::mem::take(&mut self.groups[pivot].elements);
+        used_up.retain(|&element| !self.elements[element].is_empty());
+        let mut tied = Vec::new();
+        let parts = used_up
+            .iter()
+            .map(|&element| std::mem::take(&mut self.elements[element]));
+        for group in parts.chain([variables]).flatten() {
+            let is_alive = !self.groups[group as usize].members.is_empty();
+            if is_alive && self.seen[group as usize] != step {
+                self.seen[group as usize] = step;
+                tied.push(group);
+            }
+        }
+        used_up.extend(self.count_outside(&tied));
+        let size = tied
+            .iter()
+            .map(|&group| self.groups[group as usize].members.len())
+            .sum();
+        for &group in &tied {
+            self.update(group as usize, size);
+        }
+        self.elements.push(tied);
+        self.sizes.push(size);
+        self.outside.push((0, 0));
+        used_up
+    }
+
+    /// Counts for each element that the newest one meets how many of its variables lie outside that one. Those
+    /// without any say nothing that the newest does not say: they are used up too, and returned.
+    fn count_outside(&mut self, newest: &[u32]) -> Vec<usize> {
+        let mut met = Vec::new();
+        for group in newest.iter().map(|&group| &self.groups[group as usize]) {
+            for &element in group
+                .elements
+                .iter()
+                .filter(|&&e| !self.elements[e].is_empty())
+            {
+                let (outside, counted_at) = &mut self.outside[element];
+                if *counted_at != self.step {
+                    (*outside, *counted_at) = (self.sizes[element], self.step);
+                    met.push(element);
+                }
+                *outside -= group.members.len();
+            }
+        }
+        met.retain(|&element| self.outside[element].0 == 0);
+        for &element in &met {
+            self.elements[element].clear();
+        }
+        met
+    }
+
+    /// Brings a group of the newest element up to date; `size` is that element's number of variables.
+    fn update(&mut self, group: usize, size: usize) {
+        let mut own = std::mem::take(&mut self.groups[group]);
+        own.elements
+            .retain(|&element| !self.elements[element].is_empty());
+        own.variables.retain(|&other| {
+            let is_alive = !self.groups[other as usize].members.is_empty();
+            is_alive && self.seen[other as usize] != self.step
+        });
+        let others = size - own.members.len();
+        let by_links: usize = own
+            .variables
+            .iter()
+            .map(|&other| self.groups[other as usize].members.len())
+            .sum();
+        let by_elements: usize = own
+            .elements
+            .iter()
+            .map(|&element| self.outside[element].0)
+            .sum();
+        own.elements.push(self.elements.len());
+        own.degree = (own.degree + others).min(others + by_links + by_elements);
+        own.degree = own.degree.min(self.groups.len() - 1);
+        self.groups[group] = own;
+    }
+
+    /// Merges groups of the newest element that are tied to the same others, and offers what remains.
+    fn merge_indistinguishable(&mut self) {
+        let newest = self
+            .elements
+            .last()
+            .expect("called after an elimination")
+            .clone();
+        let mut by_ties: Vec<(usize, u32)> = Vec::with_capacity(newest.len());
+        for &group in &newest {
+            let Group {
+                variables,
+                elements,
+                ..
+            } = &self.groups[group as usize];
+            let sum = variables
+                .iter()
+                .map(|&v| v as usize)
+                .chain(elements.iter().copied())
+                .sum();
+            by_ties.push((sum, group));
+        }
+        by_ties.sort_unstable();
+        for i in 0..by_ties.len() {
+            let (sum, kept) = by_ties[i];
+            if self.groups[kept as usize].members.is_empty() {
+                continue;
+            }
+            for &(_, other) in by_ties[i + 1..]
+                .iter()
+                .take_while(|(other, _)| *other == sum)
+            {
+                let (a, b) = (&self.groups[kept as usize], &self.groups[other as usize]);
+                let is_same = a.is_last == b.is_last
+                    && !b.members.is_empty()
+                    && a.elements == b.elements
+                    && a.variables == b.variables;
+                if is_same {
+                    let members = std::mem::take(&mut self.groups[other as usize].members);
+                    let kept = &mut self.groups[kept as usize];
+                    kept.degree -= members.len().min(kept.degree);
+                    kept.members.extend(members);
+                }
+            }
+        }
+        for &group in &newest {
+            if !self.groups[group as usize].members.is_empty() {
+                self.offer(group as usize);
+            }
+        }
+    }
+}
+
+/// Sizes of problems stay far below 2³².
+fn index(of: usize) -> u32 {
+    u32::try_from(of).expect("fewer than 2³² variables")
+}

@@ -1,0 +1,78 @@
+//! How the logarithm of a rigid motion changes with the motion.
+
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+use super::se3::{HALF_ANGLE_COTANGENT, SERIES_BELOW_RAD, THETA_MINUS_SIN, polynomial};
+
+/// The 6×6 matrix A, order translation, rotation, with `log(exp(ξ) exp(δ)) = ξ + A δ` to first order in δ, at
+/// ξ = (`linear` = ρ \[m\], `angular` = φ \[rad\]), |φ| ≤ π: the inverse of the right Jacobian.
+///
+/// With ψ = −φ, ϱ = −ρ and θ = |φ| (Barfoot & Furgale 2014, Eqs. 99–102):
+///
+/// ```text
+/// A = | J⁻¹  −J⁻¹ Q J⁻¹ |      J⁻¹ = I − ½ ψ× + d ψ×ψ×
+///     | 0     J⁻¹       |
+///
+/// Q = ½ ϱ× + c (ψ×ϱ× + ϱ×ψ× + ψ×ϱ×ψ×)           c = (θ − sin θ)/θ³
+///   + e (ψ×ψ×ϱ× + ϱ×ψ×ψ× − 3 ψ×ϱ×ψ×)           e = (θ² + 2 cos θ − 2)/(2 θ⁴)
+///   + f (ψ×ϱ×ψ×ψ× + ψ×ψ×ϱ×ψ×)                  f = (2 θ − 3 sin θ + θ cos θ)/(2 θ⁵)
+/// ```
+///
+/// with d of [`log`](super::se3::log).
+pub fn log_jacobian(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Matrix6<f64> {
+    let squared = angular.norm_squared();
+    let (c, d, e, f);
+    if squared < SERIES_BELOW_RAD * SERIES_BELOW_RAD {
+        c = polynomial(squared, &THETA_MINUS_SIN);
+        d = polynomial(squared, &HALF_ANGLE_COTANGENT);
+        e = polynomial(squared, &COS_REMAINDER);
+        f = polynomial(squared, &MIXED_REMAINDER);
+    } else {
+        let angle = squared.sqrt();
+        let (sin, cos) = angle.sin_cos();
+        let (sin_half, cos_half) = (0.5 * angle).sin_cos();
+        c = (angle - sin) / (squared * angle);
+        d = (1.0 - 0.5 * angle * cos_half / sin_half) / squared;
+        e = (squared + 2.0 * cos - 2.0) / (2.0 * squared * squared);
+        f = (2.0 * angle - 3.0 * sin + angle * cos) / (2.0 * squared * squared * angle);
+    }
+    let turn = -angular.cross_matrix();
+    let shift = -linear.cross_matrix();
+    let turn_turn = turn * turn;
+    let turn_shift = turn * shift;
+    let shift_turn = shift * turn;
+    let turn_shift_turn = turn_shift * turn;
+    let q = shift * 0.5
+        + (turn_shift + shift_turn + turn_shift_turn) * c
+        + (turn * turn_shift + shift_turn * turn - turn_shift_turn * 3.0) * e
+        + (turn_shift_turn * turn + turn * turn_shift_turn) * f;
+    let inverse = Matrix3::identity() - turn * 0.5 + turn_turn * d;
+    let mut jacobian = Matrix6::zeros();
+    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&inverse);
+    jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&inverse);
+    let corner = -(inverse * q * inverse);
+    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&corner);
+    jacobian
+}
+
+/// Coefficients of (θ² + 2 cos θ − 2)/(2 θ⁴) in powers of θ²: (−1)ᵏ / (2k + 4)!.
+const COS_REMAINDER: [f64; 7] = [
+    1.0 / 24.0,
+    -1.0 / 720.0,
+    1.0 / 40_320.0,
+    -1.0 / 3_628_800.0,
+    1.0 / 479_001_600.0,
+    -1.0 / 87_178_291_200.0,
+    1.0 / 20_922_789_888_000.0,
+];
+
+/// Coefficients of (2 θ − 3 sin θ + θ cos θ)/(2 θ⁵) in powers of θ²: (−1)ᵏ (k + 1) / (2k + 5)!.
+const MIXED_REMAINDER: [f64; 7] = [
+    1.0 / 120.0,
+    -2.0 / 5_040.0,
+    3.0 / 362_880.0,
+    -4.0 / 39_916_800.0,
+    5.0 / 6_227_020_800.0,
+    -6.0 / 1_307_674_368_000.0,
+    7.0 / 355_687_428_096_000.0,
+];

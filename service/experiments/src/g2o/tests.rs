@@ -1,0 +1,203 @@
+//! The format, and a graph whose optimum another solver has found.
+
+use cognitive_map::experience::{
+    ExperienceMap, IncrementalRelaxation, IncrementalSettings, InvalidInformation, Kernel,
+    RelaxationSettings, Start,
+};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+use super::{Feed, G2oError, LineReason, PoseGraph};
+
+/// A square walked twice, with errors that no arrangement explains.
+const PLANAR: &str = "\
+VERTEX_SE2 0 0 0 0
+EDGE_SE2 0 1 1.05 0.02 1.60 100 0 5 100 0 400
+EDGE_SE2 1 2 0.97 -0.03 1.52 100 0 0 100 10 400
+EDGE_SE2 2 3 1.02 0.05 1.58 100 0 0 100 0 400
+EDGE_SE2 3 4 0.99 -0.01 1.61 100 0 0 100 0 400
+EDGE_SE2 4 5 1.01 0.04 1.49 100 0 0 100 0 400
+EDGE_SE2 0 4 0.10 -0.05 0.04 50 0 0 50 0 100
+EDGE_SE2 5 1 0.05 0.08 -0.10 50 20 0 50 0 100
+";
+
+/// A tetrahedron with errors that no arrangement explains.
+const SPATIAL: &str = "\
+VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1
+EDGE_SE3:QUAT 0 1 1 0.1 0 0 0 0.38 0.92 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
+EDGE_SE3:QUAT 1 2 0.9 0 0.2 0.30 0 0 0.95 10 0 0 0 0 1 20 0 0 0 0 10 0 0 0 40 5 0 40 0 40
+EDGE_SE3:QUAT 2 3 1.1 0.1 0.1 0 0.45 0 0.89 10 2 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 80
+EDGE_SE3:QUAT 0 2 1.3 0.9 0.2 0.20 0.10 0.40 0.88 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
+EDGE_SE3:QUAT 0 3 1.4 1.5 1.1 0.30 0.60 0.20 0.71 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
+EDGE_SE3:QUAT 3 1 0.2 -1.2 -0.9 -0.5 -0.3 0.1 0.80 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
+";
+
+fn relaxed(text: &str, start: Start) -> (PoseGraph, ExperienceMap, f64) {
+    let graph = PoseGraph::read(text).unwrap();
+    let (mut map, _) = graph.experience_map();
+    let settings = RelaxationSettings {
+        start,
+        tolerance: 1e-14,
+        ..RelaxationSettings::default()
+    };
+    let chi_squared = map.relax(&settings).chi_squared;
+    (graph, map, chi_squared)
+}
+
+#[test]
+fn a_planar_graph_reads_as_the_format_says() {
+    let graph = PoseGraph::read(PLANAR).unwrap();
+    assert!(graph.is_planar());
+    assert_eq!((graph.poses().len(), graph.edges().len()), (6, 7));
+    let first = &graph.edges()[0];
+    assert_eq!((first.from, first.to, first.is_odometry()), (0, 1, true));
+    assert_eq!(
+        first.transform.translation.vector,
+        Vector3::new(1.05, 0.02, 0.0)
+    );
+    assert!((first.transform.rotation.scaled_axis() - Vector3::z() * 1.6).norm() < 1e-12);
+    let information = first.information.matrix();
+    assert_eq!(
+        (
+            information[(0, 0)],
+            information[(0, 5)],
+            information[(5, 5)]
+        ),
+        (100.0, 5.0, 400.0)
+    );
+    assert_eq!((information[(2, 2)], information[(3, 3)]), (0.0, 0.0));
+    // A node without an entry of its own begins where the first edge to it puts it.
+    assert_eq!(graph.poses()[&1], first.transform);
+}
+
+#[test]
+fn a_spatial_graph_reads_as_the_format_says() {
+    let graph = PoseGraph::read(SPATIAL).unwrap();
+    assert!(!graph.is_planar());
+    assert_eq!((graph.poses().len(), graph.edges().len()), (4, 6));
+    let edge = graph
+        .edges()
+        .iter()
+        .find(|edge| (edge.from, edge.to) == (1, 2))
+        .unwrap();
+    let information = edge.information.matrix();
+    assert_eq!(
+        (
+            information[(0, 5)],
+            information[(1, 1)],
+            information[(3, 4)]
+        ),
+        (1.0, 20.0, 5.0)
+    );
+    assert!((edge.transform.rotation.norm() - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_bad_line_is_named() {
+    let information = "1 0 0 1 0 1";
+    for (line, reason) in [
+        ("EDGE_XY 0 1 2", LineReason::Kind("EDGE_XY".to_owned())),
+        (
+            "EDGE_SE2 0 1 2",
+            LineReason::Columns {
+                expected: 12,
+                found: 4,
+            },
+        ),
+        ("VERTEX_SE2 0 x 0 0", LineReason::NotANumber { column: 3 }),
+        ("VERTEX_SE2 -1 0 0 0", LineReason::NotAnId { column: 2 }),
+        (
+            &format!("EDGE_SE2 3 3 0 0 0 {information}"),
+            LineReason::Loop,
+        ),
+        (
+            "EDGE_SE2 3 4 0 0 0 1 0 0 -1 0 1",
+            InvalidInformation::Negative.into(),
+        ),
+        (
+            "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1",
+            LineReason::Mixed { so_far: "planar" },
+        ),
+    ] {
+        let text = format!("{PLANAR}# a comment\n{line}\n");
+        assert_eq!(
+            PoseGraph::read(&text),
+            Err(G2oError::Line { line: 10, reason }),
+            "{line}"
+        );
+    }
+    let no_direction = "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 0";
+    let reason = LineReason::NoDirection;
+    assert_eq!(
+        PoseGraph::read(no_direction),
+        Err(G2oError::Line { line: 1, reason })
+    );
+    assert_eq!(PoseGraph::read("VERTEX_SE2 0 0 0 0"), Err(G2oError::NoEdge));
+}
+
+/// χ² and positions at the optimum. The constants come from gtsam 4.3.0, with `gtsam.readG2o` on the texts above (each
+/// further node with a `VERTEX` line of its own), a prior of sd 1e-6 at the first pose, and
+///
+/// ```python
+/// start = gtsam.InitializePose3.initialize(graph)  # planar: the chain of the odometry edges
+/// params = gtsam.LevenbergMarquardtParams()
+/// params.setRelativeErrorTol(1e-14); params.setAbsoluteErrorTol(1e-14)
+/// optimum = gtsam.LevenbergMarquardtOptimizer(graph, start, params).optimize()
+/// print(2 * graph.error(optimum), [optimum.atPose3(k).translation() for k in (1, 2, 3)])
+/// ```
+#[test]
+fn the_optimum_is_that_of_gtsam() {
+    let planar: [[f64; 3]; 5] = [
+        [1.051_419_21, 0.029_506_83, 0.0],
+        [1.078_692_32, 0.988_461_98, 0.0],
+        [0.074_641_85, 0.935_480_48, 0.0],
+        [0.097_138_65, -0.068_069_42, 0.0],
+        [1.116_981_83, 0.018_696_68, 0.0],
+    ];
+    let spatial = [
+        [0.854_025_92, 0.307_342_35, 0.010_760_66],
+        [1.220_372_12, 0.816_510_32, 0.348_197_25],
+        [1.624_609_84, 1.376_669_77, 0.941_785_18],
+    ];
+    for (text, chi_squared, positions) in [
+        (PLANAR, 2.213_048_826, &planar[..]),
+        (SPATIAL, 23.050_535_008, &spatial[..]),
+    ] {
+        for start in [Start::Here, Start::RotationFirst] {
+            let (graph, map, found) = relaxed(text, start);
+            let nodes = graph.experience_map().1;
+            assert!((found - chi_squared).abs() < 1e-4 * chi_squared, "{found}");
+            for (position, node) in positions.iter().zip(nodes.values().skip(1)) {
+                let error = (map.pose(*node).translation.vector - Vector3::from(*position)).norm();
+                assert!(error < 1e-4, "{error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_graph_fed_node_by_node_ends_as_the_graph_taken_whole() {
+    for text in [PLANAR, SPATIAL] {
+        let (graph, _, chi_squared) = relaxed(text, Start::Here);
+        let settings = IncrementalSettings {
+            turn_max_rad: 1e-9,
+            shift_max_m: 1e-9,
+            steps_max: 20,
+            ..IncrementalSettings::default()
+        };
+        let (mut map, mut live) = (ExperienceMap::new(), IncrementalRelaxation::new(settings));
+        let mut feed = Feed::new(&graph, Kernel::Gaussian);
+        while feed.step(&mut map).is_some() {
+            live.update(&mut map);
+        }
+        assert_eq!(feed.links().len(), graph.edges().len());
+        assert!((map.chi_squared() - chi_squared).abs() < 1e-6 * chi_squared);
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_text_is_answered(text in "(EDGE_SE2|VERTEX_SE2|EDGE_SE3:QUAT|[-+0-9.e# \n]{0,9}){0,20}") {
+        let _ = PoseGraph::read(&text);
+    }
+}

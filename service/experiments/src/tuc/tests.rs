@@ -1,0 +1,135 @@
+//! The format, and a map that false matches do not bend.
+
+use std::f64::consts::TAU;
+
+use cognitive_map::experience::{Graduation, Kernel, RelaxationSettings, Scale};
+use nalgebra::Vector3;
+
+use super::{Match, MatchNoise, MatchedMap, Tuc, TucError, TucReason};
+use crate::metrics::{Alignment, Span, Trajectory, ate_rmse_m};
+use crate::stamp::format_seconds;
+
+const INPUT: &str = "\
+odom2 0 0 0 0 0.0025 0.0025 0.0001
+odom2 0.5 2 0 0 0.0025 0.0025 0.0001
+odom2 1.0 2 0 3.141592653589793 0.0025 0.0025 0.0001
+loop 1.01 0.02 0.25
+other 1 2 3
+";
+const TRUTH: &str = "point2 0 5 6 0 0 0 0\nangle 0 1 0\npoint2 2 7 8 0 0 0 0\n";
+
+#[test]
+fn the_lines_read_as_the_format_says() {
+    let set = Tuc::read(INPUT, TRUTH).unwrap();
+    assert_eq!(set.steps().len(), 3);
+    let step = &set.steps()[1];
+    assert_eq!(step.stamp_ns, 500_000_000);
+    assert!((step.motion.translation.vector - Vector3::x()).norm() < 1e-12);
+    assert!((step.noise_sd[0] - 0.025).abs() < 1e-12 && (step.noise_sd[5] - 0.005).abs() < 1e-12);
+    // Half a second at π rad/s: a quarter of a turn to the left, along an arc.
+    let turn = set.steps()[2].motion.rotation.scaled_axis();
+    assert!((turn - Vector3::z() * std::f64::consts::FRAC_PI_2).norm() < 1e-12);
+    let expected = Match {
+        later_ns: 1_010_000_000,
+        earlier_ns: 20_000_000,
+        score: 0.25,
+    };
+    assert_eq!(set.matches(), [expected]);
+    assert_eq!(
+        set.truth().at(1_000_000_000),
+        Some(Vector3::new(6.0, 7.0, 0.0))
+    );
+}
+
+#[test]
+fn a_bad_line_is_named() {
+    for (line, expected) in [
+        (
+            "odom2 1 2 3",
+            TucReason::Columns {
+                expected: 8,
+                found: 4,
+            },
+        ),
+        ("odom2 0.9 0 0 0 0 0 0", TucReason::NotLater),
+        ("odom2 2 x 0 0 0 0 0", TucReason::NotANumber { column: 3 }),
+        ("odom2 2 0 0 0 0 -1 0", TucReason::NegativeVariance),
+        (
+            "loop 1 2",
+            TucReason::Columns {
+                expected: 4,
+                found: 3,
+            },
+        ),
+    ] {
+        match Tuc::read(&format!("{INPUT}{line}\n"), TRUTH) {
+            Err(TucError::Line { line: 6, reason }) => assert_eq!(reason, expected),
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+    assert!(matches!(Tuc::read("", TRUTH), Err(TucError::NoOdometry)));
+    assert!(matches!(Tuc::read(INPUT, ""), Err(TucError::Truth(_))));
+}
+
+/// Four rounds on a circle, with a gyroscope that drifts, matched at every quarter of a round.
+fn rounds() -> Tuc {
+    use std::fmt::Write as _;
+
+    let (mut input, mut truth) = (String::new(), String::new());
+    let n = 4 * 100;
+    let turn_s = TAU / 10.0;
+    for k in 0..=n {
+        let t = format_seconds(i64::from(k) * 100_000_000);
+        let angle = f64::from(k) * TAU / 100.0;
+        let (speed, turn) = if k == 0 {
+            (0.0, 0.0)
+        } else {
+            (10.0 * turn_s, turn_s + 0.006)
+        };
+        writeln!(input, "odom2 {t} {speed} 0 {turn} 0.0025 0.0025 0.0001").unwrap();
+        let (x, y) = (10.0 * angle.sin(), -10.0 * angle.cos());
+        writeln!(truth, "point2 {t} {x} {y} 0 0 0 0").unwrap();
+    }
+    for k in (100..=n).step_by(25) {
+        let (later, earlier) = (f64::from(k) * 0.1, f64::from(k - 100) * 0.1);
+        writeln!(input, "loop {later} {earlier} 0.5").unwrap();
+    }
+    Tuc::read(&input, &truth).unwrap()
+}
+
+#[test]
+fn more_false_matches_than_true_ones_do_not_bend_the_map() {
+    let set = rounds();
+    let mut matches = set.matches().to_vec();
+    let n_true = matches.len();
+    for k in 0..2 * i64::try_from(n_true).unwrap() {
+        // Of places a quarter of a round or more apart.
+        let later_ns = (170 + 7 * k) * 100_000_000;
+        let earlier_ns = (later_ns / 100_000_000 - 130 - k) * 100_000_000;
+        matches.push(Match {
+            later_ns,
+            earlier_ns,
+            score: 0.5,
+        });
+    }
+    let noise = MatchNoise {
+        position_sd_m: 0.05,
+        heading_sd_rad: 0.02,
+        kernel: Kernel::GemanMcClure(Scale::new(3.0).unwrap()),
+    };
+    let ate_m = |matches: &[Match]| {
+        let mut map = MatchedMap::new(&set, matches, &noise);
+        let graduation = Graduation::FromWide;
+        let poses = map.relaxed(&RelaxationSettings {
+            graduation,
+            ..RelaxationSettings::default()
+        });
+        let estimate = Trajectory::from_poses(&poses).unwrap();
+        let span = Span::common([estimate.span(), set.truth().span()]).unwrap();
+        ate_rmse_m(&estimate, set.truth(), span, Alignment::Planar).unwrap()
+    };
+    let (odometry, clean, doubted) = (ate_m(&[]), ate_m(set.matches()), ate_m(&matches));
+    assert!(odometry > 0.5, "{odometry}");
+    assert!(clean < 0.3 * odometry, "{clean} {odometry}");
+    assert!(doubted < clean + 0.1, "{doubted} {clean}");
+}
