@@ -408,11 +408,7 @@ fn of_a_crowd_those_that_see_take_part() {
             }
         }
         let frame = estimator.frame(0);
-        assert_eq!(
-            (frame.members.len(), frame.population),
-            (32, 100),
-            "{round}"
-        );
+        assert_eq!((frame.members.len(), frame.population), (32, 40), "{round}");
         assert_eq!(frame.covariance.dim(), 32 * 11 + POSTS.len() * 3);
     }
     // Agent 0 has left the joint estimate: its motion leaves that alone, and it comes back.
