@@ -44,9 +44,11 @@ pub use desk::AgentDesk;
 pub use fold::{core_settings, records_of, trajectory_interval_ns};
 pub use message::IngestError;
 pub use outlet::{Outlet, Silent};
+pub use readout::evidence;
 pub(crate) use readout::trip_end;
 pub use settings::EngineSettings;
 pub use space::{Space, TrajectoryError, Unavailable};
+pub(crate) use trajectory::stamped;
 pub use trajectory::{Chunk, Recorder};
 
 use crate::store::{Store, StoreError};

@@ -40,7 +40,8 @@ pub(crate) fn readout(space: &str, agent: &Agent, map: &CognitiveMap) -> Option<
     Some(Readout::new(estimate, odometry, evidence, travelled_m))
 }
 
-fn evidence(agent: &Agent) -> wire::Evidence {
+/// What became of an agent's sightings, as the wire has it.
+pub fn evidence(agent: &Agent) -> wire::Evidence {
     let evidence = agent.evidence();
     let components = evidence.components as f64;
     wire::Evidence {

@@ -44,9 +44,10 @@ pub struct Chunk {
 pub(crate) struct CorruptChunk;
 
 impl Recorder {
-    /// Notes the pose of `agent` after a record has been applied to it, if the record moved it and
-    /// the latest row is at least `interval_ns` old. A start pose at the stamp of the latest row
-    /// replaces that row. Returns a chunk when one is complete.
+    /// Notes the pose of `agent` after a record has been applied to it, if the record moved or corrected
+    /// it and the latest row is at least `interval_ns` old. A start pose or a sighting at the stamp of the
+    /// latest row replaces that row. An agent that is not placed has no pose in the map, and no rows.
+    /// Returns a chunk when one is complete.
     pub fn note(&mut self, record: &Record, agent: &Agent, interval_ns: i64) -> Option<Chunk> {
         let Record::Sample {
             session, sample, ..
@@ -56,7 +57,7 @@ impl Recorder {
         };
         let jumped = match sample.body {
             SampleBody::Motion(_) => false,
-            SampleBody::StartPose(_) => true,
+            SampleBody::StartPose(_) | SampleBody::Sighting(_) => true,
             _ => return None,
         };
         let mut complete = None;
@@ -64,6 +65,9 @@ impl Recorder {
             complete = self.take();
             self.session = *session;
             self.latest_ns = None;
+        }
+        if !agent.placed() {
+            return complete;
         }
         let row = stamped(sample.stamp_ns, agent.pose());
         match self.latest_ns {

@@ -1,8 +1,10 @@
 //! `cogmap replay`: a recorded data set through the map, and the error of what comes out.
 
 mod mrclam;
+mod mrclam_report;
 mod offline;
 mod online;
+mod outcome;
 mod readings;
 
 use clap::Subcommand;

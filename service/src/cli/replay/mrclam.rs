@@ -1,18 +1,17 @@
 //! `cogmap replay mrclam`.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use cogmap_experiments::metrics::{Alignment, Trajectory, ate_rmse_m, dead_reckoned};
-use cogmap_experiments::mrclam::{Mrclam, PlanarPose};
-use cogmap_experiments::reading::robot_name;
+use cogmap_experiments::mrclam::{Mrclam, TeamReading};
+use cogmap_experiments::reading::{ReadingBody, ReadingTarget, robot_name};
 use cogmap_experiments::tum::write_tum;
 use cogmap_proto::limits::BATCH_SAMPLES_MAX;
-use cogmap_proto::{Sample, SpaceSettings, StampedPose};
-use serde::Serialize;
+use cogmap_proto::{Sample, SpaceSettings};
 
+use super::mrclam_report::report;
+use super::outcome::Outcome;
 use super::{offline, online, sample_of};
 use crate::cli::export::pose;
 use crate::cli::output;
@@ -45,6 +44,12 @@ pub(in crate::cli) struct MrclamArgs {
     /// Most samples of a batch. Changes nothing but the number of messages.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=4096))]
     batch: u16,
+    /// Leave out what the robots saw of one another.
+    #[arg(long)]
+    no_robot_sightings: bool,
+    /// Tell only the first robot where it starts; the others have to find their place.
+    #[arg(long)]
+    unknown_starts: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -57,46 +62,9 @@ pub(super) struct TeamBatch {
     pub(super) samples: Vec<Sample>,
 }
 
-/// What came out of a replay.
-#[derive(Debug)]
-pub(super) struct Outcome {
-    /// Causal trajectory of each robot, by name.
-    pub(super) trajectories: BTreeMap<String, Vec<StampedPose>>,
-    pub(super) samples: u64,
-    pub(super) digest: String,
-    pub(super) places: u64,
-    pub(super) trips: u64,
-    pub(super) landmarks: u64,
-}
-
-#[derive(Debug, Serialize)]
-struct Report {
-    samples: u64,
-    digest: String,
-    places: u64,
-    trips: u64,
-    landmarks: u64,
-    dead_reckoning_ate_rmse_m: f64,
-    dead_reckoning_aligned_ate_rmse_m: f64,
-    causal_ate_rmse_m: f64,
-    causal_aligned_ate_rmse_m: f64,
-    robots: BTreeMap<String, RobotReport>,
-}
-
-/// Errors of one robot: RMSE of position on a 10 Hz grid over the common span, in the frame of the
-/// truth, and after the best rigid motion in the plane.
-#[derive(Debug, Serialize)]
-struct RobotReport {
-    samples: u64,
-    dead_reckoning_ate_rmse_m: f64,
-    dead_reckoning_aligned_ate_rmse_m: f64,
-    causal_ate_rmse_m: f64,
-    causal_aligned_ate_rmse_m: f64,
-}
-
 pub(super) fn run(args: &MrclamArgs) -> anyhow::Result<()> {
     let set = Mrclam::load(&args.directory)?;
-    let batches = batches(&set, usize::from(args.batch).min(BATCH_SAMPLES_MAX));
+    let batches = batches(&set, args);
     let settings = SpaceSettings::default();
     let outcome = match (&args.connect, &args.http) {
         (Some(endpoint), Some(http)) => {
@@ -117,14 +85,24 @@ pub(super) fn run(args: &MrclamArgs) -> anyhow::Result<()> {
     if args.json {
         output::json(&report)
     } else {
-        print(&report)
+        report.print()
     }
 }
 
-/// The team's samples by stamp, cut where the robot changes and after `most` samples.
-fn batches(set: &Mrclam, most: usize) -> Vec<TeamBatch> {
+/// The team's samples by stamp, cut where the robot changes and after the most samples of a batch.
+fn batches(set: &Mrclam, args: &MrclamArgs) -> Vec<TeamBatch> {
+    let most = usize::from(args.batch).min(BATCH_SAMPLES_MAX);
+    let first = set.robots().keys().next().copied();
+    let is_asked_for = |entry: &TeamReading| match &entry.reading.body {
+        ReadingBody::StartPose { .. } => !args.unknown_starts || Some(entry.robot) == first,
+        ReadingBody::Sighting {
+            target: ReadingTarget::Robot(_),
+            ..
+        } => !args.no_robot_sightings,
+        _ => true,
+    };
     let mut batches: Vec<TeamBatch> = Vec::new();
-    for reading in set.team_readings() {
+    for reading in set.team_readings().into_iter().filter(is_asked_for) {
         let robot = robot_name(reading.robot);
         let sample = sample_of(&reading.reading);
         match batches.last_mut() {
@@ -143,82 +121,11 @@ fn batches(set: &Mrclam, most: usize) -> Vec<TeamBatch> {
 fn write_trajectories(directory: &Path, outcome: &Outcome) -> anyhow::Result<()> {
     std::fs::create_dir_all(directory)
         .with_context(|| format!("create {}", directory.display()))?;
-    for (robot, rows) in &outcome.trajectories {
+    for (robot, came_out) in &outcome.robots {
         let file = directory.join(format!("{robot}.causal.tum"));
-        let poses: Vec<_> = rows.iter().map(pose).collect();
+        let poses: Vec<_> = came_out.causal.iter().map(pose).collect();
         std::fs::write(&file, write_tum(&poses))
             .with_context(|| format!("write {}", file.display()))?;
     }
-    Ok(())
-}
-
-fn report(set: &Mrclam, batches: &[TeamBatch], outcome: &Outcome) -> anyhow::Result<Report> {
-    let span = set.span();
-    let mut robots = BTreeMap::new();
-    for (&number, log) in set.robots() {
-        let name = robot_name(number);
-        let truth: Vec<_> = log.truth().iter().map(PlanarPose::in_space).collect();
-        let truth = Trajectory::from_poses(&truth)?;
-        let reckoned = Trajectory::from_poses(&dead_reckoned(&set.robot_readings(number))?)?;
-        let rows = outcome
-            .trajectories
-            .get(&name)
-            .map(Vec::as_slice)
-            .unwrap_or_default();
-        let causal: Vec<_> = rows.iter().map(pose).collect();
-        let causal = Trajectory::from_poses(&causal)?;
-        let error = |estimate, alignment| ate_rmse_m(estimate, &truth, span, alignment);
-        let of_robot = batches.iter().filter(|batch| batch.robot == name);
-        let robot = RobotReport {
-            samples: of_robot.map(|batch| batch.samples.len() as u64).sum(),
-            dead_reckoning_ate_rmse_m: error(&reckoned, Alignment::None)?,
-            dead_reckoning_aligned_ate_rmse_m: error(&reckoned, Alignment::Planar)?,
-            causal_ate_rmse_m: error(&causal, Alignment::None)?,
-            causal_aligned_ate_rmse_m: error(&causal, Alignment::Planar)?,
-        };
-        robots.insert(name, robot);
-    }
-    let mean = |of: fn(&RobotReport) -> f64| {
-        robots.values().map(of).sum::<f64>() / robots.len().max(1) as f64
-    };
-    Ok(Report {
-        samples: outcome.samples,
-        digest: outcome.digest.clone(),
-        places: outcome.places,
-        trips: outcome.trips,
-        landmarks: outcome.landmarks,
-        dead_reckoning_ate_rmse_m: mean(|robot| robot.dead_reckoning_ate_rmse_m),
-        dead_reckoning_aligned_ate_rmse_m: mean(|robot| robot.dead_reckoning_aligned_ate_rmse_m),
-        causal_ate_rmse_m: mean(|robot| robot.causal_ate_rmse_m),
-        causal_aligned_ate_rmse_m: mean(|robot| robot.causal_aligned_ate_rmse_m),
-        robots,
-    })
-}
-
-fn print(report: &Report) -> anyhow::Result<()> {
-    output::line("robot      samples   dead reckoning [m]    causal [m]")?;
-    output::line("                     plain    aligned       plain    aligned")?;
-    for (name, robot) in &report.robots {
-        output::line(&format!(
-            "{name:<9} {:>8}   {:>7.3}  {:>7.3}     {:>7.3}  {:>7.3}",
-            robot.samples,
-            robot.dead_reckoning_ate_rmse_m,
-            robot.dead_reckoning_aligned_ate_rmse_m,
-            robot.causal_ate_rmse_m,
-            robot.causal_aligned_ate_rmse_m,
-        ))?;
-    }
-    output::line(&format!(
-        "mean      {:>8}   {:>7.3}  {:>7.3}     {:>7.3}  {:>7.3}",
-        report.samples,
-        report.dead_reckoning_ate_rmse_m,
-        report.dead_reckoning_aligned_ate_rmse_m,
-        report.causal_ate_rmse_m,
-        report.causal_aligned_ate_rmse_m,
-    ))?;
-    output::line(&format!(
-        "{} places, {} trips, {} landmarks, digest {}",
-        report.places, report.trips, report.landmarks, report.digest
-    ))?;
     Ok(())
 }

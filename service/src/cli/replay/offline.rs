@@ -1,12 +1,19 @@
 //! A replay straight into the core.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
-use cogmap_proto::{SampleBatch, SpaceSettings, StampedPose};
-use cognitive_map::CognitiveMap;
+use cogmap_proto::{SampleBatch, SpaceSettings};
+use cognitive_map::{Agent, CognitiveMap, Record};
 
-use super::mrclam::{Outcome, TeamBatch};
-use crate::engine::{Entry, Recorder, core_settings, records_of, trajectory_interval_ns};
+use super::mrclam::TeamBatch;
+use super::outcome::{Outcome, RobotOutcome, Timing};
+use crate::engine::{
+    Entry, Recorder, core_settings, evidence, records_of, stamped, trajectory_interval_ns,
+};
+
+/// Time between two beliefs that are kept \[ns\].
+const BELIEF_INTERVAL_NS: i64 = 1_000_000_000;
 
 /// Folds the batches, in order, as a service would that got them in this order.
 pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow::Result<Outcome> {
@@ -15,6 +22,7 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
     let mut team: BTreeMap<&str, Robot> = BTreeMap::new();
     let mut events = Vec::new();
     let mut samples = 0;
+    let mut times_s = Vec::new();
     for TeamBatch {
         robot,
         samples: batch,
@@ -50,30 +58,31 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
                 batch,
             },
             |record| {
+                let begin = Instant::now();
                 map.apply(&record, &mut events);
+                times_s.push(begin.elapsed().as_secs_f64());
                 events.clear();
-                if let Some(agent) = map.agent(cognitive_map::AgentId(robot.agent))
-                    && let Some(chunk) = robot.recorder.note(&record, agent, interval_ns)
-                {
-                    robot.trajectory.extend(chunk.rows);
+                if let Some(agent) = map.agent(cognitive_map::AgentId(robot.agent)) {
+                    robot.note(&record, agent, interval_ns);
                 }
             },
         );
     }
-    let trajectories = team
-        .into_iter()
-        .map(|(name, mut robot)| {
-            robot.trajectory.extend_from_slice(robot.recorder.rows());
-            (name.to_owned(), robot.trajectory)
-        })
-        .collect();
+    let finish = |(name, mut robot): (&str, Robot)| {
+        let rest = robot.recorder.rows();
+        robot.outcome.causal.extend_from_slice(rest);
+        let agent = map.agent(cognitive_map::AgentId(robot.agent));
+        robot.outcome.evidence = agent.map(evidence).unwrap_or_default();
+        (name.to_owned(), robot.outcome)
+    };
     Ok(Outcome {
-        trajectories,
+        robots: team.into_iter().map(finish).collect(),
         samples,
         digest: map.digest().to_string(),
         places: map.place_count() as u64,
         trips: map.trip_count() as u64,
         landmarks: map.landmark_count() as u64,
+        timing: Timing::of(times_s),
     })
 }
 
@@ -82,5 +91,24 @@ struct Robot {
     agent: u32,
     next: u64,
     recorder: Recorder,
-    trajectory: Vec<StampedPose>,
+    outcome: RobotOutcome,
+}
+
+impl Robot {
+    /// Notes where the agent is after a record.
+    fn note(&mut self, record: &Record, agent: &Agent, interval_ns: i64) {
+        if let Some(chunk) = self.recorder.note(record, agent, interval_ns) {
+            self.outcome.causal.extend(chunk.rows);
+        }
+        let Some(stamp_ns) = agent.stamp_ns().filter(|_| agent.placed()) else {
+            return;
+        };
+        let beliefs = &mut self.outcome.beliefs;
+        let is_due = |(last, _): &(cogmap_proto::StampedPose, _)| {
+            stamp_ns.saturating_sub(last.stamp_ns) >= BELIEF_INTERVAL_NS
+        };
+        if beliefs.last().is_none_or(is_due) {
+            beliefs.push((stamped(stamp_ns, agent.pose()), *agent.covariance()));
+        }
+    }
 }

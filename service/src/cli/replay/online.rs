@@ -13,7 +13,8 @@ use std::sync::mpsc::{Receiver, channel};
 use zenoh::qos::CongestionControl;
 use zenoh::{Session, Wait};
 
-use super::mrclam::{Outcome, TeamBatch};
+use super::mrclam::TeamBatch;
+use super::outcome::{Outcome, RobotOutcome};
 
 /// Messages under way: far fewer than a service's queue takes, so none is dropped.
 const MESSAGES_AHEAD_MAX: usize = 2048;
@@ -48,18 +49,23 @@ pub(super) fn replay(
     let samples = send(&session, space, batches)?;
     session.close().wait().map_err(anyhow::Error::from_boxed)?;
     let info = api.space(space)?;
-    let mut trajectories = BTreeMap::new();
+    let mut robots = BTreeMap::new();
     for agent in api.agents(space)? {
-        let trajectory = api.trajectory(space, &agent.name)?;
-        trajectories.insert(agent.name, trajectory.poses);
+        let robot = RobotOutcome {
+            causal: api.trajectory(space, &agent.name)?.poses,
+            evidence: api.agent(space, &agent.name)?.evidence,
+            beliefs: Vec::new(),
+        };
+        robots.insert(agent.name, robot);
     }
     Ok(Outcome {
-        trajectories,
+        robots,
         samples,
         digest: info.digest,
         places: info.places,
         trips: info.trips,
         landmarks: info.landmarks,
+        timing: None,
     })
 }
 

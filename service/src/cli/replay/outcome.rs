@@ -1,0 +1,63 @@
+//! What came out of a replay.
+
+use std::collections::BTreeMap;
+
+use cogmap_proto::{Evidence, StampedPose};
+use cognitive_map::geometry::PoseCovariance;
+use serde::Serialize;
+
+/// What came out of a replay.
+#[derive(Debug, Default)]
+pub(super) struct Outcome {
+    /// Each robot, by name.
+    pub(super) robots: BTreeMap<String, RobotOutcome>,
+    pub(super) samples: u64,
+    pub(super) digest: String,
+    pub(super) places: u64,
+    pub(super) trips: u64,
+    pub(super) landmarks: u64,
+    /// Of a replay straight into the core.
+    pub(super) timing: Option<Timing>,
+}
+
+/// What came out of a replay for one robot.
+#[derive(Debug, Default)]
+pub(super) struct RobotOutcome {
+    /// Each pose as it was known when its sample was applied.
+    pub(super) causal: Vec<StampedPose>,
+    pub(super) evidence: Evidence,
+    /// Of a replay straight into the core: poses in the map with the covariance that they had, a second
+    /// apart.
+    pub(super) beliefs: Vec<(StampedPose, PoseCovariance)>,
+}
+
+/// Times that samples took in the core.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct Timing {
+    pub(super) p50_us: f64,
+    pub(super) p99_us: f64,
+    pub(super) max_ms: f64,
+    pub(super) total_s: f64,
+}
+
+impl Timing {
+    /// Of the time of each sample \[s\]; none without any.
+    pub(super) fn of(mut times_s: Vec<f64>) -> Option<Self> {
+        times_s.sort_by(f64::total_cmp);
+        let quantile = |part: f64| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a part of a length"
+            )]
+            let index = (part * (times_s.len().saturating_sub(1)) as f64) as usize;
+            times_s.get(index).copied()
+        };
+        Some(Self {
+            p50_us: quantile(0.5)? * 1e6,
+            p99_us: quantile(0.99)? * 1e6,
+            max_ms: quantile(1.0)? * 1e3,
+            total_s: times_s.iter().sum(),
+        })
+    }
+}
