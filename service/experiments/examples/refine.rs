@@ -26,9 +26,9 @@ fn main() -> ExitCode {
         found.and_then(|text| text.parse::<u32>().ok())
     };
     let done = match arguments.first().map(String::as_str) {
-        Some("mrclam") => arguments.get(1).is_some_and(|directory| {
-            mrclam::run(directory, !has("no-robots"), value("anchors="))
-        }),
+        Some("mrclam") => arguments
+            .get(1)
+            .is_some_and(|directory| mrclam::run(directory, !has("no-robots"), value("anchors="))),
         Some("team") => team::run(
             arguments
                 .get(1)

@@ -154,11 +154,10 @@ impl Chronicle {
                     (joined, self.sightings.get_mut(number, revision))
                 {
                     other.point = point;
-                    other.count = other.count.saturating_add(sighting.count);
                 }
                 return false;
             }
-            let spread = other.point.covariance.trace();
+            let spread = other.point.covariance().trace();
             if spread > vaguest.0 {
                 vaguest = (spread, number);
             }
@@ -167,7 +166,7 @@ impl Chronicle {
         }
         let is_crowded = count >= SIGHTINGS_PER_ANCHOR_MAX
             || self.sightings.len() >= self.settings.sightings_max as usize;
-        if is_crowded && (vaguest.1 == NONE || sighting.point.covariance.trace() >= vaguest.0) {
+        if is_crowded && (vaguest.1 == NONE || sighting.point.covariance().trace() >= vaguest.0) {
             return false;
         }
         if is_crowded {

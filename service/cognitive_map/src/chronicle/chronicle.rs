@@ -203,12 +203,7 @@ impl Chronicle {
 
     /// An agent moved by an increment in its own frame before, with these variances of the error on its right \[m², m²,
     /// m², rad², rad², rad²\].
-    pub fn motion(
-        &mut self,
-        moment: &Moment,
-        increment: &Isometry3<f64>,
-        variance: &Vector6<f64>,
-    ) {
+    pub fn motion(&mut self, moment: &Moment, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
         let agent = moment.agent;
         let Some(life) = self.lives.get(agent as usize) else {
             return;
@@ -334,8 +329,8 @@ impl Chronicle {
             .fixed_view::<3, 3>(0, 0)
             .into_owned();
         let point = SeenPoint {
-            position: waiting.point.position,
-            covariance: waiting.point.covariance + turn * spread * turn.transpose(),
+            fresh: waiting.point.fresh + turn * spread * turn.transpose(),
+            ..waiting.point
         };
         let lever = there.motion.translation.vector;
         self.sight(waiting.anchor, Shown::Agent(there.anchor, lever), point);
@@ -349,7 +344,6 @@ impl Chronicle {
             shown,
             next_shown: NONE,
             point,
-            count: 1,
         };
         if !self.attach(sighting)
             && let Shown::Landmark(landmark) = shown

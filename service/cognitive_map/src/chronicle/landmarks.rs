@@ -108,7 +108,9 @@ impl Landmarks {
             run.first()
                 .is_some_and(|&first| self.label(first) <= Some(label))
         };
-        self.by_label.partition_point(starts_up_to).saturating_sub(1)
+        self.by_label
+            .partition_point(starts_up_to)
+            .saturating_sub(1)
     }
 
     /// Puts a landmark where its label belongs.

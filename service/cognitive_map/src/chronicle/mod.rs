@@ -9,6 +9,11 @@
 
 mod anchor;
 mod chain;
+mod checkpoint;
+#[allow(
+    clippy::module_inception,
+    reason = "the noun of the module has a file of its own"
+)]
 mod chronicle;
 mod landmarks;
 mod life;
@@ -19,6 +24,10 @@ mod slots;
 mod thinning;
 mod tie;
 
+pub use checkpoint::{ChroniclePage, CorruptChronicle};
 pub use chronicle::{Chronicle, Moment};
 pub use refine::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
 pub use settings::ChronicleSettings;
+
+#[cfg(test)]
+mod tests;

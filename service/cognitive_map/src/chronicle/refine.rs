@@ -248,7 +248,7 @@ impl Chronicle {
                 SightingTarget::Point(*point.get_or_insert_with(add))
             }
         };
-        let information = PositionInformation::of_covariance(&sighting.point.covariance).ok()?;
+        let information = PositionInformation::of_covariance(&sighting.point.covariance()).ok()?;
         let link = Link::Sighting {
             from,
             target,

@@ -5,7 +5,7 @@
 pub struct ChronicleSettings {
     /// Anchors at most. An anchor with a motion takes about 400 bytes.
     pub anchors_max: u32,
-    /// Sightings at most. One takes about 150 bytes.
+    /// Sightings at most. One takes about 220 bytes.
     pub sightings_max: u32,
     /// Ties at most: start poses and matches. One takes about 250 bytes.
     pub ties_max: u32,
@@ -15,7 +15,7 @@ impl Default for ChronicleSettings {
     fn default() -> Self {
         Self {
             anchors_max: 65_536,
-            sightings_max: 262_144,
+            sightings_max: 131_072,
             ties_max: 32_768,
         }
     }

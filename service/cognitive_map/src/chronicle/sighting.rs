@@ -30,28 +30,29 @@ pub(super) struct Sighting {
     /// The next sighting that shows the same anchor.
     pub(super) next_shown: u32,
     pub(super) point: SeenPoint,
-    /// Of how many sightings this is the mean.
-    pub(super) count: u32,
 }
 
-/// A position in the frame of an anchor \[m\], with its covariance \[m²\].
+/// A position in the frame of an anchor \[m\], with the covariance of its error \[m²\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SeenPoint {
     pub(super) position: Vector3<f64>,
-    pub(super) covariance: Matrix3<f64>,
+    /// Of what is another error each time.
+    pub(super) fresh: Matrix3<f64>,
+    /// Of what is the same error each time that the point is seen from the same place.
+    pub(super) lasting: Matrix3<f64>,
 }
 
 state_of_struct!(SeenPoint {
     position,
-    covariance
+    fresh,
+    lasting
 });
 state_of_struct!(Sighting {
     anchor,
     next,
     shown,
     next_shown,
-    point,
-    count
+    point
 });
 
 impl State for Shown {
@@ -80,15 +81,23 @@ impl State for Shown {
 
 impl SeenPoint {
     /// Of a relation, with the variances of its components: along the axes \[m²\], or of the distance \[m²\] and of the
-    /// two angles about the seen direction, along growing azimuth and elevation \[rad²\].
+    /// two angles about the seen direction, along growing azimuth and elevation \[rad²\]. What these are beyond what the
+    /// relation itself states counts as an error that lasts.
     pub(super) fn new(relation: &Relation, variance: &Vector3<f64>) -> Self {
         let floor = DEVIATION_MIN_M * DEVIATION_MIN_M;
-        let (position, axes, variance) = match relation {
-            Relation::Position(seen) => (*seen.translation_m(), Matrix3::identity(), *variance),
-            Relation::Pose(seen) => {
-                let turn = seen.pose().rotation.to_rotation_matrix().into_inner();
-                (seen.pose().translation.vector, turn, *variance)
-            }
+        let (position, axes, scale, sd) = match relation {
+            Relation::Position(seen) => (
+                *seen.translation_m(),
+                Matrix3::identity(),
+                Vector3::repeat(1.0),
+                *seen.sd_m(),
+            ),
+            Relation::Pose(seen) => (
+                seen.pose().translation.vector,
+                seen.pose().rotation.to_rotation_matrix().into_inner(),
+                Vector3::repeat(1.0),
+                seen.noise().sd().fixed_rows::<3>(0).into_owned(),
+            ),
             Relation::RangeBearing(seen) => {
                 let (sin_azimuth, cos_azimuth) = seen.azimuth_rad().sin_cos();
                 let (sin_elevation, cos_elevation) = seen.elevation_rad().sin_cos();
@@ -98,57 +107,78 @@ impl SeenPoint {
                     sin_elevation,
                 );
                 let left = Vector3::new(-sin_azimuth, cos_azimuth, 0.0);
-                let up = forward.cross(&left);
                 let range_m = seen.range_m().max(DISTANCE_MIN_M);
-                let square = range_m * range_m;
+                let bearing = seen.bearing_sd_rad();
                 (
                     forward * range_m,
-                    Matrix3::from_columns(&[forward, left, up]),
-                    variance.component_mul(&Vector3::new(1.0, square, square)),
+                    Matrix3::from_columns(&[forward, left, forward.cross(&left)]),
+                    Vector3::new(1.0, range_m * range_m, range_m * range_m),
+                    Vector3::new(seen.range_sd_m(), bearing, bearing),
                 )
             }
         };
-        let variance = variance.map(|variance| variance + floor);
-        let covariance = axes * Matrix3::from_diagonal(&variance) * axes.transpose();
+        let fresh = sd.component_mul(&sd).inf(variance);
+        let lasting = variance - fresh;
+        let in_body = |variance: &Vector3<f64>| {
+            let along = Matrix3::from_diagonal(&variance.component_mul(&scale));
+            symmetric(&(axes * along * axes.transpose()))
+        };
         Self {
             position,
-            covariance: symmetric(&covariance),
+            fresh: in_body(&fresh) + Matrix3::from_diagonal_element(floor),
+            lasting: in_body(&lasting),
         }
+    }
+
+    /// Covariance of the whole error \[m²\].
+    pub(super) fn covariance(&self) -> Matrix3<f64> {
+        self.fresh + self.lasting
     }
 
     /// The point in the frame of an anchor from which a motion with this covariance led to where it was seen:
     /// Δ exp(ξ) p.
     pub(super) fn before(&self, motion: &Isometry3<f64>, covariance: &PoseCovariance) -> Self {
         let turn = motion.rotation.to_rotation_matrix().into_inner();
-        let spread = self.covariance + swing(&self.position, covariance);
+        let fresh = self.fresh + swing(&self.position, covariance);
         Self {
             position: turn * self.position + motion.translation.vector,
-            covariance: symmetric(&(turn * spread * turn.transpose())),
+            fresh: symmetric(&(turn * fresh * turn.transpose())),
+            lasting: symmetric(&(turn * self.lasting * turn.transpose())),
         }
     }
 
     /// The point in the frame of the anchor to which a motion led from where it was seen: exp(−ξ) Δ⁻¹ p.
     pub(super) fn after(&self, motion: &Isometry3<f64>, covariance: &PoseCovariance) -> Self {
-        let back = motion.rotation.to_rotation_matrix().into_inner().transpose();
+        let back = motion
+            .rotation
+            .to_rotation_matrix()
+            .into_inner()
+            .transpose();
         let position = back * (self.position - motion.translation.vector);
-        let spread = back * self.covariance * back.transpose();
+        let fresh = back * self.fresh * back.transpose() + swing(&position, covariance);
         Self {
             position,
-            covariance: symmetric(&(spread + swing(&position, covariance))),
+            fresh: symmetric(&fresh),
+            lasting: symmetric(&(back * self.lasting * back.transpose())),
         }
     }
 
-    /// The mean of two points, weighted by their information.
+    /// The mean of two points that were seen from one place, weighted by how sure they are but for what lasts. That
+    /// the mean keeps.
     pub(super) fn mean(&self, other: &Self) -> Option<Self> {
-        let (own, others) = (
-            self.covariance.try_inverse()?,
-            other.covariance.try_inverse()?,
-        );
-        let covariance = symmetric(&(own + others).try_inverse()?);
-        let shift = covariance * (others * (other.position - self.position));
+        let own = self.fresh.try_inverse()?;
+        let others = other.fresh.try_inverse()?;
+        let fresh = symmetric(&(own + others).try_inverse()?);
+        let shift = fresh * (others * (other.position - self.position));
+        let is_surer = other.lasting.trace() < self.lasting.trace();
         Some(Self {
             position: self.position + shift,
-            covariance,
+            fresh,
+            lasting: if is_surer {
+                other.lasting
+            } else {
+                self.lasting
+            },
         })
     }
 }

@@ -63,13 +63,13 @@ impl Chronicle {
         let mut at = anchor.sightings;
         while let Some(sighting) = self.sightings.get(at) {
             let spread = swing(&sighting.point.position, &covariance).trace();
-            loss += spread / sighting.point.covariance.trace();
+            loss += spread / sighting.point.covariance().trace();
             at = sighting.next;
         }
         at = anchor.shown;
         while let Some(sighting) = self.sightings.get(at) {
             let spread = covariance.matrix().fixed_view::<3, 3>(0, 0).trace();
-            loss += spread / sighting.point.covariance.trace();
+            loss += spread / sighting.point.covariance().trace();
             at = sighting.next_shown;
         }
         at = anchor.ties;
@@ -152,10 +152,9 @@ impl Chronicle {
         for waiting in &mut self.waiting {
             if waiting.anchor == number {
                 let (to, point) = match neighbour {
-                    Neighbour::Previous(to) => (
-                        to,
-                        waiting.point.before(&anchor.motion, &anchor.covariance),
-                    ),
+                    Neighbour::Previous(to) => {
+                        (to, waiting.point.before(&anchor.motion, &anchor.covariance))
+                    }
                     // An agent's latest anchors are its nearest ones: what waits here waits for long.
                     Neighbour::Next(to) => (to, waiting.point),
                 };
@@ -215,12 +214,20 @@ impl Chronicle {
             if tie.to == number {
                 tie.to = to;
                 tie.transform *= back;
-                let noise = if is_previous { on_its_other_side } else { spread };
+                let noise = if is_previous {
+                    on_its_other_side
+                } else {
+                    spread
+                };
                 tie.covariance = composed(&tie.covariance, &back, &noise);
             }
             if tie.from == number {
                 tie.from = to;
-                let noise = if is_previous { spread } else { on_its_other_side };
+                let noise = if is_previous {
+                    spread
+                } else {
+                    on_its_other_side
+                };
                 tie.covariance = composed(&noise, &tie.transform, &tie.covariance);
                 tie.transform = there * tie.transform;
             }
@@ -259,7 +266,7 @@ impl Chronicle {
             (place, noise)
         };
         sighting.shown = Shown::Agent(to, place.coords);
-        sighting.point.covariance += super::sighting::symmetric(&noise);
+        sighting.point.fresh += super::sighting::symmetric(&noise);
         if sighting.anchor != to {
             self.attach(sighting);
         }

@@ -83,7 +83,9 @@ impl SightingTarget {
 
     fn node(self) -> u32 {
         match self {
-            Self::Point(PointId(node)) | Self::Pose(PoseId(node)) | Self::PointOf(PoseId(node), _) => node,
+            Self::Point(PointId(node))
+            | Self::Pose(PoseId(node))
+            | Self::PointOf(PoseId(node), _) => node,
         }
     }
 }

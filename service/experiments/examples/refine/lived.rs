@@ -93,7 +93,7 @@ impl Lived {
             }
             SampleBody::StartPose(start) => self.chronicle.start_pose(&moment, start),
             SampleBody::Sighting(sighting) => {
-                let variance = stated(&sighting.relation);
+                let variance = stated(&sighting.relation, &self.parameters);
                 match &sighting.target {
                     Target::Landmark(label) => {
                         self.chronicle
@@ -164,15 +164,17 @@ impl Lived {
     }
 }
 
-/// Variances as a sighting states them.
-fn stated(relation: &Relation) -> Vector3<f64> {
+/// Variances as a sighting states them, of a distance with what may be off again and again.
+fn stated(relation: &Relation, parameters: &Parameters) -> Vector3<f64> {
     let sd = match relation {
         Relation::Position(seen) => *seen.sd_m(),
-        Relation::RangeBearing(seen) => Vector3::new(
-            seen.range_sd_m(),
-            seen.bearing_sd_rad(),
-            seen.bearing_sd_rad(),
-        ),
+        Relation::RangeBearing(seen) => {
+            let lasting = parameters.lasting_range_error * seen.range_m();
+            let range_sd_m = seen
+                .range_sd_m()
+                .hypot(lasting.min(3.0 * seen.range_sd_m()));
+            Vector3::new(range_sd_m, seen.bearing_sd_rad(), seen.bearing_sd_rad())
+        }
         Relation::Pose(seen) => seen.noise().sd().fixed_rows::<3>(0).into_owned(),
     };
     sd.component_mul(&sd)
