@@ -37,8 +37,15 @@ impl JointCovariance {
         self.dim
     }
 
+    /// From all entries, row by row: the square of `dim`.
+    pub(super) fn from_entries(dim: usize, entries: Vec<f64>) -> Option<Self> {
+        (entries.len() == dim * dim).then(|| Self {
+            dim,
+            entries: Arc::new(entries),
+        })
+    }
+
     /// All entries, row by row.
-    #[cfg(test)]
     pub(super) fn entries(&self) -> &[f64] {
         &self.entries
     }

@@ -1,30 +1,34 @@
 //! One frame: the agents and landmarks whose errors are estimated together.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
 use super::covariance::JointCovariance;
+use super::dormant::{Dormant, DormantMarks};
 use super::mover::{BODY_DIM, Mover};
-use super::sensor::Sensor;
+use super::seat::Traveller;
 use crate::sample::Label;
+
+/// Agents whose errors are estimated jointly; of more, those that saw and were seen longest ago leave.
+pub(super) const MEMBERS_MAX: usize = 32;
 
 /// Landmarks that are estimated jointly; of more, those seen longest ago leave.
 pub(super) const MARKS_MAX: usize = 96;
 /// Components of a landmark.
 pub(super) const MARK_DIM: usize = 3;
 
-/// An agent in a frame.
+/// An agent that takes part in a frame's joint estimate.
 #[derive(Clone, Debug)]
 pub(super) struct Member {
     /// Its number.
     pub(super) agent: u32,
-    pub(super) mover: Mover,
     /// Where its error begins.
     pub(super) offset: usize,
-    pub(super) sensor: Sensor,
-    /// Sightings refused one after the other.
-    pub(super) refused: u32,
+    /// The sighting of the frame that it took part in last.
+    pub(super) used: u64,
+    pub(super) traveller: Arc<Traveller>,
 }
 
 /// A landmark in a frame.
@@ -41,13 +45,14 @@ pub(super) struct Mark {
     pub(super) refused: u32,
 }
 
-/// One frame.
+/// One frame. A clone shares what it holds.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Frame {
+    /// Number of agents, whether they take part in the joint estimate or not.
+    pub(super) population: u32,
     pub(super) members: Vec<Member>,
-    pub(super) marks: BTreeMap<Label, Mark>,
-    /// Landmarks that left the joint estimate, with the covariance that they had.
-    pub(super) dormant: BTreeMap<Label, (Point3<f64>, Matrix3<f64>)>,
+    pub(super) marks: Arc<BTreeMap<Label, Mark>>,
+    pub(super) dormant: DormantMarks,
     pub(super) covariance: JointCovariance,
     /// Landmarks numbered so far.
     pub(super) numbered: u64,
@@ -55,26 +60,50 @@ pub(super) struct Frame {
     pub(super) sightings: u64,
 }
 
+impl Member {
+    /// Its body.
+    pub(super) fn mover(&self) -> &Mover {
+        &self.traveller.mover
+    }
+
+    /// The agent itself, to be changed.
+    pub(super) fn traveller_mut(&mut self) -> &mut Traveller {
+        Arc::make_mut(&mut self.traveller)
+    }
+}
+
 impl Frame {
-    /// Takes in an agent that nothing ties to the others yet.
-    pub(super) fn join(&mut self, agent: u32, mover: Mover, sensor: Sensor) {
+    /// Lets an agent take part that nothing ties to the others yet.
+    pub(super) fn join(&mut self, agent: u32, traveller: Arc<Traveller>) {
         let offset = self.covariance.grow(BODY_DIM);
-        self.covariance.set_diagonal(offset, &mover.covariance);
+        self.covariance
+            .set_diagonal(offset, &traveller.mover.covariance);
         self.members.push(Member {
             agent,
-            mover,
             offset,
-            sensor,
-            refused: 0,
+            used: self.sightings,
+            traveller,
         });
     }
 
-    /// Lets an agent go, with what was learned about its odometry and its sensor.
-    pub(super) fn leave(&mut self, agent: u32) -> Option<(Mover, Sensor)> {
+    /// An agent takes part no longer.
+    pub(super) fn leave(&mut self, agent: u32) -> Option<Arc<Traveller>> {
         let index = self.member(agent)?;
         let member = self.members.remove(index);
         self.drop_components(member.offset, BODY_DIM);
-        Some((member.mover, member.sensor))
+        Some(member.traveller)
+    }
+
+    /// The agent that saw and was seen longest ago.
+    pub(super) fn idlest(&self) -> Option<u32> {
+        let idlest = self.members.iter().min_by_key(|member| member.used)?;
+        Some(idlest.agent)
+    }
+
+    /// Counts a sighting that an agent takes part in.
+    pub(super) fn note_use(&mut self, index: usize) {
+        self.sightings += 1;
+        self.members[index].used = self.sightings;
     }
 
     /// Where an agent is in the list of members.
@@ -89,7 +118,7 @@ impl Frame {
 
     /// Whether all motion was in the plane.
     pub(super) fn is_planar(&self) -> bool {
-        self.members.iter().all(|member| member.mover.is_planar)
+        self.members.iter().all(|member| member.mover().is_planar)
     }
 
     /// Removes components and closes the gap.
@@ -103,14 +132,14 @@ impl Frame {
         for member in &mut self.members {
             behind(&mut member.offset);
         }
-        for mark in self.marks.values_mut() {
+        for mark in Arc::make_mut(&mut self.marks).values_mut() {
             behind(&mut mark.offset);
         }
     }
 
     /// Forgets where a landmark is.
     pub(super) fn forget(&mut self, label: &Label) {
-        if let Some(mark) = self.marks.remove(label) {
+        if let Some(mark) = Arc::make_mut(&mut self.marks).remove(label) {
             self.drop_components(mark.offset, MARK_DIM);
         }
         self.dormant.remove(label);
@@ -123,10 +152,14 @@ impl Frame {
             let Some(label) = oldest.map(|(label, _)| label.clone()) else {
                 return;
             };
-            if let Some(mark) = self.marks.remove(&label) {
-                let covariance = self.mark_covariance(&mark);
+            if let Some(mark) = Arc::make_mut(&mut self.marks).remove(&label) {
+                let dormant = Dormant {
+                    position: mark.position,
+                    covariance: self.mark_covariance(&mark),
+                    left: self.sightings,
+                };
                 self.drop_components(mark.offset, MARK_DIM);
-                self.dormant.insert(label, (mark.position, covariance));
+                self.dormant.insert(label, dormant);
             }
         }
     }
@@ -137,9 +170,9 @@ impl Frame {
     /// the others waits until it is needed.
     pub(super) fn flush(&mut self) {
         for member in &mut self.members {
-            if member.mover.is_stale {
-                let transition = member.mover.flush();
-                let own = &member.mover.covariance;
+            if member.mover().is_stale {
+                let transition = member.traveller_mut().mover.flush();
+                let own = &member.traveller.mover.covariance;
                 self.covariance.transform(member.offset, &transition, own);
             }
         }
@@ -149,16 +182,16 @@ impl Frame {
     pub(super) fn widen(&mut self, index: usize, sd_m: f64, sd_rad: f64) {
         self.flush();
         let member = &mut self.members[index];
-        let is_planar = member.mover.is_planar;
+        let mover = &mut member.traveller_mut().mover;
         for k in 0..6 {
             let out_of_plane = matches!(k, 2..=4);
-            if !(is_planar && out_of_plane) {
+            if !(mover.is_planar && out_of_plane) {
                 let sd = if k < 3 { sd_m } else { sd_rad };
-                member.mover.covariance[(k, k)] += sd * sd;
+                mover.covariance[(k, k)] += sd * sd;
             }
         }
         self.covariance
-            .set_diagonal(member.offset, &member.mover.covariance);
+            .set_diagonal(member.offset, &member.traveller.mover.covariance);
     }
 
     /// Corrects everything by what an observer's sighting tells, and carries the errors over to the
@@ -172,7 +205,7 @@ impl Frame {
     pub(super) fn correct(&mut self, index: usize, correction: &[f64]) {
         let observer = &self.members[index];
         let world = observer
-            .mover
+            .mover()
             .pose
             .rotation
             .to_rotation_matrix()
@@ -189,18 +222,19 @@ impl Frame {
         let mut turns = Vec::with_capacity(self.members.len());
         for member in &mut self.members {
             let error = SVector::from_fn(|k, _| correction[member.offset + k]);
-            let before = member.mover.pose;
-            member.mover.correct(&error);
-            let moved = member.mover.pose.translation.vector - before.translation.vector;
+            let mover = &mut Arc::make_mut(&mut member.traveller).mover;
+            let before = mover.pose;
+            mover.correct(&error);
+            let moved = mover.pose.translation.vector - before.translation.vector;
             let to_body = before
                 .rotation
                 .to_rotation_matrix()
                 .into_inner()
                 .transpose();
             lever(member.offset, -(to_body * moved.cross_matrix() * world));
-            turns.push(member.mover.pose.rotation.inverse() * before.rotation);
+            turns.push(mover.pose.rotation.inverse() * before.rotation);
         }
-        for mark in self.marks.values_mut() {
+        for mark in Arc::make_mut(&mut self.marks).values_mut() {
             let moved = Vector3::from_fn(|k, _| correction[mark.offset + k]);
             mark.position += moved;
             lever(mark.offset, -(moved.cross_matrix() * world));
@@ -209,13 +243,14 @@ impl Frame {
         // Errors of a body are stated along its axes, which a correction has turned.
         for (member, turn) in self.members.iter_mut().zip(turns) {
             let turn = turn.to_rotation_matrix().into_inner();
-            let mut axes = SMatrix::<f64, BODY_DIM, BODY_DIM>::identity();
+            let mut axes = SMatrix::<f64, 6, 6>::zeros();
             axes.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
             axes.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
             let own = self.covariance.block(member.offset, member.offset);
             let own = axes * own * axes.transpose();
             self.covariance.transform(member.offset, &axes, &own);
-            member.mover.covariance = self.covariance.block(member.offset, member.offset);
+            member.traveller_mut().mover.covariance =
+                self.covariance.block(member.offset, member.offset);
         }
     }
 }

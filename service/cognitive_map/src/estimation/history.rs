@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use crate::geometry::se3;
 
 /// Instants kept.
-const KEPT: usize = 64;
+pub(super) const KEPT: usize = 64;
 /// Least interval between two instants \[ns\]: 64 of them last three seconds.
 const INTERVAL_NS: i64 = 50_000_000;
 

@@ -1,15 +1,16 @@
 //! Two frames become one.
 
 use std::collections::btree_map::Entry;
+use std::sync::Arc;
 
-use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::covariance::Block;
-use super::frame::{Frame, MARK_DIM, Mark};
+use super::dormant::{Dormant, DormantMarks};
+use super::frame::{Frame, MARK_DIM, Mark, symmetric};
 use super::parameters::Parameters;
 use super::sight::point_block;
-use super::tie::{Pair, Tie};
-use crate::geometry::se3;
+use super::tie::{Pair, Tie, body_by_tie, point_by_tie};
 use crate::sample::Label;
 
 /// Variance of the distance between the two estimates of one landmark, beside their own \[m²\].
@@ -47,22 +48,20 @@ impl Frame {
         let newcomers = self.members.len();
         for mut member in std::mem::take(&mut newer.members) {
             member.offset += start;
-            let by_tie = se3::adjoint(&member.mover.pose.inverse());
+            member.used = self.sightings;
+            let by_tie = body_by_tie(&member.mover().pose);
             self.covariance.add(member.offset, 6, tau, &by_tie);
-            member.mover.pose = tie.pose * member.mover.pose;
+            let traveller = member.traveller_mut();
+            traveller.mover.pose = tie.pose * traveller.mover.pose;
             // Numbers of landmarks change.
-            member.sensor.latest.clear();
+            traveller.sensor.latest.clear();
             self.members.push(member);
         }
         let mut twins = Vec::new();
-        for (label, mut mark) in std::mem::take(&mut newer.marks) {
+        let marks = Arc::make_mut(&mut self.marks);
+        for (label, mut mark) in Arc::unwrap_or_clone(newer.marks) {
             mark.offset += start;
-            let mut by_tie = Matrix6::zeros();
-            by_tie
-                .fixed_view_mut::<3, 3>(0, 0)
-                .copy_from(&Matrix3::identity());
-            let lever = -mark.position.coords.cross_matrix();
-            by_tie.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+            let by_tie = point_by_tie(&mark.position);
             self.covariance.add(mark.offset, 3, tau, &by_tie);
             let own = self.covariance.block::<3, 3>(mark.offset, mark.offset);
             let turned = rotation * own * rotation.transpose();
@@ -73,7 +72,7 @@ impl Frame {
             mark.used = self.sightings;
             mark.number = self.numbered;
             self.numbered += 1;
-            match self.marks.entry(label) {
+            match marks.entry(label) {
                 Entry::Occupied(entry) => twins.push((entry.key().clone(), mark)),
                 Entry::Vacant(entry) => {
                     entry.insert(mark);
@@ -81,7 +80,8 @@ impl Frame {
             }
         }
         for member in &mut self.members[newcomers..] {
-            member.mover.covariance = self.covariance.block(member.offset, member.offset);
+            let own = self.covariance.block(member.offset, member.offset);
+            member.traveller_mut().mover.covariance = own;
         }
         for index in 0..twins.len() {
             self.equate(&mut twins, index, parameters);
@@ -92,7 +92,29 @@ impl Frame {
         for (_, twin) in twins {
             self.drop_components(twin.offset, MARK_DIM);
         }
+        self.take_over(&newer.dormant, tie);
+        self.population += newer.population;
         self.make_room();
+    }
+
+    /// The landmarks that sleep in a newer frame sleep here, unless they are known here.
+    fn take_over(&mut self, newer: &DormantMarks, tie: &Tie) {
+        let rotation = tie.pose.rotation.to_rotation_matrix().into_inner();
+        for (label, mark) in newer.iter() {
+            if self.marks.contains_key(label) || self.dormant.contains(label) {
+                continue;
+            }
+            let by_tie: SMatrix<f64, 3, 6> = point_by_tie(&mark.position)
+                .fixed_view::<3, 6>(0, 0)
+                .into_owned();
+            let spread = mark.covariance + by_tie * tie.covariance * by_tie.transpose();
+            let dormant = Dormant {
+                position: tie.pose * mark.position,
+                covariance: symmetric(&(rotation * spread * rotation.transpose())),
+                left: self.sightings,
+            };
+            self.dormant.insert(label.clone(), dormant);
+        }
     }
 
     /// Two landmarks are one.

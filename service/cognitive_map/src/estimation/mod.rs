@@ -24,18 +24,24 @@
 //!   are known in both.
 
 mod covariance;
+mod dormant;
 mod estimator;
 mod frame;
 mod history;
 mod innovation;
+mod meeting;
 mod merge;
 mod mover;
+mod outcome;
 mod parameters;
+mod seat;
 mod sensor;
 mod sight;
+mod state;
 mod tie;
 
-pub use estimator::{Estimator, Evidence};
+pub use estimator::Estimator;
+pub use outcome::{Evidence, Merged, Settled, Step, Taken};
 pub use parameters::Parameters;
 
 #[cfg(test)]

@@ -3,7 +3,9 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 
 use super::history::History;
+use super::outcome::Step;
 use super::parameters::Parameters;
+use super::tie::{Tie, body_by_tie};
 use crate::geometry::{PoseCovariance, se3};
 use crate::sample::Motion;
 
@@ -38,9 +40,9 @@ pub(super) struct Mover {
     /// Covariance of the body's error, always up to date.
     pub(super) covariance: BodyCovariance,
     /// How the error of the pose since the last flush depends on that of the calibration then.
-    tail: Tail,
+    pub(super) tail: Tail,
     /// Motion since the last flush, as corrected.
-    since_flush: Isometry3<f64>,
+    pub(super) since_flush: Isometry3<f64>,
     /// Whether there was any.
     pub(super) is_stale: bool,
     /// Where odometry was lately.
@@ -92,13 +94,21 @@ impl Mover {
         self
     }
 
+    /// The body's frame was laid into another one.
+    pub(super) fn carry_over(&mut self, tie: &Tie) {
+        let by_tie = body_by_tie(&self.pose);
+        let spread = by_tie * tie.covariance * by_tie.transpose();
+        let mut pose = self.covariance.fixed_view_mut::<6, 6>(0, 0);
+        pose += (spread + spread.transpose()) * 0.5;
+        self.pose = tie.pose * self.pose;
+    }
+
     /// Covariance of the pose.
     pub(super) fn pose_covariance(&self) -> PoseCovariance {
         PoseCovariance::from_matrix(&self.covariance.fixed_view::<6, 6>(0, 0).into_owned())
     }
 
-    /// Moves the body by what odometry read, over `duration_s`; answers the displacement along the
-    /// axes of the frame.
+    /// Moves the body by what odometry read, over `duration_s`.
     ///
     /// With the corrected increment Δ, lengths t and rotation vector r:
     ///
@@ -111,7 +121,7 @@ impl Mover {
         motion: &Motion,
         duration_s: f64,
         parameters: &Parameters,
-    ) -> Vector3<f64> {
+    ) -> Step {
         let read = motion.increment();
         let lengths = read.translation.vector;
         let angles = rotation_vector(&read.rotation);
@@ -169,7 +179,11 @@ impl Mover {
         self.since_flush *= increment;
         self.since_flush.rotation.renormalize_fast();
         self.is_stale = true;
-        displacement
+        Step {
+            displacement,
+            increment,
+            variance,
+        }
     }
 
     /// Moves the covariance and the tail.

@@ -17,7 +17,7 @@ const SCALE_MAX: f64 = 25.0;
 /// Most by which the lasting error of distances exceeds the stated deviation.
 const LASTING_OVER_STATED_MAX: f64 = 3.0;
 /// Targets whose latest sighting is remembered.
-const TARGETS_MAX: usize = 128;
+pub(super) const TARGETS_MAX: usize = 128;
 
 /// What is seen.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

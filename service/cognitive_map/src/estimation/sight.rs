@@ -1,8 +1,11 @@
 //! What a sighting does to a frame.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector};
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
 
 use super::covariance::Block;
+use super::dormant::Dormant;
 use super::frame::{Frame, MARK_DIM, Mark, Member, point_by_pose, symmetric};
 use super::innovation::{PointInnovation, pose_innovation, seen_at};
 use super::parameters::Parameters;
@@ -36,6 +39,24 @@ pub(super) enum Verdict {
     Refused,
 }
 
+/// A sighting's verdict, and what it was weighed with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Weighed {
+    pub(super) verdict: Verdict,
+    /// Variances of its components, before those far from what is expected lose weight.
+    pub(super) variance: Vector6<f64>,
+}
+
+impl Weighed {
+    /// Of a sighting that says nothing.
+    fn nothing() -> Self {
+        Self {
+            verdict: Verdict::Refused,
+            variance: Vector6::zeros(),
+        }
+    }
+}
+
 /// A sighting of a frame's member: who, how it moved since, when, and what it saw.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glance<'a> {
@@ -50,16 +71,15 @@ pub(super) struct Glance<'a> {
 
 impl Frame {
     /// A landmark was seen.
-    pub(super) fn see_mark(&mut self, glance: &Glance<'_>, label: &Label) -> Verdict {
+    pub(super) fn see_mark(&mut self, glance: &Glance<'_>, label: &Label) -> Weighed {
         self.flush();
-        self.sightings += 1;
         let side = Side::new(&self.members[glance.observer], glance.back);
         let Some(mark) = self.marks.get(label) else {
             return self.learn(glance, label);
         };
         let expected = side.pose.inverse_transform_point(&mark.position).coords;
         let Some(innovation) = PointInnovation::new(glance.relation, &expected) else {
-            return Verdict::Refused;
+            return Weighed::nothing();
         };
         let to_body = side
             .pose
@@ -71,12 +91,12 @@ impl Frame {
             side.block(&(innovation.by_point * point_by_pose(&expected))),
             point_block(mark.offset, &(innovation.by_point * to_body)),
         ];
-        let verdict = self.take_in(glance, &blocks, &innovation, Seen::Mark(mark.number));
-        let observer_refused = self.members[glance.observer].refused;
+        let weighed = self.take_in(glance, &blocks, &innovation, Seen::Mark(mark.number));
+        let observer_refused = self.members[glance.observer].traveller.refused;
         let sightings = self.sightings;
-        if let Some(mark) = self.marks.get_mut(label) {
+        if let Some(mark) = Arc::make_mut(&mut self.marks).get_mut(label) {
             mark.used = sightings;
-            mark.refused = match verdict {
+            mark.refused = match weighed.verdict {
                 Verdict::Refused => mark.refused + 1,
                 _ => 0,
             };
@@ -86,7 +106,7 @@ impl Frame {
             }
         }
         self.recover(glance.observer);
-        verdict
+        weighed
     }
 
     /// Another member was seen, which has moved by `back` since.
@@ -95,17 +115,16 @@ impl Frame {
         glance: &Glance<'_>,
         target: usize,
         back: &Isometry3<f64>,
-    ) -> Verdict {
+    ) -> Weighed {
         self.flush();
-        self.sightings += 1;
         let side = Side::new(&self.members[glance.observer], glance.back);
         let other = Side::new(&self.members[target], back);
-        let verdict = if let Relation::Pose(seen) = glance.relation {
+        let weighed = if let Relation::Pose(seen) = glance.relation {
             self.see_pose(glance, &side, &other, seen)
         } else {
             let expected = side.pose.inv_mul(&other.pose).translation.vector;
             let Some(innovation) = PointInnovation::new(glance.relation, &expected) else {
-                return Verdict::Refused;
+                return Weighed::nothing();
             };
             let relative = side.pose.rotation.inverse() * other.pose.rotation;
             let turn = relative.to_rotation_matrix().into_inner();
@@ -121,19 +140,22 @@ impl Frame {
             self.take_in(glance, &blocks, &innovation, seen)
         };
         self.recover(glance.observer);
-        verdict
+        weighed
     }
 
     /// A landmark that is not among those estimated jointly.
-    fn learn(&mut self, glance: &Glance<'_>, label: &Label) -> Verdict {
+    fn learn(&mut self, glance: &Glance<'_>, label: &Label) -> Weighed {
         self.make_room();
         let member = &self.members[glance.observer];
         let side = Side::new(member, glance.back);
         let (point, stated) = seen_at(glance.relation);
+        let mut variance = Vector6::zeros();
         let noise = PointInnovation::new(glance.relation, &point).and_then(|innovation| {
-            let variance = member.sensor.variance(&innovation, glance.parameters);
+            let sensor = &member.traveller.sensor;
+            let components = sensor.variance(&innovation, glance.parameters);
+            variance.fixed_rows_mut::<3>(0).copy_from(&components);
             let inverse = innovation.by_point.try_inverse()?;
-            Some(inverse * Matrix3::from_diagonal(&variance) * inverse.transpose())
+            Some(inverse * Matrix3::from_diagonal(&components) * inverse.transpose())
         });
         let world = side.pose.rotation.to_rotation_matrix().into_inner();
         let noise = world * noise.unwrap_or(stated) * world.transpose();
@@ -149,13 +171,12 @@ impl Frame {
             refused: 0,
         };
         self.numbered += 1;
-        self.marks.insert(label.clone(), mark);
-        match self.dormant.remove(label) {
+        Arc::make_mut(&mut self.marks).insert(label.clone(), mark);
+        let verdict = match self.dormant.remove(label) {
             None => Verdict::Learned,
-            Some((position, covariance)) => {
-                self.recall(glance.observer, offset, &position, &covariance)
-            }
-        }
+            Some(dormant) => self.recall(glance.observer, offset, &dormant),
+        };
+        Weighed { verdict, variance }
     }
 
     /// A landmark came back whose earlier estimate may be correlated with everything.
@@ -166,23 +187,21 @@ impl Frame {
     /// ```text
     /// R⁻¹ = ½ (Σ_old⁻¹ − Σ_new⁻¹), as far as that is positive
     /// ```
-    fn recall(
-        &mut self,
-        observer: usize,
-        offset: usize,
-        position: &Point3<f64>,
-        covariance: &Matrix3<f64>,
-    ) -> Verdict {
+    fn recall(&mut self, observer: usize, offset: usize, dormant: &Dormant) -> Verdict {
         let accepted = Verdict::Accepted {
             nis: 0.0,
             components: 0,
         };
         let own: Matrix3<f64> = self.covariance.block(offset, offset);
-        let inverses = own.try_inverse().zip(covariance.try_inverse());
+        let inverses = own.try_inverse().zip(dormant.covariance.try_inverse());
         let Some((own_information, old_information)) = inverses else {
             return accepted;
         };
-        let gain = symmetric(&((old_information - own_information) * 0.5)).symmetric_eigen();
+        let gain = symmetric(&((old_information - own_information) * 0.5));
+        if !gain.iter().all(|entry| entry.is_finite()) {
+            return accepted; // of such a matrix the search for eigenvalues need not end
+        }
+        let gain = gain.symmetric_eigen();
         let variances = gain
             .eigenvalues
             .map(|information| 1.0 / information.clamp(GAIN_MIN_M2, 1.0 / GAIN_MIN_M2));
@@ -193,10 +212,10 @@ impl Frame {
         let Some(here) = here.map(|mark| mark.position) else {
             return accepted;
         };
-        let innovation = axes.transpose() * (position - here);
+        let innovation = axes.transpose() * (dormant.position - here);
         let spread = projection.spread;
         let far = (0..3).any(|k| {
-            let expected = spread[(k, k)] + 2.0 * covariance.trace();
+            let expected = spread[(k, k)] + 2.0 * dormant.covariance.trace();
             innovation[k] * innovation[k] > 36.0 * expected
         });
         if far {
@@ -216,11 +235,13 @@ impl Frame {
         blocks: &[Block<3>],
         innovation: &PointInnovation,
         seen: Seen,
-    ) -> Verdict {
+    ) -> Weighed {
         let parameters = glance.parameters;
         let projection = self.covariance.project(blocks);
-        let member = &mut self.members[glance.observer];
+        let member = self.members[glance.observer].traveller_mut();
         let mut variance = member.sensor.variance(innovation, parameters);
+        let mut weighed = Weighed::nothing();
+        weighed.variance.fixed_rows_mut::<3>(0).copy_from(&variance);
         let spread = projection.spread.diagonal();
         let squares = innovation
             .residual
@@ -232,7 +253,7 @@ impl Frame {
             .all(|square| square.sqrt() <= parameters.gate)
         {
             member.refused += 1;
-            return Verdict::Refused;
+            return weighed;
         }
         member.refused = 0;
         member
@@ -252,7 +273,8 @@ impl Frame {
             self.correct(glance.observer, &correction);
         }
         let components = if is_flat { 2 } else { 3 };
-        Verdict::Accepted { nis, components }
+        weighed.verdict = Verdict::Accepted { nis, components };
+        weighed
     }
 
     /// A full pose of another member was seen.
@@ -262,7 +284,7 @@ impl Frame {
         side: &Side,
         other: &Side,
         seen: &RelativePose,
-    ) -> Verdict {
+    ) -> Weighed {
         let (residual, by_observer, by_target, variance) =
             pose_innovation(seen, &side.pose, &other.pose);
         let blocks = [side.block(&by_observer), other.block(&by_target)];
@@ -272,13 +294,17 @@ impl Frame {
             .component_mul(&residual)
             .component_div(&(spread + variance));
         let parameters = glance.parameters;
-        let member = &mut self.members[glance.observer];
+        let member = self.members[glance.observer].traveller_mut();
+        let mut weighed = Weighed {
+            verdict: Verdict::Refused,
+            variance,
+        };
         if !squares
             .iter()
             .all(|square| square.sqrt() <= parameters.gate)
         {
             member.refused += 1;
-            return Verdict::Refused;
+            return weighed;
         }
         member.refused = 0;
         let factors = squares.map(|square| (square / parameters.soft.powi(2)).max(1.0));
@@ -287,16 +313,17 @@ impl Frame {
         if let Some(correction) = self.covariance.update(projection, &residual, &s) {
             self.correct(glance.observer, &correction);
         }
-        Verdict::Accepted {
+        weighed.verdict = Verdict::Accepted {
             nis: squares.sum(),
             components: 6,
-        }
+        };
+        weighed
     }
 
     /// Lets an agent whose sightings contradict the estimate search farther around.
     fn recover(&mut self, observer: usize) {
-        if self.members[observer].refused >= REFUSED_TO_WIDEN {
-            self.members[observer].refused = 0;
+        if self.members[observer].traveller.refused >= REFUSED_TO_WIDEN {
+            self.members[observer].traveller_mut().refused = 0;
             self.widen(observer, WIDENED.0, WIDENED.1);
         }
     }
@@ -314,7 +341,7 @@ struct Side {
 impl Side {
     fn new(member: &Member, back: &Isometry3<f64>) -> Self {
         Self {
-            pose: member.mover.pose * back.inverse(),
+            pose: member.mover().pose * back.inverse(),
             by_now: se3::adjoint(back),
             offset: member.offset,
         }

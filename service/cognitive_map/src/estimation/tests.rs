@@ -144,7 +144,7 @@ fn exact_sightings_keep_a_drifting_agent_on_its_way_and_the_covariance_sound() {
     let (pose, spread) = estimator.pose(agent).unwrap();
     assert!((pose.translation.vector - truth.translation.vector).norm() < 1e-6);
     assert!(spread.position_sd_m() < 2.0);
-    let joint = &estimator.frames[0].covariance;
+    let joint = &estimator.frame(0).covariance;
     let dense = DMatrix::from_row_slice(joint.dim(), joint.dim(), joint.entries());
     assert_eq!(dense, dense.transpose(), "exactly symmetric");
     let least = dense.symmetric_eigenvalues().min();
@@ -219,11 +219,11 @@ fn waiting_with_the_cross_terms_changes_nothing() {
                 &motion([0.2, 0.0, 0.0], [0.0, 0.2, 0.3]),
             );
             if flushes {
-                estimator.frames[0].flush();
+                estimator.frame_mut(0).flush();
             }
         }
-        estimator.frames[0].flush();
-        estimator.frames[0].covariance.entries().to_vec()
+        estimator.frame_mut(0).flush();
+        estimator.frame(0).covariance.entries().to_vec()
     };
     let pairs = run(true).into_iter().zip(run(false));
     let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -314,6 +314,7 @@ fn frames_are_laid_into_one_another() {
         UnitQuaternion::from_scaled_axis(Vector3::new(0.2, -0.4, 1.5)),
     );
     let mut truth = [Isometry3::identity(), apart];
+    let mut merged = Vec::new();
     for step in 0..60 {
         for (agent, truth) in [first, second].into_iter().zip(&mut truth) {
             let moved = motion([0.2, 0.0, 0.0], [0.0, 0.02, 0.1]);
@@ -323,10 +324,15 @@ fn frames_are_laid_into_one_another() {
             for (number, post) in POSTS.iter().enumerate() {
                 let relation = polar(truth, &Point3::from(*post));
                 estimator.landmark(agent, stamp_ns, &label(number), &relation);
+                merged.append(&mut estimator.take_merged());
             }
         }
     }
     assert!(estimator.is_in_map(second));
+    assert_eq!(merged.len(), 1);
+    assert_eq!((merged[0].frame, merged[0].into), (2, 0));
+    assert_eq!(merged[0].agents, [second]);
+    assert!((merged[0].pose.to_homogeneous() - apart.to_homogeneous()).amax() < 0.1);
     let (pose, _) = estimator.pose(second).unwrap();
     let rest = truth[1].inv_mul(&pose);
     assert!(
@@ -349,7 +355,7 @@ fn more_landmarks_than_are_held_jointly_are_kept() {
         }
     }
     assert_eq!(estimator.landmarks().count(), 96);
-    assert_eq!(estimator.frames[0].dormant.len(), 150 - 96);
+    assert_eq!(estimator.frame(0).dormant.len(), 150 - 96);
     for (_, position, covariance) in estimator.landmarks() {
         assert!(covariance.iter().all(|entry| entry.is_finite()));
         let nearest = (0..150).map(|number| (place(number) - position).norm());
@@ -367,4 +373,103 @@ fn a_new_session_starts_less_certain() {
     let after = estimator.pose(agent).unwrap().1.position_sd_m();
     assert!((after * after - before * before - 3.0).abs() < 1e-9);
     assert_eq!(estimator.in_odom(agent), Some(&Isometry3::identity()));
+}
+
+/// More agents than are estimated jointly come and go; those at rest or far from all others cost nothing.
+#[test]
+fn of_a_crowd_those_that_see_take_part() {
+    let mut estimator = Estimator::new(Parameters::default());
+    let agents: Vec<u32> = (0..40).map(|_| estimator.enrol()).collect();
+    let place = |agent: u32| Isometry3::translation(0.1 * f64::from(agent), 0.0, 0.0);
+    for &agent in &agents {
+        estimator.start_pose(agent, &start(&place(agent), 0.1));
+    }
+    let step = motion([0.1, 0.0, 0.0], [0.0, 0.0, 0.0]);
+    let mut stamp_ns = 0;
+    let mut everybody_moves = |estimator: &mut Estimator| {
+        stamp_ns += SECOND_NS;
+        for &agent in &agents {
+            estimator.motion(agent, stamp_ns, &step);
+        }
+        stamp_ns
+    };
+    everybody_moves(&mut estimator);
+    assert_eq!(
+        estimator.frame(0).covariance.dim(),
+        0,
+        "nobody has seen anything"
+    );
+    let shift = Isometry3::translation(0.1, 0.0, 0.0);
+    for round in 0..2 {
+        for &agent in &agents {
+            for (number, post) in POSTS.iter().enumerate() {
+                let relation = polar(&(place(agent) * shift), &Point3::from(*post));
+                estimator.landmark(agent, SECOND_NS, &label(number), &relation);
+            }
+        }
+        let frame = estimator.frame(0);
+        assert_eq!((frame.members.len(), frame.population), (32, 40), "{round}");
+        assert_eq!(frame.covariance.dim(), 32 * 11 + POSTS.len() * 3);
+    }
+    // Agent 0 has left the joint estimate: its motion leaves that alone, and it comes back.
+    let before = estimator.frame(0).covariance.entries().to_vec();
+    estimator.motion(0, 2 * SECOND_NS, &step);
+    assert_eq!(estimator.frame(0).covariance.entries(), before);
+    let (_, apart) = estimator.pose(0).unwrap();
+    let truth = place(2);
+    let relation = polar(&truth, &Point3::from(POSTS[0]));
+    estimator.landmark(0, 2 * SECOND_NS, &label(0), &relation);
+    assert!(estimator.frame(0).member(0).is_some());
+    let (pose, back) = estimator.pose(0).unwrap();
+    assert!((pose.translation.vector - truth.translation.vector).norm() < 0.05);
+    assert!(
+        back.position_sd_m() > apart.position_sd_m(),
+        "the safe side"
+    );
+}
+
+/// A frame that is left by its only agent is forgotten, and the numbers of the others stay.
+#[test]
+fn frames_are_told_and_emptied() {
+    let mut estimator = Estimator::new(Parameters::default());
+    let [first, second] = [(); 2].map(|()| estimator.enrol());
+    assert_eq!(estimator.frame_of(second), Some(2));
+    assert!(estimator.found(first));
+    assert_eq!(estimator.frame_of(first), Some(0));
+    let taken = estimator.landmark(
+        second,
+        0,
+        &label(0),
+        &polar(&Isometry3::identity(), &Point3::from(POSTS[0])),
+    );
+    assert!(taken.is_new && taken.accepted && taken.variance.min() > 0.0);
+    estimator.start_pose(second, &start(&Isometry3::identity(), 0.1));
+    assert_eq!(estimator.frame_of(second), Some(0));
+    assert!(estimator.frame(2).marks.is_empty() && estimator.frame(2).covariance.dim() == 0);
+    assert_eq!(estimator.frame(0).population, 2);
+}
+
+/// A step tells what was corrected, and sightings of agents when they are settled.
+#[test]
+fn the_outcome_of_a_sample_is_told() {
+    let mut estimator = Estimator::new(Parameters::default());
+    let [observer, target] = [(); 2].map(|()| estimator.enrol());
+    estimator.start_pose(observer, &start(&Isometry3::identity(), 0.1));
+    estimator.start_pose(target, &start(&Isometry3::translation(3.0, 0.0, 0.0), 0.1));
+    let moved = motion([0.5, 0.0, 0.0], [0.0, 0.0, 0.2]);
+    let before = *estimator.in_frame(observer).unwrap();
+    let step = estimator.motion(observer, SECOND_NS, &moved);
+    let after = estimator.in_frame(observer).unwrap();
+    assert!((after.to_homogeneous() - (before * step.increment).to_homogeneous()).amax() < 1e-12);
+    assert_eq!(after.translation.vector, step.displacement);
+    assert!((step.variance[0] - 1e-4).abs() < 1e-12 && (step.variance[5] - 2.5e-5).abs() < 1e-12);
+    let seen = Relation::Position(RelativePosition::new([3.1, 0.2, 0.0], [0.1; 3]).unwrap());
+    estimator.sighting(observer, SECOND_NS, target, &seen);
+    assert_eq!(estimator.take_settled(), [], "the target has not moved yet");
+    estimator.motion(target, SECOND_NS, &moved);
+    let settled = estimator.take_settled();
+    assert_eq!(settled.len(), 1);
+    assert!(settled[0].accepted && settled[0].relation == seen);
+    assert_eq!((settled[0].observer, settled[0].target), (observer, target));
+    assert!(estimator.take_settled().is_empty(), "told once");
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 
+use crate::geometry::se3;
+
 /// Fewest points that tie two planar frames, and two frames in space.
 const POINTS_MIN: (usize, usize) = (3, 4);
 /// Part of the points that must agree.
@@ -97,6 +99,23 @@ pub(super) fn tie(pairs: &[Pair], is_planar: bool) -> Option<Tie> {
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
     let covariance = (covariance + covariance.transpose()) * (0.5 * WIDENING * WIDENING);
     Some(Tie { pose, covariance })
+}
+
+/// How the error τ of a tie adds to that of a point of the newer frame, in three rows: | I  −l× |.
+pub(super) fn point_by_tie(point: &Point3<f64>) -> Matrix6<f64> {
+    let mut by_tie = Matrix6::zeros();
+    by_tie
+        .fixed_view_mut::<3, 3>(0, 0)
+        .copy_from(&Matrix3::identity());
+    by_tie
+        .fixed_view_mut::<3, 3>(0, 3)
+        .copy_from(&-point.coords.cross_matrix());
+    by_tie
+}
+
+/// How it adds to that of a body of the newer frame: `Ad(T_b⁻¹)`.
+pub(super) fn body_by_tie(pose: &Isometry3<f64>) -> Matrix6<f64> {
+    se3::adjoint(&pose.inverse())
 }
 
 /// The motion of least squares. `None` when the points have no extent.

@@ -1,0 +1,85 @@
+//! An agent: which frame it is in, and whether its errors are estimated jointly with others.
+
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
+
+use super::mover::Mover;
+use super::outcome::Evidence;
+use super::sensor::Sensor;
+
+/// By how much the deviations of an agent grow that comes back to a joint estimate: three times.
+///
+/// Errors A and B whose correlation is not known any more have at most the covariance A/w beside
+/// B/(1 − w), for any w in (0, 1). With w = 1/9 the agent's own estimate counts for a ninth, and the
+/// others' variances would have to grow by an eighth each time. They stay as they are: what they miss is
+/// small, and a growth with every return would not end.
+const RETURN_WIDENING: f64 = 3.0;
+
+/// What is known of an agent itself. A clone shares it.
+#[derive(Clone, Debug)]
+pub(super) struct Traveller {
+    pub(super) mover: Mover,
+    pub(super) sensor: Sensor,
+    /// Sightings refused one after the other.
+    pub(super) refused: u32,
+}
+
+/// An agent, in whatever frame.
+#[derive(Clone, Debug)]
+pub(super) struct Seat {
+    /// Its frame.
+    pub(super) frame: usize,
+    pub(super) in_odom: Isometry3<f64>,
+    /// Stamp of its latest motion \[ns\].
+    pub(super) stamp_ns: Option<i64>,
+    pub(super) evidence: Evidence,
+    /// The agent itself, while it does not take part in its frame's joint estimate.
+    pub(super) apart: Option<Apart>,
+}
+
+/// An agent that does not take part in its frame's joint estimate.
+#[derive(Clone, Debug)]
+pub(super) struct Apart {
+    pub(super) traveller: Arc<Traveller>,
+    /// Whether it did, so that its errors are correlated with the others' in a way that is forgotten.
+    pub(super) was_joint: bool,
+}
+
+impl Seat {
+    /// Of an agent that begins at a frame's identity.
+    pub(super) fn new(frame: usize, mover: Mover) -> Self {
+        Self {
+            frame,
+            in_odom: Isometry3::identity(),
+            stamp_ns: None,
+            evidence: Evidence::default(),
+            apart: Some(Apart::new(Arc::new(Traveller {
+                mover,
+                sensor: Sensor::default(),
+                refused: 0,
+            }))),
+        }
+    }
+}
+
+impl Apart {
+    /// Of an agent that nothing ties to the others.
+    pub(super) fn new(traveller: Arc<Traveller>) -> Self {
+        Self {
+            traveller,
+            was_joint: false,
+        }
+    }
+
+    /// The agent as it may take part: its errors count as independent of all others'.
+    pub(super) fn independent(mut self) -> Arc<Traveller> {
+        let mover = &mut Arc::make_mut(&mut self.traveller).mover;
+        // Nothing waits for what happened to the errors.
+        mover.flush();
+        if self.was_joint {
+            mover.covariance *= RETURN_WIDENING * RETURN_WIDENING;
+        }
+        self.traveller
+    }
+}
