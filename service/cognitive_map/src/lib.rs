@@ -1,5 +1,6 @@
 //! The pure core of cogmap: a cognitive map as a deterministic fold over a journal of samples.
 
+pub mod chronicle;
 pub mod estimation;
 pub mod experience;
 pub mod geometry;

@@ -49,9 +49,10 @@ impl Link {
             Self::Sighting {
                 position,
                 information,
+                target,
                 ..
             } => {
-                let residual = seen(from, to) - position;
+                let residual = seen(from, to, &target.lever()) - position;
                 residual.dot(&(information.matrix() * residual))
             }
         }
@@ -112,14 +113,17 @@ impl Link {
                 target,
                 ..
             } => {
-                let seen = seen(from, to);
+                let in_target = target.lever();
+                let seen = seen(from, to, &in_target);
                 let (information, force) =
                     weighted(&(seen - position), information.matrix(), weigh);
                 // The target's motion in the axes of the pose that saw it, and what that pose's own motion
                 // does to the target in its frame: −ρ − φ×seen.
                 let turn = match target {
                     SightingTarget::Point(_) => from.rotation.inverse(),
-                    SightingTarget::Pose(_) => from.rotation.inverse() * to.rotation,
+                    SightingTarget::Pose(_) | SightingTarget::PointOf(..) => {
+                        from.rotation.inverse() * to.rotation
+                    }
                 };
                 let turn = turn.to_rotation_matrix().into_inner();
                 let lever = seen.cross_matrix();
@@ -140,6 +144,28 @@ impl Link {
                 to_from
                     .fixed_view_mut::<3, 3>(0, 3)
                     .copy_from(&(turned * lever));
+                let mut to_to = corner(&(turned * turn));
+                let mut to_gradient = top(&turn.tr_mul(&force));
+                // A point beside the target's origin moves by ρ + φ×l.
+                if in_target != Vector3::zeros() {
+                    let swing = in_target.cross_matrix();
+                    let swung = swing * turned;
+                    to_from.fixed_view_mut::<3, 3>(3, 0).copy_from(&-swung);
+                    to_from
+                        .fixed_view_mut::<3, 3>(3, 3)
+                        .copy_from(&(swung * lever));
+                    let cross = swung * turn;
+                    to_to.fixed_view_mut::<3, 3>(3, 0).copy_from(&cross);
+                    to_to
+                        .fixed_view_mut::<3, 3>(0, 3)
+                        .copy_from(&cross.transpose());
+                    to_to
+                        .fixed_view_mut::<3, 3>(3, 3)
+                        .copy_from(&-(cross * swing));
+                    to_gradient
+                        .fixed_rows_mut::<3>(3)
+                        .copy_from(&(swing * turn.tr_mul(&force)));
+                }
                 let mut from_gradient = top(&-force);
                 from_gradient
                     .fixed_rows_mut::<3>(3)
@@ -147,9 +173,9 @@ impl Link {
                 NormalBlocks {
                     from_from,
                     to_from,
-                    to_to: corner(&(turned * turn)),
+                    to_to,
                     from_gradient,
-                    to_gradient: top(&turn.tr_mul(&force)),
+                    to_gradient,
                 }
             }
         }
@@ -169,9 +195,10 @@ impl NormalBlocks {
 }
 
 /// The target's position in the frame of the pose that sees it.
-fn seen(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector3<f64> {
+fn seen(from: &Isometry3<f64>, to: &Isometry3<f64>, lever: &Vector3<f64>) -> Vector3<f64> {
+    let point = to.translation.vector + to.rotation * lever;
     from.rotation
-        .inverse_transform_vector(&(to.translation.vector - from.translation.vector))
+        .inverse_transform_vector(&(point - from.translation.vector))
 }
 
 fn pose_residual(error: &Isometry3<f64>) -> Vector6<f64> {

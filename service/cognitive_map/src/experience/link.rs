@@ -16,7 +16,7 @@ pub struct LinkId(pub(super) u32);
 /// | `PosePrior` | log(Z⁻¹ T) |
 /// | `PointPrior` | p − z |
 /// | `Between` | log(Z⁻¹ T_from⁻¹ T_to) |
-/// | `Sighting` | T_from⁻¹ p − z, with the target's position p |
+/// | `Sighting` | T_from⁻¹ p − z, with the target's position p = T_target l |
 #[derive(Clone, Debug, PartialEq)]
 pub enum Link {
     /// Where a pose is, in `map`.
@@ -62,18 +62,30 @@ pub enum Link {
 }
 
 /// What was seen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SightingTarget {
     /// A landmark.
     Point(PointId),
     /// Another robot, of which the orientation was not seen.
     Pose(PoseId),
+    /// A point that lies fixed in the frame of another pose \[m\]: where a robot was a little after it was there.
+    PointOf(PoseId, Vector3<f64>),
 }
 
 impl SightingTarget {
+    /// Where the target lies in the frame of its node \[m\].
+    pub(super) fn lever(self) -> Vector3<f64> {
+        match self {
+            Self::Point(_) | Self::Pose(_) => Vector3::zeros(),
+            Self::PointOf(_, lever) => lever,
+        }
+    }
+
     fn node(self) -> u32 {
         match self {
-            Self::Point(PointId(node)) | Self::Pose(PoseId(node)) => node,
+            Self::Point(PointId(node))
+            | Self::Pose(PoseId(node))
+            | Self::PointOf(PoseId(node), _) => node,
         }
     }
 }

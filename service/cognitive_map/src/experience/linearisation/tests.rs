@@ -43,14 +43,14 @@ fn cases(
     let node = |pose| Node::pose(pose, Freedom::Full);
     let point = Node::point(to.translation.vector.into(), Freedom::Full);
     let (a, b) = (PoseId(0), PoseId(1));
-    let position = from
-        .inverse_transform_point(&to.translation.vector.into())
-        .coords
-        + error.translation.vector;
+    let position = |target: SightingTarget| {
+        let point = to * Point3::from(target.lever());
+        from.inverse_transform_point(&point).coords + error.translation.vector
+    };
     let sighting = |target| Link::Sighting {
         from: a,
         target,
-        position,
+        position: position(target),
         information: position_information,
     };
     let at: Point3<f64> = (to.translation.vector + error.translation.vector).into();
@@ -81,6 +81,10 @@ fn cases(
             },
         ),
         (node(to), sighting(SightingTarget::Pose(b))),
+        (
+            node(to),
+            sighting(SightingTarget::PointOf(b, Vector3::new(0.4, -0.3, 0.2))),
+        ),
         (point, sighting(SightingTarget::Point(PointId(1)))),
     ];
     links
