@@ -132,11 +132,10 @@ impl Chronicle {
         let Some(life) = self.lives.get(agent as usize) else {
             return;
         };
-        let (is_in_map, pose) = (life.is_in_map, life.pose);
-        if is_in_map {
+        if life.is_in_map {
             return;
         }
-        self.placed(agent, &pose);
+        self.placed(agent, &Isometry3::identity());
         let first = self.first_of(agent);
         if let Some(anchor) = self.anchors.get(first) {
             let at = anchor.pose;
@@ -146,18 +145,35 @@ impl Chronicle {
         }
     }
 
-    /// An agent whose poses were those of a frame of its own is in the map from now on, there now. All its anchors move
-    /// with it.
-    pub fn placed(&mut self, agent: u32, pose_in_map: &Isometry3<f64>) {
+    /// The frame in which an agent was estimated turned out to lie in the map, there. All its anchors move with it.
+    pub fn placed(&mut self, agent: u32, frame: &Isometry3<f64>) {
         let revision = self.revision;
         let Some(life) = self.lives.get_mut(agent as usize, revision) else {
             return;
         };
         if !life.is_in_map {
-            life.own_frame = Some(pose_in_map * life.pose.inverse());
+            life.own_frame = Some(*frame);
             life.is_in_map = true;
+            life.pose = frame * life.pose;
         }
-        life.pose = *pose_in_map;
+    }
+
+    /// The frame in which an agent was estimated turned out to lie in another one that is not the map's, there. Walks the
+    /// whole chain of the agent.
+    pub fn carried(&mut self, agent: u32, frame: &Isometry3<f64>) {
+        let revision = self.revision;
+        let Some(life) = self.lives.get_mut(agent as usize, revision) else {
+            return;
+        };
+        if life.is_in_map {
+            return;
+        }
+        life.pose = frame * life.pose;
+        let mut number = life.newest;
+        while let Some(anchor) = self.anchors.get_mut(number, revision) {
+            anchor.pose = frame * anchor.pose;
+            number = anchor.previous;
+        }
     }
 
     /// An agent was told where it stands in the map. If it was in the map already, it has been put there: what it did
@@ -167,7 +183,8 @@ impl Chronicle {
             return;
         };
         let was_in_map = life.is_in_map;
-        self.placed(moment.agent, start.pose());
+        let own_frame = start.pose() * life.pose.inverse();
+        self.placed(moment.agent, &own_frame);
         self.note(moment);
         let revision = self.revision;
         let Some(life) = self.lives.get_mut(moment.agent as usize, revision) else {
@@ -263,29 +280,29 @@ impl Chronicle {
         }
     }
 
-    /// An agent saw another one. It is taken in as soon as both have moved up to the stamp.
+    /// An agent saw another one at an instant that may be over. It is taken in as soon as both have moved up to it.
     pub fn sighted(
         &mut self,
-        moment: &Moment,
+        observer: u32,
         target: u32,
+        stamp_ns: i64,
         relation: &Relation,
         variance: &Vector3<f64>,
     ) {
-        if moment.agent == target || target as usize >= self.lives.len() {
+        if observer == target || target as usize >= self.lives.len() {
             return;
         }
-        self.note(moment);
-        let Some(here) = self.here(moment.agent) else {
-            return;
+        let Some(here) = self.at_stamp(observer, stamp_ns) else {
+            return; // too long ago
         };
         if self.waiting.len() >= WAITING_MAX {
             self.waiting.remove(0);
         }
         self.waiting.push(Waiting {
             anchor: here.anchor,
-            observer: moment.agent,
+            observer,
             target,
-            stamp_ns: moment.stamp_ns,
+            stamp_ns,
             point: SeenPoint::new(relation, variance).before(&here.motion, &here.covariance),
         });
         self.settle();

@@ -365,7 +365,7 @@ fn an_agent_that_finds_its_place_takes_its_past_along() {
     }
     assert!(!chronicle.refine().agents[0].is_in_map);
     pose = tie * pose;
-    chronicle.placed(agent, &pose);
+    chronicle.placed(agent, &tie);
     for seq in 11..=20 {
         pose *= step;
         chronicle.motion(&moment(agent, seq, &pose), &step, &variance);

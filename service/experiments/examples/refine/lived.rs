@@ -6,14 +6,12 @@ use std::time::Instant;
 use cogmap_experiments::metrics::{Alignment, Span, StampedPose, Trajectory, ate_rmse_m};
 use cognitive_map::chronicle::{Chronicle, ChronicleSettings, Moment, Refined};
 use cognitive_map::estimation::{Estimator, Parameters};
-use cognitive_map::{Motion, Relation, Sample, SampleBody, Target};
-use nalgebra::{Vector3, Vector6};
+use cognitive_map::{Sample, SampleBody, Target};
 
 /// A team as it lives.
 pub(crate) struct Lived {
     pub(crate) estimator: Estimator,
     pub(crate) chronicle: Chronicle,
-    parameters: Parameters,
     agents: BTreeMap<u32, u32>,
     names: BTreeMap<String, u32>,
     seqs: BTreeMap<u32, u64>,
@@ -24,15 +22,13 @@ pub(crate) struct Lived {
 
 impl Lived {
     pub(crate) fn new(anchors_max: Option<u32>) -> Self {
-        let parameters = Parameters::default();
         let mut settings = ChronicleSettings::default();
         if let Some(anchors_max) = anchors_max {
             settings.anchors_max = anchors_max;
         }
         Self {
-            estimator: Estimator::new(parameters.clone()),
+            estimator: Estimator::new(Parameters::default()),
             chronicle: Chronicle::new(settings),
-            parameters,
             agents: BTreeMap::new(),
             names: BTreeMap::new(),
             seqs: BTreeMap::new(),
@@ -55,15 +51,17 @@ impl Lived {
         let seq = self.seqs.entry(agent).or_default();
         *seq += 1;
         let seq = *seq;
+        let mut step = None;
+        let mut taken = None;
         match &sample.body {
             SampleBody::Motion(motion) => {
-                self.estimator.motion(agent, stamp_ns, motion);
+                step = Some(self.estimator.motion(agent, stamp_ns, motion));
             }
             SampleBody::StartPose(start) => self.estimator.start_pose(agent, start),
             SampleBody::Sighting(sighting) => match &sighting.target {
                 Target::Landmark(label) => {
-                    self.estimator
-                        .landmark(agent, stamp_ns, label, &sighting.relation);
+                    let relation = &sighting.relation;
+                    taken = Some(self.estimator.landmark(agent, stamp_ns, label, relation));
                 }
                 Target::Agent(name) if sees_robots => {
                     let target = self.names[name.as_str()];
@@ -83,31 +81,40 @@ impl Lived {
             stamp_ns,
             pose,
         };
+        let (settled, merged) = (self.estimator.take_settled(), self.estimator.take_merged());
         let begin = Instant::now();
-        match &sample.body {
-            SampleBody::Motion(motion) => {
-                let sd = noise_sd(&self.parameters, motion);
-                let variance = sd.component_mul(&sd);
+        match (&sample.body, step, taken) {
+            (SampleBody::Motion(_), Some(step), _) => {
                 self.chronicle
-                    .motion(&moment, motion.increment(), &variance);
+                    .motion(&moment, &step.increment, &step.variance);
             }
-            SampleBody::StartPose(start) => self.chronicle.start_pose(&moment, start),
-            SampleBody::Sighting(sighting) => {
-                let variance = stated(&sighting.relation, &self.parameters);
-                match &sighting.target {
-                    Target::Landmark(label) => {
-                        self.chronicle
-                            .landmark(&moment, label, &sighting.relation, &variance);
-                    }
-                    Target::Agent(name) if sees_robots => {
-                        let target = self.names[name.as_str()];
-                        self.chronicle
-                            .sighted(&moment, target, &sighting.relation, &variance);
-                    }
-                    _ => {}
+            (SampleBody::StartPose(start), ..) => self.chronicle.start_pose(&moment, start),
+            (SampleBody::Sighting(sighting), _, Some(taken)) if taken.accepted => {
+                if let Target::Landmark(label) = &sighting.target {
+                    let (relation, variance) = (&sighting.relation, &taken.variance);
+                    self.chronicle.landmark(&moment, label, relation, variance);
                 }
             }
             _ => {}
+        }
+        for merged in merged {
+            for agent in merged.agents {
+                if merged.into == 0 {
+                    self.chronicle.placed(agent, &merged.pose);
+                } else {
+                    self.chronicle.carried(agent, &merged.pose);
+                }
+            }
+        }
+        for seen in settled.iter().filter(|seen| seen.accepted) {
+            let variance = seen.variance.fixed_rows::<3>(0).into_owned();
+            self.chronicle.sighted(
+                seen.observer,
+                seen.target,
+                seen.stamp_ns,
+                &seen.relation,
+                &variance,
+            );
         }
         self.times_s.push(begin.elapsed().as_secs_f64());
         let poses = self.causal.entry(robot).or_default();
@@ -161,43 +168,5 @@ impl Lived {
             );
         }
         sums.map(|sum| sum / self.causal.len().max(1) as f64)
-    }
-}
-
-/// Variances as a sighting states them, of a distance with what may be off again and again.
-fn stated(relation: &Relation, parameters: &Parameters) -> Vector3<f64> {
-    let sd = match relation {
-        Relation::Position(seen) => *seen.sd_m(),
-        Relation::RangeBearing(seen) => {
-            let lasting = parameters.lasting_range_error * seen.range_m();
-            let range_sd_m = seen
-                .range_sd_m()
-                .hypot(lasting.min(3.0 * seen.range_sd_m()));
-            Vector3::new(range_sd_m, seen.bearing_sd_rad(), seen.bearing_sd_rad())
-        }
-        Relation::Pose(seen) => seen.noise().sd().fixed_rows::<3>(0).into_owned(),
-    };
-    sd.component_mul(&sd)
-}
-
-/// Deviations of a motion: its own, or a random walk's.
-fn noise_sd(parameters: &Parameters, motion: &Motion) -> Vector6<f64> {
-    if let Some(noise) = motion.noise() {
-        return *noise.sd();
-    }
-    let increment = motion.increment();
-    let (path_m, angle_rad) = (
-        increment.translation.vector.norm(),
-        increment.rotation.angle(),
-    );
-    let across = parameters.translation_sd_per_sqrt_m * path_m.sqrt();
-    let about = (parameters.rotation_sd_per_sqrt_m.powi(2) * path_m
-        + parameters.rotation_sd_per_sqrt_rad.powi(2) * angle_rad)
-        .sqrt();
-    let axis = increment.rotation.imag();
-    if increment.translation.z == 0.0 && axis.x == 0.0 && axis.y == 0.0 {
-        Vector6::new(across, across, 0.0, 0.0, 0.0, about)
-    } else {
-        Vector6::new(across, across, across, about, about, about)
     }
 }
