@@ -36,6 +36,9 @@ pub struct SpaceSettings {
     pub places_max: u32,
     /// Most legs of all trips together, at least 1: for one more, the weakest trip is forgotten.
     pub legs_max: u32,
+    /// Most moments of all agents that are remembered, so that the past can be smoothed, at least 64: for one
+    /// more, one from which next to nothing is lost is left out.
+    pub anchors_max: u32,
     /// After this many samples of the space, by whichever agent, a use counts half as much for the
     /// strength of a place or trip.
     pub strength_half_life_samples: u32,
@@ -95,6 +98,7 @@ impl Default for SpaceSettings {
             trip_gap_s: 2.0,
             places_max: 65_536,
             legs_max: 65_536,
+            anchors_max: 65_536,
             strength_half_life_samples: 1_000_000,
             trajectory_interval_s: 0.005,
         }

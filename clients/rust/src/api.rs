@@ -167,12 +167,30 @@ impl Api {
     /// # Errors
     /// See [`ApiError`].
     pub fn trajectory(&self, space: &str, agent: &str) -> Result<Trajectory, ApiError> {
+        self.whole_trajectory(space, agent, "causal")
+    }
+
+    /// The whole refined trajectory of an agent: its past by all that has been seen since.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn refined_trajectory(&self, space: &str, agent: &str) -> Result<Trajectory, ApiError> {
+        self.whole_trajectory(space, agent, "refined")
+    }
+
+    /// All pages of a trajectory.
+    fn whole_trajectory(
+        &self,
+        space: &str,
+        agent: &str,
+        kind: &str,
+    ) -> Result<Trajectory, ApiError> {
         let path = agent_path(space, agent, "/trajectory")?;
-        let mut whole: Trajectory = self.get(&format!("{path}?limit={PAGE_ITEMS_MAX}"))?;
+        let path = format!("{path}?kind={kind}&limit={PAGE_ITEMS_MAX}");
+        let mut whole: Trajectory = self.get(&path)?;
         let mut from_ns = whole.next_from_ns.take();
         while let Some(from) = from_ns {
-            let page: Trajectory =
-                self.get(&format!("{path}?limit={PAGE_ITEMS_MAX}&from_ns={from}"))?;
+            let page: Trajectory = self.get(&format!("{path}&from_ns={from}"))?;
             // A page that does not lead on would be asked for without end.
             from_ns = page.next_from_ns.filter(|next| *next > from);
             whole.poses.extend(page.poses);

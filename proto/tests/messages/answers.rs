@@ -68,6 +68,7 @@ fn bernoulli() -> SpaceSettings {
         trip_gap_s: 3.0,
         places_max: 100_000,
         legs_max: 1_000_000,
+        anchors_max: 200_000,
         strength_half_life_samples: 360_000,
         trajectory_interval_s: 0.25,
     }
@@ -175,6 +176,7 @@ fn trajectory() -> Trajectory {
         session: 1_800_000_000_000_000_000,
         frame: "map".to_owned(),
         kind: "causal".to_owned(),
+        map_revision: None,
         poses: vec![
             pose(1_800_000_000_610_000_000),
             pose(1_800_000_000_620_000_000),

@@ -415,6 +415,11 @@ impl RelativePose {
         })
     }
 
+    /// The same with a pose that was read back as it was: normalising anew might change its last bit.
+    pub(crate) fn exactly(self, pose: Isometry3<f64>) -> Self {
+        Self { pose, ..self }
+    }
+
     /// Pose of the target in the body frame.
     pub fn pose(&self) -> &Isometry3<f64> {
         &self.pose

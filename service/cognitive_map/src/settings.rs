@@ -48,6 +48,9 @@ pub struct SettingsValues {
     pub places_max: u32,
     /// Most legs of all trips together: for one more, the weakest trip is forgotten.
     pub legs_max: u32,
+    /// Most moments of all agents that are remembered, so that the past can be smoothed: for one more, one
+    /// from which next to nothing is lost is left out.
+    pub anchors_max: u32,
     /// After this many records of the space, a use counts half as much for the strength of a memory.
     pub strength_half_life_samples: u32,
 }
@@ -97,6 +100,7 @@ impl Default for SettingsValues {
             trip_gap_s: 2.0,
             places_max: 65_536,
             legs_max: 65_536,
+            anchors_max: 65_536,
             strength_half_life_samples: 1_000_000,
         }
     }
@@ -158,6 +162,8 @@ impl Settings {
         // The place that a leg starts from is held while the next one is recruited.
         check(v.places_max >= 2, "places_max", "at least 2")?;
         check(v.legs_max >= 1, "legs_max", "at least 1")?;
+        let anchors = (64..=1 << 24).contains(&v.anchors_max);
+        check(anchors, "anchors_max", "64 to 16777216")?;
         let half_life = v.strength_half_life_samples >= 1;
         check(half_life, "strength_half_life_samples", "at least 1")?;
         Ok(Self(values))

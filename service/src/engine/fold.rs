@@ -48,6 +48,7 @@ pub fn core_settings(settings: &SpaceSettings) -> Result<cognitive_map::Settings
         trip_gap_s: settings.trip_gap_s,
         places_max: settings.places_max,
         legs_max: settings.legs_max,
+        anchors_max: settings.anchors_max,
         strength_half_life_samples: settings.strength_half_life_samples,
     })
 }

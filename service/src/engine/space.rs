@@ -19,6 +19,7 @@ use super::message::{IngestError, Request};
 use super::outlet::Outlet;
 use super::queue::{Inbox, NotQueued, Queue, queue};
 use super::recovery;
+use super::refinement::Refinements;
 use super::settings::EngineSettings;
 use super::trajectory;
 use super::writer::Writer;
@@ -59,6 +60,8 @@ pub(crate) struct Shared {
     snapshot: ArcSwapOption<CognitiveMap>,
     /// Those who wait for a snapshot; none once the writer is gone.
     wishes: Mutex<Option<Vec<Wish>>>,
+    /// The map relaxed for those who asked for the past.
+    refinements: Refinements,
     /// Set when the writer ended although the space was not closing.
     broken: AtomicBool,
 }
@@ -86,6 +89,9 @@ pub enum TrajectoryError {
     /// The store cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// The map cannot be read.
+    #[error(transparent)]
+    Unavailable(#[from] Unavailable),
 }
 
 /// What a space needs of the engine.
@@ -126,6 +132,7 @@ impl Space {
             agents: RwLock::default(),
             snapshot: ArcSwapOption::empty(),
             wishes: Mutex::new(Some(Vec::new())),
+            refinements: Refinements::default(),
             broken: AtomicBool::new(false),
         });
         let thread = {
@@ -281,6 +288,11 @@ impl Space {
         tokio::task::spawn_blocking(read)
             .await
             .map_err(|_| TrajectoryError::Store(StoreError::Io("reading was interrupted".into())))?
+    }
+
+    /// The map relaxed for those who asked for the past.
+    pub(super) fn refinements(&self) -> &Refinements {
+        &self.shared.refinements
     }
 
     /// Takes what is queued, checkpoints, and ends the thread.

@@ -244,6 +244,7 @@ pub(crate) fn read(
         session,
         frame: "map".to_owned(),
         kind: "causal".to_owned(),
+        map_revision: None,
         poses,
         next_from_ns,
     })

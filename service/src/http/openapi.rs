@@ -246,6 +246,8 @@ fn constrain(schemas: &mut Value) {
         &json!({ "exclusiveMinimum": 1.0, "maximum": 10.0 }),
     );
     merge(&mut settings["places_max"], &json!({ "minimum": 2 }));
+    let anchors = json!({ "minimum": 64, "maximum": 1 << 24 });
+    merge(&mut settings["anchors_max"], &anchors);
     for field in ["legs_max", "strength_half_life_samples"] {
         merge(&mut settings[field], &json!({ "minimum": 1 }));
     }

@@ -253,6 +253,7 @@ impl From<TrajectoryError> for Problem {
         match error {
             TrajectoryError::UnknownAgent => Self::new(Kind::UnknownAgent, error.to_string()),
             TrajectoryError::Store(error) => error.into(),
+            TrajectoryError::Unavailable(error) => error.into(),
         }
     }
 }

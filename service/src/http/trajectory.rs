@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 
 use super::extract::{AgentOfPath, AgentParams, Query};
 use super::page;
-use super::problem::Problem;
+use super::problem::{Kind, Problem};
 use super::reply;
 
 /// Media type of the TUM format.
@@ -25,6 +25,17 @@ pub(crate) enum TrajectoryFormat {
     Tum,
 }
 
+/// Which trajectory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum TrajectoryKind {
+    /// Each pose as it was known when its sample was applied.
+    #[default]
+    Causal,
+    /// Each pose by all that has been seen since.
+    Refined,
+}
+
 /// Which part of the trajectory, and in which form.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
@@ -33,7 +44,11 @@ pub(crate) struct TrajectoryQuery {
     /// `json` or `tum`; when absent, `tum` if `Accept` asks for text/plain.
     #[param(inline)]
     format: Option<TrajectoryFormat>,
-    /// Only poses of this session; of the current one when absent.
+    /// `causal` (when absent): each pose as it was known when its sample was applied. `refined`: by all that
+    /// has been seen since; of all sessions, and between two of its poses the agent moved evenly.
+    #[param(inline)]
+    kind: Option<TrajectoryKind>,
+    /// Only poses of this session; of the current one when absent. For causal trajectories only.
     session: Option<u64>,
     /// Only poses at or after this stamp \[ns\].
     from_ns: Option<i64>,
@@ -44,15 +59,18 @@ pub(crate) struct TrajectoryQuery {
     limit: Option<u32>,
 }
 
-/// The causal trajectory of an agent: each pose as it was known when its sample was applied.
+/// The trajectory of an agent: each pose as it was known when its sample was applied, or by all that has
+/// been seen since.
 ///
+/// For a refined trajectory the whole map is relaxed, which may take seconds.
 /// The next page begins at `next_from_ns`; in the TUM format the header `Link` names it.
 #[utoipa::path(get, path = "/v1/spaces/{space}/agents/{agent}/trajectory", tag = "agents",
     operation_id = "get_agent_trajectory", params(AgentParams, TrajectoryQuery),
     responses(
         (status = 200, description = "The poses, oldest first", content(
             (Trajectory = "application/json"), (String = "text/plain"))),
-        (status = 404, description = "There is no such space or agent")))]
+        (status = 404, description = "There is no such space or agent"),
+        (status = 422, description = "A session was named for a refined trajectory")))]
 pub(crate) async fn get(
     AgentOfPath(space, desk): AgentOfPath,
     Query(query): Query<TrajectoryQuery>,
@@ -60,22 +78,33 @@ pub(crate) async fn get(
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
-    let read = space
-        .trajectory(
-            desk.name(),
-            query.session,
-            query.from_ns,
-            query.to_ns,
-            limit,
-        )
-        .await?;
+    let (name, from_ns, to_ns) = (desk.name(), query.from_ns, query.to_ns);
+    let read = match query.kind.unwrap_or_default() {
+        TrajectoryKind::Causal => {
+            space
+                .trajectory(name, query.session, from_ns, to_ns, limit)
+                .await?
+        }
+        TrajectoryKind::Refined if query.session.is_some() => {
+            return Err(Problem::new(
+                Kind::InvalidQuery,
+                "`session` is for causal trajectories only",
+            ));
+        }
+        TrajectoryKind::Refined => {
+            space
+                .refined_trajectory(name, from_ns, to_ns, limit)
+                .await?
+        }
+    };
     let format = query.format.unwrap_or_else(|| accepted(&headers));
     if format == TrajectoryFormat::Json {
         return Ok(reply::json(&read));
     }
     let mut response = reply::with_type(TUM, Body::from(tum(&read.poses)));
     if let Some(next) = read.next_from_ns {
-        let link = next_page(&uri, read.session, next);
+        let session = (read.kind == "causal").then_some(read.session);
+        let link = next_page(&uri, session, next);
         response.headers_mut().insert(LINK, link);
     }
     Ok(response)
@@ -96,15 +125,17 @@ fn accepted(headers: &HeaderMap) -> TrajectoryFormat {
     }
 }
 
-/// `Link` to the page that begins at `from_ns`. The session stays the same even if the agent begins
-/// another one meanwhile.
-fn next_page(uri: &Uri, session: u64, from_ns: i64) -> HeaderValue {
+/// `Link` to the page that begins at `from_ns`. The session of a causal trajectory stays the same even if
+/// the agent begins another one meanwhile.
+fn next_page(uri: &Uri, session: Option<u64>, from_ns: i64) -> HeaderValue {
     let kept = uri.query().unwrap_or_default().split('&').filter(|pair| {
         !pair.is_empty() && !pair.starts_with("from_ns=") && !pair.starts_with("session=")
     });
-    let new = [format!("session={session}"), format!("from_ns={from_ns}")];
+    let session = session.map(|session| format!("session={session}"));
+    let from = format!("from_ns={from_ns}");
     let query = kept
-        .chain(new.iter().map(String::as_str))
+        .chain(session.as_deref())
+        .chain(std::iter::once(from.as_str()))
         .collect::<Vec<_>>()
         .join("&");
     let link = format!("<{}?{query}>; rel=\"next\"", uri.path());
@@ -167,7 +198,7 @@ mod tests {
         let uri: Uri = "/t?format=tum&from_ns=1&limit=2&session=4"
             .parse()
             .expect("a URI");
-        let link = next_page(&uri, 5, -7);
+        let link = next_page(&uri, Some(5), -7);
         assert_eq!(
             link,
             "</t?format=tum&limit=2&session=5&from_ns=-7>; rel=\"next\""

@@ -9,7 +9,6 @@ from .answer import (
     AgentPage,
     AgentSummary,
     Estimate,
-    Evidence,
     ExpectedDescriptor,
     ExpectedLevel,
     GridModuleState,
@@ -30,9 +29,7 @@ from .answer import (
     SkipReason,
     SpaceInfo,
     SpaceList,
-    StampedPose,
     Status,
-    Trajectory,
     Trip,
     TripDetail,
     TripEnd,
@@ -49,6 +46,7 @@ from .errors import (
     WindowFull,
     WireError,
 )
+from .evidence import Evidence
 from .event import (
     AgentEnrolled,
     AgentPlaced,
@@ -92,6 +90,7 @@ from .sample import (
     Velocity,
 )
 from .settings import Bernoulli, NoiseSettings, Novelty, Recruitment, SpaceSettings
+from .trajectory import StampedPose, Trajectory
 
 __version__ = "0.1.0"
 

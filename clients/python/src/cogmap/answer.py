@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar, Dict, Optional, Tuple, Union
 
+from .evidence import Evidence
 from .settings import SpaceSettings
+from .trajectory import StampedPose
 from .vector import Quaternion, Vec3
 
 
@@ -188,15 +190,6 @@ class SpaceList:
 
 
 @dataclass(frozen=True)
-class StampedPose:
-    """A pose at a time."""
-
-    stamp_ns: int
-    translation_m: Vec3
-    rotation_xyzw: Quaternion
-
-
-@dataclass(frozen=True)
 class AgentSummary:
     """An agent in a list."""
 
@@ -212,21 +205,6 @@ class AgentPage:
     agents: Tuple[AgentSummary, ...]
     #: Where the next page begins; absent on the last one.
     next: Optional[str] = None
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """What became of an agent's sightings of landmarks and of other agents, over all sessions."""
-
-    #: Sightings that corrected the map and its agents.
-    accepted: int
-    #: Sightings refused, as too far from what the map says.
-    refused: int
-    #: Of those, how many one after the other up to now; from 4 on the agent is not `localized`.
-    refused_in_a_row: int
-    #: Mean of the squared error of the accepted ones' components, each over what was expected of it: 1
-    #: where the stated noise is honest, more where it is too small. Absent before the first one.
-    nis_mean: Optional[float]
 
 
 @dataclass(frozen=True)
@@ -283,23 +261,6 @@ class GridState:
     turning_rad: float
     #: Heading in the x-y plane [rad].
     heading_rad: float
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """A trajectory."""
-
-    agent: str
-    #: Session of the agent.
-    session: int
-    #: Frame; always `map`.
-    frame: str
-    #: `causal`: each pose as it was known when its sample was applied.
-    kind: str
-    #: Poses, oldest first.
-    poses: Tuple[StampedPose, ...]
-    #: Where the next page begins; absent on the last one.
-    next_from_ns: Optional[int] = None
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,6 @@ from .answer import (
     RecallAnswer,
     SpaceInfo,
     SpaceList,
-    StampedPose,
-    Trajectory,
     Trip,
     TripDetail,
     TripPage,
@@ -35,6 +33,7 @@ from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
 from .sample import SampleBatch
 from .settings import SpaceSettings
 from .sse import data_fields
+from .trajectory import StampedPose, Trajectory
 from .vector import vec3
 from .wire import CBOR, JSON, decode, encode, to_wire
 
@@ -120,12 +119,19 @@ class Client:
         agent: str,
         from_ns: Optional[int] = None,
         to_ns: Optional[int] = None,
+        kind: str = "causal",
     ) -> Trajectory:
-        """The poses of an agent within a span of stamps, all pages in one."""
+        """The poses of an agent within a span of stamps, all pages in one.
+
+        Args:
+            kind: `causal`, each pose as it was known when its sample was applied, or `refined`, by all
+                that has been seen since.
+        """
         path = _path(space, "agents", agent, "trajectory")
         poses: List[StampedPose] = []
         while True:
-            page = self._get(Trajectory, path, {"from_ns": from_ns, "to_ns": to_ns})
+            query: _Query = {"kind": kind, "from_ns": from_ns, "to_ns": to_ns}
+            page = self._get(Trajectory, path, query)
             poses.extend(page.poses)
             if page.next_from_ns is None:
                 return replace(page, poses=tuple(poses))

@@ -79,6 +79,8 @@ class SpaceSettings:
     places_max: int
     #: Most legs of all trips together: for one more, the weakest trip is forgotten.
     legs_max: int
+    #: Most moments of all agents that are remembered, so that the past can be smoothed.
+    anchors_max: int
     #: After this many samples of the space, a use counts half as much for the strength of a place or
     #: trip.
     strength_half_life_samples: int

@@ -67,6 +67,7 @@ fn trajectory(stamps: &[i64], next_from_ns: Option<i64>) -> (u16, String) {
         session: 1,
         frame: "map".to_owned(),
         kind: "causal".to_owned(),
+        map_revision: None,
         poses,
         next_from_ns,
     };

@@ -1,5 +1,7 @@
 //! How much of the past is kept.
 
+use crate::settings::Settings;
+
 /// Limits of a chronicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChronicleSettings {
@@ -9,6 +11,18 @@ pub struct ChronicleSettings {
     pub sightings_max: u32,
     /// Ties at most: start poses and matches. One takes about 250 bytes.
     pub ties_max: u32,
+}
+
+impl ChronicleSettings {
+    /// Those of a space: for each anchor two sightings and half a tie.
+    pub(crate) fn of(settings: &Settings) -> Self {
+        let anchors_max = settings.anchors_max;
+        Self {
+            anchors_max,
+            sightings_max: anchors_max.saturating_mul(2),
+            ties_max: anchors_max / 2,
+        }
+    }
 }
 
 impl Default for ChronicleSettings {

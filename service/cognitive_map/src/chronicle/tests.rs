@@ -122,8 +122,9 @@ impl Walk {
                 let variance = Vector3::repeat(SEEN_SD_M * SEEN_SD_M / 3.0);
                 let moment = self.moment(robot);
                 self.chronicle.sighted(
-                    &moment,
+                    moment.agent,
                     u32::try_from(other).unwrap(),
+                    moment.stamp_ns,
                     &relation,
                     &variance,
                 );

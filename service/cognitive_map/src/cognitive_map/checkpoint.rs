@@ -12,6 +12,7 @@
 //! 7     channel · 2²⁶ + page      up to 64 places' memories of a channel of levels
 //! 8     channel · 2²⁶ + page      up to 16 KiB of places' memories of a channel of descriptors
 //! 9     0                         the joint estimate of agents and landmarks
+//! 10..  page                      the chronicle, by part
 //! ```
 //!
 //! A page is a count (u16) and its items one after the other, little endian, floats as their bits. Where
@@ -26,6 +27,7 @@ use std::sync::Arc;
 use super::CognitiveMap;
 use super::header::{Header, digest_of};
 use crate::agent::Agent;
+use crate::chronicle::{Chronicle, ChroniclePage, ChronicleSettings};
 use crate::digest::Digest;
 use crate::estimation::{Estimator, Parameters};
 use crate::paged::write_page;
@@ -38,7 +40,7 @@ use crate::state::{CorruptState, State, StateReader, StateWriter};
 use crate::trip::LEG_PAGES_MAX;
 
 /// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps,
-/// version 3 no joint estimate.
+/// version 3 no joint estimate and no chronicle.
 const VERSION: u16 = 4;
 
 const HEADER: u8 = 0;
@@ -51,6 +53,8 @@ const CHANNELS: u8 = 6;
 const LEVELS: u8 = 7;
 const DESCRIPTORS: u8 = 8;
 const ESTIMATE: u8 = 9;
+/// The chronicle's part 0; its other parts are the next kinds.
+const CHRONICLE: u8 = 10;
 
 /// One page of a checkpoint. A later page of the same kind and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -121,6 +125,7 @@ impl CognitiveMap {
                 of_items(DESCRIPTORS, channel_page(channel, page), items)
             }))
             .chain(self.estimate_page(since))
+            .chain(self.chronicle_pages(since))
     }
 
     /// The map of a checkpoint. It has the digest of the map that wrote it, and goes on like it.
@@ -153,6 +158,8 @@ impl CognitiveMap {
         let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
         map.places.skip_to(count(header.places));
         map.trips.skip_to(count(header.trips));
+        let lived = pages.split_off(&(CHRONICLE, 0));
+        map.restore_chronicle(lived)?;
         let mut trips = Vec::new();
         let mut expected = 0;
         for ((kind, index), bytes) in pages {
@@ -217,6 +224,39 @@ impl CognitiveMap {
             self.estimator.write(&mut out);
             page_of(ESTIMATE, 0, out)
         })
+    }
+
+    /// The pages of the chronicle that changed.
+    fn chronicle_pages(&self, since_revision: u64) -> impl Iterator<Item = CheckpointPage> {
+        let is_new = self.revision > since_revision;
+        let pages = is_new.then(|| self.chronicle.checkpoint(since_revision));
+        pages.into_iter().flatten().map(|page| CheckpointPage {
+            kind: CHRONICLE + page.part,
+            index: page.index,
+            bytes: page.bytes,
+        })
+    }
+
+    /// Reads the chronicle; a map in which nothing has happened has none.
+    fn restore_chronicle(
+        &mut self,
+        pages: BTreeMap<(u8, u32), Vec<u8>>,
+    ) -> Result<(), CorruptCheckpoint> {
+        let Some(&(kind, index)) = pages.keys().next() else {
+            return Ok(());
+        };
+        let pages = pages
+            .into_iter()
+            .map(|((kind, index), bytes)| ChroniclePage {
+                part: kind - CHRONICLE,
+                index,
+                bytes,
+            });
+        let settings = ChronicleSettings::of(&self.settings);
+        let chronicle = Chronicle::restore(settings, self.revision, pages)
+            .map_err(|_| CorruptCheckpoint::DamagedPage { kind, index })?;
+        self.chronicle = Arc::new(chronicle);
+        Ok(())
     }
 
     /// Adds a page.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Vector6};
 
 use crate::agent::Agent;
+use crate::chronicle::Chronicle;
 use crate::estimation::Estimator;
 use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
@@ -33,6 +34,7 @@ pub(super) struct Fold<'a> {
     pub(super) landmarks: &'a mut LandmarkMap,
     pub(super) percepts: &'a mut PerceptMap,
     pub(super) estimator: &'a mut Estimator,
+    pub(super) chronicle: &'a mut Chronicle,
     pub(super) names: &'a BTreeMap<Label, AgentId>,
     pub(super) agent_id: AgentId,
     pub(super) agent: &'a mut Agent,
@@ -76,6 +78,7 @@ impl Fold<'_> {
         if before.is_some() {
             let sd = Vector6::from(RESTART_SD);
             self.estimator.restart(self.agent_id.0, &sd);
+            self.chronicle.restart(self.agent_id.0, &sd);
         }
         self.emit(EventKind::SessionStarted { session });
     }
@@ -119,6 +122,7 @@ impl Fold<'_> {
     fn start_pose(&mut self, start: &StartPose) {
         self.end_trip(TripEnd::StartPose);
         self.estimator.start_pose(self.agent_id.0, start);
+        self.chronicle.start_pose(&self.moment(), start);
         *self.framed = true;
         self.stand();
     }
@@ -139,6 +143,7 @@ impl Fold<'_> {
         if !*self.framed {
             *self.framed = true;
             self.estimator.found(self.agent_id.0);
+            self.chronicle.found(self.agent_id.0);
             self.agent.placed = true;
         }
     }

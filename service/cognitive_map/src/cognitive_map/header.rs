@@ -69,6 +69,7 @@ pub(super) fn digest_of(settings: &Settings) -> Digest {
         trip_gap_s,
         places_max,
         legs_max,
+        anchors_max,
         strength_half_life_samples,
     } = &**settings;
     let mut out = StateWriter::default();
@@ -97,7 +98,12 @@ pub(super) fn digest_of(settings: &Settings) -> Digest {
     ] {
         value.write(&mut out);
     }
-    for value in [places_max, legs_max, strength_half_life_samples] {
+    for value in [
+        places_max,
+        legs_max,
+        anchors_max,
+        strength_half_life_samples,
+    ] {
         value.write(&mut out);
     }
     out.digest()

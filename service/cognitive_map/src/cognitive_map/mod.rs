@@ -8,6 +8,7 @@ mod header;
 mod motion;
 mod predict;
 mod read;
+mod remember;
 mod see;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ pub use checkpoint::{CheckpointPage, CorruptCheckpoint};
 pub use predict::{Predicted, Prediction};
 
 use crate::agent::Agent;
+use crate::chronicle::{Chronicle, ChronicleSettings};
 use crate::estimation::{Estimator, Parameters};
 use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
@@ -53,6 +55,8 @@ pub struct CognitiveMap {
     names: Arc<BTreeMap<Label, AgentId>>,
     /// Where agents and the landmarks seen lately are, jointly.
     estimator: Arc<Estimator>,
+    /// What they did and saw, so that the past can be smoothed.
+    chronicle: Arc<Chronicle>,
     places: PlaceMap,
     trips: TripMap,
     landmarks: LandmarkMap,
@@ -66,6 +70,7 @@ impl CognitiveMap {
             modules: Arc::new(GridModules::new(&settings)),
             places: PlaceMap::new(&settings),
             estimator: Arc::new(Estimator::new(Parameters::of(&settings))),
+            chronicle: Arc::new(Chronicle::new(ChronicleSettings::of(&settings))),
             names: Arc::default(),
             settings: Arc::new(settings),
             revision: 0,
@@ -95,6 +100,9 @@ impl CognitiveMap {
                         .entry(name.clone())
                         .or_insert(*agent);
                     Arc::make_mut(&mut self.estimator).enrol();
+                    let chronicle = Arc::make_mut(&mut self.chronicle);
+                    chronicle.set_revision(self.revision);
+                    chronicle.enrol();
                     events.push(Event {
                         agent: *agent,
                         stamp_ns: 0,
@@ -157,6 +165,8 @@ impl CognitiveMap {
         }
         self.revision += 1;
         let agent = self.agents.get_mut(index, self.revision)?;
+        let chronicle = Arc::make_mut(&mut self.chronicle);
+        chronicle.set_revision(self.revision);
         Some(Fold {
             settings: &self.settings,
             modules: &self.modules,
@@ -167,6 +177,7 @@ impl CognitiveMap {
             trips: &mut self.trips,
             landmarks: &mut self.landmarks,
             estimator: Arc::make_mut(&mut self.estimator),
+            chronicle,
             names: &self.names,
             percepts: &mut self.percepts,
             agent_id,

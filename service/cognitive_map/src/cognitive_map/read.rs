@@ -48,6 +48,7 @@ impl CognitiveMap {
         self.landmarks.landmarks().write_digests(&mut out);
         self.percepts.write_digests(&mut out);
         self.estimator.write(&mut out);
+        self.chronicle.digest().0.write(&mut out);
         out.digest()
     }
 
@@ -81,10 +82,10 @@ impl CognitiveMap {
         self.places.bytes()
     }
 
-    /// Bytes of memory that places, trips and what is remembered of percepts take, reserved ones
-    /// included: all that budgets bound.
+    /// Bytes of memory that places, trips, what is remembered of percepts and what can be smoothed take,
+    /// reserved ones included: all that budgets bound.
     pub fn memory_bytes(&self) -> usize {
-        self.places.bytes() + self.trips.bytes() + self.percepts.bytes()
+        self.places.bytes() + self.trips.bytes() + self.percepts.bytes() + self.chronicle.bytes()
     }
 
     /// Number of places ever recruited, forgotten ones included: the identifier of the next one.

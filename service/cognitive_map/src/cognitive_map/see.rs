@@ -30,6 +30,12 @@ impl Fold<'_> {
         let taken = self
             .estimator
             .landmark(agent, self.stamp_ns, label, relation);
+        if taken.accepted {
+            let moment = self.moment();
+            self.chronicle
+                .landmark(&moment, label, relation, &taken.variance);
+        }
+        self.remember_what_was_settled();
         if taken.accepted
             && self.agent.placed
             && let Some(landmark) = self.landmarks.by_label(label.as_str())
@@ -43,6 +49,7 @@ impl Fold<'_> {
         if let Some(target) = self.names.get(name) {
             let (agent, stamp_ns) = (self.agent_id.0, self.stamp_ns);
             self.estimator.sighting(agent, stamp_ns, target.0, relation);
+            self.remember_what_was_settled();
         }
     }
 

@@ -9,7 +9,6 @@ use super::frame::{Frame, MEMBERS_MAX};
 use super::innovation::seen_at;
 use super::outcome::{Merged, Settled};
 use super::sight::{Glance, Verdict};
-use super::state::normalised;
 use super::tie::{Pair, Tie, tie};
 use crate::sample::{Label, Relation};
 
@@ -60,7 +59,7 @@ impl Estimator {
             observer: agent,
             target,
             stamp_ns,
-            relation: normalised(relation),
+            relation: *relation,
         });
         self.settle();
     }

@@ -187,8 +187,8 @@ fn only_what_changed_is_saved_again() {
         .checkpoint(saved)
         .map(|page| (page.kind, page.index))
         .collect();
-    let expected = [(0, 0), (1, 0), (9, 0)];
-    assert_eq!(kinds, expected, "header, agent's page, joint estimate");
+    let expected = [(0, 0), (1, 0), (9, 0), (10, 0)];
+    assert_eq!(kinds, expected, "header, agent's page, estimate, chronicle");
 }
 
 #[test]

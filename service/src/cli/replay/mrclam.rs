@@ -20,7 +20,7 @@ use crate::cli::output;
 pub(in crate::cli) struct MrclamArgs {
     /// Directory of the data set.
     directory: PathBuf,
-    /// Write `robotN.causal.tum` for each robot into this directory.
+    /// Write `robotN.causal.tum` and `robotN.refined.tum` for each robot into this directory.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Send the samples through Zenoh to the service at this endpoint, and read the result over
@@ -122,10 +122,12 @@ fn write_trajectories(directory: &Path, outcome: &Outcome) -> anyhow::Result<()>
     std::fs::create_dir_all(directory)
         .with_context(|| format!("create {}", directory.display()))?;
     for (robot, came_out) in &outcome.robots {
-        let file = directory.join(format!("{robot}.causal.tum"));
-        let poses: Vec<_> = came_out.causal.iter().map(pose).collect();
-        std::fs::write(&file, write_tum(&poses))
-            .with_context(|| format!("write {}", file.display()))?;
+        for (kind, rows) in [("causal", &came_out.causal), ("refined", &came_out.refined)] {
+            let file = directory.join(format!("{robot}.{kind}.tum"));
+            let poses: Vec<_> = rows.iter().map(pose).collect();
+            std::fs::write(&file, write_tum(&poses))
+                .with_context(|| format!("write {}", file.display()))?;
+        }
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use cogmap_experiments::metrics::{Alignment, Trajectory, ate_rmse_m, dead_reckoned};
 use cogmap_experiments::mrclam::{Mrclam, PlanarPose, RobotLog};
 use cogmap_experiments::reading::robot_name;
+use cogmap_proto::StampedPose;
 use nalgebra::Vector2;
 use serde::Serialize;
 
@@ -25,12 +26,14 @@ pub(super) struct Report {
     dead_reckoning_aligned_ate_rmse_m: f64,
     causal_ate_rmse_m: Option<f64>,
     causal_aligned_ate_rmse_m: Option<f64>,
+    refined_ate_rmse_m: Option<f64>,
+    refined_aligned_ate_rmse_m: Option<f64>,
     /// Sightings of landmarks and of robots that counted, and that were refused.
     accepted: u64,
     rejected: u64,
     consistency: Consistency,
-    #[serde(flatten)]
-    timing: Option<Timing>,
+    /// Of a replay straight into the core: times that samples took \[ms\].
+    update_ms: Option<Timing>,
     /// Recorded time over the time that it took in the core.
     real_time_factor: Option<f64>,
     robots: BTreeMap<String, RobotReport>,
@@ -45,6 +48,8 @@ struct RobotReport {
     dead_reckoning_aligned_ate_rmse_m: f64,
     causal_ate_rmse_m: Option<f64>,
     causal_aligned_ate_rmse_m: Option<f64>,
+    refined_ate_rmse_m: Option<f64>,
+    refined_aligned_ate_rmse_m: Option<f64>,
     /// When it found its place \[s\] after the start.
     placed_after_s: Option<f64>,
     accepted: u64,
@@ -92,13 +97,15 @@ pub(super) fn report(
         .unwrap_or(0.0),
         causal_ate_rmse_m: of(|robot| robot.causal_ate_rmse_m),
         causal_aligned_ate_rmse_m: of(|robot| robot.causal_aligned_ate_rmse_m),
+        refined_ate_rmse_m: of(|robot| robot.refined_ate_rmse_m),
+        refined_aligned_ate_rmse_m: of(|robot| robot.refined_aligned_ate_rmse_m),
         accepted: robots.values().map(|robot| robot.accepted).sum(),
         rejected: robots.values().map(|robot| robot.rejected).sum(),
         consistency: Consistency {
             nees_mean: of(|robot| robot.consistency.nees_mean),
             nis_mean: of(|robot| robot.consistency.nis_mean),
         },
-        timing: outcome.timing,
+        update_ms: outcome.timing,
         real_time_factor: outcome.timing.map(|timing| span_s / timing.total_s),
         robots,
     })
@@ -116,23 +123,26 @@ fn robot_report(
     let truth = Trajectory::from_poses(&truth)?;
     let reckoned = Trajectory::from_poses(&dead_reckoned(&set.robot_readings(number))?)?;
     let error = |estimate: &Trajectory, alignment| ate_rmse_m(estimate, &truth, span, alignment);
-    let causal: Vec<_> = came_out.causal.iter().map(pose).collect();
-    let errors = if let Some(first) = causal.first() {
-        let placed_after_s = (first.stamp_ns - span.start_ns) as f64 * 1e-9;
-        let causal = Trajectory::from_poses(&causal)?;
-        let plain = error(&causal, Alignment::None)?;
-        let aligned = error(&causal, Alignment::Planar)?;
-        Some((plain, aligned, placed_after_s))
-    } else {
-        None
+    // Plain and aligned; none of a robot that never found its place.
+    let errors = |rows: &[StampedPose]| -> anyhow::Result<Option<(f64, f64)>> {
+        if rows.is_empty() {
+            return Ok(None);
+        }
+        let estimate = Trajectory::from_poses(&rows.iter().map(pose).collect::<Vec<_>>())?;
+        let plain = error(&estimate, Alignment::None)?;
+        Ok(Some((plain, error(&estimate, Alignment::Planar)?)))
     };
+    let (causal, refined) = (errors(&came_out.causal)?, errors(&came_out.refined)?);
+    let first = came_out.causal.first();
     Ok(RobotReport {
         samples,
         dead_reckoning_ate_rmse_m: error(&reckoned, Alignment::None)?,
         dead_reckoning_aligned_ate_rmse_m: error(&reckoned, Alignment::Planar)?,
-        causal_ate_rmse_m: errors.map(|(plain, _, _)| plain),
-        causal_aligned_ate_rmse_m: errors.map(|(_, aligned, _)| aligned),
-        placed_after_s: errors.map(|(_, _, placed_after_s)| placed_after_s),
+        causal_ate_rmse_m: causal.map(|(plain, _)| plain),
+        causal_aligned_ate_rmse_m: causal.map(|(_, aligned)| aligned),
+        refined_ate_rmse_m: refined.map(|(plain, _)| plain),
+        refined_aligned_ate_rmse_m: refined.map(|(_, aligned)| aligned),
+        placed_after_s: first.map(|first| (first.stamp_ns - span.start_ns) as f64 * 1e-9),
         accepted: came_out.evidence.accepted,
         rejected: came_out.evidence.refused,
         consistency: Consistency {
@@ -172,25 +182,33 @@ impl Report {
             Some(value) => format!("{value:7.3}"),
             None => "  never".to_owned(),
         };
-        output::line("robot      samples   dead reckoning [m]    causal [m]")?;
-        output::line("                     plain    aligned       plain    aligned")?;
+        output::line(
+            "robot      samples   dead reckoning [m]    causal [m]            refined [m]",
+        )?;
+        output::line(
+            "                     plain    aligned       plain    aligned      plain    aligned",
+        )?;
         for (name, robot) in &self.robots {
             output::line(&format!(
-                "{name:<9} {:>8}   {:>7.3}  {:>7.3}     {}  {}",
+                "{name:<9} {:>8}   {:>7.3}  {:>7.3}     {}  {}    {}  {}",
                 robot.samples,
                 robot.dead_reckoning_ate_rmse_m,
                 robot.dead_reckoning_aligned_ate_rmse_m,
                 metres(robot.causal_ate_rmse_m),
                 metres(robot.causal_aligned_ate_rmse_m),
+                metres(robot.refined_ate_rmse_m),
+                metres(robot.refined_aligned_ate_rmse_m),
             ))?;
         }
         output::line(&format!(
-            "mean      {:>8}   {:>7.3}  {:>7.3}     {}  {}",
+            "mean      {:>8}   {:>7.3}  {:>7.3}     {}  {}    {}  {}",
             self.samples,
             self.dead_reckoning_ate_rmse_m,
             self.dead_reckoning_aligned_ate_rmse_m,
             metres(self.causal_ate_rmse_m),
             metres(self.causal_aligned_ate_rmse_m),
+            metres(self.refined_ate_rmse_m),
+            metres(self.refined_aligned_ate_rmse_m),
         ))?;
         output::line(&format!(
             "{} sightings accepted, {} refused; squared errors over expected: {} of poses, {} of sightings",
@@ -199,10 +217,12 @@ impl Report {
             ratio(self.consistency.nees_mean),
             ratio(self.consistency.nis_mean),
         ))?;
-        if let (Some(timing), Some(factor)) = (self.timing, self.real_time_factor) {
+        if let (Some(timing), Some(factor)) = (self.update_ms, self.real_time_factor) {
             output::line(&format!(
                 "{factor:.0} times real time; a sample p50 {:.1} us, p99 {:.1} us, max {:.1} ms",
-                timing.p50_us, timing.p99_us, timing.max_ms,
+                timing.p50 * 1e3,
+                timing.p99 * 1e3,
+                timing.max,
             ))?;
         }
         output::line(&format!(

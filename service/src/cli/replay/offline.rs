@@ -9,7 +9,8 @@ use cognitive_map::{Agent, CognitiveMap, Record};
 use super::mrclam::TeamBatch;
 use super::outcome::{Outcome, RobotOutcome, Timing};
 use crate::engine::{
-    Entry, Recorder, core_settings, evidence, records_of, stamped, trajectory_interval_ns,
+    Entry, Recorder, core_settings, evidence, records_of, refined_trajectories, stamped,
+    trajectory_interval_ns,
 };
 
 /// Time between two beliefs that are kept \[ns\].
@@ -68,9 +69,11 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
             },
         );
     }
+    let mut refined = refined_trajectories(&map);
     let finish = |(name, mut robot): (&str, Robot)| {
         let rest = robot.recorder.rows();
         robot.outcome.causal.extend_from_slice(rest);
+        robot.outcome.refined = refined.remove(name).unwrap_or_default();
         let agent = map.agent(cognitive_map::AgentId(robot.agent));
         robot.outcome.evidence = agent.map(evidence).unwrap_or_default();
         (name.to_owned(), robot.outcome)

@@ -53,6 +53,7 @@ pub(super) fn replay(
     for agent in api.agents(space)? {
         let robot = RobotOutcome {
             causal: api.trajectory(space, &agent.name)?.poses,
+            refined: api.refined_trajectory(space, &agent.name)?.poses,
             evidence: api.agent(space, &agent.name)?.evidence,
             beliefs: Vec::new(),
         };

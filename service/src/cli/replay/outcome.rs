@@ -25,18 +25,22 @@ pub(super) struct Outcome {
 pub(super) struct RobotOutcome {
     /// Each pose as it was known when its sample was applied.
     pub(super) causal: Vec<StampedPose>,
+    /// Its past by all that was seen until the end; between two poses it moved evenly.
+    pub(super) refined: Vec<StampedPose>,
     pub(super) evidence: Evidence,
     /// Of a replay straight into the core: poses in the map with the covariance that they had, a second
     /// apart.
     pub(super) beliefs: Vec<(StampedPose, PoseCovariance)>,
 }
 
-/// Times that samples took in the core.
+/// Times that samples took in the core \[ms\].
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Timing {
-    pub(super) p50_us: f64,
-    pub(super) p99_us: f64,
-    pub(super) max_ms: f64,
+    pub(super) mean: f64,
+    pub(super) p50: f64,
+    pub(super) p99: f64,
+    pub(super) max: f64,
+    #[serde(skip)]
     pub(super) total_s: f64,
 }
 
@@ -53,11 +57,13 @@ impl Timing {
             let index = (part * (times_s.len().saturating_sub(1)) as f64) as usize;
             times_s.get(index).copied()
         };
+        let total_s: f64 = times_s.iter().sum();
         Some(Self {
-            p50_us: quantile(0.5)? * 1e6,
-            p99_us: quantile(0.99)? * 1e6,
-            max_ms: quantile(1.0)? * 1e3,
-            total_s: times_s.iter().sum(),
+            mean: total_s / times_s.len() as f64 * 1e3,
+            p50: quantile(0.5)? * 1e3,
+            p99: quantile(0.99)? * 1e3,
+            max: quantile(1.0)? * 1e3,
+            total_s,
         })
     }
 }

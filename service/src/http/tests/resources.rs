@@ -181,7 +181,8 @@ async fn a_trajectory_comes_in_pages_as_json_and_as_tum() {
     }
     assert_eq!(
         stamps,
-        (0..50).map(|step| step * 100_000_000).collect::<Vec<i64>>()
+        (0..52).map(|step| step * 100_000_000).collect::<Vec<i64>>(),
+        "fifty motions, and two sightings after them"
     );
 
     let tum = rig
@@ -349,7 +350,7 @@ async fn exports_hold_everything() {
     let tum = rig
         .get("/v1/spaces/lab/export?format=tum&agent=rover")
         .await;
-    assert_eq!(tum.text().lines().count(), 50);
+    assert_eq!(tum.text().lines().count(), 52);
 }
 
 #[tokio::test]

@@ -6,8 +6,6 @@
 mod lists;
 mod relation;
 
-pub(super) use relation::normalised;
-
 use std::sync::Arc;
 
 use lists::{read_all, read_count, read_map, write_all, write_count, write_map, write_pairs};

@@ -1,5 +1,7 @@
 //! The bytes of where a target was seen.
 
+use nalgebra::Isometry3;
+
 use crate::sample::{PoseNoise, RangeBearing, Relation, RelativePose, RelativePosition};
 use crate::state::{CorruptState, State, StateReader, StateWriter};
 
@@ -35,30 +37,15 @@ impl State for Relation {
                 RangeBearing::new(range, azimuth, elevation, sd[0], sd[1]).map(Self::RangeBearing)
             }
             2 => {
-                let (at, turn) = <([f64; 3], [f64; 4])>::read(input)?;
+                let pose = Isometry3::read(input)?;
+                let (at, turn) = (pose.translation.vector, pose.rotation.coords);
                 let (linear, angular) = <([f64; 3], [f64; 3])>::read(input)?;
                 PoseNoise::new(linear, angular)
-                    .and_then(|noise| RelativePose::new(at, turn, noise))
-                    .map(Self::Pose)
+                    .and_then(|noise| RelativePose::new(at.into(), turn.into(), noise))
+                    .map(|checked| Self::Pose(checked.exactly(pose)))
             }
             _ => return Err(CorruptState::Invalid),
         };
         relation.map_err(|_| CorruptState::Invalid)
     }
-}
-
-/// A relation that comes back from its bytes to the last bit: quaternions are normalised anew there.
-pub(in crate::estimation) fn normalised(relation: &Relation) -> Relation {
-    let Relation::Pose(seen) = relation else {
-        return *relation;
-    };
-    let mut seen = *seen;
-    for _ in 0..8 {
-        let (shift, turn) = (seen.pose().translation.vector, seen.pose().rotation.coords);
-        match RelativePose::new(shift.into(), turn.into(), *seen.noise()) {
-            Ok(next) if next != seen => seen = next,
-            _ => break,
-        }
-    }
-    Relation::Pose(seen)
 }

@@ -107,7 +107,7 @@ proptest! {
         }
         let written = bytes(&estimator);
         let mut twin = read(&written).unwrap();
-        prop_assert_eq!(&bytes(&twin), &written);
+        prop_assert!(bytes(&twin) == written, "it is read back as it was written");
         let snapshot = estimator.clone();
         for (step, call) in (before.len()..).zip(&after) {
             apply(&mut estimator, step, call);
@@ -115,8 +115,8 @@ proptest! {
             prop_assert_eq!(estimator.take_settled(), twin.take_settled());
             prop_assert_eq!(estimator.take_merged(), twin.take_merged());
         }
-        prop_assert_eq!(bytes(&twin), bytes(&estimator));
-        prop_assert_eq!(bytes(&snapshot), written);
+        prop_assert!(bytes(&twin) == bytes(&estimator), "they go on alike");
+        prop_assert!(bytes(&snapshot) == written, "a snapshot stays");
     }
 
     /// Damage is refused, or gives an estimate that goes on without a panic.
@@ -146,7 +146,7 @@ proptest! {
 
     #[test]
     fn a_relation_comes_back_to_the_last_bit(kind in 0u8..3, numbers in prop::array::uniform3(-1.0..1.0_f64)) {
-        let waiting = normalised(&relation(kind, numbers));
+        let waiting = relation(kind, numbers);
         let mut out = StateWriter::default();
         waiting.write(&mut out);
         let written = out.into_bytes();

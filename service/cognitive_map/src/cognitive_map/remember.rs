@@ -1,0 +1,55 @@
+//! What is kept of the past, so that it can be smoothed.
+
+use super::CognitiveMap;
+use super::fold::Fold;
+use crate::chronicle::{Moment, Refined};
+
+/// Number of the frame that is the map's.
+const MAP: usize = 0;
+
+impl Fold<'_> {
+    /// The agent at the sample that is being applied.
+    pub(super) fn moment(&self) -> Moment {
+        let agent = self.agent_id.0;
+        let pose = self.estimator.in_frame(agent);
+        Moment {
+            agent,
+            seq: self.agent.next_seq.saturating_sub(1),
+            stamp_ns: self.stamp_ns,
+            pose: *pose.unwrap_or(self.agent.body.in_map()),
+        }
+    }
+
+    /// Remembers the sightings of agents that counted with the latest call of the estimate, and the frames
+    /// that it laid into others.
+    pub(super) fn remember_what_was_settled(&mut self) {
+        for settled in self.estimator.take_settled() {
+            if settled.accepted {
+                self.chronicle.sighted(
+                    settled.observer,
+                    settled.target,
+                    settled.stamp_ns,
+                    &settled.relation,
+                    &settled.variance.fixed_rows::<3>(0).into_owned(),
+                );
+            }
+        }
+        for merged in self.estimator.take_merged() {
+            for &agent in &merged.agents {
+                if merged.into == MAP {
+                    self.chronicle.placed(agent, &merged.pose);
+                } else {
+                    self.chronicle.carried(agent, &merged.pose);
+                }
+            }
+        }
+    }
+}
+
+impl CognitiveMap {
+    /// Where all agents were and all landmarks are, by everything that was seen until now: the whole map
+    /// relaxed. A function of the map alone; takes time in proportion to what is remembered.
+    pub fn refined(&self) -> Refined {
+        self.chronicle.refine()
+    }
+}
