@@ -85,7 +85,7 @@ fn a_trajectory_is_read_to_its_last_page() {
     let stamps: Vec<_> = whole.poses.iter().map(|pose| pose.stamp_ns).collect();
     assert_eq!((stamps, whole.next_from_ns), (vec![1, 2, 3, 4, 5], None));
     let asked: Vec<_> = seen.iter().map(|seen| seen.head[0].clone()).collect();
-    let path = "GET /v1/spaces/demo/agents/ada/trajectory?limit=1000";
+    let path = "GET /v1/spaces/demo/agents/ada/trajectory?kind=causal&limit=1000";
     assert_eq!(
         asked,
         [

@@ -3,7 +3,7 @@
 use cognitive_map::{
     CognitiveMap, EventKind, RangeBearing, Relation, SampleBody, Settings, Sighting, Status, Target,
 };
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 use crate::journal::{Robot, label, motion, start_pose};
 
@@ -205,4 +205,46 @@ fn an_agent_whose_sightings_contradict_the_map_says_so_and_finds_back() {
         map.agent(driver.robot.id).unwrap().status(map.settings()),
         Status::Localized
     );
+}
+
+/// A robot is nudged on its way, and sees at the end what it saw at the start: then it is known better
+/// where it was on the way.
+#[test]
+fn what_is_seen_at_the_end_corrects_the_way() {
+    let mut map = new_map();
+    let mut driver = Driver::new(&mut map, at_start(), 1.0);
+    driver.start(&mut map);
+    driver.look_around(&mut map);
+    let mut way = Vec::new();
+    for step in 0..63 {
+        if step == 30 {
+            driver.truth.rotation *= UnitQuaternion::from_euler_angles(0.0, 0.0, 0.15);
+        }
+        driver.step(&mut map);
+        let causal = driver.robot.pose(&map).translation.vector;
+        let truth = driver.truth.translation.vector;
+        way.push((driver.robot.stamp_ns, truth, causal));
+    }
+    driver.look_around(&mut map);
+    let refined = map.refined();
+    let poses = &refined.agents[0].poses;
+    assert!(refined.agents[0].is_in_map && poses.len() > 50);
+    let (mut causal_m, mut refined_m) = (0.0f64, 0.0f64);
+    for (stamp_ns, truth, causal) in way {
+        let Some(pose) = poses.iter().find(|pose| pose.stamp_ns == stamp_ns) else {
+            continue;
+        };
+        causal_m = causal_m.max((causal - truth).norm());
+        refined_m = refined_m.max((pose.pose.translation.vector - truth).norm());
+    }
+    assert!(
+        causal_m > 0.2 && refined_m < causal_m / 3.0,
+        "{causal_m} m, refined {refined_m} m"
+    );
+    let lamp = refined
+        .landmarks
+        .iter()
+        .find(|landmark| landmark.label.as_str() == "lamp");
+    let off = lamp.unwrap().position - Point3::from(MARKS[4].1);
+    assert!(off.norm() < 0.05, "{off}");
 }
