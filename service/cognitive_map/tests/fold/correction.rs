@@ -228,7 +228,7 @@ fn what_is_seen_at_the_end_corrects_the_way() {
     driver.look_around(&mut map);
     let refined = map.refined();
     let poses = &refined.agents[0].poses;
-    assert!(refined.agents[0].is_in_map && poses.len() > 50);
+    assert!(refined.agents[0].is_in_map && poses.len() > 20);
     let (mut causal_m, mut refined_m) = (0.0f64, 0.0f64);
     for (stamp_ns, truth, causal) in way {
         let Some(pose) = poses.iter().find(|pose| pose.stamp_ns == stamp_ns) else {
