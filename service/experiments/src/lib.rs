@@ -12,6 +12,8 @@
 //! | [`mrclam`] | the UTIAS multi-robot data sets |
 //! | [`g2o`] | pose graphs |
 //! | [`tuc`] | the TUC data sets: odometry and place matches, many of them false |
+//! | [`victoria`] | Victoria Park, as text with odometry and sightings |
+//! | [`mapping`] | recordings through the experience map, causal and refined |
 //! | [`eval`] | the seed paper's experiments: protocols, measures, tables and figures |
 //! | [`metrics`] | the absolute trajectory error (ATE), alignment, dead reckoning |
 //! | [`tum`] | trajectories as text in the TUM format |
@@ -58,10 +60,12 @@
 
 pub mod eval;
 pub mod g2o;
+pub mod mapping;
 pub mod metrics;
 pub mod mrclam;
 pub mod reading;
 pub mod stamp;
 pub mod tuc;
 pub mod tum;
+pub mod victoria;
 pub mod world;

@@ -27,6 +27,10 @@ impl Equations for NormalEquations<'_> {
         &self.map.links_of[variable as usize]
     }
 
+    fn ties(&self, link: u32) -> bool {
+        self.map.links[link as usize].is_on
+    }
+
     fn add(&self, link: u32, front: &mut Front<'_>) {
         let Some((from, to, blocks)) = self.blocks(link) else {
             return;

@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3};
 use super::kernel::Kernel;
 use super::link::{Link, LinkId};
 use super::node::{Freedom, Node, PointId, PoseId};
+use crate::digest::Digest;
 
 /// The graph of lived places and landmarks, with what was measured between them.
 ///
@@ -73,25 +74,17 @@ impl ExperienceMap {
     /// It names a node that is not of this map, or one node twice.
     pub fn add_link(&mut self, link: Link, kernel: Kernel) -> Result<LinkId, InvalidLink> {
         let (from, to) = link.nodes();
-        if from.max(to) as usize >= self.nodes.len() {
-            return Err(InvalidLink::UnknownNode);
-        }
-        let joins_two = matches!(link, Link::Between { .. } | Link::Sighting { .. });
-        if joins_two && from == to {
-            return Err(InvalidLink::Loop);
-        }
-        let id = number(self.links.len());
-        self.links_of[from as usize].push((id, to));
-        if joins_two {
-            self.links_of[to as usize].push((id, from));
-        }
+        let id = self.insert(link, kernel, true)?;
         self.touched.extend([from, to]);
-        self.links.push(LinkSlot {
-            link,
-            kernel,
-            is_on: true,
-        });
-        Ok(LinkId(id))
+        Ok(id)
+    }
+
+    /// Adds a link that says nothing until it is switched on. Nothing is computed anew for it.
+    ///
+    /// # Errors
+    /// As [`add_link`](Self::add_link).
+    pub fn add_silent_link(&mut self, link: Link, kernel: Kernel) -> Result<LinkId, InvalidLink> {
+        self.insert(link, kernel, false)
     }
 
     /// Makes a link say nothing.
@@ -139,6 +132,24 @@ impl ExperienceMap {
         )
     }
 
+    /// Whether a link counts.
+    pub fn is_on(&self, link: LinkId) -> bool {
+        self.links[link.0 as usize].is_on
+    }
+
+    /// Digest of where all nodes are and of which links count: equal digests, equal maps, to the last bit.
+    pub fn digest(&self) -> Digest {
+        let mut bytes = Vec::with_capacity(self.nodes.len() * 56 + self.links.len());
+        for node in &self.nodes {
+            let coordinates = node.pose.translation.vector.iter();
+            for number in coordinates.chain(node.pose.rotation.coords.iter()) {
+                bytes.extend(number.to_le_bytes());
+            }
+        }
+        bytes.extend(self.links.iter().map(|slot| u8::from(slot.is_on)));
+        Digest::of(&bytes)
+    }
+
     /// χ² with the nodes at these poses.
     pub(super) fn cost<'a>(&self, pose: impl Fn(u32) -> &'a Isometry3<f64>, widening: f64) -> f64 {
         let mut sum = 0.0;
@@ -153,6 +164,28 @@ impl ExperienceMap {
     /// Nodes whose links have changed since the last call.
     pub(super) fn take_touched(&mut self) -> Vec<u32> {
         std::mem::take(&mut self.touched)
+    }
+
+    fn insert(&mut self, link: Link, kernel: Kernel, is_on: bool) -> Result<LinkId, InvalidLink> {
+        let (from, to) = link.nodes();
+        if from.max(to) as usize >= self.nodes.len() {
+            return Err(InvalidLink::UnknownNode);
+        }
+        let joins_two = matches!(link, Link::Between { .. } | Link::Sighting { .. });
+        if joins_two && from == to {
+            return Err(InvalidLink::Loop);
+        }
+        let id = number(self.links.len());
+        self.links_of[from as usize].push((id, to));
+        if joins_two {
+            self.links_of[to as usize].push((id, from));
+        }
+        self.links.push(LinkSlot {
+            link,
+            kernel,
+            is_on,
+        });
+        Ok(LinkId(id))
     }
 
     fn switch(&mut self, link: LinkId, is_on: bool) {

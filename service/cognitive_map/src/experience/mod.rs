@@ -5,6 +5,7 @@ mod elimination;
 mod equations;
 mod incremental;
 mod information;
+mod innovation;
 mod kernel;
 mod linearisation;
 mod link;
@@ -16,6 +17,7 @@ mod rotation_first;
 
 pub use incremental::{IncrementalRelaxation, IncrementalSettings, Updated};
 pub use information::{InvalidInformation, PoseInformation, PositionInformation};
+pub use innovation::{ExpectedPose, ExpectedPosition, Innovation};
 pub use kernel::{InvalidScale, Kernel, Scale};
 pub use link::{Link, LinkId, SightingTarget};
 pub use map::{ExperienceMap, InvalidLink};

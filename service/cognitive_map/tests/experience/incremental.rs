@@ -1,9 +1,10 @@
 //! Relaxation as the map grows.
 
 use cognitive_map::experience::{
-    ExperienceMap, Freedom, IncrementalRelaxation, IncrementalSettings, Kernel, LinkId, PoseId,
-    RelaxationSettings, Start,
+    ExperienceMap, Freedom, IncrementalRelaxation, IncrementalSettings, Kernel, Link, LinkId,
+    PoseId, RelaxationSettings, Start,
 };
+use nalgebra::Isometry3;
 
 use crate::worlds::{ROUND, Rounds, distance};
 
@@ -144,4 +145,43 @@ fn a_map_that_was_relaxed_as_a_whole_can_grow_on() {
     live.update(&mut map);
     let batch = relaxed(map.clone(), &nodes);
     assert!(distance(&map, &nodes, &batch) < 1e-6);
+}
+
+/// A link that says nothing may join anything, and the map neither moves nor gets denser; once it is switched on it counts as any
+/// other.
+#[test]
+fn a_silent_link_costs_nothing_until_it_is_switched_on() {
+    let world = Rounds::new(61, Freedom::Planar, 0.05);
+    let (mut map, nodes) = world.map(&world.dead_reckoned());
+    let (mut quiet, mut heard) = (map.clone(), map.clone());
+    let false_link = Link::Between {
+        from: nodes[3],
+        to: nodes[40],
+        transform: Isometry3::identity(),
+        information: Rounds::information(),
+    };
+    let silent = quiet
+        .add_silent_link(false_link.clone(), Kernel::Gaussian)
+        .unwrap();
+    heard.add_link(false_link, Kernel::Gaussian).unwrap();
+    assert!(!quiet.is_on(silent) && quiet.digest() != map.digest());
+    let relax = |map: &mut ExperienceMap| {
+        let mut live = IncrementalRelaxation::new(strict());
+        live.update(map);
+        live
+    };
+    relax(&mut map);
+    let mut live = relax(&mut quiet);
+    relax(&mut heard);
+    let places = |map: &ExperienceMap| {
+        nodes
+            .iter()
+            .map(|&node| *map.pose(node))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(places(&quiet), places(&map), "to the last bit");
+    quiet.switch_on(silent);
+    live.update(&mut quiet);
+    assert!(distance(&quiet, &nodes, &places(&heard)) < 1e-3);
+    assert!(distance(&map, &nodes, &places(&heard)) > 0.1);
 }

@@ -40,7 +40,7 @@ pub mod code;
 mod curve;
 mod environment;
 mod experiment;
-mod figure;
+pub(crate) mod figure;
 mod measure;
 mod protocol;
 mod quantity;

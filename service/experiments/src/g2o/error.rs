@@ -16,6 +16,9 @@ pub enum G2oError {
     /// There is no edge.
     #[error("the graph has no edge")]
     NoEdge,
+    /// A node is held that is nowhere.
+    #[error("the held node {0} has neither an entry nor an edge")]
+    HeldNowhere(u64),
 }
 
 /// What is wrong with a line.
@@ -53,6 +56,12 @@ pub enum LineReason {
     /// The information matrix makes no sense.
     #[error(transparent)]
     Information(#[from] InvalidInformation),
+    /// A node that was a pose before is a point here, or the other way round.
+    #[error("node {0} is a pose in one line and a point in another")]
+    PoseAndPoint(u64),
+    /// A sensor that has no entry before this line.
+    #[error("there is no sensor {0} before this line")]
+    UnknownSensor(u64),
     /// Planar and spatial entries in one file.
     #[error("the file was {so_far} before")]
     Mixed {

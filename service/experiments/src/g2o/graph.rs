@@ -1,15 +1,14 @@
 //! A pose graph in memory.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::path::Path;
 
-use cognitive_map::experience::{ExperienceMap, Freedom, Kernel, PoseId, PoseInformation};
-use nalgebra::Isometry3;
+use cognitive_map::experience::{Freedom, PoseInformation, PositionInformation};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::error::G2oError;
-use super::feed::Feed;
 use super::parse::parse;
 
 /// One measured relative pose.
@@ -32,12 +31,29 @@ impl Edge {
     }
 }
 
-/// The poses and edges of one file.
+/// One point as seen from a pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointEdge {
+    /// Id of the pose that saw.
+    pub pose: u64,
+    /// Id of the point.
+    pub point: u64,
+    /// The point in the frame of the pose \[m\].
+    pub position: Vector3<f64>,
+    /// Information in the axes of the pose.
+    pub information: PositionInformation,
+}
+
+/// The nodes and edges of one file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseGraph {
     pub(super) is_planar: bool,
     pub(super) poses: BTreeMap<u64, Isometry3<f64>>,
     pub(super) edges: Vec<Edge>,
+    /// Points that have an entry.
+    pub(super) points: BTreeMap<u64, Point3<f64>>,
+    pub(super) point_edges: Vec<PointEdge>,
+    pub(super) held: BTreeSet<u64>,
 }
 
 impl PoseGraph {
@@ -57,9 +73,7 @@ impl PoseGraph {
     /// A line is no entry of the format, or there is no edge.
     pub fn read(text: &str) -> Result<Self, G2oError> {
         let mut graph = parse(text)?;
-        graph
-            .edges
-            .sort_by_key(|edge| (edge.from.max(edge.to), edge.from.min(edge.to)));
+        graph.edges.sort_by_key(|edge| edge.from.max(edge.to));
         for edge in &graph.edges {
             let from = *graph
                 .poses
@@ -69,6 +83,12 @@ impl PoseGraph {
                 .poses
                 .entry(edge.to)
                 .or_insert_with(|| from * edge.transform);
+        }
+        for edge in &graph.point_edges {
+            graph
+                .poses
+                .entry(edge.pose)
+                .or_insert_with(Isometry3::identity);
         }
         Ok(graph)
     }
@@ -83,9 +103,15 @@ impl PoseGraph {
         &self.poses
     }
 
-    /// Edges, sorted by the later of their ends: the order in which a robot would have measured them.
+    /// Edges between poses, sorted by the later of their ends: the order in which a robot would have measured them. Those
+    /// with the same later end are in the order of the file.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
+    }
+
+    /// Sightings of points, in the order of the file.
+    pub fn point_edges(&self) -> &[PointEdge] {
+        &self.point_edges
     }
 
     /// How a node of this graph may move.
@@ -95,14 +121,5 @@ impl PoseGraph {
         } else {
             Freedom::Full
         }
-    }
-
-    /// The graph as an experience map, with every edge taken as right, the first pose held and the others where odometry
-    /// puts them; and the node of each id.
-    pub fn experience_map(&self) -> (ExperienceMap, BTreeMap<u64, PoseId>) {
-        let mut map = ExperienceMap::new();
-        let mut feed = Feed::new(self, Kernel::Gaussian);
-        while feed.step(&mut map).is_some() {}
-        (map, feed.nodes().clone())
     }
 }

@@ -1,13 +1,11 @@
 //! The format, and a graph whose optimum another solver has found.
 
-use cognitive_map::experience::{
-    ExperienceMap, IncrementalRelaxation, IncrementalSettings, InvalidInformation, Kernel,
-    RelaxationSettings, Start,
-};
+use cognitive_map::experience::InvalidInformation;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-use super::{Feed, G2oError, LineReason, PoseGraph};
+use super::{G2oError, LineReason, PoseGraph, Reference, ReferenceError};
+use crate::mapping::{CausalRun, Refined};
 
 /// A square walked twice, with errors that no arrangement explains.
 const PLANAR: &str = "\
@@ -31,18 +29,6 @@ EDGE_SE3:QUAT 0 2 1.3 0.9 0.2 0.20 0.10 0.40 0.88 10 0 0 0 0 0 10 0 0 0 0 10 0 0
 EDGE_SE3:QUAT 0 3 1.4 1.5 1.1 0.30 0.60 0.20 0.71 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
 EDGE_SE3:QUAT 3 1 0.2 -1.2 -0.9 -0.5 -0.3 0.1 0.80 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
 ";
-
-fn relaxed(text: &str, start: Start) -> (PoseGraph, ExperienceMap, f64) {
-    let graph = PoseGraph::read(text).unwrap();
-    let (mut map, _) = graph.experience_map();
-    let settings = RelaxationSettings {
-        start,
-        tolerance: 1e-14,
-        ..RelaxationSettings::default()
-    };
-    let chi_squared = map.relax(&settings).chi_squared;
-    (graph, map, chi_squared)
-}
 
 #[test]
 fn a_planar_graph_reads_as_the_format_says() {
@@ -114,6 +100,14 @@ fn a_bad_line_is_named() {
             "EDGE_SE2 3 4 0 0 0 1 0 0 -1 0 1",
             InvalidInformation::Negative.into(),
         ),
+        ("VERTEX_XY 3 0 0", LineReason::PoseAndPoint(3)),
+        (
+            "EDGE_SE2_XY 9 8 0 0 1 0",
+            LineReason::Columns {
+                expected: 8,
+                found: 7,
+            },
+        ),
         (
             "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1",
             LineReason::Mixed { so_far: "planar" },
@@ -133,6 +127,14 @@ fn a_bad_line_is_named() {
         Err(G2oError::Line { line: 1, reason })
     );
     assert_eq!(PoseGraph::read("VERTEX_SE2 0 0 0 0"), Err(G2oError::NoEdge));
+    let nowhere = format!("{PLANAR}FIX 0 42\n");
+    assert_eq!(PoseGraph::read(&nowhere), Err(G2oError::HeldNowhere(42)));
+    let reason = LineReason::UnknownSensor(3);
+    let unmounted = "EDGE_SE3_TRACKXYZ 0 9 3 1 2 3 1 0 0 1 0 1";
+    assert_eq!(
+        PoseGraph::read(unmounted),
+        Err(G2oError::Line { line: 1, reason })
+    );
 }
 
 /// χ² and positions at the optimum. The constants come from gtsam 4.3.0, with `gtsam.readG2o` on the texts above (each
@@ -163,41 +165,61 @@ fn the_optimum_is_that_of_gtsam() {
         (PLANAR, 2.213_048_826, &planar[..]),
         (SPATIAL, 23.050_535_008, &spatial[..]),
     ] {
-        for start in [Start::Here, Start::RotationFirst] {
-            let (graph, map, found) = relaxed(text, start);
-            let nodes = graph.experience_map().1;
-            assert!((found - chi_squared).abs() < 1e-4 * chi_squared, "{found}");
-            for (position, node) in positions.iter().zip(nodes.values().skip(1)) {
-                let error = (map.pose(*node).translation.vector - Vector3::from(*position)).norm();
-                assert!(error < 1e-4, "{error}");
-            }
+        let recording = PoseGraph::read(text).unwrap().recording();
+        let refined = Refined::of(&recording, None);
+        assert_eq!(refined.verdict.n_rejected(), 0);
+        let found = refined.chi_squared;
+        assert!((found - chi_squared).abs() < 1e-4 * chi_squared, "{found}");
+        for (position, pose) in positions.iter().zip(refined.poses.iter().skip(1)) {
+            let error = (pose.translation.vector - Vector3::from(*position)).norm();
+            assert!(error < 1e-3, "{error}");
         }
     }
 }
 
 #[test]
-fn a_graph_fed_node_by_node_ends_as_the_graph_taken_whole() {
+fn a_graph_that_arrives_pose_by_pose_ends_near_its_optimum() {
     for text in [PLANAR, SPATIAL] {
-        let (graph, _, chi_squared) = relaxed(text, Start::Here);
-        let settings = IncrementalSettings {
-            turn_max_rad: 1e-9,
-            shift_max_m: 1e-9,
-            steps_max: 20,
-            ..IncrementalSettings::default()
-        };
-        let (mut map, mut live) = (ExperienceMap::new(), IncrementalRelaxation::new(settings));
-        let mut feed = Feed::new(&graph, Kernel::Gaussian);
-        while feed.step(&mut map).is_some() {
-            live.update(&mut map);
-        }
-        assert_eq!(feed.links().len(), graph.edges().len());
-        assert!((map.chi_squared() - chi_squared).abs() < 1e-6 * chi_squared);
+        let recording = PoseGraph::read(text).unwrap().recording();
+        let mut run = CausalRun::new(&recording);
+        while run.step().is_some() {}
+        assert_eq!(run.verdict().n_rejected(), 0);
+        let optimum = Refined::of(&recording, None).chi_squared;
+        assert!(run.chi_squared() >= optimum * (1.0 - 1e-4));
+        assert!(
+            run.chi_squared() < 1.5 * optimum,
+            "{} {optimum}",
+            run.chi_squared()
+        );
     }
+}
+
+#[test]
+fn a_reference_is_read_by_id() {
+    let graph = PoseGraph::read(PLANAR).unwrap();
+    let reference = Reference::read("# id x y\n5 1 2\n0 0 0 3 # first\n77 1 1\n").unwrap();
+    let positions = reference.of_poses(&graph).unwrap();
+    assert_eq!(positions[0], Some(Vector3::new(0.0, 0.0, 3.0)));
+    assert_eq!(positions[1], None);
+    assert_eq!(positions[5], Some(Vector3::new(1.0, 2.0, 0.0)));
+    for bad in ["0 1", "0 1 x", "x 1 2", "0 1 2 3 4", "0 1 inf"] {
+        let text = format!("# id\n{bad}\n");
+        assert_eq!(
+            Reference::read(&text),
+            Err(ReferenceError::Line { line: 2 }),
+            "{bad}"
+        );
+    }
+    let elsewhere = Reference::read("99 0 0").unwrap();
+    assert_eq!(
+        elsewhere.of_poses(&graph),
+        Err(ReferenceError::NothingInCommon)
+    );
 }
 
 proptest! {
     #[test]
-    fn any_text_is_answered(text in "(EDGE_SE2|VERTEX_SE2|EDGE_SE3:QUAT|[-+0-9.e# \n]{0,9}){0,20}") {
+    fn any_text_is_answered(text in "(EDGE_SE2|VERTEX_SE2|EDGE_SE3:QUAT|EDGE_SE2_XY|FIX|[-+0-9.e# \n]{0,9}){0,20}") {
         let _ = PoseGraph::read(&text);
     }
 }

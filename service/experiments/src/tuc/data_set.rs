@@ -37,6 +37,7 @@ pub struct Tuc {
     steps: Vec<OdometryStep>,
     matches: Vec<Match>,
     truth: Trajectory,
+    start: Isometry3<f64>,
 }
 
 /// Why a data set cannot be read.
@@ -60,6 +61,14 @@ pub enum TucError {
         line: usize,
         /// What is wrong with it.
         reason: TucReason,
+    },
+    /// One of the texts is not that of a set.
+    #[error("{file}")]
+    Text {
+        /// Name of the file.
+        file: String,
+        /// Why.
+        source: Box<Self>,
     },
     /// There is no odometry.
     #[error("there is no odometry")]
@@ -103,10 +112,24 @@ impl Tuc {
     /// # Errors
     /// A file is absent or cannot be read, or as [`Tuc::read`].
     pub fn load(directory: &Path) -> Result<Self, TucError> {
-        Self::read(
-            &text_of(directory, "_Input.txt")?,
-            &text_of(directory, "_GT.txt")?,
-        )
+        let (input_file, input) = text_of(directory, "_Input.txt")?;
+        let (truth_file, truth) = text_of(directory, "_GT.txt")?;
+        let in_file = |file: &str| {
+            let file = file.to_owned();
+            |source| TucError::Text {
+                file,
+                source: Box::new(source),
+            }
+        };
+        let (steps, matches) = read_input(&input).map_err(in_file(&input_file))?;
+        let begin_ns = steps[0].stamp_ns;
+        let (truth, start) = read_truth(&truth, begin_ns).map_err(in_file(&truth_file))?;
+        Ok(Self {
+            steps,
+            matches,
+            truth,
+            start,
+        })
     }
 
     /// Reads the two texts.
@@ -114,35 +137,13 @@ impl Tuc {
     /// # Errors
     /// A line makes no sense, or there is no odometry or no truth.
     pub fn read(input: &str, truth: &str) -> Result<Self, TucError> {
-        let mut steps: Vec<OdometryStep> = Vec::new();
-        let mut matches = Vec::new();
-        for_each_line(input, |columns| {
-            match columns[0] {
-                "odom2" => steps.push(step(columns, steps.last().map(|step| step.stamp_ns))?),
-                "loop" => matches.push(place_match(columns)?),
-                _ => {}
-            }
-            Ok(())
-        })?;
-        if steps.is_empty() {
-            return Err(TucError::NoOdometry);
-        }
-        let mut positions = Vec::new();
-        for_each_line(truth, |columns| {
-            if columns[0] == "point2" {
-                require(columns, 4)?;
-                let position_m = Vector3::new(number(columns, 2)?, number(columns, 3)?, 0.0);
-                positions.push(StampedPosition {
-                    stamp_ns: parse_seconds(columns[1])?,
-                    position_m,
-                });
-            }
-            Ok(())
-        })?;
+        let (steps, matches) = read_input(input)?;
+        let (truth, start) = read_truth(truth, steps[0].stamp_ns)?;
         Ok(Self {
             steps,
             matches,
-            truth: Trajectory::new(positions)?,
+            truth,
+            start,
         })
     }
 
@@ -164,14 +165,68 @@ impl Tuc {
         &self.matches
     }
 
+    /// The robot's true pose at the first step.
+    pub fn start(&self) -> &Isometry3<f64> {
+        &self.start
+    }
+
     /// Where the robot was.
     pub fn truth(&self) -> &Trajectory {
         &self.truth
     }
 }
 
-/// The text of the first file with an ending, in the order of their names.
-fn text_of(directory: &Path, ending: &'static str) -> Result<String, TucError> {
+/// Odometry, at least one step of it, and matches.
+fn read_input(text: &str) -> Result<(Vec<OdometryStep>, Vec<Match>), TucError> {
+    let mut steps: Vec<OdometryStep> = Vec::new();
+    let mut matches = Vec::new();
+    for_each_line(text, |columns| {
+        match columns[0] {
+            "odom2" => steps.push(step(columns, steps.last().map(|step| step.stamp_ns))?),
+            "loop" => matches.push(place_match(columns)?),
+            _ => {}
+        }
+        Ok(())
+    })?;
+    if steps.is_empty() {
+        return Err(TucError::NoOdometry);
+    }
+    Ok((steps, matches))
+}
+
+/// The true positions, and the true pose at a moment.
+fn read_truth(text: &str, begin_ns: i64) -> Result<(Trajectory, Isometry3<f64>), TucError> {
+    let mut positions = Vec::new();
+    // The heading next to the moment; of two equally near ones the earlier.
+    let mut heading: Option<(u64, f64)> = None;
+    for_each_line(text, |columns| {
+        if columns[0] == "point2" {
+            require(columns, 4)?;
+            let position_m = Vector3::new(number(columns, 2)?, number(columns, 3)?, 0.0);
+            positions.push(StampedPosition {
+                stamp_ns: parse_seconds(columns[1])?,
+                position_m,
+            });
+        }
+        if columns[0] == "angle" {
+            require(columns, 3)?;
+            let apart = parse_seconds(columns[1])?.abs_diff(begin_ns);
+            if heading.is_none_or(|(nearest, _)| apart < nearest) {
+                heading = Some((apart, number(columns, 2)?));
+            }
+        }
+        Ok(())
+    })?;
+    let truth = Trajectory::new(positions)?;
+    let position = truth.at(begin_ns);
+    let position = position.unwrap_or_else(|| truth.positions()[0].position_m);
+    let turn = heading.map_or(0.0, |(_, heading)| heading);
+    let start = Isometry3::new(position, Vector3::z() * turn);
+    Ok((truth, start))
+}
+
+/// Name and text of the first file with an ending, in the order of their names.
+fn text_of(directory: &Path, ending: &'static str) -> Result<(String, String), TucError> {
     let io_error = |source| TucError::Io {
         file: directory.display().to_string(),
         source,
@@ -187,7 +242,10 @@ fn text_of(directory: &Path, ending: &'static str) -> Result<String, TucError> {
     paths.sort();
     let path = paths.first().ok_or(TucError::Absent(ending))?;
     let file = path.display().to_string();
-    fs::read_to_string(path).map_err(|source| TucError::Io { file, source })
+    match fs::read_to_string(path) {
+        Ok(text) => Ok((file, text)),
+        Err(source) => Err(TucError::Io { file, source }),
+    }
 }
 
 /// Hands out the columns of each line that has any.

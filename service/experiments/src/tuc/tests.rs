@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use cognitive_map::experience::{Graduation, Kernel, RelaxationSettings, Scale};
 use nalgebra::Vector3;
 
-use super::{Match, MatchNoise, MatchedMap, Tuc, TucError, TucReason};
-use crate::metrics::{Alignment, Span, Trajectory, ate_rmse_m};
+use super::{Match, Tuc, TucError, TucReason};
+use crate::mapping::Refined;
+use crate::metrics::{Alignment, StampedPose, Trajectory, ate_rmse_m};
 use crate::stamp::format_seconds;
 
 const INPUT: &str = "\
@@ -39,6 +39,8 @@ fn the_lines_read_as_the_format_says() {
         set.truth().at(1_000_000_000),
         Some(Vector3::new(6.0, 7.0, 0.0))
     );
+    assert_eq!(set.start().translation.vector, Vector3::new(5.0, 6.0, 0.0));
+    assert!((set.start().rotation.scaled_axis() - Vector3::z()).norm() < 1e-12);
 }
 
 #[test]
@@ -84,7 +86,7 @@ fn rounds() -> Tuc {
         let (speed, turn) = if k == 0 {
             (0.0, 0.0)
         } else {
-            (10.0 * turn_s, turn_s + 0.006)
+            (10.0 * turn_s, turn_s + 0.02)
         };
         writeln!(input, "odom2 {t} {speed} 0 {turn} 0.0025 0.0025 0.0001").unwrap();
         let (x, y) = (10.0 * angle.sin(), -10.0 * angle.cos());
@@ -112,24 +114,46 @@ fn more_false_matches_than_true_ones_do_not_bend_the_map() {
             score: 0.5,
         });
     }
-    let noise = MatchNoise {
-        position_sd_m: 0.05,
-        heading_sd_rad: 0.02,
-        kernel: Kernel::GemanMcClure(Scale::new(3.0).unwrap()),
-    };
     let ate_m = |matches: &[Match]| {
-        let mut map = MatchedMap::new(&set, matches, &noise);
-        let graduation = Graduation::FromWide;
-        let poses = map.relaxed(&RelaxationSettings {
-            graduation,
-            ..RelaxationSettings::default()
-        });
+        let recording = set.recording(matches);
+        let refined = Refined::of(&recording, None);
+        let poses = recording.steps.iter().zip(&refined.poses);
+        let poses: Vec<_> = poses
+            .map(|(step, &pose)| StampedPose {
+                stamp_ns: step.stamp_ns,
+                pose,
+            })
+            .collect();
         let estimate = Trajectory::from_poses(&poses).unwrap();
-        let span = Span::common([estimate.span(), set.truth().span()]).unwrap();
-        ate_rmse_m(&estimate, set.truth(), span, Alignment::Planar).unwrap()
+        ate_rmse_m(
+            &estimate,
+            set.truth(),
+            set.truth().span(),
+            Alignment::Planar,
+        )
+        .unwrap()
     };
     let (odometry, clean, doubted) = (ate_m(&[]), ate_m(set.matches()), ate_m(&matches));
     assert!(odometry > 0.5, "{odometry}");
     assert!(clean < 0.3 * odometry, "{clean} {odometry}");
     assert!(doubted < clean + 0.1, "{doubted} {clean}");
+}
+
+#[test]
+fn false_matches_are_added_up_to_a_share_and_by_a_seed() {
+    let set = rounds();
+    let with = |seed| {
+        let mut matches = set.matches().to_vec();
+        set.add_false(&mut matches, 0.8, seed);
+        matches
+    };
+    let matches = with(1);
+    let n_false = matches.iter().filter(|found| !set.is_true(found)).count();
+    assert_eq!((matches.len(), n_false), (65, 52));
+    assert_eq!(with(1), matches);
+    assert_ne!(with(2), matches);
+    // Without a true match no share of false ones can be reached, and none is added.
+    let mut none = Vec::new();
+    set.add_false(&mut none, 0.5, 1);
+    assert!(none.is_empty());
 }

@@ -4,6 +4,8 @@ mod code;
 mod progress;
 mod room;
 
+pub(super) use progress::Progress;
+
 use clap::Subcommand;
 use cogmap_experiments::eval::Environment;
 

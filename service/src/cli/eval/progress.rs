@@ -11,7 +11,7 @@ use crate::cli::output;
 const LINES: u64 = 10;
 
 /// A bar in a terminal, a line now and then elsewhere.
-pub(super) struct Progress {
+pub(in crate::cli) struct Progress {
     bar: Option<ProgressBar>,
     /// What is counted.
     what: &'static str,
@@ -21,7 +21,7 @@ pub(super) struct Progress {
 
 impl Progress {
     /// Of so many steps in all, or of whatever is counted.
-    pub(super) fn new(steps: u64, what: &'static str) -> Self {
+    pub(in crate::cli) fn new(steps: u64, what: &'static str) -> Self {
         let bar = stderr().is_terminal().then(|| {
             let style = ProgressStyle::with_template(
                 "[{bar:40}] {human_pos} of {human_len} {msg}, {eta} left",
@@ -38,7 +38,7 @@ impl Progress {
     }
 
     /// So many more steps were made.
-    pub(super) fn add(&self, steps: u64) {
+    pub(in crate::cli) fn add(&self, steps: u64) {
         if let Some(bar) = &self.bar {
             bar.inc(steps);
             return;
@@ -52,7 +52,7 @@ impl Progress {
         }
     }
 
-    pub(super) fn finish(&self) {
+    pub(in crate::cli) fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }

@@ -1,11 +1,16 @@
 //! `cogmap replay`: a recorded data set through the map, and the error of what comes out.
 
+mod g2o;
 mod mrclam;
 mod mrclam_report;
 mod offline;
 mod online;
 mod outcome;
 mod readings;
+mod recorded;
+mod recorded_report;
+mod tuc;
+mod victoria;
 
 use clap::Subcommand;
 
@@ -15,10 +20,19 @@ pub(super) use readings::sample_of;
 pub(in crate::cli) enum ReplayCommand {
     /// A set in the format of UTIAS MRCLAM: odometry as motion, measurements as sightings.
     Mrclam(mrclam::MrclamArgs),
+    /// A pose graph: edges from an id to the next as motion, all others as closures that are judged.
+    G2o(g2o::G2oArgs),
+    /// A set in the format of TUC: odometry, and place matches of which many are false.
+    Tuc(tuc::TucArgs),
+    /// Victoria Park as text: odometry as motion, trees as landmarks.
+    Victoria(victoria::VictoriaArgs),
 }
 
 pub(super) fn run(command: &ReplayCommand) -> anyhow::Result<()> {
     match command {
         ReplayCommand::Mrclam(args) => mrclam::run(args),
+        ReplayCommand::G2o(args) => g2o::run(args),
+        ReplayCommand::Tuc(args) => tuc::run(args),
+        ReplayCommand::Victoria(args) => victoria::run(args),
     }
 }

@@ -21,6 +21,11 @@ pub(crate) trait Equations {
     /// a link that has only one.
     fn links(&self, variable: u32) -> &[(u32, u32)];
 
+    /// Whether a link ties its variables together. One that says nothing would only make the factor denser.
+    fn ties(&self, _link: u32) -> bool {
+        true
+    }
+
     /// Adds what a variable contributes by itself.
     fn add_own(&self, _variable: u32, _front: &mut Front<'_>) {}
 
@@ -200,8 +205,9 @@ impl CliqueTree {
             self.local[variable as usize] = number(place);
         }
         let adjacent = |&variable: &u32| {
-            let others = equations.links(variable).iter().map(|&(_, other)| other);
-            others
+            let links = equations.links(variable).iter();
+            let ties = links.filter(|&&(link, _)| equations.ties(link));
+            ties.map(|&(_, other)| other)
                 .map(|other| self.local[other as usize])
                 .filter(|&place| place != NOWHERE)
                 .collect()

@@ -10,9 +10,9 @@ use crate::eval::quantity::Quantity;
 use crate::eval::statistic::quantile;
 
 /// Width and height of a figure \[px\].
-pub(super) const SIZE: (u32, u32) = (960, 600);
+pub(crate) const SIZE: (u32, u32) = (960, 600);
 /// Height of the title and subtitle \[px\].
-pub(super) const HEADER: i32 = 66;
+pub(crate) const HEADER: i32 = 66;
 /// Height of one line of the legend \[px\].
 const LEGEND_LINE: i32 = 22;
 /// A point is drawn where at least this share of the runs has a value: a mean over fewer jumps.
@@ -228,7 +228,7 @@ impl Chart {
 }
 
 /// Draws title and subtitle.
-pub(super) fn header(
+pub(crate) fn header(
     root: &DrawingArea<SVGBackend<'_>, Shift>,
     title: &str,
     subtitle: &str,

@@ -3,7 +3,7 @@
 use plotters::style::RGBColor;
 
 /// Colours of lines, in the order of their use (Okabe & Ito 2008).
-pub(super) const LINES: [RGBColor; 4] = [
+pub(crate) const LINES: [RGBColor; 4] = [
     RGBColor(0, 114, 178),   // blue
     RGBColor(230, 159, 0),   // orange
     RGBColor(0, 158, 115),   // green
@@ -12,11 +12,11 @@ pub(super) const LINES: [RGBColor; 4] = [
 /// What the paper states (Okabe & Ito's vermillion, and a darker shade).
 pub(super) const PAPER: [RGBColor; 2] = [RGBColor(213, 94, 0), RGBColor(140, 50, 0)];
 /// Text.
-pub(super) const INK: RGBColor = RGBColor(40, 40, 40);
+pub(crate) const INK: RGBColor = RGBColor(40, 40, 40);
 /// Text of lesser weight, and axes.
-pub(super) const PALE_INK: RGBColor = RGBColor(110, 110, 110);
+pub(crate) const PALE_INK: RGBColor = RGBColor(110, 110, 110);
 /// Lines of the grid.
-pub(super) const GRID: RGBColor = RGBColor(226, 226, 226);
+pub(crate) const GRID: RGBColor = RGBColor(226, 226, 226);
 
 /// Colours of a scale from 0 to 1 in equal steps: `cividis` (Nuñez, Anderton & Renslow 2018), light
 /// for little, so that blank paper is nothing.

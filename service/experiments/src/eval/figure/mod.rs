@@ -5,6 +5,8 @@ mod colour;
 mod heat;
 
 use chart::{Chart, Line, Mark, YAxis};
+pub(crate) use chart::{HEADER, SIZE, header};
+pub(crate) use colour::{GRID, INK, LINES, PALE_INK};
 
 use super::experiment::Experiment;
 use super::protocol::PAPER_P_NEW;

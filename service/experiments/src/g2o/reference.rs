@@ -1,0 +1,66 @@
+//! Where the poses of a graph are known to lie.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::graph::PoseGraph;
+
+/// Positions by the id of the pose: a text with id, x, y and, in space, z \[m\] in columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference(BTreeMap<u64, Vector3<f64>>);
+
+/// Why a text has no positions.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ReferenceError {
+    /// A line is not an id with two or three numbers.
+    #[error("line {line}: expected a node's id and two or three finite coordinates")]
+    Line {
+        /// Number of the line, from 1.
+        line: usize,
+    },
+    /// No pose of the graph has a position.
+    #[error("it has no position of a pose of the graph")]
+    NothingInCommon,
+}
+
+impl Reference {
+    /// Reads a text. What follows a `#` is a comment.
+    ///
+    /// # Errors
+    /// A line is not as it should be.
+    pub fn read(text: &str) -> Result<Self, ReferenceError> {
+        let mut positions = BTreeMap::new();
+        for (index, line) in text.lines().enumerate() {
+            let bad = ReferenceError::Line { line: index + 1 };
+            let content = line.split('#').next().unwrap_or_default();
+            let mut columns = content.split_whitespace();
+            let Some(id) = columns.next() else { continue };
+            let id = id.parse().map_err(|_| bad.clone())?;
+            let numbers: Result<Vec<f64>, _> = columns.map(str::parse).collect();
+            let numbers = numbers.map_err(|_| bad.clone())?;
+            if !(2..=3).contains(&numbers.len()) || numbers.iter().any(|x| !x.is_finite()) {
+                return Err(bad);
+            }
+            let z = numbers.get(2).copied().unwrap_or(0.0);
+            positions.insert(id, Vector3::new(numbers[0], numbers[1], z));
+        }
+        Ok(Self(positions))
+    }
+
+    /// For each pose of a graph, in the order of their ids, its position if there is one.
+    ///
+    /// # Errors
+    /// There is none for any.
+    pub fn of_poses(&self, graph: &PoseGraph) -> Result<Vec<Option<Vector3<f64>>>, ReferenceError> {
+        let positions: Vec<_> = graph
+            .poses()
+            .keys()
+            .map(|id| self.0.get(id).copied())
+            .collect();
+        if positions.iter().all(Option::is_none) {
+            return Err(ReferenceError::NothingInCommon);
+        }
+        Ok(positions)
+    }
+}
