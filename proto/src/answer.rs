@@ -82,12 +82,29 @@ pub struct AgentDetail {
     pub estimate: Option<Estimate>,
     /// Its pose in `odom`, i.e. by motion alone since the session began.
     pub odometry: Option<StampedPose>,
+    /// What became of its sightings.
+    pub evidence: Evidence,
     /// How far its samples have come.
     pub watermark: Watermark,
     /// Samples received but not yet durable.
     pub lag_samples: u64,
     /// Path travelled in this session \[m\].
     pub travelled_m: f64,
+}
+
+/// What became of an agent's sightings of landmarks and of other agents, over all sessions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Evidence {
+    /// Sightings that corrected the map and its agents.
+    pub accepted: u64,
+    /// Sightings refused, as too far from what the map says.
+    pub refused: u64,
+    /// Of those, how many one after the other up to now; from 4 on the agent is not `localized`.
+    pub refused_in_a_row: u64,
+    /// Mean of the squared error of the accepted ones' components, each over what was expected of it: 1 where
+    /// the stated noise is honest, more where it is too small. Absent before the first one.
+    pub nis_mean: Option<f64>,
 }
 
 /// A pose at a time.

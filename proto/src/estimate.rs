@@ -7,11 +7,12 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// Its position in the map is known to within the space's `localized_sd_m`.
+    /// Its position in the map is known to within the space's `localized_sd_m`, and what it sees is where
+    /// it should be.
     Localized,
-    /// It is known less well than that.
+    /// It is known less well than that, or its latest sightings contradict it.
     Uncertain,
-    /// It is known less well than the space's `lost_sd_m`.
+    /// It is known less well than the space's `lost_sd_m`, or not at all.
     Lost,
 }
 

@@ -111,6 +111,11 @@ pub enum EventKind {
         /// Its number of legs.
         legs: u64,
     },
+    /// It became known where an agent stands in the map, by what it and others saw.
+    AgentPlaced {
+        /// Its position in `map` \[m\].
+        translation_m: [f64; 3],
+    },
 }
 
 /// What kind of percept a channel carries.

@@ -29,9 +29,9 @@ mod settings;
 mod watermark;
 
 pub use answer::{
-    AgentDetail, AgentPage, AgentSummary, GridModuleState, GridState, IngestAnswer, Landmark,
-    LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer, RecalledPlace, Rivals, SpaceInfo,
-    SpaceList, StampedPose, Trajectory, Trip, TripDetail, TripPage,
+    AgentDetail, AgentPage, AgentSummary, Evidence, GridModuleState, GridState, IngestAnswer,
+    Landmark, LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer, RecalledPlace, Rivals,
+    SpaceInfo, SpaceList, StampedPose, Trajectory, Trip, TripDetail, TripPage,
 };
 pub use codec::{CBOR, Codec, DecodeError, JSON, POSTCARD_V1};
 pub use estimate::{Estimate, Status};

@@ -19,8 +19,11 @@ pub struct SpaceSettings {
     pub field_radius_m: f64,
     /// When a place cell is recruited.
     pub recruitment: Recruitment,
-    /// Noise of motion samples that carry none.
+    /// Noise of motion samples that carry none, and what odometry gets wrong all the time.
     pub odometry_noise: NoiseSettings,
+    /// Part of a distance by which a seen distance may be off again and again, e.g. of a marker seen at a
+    /// slant. It fades where an agent's sightings show that their errors change from one to the next.
+    pub lasting_range_error: f64,
     /// An agent is `localized` up to this standard deviation of position \[m\].
     pub localized_sd_m: f64,
     /// An agent is `lost` beyond this standard deviation of position \[m\].
@@ -54,8 +57,9 @@ pub enum Recruitment {
     },
 }
 
-/// Noise of motion that carries none: standard deviations that grow with the square root of the
-/// path, as independent errors do, so that they do not depend on the sampling rate.
+/// What odometry gets wrong, as standard deviations. Noise of motion that carries none grows with the square
+/// root of the path, as independent errors do, so that it does not depend on the sampling rate. Errors
+/// that last are learned for each agent from what it sees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -66,6 +70,12 @@ pub struct NoiseSettings {
     pub rotation_sd_per_sqrt_m: f64,
     /// Of the rotation, per square root of radian turned \[rad/√rad\].
     pub rotation_sd_per_sqrt_rad: f64,
+    /// Of the lasting relative error of lengths, e.g. of a wheel's radius.
+    pub length_error_sd: f64,
+    /// Of the lasting relative error of angles, e.g. of a wheel base.
+    pub angle_error_sd: f64,
+    /// Of the lasting bias about each axis, e.g. of a gyroscope \[rad/s\].
+    pub bias_sd_rad_s: f64,
 }
 
 impl Default for SpaceSettings {
@@ -78,6 +88,7 @@ impl Default for SpaceSettings {
             field_radius_m: 0.25,
             recruitment: Recruitment::Novelty {},
             odometry_noise: NoiseSettings::default(),
+            lasting_range_error: 0.1,
             localized_sd_m: 0.5,
             lost_sd_m: 5.0,
             trip_stillness_s: 5.0,
@@ -93,9 +104,12 @@ impl Default for SpaceSettings {
 impl Default for NoiseSettings {
     fn default() -> Self {
         Self {
-            translation_sd_per_sqrt_m: 0.02,
-            rotation_sd_per_sqrt_m: 0.02,
-            rotation_sd_per_sqrt_rad: 0.02,
+            translation_sd_per_sqrt_m: 0.04,
+            rotation_sd_per_sqrt_m: 0.1,
+            rotation_sd_per_sqrt_rad: 0.15,
+            length_error_sd: 0.02,
+            angle_error_sd: 0.05,
+            bias_sd_rad_s: 0.004,
         }
     }
 }

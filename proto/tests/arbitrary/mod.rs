@@ -242,6 +242,7 @@ pub(crate) fn events(floats: &Floats) -> impl Strategy<Value = Event> + use<> {
                 translation_m
             }),
             (number(), number()).prop_map(|(trip, legs)| EventKind::TripForgotten { trip, legs }),
+            three().prop_map(|translation_m| EventKind::AgentPlaced { translation_m }),
             (number(), any::<String>(), number(), floats.clone()).prop_map(
                 |(place, channel, percepts, surprise)| EventKind::PerceptSurprising {
                     place,

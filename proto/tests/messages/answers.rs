@@ -1,7 +1,7 @@
 //! Answers of the HTTP interface, and the settings of a space.
 
 use cogmap_proto::{
-    AgentDetail, AgentPage, AgentSummary, ExpectedPercept, GridModuleState, GridState,
+    AgentDetail, AgentPage, AgentSummary, Evidence, ExpectedPercept, GridModuleState, GridState,
     IngestAnswer, Landmark, LandmarkPage, Leg, NoiseSettings, Place, PlacePage, PredictAnswer,
     PredictedPercept, Problem, RecallAnswer, RecalledPlace, Recruitment, Rivals, SpaceInfo,
     SpaceList, SpaceSettings, StampedPose, Status, Trajectory, Trip, TripDetail, TripPage,
@@ -57,7 +57,11 @@ fn bernoulli() -> SpaceSettings {
             translation_sd_per_sqrt_m: 0.03,
             rotation_sd_per_sqrt_m: 0.04,
             rotation_sd_per_sqrt_rad: 0.05,
+            length_error_sd: 0.01,
+            angle_error_sd: 0.02,
+            bias_sd_rad_s: 0.001,
         },
+        lasting_range_error: 0.2,
         localized_sd_m: 0.6,
         lost_sd_m: 6.0,
         trip_stillness_s: 7.0,
@@ -106,6 +110,12 @@ fn agent() -> AgentDetail {
         name: "robot-1".to_owned(),
         estimate: Some(estimate(Status::Localized)),
         odometry: Some(pose(1_800_000_000_610_000_000)),
+        evidence: Evidence {
+            accepted: 4_000,
+            refused: 31,
+            refused_in_a_row: 2,
+            nis_mean: Some(1.125),
+        },
         watermark: watermark(),
         lag_samples: 12,
         travelled_m: 31.75,
@@ -116,6 +126,7 @@ fn silent_agent() -> AgentDetail {
     AgentDetail {
         estimate: None,
         odometry: None,
+        evidence: Evidence::default(),
         lag_samples: 0,
         travelled_m: 0.0,
         ..agent()

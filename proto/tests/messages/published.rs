@@ -126,7 +126,7 @@ fn event(kind: EventKind) -> Event {
     }
 }
 
-fn event_kinds() -> [(&'static str, EventKind); 13] {
+fn event_kinds() -> [(&'static str, EventKind); 14] {
     let session = 1_800_000_000_000_000_000;
     let landmark = "porte 3, étage α".to_owned();
     [
@@ -186,6 +186,12 @@ fn event_kinds() -> [(&'static str, EventKind); 13] {
         (
             "trip_forgotten",
             EventKind::TripForgotten { trip: 2, legs: 14 },
+        ),
+        (
+            "agent_placed",
+            EventKind::AgentPlaced {
+                translation_m: [4.5, -1.25, 0.0],
+            },
         ),
         (
             "percept_surprising_level",

@@ -66,6 +66,11 @@ pub enum EventKind {
         /// Why.
         reason: TripEnd,
     },
+    /// It became known where an agent stands in the map, by what it and others saw.
+    AgentPlaced {
+        /// Its position in `map` \[m\].
+        position: Point3<f64>,
+    },
     /// A landmark was seen for the first time.
     LandmarkLearned {
         /// The landmark.

@@ -28,6 +28,14 @@ pub struct SettingsValues {
     pub rotation_sd_per_sqrt_m: f64,
     /// Rotation per rotation \[rad/√rad\].
     pub rotation_sd_per_sqrt_rad: f64,
+    /// Deviation of odometry's lasting relative error of lengths, e.g. of a wheel's radius.
+    pub length_error_sd: f64,
+    /// Deviation of odometry's lasting relative error of angles, e.g. of a wheel base.
+    pub angle_error_sd: f64,
+    /// Deviation of odometry's lasting bias about each axis \[rad/s\], e.g. of a gyroscope.
+    pub bias_sd_rad_s: f64,
+    /// Part of a distance by which a seen distance may be off again and again.
+    pub lasting_range_error: f64,
     /// An agent is localised up to this standard deviation of position \[m\].
     pub localized_sd_m: f64,
     /// An agent is lost beyond this standard deviation of position \[m\].
@@ -76,9 +84,13 @@ impl Default for SettingsValues {
             grid_ratio: 1.618,
             field_radius_m: 0.25,
             recruitment: Recruitment::Novelty,
-            translation_sd_per_sqrt_m: 0.02,
-            rotation_sd_per_sqrt_m: 0.02,
-            rotation_sd_per_sqrt_rad: 0.02,
+            translation_sd_per_sqrt_m: 0.04,
+            rotation_sd_per_sqrt_m: 0.1,
+            rotation_sd_per_sqrt_rad: 0.15,
+            length_error_sd: 0.02,
+            angle_error_sd: 0.05,
+            bias_sd_rad_s: 0.004,
+            lasting_range_error: 0.1,
             localized_sd_m: 0.5,
             lost_sd_m: 5.0,
             trip_stillness_s: 5.0,
@@ -133,6 +145,11 @@ impl Settings {
             "rotation_sd_per_sqrt_rad",
             "0 to 1",
         )?;
+        check(share(v.length_error_sd), "length_error_sd", "0 to 1")?;
+        check(share(v.angle_error_sd), "angle_error_sd", "0 to 1")?;
+        check(share(v.bias_sd_rad_s), "bias_sd_rad_s", "0 to 1")?;
+        let lasting = share(v.lasting_range_error);
+        check(lasting, "lasting_range_error", "0 to 1")?;
         check(positive(v.localized_sd_m), "localized_sd_m", "positive")?;
         let lost = v.lost_sd_m > v.localized_sd_m && v.lost_sd_m <= 1e6;
         check(lost, "lost_sd_m", "above localized_sd_m")?;

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use arc_swap::ArcSwapOption;
 use cogmap_proto::limits::WATERMARK_REJECTIONS_MAX;
-use cogmap_proto::{AgentDetail, Estimate, Rejection, SeqRange, StampedPose, Watermark};
+use cogmap_proto::{AgentDetail, Estimate, Evidence, Rejection, SeqRange, StampedPose, Watermark};
 use cognitive_map::AgentId;
 use serde::Serialize;
 
@@ -27,6 +27,7 @@ pub struct AgentDesk {
 pub(crate) struct Readout {
     pub(crate) estimate: Estimate,
     pub(crate) odometry: StampedPose,
+    pub(crate) evidence: Evidence,
     pub(crate) travelled_m: f64,
     /// Its part of the agent's JSON, once someone has asked for it.
     json: OnceLock<Vec<u8>>,
@@ -38,6 +39,7 @@ struct DetailHead<'a> {
     name: &'a str,
     estimate: Option<&'a Estimate>,
     odometry: Option<&'a StampedPose>,
+    evidence: Evidence,
 }
 
 /// The other fields.
@@ -118,6 +120,7 @@ impl AgentDesk {
             name: self.name.clone(),
             estimate: readout.as_ref().map(|readout| readout.estimate.clone()),
             odometry: readout.as_ref().map(|readout| readout.odometry),
+            evidence: evidence(readout.as_deref()),
             watermark,
             lag_samples,
             travelled_m,
@@ -137,6 +140,7 @@ impl AgentDesk {
                 name: &self.name,
                 estimate: readout.map(|readout| &readout.estimate),
                 odometry: readout.map(|readout| &readout.odometry),
+                evidence: evidence(readout),
             };
             serde_json::to_vec(&head).expect("plain data encodes")
         };
@@ -176,11 +180,22 @@ impl AgentDesk {
     }
 }
 
+/// What became of an agent's sightings; of none before its first sample.
+fn evidence(readout: Option<&Readout>) -> Evidence {
+    readout.map_or_else(Evidence::default, |readout| readout.evidence)
+}
+
 impl Readout {
-    pub(crate) fn new(estimate: Estimate, odometry: StampedPose, travelled_m: f64) -> Self {
+    pub(crate) fn new(
+        estimate: Estimate,
+        odometry: StampedPose,
+        evidence: Evidence,
+        travelled_m: f64,
+    ) -> Self {
         Self {
             estimate,
             odometry,
+            evidence,
             travelled_m,
             json: OnceLock::new(),
         }

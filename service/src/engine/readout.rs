@@ -35,7 +35,20 @@ pub(crate) fn readout(space: &str, agent: &Agent, map: &CognitiveMap) -> Option<
         confidence,
     };
     let odometry = stamped(stamp_ns, agent.odometry());
-    Some(Readout::new(estimate, odometry, agent.travelled_m()))
+    let evidence = evidence(agent);
+    let travelled_m = agent.travelled_m();
+    Some(Readout::new(estimate, odometry, evidence, travelled_m))
+}
+
+fn evidence(agent: &Agent) -> wire::Evidence {
+    let evidence = agent.evidence();
+    let components = evidence.components as f64;
+    wire::Evidence {
+        accepted: evidence.accepted,
+        refused: evidence.refused,
+        refused_in_a_row: evidence.refused_in_a_row.into(),
+        nis_mean: (components > 0.0).then(|| evidence.nis / components),
+    }
 }
 
 fn status(agent: &Agent, settings: &Settings) -> wire::Status {
@@ -87,6 +100,9 @@ pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wi
         EventKind::TripForgotten { trip, legs } => wire::EventKind::TripForgotten {
             trip: trip.0.into(),
             legs: *legs as u64,
+        },
+        EventKind::AgentPlaced { position } => wire::EventKind::AgentPlaced {
+            translation_m: position.coords.into(),
         },
         EventKind::MarkerPassed { label } => wire::EventKind::MarkerPassed {
             label: label.as_str().to_owned(),

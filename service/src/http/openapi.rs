@@ -223,6 +223,7 @@ fn constrain(schemas: &mut Value) {
         merge(probability, &share);
     }
     let settings = &mut schemas["SpaceSettings"]["properties"];
+    merge(&mut settings["lasting_range_error"], &share);
     let large = json!({ "minimum": 0.001, "maximum": 1e6 });
     for field in ["grid_spacing_m", "field_radius_m"] {
         merge(&mut settings[field], &large);

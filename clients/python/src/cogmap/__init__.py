@@ -9,6 +9,7 @@ from .answer import (
     AgentPage,
     AgentSummary,
     Estimate,
+    Evidence,
     ExpectedDescriptor,
     ExpectedLevel,
     GridModuleState,
@@ -50,6 +51,7 @@ from .errors import (
 )
 from .event import (
     AgentEnrolled,
+    AgentPlaced,
     Event,
     EventKind,
     LandmarkLearned,
@@ -98,6 +100,7 @@ __all__ = [
     "AgentDetail",
     "AgentEnrolled",
     "AgentPage",
+    "AgentPlaced",
     "AgentSummary",
     "AgentTarget",
     "ApiError",
@@ -109,6 +112,7 @@ __all__ = [
     "Estimate",
     "Event",
     "EventKind",
+    "Evidence",
     "ExpectedDescriptor",
     "ExpectedLevel",
     "GridModuleState",

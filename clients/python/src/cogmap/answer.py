@@ -215,6 +215,21 @@ class AgentPage:
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """What became of an agent's sightings of landmarks and of other agents, over all sessions."""
+
+    #: Sightings that corrected the map and its agents.
+    accepted: int
+    #: Sightings refused, as too far from what the map says.
+    refused: int
+    #: Of those, how many one after the other up to now; from 4 on the agent is not `localized`.
+    refused_in_a_row: int
+    #: Mean of the squared error of the accepted ones' components, each over what was expected of it: 1
+    #: where the stated noise is honest, more where it is too small. Absent before the first one.
+    nis_mean: Optional[float]
+
+
+@dataclass(frozen=True)
 class AgentDetail:
     """An agent: where it is, how sure that is, and how far its samples have come."""
 
@@ -222,6 +237,8 @@ class AgentDetail:
     estimate: Optional[Estimate]
     #: Its pose in `odom`, i.e. by motion alone since the session began.
     odometry: Optional[StampedPose]
+    #: What became of its sightings.
+    evidence: Evidence
     watermark: Watermark
     #: Samples received but not yet durable.
     lag_samples: int

@@ -147,6 +147,15 @@ class TripForgotten:
 
 
 @dataclass(frozen=True)
+class AgentPlaced:
+    """It became known where an agent stands in the map, by what it and others saw."""
+
+    TAG: ClassVar[str] = "agent_placed"
+    #: Its position in `map` [m].
+    translation_m: Vec3
+
+
+@dataclass(frozen=True)
 class UnknownKind:
     """Something that this version of the package has no word for."""
 
@@ -169,6 +178,7 @@ EventKind = Union[
     PerceptSurprising,
     PlaceForgotten,
     TripForgotten,
+    AgentPlaced,
     UnknownKind,
 ]
 

@@ -30,8 +30,8 @@ Recruitment = Union[Novelty, Bernoulli]
 
 @dataclass(frozen=True)
 class NoiseSettings:
-    """Noise of motion that carries none: standard deviations that grow with the square root of the
-    path."""
+    """What odometry gets wrong, as standard deviations: noise of motion that carries none, which grows
+    with the square root of the path, and errors that last, which are learned for each agent."""
 
     #: Of the translation, per square root of metre travelled [m/√m].
     translation_sd_per_sqrt_m: float
@@ -39,6 +39,12 @@ class NoiseSettings:
     rotation_sd_per_sqrt_m: float
     #: Of the rotation, per square root of radian turned [rad/√rad].
     rotation_sd_per_sqrt_rad: float
+    #: Of the lasting relative error of lengths, e.g. of a wheel's radius.
+    length_error_sd: float = 0.02
+    #: Of the lasting relative error of angles, e.g. of a wheel base.
+    angle_error_sd: float = 0.05
+    #: Of the lasting bias about each axis, e.g. of a gyroscope [rad/s].
+    bias_sd_rad_s: float = 0.004
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,8 @@ class SpaceSettings:
     recruitment: Recruitment
     #: Noise of motion samples that carry none.
     odometry_noise: NoiseSettings
+    #: Part of a distance by which a seen distance may be off again and again.
+    lasting_range_error: float
     #: An agent is `localized` up to this standard deviation of position [m].
     localized_sd_m: float
     #: An agent is `lost` beyond this standard deviation of position [m].

@@ -1,16 +1,10 @@
-//! Path integration: where motion has brought a body.
+//! Where a body is: by its own motion, and by the estimate that everybody's sightings correct.
 
-use nalgebra::{Isometry3, Vector3, Vector6};
+use nalgebra::{Isometry3, Vector3};
 
 use crate::geometry::PoseCovariance;
 use crate::grid::{GridModules, GridState};
-use crate::sample::{Motion, StartPose};
-use crate::settings::Settings;
 use crate::state::state_of_struct;
-
-/// What a restart between two sessions adds to the uncertainty of a pose: 1 m and 0.5 rad about
-/// each axis. A robot usually restarts where it stopped, but nobody knows.
-const RESTART_SD: [f64; 6] = [1.0, 1.0, 1.0, 0.5, 0.5, 0.5];
 
 /// Poses, their uncertainty, and the grid state that goes with them.
 #[derive(Clone, Debug)]
@@ -38,15 +32,6 @@ state_of_struct!(Body {
     before_latest,
     travelled_m,
 });
-
-/// A step that a body has taken.
-#[derive(Debug)]
-pub(crate) struct Step {
-    /// Length of its path \[m\].
-    pub(crate) path_m: f64,
-    /// Standard deviations of its noise.
-    pub(crate) noise_sd: Vector6<f64>,
-}
 
 impl Body {
     /// A body at identity, without any uncertainty.
@@ -83,93 +68,72 @@ impl Body {
         self.grid.modules().len() == modules.lattices().len()
     }
 
-    /// Moves the body, and calls `entered` with each grid module that came into a new lattice cell.
+    /// Moves the body by what it measured of its motion, of which the estimate says that it led by
+    /// `displacement` along the axes of its frame. Calls `entered` with each grid module that came into a
+    /// new lattice cell.
     ///
     /// Costs the same whatever the path so far and the places known.
     pub(crate) fn step(
         &mut self,
-        motion: &Motion,
-        settings: &Settings,
+        increment: &Isometry3<f64>,
+        displacement: &Vector3<f64>,
         modules: &GridModules,
         entered: impl FnMut(usize, [i64; 3]),
-    ) -> Step {
-        let increment = motion.increment();
-        let path_m = increment.translation.vector.norm();
-        let noise_sd = match motion.noise() {
-            Some(noise) => *noise.sd(),
-            None => odometry_noise_sd(increment, path_m, settings),
-        };
-        let displacement = append(&mut self.in_map, increment);
+    ) {
         append(&mut self.in_odom, increment);
-        self.covariance = self.covariance.after_motion(increment, &noise_sd);
         // The grid moves by the displacement, not by a difference of positions, which far away from
         // the origin would have lost digits.
-        self.grid.advance(modules, &displacement, entered);
+        self.in_map.translation.vector += displacement;
+        self.grid.advance(modules, displacement, entered);
+        let path_m = increment.translation.vector.norm();
         if path_m > 0.0 {
-            self.before_latest = self.latest.replace(displacement);
+            self.before_latest = self.latest.replace(*displacement);
             self.travelled_m += path_m;
         }
-        Step { path_m, noise_sd }
     }
 
-    /// The body after a motion that begins at a pose known without error: its covariance is that of
-    /// the motion alone.
-    pub(crate) fn after(
-        &self,
-        motion: &Motion,
-        settings: &Settings,
+    /// Goes to where the estimate has the body now, and the grid with it. Without a correction since the
+    /// latest step the position is the same to the last bit.
+    pub(crate) fn follow(
+        &mut self,
+        pose: &Isometry3<f64>,
+        covariance: &PoseCovariance,
         modules: &GridModules,
-    ) -> Self {
-        let mut body = self.clone();
-        body.covariance = PoseCovariance::zero();
-        body.step(motion, settings, modules, |_, _| {});
-        body
+        entered: impl FnMut(usize, [i64; 3]),
+    ) {
+        let correction = pose.translation.vector - self.in_map.translation.vector;
+        self.in_map = *pose;
+        self.covariance = *covariance;
+        if correction != Vector3::zeros() {
+            self.grid.advance(modules, &correction, entered);
+        }
     }
 
-    /// Puts the body where it was told that it stands.
-    pub(crate) fn place(&mut self, start: &StartPose, modules: &GridModules) {
-        self.in_map = *start.pose();
-        self.covariance = PoseCovariance::from_sd(start.noise().sd());
+    /// Puts the body where it turned out to stand.
+    pub(crate) fn place(
+        &mut self,
+        pose: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+        modules: &GridModules,
+    ) {
+        self.in_map = *pose;
+        self.covariance = *covariance;
         self.grid = modules.locate(&self.in_map.translation.vector.into());
     }
 
     /// Starts a session where the one before ended.
     pub(crate) fn restart(&mut self) {
         self.in_odom = Isometry3::identity();
-        self.covariance.inflate(&RESTART_SD.into());
         self.latest = None;
         self.before_latest = None;
         self.travelled_m = 0.0;
     }
 }
 
-/// Moves a pose by an increment in its own frame; answers the displacement along the outer axes.
-fn append(pose: &mut Isometry3<f64>, increment: &Isometry3<f64>) -> Vector3<f64> {
-    let displacement = pose.rotation * increment.translation.vector;
-    pose.translation.vector += displacement;
+/// Moves a pose by an increment in its own frame.
+fn append(pose: &mut Isometry3<f64>, increment: &Isometry3<f64>) {
+    pose.translation.vector += pose.rotation * increment.translation.vector;
     pose.rotation *= increment.rotation;
     // One Newton step: products of unit quaternions leave the unit sphere by rounding alone.
     pose.rotation.renormalize_fast();
-    displacement
-}
-
-/// The noise of motion that carries none: a random walk in translation and rotation.
-///
-/// ```text
-/// σ_t² = s_t² · path      σ_r² = r_m² · path + r_rad² · angle
-/// ```
-fn odometry_noise_sd(increment: &Isometry3<f64>, path_m: f64, settings: &Settings) -> Vector6<f64> {
-    let angle_rad = increment.rotation.angle();
-    let translation = settings.translation_sd_per_sqrt_m * path_m.sqrt();
-    let rotation = (settings.rotation_sd_per_sqrt_m.powi(2) * path_m
-        + settings.rotation_sd_per_sqrt_rad.powi(2) * angle_rad)
-        .sqrt();
-    Vector6::new(
-        translation,
-        translation,
-        translation,
-        rotation,
-        rotation,
-        rotation,
-    )
 }

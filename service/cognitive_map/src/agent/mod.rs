@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Point3};
 pub(crate) use body::Body;
 pub use status::Status;
 
+use crate::estimation::Evidence;
 use crate::geometry::PoseCovariance;
 use crate::grid::{GridModules, GridState, octant};
 use crate::place::PlaceId;
@@ -19,8 +20,9 @@ use crate::trip::{LegUnderWay, Recorder, TripId};
 /// An agent of a space.
 ///
 /// The first agent that moves or sees a landmark in an empty map defines the `map` frame: it starts
-/// at identity. Any later agent is *unplaced* until a start pose tells where it stands; its pose then
-/// still counts from identity, but nothing that it does changes the map.
+/// at identity. Any later agent is *unplaced* until a start pose tells where it stands, or until enough
+/// landmarks and sightings of agents tie it to the map: its pose still counts from identity, and nothing
+/// that it does changes what places, trips and landmarks the map knows.
 #[derive(Clone, Debug)]
 pub struct Agent {
     pub(crate) name: Label,
@@ -30,6 +32,8 @@ pub struct Agent {
     pub(crate) stamp_ns: Option<i64>,
     pub(crate) placed: bool,
     pub(crate) body: Body,
+    /// What became of its sightings.
+    pub(crate) evidence: Evidence,
     /// Where the places were last asked who answers; `None` asks at the next motion.
     pub(crate) asked_at: Option<Point3<f64>>,
     /// Where and since when \[ns\] the agent has stayed within an eighth of a field radius.
@@ -50,6 +54,7 @@ state_of_struct!(Agent {
     stamp_ns,
     placed,
     body,
+    evidence,
     asked_at,
     still_since,
     place,
@@ -69,6 +74,7 @@ impl Agent {
             stamp_ns: None,
             placed: false,
             body: Body::new(modules),
+            evidence: Evidence::default(),
             asked_at: None,
             still_since: None,
             place: None,
@@ -137,7 +143,14 @@ impl Agent {
 
     /// How well the agent is localised.
     pub fn status(&self, settings: &Settings) -> Status {
-        Status::of(self.placed, self.body.covariance.position_sd_m(), settings)
+        let position_sd_m = self.body.covariance.position_sd_m();
+        let refused = self.evidence.refused_in_a_row;
+        Status::of(self.placed, position_sd_m, refused, settings)
+    }
+
+    /// What became of its sightings, of all sessions.
+    pub fn evidence(&self) -> &Evidence {
+        &self.evidence
     }
 
     /// The place cell that answers strongest, with its confidence in \[0, 1\], as of the last time
@@ -180,8 +193,7 @@ impl Agent {
         self.recorder.trip
     }
 
-    /// Sightings so far, of all sessions. Those of landmarks teach the map; those of agents and of
-    /// own samples are counted and stay in the journal.
+    /// Sightings so far, of all sessions. Those of landmarks and of agents correct poses and map.
     pub fn sightings(&self) -> u64 {
         self.sightings
     }

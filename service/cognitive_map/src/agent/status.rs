@@ -2,22 +2,33 @@
 
 use crate::settings::Settings;
 
+/// From this many sightings on that were refused one after the other, an agent is not where it is thought
+/// to be, whatever the covariance says.
+const REFUSED_MAX: u32 = 4;
+
 /// How well an agent is localised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// Its position in `map` is known to within the space's `localized_sd_m`.
+    /// Its position in `map` is known to within the space's `localized_sd_m`, and what it sees is where
+    /// it should be.
     Localized,
-    /// It is known less well than that.
+    /// It is known less well than that, or its latest sightings contradict it.
     Uncertain,
     /// It is known less well than the space's `lost_sd_m`, or not at all.
     Lost,
 }
 
 impl Status {
-    /// By the standard deviation of the position.
-    pub(super) fn of(placed: bool, position_sd_m: f64, settings: &Settings) -> Self {
+    /// By the standard deviation of the position, and by how many of the latest sightings were refused.
+    pub(super) fn of(
+        placed: bool,
+        position_sd_m: f64,
+        refused_in_a_row: u32,
+        settings: &Settings,
+    ) -> Self {
+        let is_contradicted = refused_in_a_row >= REFUSED_MAX;
         // A deviation that is not a number fails both comparisons, and so is lost.
-        if placed && position_sd_m <= settings.localized_sd_m {
+        if placed && position_sd_m <= settings.localized_sd_m && !is_contradicted {
             Self::Localized
         } else if placed && position_sd_m <= settings.lost_sd_m {
             Self::Uncertain

@@ -11,6 +11,7 @@
 //! 6     page                      up to 8 channels of percepts
 //! 7     channel · 2²⁶ + page      up to 64 places' memories of a channel of levels
 //! 8     channel · 2²⁶ + page      up to 16 KiB of places' memories of a channel of descriptors
+//! 9     0                         the joint estimate of agents and landmarks
 //! ```
 //!
 //! A page is a count (u16) and its items one after the other, little endian, floats as their bits. Where
@@ -20,11 +21,13 @@
 //! there is no such page any more. Indices are rebuilt, not stored.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::CognitiveMap;
 use super::header::{Header, digest_of};
 use crate::agent::Agent;
 use crate::digest::Digest;
+use crate::estimation::{Estimator, Parameters};
 use crate::paged::write_page;
 use crate::percept::CHANNEL_PAGES_MAX;
 use crate::place::PlaceId;
@@ -34,8 +37,9 @@ use crate::sparse::PageItems;
 use crate::state::{CorruptState, State, StateReader, StateWriter};
 use crate::trip::LEG_PAGES_MAX;
 
-/// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps.
-const VERSION: u16 = 3;
+/// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps,
+/// version 3 no joint estimate.
+const VERSION: u16 = 4;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;
@@ -46,6 +50,7 @@ const LANDMARKS: u8 = 5;
 const CHANNELS: u8 = 6;
 const LEVELS: u8 = 7;
 const DESCRIPTORS: u8 = 8;
+const ESTIMATE: u8 = 9;
 
 /// One page of a checkpoint. A later page of the same kind and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -115,6 +120,7 @@ impl CognitiveMap {
             .chain(descriptors.map(|(channel, page, items)| {
                 of_items(DESCRIPTORS, channel_page(channel, page), items)
             }))
+            .chain(self.estimate_page(since))
     }
 
     /// The map of a checkpoint. It has the digest of the map that wrote it, and goes on like it.
@@ -180,6 +186,11 @@ impl CognitiveMap {
             return Err(CorruptCheckpoint::DigestMismatch);
         }
         map.trips.summarise_all();
+        let mut names = BTreeMap::new();
+        for (id, agent) in map.agents() {
+            names.entry(agent.name().clone()).or_insert(id);
+        }
+        map.names = Arc::new(names);
         for place in map.agents.iter().flat_map(Agent::holds).flatten() {
             map.places.hold(place);
         }
@@ -197,6 +208,15 @@ impl CognitiveMap {
             index: 0,
             bytes: out.into_bytes(),
         }
+    }
+
+    /// The joint estimate. It may change with every record.
+    fn estimate_page(&self, since_revision: u64) -> Option<CheckpointPage> {
+        (self.revision > since_revision).then(|| {
+            let mut out = StateWriter::default();
+            self.estimator.write(&mut out);
+            page_of(ESTIMATE, 0, out)
+        })
     }
 
     /// Adds a page.
@@ -218,6 +238,14 @@ impl CognitiveMap {
                 let levels = kind == LEVELS;
                 self.percepts
                     .restore_memory(channel, page, levels, bytes, revision)
+            }
+            ESTIMATE => {
+                let mut input = StateReader::new(bytes);
+                let estimator = Estimator::read(&mut input)?;
+                input.end()?;
+                self.estimator =
+                    Arc::new(estimator.with_parameters(Parameters::of(&self.settings)));
+                Ok(())
             }
             _ => Err(CorruptState::Invalid),
         }
@@ -248,7 +276,8 @@ impl CognitiveMap {
                     .legs()
                     .all(|leg| was_there(leg.from()) && was_there(leg.to()))
         });
-        agents && places && trips && self.percepts.knows_only(is_there)
+        let enrolled = self.estimator.agent_count() == self.agents.len();
+        enrolled && agents && places && trips && self.percepts.knows_only(is_there)
     }
 }
 

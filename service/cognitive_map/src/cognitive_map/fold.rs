@@ -1,16 +1,25 @@
 //! What a sample does to the map.
 
-use crate::agent::{Agent, Body};
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, Vector6};
+
+use crate::agent::Agent;
+use crate::estimation::Estimator;
 use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
-use crate::landmark::{Landmark, LandmarkMap, seen};
+use crate::landmark::LandmarkMap;
 use crate::percept::PerceptMap;
 use crate::place::{PlaceId, PlaceMap};
 use crate::record::{AgentId, SkipReason};
-use crate::sample::{Label, Marker, Relation, Sample, SampleBody, Sighting, StartPose, Target};
+use crate::sample::{Label, Marker, Sample, SampleBody, StartPose};
 use crate::settings::Settings;
 use crate::strength::Clock;
 use crate::trip::{TripEnd, TripMap, interval_s};
+
+/// What a restart between two sessions adds to the uncertainty of a pose: 1 m and 0.5 rad about
+/// each axis. A robot usually restarts where it stopped, but nobody knows.
+const RESTART_SD: [f64; 6] = [1.0, 1.0, 1.0, 0.5, 0.5, 0.5];
 
 /// The map, open for one record of one agent.
 pub(super) struct Fold<'a> {
@@ -23,6 +32,8 @@ pub(super) struct Fold<'a> {
     pub(super) trips: &'a mut TripMap,
     pub(super) landmarks: &'a mut LandmarkMap,
     pub(super) percepts: &'a mut PerceptMap,
+    pub(super) estimator: &'a mut Estimator,
+    pub(super) names: &'a BTreeMap<Label, AgentId>,
     pub(super) agent_id: AgentId,
     pub(super) agent: &'a mut Agent,
     /// The places that are held for the agent.
@@ -57,14 +68,14 @@ impl Fold<'_> {
             self.stamp_ns = stamp_ns;
         }
         self.end_trip(TripEnd::SessionEnd);
-        self.agent.session = Some(session);
+        let before = self.agent.session.replace(session);
         self.agent.next_seq = 0;
         self.agent.stamp_ns = None;
         self.agent.still_since = None;
-        if self.agent.placed {
-            self.agent.body.restart();
-        } else {
-            self.agent.body = Body::new(self.modules);
+        self.agent.body.restart();
+        if before.is_some() {
+            let sd = Vector6::from(RESTART_SD);
+            self.estimator.restart(self.agent_id.0, &sd);
         }
         self.emit(EventKind::SessionStarted { session });
     }
@@ -104,45 +115,12 @@ impl Fold<'_> {
         self.rest();
     }
 
-    /// A sighting. Those of landmarks teach the map; the pose is not corrected by them.
-    fn sighting(&mut self, sighting: &Sighting) {
-        self.agent.sightings += 1;
-        if let Target::Landmark(label) = &sighting.target {
-            self.define_frame();
-            if self.agent.placed {
-                self.landmark(label, &sighting.relation);
-            }
-        }
-    }
-
-    /// A landmark was seen by an agent that is placed.
-    fn landmark(&mut self, label: &Label, relation: &Relation) {
-        let estimate = seen(
-            relation,
-            self.agent.body.in_map(),
-            self.agent.body.covariance(),
-        );
-        if let Some(landmark) = self.landmarks.by_label(label.as_str()) {
-            self.landmarks
-                .see(landmark, &estimate, self.stamp_ns, self.revision);
-            return;
-        }
-        let position = estimate.position;
-        let landmark = Landmark::learn(label.clone(), estimate, self.stamp_ns);
-        if let Some(landmark) = self.landmarks.learn(landmark, self.revision) {
-            self.emit(EventKind::LandmarkLearned { landmark, position });
-        }
-    }
-
     /// The agent was told where it stands.
     fn start_pose(&mut self, start: &StartPose) {
         self.end_trip(TripEnd::StartPose);
-        self.agent.body.place(start, self.modules);
-        self.agent.placed = true;
+        self.estimator.start_pose(self.agent_id.0, start);
         *self.framed = true;
-        self.agent.place = None;
-        self.agent.entered = None;
-        self.agent.still_since = None;
+        self.stand();
     }
 
     /// The agent passed a marker.
@@ -160,6 +138,7 @@ impl Fold<'_> {
     pub(super) fn define_frame(&mut self) {
         if !*self.framed {
             *self.framed = true;
+            self.estimator.found(self.agent_id.0);
             self.agent.placed = true;
         }
     }
@@ -180,6 +159,50 @@ impl Fold<'_> {
         if let Some(legs) = self.trips.end(trip, reason, self.revision) {
             self.emit(EventKind::TripEnded { trip, legs, reason });
         }
+    }
+
+    /// Ends the record: the agent is where the estimate has it now, by all that has been seen until now.
+    pub(super) fn finish(&mut self) {
+        self.follow();
+        self.hold();
+    }
+
+    /// Brings the agent to where the estimate has it. One that turns out to lie in the map begins there
+    /// anew.
+    pub(super) fn follow(&mut self) {
+        let number = self.agent_id.0;
+        if self.estimator.is_in_map(number) && !self.agent.placed {
+            self.end_trip(TripEnd::StartPose);
+            self.stand();
+            let position = Point3::from(self.agent.body.in_map().translation.vector);
+            self.emit(EventKind::AgentPlaced { position });
+            return;
+        }
+        let Some((pose, covariance)) = self.estimator.pose(number) else {
+            return;
+        };
+        let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
+        let events = &mut *self.events;
+        let entered = |module, reference| {
+            events.extend(cell_entered(placed, agent, stamp_ns, module, reference));
+        };
+        self.agent
+            .body
+            .follow(&pose, &covariance, self.modules, entered);
+        if let Some(evidence) = self.estimator.evidence(number) {
+            self.agent.evidence = *evidence;
+        }
+    }
+
+    /// Puts the agent where the estimate has it, without a way there.
+    fn stand(&mut self) {
+        if let Some((pose, covariance)) = self.estimator.pose(self.agent_id.0) {
+            self.agent.body.place(&pose, &covariance, self.modules);
+        }
+        self.agent.placed = true;
+        self.agent.place = None;
+        self.agent.entered = None;
+        self.agent.still_since = None;
     }
 
     /// Holds the places that the agent needs now, and releases those that it no longer does.
@@ -205,4 +228,22 @@ impl Fold<'_> {
             kind,
         });
     }
+}
+
+/// The event that a grid module came into a new lattice cell. Of an agent that is not placed, the cells
+/// are those of no map.
+pub(super) fn cell_entered(
+    placed: bool,
+    agent: AgentId,
+    stamp_ns: i64,
+    module: usize,
+    reference: [i64; 3],
+) -> Option<Event> {
+    let module = u8::try_from(module).ok().filter(|_| placed)?;
+    let kind = EventKind::CellEntered { module, reference };
+    Some(Event {
+        agent,
+        stamp_ns,
+        kind,
+    })
 }

@@ -8,13 +8,16 @@ mod header;
 mod motion;
 mod predict;
 mod read;
+mod see;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub use checkpoint::{CheckpointPage, CorruptCheckpoint};
 pub use predict::{Predicted, Prediction};
 
 use crate::agent::Agent;
+use crate::estimation::{Estimator, Parameters};
 use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
 use crate::landmark::LandmarkMap;
@@ -22,6 +25,7 @@ use crate::paged::PagedVec;
 use crate::percept::PerceptMap;
 use crate::place::PlaceMap;
 use crate::record::{AgentId, Record, SkipReason};
+use crate::sample::Label;
 use crate::settings::Settings;
 use crate::strength::Clock;
 use crate::trip::TripMap;
@@ -45,6 +49,10 @@ pub struct CognitiveMap {
     /// Whether some agent has defined the `map` frame.
     framed: bool,
     agents: PagedVec<Agent, AGENT_PAGE>,
+    /// The agents by name.
+    names: Arc<BTreeMap<Label, AgentId>>,
+    /// Where agents and the landmarks seen lately are, jointly.
+    estimator: Arc<Estimator>,
     places: PlaceMap,
     trips: TripMap,
     landmarks: LandmarkMap,
@@ -57,6 +65,8 @@ impl CognitiveMap {
         Self {
             modules: Arc::new(GridModules::new(&settings)),
             places: PlaceMap::new(&settings),
+            estimator: Arc::new(Estimator::new(Parameters::of(&settings))),
+            names: Arc::default(),
             settings: Arc::new(settings),
             revision: 0,
             framed: false,
@@ -81,6 +91,10 @@ impl CognitiveMap {
                     self.revision += 1;
                     self.agents
                         .push(Agent::new(name.clone(), &self.modules), self.revision);
+                    Arc::make_mut(&mut self.names)
+                        .entry(name.clone())
+                        .or_insert(*agent);
+                    Arc::make_mut(&mut self.estimator).enrol();
                     events.push(Event {
                         agent: *agent,
                         stamp_ns: 0,
@@ -105,7 +119,7 @@ impl CognitiveMap {
                 fold.enter_session(*session, Some(sample.stamp_ns));
                 fold.skip(*seq, SkipReason::Lost);
                 fold.sample(*seq, sample);
-                fold.hold();
+                fold.finish();
             }
             Record::Skip {
                 agent,
@@ -124,7 +138,7 @@ impl CognitiveMap {
                 fold.enter_session(*session, None);
                 fold.skip(*from, SkipReason::Lost);
                 fold.skip(*to, *reason);
-                fold.hold();
+                fold.finish();
             }
         }
     }
@@ -152,6 +166,8 @@ impl CognitiveMap {
             places: &mut self.places,
             trips: &mut self.trips,
             landmarks: &mut self.landmarks,
+            estimator: Arc::make_mut(&mut self.estimator),
+            names: &self.names,
             percepts: &mut self.percepts,
             agent_id,
             held: agent.holds(),

@@ -2,8 +2,8 @@
 
 use nalgebra::Point3;
 
-use super::fold::Fold;
-use crate::event::{Event, EventKind};
+use super::fold::{Fold, cell_entered};
+use crate::event::EventKind;
 use crate::place::{Place, PlaceId, confidence};
 use crate::random;
 use crate::sample::Motion;
@@ -21,26 +21,22 @@ impl Fold<'_> {
     pub(super) fn motion(&mut self, seq: u64, motion: &Motion) {
         self.define_frame();
         let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
+        let increment = motion.increment();
+        let step = self.estimator.motion(agent.0, stamp_ns, motion);
         let events = &mut *self.events;
-        let step =
-            self.agent
-                .body
-                .step(motion, self.settings, self.modules, |module, reference| {
-                    // Of an agent that is not placed, the cells are those of no map.
-                    if placed && let Ok(module) = u8::try_from(module) {
-                        let kind = EventKind::CellEntered { module, reference };
-                        events.push(Event {
-                            agent,
-                            stamp_ns,
-                            kind,
-                        });
-                    }
-                });
-        if !placed {
+        let entered = |module, reference| {
+            events.extend(cell_entered(placed, agent, stamp_ns, module, reference));
+        };
+        self.agent
+            .body
+            .step(increment, &step.displacement, self.modules, entered);
+        self.follow();
+        if !self.agent.placed {
             return;
         }
         if let Some(leg) = &mut self.agent.recorder.leg {
-            leg.extend(motion.increment(), &step.noise_sd, step.path_m);
+            let noise_sd = step.variance.map(f64::sqrt);
+            leg.extend(increment, &noise_sd, increment.translation.vector.norm());
         }
         let drawn = match self.settings.recruitment {
             Recruitment::Novelty => false,

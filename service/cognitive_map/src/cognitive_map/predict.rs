@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::CognitiveMap;
 use super::motion::ANSWER_MIN;
-use crate::agent::Body;
+use crate::geometry::PoseCovariance;
 use crate::percept::{ChannelKind, Remembered};
 use crate::place::{PlaceId, confidence};
 use crate::record::AgentId;
@@ -53,9 +53,12 @@ impl CognitiveMap {
         channel: Option<&Label>,
     ) -> Option<Prediction> {
         let agent = self.agent(agent).filter(|agent| agent.placed())?;
-        let body = agent.body.after(motion, &self.settings, &self.modules);
-        let at_body = Point::of(&body, &Vector3::zeros());
-        let at_sensor = Point::of(&body, offset_m);
+        let pose = agent.pose() * motion.increment();
+        // Of the motion alone: it begins at a pose that is taken for known.
+        let noise_sd = self.estimator.parameters().motion_noise_sd(motion);
+        let covariance = PoseCovariance::zero().after_motion(motion.increment(), &noise_sd);
+        let at_body = Point::of(&pose, &covariance, &Vector3::zeros());
+        let at_sensor = Point::of(&pose, &covariance, offset_m);
         let body_answer = self.answer(&at_body);
         let sensor_answer = self.answer(&at_sensor);
         let mut percepts: Vec<_> = [(body_answer, false), (sensor_answer, true)]
@@ -78,7 +81,7 @@ impl CognitiveMap {
             .collect();
         percepts.sort_by_key(|predicted| predicted.remembered.channel);
         Some(Prediction {
-            pose: *body.in_map(),
+            pose,
             place: body_answer,
             percepts,
         })
@@ -97,14 +100,13 @@ impl CognitiveMap {
 }
 
 impl Point {
-    /// A point at `offset_m` in the frame of a body.
+    /// A point at `offset_m` in the frame of a pose.
     ///
     /// ```text
     /// A = R | I  −o× |,   covariance = A P Aᵀ
     /// ```
-    fn of(body: &Body, offset_m: &Vector3<f64>) -> Self {
-        let pose = body.in_map();
-        let covariance = body.covariance().matrix();
+    fn of(pose: &Isometry3<f64>, covariance: &PoseCovariance, offset_m: &Vector3<f64>) -> Self {
+        let covariance = covariance.matrix();
         let lever = -offset_m.cross_matrix();
         let position = covariance.fixed_view::<3, 3>(0, 0);
         let cross = covariance.fixed_view::<3, 3>(0, 3) * lever.transpose();

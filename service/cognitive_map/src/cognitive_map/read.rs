@@ -12,6 +12,7 @@ use crate::percept::{Channel, ChannelId, Remembered};
 use crate::place::{Place, PlaceId};
 use crate::recall::{self, RecallCue, Recalled, Rivals};
 use crate::record::AgentId;
+use crate::sample::Label;
 use crate::settings::Settings;
 use crate::state::{State, StateWriter};
 use crate::strength::Clock;
@@ -46,7 +47,13 @@ impl CognitiveMap {
         self.trips.write_digests(&mut out);
         self.landmarks.landmarks().write_digests(&mut out);
         self.percepts.write_digests(&mut out);
+        self.estimator.write(&mut out);
         out.digest()
+    }
+
+    /// The agent with a name.
+    pub fn agent_by_name(&self, name: &Label) -> Option<AgentId> {
+        self.names.get(name).copied()
     }
 
     /// Number of agents.

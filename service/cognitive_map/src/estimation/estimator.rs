@@ -65,6 +65,22 @@ impl Estimator {
         }
     }
 
+    /// The same estimate, which goes on with other parameters.
+    pub(crate) fn with_parameters(mut self, parameters: Parameters) -> Self {
+        self.parameters = parameters;
+        self
+    }
+
+    /// What it takes for granted.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// Number of agents.
+    pub fn agent_count(&self) -> usize {
+        self.seats.len()
+    }
+
     /// A new agent, at the identity of a frame of its own; answers its number, counted from 0.
     pub fn enrol(&mut self) -> u32 {
         let agent = u32::try_from(self.seats.len()).unwrap_or(u32::MAX);

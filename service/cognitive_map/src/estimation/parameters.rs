@@ -3,6 +3,7 @@
 use nalgebra::{SVector, Vector6};
 
 use crate::sample::Motion;
+use crate::settings::Settings;
 
 /// Physical parameters of the estimation, the same for every robot and every sensor.
 ///
@@ -51,6 +52,20 @@ impl Default for Parameters {
 }
 
 impl Parameters {
+    /// Those of a space.
+    pub(crate) fn of(settings: &Settings) -> Self {
+        Self {
+            length_error_sd: settings.length_error_sd,
+            angle_error_sd: settings.angle_error_sd,
+            bias_sd_rad_s: settings.bias_sd_rad_s,
+            translation_sd_per_sqrt_m: settings.translation_sd_per_sqrt_m,
+            rotation_sd_per_sqrt_m: settings.rotation_sd_per_sqrt_m,
+            rotation_sd_per_sqrt_rad: settings.rotation_sd_per_sqrt_rad,
+            lasting_range_error: settings.lasting_range_error,
+            ..Self::default()
+        }
+    }
+
     /// Deviations of the calibration, in the order of the body's error.
     pub(super) fn calibration_sd(&self) -> SVector<f64, 5> {
         let bias = self.bias_sd_rad_s;
@@ -79,7 +94,7 @@ impl Parameters {
     /// ```
     ///
     /// Motion that lies exactly in the body's x-y plane has no noise out of it.
-    pub(super) fn motion_noise_sd(&self, motion: &Motion) -> Vector6<f64> {
+    pub(crate) fn motion_noise_sd(&self, motion: &Motion) -> Vector6<f64> {
         if let Some(noise) = motion.noise() {
             return *noise.sd();
         }

@@ -57,15 +57,26 @@ impl LandmarkMap {
     }
 
     /// A landmark was seen again.
-    pub(crate) fn see(
+    pub(crate) fn see(&mut self, landmark: LandmarkId, stamp_ns: i64, revision: u64) {
+        if let Some(landmark) = self.landmarks.get_mut(landmark.0 as usize, revision) {
+            landmark.see(stamp_ns);
+        }
+    }
+
+    /// More is known about where a landmark is.
+    pub(crate) fn place(
         &mut self,
         landmark: LandmarkId,
-        estimate: &PositionEstimate,
-        stamp_ns: i64,
+        estimate: PositionEstimate,
         revision: u64,
     ) {
-        if let Some(landmark) = self.landmarks.get_mut(landmark.0 as usize, revision) {
-            landmark.see(estimate, stamp_ns);
+        let index = landmark.0 as usize;
+        let known = self.landmarks.get(index);
+        // Where nothing changes, no page is copied.
+        if known.is_some_and(|known| known.estimate != estimate)
+            && let Some(landmark) = self.landmarks.get_mut(index, revision)
+        {
+            landmark.estimate = estimate;
         }
     }
 

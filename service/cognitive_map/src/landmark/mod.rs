@@ -1,17 +1,27 @@
 //! Landmarks: things seen from several poses, whose positions are learned, never assumed.
 
-mod estimate;
 mod map;
-mod sighting;
 
 use nalgebra::{Matrix3, Point3};
 
-pub(crate) use estimate::PositionEstimate;
 pub(crate) use map::LandmarkMap;
-pub(crate) use sighting::seen;
 
 use crate::sample::Label;
 use crate::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+
+/// A position with its covariance, both in `map`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PositionEstimate {
+    /// Position \[m\].
+    pub(crate) position: Point3<f64>,
+    /// Covariance \[m²\], exactly symmetric.
+    pub(crate) covariance: Matrix3<f64>,
+}
+
+state_of_struct!(PositionEstimate {
+    position,
+    covariance
+});
 
 /// A landmark, counted from 0 in the order of learning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -48,8 +58,7 @@ impl Landmark {
     }
 
     /// The landmark was seen again.
-    pub(crate) fn see(&mut self, estimate: &PositionEstimate, stamp_ns: i64) {
-        self.estimate = self.estimate.intersect(estimate);
+    pub(crate) fn see(&mut self, stamp_ns: i64) {
         self.sightings += 1;
         // The clocks of two agents may differ, so a later sighting may carry an earlier stamp.
         self.last_stamp_ns = self.last_stamp_ns.max(stamp_ns);

@@ -6,7 +6,8 @@
 )]
 
 mod budgets; // what is forgotten, and when
-mod checkpoint; // pages out and in, damaged ones too
+mod checkpoint;
+mod correction; // pages out and in, damaged ones too
 mod determinism; // the same records, the same map
 mod journal; // arbitrary journals, and a robot to write readable ones
 mod landmarks; // what sightings teach

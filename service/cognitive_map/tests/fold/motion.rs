@@ -136,27 +136,61 @@ fn far_away_the_grid_keeps_millimetres() {
     );
 }
 
+/// A map whose robots' odometry has noise and no lasting errors.
+fn well_calibrated() -> (CognitiveMap, Robot) {
+    let mut map = CognitiveMap::new(settings(|values| {
+        values.length_error_sd = 0.0;
+        values.angle_error_sd = 0.0;
+        values.bias_sd_rad_s = 0.0;
+    }));
+    let robot = Robot::enrol(&mut map);
+    (map, robot)
+}
+
 /// Along a straight line of n steps δ with variances s²δ and r²δ per step: along it s² n δ; across it
-/// s² n δ + r²δ · δ² Σ j², as the turn of each step moves all later ones sideways.
+/// s² n δ + r²δ · δ² Σ j², as the turn of each step moves all later ones sideways. A robot that has only
+/// moved in its plane does not leave it.
 #[test]
 fn uncertainty_grows_as_the_closed_form_says() {
-    let (mut map, mut robot) = new_map();
+    let (mut map, mut robot) = well_calibrated();
     let (n, step) = (200, 0.05);
     robot.ahead(&mut map, step, n);
     let covariance = *map.agent(robot.id).unwrap().covariance().matrix();
-    let variance = 0.02 * 0.02 * step;
+    let of_translation = map.settings().translation_sd_per_sqrt_m.powi(2) * step;
+    let of_rotation = map.settings().rotation_sd_per_sqrt_m.powi(2) * step;
     let squares: f64 = (0..n).map(|j| (j as f64).powi(2)).sum();
-    let along = variance * n as f64;
-    let across = along + variance * step * step * squares;
-    for (axis, expected) in [(0, along), (1, across), (2, across), (3, along), (5, along)] {
+    let along = of_translation * n as f64;
+    let across = along + of_rotation * step * step * squares;
+    let turn = of_rotation * n as f64;
+    for (axis, expected) in [(0, along), (1, across), (5, turn)] {
         let relative = covariance[(axis, axis)] / expected - 1.0;
         assert!(relative.abs() < 1e-9, "axis {axis}: {relative}");
     }
+    for axis in 2..5 {
+        assert!(covariance[(axis, axis)].abs() < 1e-12, "axis {axis}");
+    }
+}
+
+/// Over a straight way L, a relative error of lengths with deviation e adds (e L)² along it.
+#[test]
+fn a_lasting_error_of_lengths_grows_with_the_way() {
+    let variance_along = |length_error_sd| {
+        let mut map = CognitiveMap::new(settings(|values| {
+            values.length_error_sd = length_error_sd;
+        }));
+        let mut robot = Robot::enrol(&mut map);
+        robot.ahead(&mut map, 0.05, 200);
+        let covariance = map.agent(robot.id).unwrap().covariance();
+        covariance.matrix()[(0, 0)]
+    };
+    let added = variance_along(0.03) - variance_along(0.0);
+    let expected = (0.03f64 * 10.0).powi(2);
+    assert!((added / expected - 1.0).abs() < 0.01, "{added}");
 }
 
 #[test]
 fn noise_of_the_sample_comes_before_the_settings() {
-    let (mut map, mut robot) = new_map();
+    let (mut map, mut robot) = well_calibrated();
     let noise = PoseNoise::new([0.1, 0.2, 0.3], [0.0; 3]).unwrap();
     let step = Motion::from_increment([1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], Some(noise)).unwrap();
     robot.sample(&mut map, SampleBody::Motion(step));

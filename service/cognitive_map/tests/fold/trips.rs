@@ -59,8 +59,9 @@ fn a_straight_trip_has_the_legs_that_it_should() {
         assert!((leg.duration_s() - 0.3).abs() < 1e-9 && (leg.length_m() - 0.3).abs() < 1e-9);
         assert_eq!(leg.octant(), 1);
         let variance = leg.covariance().matrix()[(0, 0)];
+        let expected = map.settings().translation_sd_per_sqrt_m.powi(2) * 0.3;
         assert!(
-            (variance - 0.02 * 0.02 * 0.3).abs() < 1e-12,
+            (variance - expected).abs() < 1e-12,
             "its own motion alone: {variance}"
         );
     }

@@ -1,0 +1,71 @@
+//! What sightings do to the map.
+
+use super::fold::Fold;
+use crate::event::EventKind;
+use crate::landmark::{Landmark, PositionEstimate};
+use crate::sample::{Label, Relation, Sighting, Target};
+
+impl Fold<'_> {
+    /// A target was seen.
+    pub(super) fn sighting(&mut self, sighting: &Sighting) {
+        self.agent.sightings += 1;
+        match &sighting.target {
+            Target::Landmark(label) => {
+                self.define_frame();
+                self.landmark(label, &sighting.relation);
+            }
+            Target::Agent(name) => self.other_agent(name, &sighting.relation),
+            // It stays in the journal.
+            Target::OwnSample(_) => return,
+        }
+        self.follow();
+        if self.agent.placed {
+            self.place_landmarks();
+        }
+    }
+
+    /// A landmark was seen.
+    fn landmark(&mut self, label: &Label, relation: &Relation) {
+        let agent = self.agent_id.0;
+        let taken = self
+            .estimator
+            .landmark(agent, self.stamp_ns, label, relation);
+        if taken.accepted
+            && self.agent.placed
+            && let Some(landmark) = self.landmarks.by_label(label.as_str())
+        {
+            self.landmarks.see(landmark, self.stamp_ns, self.revision);
+        }
+    }
+
+    /// Another agent was seen. One that the space does not know yet is nowhere.
+    fn other_agent(&mut self, name: &Label, relation: &Relation) {
+        if let Some(target) = self.names.get(name) {
+            let (agent, stamp_ns) = (self.agent_id.0, self.stamp_ns);
+            self.estimator.sighting(agent, stamp_ns, target.0, relation);
+        }
+    }
+
+    /// Takes over where the landmarks are now: a sighting corrects all of them that are correlated with
+    /// what it shows, and may have brought those of another frame.
+    fn place_landmarks(&mut self) {
+        for (label, position, covariance) in self.estimator.landmarks() {
+            let estimate = PositionEstimate {
+                position,
+                covariance,
+            };
+            if let Some(landmark) = self.landmarks.by_label(label.as_str()) {
+                self.landmarks.place(landmark, estimate, self.revision);
+                continue;
+            }
+            let landmark = Landmark::learn(label.clone(), estimate, self.stamp_ns);
+            if let Some(landmark) = self.landmarks.learn(landmark, self.revision) {
+                self.events.push(crate::event::Event {
+                    agent: self.agent_id,
+                    stamp_ns: self.stamp_ns,
+                    kind: EventKind::LandmarkLearned { landmark, position },
+                });
+            }
+        }
+    }
+}
