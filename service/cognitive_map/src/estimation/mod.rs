@@ -26,6 +26,7 @@
 mod covariance;
 mod dormant;
 mod estimator;
+mod fix;
 mod frame;
 mod history;
 mod innovation;

@@ -83,16 +83,19 @@ impl Agent {
             .saturating_mul(STEP_NS)
     }
 
-    /// Where the agent stands, told before its first step: the frame of the room is that of the map.
-    pub(super) fn start(&self) -> Reading {
+    /// Where the agent stands, told before its first step, and what it sees from there: the frame of the
+    /// room is that of the map, and the start is the step of number 0.
+    pub(super) fn start(&mut self) -> Vec<Reading> {
         let pose = self.pose();
-        Reading {
+        let mut readings = vec![Reading {
             stamp_ns: self.stamp_ns(),
             body: ReadingBody::StartPose {
                 translation_m: pose.translation.vector.into(),
                 rotation_xyzw: pose.rotation.coords.into(),
             },
-        }
+        }];
+        self.perceive(&mut readings);
+        readings
     }
 
     /// Makes one step: what was read of the motion, then what was seen at its end.
@@ -104,16 +107,21 @@ impl Agent {
         self.steps += 1;
         let stamp_ns = self.stamp_ns();
         let mut readings = vec![self.odometer.read(&step, stamp_ns, STEP_NS as f64 * 1e-9)];
+        self.perceive(&mut readings);
+        readings
+    }
+
+    /// Perceives, if it is time to.
+    fn perceive(&mut self, readings: &mut Vec<Reading>) {
         match self.percept {
             Percept::Descriptor(views) if self.steps.is_multiple_of(views.every) => {
                 readings.push(self.view(&views));
             }
             Percept::Sightings(sightings) if self.steps.is_multiple_of(sightings.every) => {
-                self.look(&sightings, &mut readings);
+                self.look(&sightings, readings);
             }
             _ => {}
         }
-        readings
     }
 
     /// Sees the room.

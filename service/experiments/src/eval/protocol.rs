@@ -39,7 +39,7 @@ pub enum Percept {
 /// How the room is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewSettings {
-    /// The room is seen at every step whose number divides by this.
+    /// The room is seen at every step whose number divides by this, and at the start, which is step 0.
     pub every: u64,
     /// Length of a view's noise, as a share of the view's own.
     pub noise: f64,
@@ -50,7 +50,8 @@ pub struct ViewSettings {
 pub struct SightingSettings {
     /// How far \[m\].
     pub range_max_m: f64,
-    /// All obstacles within range are sighted at every step whose number divides by this.
+    /// All obstacles within range are sighted at every step whose number divides by this, and at the
+    /// start, which is step 0.
     pub every: u64,
     /// Standard deviation of the distance, as a share of it. Azimuth and elevation have one of a
     /// degree at 0.05, and more or less in proportion.

@@ -168,8 +168,9 @@ impl Trial {
             name: Label::new("agent")?,
         };
         trial.map.apply(&enrol, &mut Vec::new());
-        let start = trial.agent.start();
-        trial.apply(&start, &mut Vec::new())?;
+        for reading in trial.agent.start() {
+            trial.apply(&reading, &mut Vec::new())?;
+        }
         Ok(trial)
     }
 

@@ -1,0 +1,172 @@
+use nalgebra::Point3;
+
+use crate::hall::{Hall, Lie, Outcome, planar};
+
+/// Seeds of the halls.
+const SEEDS: std::ops::Range<u64> = 1..6;
+
+/// Runs a hall with and without trouble and hands over both.
+fn compare(trouble: impl Fn(Hall) -> Hall, check: impl Fn(&Outcome, &Outcome)) {
+    for seed in SEEDS {
+        let hall = Hall {
+            seed,
+            ..Hall::default()
+        };
+        check(&hall.run(), &trouble(hall).run());
+    }
+}
+
+#[test]
+fn without_trouble_the_robots_know_where_they_are() {
+    for seed in SEEDS {
+        let outcome = Hall {
+            seed,
+            ..Hall::default()
+        }
+        .run();
+        let worst_m = outcome.worst_rmse_m(0..4, 0);
+        assert!(worst_m < 0.12, "{seed}: {worst_m}");
+    }
+}
+
+#[test]
+fn a_robot_that_lies_does_not_mislead_the_others() {
+    let lies: [(&str, Lie); 3] = [
+        ("too far", |_, range_m, azimuth| (range_m + 1.5, azimuth)),
+        ("aside", |_, range_m, azimuth| (range_m, azimuth + 0.6)),
+        ("anything", |random, _, _| {
+            (5.0 * random.uniform(), 6.0 * random.uniform() - 3.0)
+        }),
+    ];
+    for (name, lie) in lies {
+        compare(
+            |hall| Hall {
+                lie: Some(lie),
+                ..hall
+            },
+            |without, with| {
+                let [without_m, with_m] =
+                    [without, with].map(|outcome| outcome.worst_rmse_m(1..4, 0));
+                assert!(
+                    with_m < 1.5 * without_m + 0.05,
+                    "{name}: {with_m} {without_m}"
+                );
+            },
+        );
+    }
+}
+
+#[test]
+fn noise_that_is_stated_wrongly_costs_little() {
+    for (stated, most_m) in [(0.1, 0.25), (10.0, 0.25)] {
+        compare(
+            |hall| Hall { stated, ..hall },
+            |_, with| {
+                let worst_m = with.worst_rmse_m(0..4, 0);
+                assert!(worst_m < most_m, "{stated}: {worst_m}");
+            },
+        );
+        compare(
+            |hall| Hall {
+                stated_motion: Some(stated),
+                ..hall
+            },
+            |_, with| {
+                let worst_m = with.worst_rmse_m(0..4, 0);
+                assert!(worst_m < most_m, "motion {stated}: {worst_m}");
+            },
+        );
+    }
+}
+
+#[test]
+fn a_robot_that_slipped_or_was_carried_away_comes_back() {
+    for (name, slip, steps) in [
+        ("slip", planar(1.0, 0.3, 0.4), 60),
+        ("carried", planar(-2.5, 2.0, 2.5), 120),
+    ] {
+        compare(
+            |hall| Hall {
+                slip: Some((150, slip)),
+                ..hall
+            },
+            |without, with| {
+                let after_m = with.rmse_m(1, 150 + steps);
+                assert!(
+                    after_m < 1.5 * without.rmse_m(1, 150 + steps) + 0.1,
+                    "{name}: {after_m}"
+                );
+                let others_m = [0, 2, 3].map(|robot| with.rmse_m(robot, 0));
+                assert!(others_m.iter().all(|m| *m < 0.2), "{name}: {others_m:?}");
+            },
+        );
+    }
+}
+
+#[test]
+fn a_moved_landmark_is_found_where_it_stands() {
+    let place = Point3::new(1.0, -1.0, 0.0);
+    compare(
+        |hall| Hall {
+            moved: Some((150, place)),
+            ..hall
+        },
+        |without, with| {
+            let [without_m, with_m] = [without, with].map(|outcome| outcome.worst_rmse_m(0..4, 0));
+            assert!(with_m < 1.5 * without_m + 0.05, "{with_m} {without_m}");
+            let off_m = (with.post(0).unwrap() - place).norm();
+            assert!(off_m < 0.4, "{off_m}");
+        },
+    );
+}
+
+#[test]
+fn landmarks_that_are_taken_for_each_other_mislead_nobody_for_long() {
+    compare(
+        |hall| Hall {
+            swapped: Some(150),
+            ..hall
+        },
+        |without, with| {
+            let [without_m, with_m] = [without, with].map(|outcome| outcome.worst_rmse_m(0..4, 0));
+            assert!(with_m < 1.5 * without_m + 0.05, "{with_m} {without_m}");
+        },
+    );
+}
+
+#[test]
+fn a_robot_that_was_silent_for_long_goes_on() {
+    compare(
+        |hall| Hall {
+            silence: 100..300,
+            ..hall
+        },
+        |_, with| {
+            let worst_m = with.worst_rmse_m(0..4, 0);
+            assert!(worst_m < 0.15, "{worst_m}");
+        },
+    );
+}
+
+#[test]
+fn walls_make_the_estimate_coarser_and_no_more() {
+    compare(
+        |hall| Hall {
+            walls: true,
+            ..hall
+        },
+        |without, with| {
+            let [without_m, with_m] = [without, with].map(|outcome| outcome.worst_rmse_m(0..4, 0));
+            assert!(with_m < 2.5 * without_m + 0.1, "{with_m} {without_m}");
+            let posts = with.posts.iter().enumerate();
+            let off = posts.filter_map(|(number, post)| Some((with.post(number)? - post).norm()));
+            let worst_m = off.fold(0.0, f64::max);
+            assert!(worst_m < 1.0, "{worst_m}");
+            let finite = with
+                .truth
+                .iter()
+                .flat_map(|pose| pose.translation.vector.iter().copied().collect::<Vec<_>>());
+            assert!(finite.into_iter().all(f64::is_finite));
+        },
+    );
+}
