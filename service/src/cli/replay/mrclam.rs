@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
+use cogmap_experiments::mapping;
+use cogmap_experiments::metrics::{StampedPose, dead_reckoned};
 use cogmap_experiments::mrclam::{Mrclam, TeamReading};
 use cogmap_experiments::reading::{ReadingBody, ReadingTarget, robot_name};
 use cogmap_experiments::tum::write_tum;
@@ -23,6 +25,9 @@ pub(in crate::cli) struct MrclamArgs {
     /// Write `robotN.causal.tum` and `robotN.refined.tum` for each robot into this directory.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Draw each robot's paths, seen from above, as `robotN.paths.svg` beside them.
+    #[arg(long, requires = "out")]
+    plot: bool,
     /// Send the samples through Zenoh to the service at this endpoint, and read the result over
     /// HTTP, instead of straight into the core.
     #[arg(long, value_name = "ENDPOINT", requires = "http")]
@@ -80,6 +85,9 @@ pub(super) fn run(args: &MrclamArgs) -> anyhow::Result<()> {
     };
     if let Some(directory) = &args.out {
         write_trajectories(directory, &outcome)?;
+        if args.plot {
+            draw(directory, &set, &outcome)?;
+        }
     }
     let report = report(&set, &batches, &outcome)?;
     if args.json {
@@ -128,6 +136,39 @@ fn write_trajectories(directory: &Path, outcome: &Outcome) -> anyhow::Result<()>
             std::fs::write(&file, write_tum(&poses))
                 .with_context(|| format!("write {}", file.display()))?;
         }
+    }
+    Ok(())
+}
+
+/// Draws the paths of each robot in the frame of the truth, none of them moved.
+fn draw(directory: &Path, set: &Mrclam, outcome: &Outcome) -> anyhow::Result<()> {
+    let path = |label: &str, poses: &[StampedPose]| mapping::Path {
+        label: label.to_owned(),
+        positions_m: poses
+            .iter()
+            .map(|pose| pose.pose.translation.vector)
+            .collect(),
+    };
+    for (&number, log) in set.robots() {
+        let robot = robot_name(number);
+        let Some(came_out) = outcome.robots.get(&robot) else {
+            continue;
+        };
+        let of_kind =
+            |rows: &[cogmap_proto::StampedPose]| rows.iter().map(pose).collect::<Vec<_>>();
+        let paths = [
+            path(
+                "dead reckoning",
+                &dead_reckoned(&set.robot_readings(number))?,
+            ),
+            path("causal", &of_kind(&came_out.causal)),
+            path("refined", &of_kind(&came_out.refined)),
+        ];
+        let truth: Vec<_> = log.truth().iter().map(|at| at.in_space()).collect();
+        let subtitle = "as estimated, in the frame of the truth, seen from above";
+        let figure = mapping::figure(&robot, subtitle, &paths, Some(&path("truth", &truth)), &[])?;
+        let file = directory.join(format!("{robot}.paths.svg"));
+        std::fs::write(&file, figure.svg).with_context(|| format!("write {}", file.display()))?;
     }
     Ok(())
 }
