@@ -3,12 +3,18 @@
 //! ```text
 //! cargo run --release -p cogmap-experiments --example refine -- mrclam DIR [no-robots] [anchors=N]
 //! cargo run --release -p cogmap-experiments --example refine -- team [RUNS]
+//! cargo run --release -p cogmap-experiments --example refine -- matches DIR [false=PERCENT] [g2o=FILE]
 //! ```
+//!
+//! `anchors` bounds how much is remembered; `false` adds matches of different places until they make up a share of all, and
+//! `g2o` writes the graph with the matches that are believed.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 
 #[path = "refine/lived.rs"]
 mod lived;
+#[path = "refine/matches.rs"]
+mod matches;
 #[path = "refine/mrclam.rs"]
 mod mrclam;
 #[path = "refine/team.rs"]
@@ -29,6 +35,12 @@ fn main() -> ExitCode {
         Some("mrclam") => arguments
             .get(1)
             .is_some_and(|directory| mrclam::run(directory, !has("no-robots"), value("anchors="))),
+        Some("matches") => arguments.get(1).is_some_and(|directory| {
+            let file = arguments
+                .iter()
+                .find_map(|argument| argument.strip_prefix("g2o="));
+            matches::run(directory, value("false=").unwrap_or(0), file)
+        }),
         Some("team") => team::run(
             arguments
                 .get(1)
@@ -40,7 +52,9 @@ fn main() -> ExitCode {
     if done {
         ExitCode::SUCCESS
     } else {
-        eprintln!("refine mrclam DIR [no-robots] [anchors=N] | team [RUNS]");
+        eprintln!(
+            "refine mrclam DIR [no-robots] [anchors=N] | team [RUNS] | matches DIR [false=PERCENT] [g2o=FILE]"
+        );
         ExitCode::from(2)
     }
 }

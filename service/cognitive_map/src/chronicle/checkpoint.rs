@@ -127,6 +127,7 @@ impl Chronicle {
 
     fn write_head(&self, out: &mut StateWriter) {
         self.hand.write(out);
+        (self.told, self.fresh_matches).write(out);
         self.anchors.vacancy().write(out);
         self.sightings.vacancy().write(out);
         self.ties.vacancy().write(out);
@@ -140,6 +141,7 @@ impl Chronicle {
     fn read_head(&mut self, bytes: &[u8]) -> Result<(), CorruptState> {
         let mut input = StateReader::new(bytes);
         self.hand = State::read(&mut input)?;
+        (self.told, self.fresh_matches) = State::read(&mut input)?;
         self.anchors.set_vacancy(State::read(&mut input)?);
         self.sightings.set_vacancy(State::read(&mut input)?);
         self.ties.set_vacancy(State::read(&mut input)?);

@@ -80,6 +80,9 @@ pub struct Chronicle {
     pub(super) waiting: Vec<Waiting>,
     /// The number of the anchor at which the search for what may be thinned goes on.
     pub(super) hand: u32,
+    /// Motions told since the last relaxation, and matches.
+    pub(super) told: u32,
+    pub(super) fresh_matches: u32,
 }
 
 /// A place between anchors: an anchor, the motion from there, and the covariance of its error.
@@ -94,7 +97,7 @@ impl Chronicle {
     pub fn new(settings: ChronicleSettings) -> Self {
         Self {
             settings,
-            revision: 0,
+            revision: 1,
             lives: PagedVec::default(),
             anchors: Slots::default(),
             sightings: Slots::default(),
@@ -102,6 +105,8 @@ impl Chronicle {
             landmarks: Landmarks::default(),
             waiting: Vec::new(),
             hand: 0,
+            told: 0,
+            fresh_matches: 0,
         }
     }
 
@@ -222,6 +227,7 @@ impl Chronicle {
     /// m², rad², rad², rad²\].
     pub fn motion(&mut self, moment: &Moment, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
         let agent = moment.agent;
+        self.told = self.told.saturating_add(1);
         let Some(life) = self.lives.get(agent as usize) else {
             return;
         };
@@ -373,7 +379,7 @@ impl Chronicle {
     }
 
     /// The agent is at a moment, without having moved.
-    fn note(&mut self, moment: &Moment) {
+    pub(super) fn note(&mut self, moment: &Moment) {
         let revision = self.revision;
         let Some(life) = self.lives.get_mut(moment.agent as usize, revision) else {
             return;
@@ -387,7 +393,7 @@ impl Chronicle {
     }
 
     /// Where an agent is: at its latest anchor, if that is near, or at a new one.
-    fn here(&mut self, agent: u32) -> Option<Beside> {
+    pub(super) fn here(&mut self, agent: u32) -> Option<Beside> {
         let life = self.lives.get(agent as usize)?;
         if life.is_fresh || !is_within(&life.since, NEAR.0, NEAR.1) {
             self.anchor_anew(agent);

@@ -17,6 +17,7 @@ mod checkpoint;
 mod chronicle;
 mod landmarks;
 mod life;
+mod matches;
 mod refine;
 mod settings;
 mod sighting;
@@ -26,8 +27,6 @@ mod tie;
 
 pub use checkpoint::{ChroniclePage, CorruptChronicle};
 pub use chronicle::{Chronicle, Moment};
+pub use matches::Correction;
 pub use refine::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
 pub use settings::ChronicleSettings;
-
-#[cfg(test)]
-mod tests;

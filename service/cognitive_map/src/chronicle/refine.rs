@@ -9,7 +9,7 @@ use super::slots::NONE;
 use super::tie::Standing;
 use crate::experience::{
     ExperienceMap, Freedom, Kernel, Link, LinkId, PointId, PoseId, PoseInformation,
-    PositionInformation, RelaxationSettings, Relaxed, Scale, SightingTarget,
+    PositionInformation, Relaxed, Scale, SightingTarget,
 };
 use crate::geometry::PoseCovariance;
 use crate::sample::Label;
@@ -18,6 +18,8 @@ use crate::sample::Label;
 const MOTION_DEVIATION_MIN: f64 = 1e-4;
 /// Deviations beyond which a sighting pulls less the farther it is off.
 const SIGHTING_SCALE: f64 = 3.0;
+/// Deviations far beyond which a match does not pull.
+const MATCH_SCALE: f64 = 3.0;
 
 /// The past after relaxation.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,8 +77,10 @@ pub(super) struct Graph {
 impl Chronicle {
     /// Where everything most likely was. Depends on nothing but what was told.
     pub fn refine(&self) -> Refined {
-        let mut graph = self.graph();
-        let relaxed = graph.map.relax(&RelaxationSettings::default());
+        // Matches are judged on the way, in a copy that shares all that they do not change.
+        let mut copy = self.clone();
+        copy.judge();
+        let (graph, relaxed, _) = copy.relaxed();
         let marginals = graph.map.marginals();
         let mut landmarks: Vec<RefinedLandmark> = Vec::new();
         for (number, landmark) in self.landmarks.slots.iter() {
@@ -95,6 +99,13 @@ impl Chronicle {
             landmarks,
             relaxed,
         }
+    }
+
+    /// What is remembered, relaxed, as nodes and links: for other programs.
+    pub fn experience_map(&self) -> ExperienceMap {
+        let mut copy = self.clone();
+        copy.judge();
+        copy.relaxed().0.map
     }
 
     /// The poses of an agent.
@@ -228,7 +239,12 @@ impl Chronicle {
                 information,
             },
         };
-        graph.map.add_link(link, Kernel::Gaussian).ok()
+        let kernel = if tie.standing == Standing::Accepted {
+            Kernel::GemanMcClure(Scale::new(MATCH_SCALE).expect("a positive constant"))
+        } else {
+            Kernel::Gaussian
+        };
+        graph.map.add_link(link, kernel).ok()
     }
 
     fn add_sighting(
@@ -255,7 +271,7 @@ impl Chronicle {
             position,
             information,
         };
-        let kernel = Scale::new(SIGHTING_SCALE).map_or(Kernel::Gaussian, Kernel::Cauchy);
+        let kernel = Kernel::Cauchy(Scale::new(SIGHTING_SCALE).expect("a positive constant"));
         graph.map.add_link(link, kernel).ok()
     }
 }

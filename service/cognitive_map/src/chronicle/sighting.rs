@@ -85,18 +85,16 @@ impl SeenPoint {
     /// relation itself states counts as an error that lasts.
     pub(super) fn new(relation: &Relation, variance: &Vector3<f64>) -> Self {
         let floor = DEVIATION_MIN_M * DEVIATION_MIN_M;
-        let (position, axes, scale, sd) = match relation {
+        let (position, axes, scale) = match relation {
             Relation::Position(seen) => (
                 *seen.translation_m(),
                 Matrix3::identity(),
                 Vector3::repeat(1.0),
-                *seen.sd_m(),
             ),
             Relation::Pose(seen) => (
                 seen.pose().translation.vector,
                 seen.pose().rotation.to_rotation_matrix().into_inner(),
                 Vector3::repeat(1.0),
-                seen.noise().sd().fixed_rows::<3>(0).into_owned(),
             ),
             Relation::RangeBearing(seen) => {
                 let (sin_azimuth, cos_azimuth) = seen.azimuth_rad().sin_cos();
@@ -108,16 +106,14 @@ impl SeenPoint {
                 );
                 let left = Vector3::new(-sin_azimuth, cos_azimuth, 0.0);
                 let range_m = seen.range_m().max(DISTANCE_MIN_M);
-                let bearing = seen.bearing_sd_rad();
                 (
                     forward * range_m,
                     Matrix3::from_columns(&[forward, left, forward.cross(&left)]),
                     Vector3::new(1.0, range_m * range_m, range_m * range_m),
-                    Vector3::new(seen.range_sd_m(), bearing, bearing),
                 )
             }
         };
-        let fresh = sd.component_mul(&sd).inf(variance);
+        let fresh = stated_variance(relation).inf(variance);
         let lasting = variance - fresh;
         let in_body = |variance: &Vector3<f64>| {
             let along = Matrix3::from_diagonal(&variance.component_mul(&scale));
@@ -181,6 +177,19 @@ impl SeenPoint {
             },
         })
     }
+}
+
+/// Variances of a relation's components as it states them \[m², or m², rad², rad²\].
+pub(super) fn stated_variance(relation: &Relation) -> Vector3<f64> {
+    let sd = match relation {
+        Relation::Position(seen) => *seen.sd_m(),
+        Relation::Pose(seen) => seen.noise().sd().fixed_rows::<3>(0).into_owned(),
+        Relation::RangeBearing(seen) => {
+            let bearing = seen.bearing_sd_rad();
+            Vector3::new(seen.range_sd_m(), bearing, bearing)
+        }
+    };
+    sd.component_mul(&sd)
 }
 
 /// What an error ξ of a pose does to a point p in its frame, ρ + φ×p: the covariance of that.

@@ -107,6 +107,24 @@ impl ExperienceMap {
         self.nodes[id.0 as usize].pose.translation.vector.into()
     }
 
+    /// The links that count, in the order in which they were added.
+    pub fn links(&self) -> impl Iterator<Item = &Link> {
+        let on = self.links.iter().filter(|slot| slot.is_on);
+        on.map(|slot| &slot.link)
+    }
+
+    /// The poses, in the order in which they were added.
+    pub fn poses(&self) -> impl Iterator<Item = (PoseId, &Isometry3<f64>)> {
+        let nodes = (0..).zip(&self.nodes).filter(|(_, node)| !node.is_point());
+        nodes.map(|(number, node)| (PoseId(number), &node.pose))
+    }
+
+    /// The points, in the order in which they were added.
+    pub fn points(&self) -> impl Iterator<Item = (PointId, Point3<f64>)> {
+        let nodes = (0..).zip(&self.nodes).filter(|(_, node)| node.is_point());
+        nodes.map(|(number, node)| (PointId(number), node.pose.translation.vector.into()))
+    }
+
     /// Number of nodes.
     pub fn n_nodes(&self) -> usize {
         self.nodes.len()

@@ -12,6 +12,20 @@ pub struct PoseId(pub(super) u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PointId(pub(super) u32);
 
+impl PoseId {
+    /// Its number among the nodes of its map, counted from 0.
+    pub fn number(self) -> u32 {
+        self.0
+    }
+}
+
+impl PointId {
+    /// Its number among the nodes of its map, counted from 0.
+    pub fn number(self) -> u32 {
+        self.0
+    }
+}
+
 /// How a node may move when the map is relaxed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freedom {

@@ -1,0 +1,9 @@
+//! The chronicle through its public door.
+
+#![expect(
+    clippy::unwrap_used,
+    reason = "clippy knows test functions, but not what they call"
+)]
+
+mod laws; // what holds of every chronicle
+mod matches; // places taken for one another
