@@ -46,7 +46,7 @@ impl Default for Parameters {
             rotation_sd_per_sqrt_rad: 0.15,
             lasting_range_error: 0.1,
             soft: 2.0,
-            gate: 6.0,
+            gate: 4.0,
         }
     }
 }

@@ -7,7 +7,7 @@ use super::parameters::Parameters;
 use nalgebra::Vector3;
 
 /// Sightings for which the stated noise counts before any was seen.
-const PRIOR_SIGHTINGS: f64 = 50.0;
+const PRIOR_SIGHTINGS: f64 = 15.0;
 /// Sightings over which the past fades.
 const MEMORY_SIGHTINGS: f64 = 1000.0;
 /// Longest interval between two sightings of one target that tell whether errors last \[s\].

@@ -26,8 +26,8 @@ pub(crate) struct Hall {
     pub(crate) stated: f64,
     /// Whether the motion's noise is stated, and the same factor there.
     pub(crate) stated_motion: Option<f64>,
-    /// What robot 0 says instead of what it sees.
-    pub(crate) lie: Option<Lie>,
+    /// What robot 0 says instead of what it sees, from this step on.
+    pub(crate) lie: Option<(usize, Lie)>,
     /// Robot 1 is somewhere else from this step on, without having driven there.
     pub(crate) slip: Option<(usize, Isometry3<f64>)>,
     /// Post 0 stands there from this step on.
@@ -45,7 +45,6 @@ pub(crate) struct Outcome {
     pub(crate) estimator: Estimator,
     /// Distance of each robot's estimate from the truth after each step \[m\].
     pub(crate) errors_m: Vec<[f64; ROBOTS]>,
-    pub(crate) truth: [Isometry3<f64>; ROBOTS],
     /// Where the posts stand at the end.
     pub(crate) posts: Vec<Point3<f64>>,
 }
@@ -150,7 +149,6 @@ impl Hall {
         Outcome {
             estimator,
             errors_m,
-            truth,
             posts,
         }
     }
@@ -178,6 +176,10 @@ impl Hall {
         random: &mut Seeded,
         estimator: &mut Estimator,
     ) {
+        let liar = self
+            .lie
+            .filter(|(since, _)| robot == 0 && *since <= step)
+            .map(|(_, lie)| lie);
         let pose = truth[robot];
         let here = Point3::from(pose.translation.vector);
         let quarter = |point: &Point3<f64>| (point.x > 0.0, point.y > 0.0);
@@ -193,7 +195,7 @@ impl Hall {
                 (Some(since), 0 | 1) if step >= since => 1 - post,
                 _ => post,
             };
-            let relation = self.relation(robot, &pose, &posts[post], random);
+            let relation = self.relation(liar, &pose, &posts[post], random);
             estimator.landmark(number(robot), stamp_ns, &label(called), &relation);
         }
         let others = (0..ROBOTS).filter(|&other| {
@@ -203,7 +205,7 @@ impl Hall {
         if !others.is_empty() {
             let other = others[step % others.len()];
             let point = Point3::from(truth[other].translation.vector);
-            let relation = self.relation(robot, &pose, &point, random);
+            let relation = self.relation(liar, &pose, &point, random);
             estimator.sighting(number(robot), stamp_ns, number(other), &relation);
         }
     }
@@ -211,7 +213,7 @@ impl Hall {
     /// What a robot tells of a point.
     fn relation(
         &self,
-        robot: usize,
+        liar: Option<Lie>,
         pose: &Isometry3<f64>,
         point: &Point3<f64>,
         random: &mut Seeded,
@@ -220,7 +222,7 @@ impl Hall {
         let range_sd_m = RANGE_SHARE * seen.norm();
         let mut range_m = (seen.norm() + range_sd_m * random.normal()).max(0.0);
         let mut azimuth_rad = seen.y.atan2(seen.x) + BEARING_SD_RAD * random.normal();
-        if let Some(lie) = self.lie.filter(|_| robot == 0) {
+        if let Some(lie) = liar {
             (range_m, azimuth_rad) = lie(random, range_m, azimuth_rad);
         }
         let (range_sd_m, bearing_sd_rad) = (range_sd_m * self.stated, BEARING_SD_RAD * self.stated);
@@ -243,12 +245,8 @@ fn drive(truth: &mut Isometry3<f64>, random: &mut Seeded, (scale, bias): (f64, f
     *truth *= planar(path_m, 0.0, turn);
     let read_m = path_m * scale * (1.0 + 0.05 * random.normal());
     let read_rad = turn + bias * STEP_S + 0.01 * random.normal();
-    let (linear, angular) = ([read_m / STEP_S, 0.0, 0.0], [0.0, 0.0, read_rad / STEP_S]);
-    let mut motion = Motion::from_velocity(linear, angular, STEP_S, None).unwrap();
-    // The step is along the axes at its start.
-    let rotation = motion.increment().rotation.coords;
-    motion = Motion::from_increment([read_m, 0.0, 0.0], rotation.into(), None).unwrap();
-    motion
+    let turned = planar(0.0, 0.0, read_rad).rotation.coords;
+    Motion::from_increment([read_m, 0.0, 0.0], turned.into(), None).unwrap()
 }
 
 pub(crate) fn planar(x: f64, y: f64, heading: f64) -> Isometry3<f64> {

@@ -3,7 +3,7 @@ use nalgebra::Point3;
 use crate::hall::{Hall, Lie, Outcome, planar};
 
 /// Seeds of the halls.
-const SEEDS: std::ops::Range<u64> = 1..6;
+const SEEDS: std::ops::Range<u64> = 1..3;
 
 /// Runs a hall with and without trouble and hands over both.
 fn compare(trouble: impl Fn(Hall) -> Hall, check: impl Fn(&Outcome, &Outcome)) {
@@ -38,21 +38,24 @@ fn a_robot_that_lies_does_not_mislead_the_others() {
             (5.0 * random.uniform(), 6.0 * random.uniform() - 3.0)
         }),
     ];
-    for (name, lie) in lies {
-        compare(
-            |hall| Hall {
-                lie: Some(lie),
-                ..hall
-            },
-            |without, with| {
-                let [without_m, with_m] =
-                    [without, with].map(|outcome| outcome.worst_rmse_m(1..4, 0));
-                assert!(
-                    with_m < 1.5 * without_m + 0.05,
-                    "{name}: {with_m} {without_m}"
-                );
-            },
-        );
+    // Of landmarks that nobody else has seen a liar is believed; later on the others know better.
+    for (since, most_m) in [(0, 0.3), (150, 0.1)] {
+        for (name, lie) in lies {
+            compare(
+                |hall| Hall {
+                    lie: Some((since, lie)),
+                    ..hall
+                },
+                |without, with| {
+                    let [without_m, with_m] =
+                        [without, with].map(|outcome| outcome.worst_rmse_m(1..4, since));
+                    assert!(
+                        with_m < without_m + most_m,
+                        "{name} from {since} on: {with_m} {without_m}"
+                    );
+                },
+            );
+        }
     }
 }
 
@@ -162,11 +165,6 @@ fn walls_make_the_estimate_coarser_and_no_more() {
             let off = posts.filter_map(|(number, post)| Some((with.post(number)? - post).norm()));
             let worst_m = off.fold(0.0, f64::max);
             assert!(worst_m < 1.0, "{worst_m}");
-            let finite = with
-                .truth
-                .iter()
-                .flat_map(|pose| pose.translation.vector.iter().copied().collect::<Vec<_>>());
-            assert!(finite.into_iter().all(f64::is_finite));
         },
     );
 }
