@@ -81,6 +81,10 @@ def test_agents_and_their_way(client: cogmap.Client) -> None:
     grid = client.grid("default", AGENT)
     assert len(grid.modules) == client.space("default").settings.grid_modules
     assert grid.heading_rad == pytest.approx(0, abs=EXACT)
+    past = client.trajectory("default", AGENT, kind="refined")
+    assert (past.kind, past.map_revision) == ("refined", client.space("default").map_revision)
+    assert [pose.stamp_ns for pose in past.poses] == sorted(pose.stamp_ns for pose in past.poses)
+    assert past.poses[-1].stamp_ns == way.poses[-1].stamp_ns
 
 
 def test_lists_longer_than_a_page_come_whole(client: cogmap.Client) -> None:

@@ -46,6 +46,24 @@ impl Fold<'_> {
     }
 }
 
+impl Fold<'_> {
+    /// Relaxes the past when enough has come since the last time to pay for it and matches wait, and tells the
+    /// estimate where the agents are by those that are believed.
+    ///
+    /// When that is depends on the records alone.
+    pub(super) fn believe_matches(&mut self) {
+        if !self.chronicle.is_due() {
+            return;
+        }
+        for correction in self.chronicle.relax() {
+            if let Some(covariance) = correction.covariance {
+                self.estimator
+                    .fix(correction.agent, &correction.pose, &covariance);
+            }
+        }
+    }
+}
+
 impl CognitiveMap {
     /// Where all agents were and all landmarks are, by everything that was seen until now: the whole map
     /// relaxed. A function of the map alone; takes time in proportion to what is remembered.

@@ -15,8 +15,12 @@ impl Fold<'_> {
                 self.landmark(label, &sighting.relation);
             }
             Target::Agent(name) => self.other_agent(name, &sighting.relation),
-            // It stays in the journal.
-            Target::OwnSample(_) => return,
+            Target::OwnSample(seq) => {
+                // It waits until it is found in agreement with the map.
+                let moment = self.moment();
+                self.chronicle.closure(&moment, *seq, &sighting.relation);
+                return;
+            }
         }
         self.follow();
         if self.agent.placed {

@@ -1,7 +1,8 @@
 //! What sightings do to the agents: poses are corrected, and newcomers find their place.
 
 use cognitive_map::{
-    CognitiveMap, EventKind, RangeBearing, Relation, SampleBody, Settings, Sighting, Status, Target,
+    CognitiveMap, EventKind, PoseNoise, RangeBearing, Relation, RelativePose, SampleBody, Settings,
+    Sighting, Status, Target,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
@@ -247,4 +248,47 @@ fn what_is_seen_at_the_end_corrects_the_way() {
         .find(|landmark| landmark.label.as_str() == "lamp");
     let off = lamp.unwrap().position - Point3::from(MARKS[4].1);
     assert!(off.norm() < 0.05, "{off}");
+}
+
+/// A robot that drifts is told again and again that it is where it was a round ago, sometimes wrongly.
+#[test]
+fn matches_that_agree_close_the_loop_and_wrong_ones_do_not_bend_it() {
+    let mut map = new_map();
+    let mut driver = Driver::new(&mut map, at_start(), 1.0);
+    driver.start(&mut map);
+    let mut blind = driver.truth;
+    let mut seqs = vec![driver.robot.seq];
+    let mut way = vec![driver.truth];
+    for step in 0..400 {
+        // Odometry turns 2 % too much.
+        let (ahead, turn) = (Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, 0.0, 0.05));
+        driver.truth *= Isometry3::new(ahead, turn);
+        blind *= Isometry3::new(ahead, turn * 1.02);
+        seqs.push(driver.robot.seq);
+        driver
+            .robot
+            .sample(&mut map, motion(ahead.into(), (turn * 1.02).into()));
+        way.push(driver.truth);
+        if step >= 130 && step % 5 == 0 {
+            let then = step - 126;
+            let mut seen = driver.truth.inv_mul(&way[then]);
+            if step % 3 == 0 {
+                seen = Isometry3::translation(3.0, -2.0, 0.0) * seen;
+            }
+            let noise = PoseNoise::new([0.03; 3], [0.02; 3]).unwrap();
+            let at = (seen.translation.vector.into(), seen.rotation.coords.into());
+            let relation = Relation::Pose(RelativePose::new(at.0, at.1, noise).unwrap());
+            let target = Target::OwnSample(seqs[then]);
+            driver.robot.sample(
+                &mut map,
+                SampleBody::Sighting(Sighting { target, relation }),
+            );
+        }
+    }
+    let blind_m = (blind.translation.vector - driver.truth.translation.vector).norm();
+    let error_m = driver.error_m(&map);
+    assert!(
+        blind_m > 0.3 && error_m < blind_m / 3.0,
+        "{error_m} m, blind {blind_m} m"
+    );
 }

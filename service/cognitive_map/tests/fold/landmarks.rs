@@ -118,7 +118,7 @@ fn whoever_sees_a_landmark_first_defines_the_frame() {
 }
 
 #[test]
-fn other_sightings_are_counted() {
+fn sightings_of_the_unknown_are_counted() {
     let (mut map, mut robot) = new_map();
     robot.ahead(&mut map, 0.1, 1);
     for target in [Target::Agent(label("robot-7")), Target::OwnSample(0)] {
