@@ -170,7 +170,7 @@ impl Chronicle {
             graph.ties[number as usize] = self.add_tie(tie, &mut graph);
         }
         for (_, sighting) in self.sightings.iter() {
-            self.add_sighting(sighting, &mut graph);
+            Self::add_sighting(sighting, &mut graph);
         }
         graph
     }
@@ -247,11 +247,7 @@ impl Chronicle {
         graph.map.add_link(link, kernel).ok()
     }
 
-    fn add_sighting(
-        &self,
-        sighting: &super::sighting::Sighting,
-        graph: &mut Graph,
-    ) -> Option<LinkId> {
+    fn add_sighting(sighting: &super::sighting::Sighting, graph: &mut Graph) -> Option<LinkId> {
         let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
         let from = node(sighting.anchor)?;
         let position = sighting.point.position;
