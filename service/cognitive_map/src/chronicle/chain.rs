@@ -75,7 +75,7 @@ impl Chronicle {
             (life.rest_seq, life.rest_ns) = (seq, stamp_ns);
         }
         if founds {
-            self.tie_to_map(number, pose, PoseCovariance::zero(), Standing::Origin);
+            self.tie_to_map(number, pose, &PoseCovariance::zero(), Standing::Origin);
         }
         number
     }
@@ -98,7 +98,7 @@ impl Chronicle {
         &mut self,
         anchor: u32,
         at: Isometry3<f64>,
-        covariance: PoseCovariance,
+        covariance: &PoseCovariance,
         standing: Standing,
     ) {
         let tie = Tie {
@@ -107,7 +107,7 @@ impl Chronicle {
             next_from: NONE,
             next_to: NONE,
             transform: at,
-            covariance,
+            covariance: *covariance,
             standing,
         };
         self.tie(tie);

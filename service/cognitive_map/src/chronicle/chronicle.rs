@@ -144,7 +144,7 @@ impl Chronicle {
         let first = self.first_of(agent);
         if let Some(anchor) = self.anchors.get(first) {
             let at = anchor.pose;
-            self.tie_to_map(first, at, PoseCovariance::zero(), Standing::Origin);
+            self.tie_to_map(first, at, &PoseCovariance::zero(), Standing::Origin);
         } else if let Some(life) = self.lives.get_mut(agent as usize, self.revision) {
             life.founds = true;
         }
@@ -201,7 +201,7 @@ impl Chronicle {
         life.is_planar &= is_level(start.pose());
         let anchor = self.anchor_anew(moment.agent);
         let covariance = PoseCovariance::from_sd(start.noise().sd());
-        self.tie_to_map(anchor, *start.pose(), covariance, Standing::Stated);
+        self.tie_to_map(anchor, *start.pose(), &covariance, Standing::Stated);
     }
 
     /// A new session of an agent: it may have been moved by about `sd` \[m, m, m, rad, rad, rad\] since its latest sample.

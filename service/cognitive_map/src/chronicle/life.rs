@@ -8,6 +8,10 @@ use crate::state::state_of_struct;
 
 /// An agent with its latest moment.
 #[derive(Clone, Debug)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a state of its own, in any combination"
+)]
 pub(super) struct Life {
     /// Whether its poses are those of the map.
     pub(super) is_in_map: bool,

@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
 
 use super::chronicle::{Beside, Chronicle, Moment, beside};
-use super::refine::Graph;
+use super::refine::{Among, Graph};
 use super::sighting::{SeenPoint, stated_variance};
 use super::slots::NONE;
 use super::thinning::composed;
@@ -141,15 +141,11 @@ impl Chronicle {
     pub(super) fn relaxed(&mut self) -> (Graph, Relaxed, usize) {
         let mut refuted = 0;
         let revision = self.revision;
-        let settings = RelaxationSettings {
-            graduation: Graduation::FromWide,
-            ..RelaxationSettings::default()
-        };
         let mut rounds = 0;
         loop {
             rounds += 1;
-            let mut graph = self.graph();
-            let relaxed = graph.map.relax(&settings);
+            let mut graph = self.graph(Among::Believed);
+            let relaxed = graph.map.relax(&settings());
             let before = refuted;
             for number in 0..self.ties.numbers() {
                 let link = graph.ties.get(number as usize).copied().flatten();
@@ -171,22 +167,25 @@ impl Chronicle {
 
     /// Finds waiting matches that agree with the map or with one another, and believes them; answers their number.
     pub(super) fn judge(&mut self) -> usize {
-        let waits = |tie: &Tie| matches!(tie.standing, Standing::Pending | Standing::Refuted);
         if !self.ties.iter().any(|(_, tie)| waits(tie)) {
             return 0;
         }
-        let graph = self.graph();
-        let marginals = graph.map.marginals();
+        let believed = self.graph(Among::Believed);
+        let marginals = believed.map.marginals();
+        // With kernels that begin wide, all matches together find the map that most of them agree with.
+        let mut all = self.graph(Among::All);
+        all.map.relax(&settings());
         let ways = self.ways();
         let mut accepted = Vec::new();
         let mut candidates = Vec::new();
-        for (number, tie) in self.ties.iter().filter(|(_, tie)| waits(tie)) {
-            match agreement(tie, &graph, &marginals) {
-                Agreement::Contradicts => {}
-                Agreement::Telling => accepted.push(number),
-                Agreement::Possible => {
-                    candidates.extend(self.candidate(number, tie, &ways));
-                }
+        for (number, tie) in self.ties.iter().filter(|(_, tie)| tie.is_match()) {
+            let Some(link) = all.ties.get(number as usize).copied().flatten() else {
+                continue;
+            };
+            if waits(tie) && agrees_with(tie, &believed, &marginals) {
+                accepted.push(number);
+            } else if all.map.squared_error(link) <= AGREES {
+                candidates.extend(self.candidate(number, tie, &all, &ways));
             }
         }
         candidates.sort_by_key(|candidate| (candidate.agent, candidate.stamp_ns, candidate.tie));
@@ -199,8 +198,12 @@ impl Chronicle {
                 }
             }
         }
-        let supported = candidates.iter().zip(partners);
-        let supported = supported.filter(|(_, partners)| *partners >= PARTNERS);
+        let supported = candidates
+            .iter()
+            .zip(partners)
+            .filter(|(candidate, partners)| {
+                *partners >= PARTNERS && self.ties.get(candidate.tie).is_some_and(waits)
+            });
         accepted.extend(supported.map(|(candidate, _)| candidate.tie));
         let revision = self.revision;
         for &number in &accepted {
@@ -211,16 +214,26 @@ impl Chronicle {
         accepted.len()
     }
 
-    /// What a waiting match is compared by.
-    fn candidate(&self, number: u32, tie: &Tie, ways: &[[f64; 2]]) -> Option<Candidate> {
-        let (from, to) = (self.anchors.get(tie.from)?, self.anchors.get(tie.to)?);
+    /// What a match is compared by, with its ends where a graph has them.
+    fn candidate(
+        &self,
+        number: u32,
+        tie: &Tie,
+        graph: &Graph,
+        ways: &[[f64; 2]],
+    ) -> Option<Candidate> {
+        let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
+        let from = self.anchors.get(tie.from)?;
         let diagonal = tie.covariance.matrix().diagonal();
         Some(Candidate {
             tie: number,
             agent: from.agent,
             stamp_ns: from.stamp_ns,
             transform: tie.transform,
-            ends: [from.pose, to.pose],
+            ends: [
+                *graph.map.pose(node(tie.from)?),
+                *graph.map.pose(node(tie.to)?),
+            ],
             variances: [*ways.get(tie.from as usize)?, *ways.get(tie.to as usize)?],
             own: [diagonal.rows(0, 3).max(), diagonal.rows(3, 3).max()],
         })
@@ -321,44 +334,38 @@ impl Chronicle {
     }
 }
 
-/// How a match goes with the map.
-enum Agreement {
-    /// The map says otherwise.
-    Contradicts,
-    /// The map is so vague there that it agrees with much.
-    Possible,
-    /// The map knows about as well as the match, and agrees.
-    Telling,
+/// Whether a match waits to be believed, for the first time or again.
+fn waits(tie: &Tie) -> bool {
+    matches!(tie.standing, Standing::Pending | Standing::Refuted)
 }
 
-fn agreement(tie: &Tie, graph: &Graph, marginals: &Marginals<'_>) -> Agreement {
+/// How a graph with matches is relaxed.
+fn settings() -> RelaxationSettings {
+    RelaxationSettings {
+        graduation: Graduation::FromWide,
+        ..RelaxationSettings::default()
+    }
+}
+
+/// Whether the map knows the relative pose about as well as a match says it, and agrees.
+fn agrees_with(tie: &Tie, graph: &Graph, marginals: &Marginals<'_>) -> bool {
     let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
     let (Some(from), Some(to)) = (node(tie.from), node(tie.to)) else {
-        return Agreement::Contradicts;
+        return false;
     };
     let Some(spread) = marginals.relative_pose(from, to) else {
-        return Agreement::Possible;
+        return false;
     };
+    let own = tie.covariance.matrix();
+    let least = DEVIATION_MIN * DEVIATION_MIN;
+    let is_known =
+        (0..6).all(|k| spread.matrix()[(k, k)] <= VAGUER_MAX * VAGUER_MAX * (own[(k, k)] + least));
     let expected = graph.map.pose(from).inv_mul(graph.map.pose(to));
     let (linear, angular) = se3::log(&expected.inv_mul(&tie.transform));
     let off = Vector6::from_iterator(linear.iter().chain(angular.iter()).copied());
-    let own = tie.covariance.matrix();
-    let floor = Matrix6::from_diagonal_element(DEVIATION_MIN * DEVIATION_MIN);
-    let Some(inverse) = (spread.matrix() + own + floor).try_inverse() else {
-        return Agreement::Possible;
-    };
-    if off.dot(&(inverse * off)) > AGREES {
-        return Agreement::Contradicts;
-    }
-    let is_known = (0..6).all(|k| {
-        let least = DEVIATION_MIN * DEVIATION_MIN;
-        spread.matrix()[(k, k)] <= VAGUER_MAX * VAGUER_MAX * (own[(k, k)] + least)
-    });
-    if is_known {
-        Agreement::Telling
-    } else {
-        Agreement::Possible
-    }
+    let whole = spread.matrix() + own + Matrix6::from_diagonal_element(least);
+    let inverse = whole.try_inverse();
+    is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= AGREES)
 }
 
 impl Candidate {

@@ -62,6 +62,15 @@ pub struct RefinedLandmark {
     pub covariance: Option<Matrix3<f64>>,
 }
 
+/// Which matches count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Among {
+    /// Those that are believed.
+    Believed,
+    /// All of them, as far as they agree.
+    All,
+}
+
 /// The chronicle as an experience map.
 #[derive(Debug)]
 pub(super) struct Graph {
@@ -153,7 +162,7 @@ impl Chronicle {
     }
 
     /// The graph of all agents that are in the map.
-    pub(super) fn graph(&self) -> Graph {
+    pub(super) fn graph(&self, among: Among) -> Graph {
         let mut graph = Graph {
             map: ExperienceMap::new(),
             poses: vec![None; self.anchors.numbers() as usize],
@@ -167,10 +176,10 @@ impl Chronicle {
             self.add_motion(number, anchor, &mut graph);
         }
         for (number, tie) in self.ties.iter() {
-            graph.ties[number as usize] = self.add_tie(tie, &mut graph);
+            graph.ties[number as usize] = self.add_tie(tie, among, &mut graph);
         }
         for (_, sighting) in self.sightings.iter() {
-            self.add_sighting(sighting, &mut graph);
+            Self::add_sighting(sighting, &mut graph);
         }
         graph
     }
@@ -219,14 +228,15 @@ impl Chronicle {
         graph.map.add_link(link, Kernel::Gaussian).ok();
     }
 
-    fn add_tie(&self, tie: &super::tie::Tie, graph: &mut Graph) -> Option<LinkId> {
+    fn add_tie(&self, tie: &super::tie::Tie, among: Among, graph: &mut Graph) -> Option<LinkId> {
         let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
         let to = node(tie.to)?;
         let agent = self.anchors.get(tie.to)?.agent;
         let is_planar = self.lives.get(agent as usize)?.is_planar;
         let information = information(&tie.covariance, is_planar);
         let link = match tie.standing {
-            Standing::Origin | Standing::Pending | Standing::Refuted => return None,
+            Standing::Origin => return None,
+            Standing::Pending | Standing::Refuted if among == Among::Believed => return None,
             _ if tie.from == NONE => Link::PosePrior {
                 pose: to,
                 at: tie.transform,
@@ -239,7 +249,7 @@ impl Chronicle {
                 information,
             },
         };
-        let kernel = if tie.standing == Standing::Accepted {
+        let kernel = if tie.is_match() {
             Kernel::GemanMcClure(Scale::new(MATCH_SCALE).expect("a positive constant"))
         } else {
             Kernel::Gaussian
@@ -247,11 +257,7 @@ impl Chronicle {
         graph.map.add_link(link, kernel).ok()
     }
 
-    fn add_sighting(
-        &self,
-        sighting: &super::sighting::Sighting,
-        graph: &mut Graph,
-    ) -> Option<LinkId> {
+    fn add_sighting(sighting: &super::sighting::Sighting, graph: &mut Graph) -> Option<LinkId> {
         let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
         let from = node(sighting.anchor)?;
         let position = sighting.point.position;

@@ -35,6 +35,16 @@ pub(super) struct Tie {
     pub(super) standing: Standing,
 }
 
+impl Tie {
+    /// Whether it is a match.
+    pub(super) fn is_match(&self) -> bool {
+        matches!(
+            self.standing,
+            Standing::Pending | Standing::Accepted | Standing::Refuted
+        )
+    }
+}
+
 state_of_struct!(Tie {
     from,
     to,

@@ -112,72 +112,7 @@ impl Link {
                 information,
                 target,
                 ..
-            } => {
-                let in_target = target.lever();
-                let seen = seen(from, to, &in_target);
-                let (information, force) =
-                    weighted(&(seen - position), information.matrix(), weigh);
-                // The target's motion in the axes of the pose that saw it, and what that pose's own motion
-                // does to the target in its frame: −ρ − φ×seen.
-                let turn = match target {
-                    SightingTarget::Point(_) => from.rotation.inverse(),
-                    SightingTarget::Pose(_) | SightingTarget::PointOf(..) => {
-                        from.rotation.inverse() * to.rotation
-                    }
-                };
-                let turn = turn.to_rotation_matrix().into_inner();
-                let lever = seen.cross_matrix();
-                let turned = turn.tr_mul(&information);
-                let with_lever = information * lever;
-                let lever_lever = lever.tr_mul(&with_lever);
-                let mut from_from = corner(&information);
-                from_from
-                    .fixed_view_mut::<3, 3>(0, 3)
-                    .copy_from(&-with_lever);
-                from_from
-                    .fixed_view_mut::<3, 3>(3, 0)
-                    .copy_from(&-with_lever.transpose());
-                from_from
-                    .fixed_view_mut::<3, 3>(3, 3)
-                    .copy_from(&lever_lever);
-                let mut to_from = corner(&-turned);
-                to_from
-                    .fixed_view_mut::<3, 3>(0, 3)
-                    .copy_from(&(turned * lever));
-                let mut to_to = corner(&(turned * turn));
-                let mut to_gradient = top(&turn.tr_mul(&force));
-                // A point beside the target's origin moves by ρ + φ×l.
-                if in_target != Vector3::zeros() {
-                    let swing = in_target.cross_matrix();
-                    let swung = swing * turned;
-                    to_from.fixed_view_mut::<3, 3>(3, 0).copy_from(&-swung);
-                    to_from
-                        .fixed_view_mut::<3, 3>(3, 3)
-                        .copy_from(&(swung * lever));
-                    let cross = swung * turn;
-                    to_to.fixed_view_mut::<3, 3>(3, 0).copy_from(&cross);
-                    to_to
-                        .fixed_view_mut::<3, 3>(0, 3)
-                        .copy_from(&cross.transpose());
-                    to_to
-                        .fixed_view_mut::<3, 3>(3, 3)
-                        .copy_from(&-(cross * swing));
-                    to_gradient
-                        .fixed_rows_mut::<3>(3)
-                        .copy_from(&(swing * turn.tr_mul(&force)));
-                }
-                let mut from_gradient = top(&-force);
-                from_gradient
-                    .fixed_rows_mut::<3>(3)
-                    .copy_from(&lever.tr_mul(&force));
-                NormalBlocks {
-                    from_from,
-                    to_from,
-                    to_to,
-                    from_gradient,
-                    to_gradient,
-                }
-            }
+            } => sighting_blocks((from, to), *target, position, information.matrix(), weigh),
         }
     }
 }
@@ -191,6 +126,79 @@ impl NormalBlocks {
             from_gradient: Vector6::zeros(),
             to_gradient: Vector6::zeros(),
         }
+    }
+}
+
+/// The blocks of a sighting.
+fn sighting_blocks(
+    (from, to): (&Isometry3<f64>, &Isometry3<f64>),
+    target: SightingTarget,
+    position: &Vector3<f64>,
+    information: &Matrix3<f64>,
+    weigh: impl Fn(f64) -> f64,
+) -> NormalBlocks {
+    let in_target = target.lever();
+    let seen = seen(from, to, &in_target);
+    let (information, force) = weighted(&(seen - position), information, weigh);
+    // The target's motion in the axes of the pose that saw it, and what that pose's own motion
+    // does to the target in its frame: −ρ − φ×seen.
+    let turn = match target {
+        SightingTarget::Point(_) => from.rotation.inverse(),
+        SightingTarget::Pose(_) | SightingTarget::PointOf(..) => {
+            from.rotation.inverse() * to.rotation
+        }
+    };
+    let turn = turn.to_rotation_matrix().into_inner();
+    let lever = seen.cross_matrix();
+    let turned = turn.tr_mul(&information);
+    let with_lever = information * lever;
+    let lever_lever = lever.tr_mul(&with_lever);
+    let mut from_from = corner(&information);
+    from_from
+        .fixed_view_mut::<3, 3>(0, 3)
+        .copy_from(&-with_lever);
+    from_from
+        .fixed_view_mut::<3, 3>(3, 0)
+        .copy_from(&-with_lever.transpose());
+    from_from
+        .fixed_view_mut::<3, 3>(3, 3)
+        .copy_from(&lever_lever);
+    let mut to_from = corner(&-turned);
+    to_from
+        .fixed_view_mut::<3, 3>(0, 3)
+        .copy_from(&(turned * lever));
+    let mut to_to = corner(&(turned * turn));
+    let mut to_gradient = top(&turn.tr_mul(&force));
+    // A point beside the target's origin moves by ρ + φ×l.
+    if in_target != Vector3::zeros() {
+        let swing = in_target.cross_matrix();
+        let swung = swing * turned;
+        to_from.fixed_view_mut::<3, 3>(3, 0).copy_from(&-swung);
+        to_from
+            .fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(&(swung * lever));
+        let cross = swung * turn;
+        to_to.fixed_view_mut::<3, 3>(3, 0).copy_from(&cross);
+        to_to
+            .fixed_view_mut::<3, 3>(0, 3)
+            .copy_from(&cross.transpose());
+        to_to
+            .fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(&-(cross * swing));
+        to_gradient
+            .fixed_rows_mut::<3>(3)
+            .copy_from(&(swing * turn.tr_mul(&force)));
+    }
+    let mut from_gradient = top(&-force);
+    from_gradient
+        .fixed_rows_mut::<3>(3)
+        .copy_from(&lever.tr_mul(&force));
+    NormalBlocks {
+        from_from,
+        to_from,
+        to_to,
+        from_gradient,
+        to_gradient,
     }
 }
 
