@@ -16,7 +16,11 @@
 //!   filter.
 //! - **Cost.** Between sightings an agent keeps its own covariance and its transition only, so that a
 //!   motion costs the same in every map. A sighting costs the square of the number of components, which
-//!   is bounded by the number of agents and of landmarks held jointly; more landmarks lie dormant.
+//!   is bounded: at most 32 agents and 96 landmarks of a frame are held jointly. Agents that neither see
+//!   nor are seen go on by themselves, and more landmarks lie dormant, up to 65,536 a frame. A clone
+//!   shares what it holds.
+//! - **Dropped correlations.** A landmark that comes back is fused by covariance intersection; an agent
+//!   that comes back counts for a ninth of what it knew.
 //! - **Doubt.** Components far from what is expected lose weight, sightings farther off are refused; an
 //!   agent whose sightings are refused again and again searches farther around, and a landmark that only
 //!   contradicts is forgotten. The noise of each agent's sensor is learned, upwards from what it states.
