@@ -20,6 +20,9 @@ const AGREES: f64 = 11.3;
 const CONTRADICTS: f64 = 25.0;
 /// How much less sure than the match the map may be for their agreement alone to be telling.
 const VAGUER_MAX: f64 = 2.0;
+/// Deviation within which agreement is telling, however sure the matches are of themselves: by chance few places
+/// lie so close \[m\].
+const TELLING_M: f64 = 0.5;
 /// Other matches that have to agree with one that the map cannot tell from a false one.
 const PARTNERS: usize = 2;
 /// Matches before it, in the order of time, with which a match is compared.
@@ -400,7 +403,8 @@ impl Candidate {
             error.translation.vector.norm_squared() / shift + error.rotation.angle().powi(2) / turn;
         // Two that would agree wherever they were say nothing about each other.
         let own = self.own[0] + other.own[0] + DEVIATION_MIN * DEVIATION_MIN;
-        squared <= AGREES && shift <= 4.0 * VAGUER_MAX * VAGUER_MAX * own
+        let telling = (4.0 * VAGUER_MAX * VAGUER_MAX * own).max(TELLING_M * TELLING_M);
+        squared <= AGREES && shift <= telling
     }
 }
 
