@@ -55,7 +55,7 @@ fn feed(
     (map, live, nodes, links)
 }
 
-fn relaxed(mut map: ExperienceMap, nodes: &[PoseId]) -> Vec<nalgebra::Isometry3<f64>> {
+fn relaxed(mut map: ExperienceMap, nodes: &[PoseId]) -> Vec<Isometry3<f64>> {
     map.relax(&RelaxationSettings {
         tolerance: 1e-13,
         ..RelaxationSettings::default()

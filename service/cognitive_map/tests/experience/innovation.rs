@@ -59,7 +59,7 @@ fn a_pose_after_a_motion_is_expected_as_if_the_map_had_it() {
     assert!(error < 1e-6 * expected.covariance.norm(), "{error}");
 }
 
-/// Along one axis the square is d² / (σ² + σ_z²), and a direction without information adds nothing, whatever is found there.
+/// Along one axis the square is that of the difference over the sum of both variances, and a direction without information adds nothing, whatever is found there.
 #[test]
 fn an_innovation_is_measured_in_the_deviations_of_both() {
     let sd = Vector6::repeat(0.3);

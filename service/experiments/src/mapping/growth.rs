@@ -180,12 +180,11 @@ impl<'a> Growth<'a> {
         if let Some(point) = self.landmarks[landmark] {
             return point;
         }
-        let point = match self.recording.landmarks[landmark].held_at {
-            Some(at) => self.map.add_point(at, Freedom::Held),
-            None => {
-                let at = self.map.pose(self.poses[from]) * seen;
-                self.map.add_point(at, self.recording.freedom)
-            }
+        let point = if let Some(at) = self.recording.landmarks[landmark].held_at {
+            self.map.add_point(at, Freedom::Held)
+        } else {
+            let at = self.map.pose(self.poses[from]) * seen;
+            self.map.add_point(at, self.recording.freedom)
         };
         self.landmarks[landmark] = Some(point);
         point

@@ -70,37 +70,33 @@ impl Refined {
         let n = recording.steps.len();
         if matches!(recording.matches, Matches::Recognised(_)) {
             let (growth, verdict) = judge(recording, n);
-            return Self::from_map(growth, verdict, None);
+            return Self::from_map(&growth, verdict, None);
         }
         let mut all = Growth::whole(recording, n, Kernel::Gaussian);
         relax(&mut all.map, Start::RotationFirst, Graduation::None);
         let of_all = all.map.chi_squared();
         let verdict = sorted(&all);
         if verdict.n_rejected() == 0 {
-            return Self::from_map(all, verdict, Some(of_all));
+            return Self::from_map(&all, verdict, Some(of_all));
         }
-        let mut candidates = vec![settled(all.clone(), verdict)];
+        let mut best = settled(all.clone());
         if let Some(causal) = causal {
-            let mut map = all.clone();
-            map.switch(&causal.0);
-            relax(&mut map.map, Start::RotationFirst, Graduation::None);
-            let verdict = sorted(&map);
-            candidates.push(settled(map, verdict));
+            let mut believed = all.clone();
+            believed.switch(&causal.0);
+            relax(&mut believed.map, Start::RotationFirst, Graduation::None);
+            best = better(best, settled(believed));
         }
         // Wide kernels keep every false match in the factor, which it makes dense: they are the last resort.
         if causal.is_none_or(|causal| causal.n_rejected() > causal.n_accepted()) {
-            let (judged, verdict) = judge(recording, n);
+            let (judged, _) = judge(recording, n);
             all.take_places(&judged);
-            candidates.push(settled(all, verdict));
+            best = better(best, settled(all));
         }
-        let (growth, verdict) = candidates
-            .into_iter()
-            .min_by(|(a, _), (b, _)| truncated(a).total_cmp(&truncated(b)))
-            .expect("the first was tried");
-        Self::from_map(growth, verdict, Some(of_all))
+        let (growth, verdict) = best;
+        Self::from_map(&growth, verdict, Some(of_all))
     }
 
-    fn from_map(growth: Growth<'_>, verdict: Verdict, chi_squared_of_all: Option<f64>) -> Self {
+    fn from_map(growth: &Growth<'_>, verdict: Verdict, chi_squared_of_all: Option<f64>) -> Self {
         let map = &growth.map;
         Self {
             poses: growth.poses.iter().map(|&pose| *map.pose(pose)).collect(),
@@ -143,7 +139,8 @@ pub(super) fn judge(recording: &Recording, n: usize) -> (Growth<'_>, Verdict) {
 }
 
 /// Sorts and relaxes until no match changes sides.
-fn settled(mut growth: Growth<'_>, mut verdict: Verdict) -> (Growth<'_>, Verdict) {
+fn settled(mut growth: Growth<'_>) -> (Growth<'_>, Verdict) {
+    let mut verdict = sorted(&growth);
     for _ in 0..ROUNDS_MAX {
         growth.switch(&verdict.0);
         relax(&mut growth.map, Start::Here, Graduation::None);
@@ -155,6 +152,18 @@ fn settled(mut growth: Growth<'_>, mut verdict: Verdict) -> (Growth<'_>, Verdict
     }
     growth.switch(&verdict.0);
     (growth, verdict)
+}
+
+/// The map that explains all matches at the least cost; of two as good as one another the first.
+fn better<'a>(
+    first: (Growth<'a>, Verdict),
+    second: (Growth<'a>, Verdict),
+) -> (Growth<'a>, Verdict) {
+    if truncated(&second.0) < truncated(&first.0) {
+        second
+    } else {
+        first
+    }
 }
 
 /// Which matches fit the map as it is.

@@ -38,6 +38,10 @@ pub struct Landmark {
 
 /// One measurement.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all measurements are of the large kind"
+)]
 pub enum Measured {
     /// One pose as seen from another.
     Relative {

@@ -58,14 +58,18 @@ impl Tuc {
                 });
             }
         }
-        let scale = Scale::new(DOUBT_SCALE).expect("a positive constant");
         Recording {
             freedom: Freedom::Planar,
             steps,
             landmarks: Vec::new(),
-            matches: Matches::Recognised(Kernel::GemanMcClure(scale)),
+            matches: Matches::Recognised(doubt()),
         }
     }
+}
+
+/// The kernel by which matches are doubted.
+fn doubt() -> Kernel {
+    Kernel::GemanMcClure(Scale::new(DOUBT_SCALE).expect("a positive constant"))
 }
 
 /// The inverse of the planar part of a covariance, and nothing about the other directions.
