@@ -6,7 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use cogmap_experiments::mapping;
 use cogmap_experiments::metrics::{StampedPose, dead_reckoned};
-use cogmap_experiments::mrclam::{Mrclam, TeamReading};
+use cogmap_experiments::mrclam::{Mrclam, PlanarPose, TeamReading};
 use cogmap_experiments::reading::{ReadingBody, ReadingTarget, robot_name};
 use cogmap_experiments::tum::write_tum;
 use cogmap_proto::limits::BATCH_SAMPLES_MAX;
@@ -19,6 +19,10 @@ use crate::cli::export::pose;
 use crate::cli::output;
 
 #[derive(Debug, Args)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of the command line"
+)]
 pub(in crate::cli) struct MrclamArgs {
     /// Directory of the data set.
     directory: PathBuf,
@@ -164,7 +168,7 @@ fn draw(directory: &Path, set: &Mrclam, outcome: &Outcome) -> anyhow::Result<()>
             path("causal", &of_kind(&came_out.causal)),
             path("refined", &of_kind(&came_out.refined)),
         ];
-        let truth: Vec<_> = log.truth().iter().map(|at| at.in_space()).collect();
+        let truth: Vec<_> = log.truth().iter().map(PlanarPose::in_space).collect();
         let subtitle = "as estimated, in the frame of the truth, seen from above";
         let figure = mapping::figure(&robot, subtitle, &paths, Some(&path("truth", &truth)), &[])?;
         let file = directory.join(format!("{robot}.paths.svg"));
