@@ -5,6 +5,7 @@ mod guarding;
 mod problems;
 mod resources;
 mod running;
+mod trajectories;
 
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
