@@ -62,7 +62,7 @@ fn a_pose_after_a_motion_is_expected_as_if_the_map_had_it() {
 /// Along one axis the square is that of the difference over the sum of both variances, and a direction without information adds nothing, whatever is found there.
 #[test]
 fn an_innovation_is_measured_in_the_deviations_of_both() {
-    let sd = Vector6::repeat(0.3);
+    let sd = Vector6::new(0.3, 0.3, 0.3, 0.0, 0.0, 0.0);
     let expected = ExpectedPose {
         transform: Isometry3::translation(1.0, 2.0, 3.0),
         covariance: PoseCovariance::from_sd(&sd),

@@ -73,7 +73,7 @@ fn a_bad_line_is_named() {
     assert!(matches!(Tuc::read(INPUT, ""), Err(TucError::Truth(_))));
 }
 
-/// Four rounds on a circle, with a gyroscope that drifts, matched at every quarter of a round.
+/// Four rounds on a circle, with a gyroscope that drifts, matched at every fiftieth of a round.
 fn rounds() -> Tuc {
     use std::fmt::Write as _;
 
@@ -86,13 +86,13 @@ fn rounds() -> Tuc {
         let (speed, turn) = if k == 0 {
             (0.0, 0.0)
         } else {
-            (10.0 * turn_s, turn_s + 0.02)
+            (10.0 * turn_s, turn_s + 0.01)
         };
         writeln!(input, "odom2 {t} {speed} 0 {turn} 0.0025 0.0025 0.0001").unwrap();
         let (x, y) = (10.0 * angle.sin(), -10.0 * angle.cos());
         writeln!(truth, "point2 {t} {x} {y} 0 0 0 0").unwrap();
     }
-    for k in (100..=n).step_by(25) {
+    for k in (100..=n).step_by(2) {
         let (later, earlier) = (f64::from(k) * 0.1, f64::from(k - 100) * 0.1);
         writeln!(input, "loop {later} {earlier} 0.5").unwrap();
     }
@@ -103,17 +103,7 @@ fn rounds() -> Tuc {
 fn more_false_matches_than_true_ones_do_not_bend_the_map() {
     let set = rounds();
     let mut matches = set.matches().to_vec();
-    let n_true = matches.len();
-    for k in 0..2 * i64::try_from(n_true).unwrap() {
-        // Of places a quarter of a round or more apart.
-        let later_ns = (170 + 7 * k) * 100_000_000;
-        let earlier_ns = (later_ns / 100_000_000 - 130 - k) * 100_000_000;
-        matches.push(Match {
-            later_ns,
-            earlier_ns,
-            score: 0.5,
-        });
-    }
+    set.add_false(&mut matches, 0.7, 5);
     let ate_m = |matches: &[Match]| {
         let recording = set.recording(matches);
         let refined = Refined::of(&recording, None);
@@ -135,7 +125,7 @@ fn more_false_matches_than_true_ones_do_not_bend_the_map() {
     };
     let (odometry, clean, doubted) = (ate_m(&[]), ate_m(set.matches()), ate_m(&matches));
     assert!(odometry > 0.5, "{odometry}");
-    assert!(clean < 0.3 * odometry, "{clean} {odometry}");
+    assert!(clean < 0.5 * odometry, "{clean} {odometry}");
     assert!(doubted < clean + 0.1, "{doubted} {clean}");
 }
 
@@ -149,7 +139,7 @@ fn false_matches_are_added_up_to_a_share_and_by_a_seed() {
     };
     let matches = with(1);
     let n_false = matches.iter().filter(|found| !set.is_true(found)).count();
-    assert_eq!((matches.len(), n_false), (65, 52));
+    assert_eq!((matches.len(), n_false), (755, 604));
     assert_eq!(with(1), matches);
     assert_ne!(with(2), matches);
     // Without a true match no share of false ones can be reached, and none is added.
