@@ -31,8 +31,7 @@ pub enum Percept {
     /// Views of the room ([`crate::world::Scenery`]). Places remember them, and each recalls a place;
     /// the map does not correct poses by them.
     Descriptor(ViewSettings),
-    /// The centres of obstacles, as landmarks. The map learns where they are; it does not correct
-    /// poses by them.
+    /// The centres of obstacles, as landmarks. The map learns where they are and corrects poses by them.
     Sightings(SightingSettings),
 }
 

@@ -110,9 +110,9 @@ enum WalkKind {
 enum PerceptKind {
     /// Nothing.
     None,
-    /// Views of the room, which places remember and are recalled by. They do not correct poses yet.
+    /// Views of the room, which places remember and are recalled by. They do not correct poses.
     Descriptor,
-    /// The centres of obstacles, as landmarks (env2). They do not correct poses yet.
+    /// The centres of obstacles, as landmarks, which correct poses (env2).
     Sightings,
 }
 
