@@ -175,12 +175,12 @@ pub struct Trajectory {
     /// `causal`: each pose as it was known when its sample was applied. `refined`: by all that has been seen
     /// since.
     pub kind: String,
-    /// Number of records that a refined trajectory takes into account; absent of a causal one.
-    pub map_revision: Option<u64>,
     /// Poses, oldest first.
     pub poses: Vec<StampedPose>,
     /// Pass as `from_ns` for the next page; absent on the last one.
     pub next_from_ns: Option<i64>,
+    /// Number of records that a refined trajectory takes into account; absent of a causal one.
+    pub map_revision: Option<u64>,
 }
 
 /// Answer to samples sent over HTTP: they are on disk.
