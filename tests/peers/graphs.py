@@ -192,7 +192,9 @@ def _planar_start(graph: Graph) -> Any:
     number = {key: index for index, key in enumerate(graph.keys)}
     first = np.array([number[pair[0]] for pair in graph.joined])
     second = np.array([number[pair[1]] for pair in graph.joined])
-    measured = [graph.factors.at(index).measured() for index in range(len(graph.joined))]
+    # The binding knows the factors by their general type only.
+    edges: List[Any] = [graph.factors.at(index) for index in range(len(graph.joined))]
+    measured = [edge.measured() for edge in edges]
     turns = np.exp(1j * np.array([pose.theta() for pose in measured]))
     shifts = np.array([complex(pose.x(), pose.y()) for pose in measured])
     origin = graph.first()
