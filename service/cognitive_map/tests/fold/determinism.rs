@@ -24,6 +24,30 @@ fn effective(settings: &Settings, records: &[Record]) -> Vec<Record> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// However far motions lead and however sure sightings are of themselves, the past can be relaxed, and
+    /// a map that goes on from a checkpoint has the same one.
+    #[test]
+    fn the_past_of_any_journal_can_be_refined(
+        settings in any_settings(), records in journals(),
+    ) {
+        let mut map = CognitiveMap::new(settings.clone());
+        run(&mut map, &records);
+        let refined = map.refined();
+        for pose in refined.agents.iter().flat_map(|agent| &agent.poses) {
+            let numbers = pose.pose.translation.vector.iter().chain(pose.pose.rotation.coords.iter());
+            prop_assert!(numbers.copied().all(f64::is_finite), "{:?}", pose);
+        }
+        for (_, agent) in map.agents() {
+            prop_assert!(agent.pose().translation.vector.iter().all(|x| x.is_finite()));
+        }
+        let restored = CognitiveMap::restore(settings, map.checkpoint(0)).unwrap();
+        prop_assert!(restored.refined() == refined);
+    }
+}
+
+proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
     #[test]
