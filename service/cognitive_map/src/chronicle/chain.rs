@@ -33,10 +33,11 @@ impl Chronicle {
         } else {
             (life.seq, life.stamp_ns)
         };
-        let (motion, covariance) = if is_first {
-            (Isometry3::identity(), PoseCovariance::zero())
+        let (motion, covariance, calibrated) = if is_first {
+            let nothing = (Isometry3::identity(), PoseCovariance::zero());
+            (nothing.0, nothing.1, life.calibrated.without_motion())
         } else {
-            (life.since, life.covariance)
+            (life.since, life.covariance, life.calibrated)
         };
         let anchor = Anchor {
             agent,
@@ -54,6 +55,7 @@ impl Chronicle {
             pose: life.pose,
             motion,
             covariance,
+            calibrated,
             begins: is_first,
             unevenness_m: 0.0,
         };
@@ -70,6 +72,7 @@ impl Chronicle {
             life.founds = false;
             life.since = Isometry3::identity();
             life.covariance = PoseCovariance::zero();
+            life.calibrated = life.calibrated.without_motion();
             (life.until_seq, life.until_ns) = (life.seq, life.stamp_ns);
             life.rest = Isometry3::identity();
             (life.rest_seq, life.rest_ns) = (seq, stamp_ns);

@@ -9,6 +9,7 @@ use super::settings::ChronicleSettings;
 use super::sighting::{SeenPoint, Shown, Sighting};
 use super::slots::{NONE, Slots};
 use super::tie::{Standing, Tie};
+use crate::estimation::Calibrated;
 use crate::geometry::{PoseCovariance, se3};
 use crate::paged::PagedVec;
 use crate::sample::{Label, Relation, StartPose};
@@ -224,8 +225,14 @@ impl Chronicle {
     }
 
     /// An agent moved by an increment in its own frame before, with these variances of the error on its right \[m², m²,
-    /// m², rad², rad², rad²\].
-    pub fn motion(&mut self, moment: &Moment, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
+    /// m², rad², rad², rad²\]; `calibrated` says how the increment was corrected.
+    pub fn motion(
+        &mut self,
+        moment: &Moment,
+        increment: &Isometry3<f64>,
+        variance: &Vector6<f64>,
+        calibrated: &Calibrated,
+    ) {
         let agent = moment.agent;
         self.told = self.told.saturating_add(1);
         let Some(life) = self.lives.get(agent as usize) else {
@@ -243,7 +250,7 @@ impl Chronicle {
         let Some(life) = self.lives.get_mut(agent as usize, revision) else {
             return;
         };
-        life.go(increment, variance);
+        life.go(increment, variance, calibrated);
         life.is_planar &= is_level(increment);
         life.pose = moment.pose;
         (life.seq, life.stamp_ns) = (moment.seq, moment.stamp_ns);

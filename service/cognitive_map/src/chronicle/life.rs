@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Vector6};
 
 use super::slots::NONE;
+use crate::estimation::Calibrated;
 use crate::geometry::PoseCovariance;
 use crate::state::state_of_struct;
 
@@ -36,6 +37,8 @@ pub(super) struct Life {
     /// Motion since the latest anchor, with the covariance of its error.
     pub(super) since: Isometry3<f64>,
     pub(super) covariance: PoseCovariance,
+    /// How that motion was corrected.
+    pub(super) calibrated: Calibrated,
     /// Where it came to rest lately, by the motion since the latest anchor, and when.
     pub(super) rest: Isometry3<f64>,
     pub(super) rest_seq: u64,
@@ -59,6 +62,7 @@ state_of_struct!(Life {
     until_ns,
     since,
     covariance,
+    calibrated,
     rest,
     rest_seq,
     rest_ns,
@@ -82,6 +86,7 @@ impl Life {
             until_ns: 0,
             since: Isometry3::identity(),
             covariance: PoseCovariance::zero(),
+            calibrated: Calibrated::default(),
             rest: Isometry3::identity(),
             rest_seq: 0,
             rest_ns: 0,
@@ -90,12 +95,18 @@ impl Life {
     }
 
     /// The agent moved on from where it was.
-    pub(super) fn go(&mut self, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
+    pub(super) fn go(
+        &mut self,
+        increment: &Isometry3<f64>,
+        variance: &Vector6<f64>,
+        calibrated: &Calibrated,
+    ) {
         self.since *= increment;
         self.since.rotation.renormalize_fast();
         self.covariance = self
             .covariance
             .after_motion(increment, &variance.map(f64::sqrt));
+        self.calibrated = self.calibrated.then(calibrated);
     }
 }
 

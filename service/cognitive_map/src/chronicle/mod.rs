@@ -22,6 +22,7 @@ mod refine;
 mod settings;
 mod sighting;
 mod slots;
+mod smoothing;
 mod thinning;
 mod tie;
 

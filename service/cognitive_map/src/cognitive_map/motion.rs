@@ -23,8 +23,12 @@ impl Fold<'_> {
         let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
         let increment = motion.increment();
         let step = self.estimator.motion(agent.0, stamp_ns, motion);
-        self.chronicle
-            .motion(&self.moment(), &step.increment, &step.variance);
+        self.chronicle.motion(
+            &self.moment(),
+            &step.increment,
+            &step.variance,
+            &step.calibrated,
+        );
         self.remember_what_was_settled();
         let events = &mut *self.events;
         let entered = |module, reference| {

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 
+use super::calibration::{Calibrated, Calibration};
 use super::history::History;
 use super::outcome::Step;
 use super::parameters::Parameters;
@@ -19,17 +20,6 @@ const CALIBRATION: usize = BODY_DIM - POSE;
 
 type BodyCovariance = SMatrix<f64, BODY_DIM, BODY_DIM>;
 type Tail = SMatrix<f64, POSE, CALIBRATION>;
-
-/// What odometry gets wrong all the time: reading = true · (1 + error) + bias.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Calibration {
-    /// Relative error of lengths.
-    pub(super) length: f64,
-    /// Relative error of angles.
-    pub(super) angle: f64,
-    /// Bias about the body axes \[rad/s\].
-    pub(super) bias_rad_s: Vector3<f64>,
-}
 
 /// A body that moves.
 #[derive(Clone, Debug)]
@@ -183,6 +173,12 @@ impl Mover {
             displacement,
             increment,
             variance,
+            calibrated: Calibrated {
+                calibration: self.calibration,
+                variance: SVector::from_fn(|k, _| self.covariance[(POSE + k, POSE + k)]),
+                wander,
+                moving_s: if is_rest { 0.0 } else { duration_s },
+            },
         }
     }
 

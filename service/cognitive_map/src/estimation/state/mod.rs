@@ -16,7 +16,7 @@ use super::estimator::Estimator;
 use super::frame::{Frame, MARK_DIM, MARKS_MAX, MEMBERS_MAX, Mark, Member};
 use super::history::{History, KEPT};
 use super::meeting::{MEETINGS_MAX, Meeting, PENDING_MAX, Pending};
-use super::mover::{BODY_DIM, Calibration, Mover};
+use super::mover::{BODY_DIM, Mover};
 use super::outcome::Evidence;
 use super::parameters::Parameters;
 use super::seat::{Apart, Seat, Traveller};
@@ -35,11 +35,6 @@ state_of_struct!(Evidence {
     refused_in_a_row,
     nis,
     components
-});
-state_of_struct!(Calibration {
-    length,
-    angle,
-    bias_rad_s
 });
 state_of_struct!(Mover {
     pose,
