@@ -9,11 +9,9 @@ pub(crate) use body::Body;
 pub use status::Status;
 
 use crate::estimation::Evidence;
-use crate::geometry::PoseCovariance;
 use crate::grid::{GridModules, GridState, octant};
 use crate::place::PlaceId;
 use crate::sample::Label;
-use crate::settings::Settings;
 use crate::state::state_of_struct;
 use crate::trip::{LegUnderWay, Recorder, TripId};
 
@@ -134,18 +132,6 @@ impl Agent {
     /// Pose in `odom`: by motion alone since the session began.
     pub fn odometry(&self) -> &Isometry3<f64> {
         &self.body.in_odom
-    }
-
-    /// Covariance of [`Agent::pose`].
-    pub fn covariance(&self) -> &PoseCovariance {
-        &self.body.covariance
-    }
-
-    /// How well the agent is localised.
-    pub fn status(&self, settings: &Settings) -> Status {
-        let position_sd_m = self.body.covariance.position_sd_m();
-        let refused = self.evidence.refused_in_a_row;
-        Status::of(self.placed, position_sd_m, refused, settings)
     }
 
     /// What became of its sightings, of all sessions.

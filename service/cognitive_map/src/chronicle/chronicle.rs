@@ -211,7 +211,7 @@ impl Chronicle {
         let Some(life) = self.lives.get(agent as usize) else {
             return;
         };
-        if life.newest != NONE && life.since != Isometry3::identity() {
+        if life.newest != NONE && *life.since.motion() != Isometry3::identity() {
             self.anchor_anew(agent);
         }
         let Some(life) = self.lives.get_mut(agent as usize, revision) else {
@@ -219,7 +219,7 @@ impl Chronicle {
         };
         life.session += 1;
         life.is_fresh = true;
-        life.covariance.inflate(sd);
+        life.since.inflate(&sd.component_mul(sd));
         self.waiting
             .retain(|waiting| waiting.observer != agent && waiting.target != agent);
     }
@@ -254,16 +254,16 @@ impl Chronicle {
         life.is_planar &= is_level(increment);
         life.pose = moment.pose;
         (life.seq, life.stamp_ns) = (moment.seq, moment.stamp_ns);
-        if is_within(&life.since, REST.0, REST.1) {
+        if is_within(life.since.motion(), REST.0, REST.1) {
             (life.until_seq, life.until_ns) = (moment.seq, moment.stamp_ns);
         }
-        let is_step = !is_within(&life.since, STEP.0, STEP.1);
+        let is_step = !is_within(life.since.motion(), STEP.0, STEP.1);
         let mut rests = false;
-        if is_within(&life.rest.inv_mul(&life.since), REST.0, REST.1) {
-            rests = !is_within(&life.since, NEAR.0, NEAR.1)
+        if is_within(&life.rest.inv_mul(life.since.motion()), REST.0, REST.1) {
+            rests = !is_within(life.since.motion(), NEAR.0, NEAR.1)
                 && moment.stamp_ns.saturating_sub(life.rest_ns) >= REST_NS;
         } else {
-            life.rest = life.since;
+            life.rest = *life.since.motion();
             (life.rest_seq, life.rest_ns) = (moment.seq, moment.stamp_ns);
         }
         if is_step || rests {
@@ -394,7 +394,7 @@ impl Chronicle {
         life.pose = moment.pose;
         life.seq = moment.seq;
         life.stamp_ns = life.stamp_ns.max(moment.stamp_ns);
-        if !life.is_fresh && is_within(&life.since, REST.0, REST.1) {
+        if !life.is_fresh && is_within(life.since.motion(), REST.0, REST.1) {
             (life.until_seq, life.until_ns) = (life.seq, life.stamp_ns);
         }
     }
@@ -402,17 +402,17 @@ impl Chronicle {
     /// Where an agent is: at its latest anchor, if that is near, or at a new one.
     pub(super) fn here(&mut self, agent: u32) -> Option<Beside> {
         let life = self.lives.get(agent as usize)?;
-        if life.is_fresh || !is_within(&life.since, NEAR.0, NEAR.1) {
+        if life.is_fresh || !is_within(life.since.motion(), NEAR.0, NEAR.1) {
             self.anchor_anew(agent);
         }
         let revision = self.revision;
         let life = self.lives.get(agent as usize)?;
-        let at = life.pose * life.since.inverse();
+        let at = life.pose * life.since.motion().inverse();
         let newest = life.newest;
         let here = Beside {
             anchor: newest,
-            motion: life.since,
-            covariance: life.covariance,
+            motion: *life.since.motion(),
+            covariance: life.since.covariance(),
         };
         // What is seen now has corrected the pose.
         let anchor = self.anchors.get_mut(newest, revision)?;
@@ -426,7 +426,7 @@ impl Chronicle {
         if stamp_ns >= life.stamp_ns {
             return self.here(agent);
         }
-        let mut later = (life.stamp_ns, life.since, life.covariance);
+        let mut later = (life.stamp_ns, *life.since.motion(), life.since.covariance());
         let (mut number, mut until_ns) = (life.newest, life.until_ns);
         for _ in 0..LOOK_BACK_MAX {
             let anchor = self.anchors.get(number)?;

@@ -271,12 +271,12 @@ impl Chronicle {
             let Some(node) = node.filter(|_| !life.is_fresh) else {
                 continue;
             };
-            let covariance = marginals
-                .pose(node)
-                .map(|covariance| composed(&covariance, &life.since, &life.covariance));
+            let covariance = marginals.pose(node).map(|covariance| {
+                composed(&covariance, life.since.motion(), &life.since.covariance())
+            });
             corrections.push(Correction {
                 agent,
-                pose: graph.map.pose(node) * life.since,
+                pose: graph.map.pose(node) * life.since.motion(),
                 covariance,
             });
         }
@@ -303,7 +303,7 @@ impl Chronicle {
             if let (Some(pose), true) = (newest, life.is_in_map)
                 && let Some(life) = self.lives.get_mut(agent, revision)
             {
-                life.pose = pose * life.since;
+                life.pose = pose * life.since.motion();
             }
         }
     }
@@ -314,7 +314,7 @@ impl Chronicle {
         if seq > life.seq {
             return None;
         }
-        let mut later = (life.seq, life.since, life.covariance);
+        let mut later = (life.seq, *life.since.motion(), life.since.covariance());
         let (mut number, mut until_seq) = (life.newest, life.until_seq);
         loop {
             let anchor = self.anchors.get(number)?;

@@ -126,7 +126,7 @@ impl Chronicle {
         let mut number = life.newest;
         let mut later = RefinedPose {
             stamp_ns: life.stamp_ns,
-            pose: self.now(life.newest, &life.since, graph),
+            pose: self.now(life.newest, life.since.motion(), graph),
         };
         if life.newest != NONE {
             poses.push(later);

@@ -184,7 +184,7 @@ impl Fold<'_> {
             self.emit(EventKind::AgentPlaced { position });
             return;
         }
-        let Some((pose, covariance)) = self.estimator.pose(number) else {
+        let Some(pose) = self.estimator.in_frame(number) else {
             return;
         };
         let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
@@ -192,9 +192,7 @@ impl Fold<'_> {
         let entered = |module, reference| {
             events.extend(cell_entered(placed, agent, stamp_ns, module, reference));
         };
-        self.agent
-            .body
-            .follow(&pose, &covariance, self.modules, entered);
+        self.agent.body.follow(pose, self.modules, entered);
         if let Some(evidence) = self.estimator.evidence(number) {
             self.agent.evidence = *evidence;
         }
@@ -202,8 +200,8 @@ impl Fold<'_> {
 
     /// Puts the agent where the estimate has it, without a way there.
     fn stand(&mut self) {
-        if let Some((pose, covariance)) = self.estimator.pose(self.agent_id.0) {
-            self.agent.body.place(&pose, &covariance, self.modules);
+        if let Some(pose) = self.estimator.in_frame(self.agent_id.0) {
+            self.agent.body.place(pose, self.modules);
         }
         self.agent.placed = true;
         self.agent.place = None;

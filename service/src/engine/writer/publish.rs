@@ -12,9 +12,8 @@ impl Writer {
     pub(super) fn greet(&self) {
         self.counters.sizes(&self.map, 0);
         for slot in &self.agents {
-            if let Some(agent) = self.map.agent(slot.desk.id())
-                && let Some(readout) = readout::readout(&self.shared.name, agent, &self.map)
-            {
+            let id = slot.desk.id();
+            if let Some(readout) = readout::readout(&self.shared.name, &self.map, id) {
                 slot.desk.publish(readout);
             }
             self.remind(slot);
@@ -43,7 +42,7 @@ impl Writer {
             };
             let (session, next) = (agent.session(), agent.next_seq());
             if applied {
-                if let Some(readout) = readout::readout(space, agent, &self.map) {
+                if let Some(readout) = readout::readout(space, &self.map, slot.desk.id()) {
                     let readout = slot.desk.publish(readout);
                     self.shared.outlet.estimate(&readout.estimate);
                 }
