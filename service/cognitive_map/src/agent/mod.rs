@@ -10,6 +10,7 @@ pub use status::Status;
 
 use crate::estimation::Evidence;
 use crate::grid::{GridModules, GridState, octant};
+use crate::object::Episode;
 use crate::place::PlaceId;
 use crate::sample::Label;
 use crate::state::state_of_struct;
@@ -43,6 +44,8 @@ pub struct Agent {
     pub(crate) recorder: Recorder,
     pub(crate) sightings: u64,
     pub(crate) percepts: u64,
+    /// The episode with an object that is under way.
+    pub(crate) episode: Option<Episode>,
 }
 
 state_of_struct!(Agent {
@@ -60,6 +63,7 @@ state_of_struct!(Agent {
     recorder,
     sightings,
     percepts,
+    episode,
 });
 
 impl Agent {
@@ -80,6 +84,7 @@ impl Agent {
             recorder: Recorder::default(),
             sightings: 0,
             percepts: 0,
+            episode: None,
         }
     }
 

@@ -13,6 +13,7 @@ impl Fold<'_> {
     /// A level was felt, where the sensor is.
     pub(super) fn level(&mut self, level: &Level) {
         self.agent.percepts += 1;
+        self.touch(|episode, objects| episode.level(level, objects));
         let sensor = self.agent.body.in_map() * Point3::from(*level.offset_m());
         let Some((place, weight)) = self.answering(&sensor) else {
             return;
@@ -26,6 +27,7 @@ impl Fold<'_> {
     /// A descriptor was seen, where the body is.
     pub(super) fn descriptor(&mut self, descriptor: &Descriptor) {
         self.agent.percepts += 1;
+        self.touch(|episode, objects| episode.descriptor(descriptor, objects));
         let body = self.agent.body.in_map().translation.vector.into();
         let Some((place, weight)) = self.answering(&body) else {
             return;

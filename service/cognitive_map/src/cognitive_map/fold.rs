@@ -10,6 +10,7 @@ use crate::estimation::Estimator;
 use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
 use crate::landmark::LandmarkMap;
+use crate::object::ObjectMemory;
 use crate::percept::PerceptMap;
 use crate::place::{PlaceId, PlaceMap};
 use crate::record::{AgentId, SkipReason};
@@ -33,6 +34,7 @@ pub(super) struct Fold<'a> {
     pub(super) trips: &'a mut TripMap,
     pub(super) landmarks: &'a mut LandmarkMap,
     pub(super) percepts: &'a mut PerceptMap,
+    pub(super) objects: &'a mut ObjectMemory,
     pub(super) estimator: &'a mut Estimator,
     pub(super) chronicle: &'a mut Chronicle,
     pub(super) names: &'a BTreeMap<Label, AgentId>,
@@ -70,6 +72,7 @@ impl Fold<'_> {
             self.stamp_ns = stamp_ns;
         }
         self.end_trip(TripEnd::SessionEnd);
+        self.end_episode();
         let before = self.agent.session.replace(session);
         self.agent.next_seq = 0;
         self.agent.stamp_ns = None;
@@ -93,6 +96,7 @@ impl Fold<'_> {
         // Motion was lost, so nothing measured joins what came before to what comes after.
         if reason == SkipReason::Lost {
             self.end_trip(TripEnd::Gap);
+            self.end_episode();
         }
         self.emit(EventKind::SamplesSkipped { from, to, reason });
     }
@@ -114,6 +118,7 @@ impl Fold<'_> {
             SampleBody::Sighting(sighting) => self.sighting(sighting),
             SampleBody::StartPose(start) => self.start_pose(start),
             SampleBody::Marker(marker) => self.marker(marker),
+            SampleBody::Object(mark) => self.object_mark(mark),
         }
         self.rest();
     }

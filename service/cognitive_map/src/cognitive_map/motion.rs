@@ -30,6 +30,9 @@ impl Fold<'_> {
             &step.calibrated,
         );
         self.remember_what_was_settled();
+        if let Some(episode) = &mut self.agent.episode {
+            episode.go(&step.increment, &step.variance);
+        }
         let events = &mut *self.events;
         let entered = |module, reference| {
             events.extend(cell_entered(placed, agent, stamp_ns, module, reference));

@@ -50,6 +50,7 @@ impl CognitiveMap {
         self.percepts.write_digests(&mut out);
         self.estimator.write(&mut out);
         self.chronicle.digest().0.write(&mut out);
+        self.objects.write_digests(&mut out);
         out.digest()
     }
 

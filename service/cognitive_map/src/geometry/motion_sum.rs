@@ -92,6 +92,11 @@ impl MotionSum {
     }
 
     fn add(&mut self, rotation: &Matrix3<f64>, variance: &Vector6<f64>) {
+        let is_planar = variance[2] == 0.0 && variance[3] == 0.0 && variance[4] == 0.0;
+        if is_planar && rotation[(0, 2)] == 0.0 && rotation[(1, 2)] == 0.0 {
+            self.add_planar(rotation, variance);
+            return;
+        }
         let lengths = spread(rotation, &variance.fixed_rows::<3>(0).into_owned());
         let angles = spread(rotation, &variance.fixed_rows::<3>(3).into_owned());
         let lever = self.motion.translation.vector.cross_matrix();
@@ -99,6 +104,22 @@ impl MotionSum {
         self.position += lengths - cross * lever;
         self.cross += cross;
         self.turn += angles;
+    }
+
+    /// The same where neither the noise nor the rotation leaves the plane, as of a robot on a floor.
+    fn add_planar(&mut self, rotation: &Matrix3<f64>, variance: &Vector6<f64>) {
+        let (cos, sin) = (rotation[(0, 0)], rotation[(1, 0)]);
+        let (along, across, about) = (variance[0], variance[1], variance[5]);
+        let lever = &self.motion.translation.vector;
+        let (x, y) = (lever.y, -lever.x); // how a turn at the end moves the beginning
+        self.position[(0, 0)] += cos * cos * along + sin * sin * across + about * x * x;
+        self.position[(1, 1)] += sin * sin * along + cos * cos * across + about * y * y;
+        let mixed = cos * sin * (along - across) + about * x * y;
+        self.position[(0, 1)] += mixed;
+        self.position[(1, 0)] += mixed;
+        self.cross[(0, 2)] += about * x;
+        self.cross[(1, 2)] += about * y;
+        self.turn[(2, 2)] += about;
     }
 }
 
@@ -166,11 +187,16 @@ mod tests {
     #[test]
     fn motion_in_the_plane_stays_exactly_there() {
         let mut sum = MotionSum::default();
+        let mut expected = PoseCovariance::zero();
         let increment = Isometry3::new(Vector3::new(0.3, -0.1, 0.0), Vector3::z() * 0.7);
+        let variance = Vector6::new(0.1, 0.2, 0.0, 0.0, 0.0, 0.3);
         for _ in 0..100 {
-            sum.append(&increment, &Vector6::new(0.1, 0.2, 0.0, 0.0, 0.0, 0.3));
+            sum.append(&increment, &variance);
+            expected = expected.after_motion(&increment, &variance.map(f64::sqrt));
         }
         let covariance = *sum.covariance().matrix();
+        let error = (covariance - expected.matrix()).norm();
+        assert!(error < 1e-12 * expected.matrix().norm(), "{error}");
         for out in 2..5 {
             assert!(
                 covariance

@@ -155,7 +155,7 @@ impl Recognition {
     fn none_log(&self, library: &ObjectLibrary, reach_m: Option<f64>) -> f64 {
         let extent_m = library.extent_m().max(1e-6);
         let found = reach_m.map_or(0.0, |reach_m| {
-            let radius_m = reach_m.clamp(1e-6, 0.5 * extent_m);
+            let radius_m = reach_m.min(0.5 * extent_m).max(1e-6);
             self.steps_m.len() as f64 * (8.0 * FRAC_PI_6 * radius_m.powi(3)).ln()
         });
         -found - self.aimed as f64 * extent_m.ln()
