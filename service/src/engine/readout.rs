@@ -106,6 +106,23 @@ pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wi
         EventKind::AgentPlaced { position } => wire::EventKind::AgentPlaced {
             translation_m: position.coords.into(),
         },
+        EventKind::ObjectsNarrowed { live } => wire::EventKind::ObjectsNarrowed {
+            live: (*live).into(),
+        },
+        EventKind::ObjectRecognised {
+            name, probability, ..
+        } => wire::EventKind::ObjectRecognised {
+            object: name.as_str().to_owned(),
+            probability: *probability,
+        },
+        EventKind::ObjectUnknown => wire::EventKind::ObjectUnknown {},
+        EventKind::ObjectLearned { name, contacts, .. } => wire::EventKind::ObjectLearned {
+            object: name.as_str().to_owned(),
+            contacts: *contacts,
+        },
+        EventKind::ObjectNotLearned { contacts } => wire::EventKind::ObjectNotLearned {
+            contacts: *contacts,
+        },
         EventKind::MarkerPassed { label } => wire::EventKind::MarkerPassed {
             label: label.as_str().to_owned(),
         },
@@ -187,7 +204,7 @@ pub(crate) fn skip_reason_of_wire(reason: wire::SkipReason) -> SkipReason {
 mod tests {
     use super::*;
     use cognitive_map::{
-        AgentId, Label, Level, Motion, Record, Sample, SampleBody, SettingsValues,
+        Label, Level, Motion, Record, Sample, SampleBody, Settings, SettingsValues,
     };
 
     /// An agent that stands still and feels these values.

@@ -28,6 +28,7 @@ impl Writer {
             samples: std::mem::take(&mut self.applied),
             marks: Vec::new(),
             answers: std::mem::take(&mut self.answers),
+            objects: std::mem::take(&mut self.objects),
         };
         for slot in &mut self.agents {
             if !slot.applied && !slot.remind {
@@ -75,7 +76,7 @@ impl Writer {
             .revision
             .store(self.map.revision(), Ordering::Release);
         self.publish_events();
-        if !commit.marks.is_empty() || !commit.answers.is_empty() {
+        if !commit.marks.is_empty() || !commit.answers.is_empty() || !commit.objects.is_empty() {
             // The committer outlives the writers; without it nothing could be acknowledged anyway.
             let _ = self.commits.send(commit);
         }
