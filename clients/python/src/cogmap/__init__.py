@@ -75,6 +75,7 @@ from .link import DEFAULT_ENDPOINT, open_session
 from .object import (
     AgentObject,
     Contact,
+    ContactDescriptor,
     ContactLevel,
     EpisodeKind,
     Identification,
@@ -147,6 +148,7 @@ __all__ = [
     "Closed",
     "CogmapError",
     "Contact",
+    "ContactDescriptor",
     "ContactLevel",
     "CubeTurns",
     "Descriptor",

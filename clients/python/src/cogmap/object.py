@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar, Optional, Tuple, Union
 
-from .sample import Descriptor, Orientation, TouchNoise
+from .sample import Orientation, TouchNoise
 from .scalar import text
-from .vector import Quaternion, Vec3, vec3
+from .vector import Quaternion, Vec3, single_precision, vec3
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,20 @@ class ContactLevel:
 
 
 @dataclass(frozen=True)
+class ContactDescriptor:
+    """A descriptor that was seen at a contact."""
+
+    #: Name of the channel.
+    channel: str
+    #: The vector, of 8 to 4096 numbers, in single precision; normalised by the service.
+    vector: Tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        text("channel", self.channel)
+        object.__setattr__(self, "vector", single_precision("vector", self.vector))
+
+
+@dataclass(frozen=True)
 class Contact:
     """A contact."""
 
@@ -36,7 +50,7 @@ class Contact:
     #: What was felt, at most one level of each channel.
     levels: Tuple[ContactLevel, ...] = ()
     #: What was seen, at most one descriptor of each channel.
-    descriptors: Tuple[Descriptor, ...] = ()
+    descriptors: Tuple[ContactDescriptor, ...] = ()
     #: What path integration has drifted since the first contact, per axis [m].
     drift_sd_m: float = 0.0
     #: Whether it was asked for, and not come upon: where it lies then says nothing of the object.
