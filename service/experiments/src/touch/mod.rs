@@ -1,0 +1,13 @@
+//! Objects as sets of touches: a place on the surface and one level.
+//!
+//! A set is a directory with one file an object, `<name>.csv`, of the columns `x_mm,y_mm,z_mm,level`: millimetres in the
+//! object's own frame. An [`Episode`] is an object touched again, in random order, with noise and in a frame of its own.
+
+mod data_set;
+mod episode;
+
+pub use data_set::{Touch, TouchError, TouchReason, TouchSet, TouchedObject};
+pub use episode::{Episode, TouchNoise, episode_random};
+
+#[cfg(test)]
+mod tests;
