@@ -5,6 +5,7 @@ pub mod estimation;
 pub mod experience;
 pub mod geometry;
 pub mod grid;
+pub mod recognition;
 
 mod agent;
 mod cognitive_map;

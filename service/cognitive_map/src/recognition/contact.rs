@@ -1,0 +1,115 @@
+//! Contacts: what an episode consists of.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Unit, Vector3};
+
+/// A scalar felt on a channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Felt {
+    /// Channel, as the caller numbers them.
+    pub channel: u16,
+    /// Value, in the channel's unit.
+    pub value: f64,
+    /// Standard deviation of its noise, in the channel's unit.
+    pub sd: f64,
+}
+
+/// A descriptor seen on a channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen {
+    /// Channel, as the caller numbers them.
+    pub channel: u16,
+    /// Unit vector.
+    pub vector: Arc<[f32]>,
+}
+
+/// How a contact was come by, which says what its place tells about the map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reached {
+    /// It was come upon: anywhere on the map, or within a step of the contact before.
+    #[default]
+    Found,
+    /// It was asked for: where it lies is the asker's choice, and only its distance to the map counts.
+    Aimed,
+}
+
+/// One contact with what is to be recognised: a touch, or a place passed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contact {
+    /// Position \[m\] in the episode's own frame, by path integration.
+    pub position_m: Point3<f64>,
+    /// Standard deviation of its own noise, per axis \[m\].
+    pub position_sd_m: f64,
+    /// Standard deviation of what path integration has drifted since the episode began, per axis \[m\];
+    /// never less than that of the contact before.
+    pub drift_sd_m: f64,
+    /// The surface's outward normal, in the episode's frame.
+    pub normal: Option<Unit<Vector3<f64>>>,
+    /// Standard deviation of the normal's direction, per axis \[rad\].
+    pub normal_sd_rad: f64,
+    /// Levels, at most one per channel.
+    pub levels: Vec<Felt>,
+    /// Descriptors, at most one per channel.
+    pub descriptors: Vec<Seen>,
+    /// How it was come by.
+    pub reached: Reached,
+}
+
+impl Contact {
+    /// A contact at a position with `position_sd_m` \[m\] of noise per axis, of which nothing else is
+    /// known.
+    pub fn at(position_m: Point3<f64>, position_sd_m: f64) -> Self {
+        Self {
+            position_m,
+            position_sd_m,
+            drift_sd_m: 0.0,
+            normal: None,
+            normal_sd_rad: 0.0,
+            levels: Vec::new(),
+            descriptors: Vec::new(),
+            reached: Reached::Found,
+        }
+    }
+
+    /// The same with the surface's outward normal there and its noise per axis \[rad\].
+    #[must_use]
+    pub fn with_normal(mut self, normal: Unit<Vector3<f64>>, sd_rad: f64) -> Self {
+        self.normal = Some(normal);
+        self.normal_sd_rad = sd_rad;
+        self
+    }
+
+    /// The same with a level.
+    #[must_use]
+    pub fn with_level(mut self, channel: u16, value: f64, sd: f64) -> Self {
+        self.levels.push(Felt { channel, value, sd });
+        self
+    }
+
+    /// The same with a descriptor (a unit vector).
+    #[must_use]
+    pub fn with_descriptor(mut self, channel: u16, vector: Arc<[f32]>) -> Self {
+        self.descriptors.push(Seen { channel, vector });
+        self
+    }
+
+    /// The same with what path integration has drifted since the episode began, per axis \[m\].
+    #[must_use]
+    pub fn with_drift(mut self, drift_sd_m: f64) -> Self {
+        self.drift_sd_m = drift_sd_m;
+        self
+    }
+
+    /// The same as one that was asked for.
+    #[must_use]
+    pub fn aimed(mut self) -> Self {
+        self.reached = Reached::Aimed;
+        self
+    }
+
+    /// Variance of its position in the episode's frame, per axis \[m²\].
+    pub(super) fn variance_m2(&self) -> f64 {
+        self.position_sd_m * self.position_sd_m + self.drift_sd_m * self.drift_sd_m
+    }
+}
