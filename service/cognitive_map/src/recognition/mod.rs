@@ -41,6 +41,7 @@ mod library;
 mod model;
 mod orientation;
 mod posterior;
+mod reaches;
 
 mod shifts;
 mod surface;

@@ -132,7 +132,8 @@ impl Shifts {
         let mut best: [(f64, Vector3<f64>, f64); PARTS_MAX] =
             [(f64::NEG_INFINITY, Vector3::zeros(), 0.0); PARTS_MAX];
         let mut total = outlier.exp();
-        for &place in surface.cells.near(&query) {
+        let uncertain_m2 = noise + prior.diagonal().max();
+        for &place in surface.near(&query, uncertain_m2) {
             let patch = &surface.patches[place as usize];
             let apart = patch.position - query;
             let variance = noise + patch.variance_m2;
