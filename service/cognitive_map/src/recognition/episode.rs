@@ -171,13 +171,11 @@ impl Recognition {
         let all = log_sum(own().map(|shift| shift.evidence));
         let best = own().max_by(|a, b| a.evidence.total_cmp(&b.evidence))?;
         let pose = best.pose(&self.shifts.rotations);
-        // The translation's error in the map, turned into the episode's axes.
-        let turn = pose.rotation.inverse().to_rotation_matrix().into_inner();
+        // Alike along all axes, so that it does not matter along which.
         let mut covariance = Matrix6::zeros();
-        let translation = turn * best.covariance * turn.transpose();
-        covariance
-            .fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(&translation);
+        for axis in 0..3 {
+            covariance[(axis, axis)] = best.variance_m2;
+        }
         let share = |evidence: f64| (evidence - all).exp();
         let mut others: Vec<_> = own()
             .filter(|shift| !std::ptr::eq(*shift, best))
@@ -189,7 +187,7 @@ impl Recognition {
         Some(PoseEstimate {
             object,
             map_from_episode: pose,
-            covariance: PoseCovariance::from_matrix(&((covariance + covariance.transpose()) * 0.5)),
+            covariance: PoseCovariance::from_matrix(&covariance),
             share: share(best.evidence),
             others,
         })
