@@ -1,6 +1,7 @@
 //! The maps that may be meant.
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_6;
 
 use super::model::ObjectModel;
 use super::surface::{Surface, Wide, wide};
@@ -17,6 +18,7 @@ pub struct ObjectId(pub u32);
 pub struct ObjectLibrary {
     objects: BTreeMap<ObjectId, (ObjectModel, Surface)>,
     wide: Vec<Wide>,
+    extent_m: f64,
 }
 
 impl ObjectLibrary {
@@ -56,6 +58,8 @@ impl ObjectLibrary {
     }
 
     fn survey(&mut self) {
+        let extents = self.surfaces().map(|(_, surface)| surface.extent_m);
+        self.extent_m = extents.fold(0.0, f64::max);
         self.wide = wide(self.objects.values().map(|(_, surface)| surface));
     }
 
@@ -71,10 +75,13 @@ impl ObjectLibrary {
         &self.wide
     }
 
+    /// Density of contacts with something of which only the size is known, that of the largest map, per m³.
+    pub(super) fn elsewhere(&self) -> f64 {
+        1.0 / (FRAC_PI_6 * self.extent_m().max(1e-6).powi(3))
+    }
+
     /// Extent of the largest map \[m\].
     pub(super) fn extent_m(&self) -> f64 {
-        self.surfaces()
-            .map(|(_, surface)| surface.extent_m)
-            .fold(0.0, f64::max)
+        self.extent_m
     }
 }

@@ -1,7 +1,5 @@
 //! Hypotheses where the rotation is one of a few: a sum of Gaussians over translations.
 
-use std::f64::consts::FRAC_PI_6;
-
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::contact::Contact;
@@ -15,7 +13,7 @@ const BIRTHS_MAX: usize = 65_536;
 /// A hypothesis this far below the best holds nothing worth its keep: e⁻²⁵.
 const BELOW: f64 = 25.0;
 /// Share of contacts that the map does not explain.
-pub(super) const OUTLIERS: f64 = 0.02;
+const OUTLIERS: f64 = 0.02;
 /// A hypothesis parts in two where two places could be the one touched, each with this share.
 const PART_SHARE: f64 = 0.05;
 /// Most parts.
@@ -38,11 +36,6 @@ pub(super) struct Shift {
 pub(super) struct Shifts {
     pub(super) rotations: Vec<UnitQuaternion<f64>>,
     pub(super) all: Vec<Shift>,
-}
-
-/// The density of a contact that is an outlier, per m³: somewhere about the map.
-pub(super) fn outlier_density(surface: &Surface) -> f64 {
-    OUTLIERS / (surface.extent_m.powi(3) * FRAC_PI_6)
 }
 
 impl Shifts {
@@ -127,7 +120,7 @@ impl Shifts {
         let noise = contact.position_sd_m * contact.position_sd_m;
         let query = Point3::from(rotation * contact.position_m.coords + shift.translation);
         let share_log = (1.0 - OUTLIERS).ln() - (surface.patches.len() as f64).ln();
-        let outlier = outlier_density(surface).ln();
+        let outlier = (OUTLIERS * library.elsewhere()).ln();
         // The best few places: log density, and the shift's change.
         let mut best: [(f64, Vector3<f64>, f64); PARTS_MAX] =
             [(f64::NEG_INFINITY, Vector3::zeros(), 0.0); PARTS_MAX];
