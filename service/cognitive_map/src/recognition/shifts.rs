@@ -1,22 +1,23 @@
 //! Hypotheses where the rotation is one of a few: a sum of Gaussians over translations.
 
 use std::collections::BTreeMap;
-use std::f64::consts::{FRAC_PI_6, TAU};
+use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::contact::Contact;
+use super::contact::{Contact, Reached};
 use super::library::{ObjectId, ObjectLibrary};
 use super::surface::{Surface, Wide};
 
-/// Most hypotheses kept after a touch.
+/// Most hypotheses kept in the long run. Early on, when little tells them apart, more are: as many as were
+/// born, and half as many with each touch.
 const KEPT_MAX: usize = 4096;
-/// Most births at a touch: places taken for the one that was touched.
+/// Most births: places taken for the one that was touched first.
 const BIRTHS_MAX: usize = 65_536;
-/// A hypothesis this far below the best holds nothing worth its keep: e⁻²⁵.
-const BELOW: f64 = 25.0;
+/// A hypothesis this far below the best holds nothing worth its keep: e⁻²⁰.
+const BELOW: f64 = 20.0;
 /// Share of contacts that the map does not explain.
-pub(super) const OUTLIERS: f64 = 0.02;
+const OUTLIERS: f64 = 0.02;
 /// A hypothesis parts where several places could be the one touched, each with this share of the
 /// contact's likelihood at least.
 const PART_SHARE: f64 = 0.005;
@@ -44,6 +45,8 @@ struct Touched<'a> {
     /// What path integration has drifted since the touch before, per axis \[m²\].
     drift_m2: f64,
     wide: &'a [Wide],
+    /// Density of outliers, per m³.
+    elsewhere: f64,
     felt: FeltLogs,
     /// Density, displacement and variance of the places that answer one hypothesis.
     answers: Vec<(f64, Vector3<f64>, f64)>,
@@ -68,11 +71,9 @@ impl FeltLogs {
 pub(super) struct Shifts {
     pub(super) rotations: Vec<UnitQuaternion<f64>>,
     pub(super) all: Vec<Shift>,
-}
-
-/// The density of a contact that is an outlier, per m³: somewhere about the map.
-pub(super) fn outlier_density(surface: &Surface) -> f64 {
-    OUTLIERS / (surface.extent_m.powi(3) * FRAC_PI_6)
+    /// Log-likelihood of the contacts so far, but for those asked for, with something whose surface is
+    /// like those of the library; without the share of it within a step.
+    pub(super) stranger: f64,
 }
 
 impl Shifts {
@@ -80,6 +81,7 @@ impl Shifts {
         Self {
             rotations,
             all: Vec::new(),
+            stranger: 0.0,
         }
     }
 
@@ -90,11 +92,19 @@ impl Shifts {
         } else {
             let grown = before.last().map_or(0.0, |last| last.drift_sd_m.powi(2));
             let drift = (contact.drift_sd_m.powi(2) - grown).max(0.0);
+            if contact.reached != Reached::Aimed {
+                let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
+                let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+                if let Some(nearest) = nearest {
+                    self.stranger += self.stranger_log(library, nearest, contact, drift);
+                }
+            }
             let all = std::mem::take(&mut self.all);
             let mut touched = Touched {
                 contact,
                 drift_m2: drift,
                 wide: library.wide(),
+                elsewhere: library.elsewhere(),
                 felt: FeltLogs::default(),
                 answers: Vec::new(),
                 parts: Vec::with_capacity(2 * all.len()),
@@ -108,7 +118,51 @@ impl Shifts {
             self.drop_faint();
             self.merge();
         }
-        self.prune();
+        self.prune(KEPT_MAX.max(BIRTHS_MAX >> before.len().min(31)));
+    }
+
+    /// Log-density of a contact with something that was never learned, whose surface is like those of the library: the mean
+    /// over places of it, each taken for the one touched by `other`, weighed by how well it explains what was felt there.
+    ///
+    /// It is what a hypothesis that knows nothing else would expect, so that evidence for a map begins
+    /// where the map explains more than a surface of its kind. Space filled evenly would be no rival: a step along
+    /// any surface ends on most others, and neighbouring places feel alike on most.
+    fn stranger_log(
+        &self,
+        library: &ObjectLibrary,
+        other: &Contact,
+        contact: &Contact,
+        drift: f64,
+    ) -> f64 {
+        let step = contact.position_m - other.position_m;
+        let noise = contact.position_sd_m * contact.position_sd_m + drift;
+        let wide = library.wide();
+        let (mut sum, mut weights) = (0.0, 0.0);
+        let mut turns = self.rotations.iter().cycle();
+        for &(object, place) in library.samples() {
+            let (Some(surface), Some(rotation)) = (library.surface(object), turns.next()) else {
+                continue;
+            };
+            let here = &surface.patches[place as usize];
+            let normal = normal_log(rotation, other, here.normal.as_ref());
+            let weight = (here.percept_log(other, wide) + normal).exp();
+            let query = here.position + rotation * step;
+            let mut density = 0.0;
+            for &near in surface.near(&query, noise) {
+                let patch = &surface.patches[near as usize];
+                let variance = noise + patch.variance_m2;
+                let squared = (patch.position - query).norm_squared() / variance;
+                if squared < DISTANCE_MAX {
+                    let normal = normal_log(rotation, contact, patch.normal.as_ref());
+                    let felt = patch.percept_log(contact, wide);
+                    density += (normal + felt - 0.5 * squared).exp() / (TAU * variance).powf(1.5);
+                }
+            }
+            sum += weight * density / surface.patches.len() as f64;
+            weights += weight;
+        }
+        let typical = if weights > 0.0 { sum / weights } else { 0.0 };
+        ((1.0 - OUTLIERS) * typical + OUTLIERS * library.elsewhere()).ln()
     }
 
     /// Every place taken for the one that was touched.
@@ -159,7 +213,7 @@ impl Shifts {
         let noise = contact.position_sd_m * contact.position_sd_m;
         let query = Point3::from(rotation * contact.position_m.coords + shift.translation);
         let share_log = (1.0 - OUTLIERS).ln() - (surface.patches.len() as f64).ln();
-        let outlier = outlier_density(surface);
+        let outlier = OUTLIERS * touch.elsewhere;
         let felt = touch.felt.of(shift.object, surface.patches.len());
         let mut total = outlier;
         touch.answers.clear();
@@ -259,7 +313,7 @@ impl Shifts {
     }
 
     /// Drops what holds no evidence, and the least beyond the budget; each object keeps its best.
-    fn prune(&mut self) {
+    fn prune(&mut self, most: usize) {
         self.all.sort_by(|a, b| {
             b.evidence
                 .total_cmp(&a.evidence)
@@ -273,7 +327,7 @@ impl Shifts {
         let mut seen = std::collections::BTreeSet::new();
         self.all.retain(|shift| {
             let first = seen.insert(shift.object);
-            let keep = first || kept < KEPT_MAX && shift.evidence > best - BELOW;
+            let keep = first || kept < most && shift.evidence > best - BELOW;
             kept += usize::from(keep);
             keep
         });

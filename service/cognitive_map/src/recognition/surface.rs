@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::contact::Contact;
-use super::contact::Seen;
+use super::contact::{Contact, Seen};
 use super::model::{LevelMemory, ObjectModel};
 use super::reaches::Reaches;
+use super::relief::Relief;
 
 /// A place's field is uniform over one spacing; that is its standard deviation in spacings, 1/√12.
 const FIELD_PER_SPACING: f64 = 0.288_675;
@@ -36,6 +36,8 @@ pub(super) struct Surface {
     pub(super) extent_m: f64,
     /// Area that it takes for \[m²\]: one spacing squared per place.
     pub(super) area_m2: f64,
+    /// The same as a surface, if normals were felt.
+    pub(super) relief: Option<Relief>,
     shares: [f64; SHARES + 1],
 }
 
@@ -74,6 +76,7 @@ impl Surface {
             reaches: Reaches::new(&positions, &own_m, least_m, extent_m),
             shares: shares(&positions, extent_m),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
+            relief: Relief::new(model),
             extent_m,
             patches,
         }

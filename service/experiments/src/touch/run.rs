@@ -178,5 +178,8 @@ fn explore(
 }
 
 fn contact(touch: &Touch, position_sd_m: f64, level_sd: f64) -> Contact {
-    Contact::at(touch.position_m, position_sd_m).with_level(CHANNEL, touch.level, level_sd)
+    // In random order, from anywhere to anywhere.
+    Contact::at(touch.position_m, position_sd_m)
+        .with_level(CHANNEL, touch.level, level_sd)
+        .drawn()
 }

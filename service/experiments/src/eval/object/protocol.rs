@@ -68,7 +68,7 @@ impl ObjectProtocol {
             normals: Normals::Untold,
             trials: 1000,
             touches_max: 200,
-            sure: 0.998,
+            sure: 0.9995,
             learning_touches: 5000,
             seed: 1,
         }
