@@ -200,7 +200,7 @@ fn look(
         fit: posterior.fit,
         live: posterior.live_hypotheses,
         rotation_rad: pose.filter(|_| first == Some(ObjectId(truth))).map(|pose| {
-            let tolerance_m = 0.5 * settings.noise_m + 2e-4;
+            let tolerance_m = 0.5 * settings.noise_m;
             symmetry::error_rad(cloud, &pose.map_from_episode, object_from_episode, tolerance_m)
         }),
     }
