@@ -42,7 +42,7 @@ pub use name::{Name, NameError};
 pub use object::{
     AgentObject, Contact, ContactLevel, EpisodeKind, Identification, IdentifyQuery, NextTouch,
     ObjectDetail, ObjectLesson, ObjectLevel, ObjectMark, ObjectPage, ObjectPlace, ObjectPose,
-    ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, TouchNoise,
+    ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached, TouchNoise,
 };
 pub use predict::{ExpectedPercept, MotionBody, PredictAnswer, PredictQuery, PredictedPercept};
 pub use query::{PerceptCue, RecallQuery, Verb, WatermarkQuery};

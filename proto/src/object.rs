@@ -109,9 +109,23 @@ pub struct Contact {
     /// What path integration has drifted since the first contact, per axis \[m\].
     #[serde(default)]
     pub drift_sd_m: f64,
-    /// Whether it was asked for, and not come upon: where it lies then says nothing of the object.
+    /// How it was come by; found when absent.
     #[serde(default)]
-    pub aimed: bool,
+    pub reached: Reached,
+}
+
+/// How a contact was come by, which says what its place tells about the object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Reached {
+    /// It was come upon, within a step of the contact before.
+    #[default]
+    Found,
+    /// It was asked for: where it lies is the asker's choice.
+    Aimed,
+    /// It was drawn evenly from the whole surface.
+    Drawn,
 }
 
 /// A level that was felt at a contact.

@@ -3,7 +3,7 @@
 
 use cogmap_proto as wire;
 use cogmap_proto::limits::ROTATIONS_MAX;
-use cognitive_map::recognition::Orientation;
+use cognitive_map::recognition::{Orientation, Reached};
 use cognitive_map::{
     Descriptor, InvalidSample, Label, Level, Marker, Motion, ObjectMark, PerceptCue, PoseNoise,
     RangeBearing, Relation, RelativePose, RelativePosition, Sample, SampleBody, Sighting, Spacing,
@@ -167,7 +167,11 @@ fn touch(contact: &wire::Contact, noise: TouchNoise) -> Result<Touch, InvalidSam
     if let Some(normal) = contact.normal {
         touch = touch.with_normal(normal)?;
     }
-    Ok(if contact.aimed { touch.aimed() } else { touch })
+    Ok(touch.reached(match contact.reached {
+        wire::Reached::Found => Reached::Found,
+        wire::Reached::Aimed => Reached::Aimed,
+        wire::Reached::Drawn => Reached::Drawn,
+    }))
 }
 
 fn increment(body: &wire::Increment) -> Result<Motion, InvalidSample> {

@@ -3,7 +3,7 @@
 use cogmap_proto::{
     AgentObject, Contact, ContactLevel, Descriptor, EpisodeKind, Identification, IdentifyQuery,
     NextTouch, ObjectDetail, ObjectLesson, ObjectLevel, ObjectPage, ObjectPlace, ObjectPose,
-    ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, TouchNoise,
+    ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached, TouchNoise,
 };
 
 use super::Visit;
@@ -40,7 +40,7 @@ fn contacts() -> Vec<Contact> {
                 vector: vec![0.5, -0.5, 0.25, 0.0, 1.0, 0.0, 0.0, 0.125],
             }],
             drift_sd_m: 0.004,
-            aimed: true,
+            reached: Reached::Aimed,
         },
     ]
 }

@@ -13,6 +13,8 @@
 //! | [`g2o`] | pose graphs |
 //! | [`tuc`] | the TUC data sets: odometry and place matches, many of them false |
 //! | [`victoria`] | Victoria Park, as text with odometry and sightings |
+//! | [`objects`] | objects of coloured voxels, and an end effector that explores them |
+//! | [`touch`] | objects as sets of touches |
 //! | [`mapping`] | recordings through the experience map, causal and refined |
 //! | [`eval`] | the seed paper's experiments: protocols, measures, tables and figures |
 //! | [`metrics`] | the absolute trajectory error (ATE), alignment, dead reckoning |
@@ -63,8 +65,10 @@ pub mod g2o;
 pub mod mapping;
 pub mod metrics;
 pub mod mrclam;
+pub mod objects;
 pub mod reading;
 pub mod stamp;
+pub mod touch;
 pub mod tuc;
 pub mod tum;
 pub mod victoria;

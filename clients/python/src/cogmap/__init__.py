@@ -92,6 +92,7 @@ from .object import (
     ObjectSummary,
     ObjectVerdict,
     OtherPose,
+    Reached,
     Undecided,
     UnknownObject,
 )
@@ -212,6 +213,7 @@ __all__ = [
     "PredictAnswer",
     "PredictedPercept",
     "RangeBearing",
+    "Reached",
     "RecallAnswer",
     "RecalledPlace",
     "Recruitment",

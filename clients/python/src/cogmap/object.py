@@ -11,6 +11,17 @@ from .scalar import text
 from .vector import Quaternion, Vec3, single_precision, vec3
 
 
+class Reached(Enum):
+    """How a contact was come by, which says what its place tells about the object."""
+
+    #: It was come upon, within a step of the contact before.
+    FOUND = "found"
+    #: It was asked for: where it lies is the asker's choice.
+    AIMED = "aimed"
+    #: It was drawn evenly from the whole surface.
+    DRAWN = "drawn"
+
+
 @dataclass(frozen=True)
 class ContactLevel:
     """A level that was felt at a contact."""
@@ -53,8 +64,8 @@ class Contact:
     descriptors: Tuple[ContactDescriptor, ...] = ()
     #: What path integration has drifted since the first contact, per axis [m].
     drift_sd_m: float = 0.0
-    #: Whether it was asked for, and not come upon: where it lies then says nothing of the object.
-    aimed: bool = False
+    #: How it was come by.
+    reached: Reached = Reached.FOUND
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_m", vec3("position_m", self.position_m))

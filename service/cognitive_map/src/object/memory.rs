@@ -8,7 +8,7 @@ use nalgebra::Isometry3;
 use super::touch::{Lesson, Touch};
 use crate::recognition::{
     Contact, ModelPlace, NextTouch, ObjectId, ObjectLibrary, ObjectModel, Orientation, Posterior,
-    Recognition,
+    Recognition, Verdict,
 };
 use crate::sample::Label;
 use crate::state::{State, StateWriter};
@@ -18,6 +18,9 @@ use crate::strength::{Clock, Strength};
 const OBJECTS_MAX: usize = 1024;
 /// Most channels that objects are felt on. What is felt on further ones does not count.
 const CHANNELS_MAX: usize = 256;
+
+/// Share of the evidence that a pose must hold before a visit is laid into an object.
+const ALIGNED_SHARE: f64 = 0.9;
 
 /// What is known of an object beside its places.
 #[derive(Clone, Debug, PartialEq)]
@@ -241,15 +244,15 @@ impl ObjectMemory {
         orientation: &Orientation,
         contacts: &[Contact],
     ) -> Option<Isometry3<f64>> {
-        let mut library = ObjectLibrary::default();
-        library.put(id, self.library.get(id)?.clone());
         let mut recognition = Recognition::new(orientation);
+        let mut was_it = false;
         for contact in contacts {
-            recognition.touch(&library, contact.clone());
+            recognition.touch(&self.library, contact.clone());
+            // A visit may well lead beyond what is known of the object.
+            was_it |= recognition.posterior(&self.library).verdict() == Verdict::Object(id);
         }
-        let posterior = recognition.posterior(&library);
-        let is_it = posterior.unknown < 0.5;
-        let pose = posterior.pose.filter(|pose| is_it && pose.share > 0.9)?;
+        let pose = { recognition.posterior(&self.library).pose }
+            .filter(|pose| was_it && pose.object == id && pose.share > ALIGNED_SHARE)?;
         Some(pose.map_from_episode)
     }
 

@@ -87,7 +87,12 @@ impl State for Contact {
         self.normal_sd_rad.write(out);
         write_list(self.levels.iter(), out);
         write_list(self.descriptors.iter(), out);
-        (self.reached == Reached::Aimed).write(out);
+        let reached: u8 = match self.reached {
+            Reached::Found => 0,
+            Reached::Aimed => 1,
+            Reached::Drawn => 2,
+        };
+        reached.write(out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
@@ -103,10 +108,11 @@ impl State for Contact {
             normal_sd_rad: State::read(input)?,
             levels: read_list(input, ITEMS_MAX)?,
             descriptors: read_list(input, ITEMS_MAX)?,
-            reached: if bool::read(input)? {
-                Reached::Aimed
-            } else {
-                Reached::Found
+            reached: match u8::read(input)? {
+                0 => Reached::Found,
+                1 => Reached::Aimed,
+                2 => Reached::Drawn,
+                _ => return Err(CorruptState::Invalid),
             },
         })
     }

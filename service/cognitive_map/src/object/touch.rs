@@ -43,7 +43,7 @@ pub struct Touch {
     descriptors: Vec<Descriptor>,
     noise: TouchNoise,
     drift_sd_m: f64,
-    aimed: bool,
+    reached: Reached,
 }
 
 impl Touch {
@@ -62,7 +62,7 @@ impl Touch {
             descriptors: Vec::new(),
             noise,
             drift_sd_m: 0.0,
-            aimed: false,
+            reached: Reached::Found,
         })
     }
 
@@ -101,10 +101,10 @@ impl Touch {
         Ok(self)
     }
 
-    /// The same as one that was asked for.
+    /// The same, come by in this way.
     #[must_use]
-    pub fn aimed(mut self) -> Self {
-        self.aimed = true;
+    pub fn reached(mut self, reached: Reached) -> Self {
+        self.reached = reached;
         self
     }
 
@@ -114,11 +114,7 @@ impl Touch {
         contact.drift_sd_m = self.drift_sd_m;
         contact.normal = self.normal;
         contact.normal_sd_rad = self.noise.normal_sd_rad();
-        contact.reached = if self.aimed {
-            Reached::Aimed
-        } else {
-            Reached::Found
-        };
+        contact.reached = self.reached;
         for level in &self.levels {
             let felt = number(&level.channel).map(|channel| Felt {
                 channel,

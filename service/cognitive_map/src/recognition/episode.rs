@@ -1,22 +1,25 @@
 //! An episode: contacts come in, hypotheses gain and lose.
 
-use std::f64::consts::FRAC_PI_6;
+use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_6, PI};
 
-use nalgebra::{Matrix6, Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix6, Point3, Translation3, Unit, Vector3};
 
 use super::contact::{Contact, Reached};
 use super::library::{ObjectId, ObjectLibrary};
 use super::orientation::Orientation;
+use super::poses::{Hypothesis as PoseHypothesis, Poses};
 use super::posterior::{PoseEstimate, Posterior, entropy_nats};
 use super::shifts::{Shifts, log_sum};
-use crate::geometry::PoseCovariance;
+use super::surface::Surface;
+use crate::geometry::{PoseCovariance, se3};
 
 /// Contacts of an episode that are kept.
 const CONTACTS_MAX: usize = 128;
 /// A step reaches to twice the median step.
 const REACH_PER_STEP: f64 = 2.0;
 /// Prior probability that it is none of the objects.
-const UNKNOWN_PRIOR: f64 = 0.01;
+const UNKNOWN_PRIOR: f64 = 0.1;
 /// Other poses that an answer names.
 const OTHERS_MAX: usize = 24;
 
@@ -33,53 +36,73 @@ pub struct NextTouch {
 
 /// The state of one episode of recognition.
 ///
-/// All work is bounded per touch: by the number of places of the library at the first, by a budget of
-/// hypotheses after.
+/// All work is bounded per touch: by the number of places of the library at the first, by budgets of
+/// hypotheses and of poses tried after.
 #[derive(Clone, Debug)]
 pub struct Recognition {
     contacts: Vec<Contact>,
     count: usize,
     /// Lengths of the steps between contacts that were found, in order of length.
     steps_m: Vec<f64>,
-    /// Contacts, but the first, that were asked for.
+    /// Contacts that were drawn from the whole map, but for the first.
+    drawn: usize,
+    /// Contacts that were asked for.
     aimed: usize,
-    shifts: Shifts,
+    hypotheses: Hypotheses,
+}
+
+#[derive(Clone, Debug)]
+enum Hypotheses {
+    Shifts(Shifts),
+    Poses(Poses),
+}
+
+/// One hypothesis, whichever kind it is.
+struct Mass {
+    map_from_episode: Isometry3<f64>,
+    covariance: Matrix6<f64>,
+    /// Log of its mass.
+    log: f64,
 }
 
 impl Recognition {
     /// An episode that begins.
     pub fn new(orientation: &Orientation) -> Self {
-        let rotations = orientation.rotations().unwrap_or_default();
+        let hypotheses = match orientation.rotations() {
+            Some(rotations) => Hypotheses::Shifts(Shifts::new(rotations)),
+            None => Hypotheses::Poses(Poses::default()),
+        };
         Self {
             contacts: Vec::new(),
             count: 0,
             steps_m: Vec::new(),
+            drawn: 0,
             aimed: 0,
-            shifts: Shifts::new(rotations),
+            hypotheses,
         }
     }
 
     /// Takes in one contact.
     pub fn touch(&mut self, library: &ObjectLibrary, contact: Contact) {
-        if let Some(last) = self.contacts.last() {
-            match contact.reached {
-                Reached::Found => {
-                    let step_m = (contact.position_m - last.position_m).norm();
-                    let at = self.steps_m.partition_point(|other| *other < step_m);
-                    self.steps_m.insert(at, step_m);
-                }
-                Reached::Aimed => self.aimed += 1,
+        match (self.contacts.last(), contact.reached) {
+            (_, Reached::Aimed) => self.aimed += 1,
+            (None, _) => {}
+            (Some(_), Reached::Drawn) => self.drawn += 1,
+            (Some(last), Reached::Found) => {
+                let step_m = (contact.position_m - last.position_m).norm();
+                let at = self.steps_m.partition_point(|other| *other < step_m);
+                self.steps_m.insert(at, step_m);
             }
         }
-        self.shifts.touch(library, &self.contacts, &contact);
-        self.count += 1;
-        if self.contacts.len() < CONTACTS_MAX {
-            self.contacts.push(contact);
-        } else {
-            // The oldest but one goes: the first anchors the episode.
-            self.contacts.remove(1);
-            self.contacts.push(contact);
+        match &mut self.hypotheses {
+            Hypotheses::Shifts(shifts) => shifts.touch(library, &self.contacts, &contact),
+            Hypotheses::Poses(poses) => poses.touch(library, &contact, CONTACTS_MAX),
         }
+        self.count += 1;
+        if self.contacts.len() >= CONTACTS_MAX {
+            self.contacts.remove(0);
+        }
+        self.contacts.push(contact);
     }
 
     /// Contacts so far.
@@ -89,114 +112,229 @@ impl Recognition {
 
     /// What it says so far.
     pub fn posterior(&self, library: &ObjectLibrary) -> Posterior {
-        let steps = self.steps_m.len();
-        // A step that was found starts from the one before: it is among what lies within reach.
-        let reach_m = (steps > 0).then(|| REACH_PER_STEP * self.steps_m[steps / 2]);
-        let share_log = |object: ObjectId| {
-            let Some(surface) = library.surface(object) else {
-                return 0.0;
-            };
-            let found = reach_m.map_or(0.0, |reach_m| surface.share(reach_m).max(1e-9).ln());
-            // Of one that was asked for only the distance counts: per metre, not per place.
-            self.aimed as f64 * surface.area_m2.ln() - steps as f64 * found
-        };
-        let mut objects: Vec<(ObjectId, f64)> = library
-            .surfaces()
-            .map(|(object, _)| {
-                let own = self
-                    .shifts
-                    .all
-                    .iter()
-                    .filter(|shift| shift.object == object);
-                let evidence = log_sum(own.map(|shift| shift.evidence));
-                (object, evidence + share_log(object))
-            })
-            .collect();
-        let none = self.none_log(library, reach_m);
+        let mut logs = self.logs(library);
+        let mut objects = sums(library, &logs);
         let prior = (1.0 - UNKNOWN_PRIOR).ln() - (objects.len().max(1) as f64).ln();
-        for (_, evidence) in &mut objects {
-            *evidence += prior;
+        let mut none = UNKNOWN_PRIOR.ln();
+        if logs.is_empty() {
+            // Too little was felt for any hypothesis: every object is as likely as any.
+            for (_, log) in &mut objects {
+                *log = prior;
+            }
+        } else {
+            let best = objects.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+            none += self.none_log(library, best.map(|&(object, _)| object));
+            for (_, log) in &mut objects {
+                *log += prior;
+            }
         }
-        let none = none + UNKNOWN_PRIOR.ln();
         let total = log_sum(objects.iter().map(|object| object.1).chain([none]));
-        for (_, evidence) in &mut objects {
-            *evidence = (*evidence - total).exp();
+        for (_, log) in &mut objects {
+            *log = (*log - total).exp();
         }
         let unknown = (none - total).exp();
         objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let pose = objects.first().and_then(|(object, _)| self.pose(*object));
-        let mut masses: Vec<f64> = self
-            .shifts
-            .all
-            .iter()
-            .map(|shift| shift.evidence + share_log(shift.object))
-            .collect();
-        masses.sort_by(|a, b| b.total_cmp(a));
-        let all = log_sum(masses.iter().copied());
+        let pose = objects
+            .first()
+            .and_then(|(object, _)| pose(*object, &self.masses(library, *object)));
+        logs.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
+        let all = log_sum(logs.iter().map(|(_, log)| *log));
         let mut sum = 0.0;
-        let live = masses.iter().position(|mass| {
-            sum += (mass - all).exp();
+        let live = logs.iter().position(|(_, log)| {
+            sum += (log - all).exp();
             sum >= 0.99
         });
         Posterior {
-            live_hypotheses: live.map_or(masses.len(), |at| at + 1),
+            live_hypotheses: live.map_or(logs.len(), |at| at + 1),
             live_objects: objects.iter().filter(|object| object.1 > 0.01).count(),
             entropy_nats: entropy_nats(objects.iter().map(|object| object.1).chain([unknown])),
             objects,
             unknown,
             pose,
             contacts: self.count,
-            fit: 0.0,
+            fit: self.fit(library),
         }
     }
 
-    /// Log-likelihood of the contacts under something of which only the size is known: anywhere within a
-    /// step of the one before, and any percept.
-    fn none_log(&self, library: &ObjectLibrary, reach_m: Option<f64>) -> f64 {
-        let extent_m = library.extent_m().max(1e-6);
-        let found = reach_m.map_or(0.0, |reach_m| {
-            let radius_m = reach_m.min(0.5 * extent_m).max(1e-6);
-            self.steps_m.len() as f64 * (8.0 * FRAC_PI_6 * radius_m.powi(3)).ln()
-        });
-        -found - self.aimed as f64 * extent_m.ln()
+    /// Log of the mass of each hypothesis, in one measure.
+    fn logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
+        match &self.hypotheses {
+            Hypotheses::Shifts(shifts) => {
+                let reach_m = self.reach_m();
+                let shares = library.surfaces().map(|(object, surface)| {
+                    let asked = self.aimed as f64 * surface.area_m2.ln();
+                    (object, asked + self.found_log(surface, reach_m))
+                });
+                let shares: BTreeMap<ObjectId, f64> = shares.collect();
+                let logs = shifts.all.iter().filter_map(|shift| {
+                    let share = shares.get(&shift.object)?;
+                    Some((shift.object, shift.evidence + share))
+                });
+                logs.collect()
+            }
+            Hypotheses::Poses(poses) => {
+                let logs = poses.all.iter().filter_map(|hypothesis| {
+                    let log = self.pose_log(library, hypothesis)?;
+                    Some((hypothesis.object, log))
+                });
+                logs.collect()
+            }
+        }
     }
 
-    fn pose(&self, object: ObjectId) -> Option<PoseEstimate> {
-        let own = || {
-            self.shifts
+    /// Of one that was found, the density is per part of the map within reach; of one that was asked for only the distance
+    /// counts: per metre, not per place.
+    fn found_log(&self, surface: &Surface, reach_m: Option<f64>) -> f64 {
+        let share = reach_m.map_or(0.0, |reach_m| surface.share(reach_m).max(1e-9).ln());
+        -(self.steps_m.len() as f64) * share
+    }
+
+    fn pose_log(&self, library: &ObjectLibrary, hypothesis: &PoseHypothesis) -> Option<f64> {
+        let surface = library.surface(hypothesis.object)?;
+        let relief = surface.relief.as_ref()?;
+        let count = (self.count - self.aimed) as f64;
+        Some(
+            hypothesis.evidence() - (8.0 * PI * PI).ln() + self.found_log(surface, self.reach_m())
+                - count * relief.area_m2.ln(),
+        )
+    }
+
+    /// All hypotheses of an object with their masses, in one measure.
+    fn masses(&self, library: &ObjectLibrary, object: ObjectId) -> Vec<Mass> {
+        let Some(surface) = library.surface(object) else {
+            return Vec::new();
+        };
+        match &self.hypotheses {
+            Hypotheses::Shifts(shifts) => shifts
                 .all
                 .iter()
                 .filter(|shift| shift.object == object)
+                .map(|shift| {
+                    let mut covariance = Matrix6::zeros();
+                    let mut corner = covariance.fixed_view_mut::<3, 3>(0, 0);
+                    corner.fill_diagonal(shift.variance_m2);
+                    Mass {
+                        map_from_episode: shift.pose(&shifts.rotations),
+                        covariance,
+                        log: shift.evidence,
+                    }
+                })
+                .collect(),
+            Hypotheses::Poses(poses) => poses
+                .all
+                .iter()
+                .filter(|hypothesis| hypothesis.object == object)
+                .filter_map(|hypothesis| {
+                    let relief = surface.relief.as_ref()?;
+                    let origin = Translation3::from(-poses.origin().coords);
+                    let middle = Translation3::from(relief.middle);
+                    let lever = se3::adjoint(&middle.into());
+                    Some(Mass {
+                        map_from_episode: middle * hypothesis.pose * origin,
+                        covariance: lever
+                            * hypothesis.information.try_inverse()?
+                            * lever.transpose(),
+                        log: self.pose_log(library, hypothesis)?,
+                    })
+                })
+                .collect(),
+        }
+    }
+
+    /// How well the best hypothesis explains the contacts.
+    fn fit(&self, library: &ObjectLibrary) -> f64 {
+        let Hypotheses::Poses(poses) = &self.hypotheses else {
+            return 0.0;
         };
-        let all = log_sum(own().map(|shift| shift.evidence));
-        let best = own().max_by(|a, b| a.evidence.total_cmp(&b.evidence))?;
-        let pose = best.pose(&self.shifts.rotations);
-        // The translation's error in the map, turned into the episode's axes.
-        let turn = pose.rotation.inverse().to_rotation_matrix().into_inner();
-        let mut covariance = Matrix6::zeros();
-        let translation = turn * best.covariance * turn.transpose();
-        covariance
-            .fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(&translation);
-        let share = |evidence: f64| (evidence - all).exp();
-        let mut others: Vec<_> = own()
-            .filter(|shift| !std::ptr::eq(*shift, best))
-            .map(|shift| (shift.pose(&self.shifts.rotations), share(shift.evidence)))
-            .filter(|(_, share)| *share > 0.01)
-            .collect();
-        others.sort_by(|a, b| b.1.total_cmp(&a.1));
-        others.truncate(OTHERS_MAX);
-        Some(PoseEstimate {
-            object,
-            map_from_episode: pose,
-            covariance: PoseCovariance::from_matrix(&((covariance + covariance.transpose()) * 0.5)),
-            share: share(best.evidence),
-            others,
-        })
+        let best = poses.all.iter().max_by(|a, b| a.score.total_cmp(&b.score));
+        best.and_then(|best| poses.fit(library, best))
+            .unwrap_or(0.0)
+    }
+
+    /// How far from a contact the next one was looked for \[m\].
+    fn reach_m(&self) -> Option<f64> {
+        let steps = self.steps_m.len();
+        (steps > 0).then(|| REACH_PER_STEP * self.steps_m[steps / 2])
+    }
+
+    /// Log-likelihood of the contacts under something that was never learned, in the measure of the hypotheses. `best` is the
+    /// object that it would be taken for.
+    fn none_log(&self, library: &ObjectLibrary, best: Option<ObjectId>) -> f64 {
+        let extent_m = library.extent_m().max(1e-6);
+        let asked = -(self.aimed as f64) * extent_m.ln();
+        let steps = self.steps_m.len() as f64;
+        match &self.hypotheses {
+            Hypotheses::Shifts(shifts) => {
+                let shares = self.reach_m().map_or(0.0, |reach_m| {
+                    let logs = library
+                        .surfaces()
+                        .map(|(_, s)| s.share(reach_m).max(1e-9).ln());
+                    logs.sum::<f64>() / library.len().max(1) as f64
+                });
+                shifts.stranger_log(library, best) - steps * shares + asked
+            }
+            // Of something of which only the size is known: anywhere within a step of the contact before, and any normal.
+            Hypotheses::Poses(_) => {
+                let ball = |radius_m: f64| (8.0 * FRAC_PI_6 * radius_m.powi(3)).ln();
+                let found = self.reach_m().map_or(0.0, |reach_m| {
+                    steps * ball(reach_m.min(0.5 * extent_m).max(1e-6))
+                });
+                let drawn = self.drawn as f64 * ball(0.5 * extent_m);
+                -found - drawn - self.count as f64 * (4.0 * PI).ln() + asked
+            }
+        }
     }
 
     /// The touch that would tell most between the hypotheses that are live, if there are several.
     pub fn next_touch(&self, _library: &ObjectLibrary) -> Option<NextTouch> {
         None
     }
+}
+
+/// Log of each object's mass.
+fn sums(library: &ObjectLibrary, logs: &[(ObjectId, f64)]) -> Vec<(ObjectId, f64)> {
+    let mut sums: BTreeMap<ObjectId, (f64, f64)> = library
+        .surfaces()
+        .map(|(object, _)| (object, (f64::NEG_INFINITY, 0.0)))
+        .collect();
+    for (object, log) in logs {
+        if let Some((most, _)) = sums.get_mut(object) {
+            *most = most.max(*log);
+        }
+    }
+    for (object, log) in logs {
+        if let Some((most, sum)) = sums.get_mut(object) {
+            *sum += (log - *most).exp();
+        }
+    }
+    let sum = |(object, (most, sum)): (ObjectId, (f64, f64))| {
+        let is_empty = most == f64::NEG_INFINITY;
+        (object, if is_empty { most } else { most + sum.ln() })
+    };
+    sums.into_iter().map(sum).collect()
+}
+
+/// The most likely pose in one object, and those beside it.
+fn pose(object: ObjectId, masses: &[Mass]) -> Option<PoseEstimate> {
+    let all = log_sum(masses.iter().map(|mass| mass.log));
+    let best = masses.iter().max_by(|a, b| a.log.total_cmp(&b.log))?;
+    let share = |log: f64| (log - all).exp();
+    let mut others: Vec<_> = masses
+        .iter()
+        .filter(|mass| !std::ptr::eq(*mass, best))
+        .map(|mass| (mass.map_from_episode, share(mass.log)))
+        .filter(|(_, share)| *share > 0.01)
+        .collect();
+    others.sort_by(|a, b| b.1.total_cmp(&a.1));
+    others.truncate(OTHERS_MAX);
+    // From an error on the left of the pose to one on its right.
+    let back = se3::adjoint(&best.map_from_episode.inverse());
+    let covariance = back * best.covariance * back.transpose();
+    Some(PoseEstimate {
+        object,
+        map_from_episode: best.map_from_episode,
+        covariance: PoseCovariance::from_matrix(&((covariance + covariance.transpose()) * 0.5)),
+        share: share(best.log),
+        others,
+    })
 }

@@ -37,11 +37,16 @@
 mod cells;
 mod contact;
 mod episode;
+mod facet;
 mod library;
 mod model;
 mod orientation;
+mod pairs;
+mod poses;
 mod posterior;
+mod reaches;
 
+mod relief;
 mod shifts;
 mod surface;
 

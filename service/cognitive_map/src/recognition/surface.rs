@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::cells::Cells;
-use super::contact::Contact;
-use super::contact::Seen;
+use super::contact::{Contact, Seen};
 use super::model::{LevelMemory, ObjectModel};
+use super::reaches::Reaches;
+use super::relief::Relief;
 
 /// A place's field is uniform over one spacing; that is its standard deviation in spacings, 1/√12.
 const FIELD_PER_SPACING: f64 = 0.288_675;
@@ -31,16 +31,18 @@ pub(super) struct Patch {
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     pub(super) patches: Vec<Patch>,
-    pub(super) cells: Cells,
+    reaches: Reaches,
     /// Diameter of a ball about the map's middle that holds all of it \[m\].
     pub(super) extent_m: f64,
     /// Area that it takes for \[m²\]: one spacing squared per place.
     pub(super) area_m2: f64,
+    /// The same as a surface, if normals were felt.
+    pub(super) relief: Option<Relief>,
     shares: [f64; SHARES + 1],
 }
 
 impl Surface {
-    /// Of a model; touches will have noise of about `sd_m` \[m\].
+    /// Of a model.
     pub(super) fn new(model: &ObjectModel) -> Self {
         let field_m = FIELD_PER_SPACING * model.spacing_m();
         let patches: Vec<_> = model
@@ -57,11 +59,10 @@ impl Surface {
         // Touches are about as noisy as those that were learned; hypotheses add as much again.
         let noise_m2 = model.places().iter().map(|p| p.variance_m2 / p.count);
         let noise_m2 = noise_m2.sum::<f64>() / patches.len().max(1) as f64;
-        let reach = |patch: &Patch| {
-            REACH_SD * (patch.variance_m2 + 2.0 * noise_m2).sqrt() + 0.5 * model.spacing_m()
-        };
+        let reach = |patch: &Patch| REACH_SD * patch.variance_m2.sqrt() + 0.5 * model.spacing_m();
         let positions: Vec<_> = patches.iter().map(|patch| patch.position).collect();
-        let reaches: Vec<_> = patches.iter().map(reach).collect();
+        let own_m: Vec<_> = patches.iter().map(reach).collect();
+        let least_m = REACH_SD * (2.0 * noise_m2).sqrt() + 0.5 * model.spacing_m();
         let middle = positions
             .iter()
             .fold(Vector3::zeros(), |sum, p| sum + p.coords)
@@ -72,12 +73,19 @@ impl Surface {
             .fold(model.spacing_m(), f64::max);
         let extent_m = 2.0 * radius_m;
         Self {
-            cells: Cells::new(&positions, &reaches),
+            reaches: Reaches::new(&positions, &own_m, least_m, extent_m),
             shares: shares(&positions, extent_m),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
+            relief: Relief::new(model),
             extent_m,
             patches,
         }
+    }
+
+    /// All places that a point could be of whose variance along each axis is `variance_m2` at most
+    /// \[m²\], and some others, in order.
+    pub(super) fn near(&self, point: &Point3<f64>, variance_m2: f64) -> &[u32] {
+        self.reaches.near(point, REACH_SD * variance_m2.sqrt())
     }
 
     /// The share of the map within `reach_m` \[m\] of a place of it, on average.

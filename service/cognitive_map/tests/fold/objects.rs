@@ -2,19 +2,36 @@
 
 use cognitive_map::recognition::{Orientation, Verdict};
 use cognitive_map::{
-    CognitiveMap, EventKind, Lesson, ObjectMark, Record, SampleBody, Settings, Spacing, Touch,
-    TouchLevel, TouchNoise,
+    CognitiveMap, EventKind, Lesson, Motion, ObjectMark, PoseNoise, Record, SampleBody, Settings,
+    Spacing, Touch, TouchLevel, TouchNoise,
 };
 
 use crate::journal::{Robot, label, level, run};
 
 /// Levels along three rods whose places are 2 cm apart.
-const RODS: [(&str, [f64; 8]); 3] = [
-    ("fork", [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]),
-    ("knife", [1.0, 3.0, 2.0, 7.0, 4.0, 8.0, 6.0, 5.0]),
-    ("spoon", [8.0, 2.0, 6.0, 1.0, 5.0, 3.0, 4.0, 7.0]),
+const RODS: [(&str, [f64; 12]); 3] = [
+    (
+        "fork",
+        [
+            1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0,
+        ],
+    ),
+    (
+        "knife",
+        [
+            1.0, 3.0, 2.0, 12.0, 4.0, 8.0, 6.0, 5.0, 11.0, 7.0, 10.0, 9.0,
+        ],
+    ),
+    (
+        "spoon",
+        [
+            8.0, 2.0, 6.0, 11.0, 5.0, 3.0, 12.0, 4.0, 7.0, 9.0, 1.0, 10.0,
+        ],
+    ),
 ];
 const PITCH_M: f64 = 0.02;
+/// From one end to the other.
+const UP: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
 fn noise() -> TouchNoise {
     TouchNoise::new(0.001, 0.02, 0.2).unwrap()
@@ -46,7 +63,11 @@ fn feel(map: &mut CognitiveMap, hand: &mut Robot, rod: &[f64], order: &[usize]) 
     let mut at = order[0];
     for &place in order {
         let way_m = (place as f64 - at as f64) * PITCH_M;
-        hand.go(map, [way_m, 0.0, 0.0], [0.0; 3]);
+        // The joints of an arm are more exact than wheels.
+        let noise = PoseNoise::new([0.0003; 3], [0.0; 3]).unwrap();
+        let upright = [0.0, 0.0, 0.0, 1.0];
+        let motion = Motion::from_increment([way_m, 0.0, 0.0], upright, Some(noise));
+        hand.sample(map, SampleBody::Motion(motion.unwrap()));
         at = place;
         events.extend(hand.sample(map, level("touch", rod[place], [0.0; 3])));
     }
@@ -62,10 +83,10 @@ fn taught() -> (CognitiveMap, Robot) {
     let mut hand = Robot::enrol(&mut map);
     for (name, rod) in &RODS {
         hand.sample(&mut map, learn(Some(name)));
-        feel(&mut map, &mut hand, rod, &[0, 1, 2, 3, 4, 5, 6, 7]);
+        feel(&mut map, &mut hand, rod, &UP);
         let events = hand.sample(&mut map, end());
         assert!(
-            matches!(&events[..], [EventKind::ObjectLearned { name: learned, contacts: 8, .. }] if learned.as_str() == *name),
+            matches!(&events[..], [EventKind::ObjectLearned { name: learned, contacts: 12, .. }] if learned.as_str() == *name),
             "{events:?}"
         );
     }
@@ -86,13 +107,13 @@ fn what_was_learned_by_touch_is_known_again_from_an_unknown_start() {
     let (mut map, mut hand) = taught();
     for (name, rod) in &RODS {
         hand.sample(&mut map, identify());
-        let events = feel(&mut map, &mut hand, rod, &[5, 4, 3, 2]);
+        let events = feel(&mut map, &mut hand, rod, &[10, 9, 8, 7, 6, 5, 4, 3, 2, 1]);
         assert_eq!(recognised(&events), [*name], "{events:?}");
         let (teaches, identified) = map.episode(hand.id).unwrap();
         assert!(!teaches);
-        // The episode began at the rod's sixth place.
+        // The episode began at the rod's eleventh place.
         let pose = identified.posterior.pose.unwrap();
-        let off = pose.map_from_episode.translation.vector.x - 5.0 * PITCH_M;
+        let off = pose.map_from_episode.translation.vector.x - 10.0 * PITCH_M;
         assert!(off.abs() < 0.003, "{off}");
         hand.sample(&mut map, end());
         assert!(map.episode(hand.id).is_none());
@@ -103,9 +124,9 @@ fn what_was_learned_by_touch_is_known_again_from_an_unknown_start() {
 #[test]
 fn something_unknown_is_said_to_be_and_learned() {
     let (mut map, mut hand) = taught();
-    let strange = [20.0, 23.0, 21.0, 25.0, 22.0, 26.0, 24.0, 27.0];
+    let strange = RODS[2].1.map(|level| level + 20.0);
     hand.sample(&mut map, identify());
-    let events = feel(&mut map, &mut hand, &strange, &[0, 1, 2, 3, 4, 5, 6, 7]);
+    let events = feel(&mut map, &mut hand, &strange, &UP);
     assert!(events.contains(&EventKind::ObjectUnknown), "{events:?}");
     let events = hand.sample(&mut map, end());
     let [EventKind::ObjectLearned { name, .. }] = &events[..] else {
@@ -113,7 +134,12 @@ fn something_unknown_is_said_to_be_and_learned() {
     };
     assert_eq!(name.as_str(), "object-3");
     hand.sample(&mut map, identify());
-    let events = feel(&mut map, &mut hand, &strange, &[6, 5, 4, 3]);
+    let events = feel(
+        &mut map,
+        &mut hand,
+        &strange,
+        &[10, 9, 8, 7, 6, 5, 4, 3, 2, 1],
+    );
     assert_eq!(recognised(&events), ["object-3"]);
 }
 
@@ -122,18 +148,23 @@ fn another_visit_extends_an_object_in_its_own_frame() {
     let (mut map, mut hand) = taught();
     let fork = map.object_by_name(&label("fork")).unwrap();
     let mut longer = RODS[0].1.to_vec();
-    longer.extend([9.0, 10.0]);
+    longer.extend([13.0, 14.0]);
     // It begins elsewhere, and goes beyond what was known.
     hand.sample(&mut map, learn(Some("fork")));
-    feel(&mut map, &mut hand, &longer, &[3, 4, 5, 6, 7, 8, 9]);
+    feel(
+        &mut map,
+        &mut hand,
+        &longer,
+        &[3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13],
+    );
     let events = hand.sample(&mut map, end());
     assert!(matches!(&events[..], [EventKind::ObjectLearned { object, .. }] if *object == fork));
-    assert_eq!(map.object_places(fork).len(), 10);
+    assert_eq!(map.object_places(fork).len(), 14);
     let farthest = map
         .object_places(fork)
         .iter()
         .map(|place| place.position_m.x);
-    let off_m = farthest.fold(0.0, f64::max) - 9.0 * PITCH_M;
+    let off_m = farthest.fold(0.0, f64::max) - 13.0 * PITCH_M;
     assert!(off_m.abs() < 0.5 * PITCH_M, "{off_m} m");
     // Something else under that name changes nothing.
     hand.sample(&mut map, learn(Some("fork")));
@@ -145,7 +176,7 @@ fn another_visit_extends_an_object_in_its_own_frame() {
     );
     let events = hand.sample(&mut map, end());
     assert_eq!(events, [EventKind::ObjectNotLearned { contacts: 4 }]);
-    assert_eq!(map.object_places(fork).len(), 10);
+    assert_eq!(map.object_places(fork).len(), 14);
 }
 
 /// A lesson of a rod.
@@ -170,7 +201,9 @@ fn a_lesson_teaches_at_once_and_what_is_forgotten_is_unknown() {
         };
         run(&mut map, &[record]);
     }
-    let asked: Vec<Touch> = [(2, 2.0), (3, 7.0), (1, 3.0)]
+    let order = [2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+    let felt = order.map(|k: u8| (k, RODS[1].1[usize::from(k)]));
+    let asked: Vec<Touch> = felt
         .map(|(k, value)| {
             let felt = TouchLevel::new(label("touch"), value, 0.2).unwrap();
             let at = [f64::from(k) * PITCH_M - 7.0, 1.0, 2.0];
@@ -206,12 +239,13 @@ fn an_episode_goes_on_where_a_checkpoint_was_taken() {
     let (mut map, mut hand) = taught();
     hand.sample(&mut map, identify());
     let rod = &RODS[2].1;
-    feel(&mut map, &mut hand, rod, &[5, 4]);
+    feel(&mut map, &mut hand, rod, &[10]);
     let mut restored = CognitiveMap::restore(Settings::default(), map.checkpoint(0)).unwrap();
     assert_eq!(restored.digest(), map.digest());
     let mut twin = Robot { ..hand };
-    let on = feel(&mut map, &mut hand, rod, &[3, 2, 1]);
-    let again = feel(&mut restored, &mut twin, rod, &[3, 2, 1]);
+    let rest = [10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0];
+    let on = feel(&mut map, &mut hand, rod, &rest);
+    let again = feel(&mut restored, &mut twin, rod, &rest);
     assert_eq!(on, again);
     assert_eq!(recognised(&on).last(), Some(&"spoon"));
     assert_eq!(restored.digest(), map.digest());

@@ -1,0 +1,314 @@
+//! Hypotheses where the rotation is free: poses that explain the contacts, several to a map.
+
+use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+
+use super::contact::Contact;
+use super::facet::Noise;
+use super::library::{ObjectId, ObjectLibrary};
+use super::pairs::{Pair, Pairs};
+use super::relief::{Relief, Scene, local};
+use super::surface::Surface;
+use crate::geometry::se3;
+
+/// Poses kept per map.
+const KEPT_MAX: usize = 16;
+/// Pairs of contacts looked up per map and touch, rarest first.
+const PAIRS_MAX: usize = 12;
+/// Poses tried per map and touch.
+const TRIED_MAX: usize = 400;
+/// Of the poses tried, those scored on more contacts.
+const SIFTED_MAX: usize = 80;
+/// Of those, the ones refined.
+const REFINED_MAX: usize = 8;
+/// Contacts of the first and second sieve.
+const SIEVE: [usize; 2] = [4, 16];
+/// Contacts by which a new pose is refined.
+const REFINE_CONTACTS: usize = 24;
+/// While a pose is rough, variances count this much more: three times the deviations.
+const WIDE: f64 = 9.0;
+/// Variances count so much more in each step of refining a new pose.
+const STEPS: [f64; 5] = [9.0, 4.0, 2.0, 1.0, 1.0];
+/// Poses this far below the best are not refined at every touch \[nats\].
+const LIVE: f64 = 15.0;
+/// Maps this far below the best are searched at every eighth touch only \[nats\].
+const FAR: f64 = 30.0;
+/// Two poses are one when their distance, squared and in deviations, is below this.
+const SAME: f64 = 9.0;
+
+/// One hypothesis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hypothesis {
+    pub(super) object: ObjectId,
+    /// From the frame of the episode's first contact into the relief's.
+    pub(super) pose: Isometry3<f64>,
+    /// As [`super::relief::Explained::score`], over all contacts.
+    pub(super) score: f64,
+    pub(super) information: Matrix6<f64>,
+}
+
+impl Hypothesis {
+    /// Log of the mass of poses about this one, m³: its peak's likelihood times its width.
+    pub(super) fn evidence(&self) -> f64 {
+        let log_det = self.information.cholesky().map_or(0.0, |cholesky| {
+            2.0 * cholesky.l_dirty().diagonal().map(f64::ln).sum()
+        });
+        self.score - 0.5 * log_det + 3.0 * std::f64::consts::TAU.ln()
+    }
+
+    /// Whether another is the same, as far as the contacts tell.
+    fn same(&self, other: &Isometry3<f64>) -> bool {
+        let (linear, angular) = se3::log(&(other * self.pose.inverse()));
+        let twist = Vector6::new(
+            linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+        );
+        twist.dot(&(self.information * twist)) < SAME
+    }
+}
+
+/// All hypotheses.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Poses {
+    origin: Option<Point3<f64>>,
+    contacts: Vec<Contact>,
+    count: usize,
+    pub(super) all: Vec<Hypothesis>,
+}
+
+impl Poses {
+    /// Where the frame of the hypotheses' poses lies in the episode's.
+    pub(super) fn origin(&self) -> Point3<f64> {
+        self.origin.unwrap_or_else(Point3::origin)
+    }
+
+    /// One more contact; of those before, `kept` are remembered.
+    pub(super) fn touch(&mut self, library: &ObjectLibrary, contact: &Contact, kept: usize) {
+        let origin = *self.origin.get_or_insert(contact.position_m);
+        if self.contacts.len() >= kept {
+            self.contacts.remove(0);
+        }
+        let contact = local(contact, &origin);
+        self.count += 1;
+        for hypothesis in &mut self.all {
+            if let Some((surface, relief)) = found(library, hypothesis.object) {
+                hypothesis.score += relief.log(&hypothesis.pose, &contact, scene(library, surface));
+            }
+        }
+        self.all
+            .retain(|hypothesis| found(library, hypothesis.object).is_some());
+        self.contacts.push(contact);
+        if self.contacts.len() < 3 {
+            return;
+        }
+        let best = self
+            .all
+            .iter()
+            .map(|h| h.score)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let mut all = std::mem::take(&mut self.all);
+        for (at, (object, surface)) in library.surfaces().enumerate() {
+            let Some(relief) = &surface.relief else {
+                continue;
+            };
+            let (mut own, others): (Vec<_>, Vec<_>) = all
+                .into_iter()
+                .partition(|hypothesis| hypothesis.object == object);
+            all = others;
+            let map = Map {
+                object,
+                relief,
+                scene: scene(library, surface),
+            };
+            let top = own
+                .iter()
+                .map(|h| h.score)
+                .fold(f64::NEG_INFINITY, f64::max);
+            for hypothesis in &mut own {
+                if hypothesis.score > best - LIVE {
+                    self.refine(&map, hypothesis, &[1.0]);
+                }
+            }
+            if own.is_empty() || top > best - FAR || (self.count + at).is_multiple_of(8) {
+                self.search(&map, &mut own);
+            }
+            all.extend(kept_of(own));
+        }
+        self.all = all;
+    }
+
+    /// Moves a hypothesis nearer to all contacts, and scores it anew.
+    fn refine(&self, map: &Map<'_>, hypothesis: &mut Hypothesis, steps: &[f64]) {
+        let forgotten = self.count - self.contacts.len();
+        let before = if forgotten > 0 {
+            // What the forgotten contacts have said stays said.
+            hypothesis.score - self.explain(map, &hypothesis.pose, 1.0).score
+        } else {
+            0.0
+        };
+        let mut pose = hypothesis.pose;
+        for widen in steps {
+            pose = self.explain(map, &pose, *widen).step(&pose);
+        }
+        let explained = self.explain(map, &pose, 1.0);
+        if explained.score + before >= hypothesis.score - 0.5 || steps.len() > 1 {
+            hypothesis.pose = pose;
+            hypothesis.score = explained.score + before;
+            hypothesis.information = explained.information;
+        }
+    }
+
+    fn explain(
+        &self,
+        map: &Map<'_>,
+        pose: &Isometry3<f64>,
+        widen: f64,
+    ) -> super::relief::Explained {
+        let contacts = self.contacts.iter();
+        map.relief.explain(pose, contacts, widen, map.scene)
+    }
+
+    /// Births: poses that lay a pair of contacts upon a pair of facets like it.
+    fn search(&self, map: &Map<'_>, own: &mut Vec<Hypothesis>) {
+        let noises: Vec<_> = self.contacts.iter().map(|c| Noise::of(c, WIDE)).collect();
+        let first = spread(self.contacts.len(), SIEVE[0], self.count);
+        let second = spread(self.contacts.len(), SIEVE[1], 0);
+        let rough = |pose: &Isometry3<f64>, on: &[usize]| -> f64 {
+            on.iter()
+                .map(|&at| map.relief.rough(pose, &self.contacts[at], &noises[at]))
+                .sum()
+        };
+        let mut tried: Vec<(f64, Isometry3<f64>)> = Vec::with_capacity(TRIED_MAX);
+        for (pair, like) in self.pairs(&map.relief.pairs) {
+            let room = TRIED_MAX - tried.len();
+            let step = like.len().div_ceil((TRIED_MAX / 4).min(room).max(1)).max(1);
+            for numbers in like.iter().step_by(step).take(room) {
+                if let Some(pose) = Pairs::pair(&map.relief.facets, *numbers).onto(&pair) {
+                    tried.push((rough(&pose, &first), pose));
+                }
+            }
+            if tried.len() >= TRIED_MAX {
+                break;
+            }
+        }
+        tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+        tried.truncate(SIFTED_MAX);
+        for (score, pose) in &mut tried {
+            *score = rough(pose, &second);
+        }
+        tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let on = spread(self.contacts.len(), REFINE_CONTACTS, 0);
+        let mut refined = 0;
+        for (_, pose) in &tried {
+            if refined >= REFINED_MAX {
+                break;
+            }
+            if own.iter().any(|other| other.same(pose)) {
+                continue;
+            }
+            refined += 1;
+            let mut pose = *pose;
+            for widen in STEPS {
+                let contacts = on.iter().map(|&at| &self.contacts[at]);
+                let explained = map.relief.explain(&pose, contacts, widen, map.scene);
+                pose = explained.step(&pose);
+            }
+            let explained = self.explain(map, &pose, 1.0);
+            // A birth was not there for the contacts that are forgotten: it is given the mean of those kept.
+            let unseen = self.count as f64 / self.contacts.len() as f64;
+            let born = Hypothesis {
+                object: map.object,
+                pose,
+                score: explained.score * unseen,
+                information: explained.information,
+            };
+            match own
+                .iter_mut()
+                .find(|other| other.same(&pose) || born.same(&other.pose))
+            {
+                Some(other) if other.score < born.score => *other = born,
+                Some(_) => {}
+                None => own.push(born),
+            }
+        }
+    }
+
+    /// Pairs of contacts and the facet pairs like them, the most telling first.
+    fn pairs<'a>(&self, pairs: &'a Pairs) -> Vec<(Pair, &'a [[u16; 2]])> {
+        let oriented: Vec<_> = self
+            .contacts
+            .iter()
+            .filter_map(|c| Some((c.position_m, c.normal?)))
+            .collect();
+        let count = oriented.len();
+        let mut found = Vec::new();
+        // The newest with those before; and, as these are few at first, others.
+        let with_newest = (1..count).map(|back| (count - 1, count - 1 - back));
+        let others = (1..count).flat_map(|a| (0..a).map(move |b| (a, b)));
+        let chosen: Vec<_> = with_newest
+            .chain(others.filter(|(a, _)| *a + 1 < count))
+            .collect();
+        let step = chosen.len().div_ceil(64).max(1);
+        for (a, b) in chosen.into_iter().step_by(step) {
+            let pair = Pair {
+                points: [oriented[a].0, oriented[b].0],
+                normals: [oriented[a].1.into_inner(), oriented[b].1.into_inner()],
+            };
+            let like = pairs.like(&pair);
+            if !like.is_empty() {
+                found.push((pair, like));
+            }
+        }
+        found.sort_by_key(|(_, like)| like.len());
+        found.truncate(PAIRS_MAX);
+        found
+    }
+
+    /// How far below what is right a hypothesis explains the contacts, in deviations.
+    pub(super) fn fit(&self, library: &ObjectLibrary, hypothesis: &Hypothesis) -> Option<f64> {
+        let (surface, relief) = found(library, hypothesis.object)?;
+        let scene = scene(library, surface);
+        let logs = self
+            .contacts
+            .iter()
+            .map(|c| relief.log(&hypothesis.pose, c, scene));
+        let expected = relief.expected();
+        let (sum, count) = (logs.sum::<f64>(), self.contacts.len() as f64);
+        Some((sum - count * expected.0) / (count.sqrt() * expected.1))
+    }
+}
+
+struct Map<'a> {
+    object: ObjectId,
+    relief: &'a Relief,
+    scene: Scene<'a>,
+}
+
+fn scene<'a>(library: &'a ObjectLibrary, surface: &'a Surface) -> Scene<'a> {
+    Scene {
+        patches: &surface.patches,
+        wide: library.wide(),
+        elsewhere: library.elsewhere(),
+    }
+}
+
+fn found(library: &ObjectLibrary, object: ObjectId) -> Option<(&Surface, &Relief)> {
+    let surface = library.surface(object)?;
+    Some((surface, surface.relief.as_ref()?))
+}
+
+/// The best of one map, each once.
+fn kept_of(mut own: Vec<Hypothesis>) -> Vec<Hypothesis> {
+    own.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut kept: Vec<Hypothesis> = Vec::with_capacity(KEPT_MAX);
+    for hypothesis in own {
+        if kept.len() < KEPT_MAX && kept.iter().all(|other| !other.same(&hypothesis.pose)) {
+            kept.push(hypothesis);
+        }
+    }
+    kept
+}
+
+/// So many of the first `len` numbers, evenly, beginning at `from`.
+fn spread(len: usize, most: usize, from: usize) -> Vec<usize> {
+    let count = most.min(len);
+    (0..count).map(|k| (from + k * len / count) % len).collect()
+}

@@ -1,0 +1,329 @@
+//! A map's facets, their index, and how well they explain contacts from a pose.
+
+use std::f64::consts::FRAC_1_PI;
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Unit, Vector3, Vector6};
+
+use super::cells::Cells;
+use super::contact::Contact;
+use super::facet::{Facet, Noise, facets};
+use super::model::ObjectModel;
+use super::pairs::Pairs;
+use super::surface::{Patch, Wide};
+use crate::geometry::se3;
+
+/// Facets farther along the surface than this many deviations of their reach do not count.
+const REACH_SD: f64 = 2.83;
+/// Share of contacts that the map does not explain.
+const OUTLIERS: f64 = 0.02;
+/// Most places from which it is told how well a right pose explains contacts.
+const REHEARSED: usize = 256;
+/// Deviations beyond which a rough score no longer falls, in nats.
+const ROUGH_WORST: f64 = -12.0;
+
+/// A map with normals, ready to be laid under contacts in any pose. Its frame is the model's, moved so
+/// that the middle of the places is the origin: turns about it are then hardly tied to shifts.
+#[derive(Clone, Debug)]
+pub(super) struct Relief {
+    /// The middle of the places, in the model's frame \[m\].
+    pub(super) middle: Vector3<f64>,
+    pub(super) facets: Vec<Facet>,
+    pub(super) pairs: Pairs,
+    pub(super) area_m2: f64,
+    pub(super) extent_m: f64,
+    cells: Cells,
+    expected: (f64, f64),
+}
+
+/// What a relief is laid under contacts with.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scene<'a> {
+    /// The patches of the places.
+    pub(super) patches: &'a [Patch],
+    /// What percepts are anywhere.
+    pub(super) wide: &'a [Wide],
+    /// Density of contacts with something else, per m³.
+    pub(super) elsewhere: f64,
+}
+
+/// Contacts from one pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Explained {
+    /// Σ log density per metre of depth and steradian: what an even touch of each part of the surface has,
+    /// times its area.
+    pub(super) score: f64,
+    /// Information about a motion on the pose's left, from depths and normals.
+    pub(super) information: Matrix6<f64>,
+    /// The same with the pull of the map's edges.
+    normal_matrix: Matrix6<f64>,
+    gradient: Vector6<f64>,
+}
+
+impl Relief {
+    /// Of a model with normals; `None` if it has none.
+    pub(super) fn new(model: &ObjectModel) -> Option<Self> {
+        let mut facets = facets(model.places());
+        if facets.len() < 3 {
+            return None;
+        }
+        let sum = facets
+            .iter()
+            .fold(Vector3::zeros(), |sum, facet| sum + facet.position.coords);
+        let middle = sum / facets.len() as f64;
+        for facet in &mut facets {
+            facet.position -= middle;
+        }
+        let radius_m = facets
+            .iter()
+            .map(|f| f.position.coords.norm())
+            .fold(1e-9, f64::max);
+        let extent_m = 2.0 * radius_m;
+        let noise_m2 = model
+            .places()
+            .iter()
+            .map(|p| p.variance_m2 / p.count)
+            .sum::<f64>()
+            / model.places().len() as f64;
+        let positions: Vec<_> = facets.iter().map(|facet| facet.position).collect();
+        let reaches: Vec<_> = facets
+            .iter()
+            .map(|facet| REACH_SD * (facet.tangent_m2() + noise_m2).sqrt())
+            .collect();
+        let area_m2 = facets.iter().map(|facet| facet.area_m2).sum::<f64>();
+        let mut relief = Self {
+            middle,
+            pairs: Pairs::new(&facets, extent_m),
+            cells: Cells::new(&positions, &reaches),
+            area_m2,
+            extent_m,
+            facets,
+            expected: (0.0, 1.0),
+        };
+        relief.expected = relief.rehearse(model);
+        Some(relief)
+    }
+
+    /// Mean and standard deviation of the log density of a contact with this map in the right pose.
+    pub(super) fn expected(&self) -> (f64, f64) {
+        self.expected
+    }
+
+    /// The places taken for contacts, each explained by the others.
+    fn rehearse(&self, model: &ObjectModel) -> (f64, f64) {
+        let step = self.facets.len().div_ceil(REHEARSED).max(1);
+        let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for own in (0..self.facets.len()).step_by(step) {
+            let place = &model.places()[self.facets[own].place as usize];
+            let point = place.position_m - self.middle;
+            let normal = place.normal();
+            let normal = normal.as_ref().map(Unit::as_ref);
+            let noise = Noise {
+                position_m2: place.variance_m2 / place.count,
+                normal: place.normal_variance / place.count,
+                widen: 1.0,
+            };
+            let mut total = 0.0;
+            for &number in self.cells.near(&point) {
+                let facet = &self.facets[number as usize];
+                if number as usize != own {
+                    let (tight, loose) = facet.density(&facet.against(&point), normal, &noise);
+                    total += tight + loose;
+                }
+            }
+            let floor = 1e-3 * self.area_m2 / self.extent_m.powi(3);
+            let log = ((1.0 - OUTLIERS) * total + floor).ln();
+            count += 1.0;
+            sum += log;
+            squares += log * log;
+        }
+        let mean: f64 = sum / count;
+        (mean, (squares / count - mean * mean).max(0.01).sqrt())
+    }
+
+    /// Density of an outlier per metre and steradian, times the map's area.
+    fn outlier(&self, scene: Scene<'_>) -> f64 {
+        OUTLIERS * self.area_m2 * scene.elsewhere * 0.25 * FRAC_1_PI
+    }
+
+    /// Log density of one contact, as in [`Explained::score`].
+    pub(super) fn log(&self, pose: &Isometry3<f64>, contact: &Contact, scene: Scene<'_>) -> f64 {
+        let point = pose * contact.position_m;
+        let normal = contact.normal.map(|normal| pose * normal);
+        let normal = normal.as_ref().map(Unit::as_ref);
+        let noise = Noise::of(contact, 1.0);
+        let mut total = 0.0;
+        for &number in self.cells.near(&point) {
+            let facet = &self.facets[number as usize];
+            let (tight, loose) = facet.density(&facet.against(&point), normal, &noise);
+            let density = tight + loose;
+            if density > 0.0 {
+                total += density * percept(facet, contact, scene);
+            }
+        }
+        ((1.0 - OUTLIERS) * total + self.outlier(scene)).ln()
+    }
+
+    /// A rough score of one contact, cheap, for poses that are not yet right: of the one facet that
+    /// explains it best.
+    pub(super) fn rough(&self, pose: &Isometry3<f64>, contact: &Contact, noise: &Noise) -> f64 {
+        let point = pose * contact.position_m;
+        let normal = contact.normal.map(|normal| pose * normal);
+        let mut best = ROUGH_WORST;
+        for &number in self.cells.near(&point) {
+            let facet = &self.facets[number as usize];
+            let apart = point - facet.position;
+            let depth_m = apart.dot(&facet.normal);
+            let depth = (facet.depth_m2 + noise.position_m2) * noise.widen;
+            let tangent = (facet.tangent_m2() + noise.position_m2) * 2.0;
+            let mut half =
+                depth_m * depth_m / depth + (apart.norm_squared() - depth_m * depth_m) / tangent;
+            if let Some(normal) = &normal {
+                let own = facet.normal + facet.bend * apart;
+                let angle = (facet.angle + noise.normal) * noise.widen;
+                half += (normal.into_inner() - own).norm_squared() / angle;
+            }
+            best = best.max(-0.5 * half);
+        }
+        best
+    }
+
+    /// Score of contacts from a pose, and what moves it.
+    pub(super) fn explain<'a>(
+        &self,
+        pose: &Isometry3<f64>,
+        contacts: impl Iterator<Item = &'a Contact>,
+        widen: f64,
+        scene: Scene<'_>,
+    ) -> Explained {
+        let mut explained = Explained {
+            score: 0.0,
+            information: Matrix6::zeros(),
+            normal_matrix: Matrix6::zeros(),
+            gradient: Vector6::zeros(),
+        };
+        for contact in contacts {
+            self.gather(pose, contact, widen, scene, &mut explained);
+        }
+        // Nothing is known beforehand but that the map lies about the contacts, turned anyhow.
+        let beforehand = Vector6::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+            / (self.extent_m * self.extent_m)
+            + Vector6::new(0.0, 0.0, 0.0, 0.25, 0.25, 0.25);
+        explained.information += Matrix6::from_diagonal(&beforehand);
+        explained.normal_matrix += explained.information;
+        explained
+    }
+
+    fn gather(
+        &self,
+        pose: &Isometry3<f64>,
+        contact: &Contact,
+        widen: f64,
+        scene: Scene<'_>,
+        explained: &mut Explained,
+    ) {
+        let point = pose * contact.position_m;
+        let turned = contact.normal.map(|normal| pose * normal);
+        let normal = turned.as_ref().map(Unit::as_ref);
+        let noise = Noise::of(contact, widen);
+        let mut total = 0.0;
+        let mut pull = Vector3::zeros();
+        let mut pulled = 0.0;
+        let mut information = Matrix6::zeros();
+        let mut gradient = Vector6::zeros();
+        for &number in self.cells.near(&point) {
+            let facet = &self.facets[number as usize];
+            let against = facet.against(&point);
+            let (tight, loose) = facet.density(&against, normal, &noise);
+            if tight + loose <= 0.0 {
+                continue;
+            }
+            let felt = percept(facet, contact, scene);
+            let (tight, loose) = (tight * felt, loose * felt);
+            let density = tight + loose;
+            total += density;
+            // Both parts of the mixture see the same distance, with their own precision.
+            let depth = (facet.depth_m2 + noise.position_m2) * widen;
+            let weight = (tight + loose / 9.0) / depth;
+            let lever = point.coords.cross(&against.through);
+            let row = Vector6::new(
+                against.through.x,
+                against.through.y,
+                against.through.z,
+                lever.x,
+                lever.y,
+                lever.z,
+            );
+            information += row * row.transpose() * weight;
+            gradient -= row * (weight * against.depth_m);
+            if let Some(normal) = normal {
+                let angle = (facet.angle + noise.normal) * widen;
+                let weight = tight / angle + loose / (angle + 0.1225);
+                let turn = normal.cross(&against.normal) * weight;
+                let mut turns = gradient.fixed_rows_mut::<3>(3);
+                turns += turn;
+                let across = (Matrix3::identity() - normal * normal.transpose()) * weight;
+                let mut corner = information.fixed_view_mut::<3, 3>(3, 3);
+                corner += across;
+            }
+            let apart = point - facet.position;
+            let along = apart - against.through * against.depth_m;
+            let weight = density / (facet.tangent_m2() + noise.position_m2);
+            pull -= along * weight;
+            pulled += weight;
+        }
+        let all = (1.0 - OUTLIERS) * total + self.outlier(scene);
+        explained.score += all.ln();
+        if total <= 0.0 {
+            return;
+        }
+        let share = (1.0 - OUTLIERS) / all;
+        explained.information += information * share;
+        explained.gradient += gradient * share;
+        // Beyond the map's edge the facets all pull the same way; within, their pulls cancel.
+        let lever = point.coords.cross(&pull);
+        let pull = Vector6::new(pull.x, pull.y, pull.z, lever.x, lever.y, lever.z);
+        explained.gradient += pull * (0.5 * share);
+        let hold = 0.25 * share * pulled;
+        let cross = point.coords.cross_matrix();
+        for axis in 0..3 {
+            explained.normal_matrix[(axis, axis)] += hold;
+        }
+        let mut corner = explained.normal_matrix.fixed_view_mut::<3, 3>(3, 3);
+        corner += -(cross * cross) * hold;
+        let mut corner = explained.normal_matrix.fixed_view_mut::<3, 3>(0, 3);
+        corner += -cross * hold;
+        let mut corner = explained.normal_matrix.fixed_view_mut::<3, 3>(3, 0);
+        corner += cross * hold;
+    }
+}
+
+impl Explained {
+    /// The pose one Gauss–Newton step nearer to the contacts.
+    pub(super) fn step(&self, pose: &Isometry3<f64>) -> Isometry3<f64> {
+        let Some(cholesky) = self.normal_matrix.cholesky() else {
+            return *pose;
+        };
+        let step = cholesky.solve(&self.gradient);
+        let linear = Vector3::new(step[0], step[1], step[2]);
+        let angular = Vector3::new(step[3], step[4], step[5]);
+        // A step farther than the contacts' neighbourhood is not to be trusted.
+        let most = (0.3 / angular.norm().max(1e-12)).min(1.0);
+        se3::exp(&(linear * most), &(angular * most)) * pose
+    }
+}
+
+/// Likelihood of a contact's levels and descriptors at a facet's place, against anywhere.
+fn percept(facet: &Facet, contact: &Contact, scene: Scene<'_>) -> f64 {
+    if contact.levels.is_empty() && contact.descriptors.is_empty() {
+        return 1.0;
+    }
+    let patch = scene.patches.get(facet.place as usize);
+    patch.map_or(1.0, |patch| patch.percept_log(contact, scene.wide).exp())
+}
+
+/// A point of the episode in the frame of its first contact, where nothing is far away.
+pub(super) fn local(contact: &Contact, origin: &Point3<f64>) -> Contact {
+    let mut contact = contact.clone();
+    contact.position_m = Point3::from(contact.position_m - origin);
+    contact
+}

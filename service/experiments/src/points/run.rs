@@ -1,0 +1,313 @@
+//! Learning and trials.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+use std::time::Duration;
+
+use cognitive_map::recognition::{
+    Contact, ModelSettings, ObjectId, ObjectLibrary, ObjectModel, Orientation, Posterior, Recognition,
+    Verdict,
+};
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+use rand_distr::StandardNormal;
+
+use super::cloud::Cloud;
+use super::probe::{Exploration, Probe};
+use super::report::{OneObject, Report, Rotation, Stop, quantile};
+use super::symmetry;
+
+/// Contacts before the recogniser is asked where to touch.
+const BEFORE_ASKING: usize = 3;
+/// Farthest start of an episode's frame from the object, per axis \[m\].
+const OFFSET_M: f64 = 1.0;
+
+/// What is evaluated.
+#[derive(Clone, Debug)]
+pub struct PointsSettings {
+    /// How contacts of a trial come about.
+    pub exploration: Exploration,
+    /// Contacts by which each object is learned.
+    pub learned: usize,
+    /// Standard deviation of a contact's position, per axis \[m\].
+    pub noise_m: f64,
+    /// Standard deviation of a contact's normal, per axis \[rad\].
+    pub noise_rad: f64,
+    /// Trials per object.
+    pub trials: usize,
+    /// Objects left out at a time, until each was left out once; 0 for no such trials.
+    pub leave_out: usize,
+    /// Contacts after which is looked, in order; the last ends a trial.
+    pub looks: Vec<usize>,
+    /// Seed.
+    pub seed: u64,
+}
+
+impl Default for PointsSettings {
+    fn default() -> Self {
+        Self {
+            exploration: Exploration::Independent,
+            learned: 1000,
+            noise_m: 0.002,
+            noise_rad: 2.0 * PI / 180.0,
+            trials: 10,
+            leave_out: 0,
+            looks: vec![3, 5, 10, 20, 30, 60],
+            seed: 1,
+        }
+    }
+}
+
+/// One trial.
+struct Trial {
+    truth: usize,
+    /// At each look: most probable object, whether unknown is more probable, fit, rotation error.
+    looks: Vec<Look>,
+    stop: Option<(usize, Verdict)>,
+}
+
+struct Look {
+    first: Option<ObjectId>,
+    unknown: bool,
+    fit: f64,
+    live: usize,
+    rotation_rad: Option<f64>,
+}
+
+/// Learns all clouds and runs the trials. `clock` tells the time since any instant; `progress` is told how
+/// many trials of how many are done.
+pub fn run(
+    clouds: &[Cloud],
+    settings: &PointsSettings,
+    clock: &mut dyn FnMut() -> Duration,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Report {
+    let mut library = ObjectLibrary::default();
+    let mut held = Vec::new();
+    for (number, cloud) in (0u32..).zip(clouds) {
+        let mut rng = generator(settings.seed, number, 0);
+        let mut order: Vec<usize> = (0..cloud.points.len()).collect();
+        order.shuffle(&mut rng);
+        let learned = settings.learned.min(order.len() / 2);
+        let mut model = ObjectModel::new(ModelSettings::default());
+        for &at in &order[..learned] {
+            model.learn(&felt(cloud, at, &Isometry3::identity(), settings, &mut rng));
+        }
+        library.put(ObjectId(number), model);
+        order.drain(..learned);
+        held.push(order);
+    }
+    let places = library.iter().map(|(_, model)| model.places().len()).sum::<usize>();
+    let group = settings.leave_out;
+    let total = clouds.len() * settings.trials * if group > 0 { 2 } else { 1 };
+    let mut times = Vec::new();
+    let mut known = Vec::new();
+    let mut left_out = Vec::new();
+    for trial in 0..settings.trials {
+        for truth in 0..clouds.len() {
+            known.push(one(&library, clouds, &held, truth, trial, settings, clock, &mut times));
+            progress(known.len(), total);
+        }
+    }
+    if group > 0 {
+        for first in (0..clouds.len()).step_by(group) {
+            let out = first..(first + group).min(clouds.len());
+            let mut others = library.clone();
+            for object in out.clone() {
+                others.remove(ObjectId(u32::try_from(object).expect("few objects")));
+            }
+            for truth in out {
+                for trial in 0..settings.trials {
+                    let trial = one(&others, clouds, &held, truth, trial, settings, clock, &mut Vec::new());
+                    left_out.push(trial);
+                    progress(known.len() + left_out.len(), total);
+                }
+            }
+        }
+    }
+    let mut report = summary(clouds, settings, &known, &left_out, &mut times);
+    report.places_mean = places as f64 / clouds.len() as f64;
+    report
+}
+
+#[expect(clippy::too_many_arguments, reason = "all that a trial is made of, once")]
+fn one(
+    library: &ObjectLibrary,
+    clouds: &[Cloud],
+    held: &[Vec<usize>],
+    truth: usize,
+    trial: usize,
+    settings: &PointsSettings,
+    clock: &mut dyn FnMut() -> Duration,
+    times: &mut Vec<f64>,
+) -> Trial {
+    let cloud = &clouds[truth];
+    let number = u32::try_from(truth).expect("few objects");
+    let mut rng = generator(settings.seed, number, trial as u64 + 1);
+    let rotation = {
+        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        UnitQuaternion::new_normalize(Quaternion::new(normal(), normal(), normal(), normal()))
+    };
+    let mut offset = || rng.random_range(-OFFSET_M..OFFSET_M);
+    let translation = Translation3::new(offset(), offset(), offset());
+    let object_from_episode = Isometry3::from_parts(translation, rotation);
+    let episode_from_object = object_from_episode.inverse();
+    let mut probe = Probe::new(cloud, &held[truth]);
+    let mut recognition = Recognition::new(&Orientation::Free);
+    let mut outcome = Trial { truth, looks: Vec::new(), stop: None };
+    let last = settings.looks.last().copied().unwrap_or(0);
+    for count in 1..=last {
+        let next = (settings.exploration == Exploration::Policy && count > BEFORE_ASKING)
+            .then(|| recognition.next_touch(library))
+            .flatten();
+        let at = match (&next, settings.exploration) {
+            (Some(next), _) => probe.asked(next, &object_from_episode),
+            (None, Exploration::Walk) => probe.step(&mut rng),
+            _ => probe.anywhere(&mut rng),
+        };
+        let mut contact = felt(cloud, at, &episode_from_object, settings, &mut rng);
+        if next.is_some() {
+            contact = contact.aimed();
+        }
+        let before = clock();
+        recognition.touch(library, contact);
+        let posterior = recognition.posterior(library);
+        times.push((clock() - before).as_secs_f64() * 1e3);
+        if outcome.stop.is_none() && posterior.verdict() != Verdict::Undecided {
+            outcome.stop = Some((count, posterior.verdict()));
+        }
+        if settings.looks.contains(&count) {
+            outcome.looks.push(look(&posterior, cloud, number, &object_from_episode, settings));
+        }
+    }
+    outcome
+}
+
+fn look(
+    posterior: &Posterior,
+    cloud: &Cloud,
+    truth: u32,
+    object_from_episode: &Isometry3<f64>,
+    settings: &PointsSettings,
+) -> Look {
+    let first = posterior.objects.first().map(|first| first.0);
+    let pose = posterior.pose.as_ref().filter(|pose| pose.object == ObjectId(truth));
+    Look {
+        first,
+        unknown: posterior.objects.first().is_none_or(|first| posterior.unknown > first.1),
+        fit: posterior.fit,
+        live: posterior.live_hypotheses,
+        rotation_rad: pose.filter(|_| first == Some(ObjectId(truth))).map(|pose| {
+            let tolerance_m = 0.5 * settings.noise_m;
+            symmetry::error_rad(cloud, &pose.map_from_episode, object_from_episode, tolerance_m)
+        }),
+    }
+}
+
+fn summary(
+    clouds: &[Cloud],
+    settings: &PointsSettings,
+    known: &[Trial],
+    left_out: &[Trial],
+    times: &mut [f64],
+) -> Report {
+    let id = |truth: usize| u32::try_from(truth).ok().map(ObjectId);
+    let share = |trials: &[Trial], is: &dyn Fn(&Trial) -> bool| {
+        trials.iter().filter(|trial| is(trial)).count() as f64 / trials.len().max(1) as f64
+    };
+    let mut report = Report {
+        objects: clouds.len(),
+        trials: known.len(),
+        left_out_trials: left_out.len(),
+        places_mean: 0.0,
+        top1_after: BTreeMap::new(),
+        false_unknown_after: BTreeMap::new(),
+        rotation_deg: BTreeMap::new(),
+        unknown_caught: BTreeMap::new(),
+        unknown_answered: BTreeMap::new(),
+        stop: Stop {
+            accuracy: share(known, &|trial| {
+                matches!(trial.stop, Some((_, Verdict::Object(object))) if Some(object) == id(trial.truth))
+            }),
+            contacts_mean: known
+                .iter()
+                .map(|trial| trial.stop.map_or(settings.looks.last().copied().unwrap_or(0), |s| s.0) as f64)
+                .sum::<f64>()
+                / known.len().max(1) as f64,
+            undecided: share(known, &|trial| trial.stop.is_none()),
+        },
+        decision_ms_p50: quantile(times, 0.5),
+        decision_ms_p99: quantile(times, 0.99),
+        live_hypotheses: BTreeMap::new(),
+        by_object: BTreeMap::new(),
+        confusions: BTreeMap::new(),
+    };
+    for (at, &count) in settings.looks.iter().enumerate() {
+        let right = |trial: &Trial| trial.looks[at].first == id(trial.truth);
+        report.top1_after.insert(count, share(known, &right));
+        report.false_unknown_after.insert(count, share(known, &|trial| trial.looks[at].unknown));
+        let live = known.iter().map(|trial| trial.looks[at].live as f64).sum::<f64>();
+        report.live_hypotheses.insert(count, live / known.len().max(1) as f64);
+        let errors = known.iter().filter_map(|trial| trial.looks[at].rotation_rad);
+        let mut errors: Vec<_> = errors.map(f64::to_degrees).collect();
+        if !errors.is_empty() {
+            let rotation = Rotation { p50: quantile(&mut errors, 0.5), p90: quantile(&mut errors, 0.9) };
+            report.rotation_deg.insert(count, rotation);
+        }
+        if !left_out.is_empty() {
+            let mut fits: Vec<_> = known.iter().map(|trial| trial.looks[at].fit).collect();
+            let threshold = quantile(&mut fits, 0.02);
+            let caught = share(left_out, &|trial| trial.looks[at].fit < threshold);
+            report.unknown_caught.insert(count, caught);
+            report.unknown_answered.insert(count, share(left_out, &|trial| trial.looks[at].unknown));
+        }
+    }
+    for (truth, cloud) in clouds.iter().enumerate() {
+        let looks = || known.iter().filter(|t| t.truth == truth).filter_map(|t| t.looks.last());
+        let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let mut errors: Vec<_> =
+            looks().filter_map(|look| look.rotation_rad).map(f64::to_degrees).collect();
+        let one = OneObject {
+            top1: mean(looks().map(|look| f64::from(u8::from(look.first == id(truth)))).collect()),
+            rotation_deg_p50: quantile(&mut errors, 0.5),
+            fit_mean: mean(looks().map(|look| look.fit).collect()),
+        };
+        report.by_object.insert(cloud.name.clone(), one);
+    }
+    for trial in known {
+        let first = trial.looks.last().and_then(|look| look.first);
+        if first != id(trial.truth) {
+            let name = first.and_then(|first| clouds.get(first.0 as usize)).map_or("none", |c| &c.name);
+            *report.confusions.entry(format!("{} as {name}", clouds[trial.truth].name)).or_default() += 1;
+        }
+    }
+    report
+}
+
+/// A noisy contact with a point of a cloud.
+fn felt(
+    cloud: &Cloud,
+    at: usize,
+    frame_from_object: &Isometry3<f64>,
+    settings: &PointsSettings,
+    rng: &mut ChaCha12Rng,
+) -> Contact {
+    let (point, normal) = cloud.points[at];
+    let mut noise = |sd: f64| {
+        let mut normal = || sd * rng.sample::<f64, _>(StandardNormal);
+        Vector3::new(normal(), normal(), normal())
+    };
+    let point = frame_from_object * Point3::from(point.coords + noise(settings.noise_m));
+    let normal = frame_from_object
+        * Unit::new_normalize(normal.into_inner() + normal.cross(&noise(settings.noise_rad)));
+    Contact::at(point, settings.noise_m).with_normal(normal, settings.noise_rad)
+}
+
+fn generator(seed: u64, object: u32, trial: u64) -> ChaCha12Rng {
+    let mut rng = ChaCha12Rng::seed_from_u64(seed);
+    // Each trial has a stream of its own, so that neither the number of trials nor of objects changes it.
+    rng.set_stream((u64::from(object) << 32) | trial);
+    rng
+}
