@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 use super::anchor::Anchor;
 use super::landmarks::Landmarks;
 use super::life::{Life, is_within};
+use super::revisit::Revisits;
 use super::settings::ChronicleSettings;
 use super::sighting::{SeenPoint, Shown, Sighting};
 use super::slots::{NONE, Slots};
@@ -83,6 +84,10 @@ pub struct Chronicle {
     /// Motions told since the last relaxation, and matches.
     pub(super) told: u32,
     pub(super) fresh_matches: u32,
+    /// Matches believed since then without waiting.
+    pub(super) agreed: u32,
+    /// What was seen, for who comes there again.
+    pub(super) revisits: Revisits,
 }
 
 /// A place between anchors: an anchor, the motion from there, and the covariance of its error.
@@ -107,6 +112,8 @@ impl Chronicle {
             hand: 0,
             told: 0,
             fresh_matches: 0,
+            agreed: 0,
+            revisits: Revisits::default(),
         }
     }
 

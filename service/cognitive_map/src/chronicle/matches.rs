@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
 
-use super::chronicle::{Beside, Chronicle, Moment, beside};
+use super::chronicle::{Beside, Chronicle, Moment};
 use super::refine::{Among, Graph};
 use super::sighting::{SeenPoint, stated_variance};
 use super::slots::NONE;
@@ -70,7 +70,8 @@ impl Chronicle {
         let Some(now) = self.here(moment.agent) else {
             return false;
         };
-        let Some(then) = self.at_seq(moment.agent, earlier_seq) else {
+        let session = self.session(moment.agent);
+        let Some(then) = self.at_seq(moment.agent, session, earlier_seq) else {
             return false;
         };
         let place = |beside: &Beside| {
@@ -81,7 +82,21 @@ impl Chronicle {
             return false;
         };
         let (seen, noise) = seen_pose(relation, &pose_now.inv_mul(&pose_then));
-        let from_now = composed(&now.covariance, &seen, &noise);
+        let is_kept = self.tie_beside(&now, &then, &seen, &noise, Standing::Pending);
+        self.fresh_matches += u32::from(is_kept);
+        is_kept
+    }
+
+    /// Ties two places beside anchors by a match; answers whether there is room for it.
+    pub(super) fn tie_beside(
+        &mut self,
+        now: &Beside,
+        then: &Beside,
+        seen: &Isometry3<f64>,
+        noise: &PoseCovariance,
+        standing: Standing,
+    ) -> bool {
+        let from_now = composed(&now.covariance, seen, noise);
         let both = PoseCovariance::from_matrix(&(from_now.matrix() + then.covariance.matrix()));
         let back = then.motion.inverse();
         let tie = Tie {
@@ -91,7 +106,7 @@ impl Chronicle {
             next_to: NONE,
             transform: now.motion * seen * back,
             covariance: both.after_motion(&back, &Vector6::zeros()),
-            standing: Standing::Pending,
+            standing,
         };
         if self.ties.len() >= self.settings.ties_max as usize {
             let doubtful = |tie: &&(u32, &Tie)| {
@@ -104,9 +119,7 @@ impl Chronicle {
                 .map(|(at, _)| at);
             oldest.map(|at| self.untie(at));
         }
-        let is_kept = self.tie(tie) != NONE;
-        self.fresh_matches += u32::from(is_kept);
-        is_kept
+        self.tie(tie) != NONE
     }
 
     /// Number of matches that are believed.
@@ -129,7 +142,7 @@ impl Chronicle {
     pub fn relax(&mut self) -> Vec<Correction> {
         self.told = 0;
         self.fresh_matches = 0;
-        let changed = self.judge();
+        let changed = std::mem::take(&mut self.agreed) as usize + self.judge();
         let (graph, _, refuted) = self.relaxed();
         if changed + refuted == 0 {
             return Vec::new();
@@ -305,34 +318,6 @@ impl Chronicle {
             {
                 life.pose = pose * life.since;
             }
-        }
-    }
-
-    /// Where an agent was at a sample of its session. Walks back to it.
-    fn at_seq(&self, agent: u32, seq: u64) -> Option<Beside> {
-        let life = self.lives.get(agent as usize)?;
-        if seq > life.seq {
-            return None;
-        }
-        let mut later = (life.seq, life.since, life.covariance);
-        let (mut number, mut until_seq) = (life.newest, life.until_seq);
-        loop {
-            let anchor = self.anchors.get(number)?;
-            if anchor.session != life.session {
-                return None;
-            }
-            if anchor.seq <= seq {
-                let (end, motion, covariance) = later;
-                let way = end.saturating_sub(until_seq).max(1) as f64;
-                let share = seq.saturating_sub(until_seq) as f64 / way;
-                return Some(beside(number, &motion, &covariance, share));
-            }
-            if anchor.begins {
-                return None;
-            }
-            later = (anchor.seq, anchor.motion, anchor.covariance);
-            number = anchor.previous;
-            until_seq = self.anchors.get(number)?.until_seq;
         }
     }
 }
