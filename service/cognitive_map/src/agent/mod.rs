@@ -45,6 +45,7 @@ pub struct Agent {
     pub(crate) recorder: Recorder,
     pub(crate) sightings: u64,
     pub(crate) percepts: u64,
+    pub(crate) forgotten_matches: u64,
 }
 
 state_of_struct!(Agent {
@@ -62,6 +63,7 @@ state_of_struct!(Agent {
     recorder,
     sightings,
     percepts,
+    forgotten_matches,
 });
 
 impl Agent {
@@ -82,6 +84,7 @@ impl Agent {
             recorder: Recorder::default(),
             sightings: 0,
             percepts: 0,
+            forgotten_matches: 0,
         }
     }
 
@@ -202,5 +205,10 @@ impl Agent {
     /// others are counted and stay in the journal.
     pub fn percepts(&self) -> u64 {
         self.percepts
+    }
+
+    /// Matches so far whose earlier sample was not, or no longer, remembered, of all sessions. They are dropped.
+    pub fn forgotten_matches(&self) -> u64 {
+        self.forgotten_matches
     }
 }

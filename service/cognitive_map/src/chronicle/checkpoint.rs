@@ -99,6 +99,7 @@ impl Chronicle {
         if read.is_err() || !chronicle.landmarks.sort() || !chronicle.is_sound() {
             return Err(CorruptChronicle);
         }
+        chronicle.set_milestones();
         Ok(chronicle)
     }
 

@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 use super::anchor::Anchor;
 use super::landmarks::Landmarks;
 use super::life::{Life, is_within};
+use super::milestones::Milestones;
 use super::revisit::Revisits;
 use super::settings::ChronicleSettings;
 use super::sighting::{SeenPoint, Shown, Sighting};
@@ -88,6 +89,7 @@ pub struct Chronicle {
     pub(super) agreed: u32,
     /// What was seen, for who comes there again.
     pub(super) revisits: Revisits,
+    pub(super) milestones: Milestones,
 }
 
 /// A place between anchors: an anchor, the motion from there, and the covariance of its error.
@@ -114,6 +116,7 @@ impl Chronicle {
             fresh_matches: 0,
             agreed: 0,
             revisits: Revisits::default(),
+            milestones: Milestones::default(),
         }
     }
 

@@ -142,14 +142,17 @@ impl Chronicle {
     pub fn relax(&mut self) -> Vec<Correction> {
         self.told = 0;
         self.fresh_matches = 0;
-        let changed = std::mem::take(&mut self.agreed) as usize + self.judge();
-        let (graph, _, refuted) = self.relaxed();
-        if changed + refuted == 0 {
+        let agreed = std::mem::take(&mut self.agreed) as usize;
+        let mut coarse = self.coarse();
+        let judged = coarse.judge();
+        let (graph, _, refuted) = coarse.relaxed();
+        if agreed + judged + refuted == 0 {
             return Vec::new();
         }
         let marginals = graph.map.marginals();
-        let corrections = self.corrections(&graph, &marginals);
-        self.move_anchors(&graph);
+        let corrections = coarse.corrections(&graph, &marginals);
+        coarse.move_anchors(&graph);
+        self.take_over(&coarse);
         corrections
     }
 
@@ -308,17 +311,6 @@ impl Chronicle {
                 anchor.is_in_map = true;
             }
         }
-        for agent in 0..self.lives.len() {
-            let Some(life) = self.lives.get(agent) else {
-                continue;
-            };
-            let newest = self.anchors.get(life.newest).map(|anchor| anchor.pose);
-            if let (Some(pose), true) = (newest, life.is_in_map)
-                && let Some(life) = self.lives.get_mut(agent, revision)
-            {
-                life.pose = pose * life.since;
-            }
-        }
     }
 }
 
@@ -341,16 +333,22 @@ fn agrees_with(tie: &Tie, graph: &Graph, marginals: &Marginals<'_>) -> bool {
     let (Some(from), Some(to)) = (node(tie.from), node(tie.to)) else {
         return false;
     };
-    let Some(spread) = marginals.relative_pose(from, to) else {
-        return false;
-    };
     let own = tie.covariance.matrix();
     let least = DEVIATION_MIN * DEVIATION_MIN;
-    let is_known =
-        (0..6).all(|k| spread.matrix()[(k, k)] <= VAGUER_MAX * VAGUER_MAX * (own[(k, k)] + least));
     let expected = graph.map.pose(from).inv_mul(graph.map.pose(to));
     let (linear, angular) = se3::log(&expected.inv_mul(&tie.transform));
     let off = Vector6::from_iterator(linear.iter().chain(angular.iter()).copied());
+    // One that is too far off in one direction is so for every map that is sure enough: its covariance, which takes
+    // long to find, need not be known.
+    let vaguest = VAGUER_MAX * VAGUER_MAX + 1.0;
+    if (0..6).any(|k| off[k] * off[k] > AGREES * vaguest * (own[(k, k)] + least)) {
+        return false;
+    }
+    let Some(spread) = marginals.relative_pose(from, to) else {
+        return false;
+    };
+    let is_known =
+        (0..6).all(|k| spread.matrix()[(k, k)] <= VAGUER_MAX * VAGUER_MAX * (own[(k, k)] + least));
     let whole = spread.matrix() + own + Matrix6::from_diagonal_element(least);
     let inverse = whole.try_inverse();
     is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= AGREES)

@@ -15,9 +15,11 @@ mod checkpoint;
     reason = "the noun of the module has a file of its own"
 )]
 mod chronicle;
+mod coarse;
 mod landmarks;
 mod life;
 mod matches;
+mod milestones;
 mod refine;
 mod revisit;
 mod revisited;

@@ -87,7 +87,7 @@ impl Chronicle {
             .map_or(0, |life| life.session)
     }
 
-    /// Where an agent was at a sample of a session. Walks back to it.
+    /// Where an agent was at a sample of a session. Walks back to it from the next milestone.
     pub(super) fn at_seq(&self, agent: u32, session: u32, seq: u64) -> Option<Beside> {
         let life = self.lives.get(agent as usize)?;
         if session > life.session || (session == life.session && seq > life.seq) {
@@ -95,6 +95,14 @@ impl Chronicle {
         }
         let mut later = (life.seq, life.since, life.covariance);
         let (mut number, mut until_seq) = (life.newest, life.until_seq);
+        if let Some(milestone) = self.anchors.get(self.milestone_after(agent, session, seq)) {
+            if milestone.begins && milestone.session == session {
+                return None;
+            }
+            later = (milestone.seq, milestone.motion, milestone.covariance);
+            number = milestone.previous;
+            until_seq = self.anchors.get(number)?.until_seq;
+        }
         loop {
             let anchor = self.anchors.get(number)?;
             if anchor.session < session {
