@@ -211,6 +211,7 @@ impl Chronicle {
         life.is_planar &= is_level(start.pose());
         let anchor = self.anchor_anew(moment.agent);
         let covariance = PoseCovariance::from_sd(start.noise().sd());
+        self.revisits.cut(moment.agent, self.revision);
         self.tie_to_map(anchor, *start.pose(), &covariance, Standing::Stated);
     }
 

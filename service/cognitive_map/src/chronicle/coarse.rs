@@ -11,6 +11,10 @@ use super::tie::Standing;
 /// matches state, and what hangs on the anchors in between goes to a neighbour with it.
 const STEP: (f64, f64) = (1.0, 0.5);
 
+/// Matches that wait and are looked at again: the latest ones. Earlier ones have been looked at many times; once the whole
+/// past is refined they are again.
+const WAITING_MAX: usize = 512;
+
 impl Chronicle {
     /// A copy with an anchor a step only, and where something was seen, where an agent began anew, and where it is now.
     /// Anchors and ties keep their numbers.
@@ -32,7 +36,23 @@ impl Chronicle {
                 number = previous;
             }
         }
+        coarse.leave_out();
         coarse
+    }
+
+    /// Leaves out matches that wait, but for the latest ones.
+    fn leave_out(&mut self) {
+        let mut waiting: Vec<(i64, u32)> = self
+            .ties
+            .iter()
+            .filter(|(_, tie)| matches!(tie.standing, Standing::Pending | Standing::Refuted))
+            .filter_map(|(number, tie)| Some((self.anchors.get(tie.from)?.stamp_ns, number)))
+            .collect();
+        waiting.sort_unstable();
+        let n_old = waiting.len().saturating_sub(WAITING_MAX);
+        for &(_, number) in &waiting[..n_old] {
+            self.untie(number);
+        }
     }
 
     /// Whether an anchor has to stay in a coarse past.

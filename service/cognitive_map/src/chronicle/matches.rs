@@ -156,7 +156,8 @@ impl Chronicle {
         corrections
     }
 
-    /// The relaxed graph, after matches that do not fit into it have ceased to be believed; their number.
+    /// The relaxed graph, after matches that do not fit into it have ceased to be believed; their number. Moves the anchors on
+    /// the way: for a copy.
     pub(super) fn relaxed(&mut self) -> (Graph, Relaxed, usize) {
         let mut refuted = 0;
         let revision = self.revision;
@@ -164,7 +165,11 @@ impl Chronicle {
         loop {
             rounds += 1;
             let mut graph = self.graph(Among::Believed);
-            let relaxed = graph.map.relax(&settings());
+            let mut settings = settings();
+            if self.fits(&graph) {
+                settings.graduation = Graduation::None;
+            }
+            let relaxed = graph.map.relax(&settings);
             let before = refuted;
             for number in 0..self.ties.numbers() {
                 let link = graph.ties.get(number as usize).copied().flatten();
@@ -181,10 +186,21 @@ impl Chronicle {
             if refuted == before || rounds >= ROUNDS_MAX {
                 return (graph, relaxed, refuted);
             }
+            self.move_anchors(&graph);
         }
     }
 
-    /// Finds waiting matches that agree with the map or with one another, and believes them; answers their number.
+    /// Whether a graph is near enough to where the matches that it believes have it for their kernels to pull.
+    fn fits(&self, graph: &Graph) -> bool {
+        let links = graph.ties.iter().zip(0..);
+        links
+            .filter_map(|(link, number)| Some(((*link)?, self.ties.get(number)?)))
+            .filter(|(_, tie)| tie.standing == Standing::Accepted)
+            .all(|(link, _)| graph.map.squared_error(link) <= CONTRADICTS)
+    }
+
+    /// Finds waiting matches that agree with the map or with one another, and believes them; answers their number. Moves the
+    /// anchors to where all that are believed have them: for a copy.
     pub(super) fn judge(&mut self) -> usize {
         if !self.ties.iter().any(|(_, tie)| waits(tie)) {
             return 0;
@@ -229,6 +245,9 @@ impl Chronicle {
             if let Some(tie) = self.ties.get_mut(number, revision) {
                 tie.standing = Standing::Accepted;
             }
+        }
+        if self.fits(&all) {
+            self.move_anchors(&all);
         }
         accepted.len()
     }

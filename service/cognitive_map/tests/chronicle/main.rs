@@ -6,4 +6,5 @@
 )]
 
 mod laws; // what holds of every chronicle
-mod matches; // places taken for one another
+mod matches;
+mod revisits; // places taken for one another

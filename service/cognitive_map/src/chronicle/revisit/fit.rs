@@ -260,3 +260,101 @@ fn moved(pose: &Isometry3<f64>, twist: &Vector6<f64>) -> Isometry3<f64> {
     moved.rotation.renormalize_fast();
     moved
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Translation3;
+
+    use super::super::passage::Passage;
+    use super::super::reach::Distance;
+    use super::super::view::View;
+    use super::*;
+
+    fn view(ordinal: u32, at: Vector3<f64>) -> View {
+        View {
+            channel: 0,
+            agent: 0,
+            session: 0,
+            seq: ordinal.into(),
+            ordinal,
+            in_odom: Translation3::from(at).into(),
+            spread: [1.0, 0.3],
+            vector: Box::default(),
+        }
+    }
+
+    /// Two stretches of seven views each. Motion has the earlier one where `apart` takes it from where it is.
+    fn passage(
+        now: impl Fn(f64) -> Vector3<f64>,
+        then: impl Fn(f64) -> Vector3<f64>,
+        apart: &Isometry3<f64>,
+    ) -> (Passage, Isometry3<f64>) {
+        let along = |k: u32| f64::from(k) * 0.3 - 0.9;
+        let mut passage: Option<Passage> = None;
+        for k in 0..7 {
+            for j in 0..7 {
+                let (here, there) = (now(along(k)), then(along(j)));
+                let distance = Distance {
+                    mean_m: (here - there).norm(),
+                    sd_m: 0.03,
+                };
+                let carried = apart * Point3::from(there);
+                let (here, there) = (view(k, here), view(j, carried.coords));
+                match &mut passage {
+                    None => passage = Some(Passage::new(&here, &there, distance)),
+                    Some(passage) => passage.add(&here, &there, distance),
+                }
+            }
+        }
+        let passage = passage.unwrap();
+        let carried = passage.then.in_odom;
+        let there = apart.inverse() * carried;
+        let truth = passage.now.in_odom.inverse() * there;
+        (passage, truth)
+    }
+
+    fn bent(t: f64) -> Vector3<f64> {
+        Vector3::new(t, 0.4 * t * t, 0.3 * t * t * t)
+    }
+
+    #[test]
+    fn bent_stretches_are_laid_over_each_other() {
+        let across = |t: f64| Vector3::new(0.2 * t * t, t, 0.5 - 0.3 * t);
+        for turn in [-0.3, 0.2] {
+            let apart =
+                Isometry3::new(Vector3::new(0.5, -0.4, 0.3), Vector3::new(turn, 0.1, -turn));
+            let (passage, truth) = passage(bent, across, &apart);
+            let expected = passage.now.in_odom.inverse() * passage.then.in_odom;
+            let fit = Fit::of(&passage, &expected, [1.0, 0.5]).unwrap();
+            let off = twist(&fit.transform.inv_mul(&truth));
+            assert!(off.fixed_rows::<3>(0).norm() < 0.05, "{off}");
+            assert!(off.fixed_rows::<3>(3).norm() < 0.05, "{off}");
+            let inverse = fit.covariance.matrix().try_inverse().unwrap();
+            assert!(off.dot(&(inverse * off)) < 10.0);
+        }
+    }
+
+    #[test]
+    fn straight_stretches_that_cross_leave_open_which_is_above() {
+        let (passage, truth) = passage(
+            |t| Vector3::new(t, 0.0, 0.0),
+            |t| Vector3::new(0.0, t, 0.6),
+            &Isometry3::identity(),
+        );
+        let fit = Fit::of(&passage, &truth, [2.0, 0.3]).unwrap();
+        let off = twist(&fit.transform.inv_mul(&truth));
+        let inverse = fit.covariance.matrix().try_inverse().unwrap();
+        assert!(off.dot(&(inverse * off)) < 10.0);
+        let up = fit.covariance.matrix()[(2, 2)].sqrt();
+        assert!(up > 0.3, "{up}");
+        let along = fit.covariance.matrix()[(0, 0)].sqrt();
+        assert!(along < 0.1, "{along}");
+    }
+
+    #[test]
+    fn what_contradicts_the_map_is_no_revisit() {
+        let (passage, truth) = passage(bent, bent, &Isometry3::identity());
+        let far = truth * Isometry3::translation(3.0, 0.0, 0.0);
+        assert!(Fit::of(&passage, &far, [0.2, 0.1]).is_none());
+    }
+}

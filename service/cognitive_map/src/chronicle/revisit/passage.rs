@@ -13,10 +13,10 @@ const GAP_MAX: u32 = 4;
 const MISSES_MAX: u32 = 2;
 /// Views of the present stretch after which another passage begins: beyond, odometry adds errors of its own.
 const VIEWS_MAX: usize = 8;
-/// Different views of each stretch that have to agree.
-const VIEWS_MIN: usize = 3;
+/// Different views of each stretch that have to agree. By chance one view in tens of thousands is as like another one.
+const VIEWS_MIN: usize = 2;
 /// Pairs of views that have to agree.
-const PAIRS_MIN: usize = 8;
+const PAIRS_MIN: usize = 5;
 /// Pairs that are kept.
 const PAIRS_MAX: usize = 96;
 

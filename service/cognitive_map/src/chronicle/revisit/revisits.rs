@@ -22,6 +22,8 @@ const MOVED: (f64, f64) = (0.05, 0.1);
 const STEP: (f64, f64) = (0.1, 0.1);
 /// Of an agent's own views those count as earlier that lie so many before the present one.
 const EARLIER: u32 = 16;
+/// Ordinals left out where an agent was put somewhere else.
+const APART: u32 = 64;
 /// Views that a new one is taken to be like at most, the most alike first.
 const ALIKE_MAX: usize = 32;
 /// Passages of an agent under way.
@@ -101,6 +103,25 @@ impl Revisits {
             self.remember(view, revision);
         }
         over
+    }
+
+    /// An agent has been put somewhere else: what it sees from now on is not beside what it saw.
+    pub(in crate::chronicle) fn cut(&mut self, agent: u32, revision: u64) {
+        for number in 0..self.tracks.len() {
+            if self
+                .tracks
+                .get(number)
+                .is_none_or(|track| track.agent != agent)
+            {
+                continue;
+            }
+            if let Some(track) = self.tracks.get_mut(number, revision) {
+                track.last = None;
+                track.recent.clear();
+                track.passages.clear();
+                track.next = track.next.saturating_add(APART);
+            }
+        }
     }
 
     /// The earlier views that one is like, by number, with their distances; and whether one of them is as good as the same.
