@@ -361,6 +361,6 @@ fn protocol_with_views() -> Protocol {
         every: 5,
         noise: 0.05,
     });
-    protocol.odometry = crate::world::OdometryNoise::default();
+    protocol.odometry = OdometryNoise::default();
     protocol
 }
