@@ -46,6 +46,7 @@ pub struct Agent {
     pub(crate) percepts: u64,
     /// The episode with an object that is under way.
     pub(crate) episode: Option<Episode>,
+    pub(crate) forgotten_matches: u64,
 }
 
 state_of_struct!(Agent {
@@ -64,6 +65,7 @@ state_of_struct!(Agent {
     sightings,
     percepts,
     episode,
+    forgotten_matches,
 });
 
 impl Agent {
@@ -85,6 +87,7 @@ impl Agent {
             sightings: 0,
             percepts: 0,
             episode: None,
+            forgotten_matches: 0,
         }
     }
 
@@ -193,5 +196,10 @@ impl Agent {
     /// others are counted and stay in the journal.
     pub fn percepts(&self) -> u64 {
         self.percepts
+    }
+
+    /// Matches so far whose earlier sample was not, or no longer, remembered, of all sessions. They are dropped.
+    pub fn forgotten_matches(&self) -> u64 {
+        self.forgotten_matches
     }
 }

@@ -81,6 +81,7 @@ impl Chronicle {
             life.rest = Isometry3::identity();
             (life.rest_seq, life.rest_ns) = (seq, stamp_ns);
         }
+        self.pass_milestone(agent, number);
         if founds {
             self.tie_to_map(number, pose, &PoseCovariance::zero(), Standing::Origin);
         }

@@ -5,6 +5,8 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 use super::anchor::Anchor;
 use super::landmarks::Landmarks;
 use super::life::{Life, is_within};
+use super::milestones::Milestones;
+use super::revisit::Revisits;
 use super::settings::ChronicleSettings;
 use super::sighting::{SeenPoint, Shown, Sighting};
 use super::slots::{NONE, Slots};
@@ -84,6 +86,11 @@ pub struct Chronicle {
     /// Motions told since the last relaxation, and matches.
     pub(super) told: u32,
     pub(super) fresh_matches: u32,
+    /// Matches believed since then without waiting.
+    pub(super) agreed: u32,
+    /// What was seen, for who comes there again.
+    pub(super) revisits: Revisits,
+    pub(super) milestones: Milestones,
 }
 
 /// A place between anchors: an anchor, the motion from there, and the covariance of its error.
@@ -108,6 +115,9 @@ impl Chronicle {
             hand: 0,
             told: 0,
             fresh_matches: 0,
+            agreed: 0,
+            revisits: Revisits::default(),
+            milestones: Milestones::default(),
         }
     }
 
@@ -202,6 +212,7 @@ impl Chronicle {
         life.is_planar &= is_level(start.pose());
         let anchor = self.anchor_anew(moment.agent);
         let covariance = PoseCovariance::from_sd(start.noise().sd());
+        self.revisits.cut(moment.agent, self.revision);
         self.tie_to_map(anchor, *start.pose(), &covariance, Standing::Stated);
     }
 

@@ -122,7 +122,7 @@ impl Chronicle {
     }
 
     /// Takes an anchor out of its chain.
-    fn dissolve(&mut self, number: u32) {
+    pub(super) fn dissolve(&mut self, number: u32) {
         let revision = self.revision;
         let Some(anchor) = self.anchors.get(number).cloned() else {
             return;

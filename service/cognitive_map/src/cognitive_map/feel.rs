@@ -4,6 +4,7 @@ use nalgebra::Point3;
 
 use super::fold::Fold;
 use super::motion::ANSWER_MIN;
+use crate::chronicle::Viewed;
 use crate::event::EventKind;
 use crate::percept::Compared;
 use crate::place::{PlaceId, confidence};
@@ -28,6 +29,7 @@ impl Fold<'_> {
     pub(super) fn descriptor(&mut self, descriptor: &Descriptor) {
         self.agent.percepts += 1;
         self.touch(|episode, objects| episode.descriptor(descriptor, objects));
+        self.look_back(descriptor);
         let body = self.agent.body.in_map().translation.vector.into();
         let Some((place, weight)) = self.answering(&body) else {
             return;
@@ -37,6 +39,26 @@ impl Fold<'_> {
             .percepts
             .feel_descriptor(descriptor, place, weight, revision);
         self.compared(place, compared);
+    }
+
+    /// Remembers what an agent of the map saw, and finds out whether it has come where something like it was seen.
+    fn look_back(&mut self, descriptor: &Descriptor) {
+        let number = self.agent_id.0;
+        if !self.agent.placed {
+            return;
+        }
+        let Some((_, covariance)) = self.estimator.pose(number) else {
+            return;
+        };
+        let Some(in_odom) = self.estimator.in_odom(number) else {
+            return;
+        };
+        let viewed = Viewed {
+            descriptor,
+            in_odom: *in_odom,
+            covariance,
+        };
+        self.chronicle.viewed(&self.moment(), &viewed);
     }
 
     /// The place that answers at a position, with its confidence; none for an agent that is not
