@@ -120,9 +120,7 @@ pub(super) fn run(args: &ObjectArgs) -> anyhow::Result<()> {
     match &reports[..] {
         [report] if args.json => output::json(report),
         experiments if args.json => output::json(&Reports { experiments }),
-        _ => Ok(output::line(
-            ObjectTable(&reports).to_string().trim_end(),
-        )?),
+        _ => Ok(output::line(ObjectTable(&reports).to_string().trim_end())?),
     }
 }
 
