@@ -60,6 +60,7 @@ fn a_directory_is_read_by_name_and_an_empty_one_refused() {
     for name in ["b.csv", "a.csv", "notes.txt"] {
         std::fs::write(directory.join(name), TEXT).unwrap();
     }
+    std::fs::write(directory.join("summary.csv"), "name,area\n").unwrap();
     let set = TouchSet::load(&directory);
     std::fs::remove_dir_all(&directory).unwrap();
     assert!(matches!(empty, Err(TouchError::Empty(_))));
