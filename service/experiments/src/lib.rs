@@ -15,6 +15,7 @@
 //! | [`victoria`] | Victoria Park, as text with odometry and sightings |
 //! | [`objects`] | objects of coloured voxels, and an end effector that explores them |
 //! | [`touch`] | objects as sets of touches |
+//! | [`points`] | objects as points with normals, recognised in any pose |
 //! | [`mapping`] | recordings through the experience map, causal and refined |
 //! | [`eval`] | the seed paper's experiments: protocols, measures, tables and figures |
 //! | [`metrics`] | the absolute trajectory error (ATE), alignment, dead reckoning |
@@ -66,6 +67,7 @@ pub mod mapping;
 pub mod metrics;
 pub mod mrclam;
 pub mod objects;
+pub mod points;
 pub mod reading;
 pub mod stamp;
 pub mod touch;

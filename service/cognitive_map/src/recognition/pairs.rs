@@ -87,7 +87,7 @@ impl Pair {
 pub(super) struct Pairs {
     width_m: f64,
     starts: Vec<u32>,
-    pairs: Vec<[u16; 2]>,
+    facets: Vec<[u16; 2]>,
 }
 
 impl Pairs {
@@ -115,16 +115,16 @@ impl Pairs {
             starts[bin + 1] += starts[bin];
         }
         let mut filled = starts.clone();
-        let mut pairs = vec![[0; 2]; keyed.len()];
+        let mut facets = vec![[0; 2]; keyed.len()];
         for (bin, pair) in keyed {
             let at = &mut filled[bin as usize];
-            pairs[*at as usize] = pair;
+            facets[*at as usize] = pair;
             *at += 1;
         }
         Self {
             width_m,
             starts,
-            pairs,
+            facets,
         }
     }
 
@@ -133,7 +133,7 @@ impl Pairs {
         match bin(pair, self.width_m) {
             Some(bin) => {
                 let bin = bin as usize;
-                &self.pairs[self.starts[bin] as usize..self.starts[bin + 1] as usize]
+                &self.facets[self.starts[bin] as usize..self.starts[bin + 1] as usize]
             }
             None => &[],
         }

@@ -101,6 +101,9 @@ impl TouchSet {
         let mut objects = Vec::new();
         for file in files {
             let text = fs::read_to_string(&file).map_err(failed(&file))?;
+            if text.lines().next().is_none_or(|line| line.trim() != HEADER) {
+                continue;
+            }
             let name = file.file_stem().unwrap_or_default().to_string_lossy();
             objects.push(TouchedObject::read(&name, &text)?);
         }

@@ -34,3 +34,6 @@ pub use rotate::Rotate;
 pub use run::ObjectExperiment;
 pub(crate) use run::object_id;
 pub use trace::{Answer, Decision, Ending, GoesOn, TouchStep, Trace};
+
+#[cfg(test)]
+mod tests;
