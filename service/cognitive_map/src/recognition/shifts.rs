@@ -23,6 +23,8 @@ const OUTLIERS: f64 = 0.02;
 const PART_SHARE: f64 = 0.005;
 /// Most parts.
 const PARTS_MAX: usize = 16;
+/// Least share of the weight that places of other objects must have before they say what is beside them.
+const WEIGHT_MIN: f64 = 1e-9;
 /// Squared distance, in variances, beyond which a place is not the one that was touched: e⁻²⁵.
 const DISTANCE_MAX: f64 = 50.0;
 
@@ -72,7 +74,8 @@ pub(super) struct Shifts {
     pub(super) rotations: Vec<UnitQuaternion<f64>>,
     pub(super) all: Vec<Shift>,
     /// Log-likelihood of the contacts so far, but for those asked for, with something whose surface is
-    /// like that of each object of the library; without the share of it within a step.
+    /// like those of the library, but for the one that it would be taken for; without the share of it
+    /// within a step.
     pub(super) strangers: BTreeMap<ObjectId, f64>,
 }
 
@@ -123,26 +126,10 @@ impl Shifts {
         self.prune(KEPT_MAX.max(BIRTHS_MAX >> before.len().min(31)));
     }
 
-    /// Log-likelihood of the contacts so far with something that was never learned: its surface is like that of one of the
-    /// objects of the library, but for the one that it would be taken for. For what is felt nowhere but on
-    /// that one would otherwise be as like something unknown as it is like that one.
-    pub(super) fn stranger_log(&self, library: &ObjectLibrary, but: Option<ObjectId>) -> f64 {
-        let log = |object| self.strangers.get(&object).copied().unwrap_or(0.0);
-        let objects = || library.surfaces().map(|(object, _)| object);
-        let others: Vec<f64> = objects()
-            .filter(|&object| Some(object) != but)
-            .map(log)
-            .collect();
-        if others.is_empty() {
-            but.map_or(0.0, log)
-        } else {
-            log_sum(others.iter().copied()) - (others.len() as f64).ln()
-        }
-    }
-
-    /// Log-density of a contact with something that was never learned, for each object that its surface may be like: the
-    /// mean over places of that, each taken for the one touched by `other`, weighed by how well it explains what
-    /// was felt there.
+    /// Log-density of a contact with something that was never learned: the mean over places of the library, each taken for
+    /// the one touched by `other`, weighed by how well it explains what was felt there. By the object that it would be
+    /// taken for, whose own places do not count: what is felt nowhere else would otherwise be as like something
+    /// unknown as it is like that one.
     ///
     /// It is what a hypothesis that knows nothing else would expect, so that evidence for a map begins
     /// where the map explains more than a surface of its kind. Space filled evenly would be no rival: a step along
@@ -157,7 +144,7 @@ impl Shifts {
         let step = contact.position_m - other.position_m;
         let noise = contact.position_sd_m * contact.position_sd_m + drift;
         let wide = library.wide();
-        let mut sums: BTreeMap<ObjectId, (f64, f64)> = BTreeMap::new();
+        let mut sums: BTreeMap<ObjectId, [f64; 4]> = BTreeMap::new();
         let mut turns = self.rotations.iter().cycle();
         for &(object, place) in library.samples() {
             let (Some(surface), Some(rotation)) = (library.surface(object), turns.next()) else {
@@ -178,16 +165,31 @@ impl Shifts {
                     density += (normal + felt - 0.5 * squared).exp() / (TAU * variance).powf(1.5);
                 }
             }
-            let (sum, weights) = sums.entry(object).or_default();
-            *sum += weight * density / surface.patches.len() as f64;
+            let density = density / surface.patches.len() as f64;
+            let [sum, weights, plain, count] = sums.entry(object).or_default();
+            *sum += weight * density;
             *weights += weight;
+            *plain += density;
+            *count += 1.0;
         }
+        let all = { sums.values() }.fold([0.0; 4], |all, own| {
+            std::array::from_fn(|k| all[k] + own[k])
+        });
+        // Of places of no other object, how a surface goes on is all that is known.
+        let [_, _, plain, count] = all;
         let elsewhere = OUTLIERS * library.elsewhere();
-        let typical = |(sum, weights): (f64, f64)| if weights > 0.0 { sum / weights } else { 0.0 };
         { sums.into_iter() }
-            .map(|(object, sums)| {
-                let density = (1.0 - OUTLIERS) * typical(sums) + elsewhere;
-                (object, density.ln())
+            .map(|(object, [sum, weights, ..])| {
+                let (sum, weights) = (all[0] - sum, all[1] - weights);
+                let typical = if weights > WEIGHT_MIN * all[1] {
+                    sum / weights
+                } else {
+                    plain / count
+                };
+                (
+                    object,
+                    ((1.0 - OUTLIERS) * typical.max(0.0) + elsewhere).ln(),
+                )
             })
             .collect()
     }

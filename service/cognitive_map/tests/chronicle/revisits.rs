@@ -1,6 +1,7 @@
 //! Revisits: what was seen before corrects the way, and nothing else does.
 
 use cognitive_map::chronicle::{Chronicle, ChronicleSettings, Moment, Viewed};
+use cognitive_map::estimation::Calibrated;
 use cognitive_map::geometry::PoseCovariance;
 use cognitive_map::{Descriptor, Label};
 use nalgebra::{Isometry3, Vector3, Vector6};
@@ -61,8 +62,12 @@ impl Round {
             pose,
         };
         let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-5);
-        self.chronicle
-            .motion(&moment(self.told, self.seq), &read, &variance);
+        self.chronicle.motion(
+            &moment(self.told, self.seq),
+            &read,
+            &variance,
+            &Calibrated::default(),
+        );
         let mut noise = Seeded(strange.unwrap_or(self.seq) << 20);
         let at = self.truth.translation.vector;
         let view: Vec<f32> = self
