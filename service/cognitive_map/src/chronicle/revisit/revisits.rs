@@ -13,9 +13,9 @@ use crate::state::{CorruptState, StateReader, StateWriter};
 /// Channels whose views are remembered.
 const CHANNELS_MAX: usize = 64;
 /// Views that are remembered.
-const VIEWS_MAX: usize = 32_768;
-/// Numbers in them: 16 MiB.
-const NUMBERS_MAX: usize = 1 << 22;
+const VIEWS_MAX: usize = 16_384;
+/// Numbers in them, all of which a view that is news is compared with: 8 MiB.
+const NUMBERS_MAX: usize = 1 << 21;
 /// Motion between two views that are compared \[m, rad\].
 const MOVED: (f64, f64) = (0.05, 0.1);
 /// Motion after which a view may be news \[m, rad\]: an anchor's.
@@ -116,7 +116,6 @@ impl Revisits {
                 continue;
             }
             if let Some(track) = self.tracks.get_mut(number, revision) {
-                track.last = None;
                 track.recent.clear();
                 track.passages.clear();
                 track.next = track.next.saturating_add(APART);
