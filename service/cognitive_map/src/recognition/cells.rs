@@ -35,8 +35,8 @@ impl Cells {
         if positions.is_empty() {
             (low, high) = (Vector3::zeros(), Vector3::zeros());
         }
-        // Cells of half a reach keep the lists near what is within reach indeed.
-        let mut spacing_m = (0.5 * reach_sum_m / positions.len().max(1) as f64).max(1e-9);
+        // Cells of a third of a reach keep the lists near what is within reach indeed.
+        let mut spacing_m = (0.33 * reach_sum_m / positions.len().max(1) as f64).max(1e-9);
         loop {
             let lattice = Lattice::new(spacing_m, UnitQuaternion::identity());
             let (low, size) = box_of(&lattice, &low, &high);

@@ -23,7 +23,7 @@ const ROUGH_RAD: f64 = 0.35;
 /// How much wider than the patch's the depths about an edge or seam are, as a standard deviation.
 const ROUGH_DEPTH: f64 = 3.0;
 /// Facets count up to here along the surface, as half a squared number of deviations.
-pub(super) const ALONG_MAX: f64 = 4.0;
+pub(super) const ALONG_MAX: f64 = 3.0;
 /// And up to here in depth, as a squared number of deviations.
 const DEPTH_MAX: f64 = 100.0;
 /// A facet stands for no more than so many times the usual area: beyond, nothing is known.

@@ -19,20 +19,24 @@ const PAIRS_MAX: usize = 12;
 const TRIED_MAX: usize = 400;
 /// Of the poses tried, those scored on more contacts.
 const SIFTED_MAX: usize = 80;
+/// Of those, the ones of which refining is begun.
+const BEGUN_MAX: usize = 8;
 /// Of those, the ones refined.
-const REFINED_MAX: usize = 8;
+const REFINED_MAX: usize = 4;
 /// Contacts of the first and second sieve.
-const SIEVE: [usize; 2] = [4, 16];
+const SIEVE: [usize; 2] = [4, 12];
 /// Contacts by which a new pose is refined.
-const REFINE_CONTACTS: usize = 24;
+const REFINE_CONTACTS: usize = 20;
 /// While a pose is rough, variances count this much more: three times the deviations.
 const WIDE: f64 = 9.0;
 /// Variances count so much more in each step of refining a new pose.
 const STEPS: [f64; 5] = [9.0, 4.0, 2.0, 1.0, 1.0];
+/// Until then every touch is followed by a search.
+const EARLY: usize = 12;
 /// Poses this far below the best are not refined at every touch \[nats\].
-const LIVE: f64 = 15.0;
+const LIVE: f64 = 12.0;
 /// Maps this far below the best are searched at every eighth touch only \[nats\].
-const FAR: f64 = 30.0;
+const FAR: f64 = 20.0;
 /// Two poses are one when their distance, squared and in deviations, is below this.
 const SAME: f64 = 9.0;
 
@@ -100,11 +104,22 @@ impl Poses {
         if self.contacts.len() < 3 {
             return;
         }
-        let best = self
-            .all
+        let tops: Vec<(ObjectId, f64)> = library
+            .surfaces()
+            .map(|(object, _)| {
+                let own = self.all.iter().filter(|h| h.object == object);
+                (
+                    object,
+                    own.map(|h| h.score).fold(f64::NEG_INFINITY, f64::max),
+                )
+            })
+            .collect();
+        let best = tops
             .iter()
-            .map(|h| h.score)
+            .map(|top| top.1)
             .fold(f64::NEG_INFINITY, f64::max);
+        let rivals = tops.iter().filter(|top| top.1 > best - LIVE).count() > 1;
+        let busy = rivals || self.count <= EARLY || self.count.is_multiple_of(4);
         let mut all = std::mem::take(&mut self.all);
         for (at, (object, surface)) in library.surfaces().enumerate() {
             let Some(relief) = &surface.relief else {
@@ -119,16 +134,14 @@ impl Poses {
                 relief,
                 scene: scene(library, surface),
             };
-            let top = own
-                .iter()
-                .map(|h| h.score)
-                .fold(f64::NEG_INFINITY, f64::max);
-            for hypothesis in &mut own {
-                if hypothesis.score > best - LIVE {
+            for (rank, hypothesis) in own.iter_mut().enumerate() {
+                let turn = rank < 3 || (self.count + rank).is_multiple_of(4);
+                if turn && hypothesis.score > best - LIVE {
                     self.refine(&map, hypothesis, &[1.0]);
                 }
             }
-            if own.is_empty() || top > best - FAR || (self.count + at).is_multiple_of(8) {
+            let near = busy && tops[at].1 > best - FAR;
+            if own.is_empty() || near || (self.count + at).is_multiple_of(8) {
                 self.search(&map, &mut own);
             }
             all.extend(kept_of(own));
@@ -196,21 +209,34 @@ impl Poses {
             *score = rough(pose, &second);
         }
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let on = spread(self.contacts.len(), REFINE_CONTACTS, 0);
-        let mut refined = 0;
+        // First steps of several, on few contacts; then the rest of the way with those that came nearest.
+        let mut begun: Vec<(f64, Isometry3<f64>)> = Vec::with_capacity(BEGUN_MAX);
+        let mut step = |pose: &Isometry3<f64>, on: &[usize], widen: f64| {
+            let contacts = on.iter().map(|&at| &self.contacts[at]);
+            let explained = map.relief.explain(pose, contacts, widen, map.scene);
+            (explained.score, explained.step(pose))
+        };
         for (_, pose) in &tried {
-            if refined >= REFINED_MAX {
+            if begun.len() >= BEGUN_MAX {
                 break;
             }
             if own.iter().any(|other| other.same(pose)) {
                 continue;
             }
-            refined += 1;
-            let mut pose = *pose;
-            for widen in STEPS {
-                let contacts = on.iter().map(|&at| &self.contacts[at]);
-                let explained = map.relief.explain(&pose, contacts, widen, map.scene);
-                pose = explained.step(&pose);
+            let (_, mut pose) = step(pose, &second, STEPS[0]);
+            let score;
+            (score, pose) = step(&pose, &second, STEPS[1]);
+            begun.push((score, pose));
+        }
+        begun.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let on = spread(self.contacts.len(), REFINE_CONTACTS, 0);
+        for (_, pose) in begun.into_iter().take(REFINED_MAX) {
+            if own.iter().any(|other| other.same(&pose)) {
+                continue;
+            }
+            let mut pose = pose;
+            for widen in &STEPS[2..] {
+                pose = step(&pose, &on, *widen).1;
             }
             let explained = self.explain(map, &pose, 1.0);
             // A birth was not there for the contacts that are forgotten: it is given the mean of those kept.

@@ -6,14 +6,14 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Unit, Vector3, Vector6};
 
 use super::cells::Cells;
 use super::contact::Contact;
-use super::facet::{Facet, Noise, facets};
+use super::facet::{ALONG_MAX, Facet, Noise, facets};
 use super::model::ObjectModel;
 use super::pairs::Pairs;
 use super::surface::{Patch, Wide};
 use crate::geometry::se3;
 
 /// Facets farther along the surface than this many deviations of their reach do not count.
-const REACH_SD: f64 = 2.83;
+const REACH_SD: f64 = 2.45;
 /// Share of contacts that the map does not explain.
 const OUTLIERS: f64 = 0.02;
 /// Most places from which it is told how well a right pose explains contacts.
@@ -124,7 +124,7 @@ impl Relief {
                     let facet = &self.facets[number as usize];
                     let along = 0.5 * facet.against(&own.position).along_m2;
                     let tangent = facet.tangent_m2 + noise_m2;
-                    let same = facet.normal.dot(&own.normal) > 0.5 && along < 4.0 * tangent;
+                    let same = facet.normal.dot(&own.normal) > 0.5 && along < ALONG_MAX * tangent;
                     let weight = facet.area_m2 / (TAU * tangent) * (-along / tangent).exp();
                     if same { weight } else { 0.0 }
                 })
