@@ -87,7 +87,7 @@ impl Pair {
 pub(super) struct Pairs {
     width_m: f64,
     starts: Vec<u32>,
-    pairs: Vec<[u16; 2]>,
+    facets: Vec<[u16; 2]>,
 }
 
 impl Pairs {
@@ -124,7 +124,7 @@ impl Pairs {
         Self {
             width_m,
             starts,
-            pairs,
+            facets: pairs,
         }
     }
 
@@ -133,7 +133,7 @@ impl Pairs {
         match bin(pair, self.width_m) {
             Some(bin) => {
                 let bin = bin as usize;
-                &self.pairs[self.starts[bin] as usize..self.starts[bin + 1] as usize]
+                &self.facets[self.starts[bin] as usize..self.starts[bin + 1] as usize]
             }
             None => &[],
         }

@@ -7,22 +7,23 @@ use super::facet::Noise;
 use super::library::{ObjectId, ObjectLibrary};
 use super::pairs::{Pair, Pairs};
 use super::relief::{Relief, Scene, local};
-use super::shifts::log_sum;
 use super::surface::Surface;
 use crate::geometry::se3;
 
 /// Poses kept per map.
 const KEPT_MAX: usize = 16;
 /// Pairs of contacts looked up per map and touch, rarest first.
-const PAIRS_MAX: usize = 12;
+const PAIRS_MAX: usize = 16;
+/// Fewest pairs of facets like a pair of contacts for it to be looked up.
+const LIKE_MIN: usize = 4;
 /// Poses tried per map and touch.
-const TRIED_MAX: usize = 400;
+const TRIED_MAX: usize = 600;
 /// Of the poses tried, those scored on more contacts.
-const SIFTED_MAX: usize = 80;
+const SIFTED_MAX: usize = 120;
 /// Of those, the ones of which refining is begun.
-const BEGUN_MAX: usize = 8;
+const BEGUN_MAX: usize = 14;
 /// Of those, the ones refined.
-const REFINED_MAX: usize = 4;
+const REFINED_MAX: usize = 6;
 /// Contacts of the first and second sieve.
 const SIEVE: [usize; 2] = [4, 12];
 /// Contacts by which a new pose is refined.
@@ -38,7 +39,11 @@ const LIVE: f64 = 12.0;
 /// Maps this far below the best are searched at every eighth touch only \[nats\].
 const FAR: f64 = 20.0;
 /// Two poses are one when their distance, squared and in deviations, is below this.
-const SAME: f64 = 9.0;
+const SAME: f64 = 6.0;
+/// Nearer than this no further pose is begun \[rad\].
+const NEAR_RAD: f64 = 0.12;
+/// And nearer than this part of the map's extent.
+const NEAR_EXTENT: f64 = 0.05;
 
 /// One hypothesis.
 #[derive(Clone, Copy, Debug)]
@@ -60,8 +65,19 @@ impl Hypothesis {
         self.score - 0.5 * log_det + 3.0 * std::f64::consts::TAU.ln()
     }
 
-    /// Whether another is the same, as far as the contacts tell.
-    fn same(&self, other: &Isometry3<f64>) -> bool {
+    /// Whether another pose is so near that both would be refined to the same.
+    fn near(&self, other: &Isometry3<f64>, extent_m: f64) -> bool {
+        let apart = other.translation.vector - self.pose.translation.vector;
+        self.pose.rotation.angle_to(&other.rotation) < NEAR_RAD
+            && apart.norm() < NEAR_EXTENT * extent_m
+    }
+
+    /// Whether another hypothesis is the same, as far as the contacts tell.
+    fn same(&self, other: &Self) -> bool {
+        self.object == other.object && self.holds(&other.pose) && other.holds(&self.pose)
+    }
+
+    fn holds(&self, other: &Isometry3<f64>) -> bool {
         let (linear, angular) = se3::log(&(other * self.pose.inverse()));
         let twist = Vector6::new(
             linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
@@ -193,7 +209,7 @@ impl Poses {
         let mut tried: Vec<(f64, Isometry3<f64>)> = Vec::with_capacity(TRIED_MAX);
         for (pair, like) in self.pairs(&map.relief.pairs) {
             let room = TRIED_MAX - tried.len();
-            let step = like.len().div_ceil((TRIED_MAX / 4).min(room).max(1)).max(1);
+            let step = like.len().div_ceil((TRIED_MAX / 8).min(room).max(1)).max(1);
             for numbers in like.iter().step_by(step).take(room) {
                 if let Some(pose) = Pairs::pair(&map.relief.facets, *numbers).onto(&pair) {
                     tried.push((rough(&pose, &first), pose));
@@ -211,7 +227,7 @@ impl Poses {
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
         // First steps of several, on few contacts; then the rest of the way with those that came nearest.
         let mut begun: Vec<(f64, Isometry3<f64>)> = Vec::with_capacity(BEGUN_MAX);
-        let mut step = |pose: &Isometry3<f64>, on: &[usize], widen: f64| {
+        let step = |pose: &Isometry3<f64>, on: &[usize], widen: f64| {
             let contacts = on.iter().map(|&at| &self.contacts[at]);
             let explained = map.relief.explain(pose, contacts, widen, map.scene);
             (explained.score, explained.step(pose))
@@ -220,7 +236,18 @@ impl Poses {
             if begun.len() >= BEGUN_MAX {
                 break;
             }
-            if own.iter().any(|other| other.same(pose)) {
+            if own
+                .iter()
+                .any(|other| other.near(pose, map.relief.extent_m))
+            {
+                continue;
+            }
+            let alike = |begun: &(f64, Isometry3<f64>)| {
+                begun.1.rotation.angle_to(&pose.rotation) < NEAR_RAD
+                    && (begun.1.translation.vector - pose.translation.vector).norm()
+                        < NEAR_EXTENT * map.relief.extent_m
+            };
+            if begun.iter().any(alike) {
                 continue;
             }
             let (_, mut pose) = step(pose, &second, STEPS[0]);
@@ -231,7 +258,10 @@ impl Poses {
         begun.sort_by(|a, b| b.0.total_cmp(&a.0));
         let on = spread(self.contacts.len(), REFINE_CONTACTS, 0);
         for (_, pose) in begun.into_iter().take(REFINED_MAX) {
-            if own.iter().any(|other| other.same(&pose)) {
+            if own
+                .iter()
+                .any(|other| other.near(&pose, map.relief.extent_m))
+            {
                 continue;
             }
             let mut pose = pose;
@@ -247,10 +277,7 @@ impl Poses {
                 score: explained.score * unseen,
                 information: explained.information,
             };
-            match own
-                .iter_mut()
-                .find(|other| other.same(&pose) || born.same(&other.pose))
-            {
+            match own.iter_mut().find(|other| other.same(&born)) {
                 Some(other) if other.score < born.score => *other = born,
                 Some(_) => {}
                 None => own.push(born),
@@ -280,7 +307,8 @@ impl Poses {
                 normals: [oriented[a].1.into_inner(), oriented[b].1.into_inner()],
             };
             let like = pairs.like(&pair);
-            if !like.is_empty() {
+            // Of a pair like few or none, the like ones lie in the next bin more often than not.
+            if like.len() >= LIKE_MIN {
                 found.push((pair, like));
             }
         }
@@ -300,15 +328,6 @@ impl Poses {
         let expected = relief.expected();
         let (sum, count) = (logs.sum::<f64>(), self.contacts.len() as f64);
         Some((sum - count * expected.0) / (count.sqrt() * expected.1))
-    }
-
-    /// Log evidence of each map, without the prior.
-    pub(super) fn evidence(&self, object: ObjectId) -> f64 {
-        let own = self
-            .all
-            .iter()
-            .filter(|hypothesis| hypothesis.object == object);
-        log_sum(own.map(Hypothesis::evidence))
     }
 }
 
@@ -336,7 +355,7 @@ fn kept_of(mut own: Vec<Hypothesis>) -> Vec<Hypothesis> {
     own.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<Hypothesis> = Vec::with_capacity(KEPT_MAX);
     for hypothesis in own {
-        if kept.len() < KEPT_MAX && kept.iter().all(|other| !other.same(&hypothesis.pose)) {
+        if kept.len() < KEPT_MAX && kept.iter().all(|other| !other.same(&hypothesis)) {
             kept.push(hypothesis);
         }
     }

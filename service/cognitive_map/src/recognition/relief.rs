@@ -16,6 +16,8 @@ use crate::geometry::se3;
 const REACH_SD: f64 = 2.45;
 /// Share of contacts that the map does not explain.
 const OUTLIERS: f64 = 0.02;
+/// Cells of a third of a reach keep the lists near what is within reach indeed.
+const CELL_PER_REACH: f64 = 0.33;
 /// Most places from which it is told how well a right pose explains contacts.
 const REHEARSED: usize = 256;
 /// Deviations beyond which a rough score no longer falls, in nats.
@@ -93,7 +95,7 @@ impl Relief {
         let mut relief = Self {
             middle,
             pairs: Pairs::new(&facets, extent_m),
-            cells: Cells::new(&positions, &reaches),
+            cells: Cells::new(&positions, &reaches, CELL_PER_REACH),
             area_m2,
             extent_m,
             facets,

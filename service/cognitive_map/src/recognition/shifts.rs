@@ -14,6 +14,8 @@ const BIRTHS_MAX: usize = 65_536;
 const BELOW: f64 = 25.0;
 /// Share of contacts that the map does not explain.
 const OUTLIERS: f64 = 0.02;
+/// Places farther than this many standard deviations are not the one touched: e⁻¹².
+const GATE_SD: f64 = 5.0;
 /// A hypothesis parts in two where two places could be the one touched, each with this share.
 const PART_SHARE: f64 = 0.05;
 /// Most parts.
@@ -125,7 +127,8 @@ impl Shifts {
         let mut best: [(f64, Vector3<f64>, f64); PARTS_MAX] =
             [(f64::NEG_INFINITY, Vector3::zeros(), 0.0); PARTS_MAX];
         let mut total = outlier.exp();
-        for &place in surface.cells.near(&query) {
+        let widest = prior.diagonal().max() + noise + surface.variance_m2;
+        for &place in surface.near(&query, GATE_SD * widest.sqrt()) {
             let patch = &surface.patches[place as usize];
             let apart = patch.position - query;
             let variance = noise + patch.variance_m2;
