@@ -13,6 +13,7 @@
 //! | [`g2o`] | pose graphs |
 //! | [`tuc`] | the TUC data sets: odometry and place matches, many of them false |
 //! | [`victoria`] | Victoria Park, as text with odometry and sightings |
+//! | [`points`] | objects as oriented points, recognised by touch in any pose |
 //! | [`mapping`] | recordings through the experience map, causal and refined |
 //! | [`eval`] | the seed paper's experiments: protocols, measures, tables and figures |
 //! | [`metrics`] | the absolute trajectory error (ATE), alignment, dead reckoning |
@@ -63,6 +64,7 @@ pub mod g2o;
 pub mod mapping;
 pub mod metrics;
 pub mod mrclam;
+pub mod points;
 pub mod reading;
 pub mod stamp;
 pub mod tuc;
