@@ -79,12 +79,15 @@ bench: release ## the benchmarks, each beside its yardstick; ARGS="--json"
 
 # Peers are large packages, so they have a venv of their own and no part in the gate.
 .PHONY: peers
-peers: release $(PEERS)/.venv/installed ## cogmap beside its peers in the same run, for minutes; ARGS="--json" DATA=DIR with pose graphs
+peers: release $(PEERS)/.venv/installed ## cogmap beside its peers in the same run, for minutes; ARGS="--json" DATA=DIR with pose graphs, TOUCH=DIR with touched objects
 	cd $(PEERS) && .venv/bin/mypy .
 	$(PEERS)/.venv/bin/python $(PEERS)/recall.py --binary $(TARGET)/release/cogmap $(ARGS)
 	$(PEERS)/.venv/bin/python $(PEERS)/gridness.py --binary $(TARGET)/release/cogmap $(ARGS)
 ifdef DATA
 	$(PEERS)/.venv/bin/python $(PEERS)/graphs.py --binary $(TARGET)/release/cogmap $(ARGS) $(DATA)
+endif
+ifdef TOUCH
+	$(PEERS)/.venv/bin/python $(PEERS)/touch.py --binary $(TARGET)/release/cogmap $(ARGS) $(TOUCH)
 endif
 
 $(PEERS)/.venv/installed: $(PEERS)/requirements.txt $(PEERS)/judge.txt $(CLIENT)/pyproject.toml

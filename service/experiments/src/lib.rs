@@ -13,7 +13,9 @@
 //! | [`g2o`] | pose graphs |
 //! | [`tuc`] | the TUC data sets: odometry and place matches, many of them false |
 //! | [`victoria`] | Victoria Park, as text with odometry and sightings |
-//! | [`points`] | objects as oriented points, recognised by touch in any pose |
+//! | [`objects`] | objects of coloured voxels, and an end effector that explores them |
+//! | [`touch`] | objects as sets of touches |
+//! | [`points`] | objects as points with normals, recognised in any pose |
 //! | [`mapping`] | recordings through the experience map, causal and refined |
 //! | [`eval`] | the seed paper's experiments: protocols, measures, tables and figures |
 //! | [`metrics`] | the absolute trajectory error (ATE), alignment, dead reckoning |
@@ -64,9 +66,11 @@ pub mod g2o;
 pub mod mapping;
 pub mod metrics;
 pub mod mrclam;
+pub mod objects;
 pub mod points;
 pub mod reading;
 pub mod stamp;
+pub mod touch;
 pub mod tuc;
 pub mod tum;
 pub mod victoria;

@@ -14,6 +14,8 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use cogmap_experiments::eval::InvalidProtocol;
+use cogmap_experiments::eval::object::InvalidObjectProtocol;
+use cogmap_experiments::touch::InvalidTouchProtocol;
 
 use crate::config::{Config, ConfigError};
 
@@ -102,7 +104,10 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             output::complain(&error);
-            let wrong_usage = error.is::<ConfigError>() || error.is::<InvalidProtocol>();
+            let wrong_usage = error.is::<ConfigError>()
+                || error.is::<InvalidProtocol>()
+                || error.is::<InvalidObjectProtocol>()
+                || error.is::<InvalidTouchProtocol>();
             ExitCode::from(if wrong_usage { 2 } else { 1 })
         }
     }

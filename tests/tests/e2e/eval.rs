@@ -49,3 +49,25 @@ fn views_are_measured_and_what_makes_no_sense_is_refused() {
     let refused = run(&[&views[..], &["--percept-noise", "2"]].concat());
     assert_eq!(refused.code(), 2, "{refused:?}");
 }
+
+#[test]
+fn objects_are_told_apart_and_figures_are_written() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().to_str().unwrap();
+    let small = ["eval", "env3", "--objects", "2", "--trials", "8"];
+    let report = run(&[&small[..], &["--json", "--out", out]].concat()).json();
+    let number = |name: &str| report[name].as_f64().unwrap();
+    assert!(number("accuracy") > 0.6, "{report}");
+    assert!(number("steps_mean") < 30.0, "{report}");
+    assert!(number("touch_us_p50") <= number("touch_us_p99"), "{report}");
+    for name in ["unknown_rate", "false_known_rate", "steps_sd"] {
+        assert!(report[name].is_number(), "{name} in {report}");
+    }
+    assert!(!report["live_hypotheses"].as_array().unwrap().is_empty());
+    assert_eq!(report["paper"]["steps_mean"], 180.0);
+    for name in ["active-objects.svg", "object-confidence.svg", "report.json"] {
+        assert!(directory.path().join(name).exists(), "{name}");
+    }
+    let refused = run(&[&small[..], &["--value-noise", "-1"]].concat());
+    assert_eq!(refused.code(), 2, "{refused:?}");
+}

@@ -21,6 +21,7 @@ mod http_guard; // who is let in, and how the service goes
 mod http_ingest; // samples over HTTP alone
 mod percepts; // what was felt and seen, recalled and predicted
 mod replay; // graphs and recordings through the experience map
+mod replay_objects; // objects learned and recognised, from files
 mod zenoh; // estimates, watermarks, queries, events
 
 mod feeding; // a robot that keeps sending; what the drills compare

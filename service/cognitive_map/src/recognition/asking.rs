@@ -8,7 +8,7 @@ use super::relief::Scene;
 use super::surface::Surface;
 
 /// Hypotheses told apart at a time: the heaviest.
-const RIVALS_MAX: usize = 6;
+pub(super) const RIVALS_MAX: usize = 6;
 /// Touches considered on each of them.
 const TOUCHES_MAX: usize = 32;
 /// A touch tells two hypotheses apart by this much at most: it may be an outlier \[nats\].
@@ -113,8 +113,7 @@ fn log(library: &ObjectLibrary, surface: &Surface, rival: &Rival, touch: &Contac
         return relief.log(&(to_middle * rival.map_from_episode), touch, scene);
     }
     let point = rival.map_from_episode * touch.position_m;
-    let radius_m = 4.0 * (surface.variance_m2 + touch.variance_m2()).sqrt();
-    let near = surface.near(&point, radius_m).iter();
+    let near = surface.near(&point, touch.variance_m2()).iter();
     let logs = near.map(|&number| {
         let patch = &surface.patches[number as usize];
         let variance = patch.variance_m2 + touch.variance_m2();

@@ -30,6 +30,8 @@ pub enum Reached {
     /// It was come upon: anywhere on the map, or within a step of the contact before.
     #[default]
     Found,
+    /// It was drawn evenly from the whole map, wherever the contact before was.
+    Drawn,
     /// It was asked for: where it lies is the asker's choice, and only its distance to the map counts.
     Aimed,
 }
@@ -98,6 +100,13 @@ impl Contact {
     #[must_use]
     pub fn with_drift(mut self, drift_sd_m: f64) -> Self {
         self.drift_sd_m = drift_sd_m;
+        self
+    }
+
+    /// The same as one that was drawn evenly from the whole map.
+    #[must_use]
+    pub fn drawn(mut self) -> Self {
+        self.reached = Reached::Drawn;
         self
     }
 

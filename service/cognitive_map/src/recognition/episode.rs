@@ -1,14 +1,15 @@
 //! An episode: contacts come in, hypotheses gain and lose.
 
+use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_6, PI};
 
 use nalgebra::{Isometry3, Matrix6, Translation3};
 
-use super::asking::{NextTouch, Rival, next_touch};
+use super::asking::{NextTouch, RIVALS_MAX, Rival, next_touch};
 use super::contact::{Contact, Reached};
 use super::library::{ObjectId, ObjectLibrary};
 use super::orientation::Orientation;
-use super::poses::Poses;
+use super::poses::{Hypothesis as PoseHypothesis, Poses};
 use super::posterior::{PoseEstimate, Posterior, entropy_nats};
 use super::shifts::{Shifts, log_sum};
 use super::surface::Surface;
@@ -19,7 +20,7 @@ const CONTACTS_MAX: usize = 128;
 /// A step reaches to twice the median step.
 const REACH_PER_STEP: f64 = 2.0;
 /// Prior probability that it is none of the objects.
-const UNKNOWN_PRIOR: f64 = 0.01;
+const UNKNOWN_PRIOR: f64 = 0.1;
 /// Log of the range over which the fit of something else is spread, 20 deviations, against the width of a
 /// normal number's, √(2π).
 const MISFIT_LOG: f64 = 2.076_8;
@@ -36,6 +37,8 @@ pub struct Recognition {
     count: usize,
     /// Lengths of the steps between contacts that were found, in order of length.
     steps_m: Vec<f64>,
+    /// Contacts that were drawn from the whole map, but for the first.
+    drawn: usize,
     /// Contacts that were asked for.
     aimed: usize,
     hypotheses: Hypotheses,
@@ -49,7 +52,6 @@ enum Hypotheses {
 
 /// One hypothesis, whichever kind it is.
 struct Mass {
-    object: ObjectId,
     map_from_episode: Isometry3<f64>,
     covariance: Matrix6<f64>,
     /// Log of its mass.
@@ -67,6 +69,7 @@ impl Recognition {
             contacts: Vec::new(),
             count: 0,
             steps_m: Vec::new(),
+            drawn: 0,
             aimed: 0,
             hypotheses,
         }
@@ -76,7 +79,8 @@ impl Recognition {
     pub fn touch(&mut self, library: &ObjectLibrary, contact: Contact) {
         match (self.contacts.last(), contact.reached) {
             (_, Reached::Aimed) => self.aimed += 1,
-            (None, Reached::Found) => {}
+            (None, _) => {}
+            (Some(_), Reached::Drawn) => self.drawn += 1,
             (Some(last), Reached::Found) => {
                 let step_m = (contact.position_m - last.position_m).norm();
                 let at = self.steps_m.partition_point(|other| *other < step_m);
@@ -101,17 +105,11 @@ impl Recognition {
 
     /// What it says so far.
     pub fn posterior(&self, library: &ObjectLibrary) -> Posterior {
-        let masses = self.masses(library);
-        let mut objects: Vec<(ObjectId, f64)> = library
-            .surfaces()
-            .map(|(object, _)| {
-                let own = masses.iter().filter(|mass| mass.object == object);
-                (object, log_sum(own.map(|mass| mass.log)))
-            })
-            .collect();
+        let mut logs = self.logs(library);
+        let mut objects = sums(library, &logs);
         let prior = (1.0 - UNKNOWN_PRIOR).ln() - (objects.len().max(1) as f64).ln();
         let mut none = UNKNOWN_PRIOR.ln();
-        if masses.is_empty() {
+        if logs.is_empty() {
             // Too little was felt for any hypothesis: every object is as likely as any.
             for (_, log) in &mut objects {
                 *log = prior;
@@ -119,9 +117,9 @@ impl Recognition {
         } else {
             none += self.none_log(library);
             let fit = self.fit(library).min(0.0);
-            let best = masses
+            let best = logs
                 .iter()
-                .map(|mass| mass.log)
+                .map(|(_, log)| *log)
                 .fold(f64::NEG_INFINITY, f64::max);
             // The fit of what was learned is a normal number, that of anything else about evenly spread
             // below: the ratio of the two densities.
@@ -141,12 +139,11 @@ impl Recognition {
         objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let pose = objects
             .first()
-            .and_then(|(object, _)| pose(*object, &masses));
-        let mut logs: Vec<f64> = masses.iter().map(|mass| mass.log).collect();
-        logs.sort_by(|a, b| b.total_cmp(a));
-        let all = log_sum(logs.iter().copied());
+            .and_then(|(object, _)| pose(*object, &self.masses(library, *object)));
+        logs.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
+        let all = log_sum(logs.iter().map(|(_, log)| *log));
         let mut sum = 0.0;
-        let live = logs.iter().position(|log| {
+        let live = logs.iter().position(|(_, log)| {
             sum += (log - all).exp();
             sum >= 0.99
         });
@@ -162,52 +159,85 @@ impl Recognition {
         }
     }
 
-    /// All hypotheses with their masses, in one measure.
-    fn masses(&self, library: &ObjectLibrary) -> Vec<Mass> {
-        let reach_m = self.reach_m();
-        // Of one that was found, the density is per part of the map within reach; of one that was asked for
-        // only the distance counts: per metre, not per place.
-        let found = |surface: &Surface| {
-            let share = reach_m.map_or(0.0, |reach_m| surface.share(reach_m).max(1e-9).ln());
-            -(self.steps_m.len() as f64) * share
+    /// Log of the mass of each hypothesis, in one measure.
+    fn logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
+        match &self.hypotheses {
+            Hypotheses::Shifts(shifts) => {
+                let reach_m = self.reach_m();
+                let shares = library.surfaces().map(|(object, surface)| {
+                    let asked = self.aimed as f64 * surface.area_m2.ln();
+                    (object, asked + self.found_log(surface, reach_m))
+                });
+                let shares: BTreeMap<ObjectId, f64> = shares.collect();
+                let logs = shifts.all.iter().filter_map(|shift| {
+                    let share = shares.get(&shift.object)?;
+                    Some((shift.object, shift.evidence + share))
+                });
+                logs.collect()
+            }
+            Hypotheses::Poses(poses) => {
+                let logs = poses.all.iter().filter_map(|hypothesis| {
+                    let log = self.pose_log(library, hypothesis)?;
+                    Some((hypothesis.object, log))
+                });
+                logs.collect()
+            }
+        }
+    }
+
+    /// Of one that was found, the density is per part of the map within reach; of one that was asked for only the distance
+    /// counts: per metre, not per place.
+    fn found_log(&self, surface: &Surface, reach_m: Option<f64>) -> f64 {
+        let share = reach_m.map_or(0.0, |reach_m| surface.share(reach_m).max(1e-9).ln());
+        -(self.steps_m.len() as f64) * share
+    }
+
+    fn pose_log(&self, library: &ObjectLibrary, hypothesis: &PoseHypothesis) -> Option<f64> {
+        let surface = library.surface(hypothesis.object)?;
+        let relief = surface.relief.as_ref()?;
+        let count = (self.count - self.aimed) as f64;
+        Some(
+            hypothesis.evidence() - (8.0 * PI * PI).ln() + self.found_log(surface, self.reach_m())
+                - count * relief.area_m2.ln(),
+        )
+    }
+
+    /// All hypotheses of an object with their masses, in one measure.
+    fn masses(&self, library: &ObjectLibrary, object: ObjectId) -> Vec<Mass> {
+        let Some(surface) = library.surface(object) else {
+            return Vec::new();
         };
         match &self.hypotheses {
             Hypotheses::Shifts(shifts) => shifts
                 .all
                 .iter()
-                .filter_map(|shift| {
-                    let surface = library.surface(shift.object)?;
+                .filter(|shift| shift.object == object)
+                .map(|shift| {
                     let mut covariance = Matrix6::zeros();
                     let mut corner = covariance.fixed_view_mut::<3, 3>(0, 0);
-                    corner.copy_from(&shift.covariance);
-                    Some(Mass {
-                        object: shift.object,
+                    corner.fill_diagonal(shift.variance_m2);
+                    Mass {
                         map_from_episode: shift.pose(&shifts.rotations),
                         covariance,
-                        log: shift.evidence
-                            + found(surface)
-                            + self.aimed as f64 * surface.area_m2.ln(),
-                    })
+                        log: shift.evidence,
+                    }
                 })
                 .collect(),
             Hypotheses::Poses(poses) => poses
                 .all
                 .iter()
+                .filter(|hypothesis| hypothesis.object == object)
                 .filter_map(|hypothesis| {
-                    let surface = library.surface(hypothesis.object)?;
                     let relief = surface.relief.as_ref()?;
                     let origin = Translation3::from(-poses.origin().coords);
                     let middle = Translation3::from(relief.middle);
-                    let count = (self.count - self.aimed) as f64;
                     let lever = se3::adjoint(&middle.into());
                     Some(Mass {
-                        object: hypothesis.object,
                         map_from_episode: middle * hypothesis.pose * origin,
                         covariance: lever
                             * hypothesis.information.try_inverse()?
                             * lever.transpose(),
-                        log: hypothesis.evidence() - (8.0 * PI * PI).ln() + found(surface)
-                            - count * relief.area_m2.ln(),
+                        log: self.pose_log(library, hypothesis)?,
                     })
                 })
                 .collect(),
@@ -230,41 +260,83 @@ impl Recognition {
         (steps > 0).then(|| REACH_PER_STEP * self.steps_m[steps / 2])
     }
 
-    /// Log-likelihood of the contacts under something of which only the size is known: anywhere within a
-    /// step of the one before, with any percept and any normal.
+    /// Log-likelihood of the contacts under something that was never learned, in the measure of the hypotheses.
     fn none_log(&self, library: &ObjectLibrary) -> f64 {
         let extent_m = library.extent_m().max(1e-6);
-        let found = self.reach_m().map_or(0.0, |reach_m| {
-            let radius_m = reach_m.clamp(1e-6, 0.5 * extent_m);
-            self.steps_m.len() as f64 * (8.0 * FRAC_PI_6 * radius_m.powi(3)).ln()
-        });
-        let normals = match &self.hypotheses {
-            Hypotheses::Shifts(_) => 0.0,
-            Hypotheses::Poses(_) => self.count as f64 * (4.0 * PI).ln(),
-        };
-        -found - normals - self.aimed as f64 * extent_m.ln()
+        let asked = -(self.aimed as f64) * extent_m.ln();
+        let steps = self.steps_m.len() as f64;
+        match &self.hypotheses {
+            Hypotheses::Shifts(shifts) => {
+                let shares = self.reach_m().map_or(0.0, |reach_m| {
+                    let logs = library
+                        .surfaces()
+                        .map(|(_, s)| s.share(reach_m).max(1e-9).ln());
+                    logs.sum::<f64>() / library.len().max(1) as f64
+                });
+                shifts.stranger - steps * shares + asked
+            }
+            // Of something of which only the size is known: anywhere within a step of the contact before, and any normal.
+            Hypotheses::Poses(_) => {
+                let ball = |radius_m: f64| (8.0 * FRAC_PI_6 * radius_m.powi(3)).ln();
+                let found = self.reach_m().map_or(0.0, |reach_m| {
+                    steps * ball(reach_m.min(0.5 * extent_m).max(1e-6))
+                });
+                let drawn = self.drawn as f64 * ball(0.5 * extent_m);
+                -found - drawn - self.count as f64 * (4.0 * PI).ln() + asked
+            }
+        }
     }
 
     /// The touch that would tell most between the hypotheses that are live, if there are several.
     pub fn next_touch(&self, library: &ObjectLibrary) -> Option<NextTouch> {
-        let masses = self.masses(library);
-        let all = log_sum(masses.iter().map(|mass| mass.log));
-        let rivals = masses.iter().map(|mass| Rival {
-            object: mass.object,
-            map_from_episode: mass.map_from_episode,
-            weight: (mass.log - all).exp(),
-        });
-        next_touch(library, rivals.collect(), self.contacts.last()?)
+        let mut objects = sums(library, &self.logs(library));
+        objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let all = log_sum(objects.iter().map(|object| object.1));
+        let mut rivals = Vec::new();
+        for (object, sum) in objects.into_iter().take(RIVALS_MAX) {
+            let mut masses = self.masses(library, object);
+            masses.sort_by(|a, b| b.log.total_cmp(&a.log));
+            let own = log_sum(masses.iter().map(|mass| mass.log));
+            rivals.extend(masses.iter().take(RIVALS_MAX).map(|mass| Rival {
+                object,
+                map_from_episode: mass.map_from_episode,
+                weight: (mass.log - own + sum - all).exp(),
+            }));
+        }
+        next_touch(library, rivals, self.contacts.last()?)
     }
+}
+
+/// Log of each object's mass.
+fn sums(library: &ObjectLibrary, logs: &[(ObjectId, f64)]) -> Vec<(ObjectId, f64)> {
+    let mut sums: BTreeMap<ObjectId, (f64, f64)> = library
+        .surfaces()
+        .map(|(object, _)| (object, (f64::NEG_INFINITY, 0.0)))
+        .collect();
+    for (object, log) in logs {
+        if let Some((most, _)) = sums.get_mut(object) {
+            *most = most.max(*log);
+        }
+    }
+    for (object, log) in logs {
+        if let Some((most, sum)) = sums.get_mut(object) {
+            *sum += (log - *most).exp();
+        }
+    }
+    let sum = |(object, (most, sum)): (ObjectId, (f64, f64))| {
+        let is_empty = most == f64::NEG_INFINITY;
+        (object, if is_empty { most } else { most + sum.ln() })
+    };
+    sums.into_iter().map(sum).collect()
 }
 
 /// The most likely pose in one object, and those beside it.
 fn pose(object: ObjectId, masses: &[Mass]) -> Option<PoseEstimate> {
-    let own = || masses.iter().filter(|mass| mass.object == object);
-    let all = log_sum(own().map(|mass| mass.log));
-    let best = own().max_by(|a, b| a.log.total_cmp(&b.log))?;
+    let all = log_sum(masses.iter().map(|mass| mass.log));
+    let best = masses.iter().max_by(|a, b| a.log.total_cmp(&b.log))?;
     let share = |log: f64| (log - all).exp();
-    let mut others: Vec<_> = own()
+    let mut others: Vec<_> = masses
+        .iter()
         .filter(|mass| !std::ptr::eq(*mass, best))
         .map(|mass| (mass.map_from_episode, share(mass.log)))
         .filter(|(_, share)| *share > 0.01)

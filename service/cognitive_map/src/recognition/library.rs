@@ -6,6 +6,10 @@ use std::f64::consts::FRAC_PI_6;
 use super::model::ObjectModel;
 use super::surface::{Surface, Wide, wide};
 
+/// Most places from which is judged what a surface is like: shares of it are then good to a few
+/// hundredths.
+const SAMPLES: usize = 256;
+
 /// A map, as the caller numbers them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ObjectId(pub u32);
@@ -18,6 +22,7 @@ pub struct ObjectId(pub u32);
 pub struct ObjectLibrary {
     objects: BTreeMap<ObjectId, (ObjectModel, Surface)>,
     wide: Vec<Wide>,
+    samples: Vec<(ObjectId, u32)>,
     extent_m: f64,
 }
 
@@ -60,6 +65,14 @@ impl ObjectLibrary {
     fn survey(&mut self) {
         let extents = self.surfaces().map(|(_, surface)| surface.extent_m);
         self.extent_m = extents.fold(0.0, f64::max);
+        let places = || {
+            self.surfaces().flat_map(|(object, surface)| {
+                let count = u32::try_from(surface.patches.len()).unwrap_or(u32::MAX);
+                (0..count).map(move |place| (object, place))
+            })
+        };
+        let step = places().count().div_ceil(SAMPLES).max(1);
+        self.samples = places().skip(step / 2).step_by(step).collect();
         self.wide = wide(self.objects.values().map(|(_, surface)| surface));
     }
 
@@ -69,6 +82,11 @@ impl ObjectLibrary {
 
     pub(super) fn surface(&self, id: ObjectId) -> Option<&Surface> {
         self.objects.get(&id).map(|(_, surface)| surface)
+    }
+
+    /// Some places, spread evenly over all maps: what a surface is like.
+    pub(super) fn samples(&self) -> &[(ObjectId, u32)] {
+        &self.samples
     }
 
     pub(super) fn wide(&self) -> &[Wide] {

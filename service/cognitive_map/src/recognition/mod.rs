@@ -45,6 +45,7 @@ mod orientation;
 mod pairs;
 mod poses;
 mod posterior;
+mod reaches;
 
 mod relief;
 mod shifts;

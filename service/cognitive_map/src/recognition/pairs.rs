@@ -115,16 +115,16 @@ impl Pairs {
             starts[bin + 1] += starts[bin];
         }
         let mut filled = starts.clone();
-        let mut pairs = vec![[0; 2]; keyed.len()];
+        let mut facets = vec![[0; 2]; keyed.len()];
         for (bin, pair) in keyed {
             let at = &mut filled[bin as usize];
-            pairs[*at as usize] = pair;
+            facets[*at as usize] = pair;
             *at += 1;
         }
         Self {
             width_m,
             starts,
-            facets: pairs,
+            facets,
         }
     }
 

@@ -1,25 +1,30 @@
 //! Hypotheses where the rotation is one of a few: a sum of Gaussians over translations.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
-use super::contact::Contact;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+use super::contact::{Contact, Reached};
 use super::library::{ObjectId, ObjectLibrary};
-use super::surface::Surface;
+use super::surface::{Surface, Wide};
 
-/// Most hypotheses kept after a touch.
+/// Most hypotheses kept in the long run. Early on, when little tells them apart, more are: as many as were
+/// born, and half as many with each touch.
 const KEPT_MAX: usize = 4096;
-/// Most births at a touch: places taken for the one that was touched.
+/// Most births: places taken for the one that was touched first.
 const BIRTHS_MAX: usize = 65_536;
-/// A hypothesis this far below the best holds nothing worth its keep: e⁻²⁵.
-const BELOW: f64 = 25.0;
+/// A hypothesis this far below the best holds nothing worth its keep: e⁻²⁰.
+const BELOW: f64 = 20.0;
 /// Share of contacts that the map does not explain.
 const OUTLIERS: f64 = 0.02;
-/// Places farther than this many standard deviations are not the one touched: e⁻¹².
-const GATE_SD: f64 = 5.0;
-/// A hypothesis parts in two where two places could be the one touched, each with this share.
-const PART_SHARE: f64 = 0.05;
+/// A hypothesis parts where several places could be the one touched, each with this share of the
+/// contact's likelihood at least.
+const PART_SHARE: f64 = 0.005;
 /// Most parts.
-const PARTS_MAX: usize = 4;
+const PARTS_MAX: usize = 16;
+/// Squared distance, in variances, beyond which a place is not the one that was touched: e⁻²⁵.
+const DISTANCE_MAX: f64 = 50.0;
 
 /// One hypothesis: a Gaussian over the translation, its mass being e^`evidence`.
 #[derive(Clone, Copy, Debug)]
@@ -28,9 +33,37 @@ pub(super) struct Shift {
     pub(super) rotation: u16,
     /// The episode's origin in the map \[m\].
     pub(super) translation: Vector3<f64>,
-    pub(super) covariance: Matrix3<f64>,
+    /// Variance of the translation along each axis \[m²\]: all that adds to it is alike along all axes.
+    pub(super) variance_m2: f64,
     /// Log-likelihood of the contacts so far, without the share of the map within a step.
     pub(super) evidence: f64,
+}
+
+/// A touch while it is taken in.
+struct Touched<'a> {
+    contact: &'a Contact,
+    /// What path integration has drifted since the touch before, per axis \[m²\].
+    drift_m2: f64,
+    wide: &'a [Wide],
+    /// Density of outliers, per m³.
+    elsewhere: f64,
+    felt: FeltLogs,
+    /// Density, displacement and variance of the places that answer one hypothesis.
+    answers: Vec<(f64, Vector3<f64>, f64)>,
+    parts: Vec<Shift>,
+}
+
+/// What the percepts of a touch say of each place, worked out when it is first asked for.
+#[derive(Default)]
+struct FeltLogs(BTreeMap<ObjectId, Vec<f64>>);
+
+impl FeltLogs {
+    /// Log-likelihoods at the places of an object; NaN where nobody has asked.
+    fn of(&mut self, object: ObjectId, places: usize) -> &mut [f64] {
+        self.0
+            .entry(object)
+            .or_insert_with(|| vec![f64::NAN; places])
+    }
 }
 
 /// All hypotheses.
@@ -38,6 +71,9 @@ pub(super) struct Shift {
 pub(super) struct Shifts {
     pub(super) rotations: Vec<UnitQuaternion<f64>>,
     pub(super) all: Vec<Shift>,
+    /// Log-likelihood of the contacts so far, but for those asked for, with something whose surface is
+    /// like those of the library; without the share of it within a step.
+    pub(super) stranger: f64,
 }
 
 impl Shifts {
@@ -45,6 +81,7 @@ impl Shifts {
         Self {
             rotations,
             all: Vec::new(),
+            stranger: 0.0,
         }
     }
 
@@ -55,17 +92,77 @@ impl Shifts {
         } else {
             let grown = before.last().map_or(0.0, |last| last.drift_sd_m.powi(2));
             let drift = (contact.drift_sd_m.powi(2) - grown).max(0.0);
-            let all = std::mem::take(&mut self.all);
-            let mut parts = Vec::with_capacity(all.len());
-            for shift in all {
-                if let Some(surface) = library.surface(shift.object) {
-                    self.explain(surface, library, shift, contact, drift, &mut parts);
+            if contact.reached != Reached::Aimed {
+                let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
+                let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+                if let Some(nearest) = nearest {
+                    self.stranger += self.stranger_log(library, nearest, contact, drift);
                 }
             }
-            self.all = parts;
+            let all = std::mem::take(&mut self.all);
+            let mut touched = Touched {
+                contact,
+                drift_m2: drift,
+                wide: library.wide(),
+                elsewhere: library.elsewhere(),
+                felt: FeltLogs::default(),
+                answers: Vec::new(),
+                parts: Vec::with_capacity(2 * all.len()),
+            };
+            for shift in all {
+                if let Some(surface) = library.surface(shift.object) {
+                    self.explain(surface, shift, &mut touched);
+                }
+            }
+            self.all = touched.parts;
+            self.drop_faint();
             self.merge();
         }
-        self.prune();
+        self.prune(KEPT_MAX.max(BIRTHS_MAX >> before.len().min(31)));
+    }
+
+    /// Log-density of a contact with something that was never learned, whose surface is like those of the library: the mean
+    /// over places of it, each taken for the one touched by `other`, weighed by how well it explains what was felt there.
+    ///
+    /// It is what a hypothesis that knows nothing else would expect, so that evidence for a map begins
+    /// where the map explains more than a surface of its kind. Space filled evenly would be no rival: a step along
+    /// any surface ends on most others, and neighbouring places feel alike on most.
+    fn stranger_log(
+        &self,
+        library: &ObjectLibrary,
+        other: &Contact,
+        contact: &Contact,
+        drift: f64,
+    ) -> f64 {
+        let step = contact.position_m - other.position_m;
+        let noise = contact.position_sd_m * contact.position_sd_m + drift;
+        let wide = library.wide();
+        let (mut sum, mut weights) = (0.0, 0.0);
+        let mut turns = self.rotations.iter().cycle();
+        for &(object, place) in library.samples() {
+            let (Some(surface), Some(rotation)) = (library.surface(object), turns.next()) else {
+                continue;
+            };
+            let here = &surface.patches[place as usize];
+            let normal = normal_log(rotation, other, here.normal.as_ref());
+            let weight = (here.percept_log(other, wide) + normal).exp();
+            let query = here.position + rotation * step;
+            let mut density = 0.0;
+            for &near in surface.near(&query, noise) {
+                let patch = &surface.patches[near as usize];
+                let variance = noise + patch.variance_m2;
+                let squared = (patch.position - query).norm_squared() / variance;
+                if squared < DISTANCE_MAX {
+                    let normal = normal_log(rotation, contact, patch.normal.as_ref());
+                    let felt = patch.percept_log(contact, wide);
+                    density += (normal + felt - 0.5 * squared).exp() / (TAU * variance).powf(1.5);
+                }
+            }
+            sum += weight * density / surface.patches.len() as f64;
+            weights += weight;
+        }
+        let typical = if weights > 0.0 { sum / weights } else { 0.0 };
+        ((1.0 - OUTLIERS) * typical + OUTLIERS * library.elsewhere()).ln()
     }
 
     /// Every place taken for the one that was touched.
@@ -98,7 +195,7 @@ impl Shifts {
                         object,
                         rotation: number,
                         translation: patch.position.coords - turned,
-                        covariance: Matrix3::from_diagonal_element(variance),
+                        variance_m2: variance,
                         evidence: each + felt + normal,
                     });
                 }
@@ -107,88 +204,90 @@ impl Shifts {
         births
     }
 
-    /// What becomes of a hypothesis with one more contact: one or more parts.
-    fn explain(
-        &self,
-        surface: &Surface,
-        library: &ObjectLibrary,
-        shift: Shift,
-        contact: &Contact,
-        drift: f64,
-        parts: &mut Vec<Shift>,
-    ) {
+    /// What becomes of a hypothesis with one more contact: one or more parts, each with its place taken for
+    /// the one that was touched.
+    fn explain(&self, surface: &Surface, shift: Shift, touch: &mut Touched<'_>) {
         let rotation = &self.rotations[usize::from(shift.rotation)];
-        let prior = shift.covariance + Matrix3::from_diagonal_element(drift);
+        let contact = touch.contact;
+        let prior = shift.variance_m2 + touch.drift_m2;
         let noise = contact.position_sd_m * contact.position_sd_m;
         let query = Point3::from(rotation * contact.position_m.coords + shift.translation);
         let share_log = (1.0 - OUTLIERS).ln() - (surface.patches.len() as f64).ln();
-        let outlier = (OUTLIERS * library.elsewhere()).ln();
-        // The best few places: log density, and the shift's change.
-        let mut best: [(f64, Vector3<f64>, f64); PARTS_MAX] =
-            [(f64::NEG_INFINITY, Vector3::zeros(), 0.0); PARTS_MAX];
-        let mut total = outlier.exp();
-        let widest = prior.diagonal().max() + noise + surface.variance_m2;
-        for &place in surface.near(&query, GATE_SD * widest.sqrt()) {
+        let outlier = OUTLIERS * touch.elsewhere;
+        let felt = touch.felt.of(shift.object, surface.patches.len());
+        let mut total = outlier;
+        touch.answers.clear();
+        for &place in surface.near(&query, prior + noise) {
             let patch = &surface.patches[place as usize];
             let apart = patch.position - query;
             let variance = noise + patch.variance_m2;
-            let total_variance = prior + Matrix3::from_diagonal_element(variance);
-            // Too far along any axis: the largest variance bounds the distance.
-            if apart.norm_squared() > 25.0 * total_variance.trace() {
+            let squared = apart.norm_squared() / (prior + variance);
+            if squared > DISTANCE_MAX {
                 continue;
             }
-            let Some(inverse) = total_variance.try_inverse() else {
-                continue;
-            };
-            let distance = apart.dot(&(inverse * apart));
-            if distance > 50.0 {
-                continue;
+            let felt = &mut felt[place as usize];
+            if felt.is_nan() {
+                *felt = patch.percept_log(contact, touch.wide);
             }
-            let log = share_log - 0.5 * distance + 0.5 * inverse.determinant().ln()
-                - 2.756_815_599_614_018
-                + patch.percept_log(contact, library.wide())
+            let log = share_log - 0.5 * squared - 1.5 * (TAU * (prior + variance)).ln()
+                + *felt
                 + normal_log(rotation, contact, patch.normal.as_ref());
-            total += log.exp();
-            if log > best[PARTS_MAX - 1].0 {
-                best[PARTS_MAX - 1] = (log, apart, variance);
-                best.sort_by(|a, b| b.0.total_cmp(&a.0));
-            }
+            let density = log.exp();
+            total += density;
+            touch.answers.push((density, apart, variance));
         }
-        if best[0].0 < outlier {
+        let total_log = total.ln();
+        let least = PART_SHARE * total;
+        touch.answers.retain(|answer| answer.0 >= least);
+        if touch.answers.len() > PARTS_MAX {
+            touch.answers.sort_by(|a, b| b.0.total_cmp(&a.0));
+            touch.answers.truncate(PARTS_MAX);
+        }
+        let best = touch.answers.iter().map(|answer| answer.0);
+        if best.fold(0.0, f64::max) < outlier {
             // Most likely an outlier: the hypothesis stays where it is.
-            parts.push(Shift {
-                covariance: prior,
-                evidence: shift.evidence + total.ln(),
+            touch.parts.push(Shift {
+                variance_m2: prior,
+                evidence: shift.evidence + total_log,
                 ..shift
             });
             return;
         }
-        let taken = best
+        let sum_log = touch
+            .answers
             .iter()
-            .filter(|part| part.0.exp() >= PART_SHARE * total)
-            .count()
-            .max(1);
-        let sum: f64 = best[..taken].iter().map(|part| part.0.exp()).sum();
-        for (log, apart, variance) in &best[..taken] {
-            let gain = prior
-                * (prior + Matrix3::from_diagonal_element(*variance))
-                    .try_inverse()
-                    .unwrap_or_else(Matrix3::zeros);
-            let covariance = prior - gain * prior;
-            parts.push(Shift {
+            .map(|answer| answer.0)
+            .sum::<f64>()
+            .ln();
+        for (density, apart, variance) in &touch.answers {
+            let gain = prior / (prior + variance);
+            touch.parts.push(Shift {
                 translation: shift.translation + gain * apart,
-                covariance: (covariance + covariance.transpose()) * 0.5,
-                evidence: shift.evidence + total.ln() + log - sum.ln(),
+                variance_m2: prior - gain * prior,
+                evidence: shift.evidence + total_log + density.ln() - sum_log,
                 ..shift
             });
         }
+    }
+
+    /// Drops what holds no evidence before it is sorted. The last hypothesis of an object waits for
+    /// [`prune`](Self::prune).
+    fn drop_faint(&mut self) {
+        let mut best: BTreeMap<ObjectId, f64> = BTreeMap::new();
+        for shift in &self.all {
+            let best = best.entry(shift.object).or_insert(f64::NEG_INFINITY);
+            *best = best.max(shift.evidence);
+        }
+        let most = best.values().copied().fold(f64::NEG_INFINITY, f64::max);
+        self.all
+            .retain(|shift| shift.evidence > most - BELOW || shift.evidence >= best[&shift.object]);
     }
 
     /// Makes one of hypotheses that have become the same.
     fn merge(&mut self) {
         let key = |shift: &Shift| {
             // Within a fifth of a deviation or so of one another, whose sum is one Gaussian again.
-            let cell = 0.4 * (shift.covariance.trace() / 3.0).sqrt().max(1e-12);
+            let cell = 0.4 * shift.variance_m2.sqrt().max(1e-12);
             // Powers of two, so that hypotheses of about the same width have the same cells.
             let cell = cell.log2().floor().exp2();
             #[expect(clippy::cast_possible_truncation, reason = "saturates")]
@@ -214,7 +313,7 @@ impl Shifts {
     }
 
     /// Drops what holds no evidence, and the least beyond the budget; each object keeps its best.
-    fn prune(&mut self) {
+    fn prune(&mut self, most: usize) {
         self.all.sort_by(|a, b| {
             b.evidence
                 .total_cmp(&a.evidence)
@@ -228,7 +327,7 @@ impl Shifts {
         let mut seen = std::collections::BTreeSet::new();
         self.all.retain(|shift| {
             let first = seen.insert(shift.object);
-            let keep = first || kept < KEPT_MAX && shift.evidence > best - BELOW;
+            let keep = first || kept < most && shift.evidence > best - BELOW;
             kept += usize::from(keep);
             keep
         });

@@ -2,17 +2,15 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::cells::Cells;
 use super::contact::{Contact, Seen};
 use super::model::{LevelMemory, ObjectModel};
+use super::reaches::Reaches;
 use super::relief::Relief;
 
 /// A place's field is uniform over one spacing; that is its standard deviation in spacings, 1/√12.
 const FIELD_PER_SPACING: f64 = 0.288_675;
-/// From one index to the next coarser one, look-ups reach so many times as far.
-const SCALE: f64 = 2.5;
-/// Cells of seven tenths of a reach: four indexes of a thousand places take about a megabyte.
-const CELL_PER_REACH: f64 = 0.7;
+/// How many standard deviations a field reaches.
+const REACH_SD: f64 = 4.0;
 /// Distances at which the share of the map within them is tabled, per extent.
 const SHARES: usize = 32;
 /// Most places from which the shares are counted: their error is then a few hundredths.
@@ -33,11 +31,7 @@ pub(super) struct Patch {
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     pub(super) patches: Vec<Patch>,
-    /// One index per scale, each for look-ups within `SCALE` times the reach of the one before.
-    scales: Vec<(f64, Cells)>,
-    all: Vec<u32>,
-    /// Largest variance of a patch per axis \[m²\].
-    pub(super) variance_m2: f64,
+    reaches: Reaches,
     /// Diameter of a ball about the map's middle that holds all of it \[m\].
     pub(super) extent_m: f64,
     /// Area that it takes for \[m²\]: one spacing squared per place.
@@ -48,7 +42,7 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// Of a model; touches will have noise of about `sd_m` \[m\].
+    /// Of a model.
     pub(super) fn new(model: &ObjectModel) -> Self {
         let field_m = FIELD_PER_SPACING * model.spacing_m();
         let patches: Vec<_> = model
@@ -62,7 +56,13 @@ impl Surface {
                 descriptors: place.descriptors.clone(),
             })
             .collect();
+        // Touches are about as noisy as those that were learned; hypotheses add as much again.
+        let noise_m2 = model.places().iter().map(|p| p.variance_m2 / p.count);
+        let noise_m2 = noise_m2.sum::<f64>() / patches.len().max(1) as f64;
+        let reach = |patch: &Patch| REACH_SD * patch.variance_m2.sqrt() + 0.5 * model.spacing_m();
         let positions: Vec<_> = patches.iter().map(|patch| patch.position).collect();
+        let own_m: Vec<_> = patches.iter().map(reach).collect();
+        let least_m = REACH_SD * (2.0 * noise_m2).sqrt() + 0.5 * model.spacing_m();
         let middle = positions
             .iter()
             .fold(Vector3::zeros(), |sum, p| sum + p.coords)
@@ -73,12 +73,7 @@ impl Surface {
             .fold(model.spacing_m(), f64::max);
         let extent_m = 2.0 * radius_m;
         Self {
-            scales: scales(&positions, extent_m),
-            all: (0u32..).zip(&positions).map(|(number, _)| number).collect(),
-            variance_m2: patches
-                .iter()
-                .map(|patch| patch.variance_m2)
-                .fold(0.0, f64::max),
+            reaches: Reaches::new(&positions, &own_m, least_m, extent_m),
             shares: shares(&positions, extent_m),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
             relief: Relief::new(model),
@@ -87,10 +82,10 @@ impl Surface {
         }
     }
 
-    /// All places within a distance \[m\] of a point, and some others near it.
-    pub(super) fn near(&self, point: &Point3<f64>, radius_m: f64) -> &[u32] {
-        let scale = self.scales.iter().find(|scale| scale.0 >= radius_m);
-        scale.map_or(&self.all, |(_, cells)| cells.near(point))
+    /// All places that a point could be of whose variance along each axis is `variance_m2` at most
+    /// \[m²\], and some others, in order.
+    pub(super) fn near(&self, point: &Point3<f64>, variance_m2: f64) -> &[u32] {
+        self.reaches.near(point, REACH_SD * variance_m2.sqrt())
     }
 
     /// The share of the map within `reach_m` \[m\] of a place of it, on average.
@@ -105,17 +100,6 @@ impl Surface {
         let part = at - below as f64;
         self.shares[below] * (1.0 - part) + self.shares[below + 1] * part
     }
-}
-
-/// Indexes for look-ups within a 48th of the extent, and so on by scale, as long as that leaves places out.
-fn scales(positions: &[Point3<f64>], extent_m: f64) -> Vec<(f64, Cells)> {
-    let reaches_m = (0..4).map(|scale| extent_m / 48.0 * SCALE.powi(scale));
-    reaches_m
-        .map(|reach_m| {
-            let reaches = vec![reach_m; positions.len()];
-            (reach_m, Cells::new(positions, &reaches, CELL_PER_REACH))
-        })
-        .collect()
 }
 
 fn shares(positions: &[Point3<f64>], extent_m: f64) -> [f64; SHARES + 1] {

@@ -19,6 +19,8 @@
 //! | position of a recalled place | where the map believes that it is; the paper stores the true one. Without noise they are equal |
 //! | ε of a unique location, σ of Eq. 9 | see [`Quantity`] |
 //!
+//! The third experiment, with objects, is in [`object`].
+//!
 //! The room's corner is the origin of the map, and the start is told without error. Sums are taken in a
 //! fixed order, so that equal protocols and seeds give equal reports, on any number of threads.
 //!
@@ -42,6 +44,7 @@ mod environment;
 mod experiment;
 pub(crate) mod figure;
 mod measure;
+pub mod object;
 mod protocol;
 mod quantity;
 mod report;

@@ -62,9 +62,9 @@ impl Cloud {
         for path in paths {
             let text = std::fs::read_to_string(&path).map_err(io(&path))?;
             if text.lines().next().map(str::trim) == Some(HEADER) {
-                let name = path.file_stem().map_or_else(String::new, |stem| {
-                    stem.to_string_lossy().into_owned()
-                });
+                let name = path
+                    .file_stem()
+                    .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
                 let points = parse(&text).map_err(|line| InvalidCloud::Line { path, line })?;
                 clouds.push(Self { name, points });
             }
@@ -83,7 +83,10 @@ fn parse(text: &str) -> Result<Vec<(Point3<f64>, Unit<Vector3<f64>>)>, usize> {
         if line.trim().is_empty() {
             continue;
         }
-        let numbers: Vec<f64> = line.split(',').map_while(|field| field.trim().parse().ok()).collect();
+        let numbers: Vec<f64> = line
+            .split(',')
+            .map_while(|field| field.trim().parse().ok())
+            .collect();
         let [x, y, z, nx, ny, nz] = numbers[..] else {
             return Err(number + 1);
         };

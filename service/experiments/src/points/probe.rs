@@ -37,7 +37,12 @@ pub(super) struct Probe<'a> {
 
 impl<'a> Probe<'a> {
     pub(super) fn new(cloud: &'a Cloud, held: &'a [usize]) -> Self {
-        Self { cloud, held, at: None, heading: Vector3::zeros() }
+        Self {
+            cloud,
+            held,
+            at: None,
+            heading: Vector3::zeros(),
+        }
     }
 
     /// A point anywhere.
@@ -68,12 +73,20 @@ impl<'a> Probe<'a> {
         let next = self.nearest(|point, n| {
             // Through something thin is no way along the surface.
             let through = if n.dot(&normal) < -0.3 { 1.0 } else { 0.0 };
-            let still = if (point - position).norm() < 0.2 * STEP_M { 1.0 } else { 0.0 };
+            let still = if (point - position).norm() < 0.2 * STEP_M {
+                1.0
+            } else {
+                0.0
+            };
             (point - goal).norm() + through + still
         });
         let moved = self.cloud.points[next].0 - position;
         // The heading follows the surface, and turns back where it goes on no farther.
-        self.heading = if moved.dot(&heading) > 0.0 { moved.normalize() } else { -heading };
+        self.heading = if moved.dot(&heading) > 0.0 {
+            moved.normalize()
+        } else {
+            -heading
+        };
         self.at = Some(next);
         next
     }
@@ -94,7 +107,11 @@ impl<'a> Probe<'a> {
                 let aside = (apart - along.into_inner() * depth).norm();
                 let away = if normal.dot(&along) > 0.0 { 10.0 } else { 0.0 };
                 // Whatever is on the line comes before whatever is not.
-                away + if aside <= LINE_M { -1.0 + 1e-3 * depth } else { aside }
+                away + if aside <= LINE_M {
+                    -1.0 + 1e-3 * depth
+                } else {
+                    aside
+                }
             })
         } else {
             self.nearest(|point, _| (point - target).norm())
@@ -109,6 +126,8 @@ impl<'a> Probe<'a> {
     ) -> usize {
         let cost = |at: usize| cost(&self.cloud.points[at].0, &self.cloud.points[at].1);
         let costs = self.held.iter().map(|&at| (cost(at), at));
-        costs.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |best| best.1)
+        costs
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or(0, |best| best.1)
     }
 }

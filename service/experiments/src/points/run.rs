@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use cognitive_map::recognition::{
-    Contact, ModelSettings, ObjectId, ObjectLibrary, ObjectModel, Orientation, Posterior, Recognition,
-    Verdict,
+    Contact, ModelSettings, ObjectId, ObjectLibrary, ObjectModel, Orientation, Posterior,
+    Recognition, Verdict,
 };
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::seq::SliceRandom;
@@ -99,7 +99,10 @@ pub fn run(
         order.drain(..learned);
         held.push(order);
     }
-    let places = library.iter().map(|(_, model)| model.places().len()).sum::<usize>();
+    let places = library
+        .iter()
+        .map(|(_, model)| model.places().len())
+        .sum::<usize>();
     let group = settings.leave_out;
     let total = clouds.len() * settings.trials * if group > 0 { 2 } else { 1 };
     let mut times = Vec::new();
@@ -107,7 +110,9 @@ pub fn run(
     let mut left_out = Vec::new();
     for trial in 0..settings.trials {
         for truth in 0..clouds.len() {
-            known.push(one(&library, clouds, &held, truth, trial, settings, clock, &mut times));
+            known.push(one(
+                &library, clouds, &held, truth, trial, settings, clock, &mut times,
+            ));
             progress(known.len(), total);
         }
     }
@@ -120,7 +125,16 @@ pub fn run(
             }
             for truth in out {
                 for trial in 0..settings.trials {
-                    let trial = one(&others, clouds, &held, truth, trial, settings, clock, &mut Vec::new());
+                    let trial = one(
+                        &others,
+                        clouds,
+                        &held,
+                        truth,
+                        trial,
+                        settings,
+                        clock,
+                        &mut Vec::new(),
+                    );
                     left_out.push(trial);
                     progress(known.len() + left_out.len(), total);
                 }
@@ -132,7 +146,10 @@ pub fn run(
     report
 }
 
-#[expect(clippy::too_many_arguments, reason = "all that a trial is made of, once")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "all that a trial is made of, once"
+)]
 fn one(
     library: &ObjectLibrary,
     clouds: &[Cloud],
@@ -156,7 +173,11 @@ fn one(
     let episode_from_object = object_from_episode.inverse();
     let mut probe = Probe::new(cloud, &held[truth]);
     let mut recognition = Recognition::new(&Orientation::Free);
-    let mut outcome = Trial { truth, looks: Vec::new(), stop: None };
+    let mut outcome = Trial {
+        truth,
+        looks: Vec::new(),
+        stop: None,
+    };
     let last = settings.looks.last().copied().unwrap_or(0);
     for count in 1..=last {
         let next = (settings.exploration == Exploration::Policy && count > BEFORE_ASKING)
@@ -179,7 +200,13 @@ fn one(
             outcome.stop = Some((count, posterior.verdict()));
         }
         if settings.looks.contains(&count) {
-            outcome.looks.push(look(&posterior, cloud, number, &object_from_episode, settings));
+            outcome.looks.push(look(
+                &posterior,
+                cloud,
+                number,
+                &object_from_episode,
+                settings,
+            ));
         }
     }
     outcome
@@ -193,15 +220,26 @@ fn look(
     settings: &PointsSettings,
 ) -> Look {
     let first = posterior.objects.first().map(|first| first.0);
-    let pose = posterior.pose.as_ref().filter(|pose| pose.object == ObjectId(truth));
+    let pose = posterior
+        .pose
+        .as_ref()
+        .filter(|pose| pose.object == ObjectId(truth));
     Look {
         first,
-        unknown: posterior.objects.first().is_none_or(|first| posterior.unknown > first.1),
+        unknown: posterior
+            .objects
+            .first()
+            .is_none_or(|first| posterior.unknown > first.1),
         fit: posterior.fit,
         live: posterior.live_hypotheses,
         rotation_rad: pose.filter(|_| first == Some(ObjectId(truth))).map(|pose| {
             let tolerance_m = 0.5 * settings.noise_m;
-            symmetry::error_rad(cloud, &pose.map_from_episode, object_from_episode, tolerance_m)
+            symmetry::error_rad(
+                cloud,
+                &pose.map_from_episode,
+                object_from_episode,
+                tolerance_m,
+            )
         }),
     }
 }
@@ -228,12 +266,18 @@ fn summary(
         unknown_caught: BTreeMap::new(),
         unknown_answered: BTreeMap::new(),
         stop: Stop {
-            accuracy: share(known, &|trial| {
-                matches!(trial.stop, Some((_, Verdict::Object(object))) if Some(object) == id(trial.truth))
-            }),
+            accuracy: share(
+                known,
+                &|trial| matches!(trial.stop, Some((_, Verdict::Object(object))) if Some(object) == id(trial.truth)),
+            ),
             contacts_mean: known
                 .iter()
-                .map(|trial| trial.stop.map_or(settings.looks.last().copied().unwrap_or(0), |s| s.0) as f64)
+                .map(|trial| {
+                    trial
+                        .stop
+                        .map_or(settings.looks.last().copied().unwrap_or(0), |s| s.0)
+                        as f64
+                })
                 .sum::<f64>()
                 / known.len().max(1) as f64,
             undecided: share(known, &|trial| trial.stop.is_none()),
@@ -247,13 +291,25 @@ fn summary(
     for (at, &count) in settings.looks.iter().enumerate() {
         let right = |trial: &Trial| trial.looks[at].first == id(trial.truth);
         report.top1_after.insert(count, share(known, &right));
-        report.false_unknown_after.insert(count, share(known, &|trial| trial.looks[at].unknown));
-        let live = known.iter().map(|trial| trial.looks[at].live as f64).sum::<f64>();
-        report.live_hypotheses.insert(count, live / known.len().max(1) as f64);
-        let errors = known.iter().filter_map(|trial| trial.looks[at].rotation_rad);
+        report
+            .false_unknown_after
+            .insert(count, share(known, &|trial| trial.looks[at].unknown));
+        let live = known
+            .iter()
+            .map(|trial| trial.looks[at].live as f64)
+            .sum::<f64>();
+        report
+            .live_hypotheses
+            .insert(count, live / known.len().max(1) as f64);
+        let errors = known
+            .iter()
+            .filter_map(|trial| trial.looks[at].rotation_rad);
         let mut errors: Vec<_> = errors.map(f64::to_degrees).collect();
         if !errors.is_empty() {
-            let rotation = Rotation { p50: quantile(&mut errors, 0.5), p90: quantile(&mut errors, 0.9) };
+            let rotation = Rotation {
+                p50: quantile(&mut errors, 0.5),
+                p90: quantile(&mut errors, 0.9),
+            };
             report.rotation_deg.insert(count, rotation);
         }
         if !left_out.is_empty() {
@@ -261,16 +317,29 @@ fn summary(
             let threshold = quantile(&mut fits, 0.02);
             let caught = share(left_out, &|trial| trial.looks[at].fit < threshold);
             report.unknown_caught.insert(count, caught);
-            report.unknown_answered.insert(count, share(left_out, &|trial| trial.looks[at].unknown));
+            report
+                .unknown_answered
+                .insert(count, share(left_out, &|trial| trial.looks[at].unknown));
         }
     }
     for (truth, cloud) in clouds.iter().enumerate() {
-        let looks = || known.iter().filter(|t| t.truth == truth).filter_map(|t| t.looks.last());
+        let looks = || {
+            known
+                .iter()
+                .filter(|t| t.truth == truth)
+                .filter_map(|t| t.looks.last())
+        };
         let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len().max(1) as f64;
-        let mut errors: Vec<_> =
-            looks().filter_map(|look| look.rotation_rad).map(f64::to_degrees).collect();
+        let mut errors: Vec<_> = looks()
+            .filter_map(|look| look.rotation_rad)
+            .map(f64::to_degrees)
+            .collect();
         let one = OneObject {
-            top1: mean(looks().map(|look| f64::from(u8::from(look.first == id(truth)))).collect()),
+            top1: mean(
+                looks()
+                    .map(|look| f64::from(u8::from(look.first == id(truth))))
+                    .collect(),
+            ),
             rotation_deg_p50: quantile(&mut errors, 0.5),
             fit_mean: mean(looks().map(|look| look.fit).collect()),
         };
@@ -279,8 +348,13 @@ fn summary(
     for trial in known {
         let first = trial.looks.last().and_then(|look| look.first);
         if first != id(trial.truth) {
-            let name = first.and_then(|first| clouds.get(first.0 as usize)).map_or("none", |c| &c.name);
-            *report.confusions.entry(format!("{} as {name}", clouds[trial.truth].name)).or_default() += 1;
+            let name = first
+                .and_then(|first| clouds.get(first.0 as usize))
+                .map_or("none", |c| &c.name);
+            *report
+                .confusions
+                .entry(format!("{} as {name}", clouds[trial.truth].name))
+                .or_default() += 1;
         }
     }
     report

@@ -26,7 +26,10 @@ pub(super) fn error_rad(
 ) -> f64 {
     let error = estimate * truth.inverse();
     let plain = error.rotation.angle();
-    let middle = cloud.points.iter().fold(Vector3::zeros(), |sum, p| sum + p.0.coords)
+    let middle = cloud
+        .points
+        .iter()
+        .fold(Vector3::zeros(), |sum, p| sum + p.0.coords)
         / cloud.points.len() as f64;
     // A symmetry does not move the middle; the estimate's shift is no part of the rotation's error.
     let to = nalgebra::Translation3::from(middle);
@@ -62,9 +65,14 @@ pub(super) fn error_rad(
         squares.sort_by(f64::total_cmp);
         squares.truncate(squares.len() * 9 / 10);
         rms_m = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-        let Some(cholesky) = matrix.cholesky() else { break };
+        let Some(cholesky) = matrix.cholesky() else {
+            break;
+        };
         let step = cholesky.solve(&right);
-        let turn = se3::exp(&step.fixed_rows::<3>(0).into(), &step.fixed_rows::<3>(3).into());
+        let turn = se3::exp(
+            &step.fixed_rows::<3>(0).into(),
+            &step.fixed_rows::<3>(3).into(),
+        );
         pose = to * turn * to.inverse() * pose;
     }
     if rms_m < tolerance_m {
@@ -78,5 +86,7 @@ pub(super) fn error_rad(
 fn every(cloud: &Cloud, most: usize) -> Vec<(Point3<f64>, Vector3<f64>)> {
     let step = cloud.points.len().div_ceil(most).max(1);
     let points = cloud.points.iter().step_by(step);
-    points.map(|(point, normal)| (*point, normal.into_inner())).collect()
+    points
+        .map(|(point, normal)| (*point, normal.into_inner()))
+        .collect()
 }

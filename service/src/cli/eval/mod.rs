@@ -1,9 +1,11 @@
 //! `cogmap eval`: the seed paper's experiments, ours beside the paper's, and what a grid code tells.
 
 mod code;
+mod object;
 mod progress;
 mod room;
 
+pub(super) use object::Turns;
 pub(super) use progress::Progress;
 
 use clap::Subcommand;
@@ -15,6 +17,8 @@ pub(in crate::cli) enum EvalCommand {
     Env1(room::RoomArgs),
     /// The second experiment: a room of 15 × 15 × 15 m with 50 cubes, 1000 steps.
     Env2(room::RoomArgs),
+    /// The third experiment: which of some objects of coloured voxels an end effector touches.
+    Env3(object::ObjectArgs),
     /// How well a grid code tells places apart: whole, beside the place, noisy, with modules erased.
     Code(code::CodeArgs),
 }
@@ -23,6 +27,7 @@ pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
     match command {
         EvalCommand::Env1(args) => room::run(Environment::GridAligned, args),
         EvalCommand::Env2(args) => room::run(Environment::ObstacleRich, args),
+        EvalCommand::Env3(args) => object::run(args),
         EvalCommand::Code(args) => code::run(args),
     }
 }

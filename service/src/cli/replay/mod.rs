@@ -6,9 +6,11 @@ mod mrclam_report;
 mod offline;
 mod online;
 mod outcome;
+mod points;
 mod readings;
 mod recorded;
 mod recorded_report;
+mod touch;
 mod tuc;
 mod victoria;
 
@@ -26,6 +28,10 @@ pub(in crate::cli) enum ReplayCommand {
     Tuc(tuc::TucArgs),
     /// Victoria Park as text: odometry as motion, trees as landmarks.
     Victoria(victoria::VictoriaArgs),
+    /// Objects as touches, a place and a level each: learned, and touched again with noise.
+    Touch(touch::TouchArgs),
+    /// Objects as points with normals: learned from some, and recognised from others in any pose.
+    Points(points::PointsArgs),
 }
 
 pub(super) fn run(command: &ReplayCommand) -> anyhow::Result<()> {
@@ -34,5 +40,7 @@ pub(super) fn run(command: &ReplayCommand) -> anyhow::Result<()> {
         ReplayCommand::G2o(args) => g2o::run(args),
         ReplayCommand::Tuc(args) => tuc::run(args),
         ReplayCommand::Victoria(args) => victoria::run(args),
+        ReplayCommand::Touch(args) => touch::run(args),
+        ReplayCommand::Points(args) => points::run(args),
     }
 }
