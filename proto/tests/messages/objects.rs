@@ -118,11 +118,11 @@ fn recognised() -> Identification {
         objects: vec![
             ObjectProbability {
                 name: "mug".to_owned(),
-                probability: 0.9921875,
+                probability: 0.992_187_5,
             },
             ObjectProbability {
                 name: "bowl".to_owned(),
-                probability: 0.0078125,
+                probability: 0.007_812_5,
             },
         ],
         unknown: 0.0,

@@ -192,7 +192,7 @@ fn event_kinds() -> [(&'static str, EventKind); 19] {
             "object_recognised",
             EventKind::ObjectRecognised {
                 object: "mug".to_owned(),
-                probability: 0.9921875,
+                probability: 0.992_187_5,
             },
         ),
         ("object_unknown", EventKind::ObjectUnknown {}),
