@@ -41,7 +41,7 @@ pub(super) fn each(visit: &mut impl Visit) {
     visit.message("estimate_lost", &estimate(Status::Lost));
     visit.message("watermark", &watermark());
     visit.message("watermark_gap_rejections", &watermark_with_gap());
-    for (name, kind) in event_kinds() {
+    for (name, kind) in event_kinds().into_iter().chain(object_events()) {
         visit.message(&format!("event_{name}"), &event(kind));
     }
     visit.message("recall_query_empty", &RecallQuery::default());
@@ -126,7 +126,32 @@ fn event(kind: EventKind) -> Event {
     }
 }
 
-fn event_kinds() -> [(&'static str, EventKind); 19] {
+fn object_events() -> [(&'static str, EventKind); 5] {
+    [
+        ("objects_narrowed", EventKind::ObjectsNarrowed { live: 2 }),
+        (
+            "object_recognised",
+            EventKind::ObjectRecognised {
+                object: "mug".to_owned(),
+                probability: 0.992_187_5,
+            },
+        ),
+        ("object_unknown", EventKind::ObjectUnknown {}),
+        (
+            "object_learned",
+            EventKind::ObjectLearned {
+                object: "object-7".to_owned(),
+                contacts: 31,
+            },
+        ),
+        (
+            "object_not_learned",
+            EventKind::ObjectNotLearned { contacts: 4 },
+        ),
+    ]
+}
+
+fn event_kinds() -> [(&'static str, EventKind); 14] {
     let session = 1_800_000_000_000_000_000;
     let landmark = "porte 3, étage α".to_owned();
     [
@@ -186,26 +211,6 @@ fn event_kinds() -> [(&'static str, EventKind); 19] {
         (
             "trip_forgotten",
             EventKind::TripForgotten { trip: 2, legs: 14 },
-        ),
-        ("objects_narrowed", EventKind::ObjectsNarrowed { live: 2 }),
-        (
-            "object_recognised",
-            EventKind::ObjectRecognised {
-                object: "mug".to_owned(),
-                probability: 0.992_187_5,
-            },
-        ),
-        ("object_unknown", EventKind::ObjectUnknown {}),
-        (
-            "object_learned",
-            EventKind::ObjectLearned {
-                object: "object-7".to_owned(),
-                contacts: 31,
-            },
-        ),
-        (
-            "object_not_learned",
-            EventKind::ObjectNotLearned { contacts: 4 },
         ),
         (
             "agent_placed",

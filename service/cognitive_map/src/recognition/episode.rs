@@ -24,6 +24,8 @@ const UNKNOWN_PRIOR: f64 = 0.1;
 /// Log of the range over which the fit of something else is spread, 20 deviations, against the width of a
 /// normal number's, √(2π).
 const MISFIT_LOG: f64 = 2.076_8;
+/// What the evidence of a contact counts in a free pose, against one that is independent of all others.
+const POSES_WORTH: f64 = 0.6;
 /// Other poses that an answer names.
 const OTHERS_MAX: usize = 24;
 
@@ -107,6 +109,15 @@ impl Recognition {
     pub fn posterior(&self, library: &ObjectLibrary) -> Posterior {
         let mut logs = self.logs(library);
         let mut objects = sums(library, &logs);
+        // A surface's errors are shared by the contacts near one another: those in a free pose, which is fitted to
+        // them, are worth fewer independent ones.
+        let worth = match &self.hypotheses {
+            Hypotheses::Shifts(_) => 1.0,
+            Hypotheses::Poses(_) => POSES_WORTH,
+        };
+        for (_, log) in &mut objects {
+            *log *= worth;
+        }
         let prior = (1.0 - UNKNOWN_PRIOR).ln() - (objects.len().max(1) as f64).ln();
         let mut none = UNKNOWN_PRIOR.ln();
         if logs.is_empty() {
@@ -116,11 +127,11 @@ impl Recognition {
             }
         } else {
             let best = objects.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-            none += self.none_log(library, best.map(|&(object, _)| object));
+            none += worth * self.none_log(library, best.map(|&(object, _)| object));
             let fit = self.fit(library).min(0.0);
-            let most = logs
+            let most = objects
                 .iter()
-                .map(|(_, log)| *log)
+                .map(|object| object.1)
                 .fold(f64::NEG_INFINITY, f64::max);
             // The fit of what was learned is a normal number, that of anything else about evenly spread
             // below: the ratio of the two densities.

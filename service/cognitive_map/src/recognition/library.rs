@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_6;
+use std::sync::Arc;
 
 use super::model::ObjectModel;
 use super::surface::{Surface, Wide, wide};
@@ -20,7 +21,8 @@ pub struct ObjectId(pub u32);
 /// changes nothing here.
 #[derive(Clone, Debug, Default)]
 pub struct ObjectLibrary {
-    objects: BTreeMap<ObjectId, (ObjectModel, Surface)>,
+    /// Shared with the library's clones, so that a snapshot costs a pointer per object.
+    objects: BTreeMap<ObjectId, Arc<(ObjectModel, Surface)>>,
     wide: Vec<Wide>,
     samples: Vec<(ObjectId, u32)>,
     extent_m: f64,
@@ -31,7 +33,7 @@ impl ObjectLibrary {
     /// with what they have gathered.
     pub fn put(&mut self, id: ObjectId, model: ObjectModel) {
         let surface = Surface::new(&model);
-        self.objects.insert(id, (model, surface));
+        self.objects.insert(id, Arc::new((model, surface)));
         self.survey();
     }
 
@@ -44,12 +46,12 @@ impl ObjectLibrary {
 
     /// What was learned of an object.
     pub fn get(&self, id: ObjectId) -> Option<&ObjectModel> {
-        self.objects.get(&id).map(|(model, _)| model)
+        self.objects.get(&id).map(|object| &object.0)
     }
 
     /// All objects, by number.
     pub fn iter(&self) -> impl Iterator<Item = (ObjectId, &ObjectModel)> {
-        self.objects.iter().map(|(id, (model, _))| (*id, model))
+        self.objects.iter().map(|(id, object)| (*id, &object.0))
     }
 
     /// How many there are.
@@ -73,15 +75,15 @@ impl ObjectLibrary {
         };
         let step = places().count().div_ceil(SAMPLES).max(1);
         self.samples = places().skip(step / 2).step_by(step).collect();
-        self.wide = wide(self.objects.values().map(|(_, surface)| surface));
+        self.wide = wide(self.objects.values().map(|object| &object.1));
     }
 
     pub(super) fn surfaces(&self) -> impl Iterator<Item = (ObjectId, &Surface)> {
-        self.objects.iter().map(|(id, (_, surface))| (*id, surface))
+        self.objects.iter().map(|(id, object)| (*id, &object.1))
     }
 
     pub(super) fn surface(&self, id: ObjectId) -> Option<&Surface> {
-        self.objects.get(&id).map(|(_, surface)| surface)
+        self.objects.get(&id).map(|object| &object.1)
     }
 
     /// Some places, spread evenly over all maps: what a surface is like.

@@ -218,7 +218,7 @@ fn a_lesson_teaches_at_once_and_what_is_forgotten_is_unknown() {
         number: 3,
         name: name.clone(),
     };
-    run(&mut map, &[forgetting.clone()]);
+    run(&mut map, std::slice::from_ref(&forgetting));
     assert!(map.object_by_name(&name).is_none() && map.object_count() == 2);
     let posterior = map.identify(&Orientation::Known, &asked).posterior;
     assert_ne!(posterior.verdict(), Verdict::Object(knife));

@@ -157,7 +157,7 @@ fn objects_are_known_again_however_noisy_the_touch() {
         assert_eq!(shares.len(), 8);
         assert!(shares[&8] >= least, "{position_sd_m} m: {shares:?}");
         assert!(shares[&1] < 0.9, "one touch tells little: {shares:?}");
-        assert_eq!(report.outcomes.unwrap().wrong_rate, 0.0);
+        assert!(report.outcomes.unwrap().wrong_rate < f64::MIN_POSITIVE);
     }
 }
 
