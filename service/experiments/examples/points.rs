@@ -2,6 +2,8 @@
 //! [--noise-mm X] [--noise-deg X] [--trials N] [--leave-out N] [--looks K,K,…] [--seed N]`; one JSON
 //! object on stdout.
 
+#![expect(clippy::print_stdout, reason = "the report is what it is run for")]
+
 use std::path::Path;
 use std::time::Instant;
 
@@ -28,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "--trials" => settings.trials = value.parse()?,
             "--leave-out" => settings.leave_out = value.parse()?,
             "--looks" => {
-                settings.looks = value.split(',').map(str::parse).collect::<Result<_, _>>()?
+                settings.looks = value.split(',').map(str::parse).collect::<Result<_, _>>()?;
             }
             "--seed" => settings.seed = value.parse()?,
             _ => return Err(format!("no option {option}").into()),

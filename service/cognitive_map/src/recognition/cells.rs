@@ -22,8 +22,9 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Of places at these positions \[m\], whose fields reach so far \[m\].
-    pub(super) fn new(positions: &[Point3<f64>], reaches_m: &[f64]) -> Self {
+    /// Of places at these positions \[m\], whose fields reach so far \[m\], in cells of about `fineness`
+    /// reaches: finer ones list fewer places that do not reach there, and are more.
+    pub(super) fn new(positions: &[Point3<f64>], reaches_m: &[f64], fineness: f64) -> Self {
         let mut low = Vector3::repeat(f64::INFINITY);
         let mut high = Vector3::repeat(f64::NEG_INFINITY);
         let mut reach_sum_m = 0.0;
@@ -35,8 +36,7 @@ impl Cells {
         if positions.is_empty() {
             (low, high) = (Vector3::zeros(), Vector3::zeros());
         }
-        // Cells of half a reach keep the lists near what is within reach indeed.
-        let mut spacing_m = (0.5 * reach_sum_m / positions.len().max(1) as f64).max(1e-9);
+        let mut spacing_m = (fineness * reach_sum_m / positions.len().max(1) as f64).max(1e-9);
         loop {
             let lattice = Lattice::new(spacing_m, UnitQuaternion::identity());
             let (low, size) = box_of(&lattice, &low, &high);
@@ -170,7 +170,7 @@ mod tests {
         let reaches_m: Vec<_> = (0..300)
             .map(|k| 0.004 + 0.02 * noise(5000 + k).abs())
             .collect();
-        let cells = Cells::new(&positions, &reaches_m);
+        let cells = Cells::new(&positions, &reaches_m, 0.33);
         let mut listed = 0;
         for k in 1000..3000 {
             let query = point(k);
@@ -184,6 +184,6 @@ mod tests {
         }
         assert!(listed < 2000 * 60, "the lists hold few others: {listed}");
         assert!(cells.near(&Point3::new(1e300, 0.0, -1e300)).is_empty());
-        assert!(Cells::new(&[], &[]).near(&Point3::origin()).is_empty());
+        assert!(Cells::new(&[], &[], 1.0).near(&Point3::origin()).is_empty());
     }
 }

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_6, PI};
 
-use nalgebra::{Isometry3, Matrix6, Point3, Translation3, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix6, Translation3};
 
+use super::asking::{NextTouch, RIVALS_MAX, Rival, next_touch};
 use super::contact::{Contact, Reached};
 use super::library::{ObjectId, ObjectLibrary};
 use super::orientation::Orientation;
@@ -20,19 +21,13 @@ const CONTACTS_MAX: usize = 128;
 const REACH_PER_STEP: f64 = 2.0;
 /// Prior probability that it is none of the objects.
 const UNKNOWN_PRIOR: f64 = 0.1;
+/// Log of the range over which the fit of something else is spread, 20 deviations, against the width of a
+/// normal number's, √(2π).
+const MISFIT_LOG: f64 = 2.076_8;
+/// What the evidence of a contact counts in a free pose, against one that is independent of all others.
+const POSES_WORTH: f64 = 0.6;
 /// Other poses that an answer names.
 const OTHERS_MAX: usize = 24;
-
-/// A touch that would tell much.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NextTouch {
-    /// Where to touch \[m\], in the episode's frame.
-    pub point_m: Point3<f64>,
-    /// From which side: the way to move on the approach, in the episode's frame.
-    pub approach: Option<Unit<Vector3<f64>>>,
-    /// Information expected from it \[nats\], at most.
-    pub gain_nats: f64,
-}
 
 /// The state of one episode of recognition.
 ///
@@ -114,6 +109,15 @@ impl Recognition {
     pub fn posterior(&self, library: &ObjectLibrary) -> Posterior {
         let mut logs = self.logs(library);
         let mut objects = sums(library, &logs);
+        // A surface's errors are shared by the contacts near one another: those in a free pose, which is fitted to
+        // them, are worth fewer independent ones.
+        let worth = match &self.hypotheses {
+            Hypotheses::Shifts(_) => 1.0,
+            Hypotheses::Poses(_) => POSES_WORTH,
+        };
+        for (_, log) in &mut objects {
+            *log *= worth;
+        }
         let prior = (1.0 - UNKNOWN_PRIOR).ln() - (objects.len().max(1) as f64).ln();
         let mut none = UNKNOWN_PRIOR.ln();
         if logs.is_empty() {
@@ -122,7 +126,18 @@ impl Recognition {
                 *log = prior;
             }
         } else {
-            none += self.none_log(library);
+            none += worth * self.none_log(library);
+            let fit = self.fit(library).min(0.0);
+            let best = objects
+                .iter()
+                .map(|object| object.1)
+                .fold(f64::NEG_INFINITY, f64::max);
+            // The fit of what was learned is a normal number, that of anything else about evenly spread
+            // below: the ratio of the two densities.
+            let misfit = UNKNOWN_PRIOR.ln() + best + prior + 0.5 * fit * fit - MISFIT_LOG;
+            if fit < 0.0 {
+                none = log_sum([none, misfit].into_iter());
+            }
             for (_, log) in &mut objects {
                 *log += prior;
             }
@@ -284,8 +299,22 @@ impl Recognition {
     }
 
     /// The touch that would tell most between the hypotheses that are live, if there are several.
-    pub fn next_touch(&self, _library: &ObjectLibrary) -> Option<NextTouch> {
-        None
+    pub fn next_touch(&self, library: &ObjectLibrary) -> Option<NextTouch> {
+        let mut objects = sums(library, &self.logs(library));
+        objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let all = log_sum(objects.iter().map(|object| object.1));
+        let mut rivals = Vec::new();
+        for (object, sum) in objects.into_iter().take(RIVALS_MAX) {
+            let mut masses = self.masses(library, object);
+            masses.sort_by(|a, b| b.log.total_cmp(&a.log));
+            let own = log_sum(masses.iter().map(|mass| mass.log));
+            rivals.extend(masses.iter().take(RIVALS_MAX).map(|mass| Rival {
+                object,
+                map_from_episode: mass.map_from_episode,
+                weight: (mass.log - own + sum - all).exp(),
+            }));
+        }
+        next_touch(library, rivals, self.contacts.last()?)
     }
 }
 

@@ -15,7 +15,7 @@ const SMOOTH_NEIGHBOURS: usize = 20;
 const PATCH_COS: f64 = 0.707;
 /// Reach of a facet along the surface, as a standard deviation, per spacing of places: so wide that the
 /// sum over random places is even to a third.
-const TANGENT_PER_SPACING: f64 = 0.8;
+const TANGENT_PER_SPACING: f64 = 0.7;
 /// Share of contacts that are as the smooth patch predicts; the rest are about edges and seams.
 const SMOOTH_SHARE: f64 = 0.85;
 /// Standard deviation of a normal about an edge or seam \[rad\], 20°.
@@ -23,10 +23,14 @@ const ROUGH_RAD: f64 = 0.35;
 /// How much wider than the patch's the depths about an edge or seam are, as a standard deviation.
 const ROUGH_DEPTH: f64 = 3.0;
 /// Facets count up to here along the surface, as half a squared number of deviations.
-pub(super) const ALONG_MAX: f64 = 4.0;
+pub(super) const ALONG_MAX: f64 = 3.0;
 /// And up to here in depth, as a squared number of deviations.
 const DEPTH_MAX: f64 = 100.0;
-/// Weight of the map's mean in a facet's own scatter, in neighbours.
+/// A facet stands for no more than so many times the usual area: beyond, nothing is known.
+const AREA_MAX: f64 = 4.0;
+/// A facet scatters no more than so many times the usual variance.
+const SPREAD_MAX: f64 = 16.0;
+/// Weight of what is usual on the map in a facet's own scatter, in neighbours.
 const SHRINK: f64 = 8.0;
 
 /// A curved patch of surface.
@@ -42,6 +46,8 @@ pub(super) struct Facet {
     pub(super) angle: f64,
     /// Area that the place stands for \[m²\].
     pub(super) area_m2: f64,
+    /// Reach along the surface, as a variance \[m²\].
+    pub(super) tangent_m2: f64,
     /// Number of the place it comes from.
     pub(super) place: u32,
 }
@@ -60,11 +66,6 @@ pub(super) struct Against {
 }
 
 impl Facet {
-    /// Reach along the surface, as a variance \[m²\].
-    pub(super) fn tangent_m2(&self) -> f64 {
-        TANGENT_PER_SPACING * TANGENT_PER_SPACING * self.area_m2
-    }
-
     /// A point against the patch. A parabola's height at u is that over the plane that halves the angle
     /// between the normals at both ends (Rusinkiewicz 2019, "A symmetric objective function for ICP").
     pub(super) fn against(&self, point: &Point3<f64>) -> Against {
@@ -91,7 +92,7 @@ impl Facet {
         normal: Option<&Vector3<f64>>,
         noise: &Noise,
     ) -> (f64, f64) {
-        let tangent = self.tangent_m2() + noise.position_m2;
+        let tangent = self.tangent_m2 + noise.position_m2;
         let along = 0.5 * against.along_m2 / tangent;
         let depth = (self.depth_m2 + noise.position_m2) * noise.widen;
         let squared = against.depth_m * against.depth_m / depth;
@@ -174,27 +175,36 @@ pub(super) fn facets(places: &[ModelPlace]) -> Vec<Facet> {
     let fits: Vec<_> = (0..raw.len())
         .map(|at| fit(&raw, at, &neighbours[at]))
         .collect();
-    // The scatter of few neighbours is itself uncertain; the map's mean steadies it.
-    let mean =
-        |value: fn(&Fit) -> f64| fits.iter().map(value).sum::<f64>() / fits.len().max(1) as f64;
-    let (mean_depth, mean_angle) = (mean(|fit| fit.depth_m2), mean(|fit| fit.angle));
-    let shrunk =
-        |own: f64, mean: f64, weight: f64| (own * weight + mean * SHRINK) / (weight + SHRINK);
+    // The scatter of few neighbours is itself uncertain; what is usual on the map steadies it.
+    let usual_depth = median(fits.iter().map(|fit| fit.depth_m2));
+    let usual_angle = median(fits.iter().map(|fit| fit.angle));
+    let usual_area = median(fits.iter().map(|fit| fit.area_m2));
+    let shrunk = |own: f64, mean: f64, weight: f64| {
+        (own.min(SPREAD_MAX * mean) * weight + mean * SHRINK) / (weight + SHRINK)
+    };
     fits.iter()
         .zip(&raw)
         .map(|(fit, raw)| Facet {
             position: fit.position,
             normal: fit.normal,
             bend: fit.bend,
-            depth_m2: (shrunk(fit.depth_m2, mean_depth, fit.weight) - raw.noise_m2).max(0.0)
+            depth_m2: (shrunk(fit.depth_m2, usual_depth, fit.weight) - raw.noise_m2).max(0.0)
                 + raw.noise_m2 / (0.5 * fit.weight + 1.0),
-            angle: (shrunk(fit.angle, mean_angle, fit.weight) - raw.noise_normal).max(0.0)
+            angle: (shrunk(fit.angle, usual_angle, fit.weight) - raw.noise_normal).max(0.0)
                 + raw.noise_normal / (0.5 * fit.weight + 1.0)
                 + 1e-6,
-            area_m2: fit.area_m2,
+            area_m2: fit.area_m2.min(AREA_MAX * usual_area),
+            tangent_m2: TANGENT_PER_SPACING.powi(2) * fit.area_m2.min(AREA_MAX * usual_area),
             place: raw.place,
         })
         .collect()
+}
+
+/// The middle one; zero of none.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<_> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 struct Raw {
@@ -220,15 +230,20 @@ fn neighbours(raw: &[Raw], at: usize) -> Neighbours {
     let own = &raw[at];
     let mut all: Neighbours = (0u32..)
         .zip(raw)
-        .filter(|(other, near)| *other as usize != at && near.normal.dot(&own.normal) > PATCH_COS)
+        .filter(|(other, _)| *other as usize != at)
         .map(|(other, near)| ((near.position - own.position).norm_squared(), other))
         .collect();
-    let most = SMOOTH_NEIGHBOURS.min(all.len());
-    if most < all.len() {
-        all.select_nth_unstable_by(most, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        all.truncate(most);
+    let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    // Of something thin or round, few of those about it are on its side; farther ones are not its
+    // neighbours.
+    let about = (3 * SMOOTH_NEIGHBOURS).min(all.len());
+    if about < all.len() {
+        all.select_nth_unstable_by(about, order);
+        all.truncate(about);
     }
-    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    all.retain(|(_, near)| raw[*near as usize].normal.dot(&own.normal) > PATCH_COS);
+    all.sort_by(order);
+    all.truncate(SMOOTH_NEIGHBOURS);
     all
 }
 
@@ -342,6 +357,7 @@ impl Fit {
             depth_m2: self.depth_m2,
             angle: self.angle,
             area_m2: self.area_m2,
+            tangent_m2: self.area_m2,
             place: 0,
         }
     }

@@ -34,6 +34,7 @@
 //! assert_eq!(posterior.verdict(), Verdict::Object(ObjectId(2)));
 //! ```
 
+mod asking;
 mod cells;
 mod contact;
 mod episode;
@@ -49,9 +50,12 @@ mod reaches;
 mod relief;
 mod shifts;
 mod surface;
+#[cfg(test)]
+mod tests;
 
+pub use asking::NextTouch;
 pub use contact::{Contact, Felt, Reached, Seen};
-pub use episode::{NextTouch, Recognition};
+pub use episode::Recognition;
 pub use library::{ObjectId, ObjectLibrary};
 pub use model::{LevelMemory, ModelPlace, ModelSettings, ObjectModel};
 pub use orientation::Orientation;

@@ -16,7 +16,7 @@ pub struct ModelSettings {
     /// Contacts within this distance \[m\], on the same side of the surface, are of one place. About the
     /// finest structure that is worth remembering, and not below the noise of a contact.
     pub spacing_m: f64,
-    /// Most places. A map that grows beyond keeps its extent and doubles its spacing.
+    /// Most places, at least 8. A map that grows beyond keeps its extent and doubles its spacing.
     pub places_max: usize,
 }
 
@@ -192,7 +192,7 @@ impl ObjectModel {
     /// Learns one contact, whose position is in the model's frame.
     pub fn learn(&mut self, contact: &Contact) {
         self.add(&ModelPlace::of(contact));
-        if self.places.len() > self.settings.places_max.max(1) {
+        while self.places.len() > self.settings.places_max.max(8) {
             self.spacing_m *= 2.0;
             self.by_cell.clear();
             for place in std::mem::take(&mut self.places) {

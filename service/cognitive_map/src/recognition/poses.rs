@@ -13,27 +13,37 @@ use crate::geometry::se3;
 /// Poses kept per map.
 const KEPT_MAX: usize = 16;
 /// Pairs of contacts looked up per map and touch, rarest first.
-const PAIRS_MAX: usize = 12;
+const PAIRS_MAX: usize = 16;
+/// Fewest pairs of facets like a pair of contacts for it to be looked up.
+const LIKE_MIN: usize = 4;
 /// Poses tried per map and touch.
-const TRIED_MAX: usize = 400;
+const TRIED_MAX: usize = 600;
 /// Of the poses tried, those scored on more contacts.
-const SIFTED_MAX: usize = 80;
+const SIFTED_MAX: usize = 120;
+/// Of those, the ones of which refining is begun.
+const BEGUN_MAX: usize = 14;
 /// Of those, the ones refined.
-const REFINED_MAX: usize = 8;
+const REFINED_MAX: usize = 6;
 /// Contacts of the first and second sieve.
-const SIEVE: [usize; 2] = [4, 16];
+const SIEVE: [usize; 2] = [4, 12];
 /// Contacts by which a new pose is refined.
-const REFINE_CONTACTS: usize = 24;
+const REFINE_CONTACTS: usize = 20;
 /// While a pose is rough, variances count this much more: three times the deviations.
 const WIDE: f64 = 9.0;
 /// Variances count so much more in each step of refining a new pose.
 const STEPS: [f64; 5] = [9.0, 4.0, 2.0, 1.0, 1.0];
+/// Until then every touch is followed by a search.
+const EARLY: usize = 12;
 /// Poses this far below the best are not refined at every touch \[nats\].
-const LIVE: f64 = 15.0;
+const LIVE: f64 = 12.0;
 /// Maps this far below the best are searched at every eighth touch only \[nats\].
-const FAR: f64 = 30.0;
+const FAR: f64 = 20.0;
 /// Two poses are one when their distance, squared and in deviations, is below this.
-const SAME: f64 = 9.0;
+const SAME: f64 = 6.0;
+/// Nearer than this no further pose is begun \[rad\].
+const NEAR_RAD: f64 = 0.12;
+/// And nearer than this part of the map's extent.
+const NEAR_EXTENT: f64 = 0.05;
 
 /// One hypothesis.
 #[derive(Clone, Copy, Debug)]
@@ -55,8 +65,19 @@ impl Hypothesis {
         self.score - 0.5 * log_det + 3.0 * std::f64::consts::TAU.ln()
     }
 
-    /// Whether another is the same, as far as the contacts tell.
-    fn same(&self, other: &Isometry3<f64>) -> bool {
+    /// Whether another pose is so near that both would be refined to the same.
+    fn near(&self, other: &Isometry3<f64>, extent_m: f64) -> bool {
+        let apart = other.translation.vector - self.pose.translation.vector;
+        self.pose.rotation.angle_to(&other.rotation) < NEAR_RAD
+            && apart.norm() < NEAR_EXTENT * extent_m
+    }
+
+    /// Whether another hypothesis is the same, as far as the contacts tell.
+    fn same(&self, other: &Self) -> bool {
+        self.object == other.object && self.holds(&other.pose) && other.holds(&self.pose)
+    }
+
+    fn holds(&self, other: &Isometry3<f64>) -> bool {
         let (linear, angular) = se3::log(&(other * self.pose.inverse()));
         let twist = Vector6::new(
             linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
@@ -99,11 +120,22 @@ impl Poses {
         if self.contacts.len() < 3 {
             return;
         }
-        let best = self
-            .all
+        let tops: Vec<(ObjectId, f64)> = library
+            .surfaces()
+            .map(|(object, _)| {
+                let own = self.all.iter().filter(|h| h.object == object);
+                (
+                    object,
+                    own.map(|h| h.score).fold(f64::NEG_INFINITY, f64::max),
+                )
+            })
+            .collect();
+        let best = tops
             .iter()
-            .map(|h| h.score)
+            .map(|top| top.1)
             .fold(f64::NEG_INFINITY, f64::max);
+        let rivals = tops.iter().filter(|top| top.1 > best - LIVE).count() > 1;
+        let busy = rivals || self.count <= EARLY || self.count.is_multiple_of(4);
         let mut all = std::mem::take(&mut self.all);
         for (at, (object, surface)) in library.surfaces().enumerate() {
             let Some(relief) = &surface.relief else {
@@ -118,16 +150,14 @@ impl Poses {
                 relief,
                 scene: scene(library, surface),
             };
-            let top = own
-                .iter()
-                .map(|h| h.score)
-                .fold(f64::NEG_INFINITY, f64::max);
-            for hypothesis in &mut own {
-                if hypothesis.score > best - LIVE {
+            for (rank, hypothesis) in own.iter_mut().enumerate() {
+                let turn = rank < 3 || (self.count + rank).is_multiple_of(4);
+                if turn && hypothesis.score > best - LIVE {
                     self.refine(&map, hypothesis, &[1.0]);
                 }
             }
-            if own.is_empty() || top > best - FAR || (self.count + at).is_multiple_of(8) {
+            let near = busy && tops[at].1 > best - FAR;
+            if own.is_empty() || near || (self.count + at).is_multiple_of(8) {
                 self.search(&map, &mut own);
             }
             all.extend(kept_of(own));
@@ -179,7 +209,7 @@ impl Poses {
         let mut tried: Vec<(f64, Isometry3<f64>)> = Vec::with_capacity(TRIED_MAX);
         for (pair, like) in self.pairs(&map.relief.pairs) {
             let room = TRIED_MAX - tried.len();
-            let step = like.len().div_ceil((TRIED_MAX / 4).min(room).max(1)).max(1);
+            let step = like.len().div_ceil((TRIED_MAX / 8).min(room).max(1)).max(1);
             for numbers in like.iter().step_by(step).take(room) {
                 if let Some(pose) = Pairs::pair(&map.relief.facets, *numbers).onto(&pair) {
                     tried.push((rough(&pose, &first), pose));
@@ -195,21 +225,48 @@ impl Poses {
             *score = rough(pose, &second);
         }
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let on = spread(self.contacts.len(), REFINE_CONTACTS, 0);
-        let mut refined = 0;
+        // First steps of several, on few contacts; then the rest of the way with those that came nearest.
+        let mut begun: Vec<(f64, Isometry3<f64>)> = Vec::with_capacity(BEGUN_MAX);
+        let step = |pose: &Isometry3<f64>, on: &[usize], widen: f64| {
+            let contacts = on.iter().map(|&at| &self.contacts[at]);
+            let explained = map.relief.explain(pose, contacts, widen, map.scene);
+            (explained.score, explained.step(pose))
+        };
         for (_, pose) in &tried {
-            if refined >= REFINED_MAX {
+            if begun.len() >= BEGUN_MAX {
                 break;
             }
-            if own.iter().any(|other| other.same(pose)) {
+            if own
+                .iter()
+                .any(|other| other.near(pose, map.relief.extent_m))
+            {
                 continue;
             }
-            refined += 1;
-            let mut pose = *pose;
-            for widen in STEPS {
-                let contacts = on.iter().map(|&at| &self.contacts[at]);
-                let explained = map.relief.explain(&pose, contacts, widen, map.scene);
-                pose = explained.step(&pose);
+            let alike = |begun: &(f64, Isometry3<f64>)| {
+                begun.1.rotation.angle_to(&pose.rotation) < NEAR_RAD
+                    && (begun.1.translation.vector - pose.translation.vector).norm()
+                        < NEAR_EXTENT * map.relief.extent_m
+            };
+            if begun.iter().any(alike) {
+                continue;
+            }
+            let (_, mut pose) = step(pose, &second, STEPS[0]);
+            let score;
+            (score, pose) = step(&pose, &second, STEPS[1]);
+            begun.push((score, pose));
+        }
+        begun.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let on = spread(self.contacts.len(), REFINE_CONTACTS, 0);
+        for (_, pose) in begun.into_iter().take(REFINED_MAX) {
+            if own
+                .iter()
+                .any(|other| other.near(&pose, map.relief.extent_m))
+            {
+                continue;
+            }
+            let mut pose = pose;
+            for widen in &STEPS[2..] {
+                pose = step(&pose, &on, *widen).1;
             }
             let explained = self.explain(map, &pose, 1.0);
             // A birth was not there for the contacts that are forgotten: it is given the mean of those kept.
@@ -220,10 +277,7 @@ impl Poses {
                 score: explained.score * unseen,
                 information: explained.information,
             };
-            match own
-                .iter_mut()
-                .find(|other| other.same(&pose) || born.same(&other.pose))
-            {
+            match own.iter_mut().find(|other| other.same(&born)) {
                 Some(other) if other.score < born.score => *other = born,
                 Some(_) => {}
                 None => own.push(born),
@@ -253,7 +307,8 @@ impl Poses {
                 normals: [oriented[a].1.into_inner(), oriented[b].1.into_inner()],
             };
             let like = pairs.like(&pair);
-            if !like.is_empty() {
+            // Of a pair like few or none, the like ones lie in the next bin more often than not.
+            if like.len() >= LIKE_MIN {
                 found.push((pair, like));
             }
         }
@@ -300,7 +355,7 @@ fn kept_of(mut own: Vec<Hypothesis>) -> Vec<Hypothesis> {
     own.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<Hypothesis> = Vec::with_capacity(KEPT_MAX);
     for hypothesis in own {
-        if kept.len() < KEPT_MAX && kept.iter().all(|other| !other.same(&hypothesis.pose)) {
+        if kept.len() < KEPT_MAX && kept.iter().all(|other| !other.same(&hypothesis)) {
             kept.push(hypothesis);
         }
     }

@@ -7,6 +7,9 @@ use super::cells::Cells;
 /// From one index to the next the reach grows so much.
 const GROWTH: f64 = 3.0;
 
+/// Cells of half a reach: each index of a thousand places takes a few hundred kilobytes.
+const CELL_PER_REACH: f64 = 0.5;
+
 /// Indexes of the same places for reaches that grow by a factor of three, up to the extent of the map.
 ///
 /// A touch is looked up by what it knows: a contact of 10 mm noise reaches far in a map that was learned to a
@@ -31,7 +34,7 @@ impl Reaches {
         let mut reach_m = least_m.max(1e-9);
         loop {
             let reaches: Vec<f64> = own_m.iter().map(|own_m| own_m.hypot(reach_m)).collect();
-            indexes.push((reach_m, Cells::new(positions, &reaches)));
+            indexes.push((reach_m, Cells::new(positions, &reaches, CELL_PER_REACH)));
             reach_m *= GROWTH;
             // An index that finds a good part of the map everywhere is no better than all of it.
             if reach_m > 0.25 * extent_m {

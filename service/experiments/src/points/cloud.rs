@@ -7,13 +7,16 @@ use nalgebra::{Point3, Unit, Vector3};
 /// First line of a file.
 const HEADER: &str = "x,y,z,nx,ny,nz";
 
+/// A point \[m\] and the outward unit normal there.
+pub type Oriented = (Point3<f64>, Unit<Vector3<f64>>);
+
 /// Oriented points of one object's surface.
 #[derive(Clone, Debug)]
 pub struct Cloud {
     /// Name: the file's, without `.csv`.
     pub name: String,
     /// Points \[m\] and outward unit normals, in the object's own frame.
-    pub points: Vec<(Point3<f64>, Unit<Vector3<f64>>)>,
+    pub points: Vec<Oriented>,
 }
 
 /// Why clouds cannot be read.
@@ -77,7 +80,7 @@ impl Cloud {
 }
 
 /// The points, or the number of the line that is wrong.
-fn parse(text: &str) -> Result<Vec<(Point3<f64>, Unit<Vector3<f64>>)>, usize> {
+fn parse(text: &str) -> Result<Vec<Oriented>, usize> {
     let mut points = Vec::new();
     for (number, line) in text.lines().enumerate().skip(1) {
         if line.trim().is_empty() {

@@ -11,7 +11,7 @@ mod report;
 mod run;
 mod symmetry;
 
-pub use cloud::{Cloud, InvalidCloud};
+pub use cloud::{Cloud, InvalidCloud, Oriented};
 pub use probe::Exploration;
 pub use report::{OneObject, Report, Rotation, Stop};
 pub use run::{PointsSettings, run};

@@ -121,7 +121,7 @@ pub fn run(
             let out = first..(first + group).min(clouds.len());
             let mut others = library.clone();
             for object in out.clone() {
-                others.remove(ObjectId(u32::try_from(object).expect("few objects")));
+                others.remove(ObjectId(number_of(object)));
             }
             for truth in out {
                 for trial in 0..settings.trials {
@@ -161,7 +161,7 @@ fn one(
     times: &mut Vec<f64>,
 ) -> Trial {
     let cloud = &clouds[truth];
-    let number = u32::try_from(truth).expect("few objects");
+    let number = number_of(truth);
     let mut rng = generator(settings.seed, number, trial as u64 + 1);
     let rotation = {
         let mut normal = || rng.sample::<f64, _>(StandardNormal);
@@ -195,7 +195,7 @@ fn one(
         let before = clock();
         recognition.touch(library, contact);
         let posterior = recognition.posterior(library);
-        times.push((clock() - before).as_secs_f64() * 1e3);
+        times.push(clock().saturating_sub(before).as_secs_f64() * 1e3);
         if outcome.stop.is_none() && posterior.verdict() != Verdict::Undecided {
             outcome.stop = Some((count, posterior.verdict()));
         }
@@ -322,6 +322,26 @@ fn summary(
                 .insert(count, share(left_out, &|trial| trial.looks[at].unknown));
         }
     }
+    report.by_object = by_object(clouds, known);
+    for trial in known {
+        let first = trial.looks.last().and_then(|look| look.first);
+        if first != id(trial.truth) {
+            let name = first
+                .and_then(|first| clouds.get(first.0 as usize))
+                .map_or("none", |c| &c.name);
+            *report
+                .confusions
+                .entry(format!("{} as {name}", clouds[trial.truth].name))
+                .or_default() += 1;
+        }
+    }
+    report
+}
+
+/// What was found of each object after the last contact.
+fn by_object(clouds: &[Cloud], known: &[Trial]) -> BTreeMap<String, OneObject> {
+    let id = |truth: usize| u32::try_from(truth).ok().map(ObjectId);
+    let mut all = BTreeMap::new();
     for (truth, cloud) in clouds.iter().enumerate() {
         let looks = || {
             known
@@ -343,21 +363,14 @@ fn summary(
             rotation_deg_p50: quantile(&mut errors, 0.5),
             fit_mean: mean(looks().map(|look| look.fit).collect()),
         };
-        report.by_object.insert(cloud.name.clone(), one);
+        all.insert(cloud.name.clone(), one);
     }
-    for trial in known {
-        let first = trial.looks.last().and_then(|look| look.first);
-        if first != id(trial.truth) {
-            let name = first
-                .and_then(|first| clouds.get(first.0 as usize))
-                .map_or("none", |c| &c.name);
-            *report
-                .confusions
-                .entry(format!("{} as {name}", clouds[trial.truth].name))
-                .or_default() += 1;
-        }
-    }
-    report
+    all
+}
+
+/// An object's number.
+fn number_of(object: usize) -> u32 {
+    u32::try_from(object).unwrap_or(u32::MAX)
 }
 
 /// A noisy contact with a point of a cloud.
