@@ -9,7 +9,7 @@
 //! | question | answer |
 //! |---|---|
 //! | objects, colours, moves | see [`crate::objects`] |
-//! | how an object is learned | in visits of 100 touches, each from the same face on, until the latest three found less than one new place in a hundred touches; with the same noise as later |
+//! | how an object is learned | in visits of 100 touches, each from the same face on, until three one after the other found no new place; with the same noise as later |
 //! | when recognition has converged | when one object, or that it is none of them, is as probable as [`ObjectProtocol::sure`] |
 //! | accuracy | share of all explorations that ended with the right object; those without an answer count as wrong |
 //! | an active object representation | an object with a probability above one in a hundred |

@@ -69,7 +69,7 @@ impl ObjectProtocol {
             trials: 1000,
             touches_max: 200,
             sure: 0.9995,
-            learning_touches: 5000,
+            learning_touches: 10_000,
             seed: 1,
         }
     }

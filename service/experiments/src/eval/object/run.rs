@@ -22,10 +22,9 @@ const LEVEL_SD_MIN: f64 = 1e-3;
 const CHANNEL: u16 = 0;
 /// Touches of a visit. Each begins at the same face, as a hand begins at the handle, so that the drift of one visit is all there is.
 const VISIT_TOUCHES: usize = 100;
-/// Learning is over when so few of the touches of the latest visits found a place that was new.
-const NEW_SHARE: f64 = 0.01;
-/// Visits over which that share is taken.
-const NEW_VISITS: usize = 3;
+/// Learning is over when so many visits one after the other found no place that was new: one that is missing looks like
+/// another object when it is touched.
+const NOTHING_NEW_VISITS: usize = 3;
 /// One exploration of an object that was never learned comes on so many of learned ones.
 const LEARNED_PER_STRANGER: u32 = 4;
 /// First random stream of learning, and of recognising: those below are the objects'.
@@ -122,8 +121,8 @@ fn learn(protocol: &ObjectProtocol, object: &VoxelObject, number: u64) -> (Objec
     let mut random = ChaCha8Rng::seed_from_u64(protocol.seed);
     random.set_stream(LEARNING + number);
     let mut touches = 0;
-    let mut found = Vec::new();
-    while touches < protocol.learning_touches {
+    let mut nothing_new = 0;
+    while touches < protocol.learning_touches && nothing_new < NOTHING_NEW_VISITS {
         let before = model.places().len();
         let mut explorer = Explorer::from(object, protocol.noise, 0, random);
         for _ in 0..VISIT_TOUCHES.min(protocol.learning_touches - touches) {
@@ -133,12 +132,8 @@ fn learn(protocol: &ObjectProtocol, object: &VoxelObject, number: u64) -> (Objec
             touches += 1;
         }
         random = explorer.into_random();
-        found.push(model.places().len() - before);
-        let latest = &found[found.len().saturating_sub(NEW_VISITS)..];
-        let new = latest.iter().sum::<usize>() as f64;
-        if latest.len() == NEW_VISITS && new < NEW_SHARE * (NEW_VISITS * VISIT_TOUCHES) as f64 {
-            break;
-        }
+        let is_new = model.places().len() > before;
+        nothing_new = if is_new { 0 } else { nothing_new + 1 };
     }
     (model, touches)
 }
