@@ -116,6 +116,32 @@ pub enum EventKind {
         /// Its position in `map` \[m\].
         translation_m: [f64; 3],
     },
+    /// Fewer objects come into question for what the agent touches.
+    ObjectsNarrowed {
+        /// How many.
+        live: u64,
+    },
+    /// What the agent touches is known.
+    ObjectRecognised {
+        /// Name of the object.
+        object: String,
+        /// How probable it is, 0.99 at least.
+        probability: f64,
+    },
+    /// What the agent touches is none of the objects that were learned.
+    ObjectUnknown {},
+    /// An object was learned, or more of it.
+    ObjectLearned {
+        /// Its name.
+        object: String,
+        /// Contacts of the episode that taught it.
+        contacts: u64,
+    },
+    /// An episode was to teach an object and has not: it did not become clear how its frame lies in the object's.
+    ObjectNotLearned {
+        /// Contacts of the episode.
+        contacts: u64,
+    },
 }
 
 /// What kind of percept a channel carries.

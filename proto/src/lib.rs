@@ -22,6 +22,7 @@ mod key;
 pub mod limits;
 mod name;
 mod narrow;
+mod object;
 mod predict;
 mod query;
 mod sample;
@@ -38,6 +39,11 @@ pub use estimate::{Estimate, Status};
 pub use event::{Event, EventKind, PerceptKind, TripEnd};
 pub use key::{AgentKey, KeyError, durable_key, estimate_key, events_key, query_key, samples_key};
 pub use name::{Name, NameError};
+pub use object::{
+    AgentObject, Contact, ContactLevel, EpisodeKind, Identification, IdentifyQuery, NextTouch,
+    ObjectDetail, ObjectLesson, ObjectLevel, ObjectMark, ObjectPage, ObjectPlace, ObjectPose,
+    ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached, TouchNoise,
+};
 pub use predict::{ExpectedPercept, MotionBody, PredictAnswer, PredictQuery, PredictedPercept};
 pub use query::{PerceptCue, RecallQuery, Verb, WatermarkQuery};
 pub use sample::{

@@ -43,3 +43,12 @@ pub const GRID_MODULES_MAX: usize = 16;
 
 /// Rejections that a watermark carries: the latest ones.
 pub const WATERMARK_REJECTIONS_MAX: usize = 16;
+
+/// Most contacts of one lesson about an object.
+pub const LESSON_CONTACTS_MAX: usize = 4096;
+
+/// Most contacts of one question which object it is: each is compared with every object.
+pub const IDENTIFY_CONTACTS_MAX: usize = 256;
+
+/// Most rotations by which the frame of an episode may be turned against an object's.
+pub const ROTATIONS_MAX: usize = 1000;

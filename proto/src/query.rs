@@ -13,6 +13,8 @@ pub enum Verb {
     Watermark,
     /// [`crate::PredictQuery`] → [`crate::PredictAnswer`].
     Predict,
+    /// [`crate::IdentifyQuery`] → [`crate::Identification`].
+    Identify,
 }
 
 impl Verb {
@@ -22,6 +24,7 @@ impl Verb {
             Self::Recall => "recall",
             Self::Watermark => "watermark",
             Self::Predict => "predict",
+            Self::Identify => "identify",
         }
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::narrow;
+use crate::object::ObjectMark;
 
 /// Consecutive samples of one agent: sample `i` of the batch has the number `first_seq + i`.
 ///
@@ -48,6 +49,8 @@ pub enum SampleBody {
     StartPose(StartPose),
     /// A named moment; may end the trip under way.
     Marker(Marker),
+    /// An episode with an object begins or ends.
+    Object(ObjectMark),
 }
 
 /// The body's displacement since the previous motion sample, in the body frame at its start.

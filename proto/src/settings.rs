@@ -111,8 +111,8 @@ impl Default for NoiseSettings {
             translation_sd_per_sqrt_m: 0.04,
             rotation_sd_per_sqrt_m: 0.1,
             rotation_sd_per_sqrt_rad: 0.15,
-            length_error_sd: 0.02,
-            angle_error_sd: 0.05,
+            length_error_sd: 0.05,
+            angle_error_sd: 0.1,
             bias_sd_rad_s: 0.004,
         }
     }

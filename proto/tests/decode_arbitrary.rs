@@ -7,8 +7,9 @@ mod messages;
 use std::fmt::Debug;
 
 use cogmap_proto::{
-    AgentDetail, AgentPage, Codec, DecodeError, Estimate, Event, GridState, IngestAnswer,
-    LandmarkPage, Name, PlacePage, PredictAnswer, PredictQuery, Problem, RecallAnswer, RecallQuery,
+    AgentDetail, AgentObject, AgentPage, Codec, DecodeError, Estimate, Event, GridState,
+    Identification, IdentifyQuery, IngestAnswer, LandmarkPage, Name, ObjectDetail, ObjectLesson,
+    ObjectPage, PlacePage, PredictAnswer, PredictQuery, Problem, RecallAnswer, RecallQuery,
     SampleBatch, SpaceList, SpaceSettings, Trajectory, TripDetail, TripPage, Watermark,
     WatermarkQuery,
 };
@@ -26,13 +27,19 @@ const CODECS: [Codec; 3] = [Codec::Postcard, Codec::Cbor, Codec::Json];
 /// Reads `bytes` as every message there is, in every codec.
 fn decode_as_everything(bytes: &[u8]) {
     decode_as::<AgentDetail>(bytes);
+    decode_as::<AgentObject>(bytes);
     decode_as::<AgentPage>(bytes);
     decode_as::<Estimate>(bytes);
     decode_as::<Event>(bytes);
     decode_as::<GridState>(bytes);
+    decode_as::<Identification>(bytes);
+    decode_as::<IdentifyQuery>(bytes);
     decode_as::<IngestAnswer>(bytes);
     decode_as::<LandmarkPage>(bytes);
     decode_as::<Name>(bytes);
+    decode_as::<ObjectDetail>(bytes);
+    decode_as::<ObjectLesson>(bytes);
+    decode_as::<ObjectPage>(bytes);
     decode_as::<PlacePage>(bytes);
     decode_as::<PredictAnswer>(bytes);
     decode_as::<PredictQuery>(bytes);

@@ -37,11 +37,12 @@ fn the_examples_are_messages() {
             SampleBody::Sighting(_) => "sighting",
             SampleBody::StartPose(_) => "start_pose",
             SampleBody::Marker(_) => "marker",
+            SampleBody::Object(_) => "object",
         })
         .collect();
     assert_eq!(
         kinds.len(),
-        7,
+        8,
         "every kind of sample has an example: {kinds:?}"
     );
     let estimate: Estimate = Codec::Json.decode(estimate.as_bytes()).unwrap();

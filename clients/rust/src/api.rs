@@ -4,10 +4,11 @@ use std::time::Duration;
 
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
-    AgentDetail, AgentPage, AgentSummary, Codec, GridState, IngestAnswer, Landmark, LandmarkPage,
-    Name, NameError, Place, PlacePage, PredictAnswer, PredictQuery, Problem, RecallAnswer,
-    RecallQuery, SampleBatch, SpaceInfo, SpaceList, SpaceSettings, Trajectory, Trip, TripDetail,
-    TripPage,
+    AgentDetail, AgentObject, AgentPage, AgentSummary, Codec, GridState, Identification,
+    IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Name, NameError, ObjectDetail,
+    ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage, PredictAnswer, PredictQuery,
+    Problem, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo, SpaceList, SpaceSettings,
+    Trajectory, Trip, TripDetail, TripPage,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -128,12 +129,7 @@ impl Api {
     /// # Errors
     /// See [`ApiError`].
     pub fn delete_space(&self, space: &str) -> Result<(), ApiError> {
-        let response = self.run(Method::DELETE, &path(space, "")?, None)?;
-        if response.status().is_success() {
-            Ok(())
-        } else {
-            Err(refusal(response))
-        }
+        done(self.run(Method::DELETE, &path(space, "")?, None)?)
     }
 
     /// All agents of a space, by name.
@@ -282,6 +278,64 @@ impl Api {
         })
     }
 
+    /// All objects of a space, by name.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn objects(&self, space: &str) -> Result<Vec<ObjectSummary>, ApiError> {
+        self.pages(&path(space, "/objects")?, |page: ObjectPage| {
+            (page.objects, page.next)
+        })
+    }
+
+    /// An object with its places.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn object(&self, space: &str, name: &str) -> Result<ObjectDetail, ApiError> {
+        self.get(&path(space, &format!("/objects/{}", escaped(name)))?)
+    }
+
+    /// Teaches an object at once, in place of what was known of it; returns when that is durable.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn teach_object(
+        &self,
+        space: &str,
+        name: &str,
+        lesson: &ObjectLesson,
+    ) -> Result<ObjectSummary, ApiError> {
+        let path = path(space, &format!("/objects/{}", escaped(name)))?;
+        self.send(Method::PUT, &path, &json(lesson))
+    }
+
+    /// Forgets an object.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn forget_object(&self, space: &str, name: &str) -> Result<(), ApiError> {
+        let path = path(space, &format!("/objects/{}", escaped(name)))?;
+        done(self.run(Method::DELETE, &path, None)?)
+    }
+
+    /// Which object a sequence of contacts is of, and in which pose.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn identify(&self, space: &str, query: &IdentifyQuery) -> Result<Identification, ApiError> {
+        let path = path(space, "/objects/identify")?;
+        self.send(Method::POST, &path, &json(query))
+    }
+
+    /// What an agent's episode with an object says so far.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn agent_object(&self, space: &str, agent: &str) -> Result<AgentObject, ApiError> {
+        self.get(&agent_path(space, agent, "/object")?)
+    }
+
     fn pages<P: DeserializeOwned, I>(
         &self,
         path: &str,
@@ -363,8 +417,17 @@ fn agent_path(space: &str, agent: &str, rest: &str) -> Result<String, ApiError> 
     path(space, &format!("/agents/{agent}{rest}"))
 }
 
-/// A landmark's label may have any characters; in a URL all but the unreserved ones are escaped
-/// (RFC 3986, section 2.3).
+/// Whether something was done that has no answer.
+fn done(response: Response<Body>) -> Result<(), ApiError> {
+    if response.status().is_success() {
+        Ok(())
+    } else {
+        Err(refusal(response))
+    }
+}
+
+/// A label may have any characters; in a URL all but the unreserved ones are escaped (RFC 3986, section
+/// 2.3).
 fn escaped(text: &str) -> String {
     use std::fmt::Write as _;
     text.bytes().fold(String::new(), |mut url, byte| {

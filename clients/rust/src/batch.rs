@@ -1,7 +1,7 @@
 //! Writing batches straight from the window, and how long a sample can become in a codec.
 
 use cogmap_proto::limits::MESSAGE_BYTES_MAX;
-use cogmap_proto::{Codec, Relation, Sample, SampleBody, Target};
+use cogmap_proto::{Codec, ObjectMark, Orientation, Relation, Sample, SampleBody, Target};
 use serde::{Serialize, Serializer};
 
 /// Most bytes that the samples of one batch may have, which leaves room for its head.
@@ -61,6 +61,21 @@ pub(crate) fn bytes_max(sample: &Sample, codec: Codec) -> usize {
             (Target::OwnSample(_), _) => (0, 0),
         },
         SampleBody::Marker(marker) => (marker.label.len(), 0),
+        SampleBody::Object(mark) => {
+            let (name, orientation) = match mark {
+                ObjectMark::Learn {
+                    name, orientation, ..
+                } => (name.as_ref().map_or(0, String::len), Some(orientation)),
+                ObjectMark::Identify { orientation, .. } => (0, Some(orientation)),
+                ObjectMark::End {} => (0, None),
+            };
+            let rotations = match orientation {
+                Some(Orientation::Finite { rotations_xyzw }) => rotations_xyzw.len(),
+                _ => 0,
+            };
+            // Four numbers each, twice as long as those of a vector, and their brackets.
+            (name, rotations * 9)
+        }
     };
     // Numbers, field names and lengths of the longest kind; then one character, one number.
     let (fixed, character, number) = match codec {
@@ -82,8 +97,9 @@ pub(crate) fn is_carried(sample: &Sample, codec: Codec) -> bool {
 mod tests {
     use super::{bytes_max, encode, is_carried};
     use cogmap_proto::{
-        Codec, Descriptor, Increment, Level, Marker, MotionNoise, Relation, Sample, SampleBatch,
-        SampleBody, Sighting, StartPose, Target, Velocity,
+        Codec, Descriptor, Increment, Level, Marker, MotionNoise, ObjectMark, Orientation,
+        Relation, Sample, SampleBatch, SampleBody, Sighting, StartPose, Target, TouchNoise,
+        Velocity,
     };
 
     const CODECS: [Codec; 3] = [Codec::Postcard, Codec::Cbor, Codec::Json];
@@ -140,6 +156,18 @@ mod tests {
                 translation_m: [LONG; 3],
                 rotation_xyzw: [LONG; 4],
                 noise: Some(NOISE),
+            }),
+            SampleBody::Object(ObjectMark::Learn {
+                name: Some(text.clone()),
+                spacing_m: LONG,
+                orientation: Orientation::Finite {
+                    rotations_xyzw: vec![[LONG; 4]; 1000],
+                },
+                noise: TouchNoise {
+                    position_sd_m: LONG,
+                    normal_sd_rad: LONG,
+                    level_sd: LONG,
+                },
             }),
             SampleBody::Marker(Marker {
                 label: text,

@@ -1,9 +1,10 @@
 //! Arbitrary messages, from a strategy for their floats.
 
 use cogmap_proto::{
-    Descriptor, Estimate, Event, EventKind, Increment, Level, Marker, MotionNoise, PerceptCue,
-    PerceptKind, RecallQuery, Rejection, Relation, Sample, SampleBatch, SampleBody, SeqRange,
-    Sighting, SkipReason, StartPose, Status, Target, TripEnd, Velocity, Watermark,
+    Descriptor, Estimate, Event, EventKind, Increment, Level, Marker, MotionNoise, ObjectMark,
+    Orientation, PerceptCue, PerceptKind, RecallQuery, Rejection, Relation, Sample, SampleBatch,
+    SampleBody, SeqRange, Sighting, SkipReason, StartPose, Status, Target, TouchNoise, TripEnd,
+    Velocity, Watermark,
 };
 use proptest::array::{uniform3, uniform4, uniform21};
 use proptest::collection::vec;
@@ -91,6 +92,14 @@ fn bodies(floats: &Floats) -> impl Strategy<Value = SampleBody> + use<> {
         ),
         (any::<String>(), any::<bool>())
             .prop_map(|(label, ends_trip)| SampleBody::Marker(Marker { label, ends_trip })),
+        option::of(any::<String>()).prop_map(|name| {
+            SampleBody::Object(ObjectMark::Learn {
+                name,
+                spacing_m: 0.5,
+                orientation: Orientation::Cube {},
+                noise: TouchNoise::default(),
+            })
+        }),
     ]
 }
 

@@ -4,6 +4,7 @@
 //! JSON, and halves, quarters and so on in the `f32` vectors.
 
 mod answers;
+mod objects;
 mod published;
 mod samples;
 
@@ -33,4 +34,5 @@ pub(crate) fn each(visit: &mut impl Visit) {
     samples::each(visit);
     published::each(visit);
     answers::each(visit);
+    objects::each(visit);
 }

@@ -126,7 +126,7 @@ fn event(kind: EventKind) -> Event {
     }
 }
 
-fn event_kinds() -> [(&'static str, EventKind); 14] {
+fn event_kinds() -> [(&'static str, EventKind); 19] {
     let session = 1_800_000_000_000_000_000;
     let landmark = "porte 3, étage α".to_owned();
     [
@@ -186,6 +186,26 @@ fn event_kinds() -> [(&'static str, EventKind); 14] {
         (
             "trip_forgotten",
             EventKind::TripForgotten { trip: 2, legs: 14 },
+        ),
+        ("objects_narrowed", EventKind::ObjectsNarrowed { live: 2 }),
+        (
+            "object_recognised",
+            EventKind::ObjectRecognised {
+                object: "mug".to_owned(),
+                probability: 0.992_187_5,
+            },
+        ),
+        ("object_unknown", EventKind::ObjectUnknown {}),
+        (
+            "object_learned",
+            EventKind::ObjectLearned {
+                object: "object-7".to_owned(),
+                contacts: 31,
+            },
+        ),
+        (
+            "object_not_learned",
+            EventKind::ObjectNotLearned { contacts: 4 },
         ),
         (
             "agent_placed",

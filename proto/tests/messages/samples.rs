@@ -1,8 +1,8 @@
 //! Batches with every kind of sample.
 
 use cogmap_proto::{
-    Descriptor, Increment, Level, Marker, MotionNoise, Relation, Sample, SampleBatch, SampleBody,
-    Sighting, StartPose, Target, Velocity,
+    Descriptor, Increment, Level, Marker, MotionNoise, ObjectMark, Orientation, Relation, Sample,
+    SampleBatch, SampleBody, Sighting, StartPose, Target, TouchNoise, Velocity,
 };
 
 use super::Visit;
@@ -23,6 +23,7 @@ pub(super) fn each(visit: &mut impl Visit) {
     visit.batch("batch_sighting", &batch(sightings()));
     visit.batch("batch_start_pose", &batch(start_poses()));
     visit.batch("batch_marker", &batch(markers()));
+    visit.batch("batch_object", &batch(object_marks()));
     visit.batch("batch_extremes", &extremes());
 }
 
@@ -38,6 +39,40 @@ fn batch(bodies: Vec<SampleBody>) -> SampleBatch {
         first_seq: 50,
         samples,
     }
+}
+
+fn object_marks() -> Vec<SampleBody> {
+    let noise = TouchNoise {
+        position_sd_m: 0.001,
+        normal_sd_rad: 0.02,
+        level_sd: 0.5,
+    };
+    let marks = [
+        ObjectMark::Learn {
+            name: Some("mug".to_owned()),
+            spacing_m: 0.008,
+            orientation: Orientation::Known {},
+            noise,
+        },
+        ObjectMark::Learn {
+            name: None,
+            spacing_m: 0.002,
+            orientation: Orientation::Free {},
+            noise: TouchNoise::default(),
+        },
+        ObjectMark::Identify {
+            orientation: Orientation::Cube {},
+            noise,
+        },
+        ObjectMark::Identify {
+            orientation: Orientation::Finite {
+                rotations_xyzw: vec![LEFT_XYZW, [0.0, 0.0, 0.0, 1.0]],
+            },
+            noise,
+        },
+        ObjectMark::End {},
+    ];
+    marks.map(SampleBody::Object).to_vec()
 }
 
 fn increments() -> Vec<SampleBody> {

@@ -5,6 +5,7 @@ use nalgebra::Point3;
 use crate::landmark::LandmarkId;
 use crate::percept::ChannelId;
 use crate::place::PlaceId;
+use crate::recognition::ObjectId;
 use crate::record::{AgentId, SkipReason};
 use crate::sample::Label;
 use crate::trip::{TripEnd, TripId};
@@ -105,6 +106,36 @@ pub enum EventKind {
         trip: TripId,
         /// Its number of legs.
         legs: usize,
+    },
+    /// Fewer objects come into question for what the agent touches.
+    ObjectsNarrowed {
+        /// How many.
+        live: u32,
+    },
+    /// What the agent touches is known.
+    ObjectRecognised {
+        /// The object.
+        object: ObjectId,
+        /// Its name.
+        name: Label,
+        /// How probable that is.
+        probability: f64,
+    },
+    /// What the agent touches is none of the objects that were learned.
+    ObjectUnknown,
+    /// An object was learned, or more of it.
+    ObjectLearned {
+        /// The object.
+        object: ObjectId,
+        /// Its name.
+        name: Label,
+        /// Contacts of this episode.
+        contacts: u64,
+    },
+    /// An episode was to teach an object and has not: it did not become clear how its frame lies in the object's.
+    ObjectNotLearned {
+        /// Contacts of this episode.
+        contacts: u64,
     },
     /// A percept was felt where a place remembers its channel; before the place learned from it.
     PerceptCompared {

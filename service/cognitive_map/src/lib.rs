@@ -12,6 +12,7 @@ mod cognitive_map;
 mod digest;
 mod event;
 mod landmark;
+mod object;
 mod paged;
 mod percept;
 mod place;
@@ -31,6 +32,9 @@ pub use cognitive_map::{CheckpointPage, CognitiveMap, CorruptCheckpoint, Predict
 pub use digest::{Digest, InvalidDigest};
 pub use event::{Event, EventKind};
 pub use landmark::{Landmark, LandmarkId};
+pub use object::{
+    Identified, KnownObject, Lesson, ObjectMark, Spacing, Touch, TouchLevel, TouchNoise,
+};
 pub use percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
 pub use place::{Place, PlaceId};
 pub use recall::{RecallCue, Recalled, Rivals};

@@ -1,5 +1,6 @@
 //! Records: the journal's entries, in the order in which the fold meets them.
 
+use crate::object::Lesson;
 use crate::sample::{InvalidSample, Label, Sample};
 
 /// An agent of a space, counted from 0 in the order of enrolment.
@@ -39,6 +40,22 @@ pub enum Record {
         to: u64,
         /// Why.
         reason: SkipReason,
+    },
+    /// An object is taught at once, in place of what was known of it.
+    TeachObject {
+        /// Number of the space's lessons and wishes to forget before it.
+        number: u64,
+        /// Its name.
+        name: Label,
+        /// Its contacts.
+        lesson: Lesson,
+    },
+    /// An object is forgotten.
+    ForgetObject {
+        /// Number of the space's lessons and wishes to forget before it.
+        number: u64,
+        /// Its name.
+        name: Label,
     },
 }
 

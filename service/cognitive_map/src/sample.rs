@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3, Vector6};
 
 use crate::geometry::se3;
+use crate::object::ObjectMark;
 
 /// Largest coordinate, length or speed \[m, m/s\].
 const METRES_MAX: f64 = 1e8;
@@ -41,6 +42,8 @@ pub enum SampleBody {
     StartPose(StartPose),
     /// A named moment.
     Marker(Marker),
+    /// An episode with an object begins or ends.
+    Object(ObjectMark),
 }
 
 /// Why a sample is refused.

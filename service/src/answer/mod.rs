@@ -2,6 +2,7 @@
 
 mod grid;
 mod landmark;
+mod object;
 mod place;
 mod predict;
 mod recall;
@@ -10,6 +11,7 @@ mod trip;
 
 pub use grid::grid_state;
 pub use landmark::landmark;
+pub use object::{InvalidContacts, agent_object, identify, lesson, object_detail, object_summary};
 pub use place::place;
 pub use predict::{InvalidPrediction, predict};
 pub use recall::{InvalidQuery, cue, recall};

@@ -5,6 +5,8 @@
 //! entry  = 0 agent:varint name:string                      enrolment
 //!        | 1 agent:varint batch                            samples, as a postcard v1 SampleBatch
 //!        | 2 agent:varint session:varint from:varint to:varint reason:varint
+//!        | 3 number:varint name:string lesson              a lesson about an object
+//!        | 4 number:varint name:string                     an object to forget
 //! ```
 //!
 //! All of it is postcard of [`Entry`], so a batch that came as postcard and is accepted whole goes to
@@ -12,7 +14,7 @@
 
 use std::borrow::Cow;
 
-use cogmap_proto::{Codec, SampleBatch, SkipReason};
+use cogmap_proto::{Codec, ObjectLesson, SampleBatch, SkipReason};
 use serde::{Deserialize, Serialize};
 
 /// Version of blocks that this build writes.
@@ -47,6 +49,22 @@ pub enum Entry<'a> {
         to: u64,
         /// Why.
         reason: SkipReason,
+    },
+    /// An object is taught.
+    Teach {
+        /// Number of lessons and wishes to forget before it.
+        number: u64,
+        /// Name of the object.
+        name: Cow<'a, str>,
+        /// Its contacts.
+        lesson: ObjectLesson,
+    },
+    /// An object is forgotten.
+    Forget {
+        /// Number of lessons and wishes to forget before it.
+        number: u64,
+        /// Name of the object.
+        name: Cow<'a, str>,
     },
 }
 

@@ -13,7 +13,7 @@ use cogmap_proto::IngestAnswer;
 use super::counters::CommitCounters;
 use super::desk::AgentDesk;
 use super::health::Health;
-use super::message::{IngestError, Reply};
+use super::message::{IngestError, ObjectReply, Reply};
 use super::outlet::Outlet;
 use crate::store::Store;
 
@@ -24,6 +24,8 @@ pub(crate) struct Commit {
     pub(crate) samples: u64,
     pub(crate) marks: Vec<Mark>,
     pub(crate) answers: Vec<Answer>,
+    /// Those who wait for a change of objects.
+    pub(crate) objects: Vec<ObjectReply>,
 }
 
 /// Samples of an agent's session below `next` are in the store.
@@ -120,11 +122,17 @@ fn acknowledge(commit: Commit, outlet: &dyn Outlet, counters: &CommitCounters) {
             duplicates,
         }));
     }
+    for reply in commit.objects {
+        let _ = reply.send(Ok(()));
+    }
 }
 
 fn refuse(commit: Commit, health: &Health) {
     for answer in commit.answers {
         let refusal = health.refusal().unwrap_or(IngestError::Closed);
         let _ = answer.reply.send(Err(refusal));
+    }
+    for reply in commit.objects {
+        let _ = reply.send(Err(health.refusal().unwrap_or(IngestError::Closed)));
     }
 }

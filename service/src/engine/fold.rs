@@ -8,7 +8,7 @@ use cognitive_map::{AgentId, InvalidSettings, Label, Record, SkipReason};
 
 use super::block::Entry;
 use super::readout::skip_reason_of_wire;
-use crate::decode;
+use crate::{answer, decode};
 
 /// Settings of the core from those of the wire.
 ///
@@ -113,5 +113,27 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
             to: *to,
             reason: skip_reason_of_wire(*reason),
         }),
+        Entry::Teach {
+            number,
+            name,
+            lesson,
+        } => {
+            // Only lessons that passed are journaled.
+            if let (Ok(name), Ok(lesson)) = (Label::new(name), answer::lesson(lesson)) {
+                take(Record::TeachObject {
+                    number: *number,
+                    name,
+                    lesson,
+                });
+            }
+        }
+        Entry::Forget { number, name } => {
+            if let Ok(name) = Label::new(name) {
+                take(Record::ForgetObject {
+                    number: *number,
+                    name,
+                });
+            }
+        }
     }
 }

@@ -1,6 +1,9 @@
 //! Samples that someone waits for, and what the waiting can end with.
 
-use cogmap_proto::{IngestAnswer, Sample, SampleBatch, SampleBody, Target};
+use cogmap_proto::{
+    IngestAnswer, ObjectLesson, ObjectMark, Orientation, Sample, SampleBatch, SampleBody, Target,
+};
+use cognitive_map::{Label, Lesson};
 use tokio::sync::oneshot;
 
 use super::sequencer::Weight;
@@ -11,6 +14,25 @@ pub(crate) struct Request {
     pub(crate) agent: Box<str>,
     pub(crate) batch: SampleBatch,
     pub(crate) reply: Reply,
+}
+
+/// A change of what is known of objects, for whose durability someone waits.
+#[derive(Debug)]
+pub(crate) struct ObjectRequest {
+    pub(crate) name: Label,
+    /// The lesson as it came and as the map takes it; none to forget the object.
+    pub(crate) lesson: Option<(ObjectLesson, Lesson)>,
+    pub(crate) reply: ObjectReply,
+}
+
+/// Whoever waits for a change of objects to be durable.
+pub(crate) type ObjectReply = oneshot::Sender<Result<(), IngestError>>;
+
+/// What someone waits for.
+#[derive(Debug)]
+pub(crate) enum Call {
+    Samples(Request),
+    Object(ObjectRequest),
 }
 
 /// Whoever waits for samples to be durable.
@@ -67,6 +89,22 @@ impl Weight for Sample {
                 Target::OwnSample(_) => 0,
             },
             SampleBody::Marker(marker) => marker.label.len(),
+            SampleBody::Object(mark) => {
+                let (name, orientation) = match mark {
+                    ObjectMark::Learn {
+                        name, orientation, ..
+                    } => (name.as_ref().map_or(0, String::len), Some(orientation)),
+                    ObjectMark::Identify { orientation, .. } => (0, Some(orientation)),
+                    ObjectMark::End {} => (0, None),
+                };
+                let rotations = match orientation {
+                    Some(Orientation::Finite { rotations_xyzw }) => {
+                        size_of_val(rotations_xyzw.as_slice())
+                    }
+                    _ => 0,
+                };
+                name + rotations
+            }
         };
         size_of::<Self>() + beside
     }

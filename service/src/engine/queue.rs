@@ -7,9 +7,9 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use cogmap_proto::{Codec, Sample};
+use cogmap_proto::{Codec, Contact, ContactLevel, Sample};
 
-use super::message::Request;
+use super::message::{Call, ObjectRequest, Request};
 use super::sequencer::Weight;
 
 /// A buffer that has grown beyond this is given back when little of it is used.
@@ -47,7 +47,7 @@ struct Channel {
 #[derive(Debug, Default)]
 struct Waiting {
     frames: Frames,
-    requests: Vec<Request>,
+    calls: Vec<Call>,
     /// What the bounds hold for: that which the writer has taken and not yet handled is part of it.
     load: Load,
     /// The writer is to look up although no message comes.
@@ -65,7 +65,7 @@ struct Load {
 #[derive(Debug, Default)]
 struct Taken {
     frames: Frames,
-    requests: std::vec::IntoIter<Request>,
+    calls: std::vec::IntoIter<Call>,
     handled: Load,
 }
 
@@ -98,7 +98,7 @@ pub(crate) enum Message<'a> {
         payload: &'a [u8],
     },
     /// Decoded, and someone waits for the answer.
-    Request(Request),
+    Call(Call),
 }
 
 /// A queue of at most so many messages and bytes.
@@ -126,9 +126,9 @@ impl Queue {
     }
 
     /// Queues a request, or gives up at once.
-    pub(crate) fn request(&self, request: Request) -> Result<(), NotQueued> {
-        let mut waiting = self.0.room_for(size_of_request(&request))?;
-        waiting.requests.push(request);
+    pub(crate) fn request(&self, call: Call) -> Result<(), NotQueued> {
+        let mut waiting = self.0.room_for(size_of_call(&call))?;
+        waiting.calls.push(call);
         self.0.ring(waiting);
         Ok(())
     }
@@ -167,7 +167,7 @@ impl Inbox {
         waiting.call = false;
         self.taken.frames.clear();
         std::mem::swap(&mut self.taken.frames, &mut waiting.frames);
-        self.taken.requests = std::mem::take(&mut waiting.requests).into_iter();
+        self.taken.calls = std::mem::take(&mut waiting.calls).into_iter();
         waiting.load.messages
     }
 
@@ -228,19 +228,19 @@ impl Load {
 
 impl Waiting {
     fn is_empty(&self) -> bool {
-        self.frames.heads.is_empty() && self.requests.is_empty()
+        self.frames.heads.is_empty() && self.calls.is_empty()
     }
 }
 
 impl Taken {
     fn is_empty(&self) -> bool {
-        self.frames.read.messages == self.frames.heads.len() && self.requests.len() == 0
+        self.frames.read.messages == self.frames.heads.len() && self.calls.len() == 0
     }
 
     fn next(&mut self) -> Option<Message<'_>> {
-        if let Some(request) = self.requests.next() {
-            self.handled.add(size_of_request(&request));
-            return Some(Message::Request(request));
+        if let Some(call) = self.calls.next() {
+            self.handled.add(size_of_call(&call));
+            return Some(Message::Call(call));
         }
         let (agent, codec, payload) = self.frames.next()?;
         self.handled.add(agent.len() + payload.len());
@@ -284,6 +284,29 @@ impl Frames {
         self.bytes.clear();
         self.read = Load::default();
     }
+}
+
+fn size_of_call(call: &Call) -> usize {
+    match call {
+        Call::Samples(request) => size_of_request(request),
+        Call::Object(ObjectRequest { name, lesson, .. }) => {
+            let contacts = lesson.iter().flat_map(|(lesson, _)| &lesson.contacts);
+            // Twice: as it came, and as the map takes it.
+            name.as_str().len() + 2 * contacts.map(size_of_contact).sum::<usize>()
+        }
+    }
+}
+
+fn size_of_contact(contact: &Contact) -> usize {
+    let levels = contact.levels.iter();
+    let descriptors = contact.descriptors.iter();
+    size_of::<Contact>()
+        + levels
+            .map(|level| size_of::<ContactLevel>() + level.channel.len())
+            .sum::<usize>()
+        + descriptors
+            .map(|seen| seen.channel.len() + size_of_val(seen.vector.as_slice()))
+            .sum::<usize>()
 }
 
 fn size_of_request(request: &Request) -> usize {

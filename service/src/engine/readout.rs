@@ -2,8 +2,8 @@
 
 use cogmap_proto as wire;
 use cognitive_map::{
-    Agent, ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, Settings, SkipReason,
-    Status, TripEnd,
+    Agent, AgentId, ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, SkipReason, Status,
+    TripEnd,
 };
 
 use super::desk::Readout;
@@ -11,10 +11,11 @@ use super::surprise::is_surprising;
 use super::trajectory::stamped;
 
 /// What is published of an agent; nothing before its first sample.
-pub(crate) fn readout(space: &str, agent: &Agent, map: &CognitiveMap) -> Option<Readout> {
+pub(crate) fn readout(space: &str, map: &CognitiveMap, id: AgentId) -> Option<Readout> {
+    let agent = map.agent(id)?;
     let stamp_ns = agent.stamp_ns()?;
     let pose = stamped(stamp_ns, agent.pose());
-    let covariance = agent.covariance().in_map_axes(&agent.pose().rotation);
+    let covariance = { map.covariance(id)? }.in_map_axes(&agent.pose().rotation);
     let (place, confidence) = match agent.place() {
         Some((place, confidence)) => (Some(place.0.into()), confidence),
         None => (None, 0.0),
@@ -27,7 +28,7 @@ pub(crate) fn readout(space: &str, agent: &Agent, map: &CognitiveMap) -> Option<
         stamp_ns,
         frame: "map".to_owned(),
         map_revision: map.revision(),
-        status: status(agent, map.settings()),
+        status: status(map.status(id)?),
         translation_m: pose.translation_m,
         rotation_xyzw: pose.rotation_xyzw,
         covariance: cognitive_map::geometry::upper_triangle(&covariance),
@@ -52,8 +53,8 @@ pub fn evidence(agent: &Agent) -> wire::Evidence {
     }
 }
 
-fn status(agent: &Agent, settings: &Settings) -> wire::Status {
-    match agent.status(settings) {
+fn status(status: Status) -> wire::Status {
+    match status {
         Status::Localized => wire::Status::Localized,
         Status::Uncertain => wire::Status::Uncertain,
         Status::Lost => wire::Status::Lost,
@@ -104,6 +105,23 @@ pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wi
         },
         EventKind::AgentPlaced { position } => wire::EventKind::AgentPlaced {
             translation_m: position.coords.into(),
+        },
+        EventKind::ObjectsNarrowed { live } => wire::EventKind::ObjectsNarrowed {
+            live: (*live).into(),
+        },
+        EventKind::ObjectRecognised {
+            name, probability, ..
+        } => wire::EventKind::ObjectRecognised {
+            object: name.as_str().to_owned(),
+            probability: *probability,
+        },
+        EventKind::ObjectUnknown => wire::EventKind::ObjectUnknown {},
+        EventKind::ObjectLearned { name, contacts, .. } => wire::EventKind::ObjectLearned {
+            object: name.as_str().to_owned(),
+            contacts: *contacts,
+        },
+        EventKind::ObjectNotLearned { contacts } => wire::EventKind::ObjectNotLearned {
+            contacts: *contacts,
         },
         EventKind::MarkerPassed { label } => wire::EventKind::MarkerPassed {
             label: label.as_str().to_owned(),
@@ -186,7 +204,7 @@ pub(crate) fn skip_reason_of_wire(reason: wire::SkipReason) -> SkipReason {
 mod tests {
     use super::*;
     use cognitive_map::{
-        AgentId, Label, Level, Motion, Record, Sample, SampleBody, SettingsValues,
+        Label, Level, Motion, Record, Sample, SampleBody, Settings, SettingsValues,
     };
 
     /// An agent that stands still and feels these values.

@@ -7,15 +7,17 @@ use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 use arc_swap::ArcSwapOption;
-use cogmap_proto::{Codec, Event, IngestAnswer, Name, SampleBatch, SpaceSettings, Trajectory};
-use cognitive_map::{CognitiveMap, Settings};
+use cogmap_proto::{
+    Codec, Event, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings, Trajectory,
+};
+use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
 use tokio::sync::{broadcast, oneshot};
 
 use super::checkpointer::{Checkpointer, Job};
 use super::committer::Commit;
 use super::desk::AgentDesk;
 use super::health::Health;
-use super::message::{IngestError, Request};
+use super::message::{Call, IngestError, ObjectRequest, Request};
 use super::outlet::Outlet;
 use super::queue::{Inbox, NotQueued, Queue, queue};
 use super::recovery;
@@ -242,22 +244,62 @@ impl Space {
         agent: &Name,
         batch: SampleBatch,
     ) -> Result<IngestAnswer, IngestError> {
+        let (reply, answer) = oneshot::channel();
+        self.call(Call::Samples(Request {
+            agent: agent.as_str().into(),
+            batch,
+            reply,
+        }))?;
+        answer.await.unwrap_or(Err(IngestError::Closed))
+    }
+
+    /// Teaches an object at once and answers when that is durable. `lesson` is what came, `valid` the same as the map
+    /// takes it.
+    ///
+    /// # Errors
+    /// See [`IngestError`].
+    pub async fn teach(
+        &self,
+        name: &Label,
+        lesson: ObjectLesson,
+        valid: Lesson,
+    ) -> Result<(), IngestError> {
+        self.change_object(name, Some((lesson, valid))).await
+    }
+
+    /// Forgets an object, if there is one of that name, and answers when that is durable.
+    ///
+    /// # Errors
+    /// See [`IngestError`].
+    pub async fn forget_object(&self, name: &Label) -> Result<(), IngestError> {
+        self.change_object(name, None).await
+    }
+
+    async fn change_object(
+        &self,
+        name: &Label,
+        lesson: Option<(ObjectLesson, Lesson)>,
+    ) -> Result<(), IngestError> {
+        let (reply, answer) = oneshot::channel();
+        self.call(Call::Object(ObjectRequest {
+            name: name.clone(),
+            lesson,
+            reply,
+        }))?;
+        answer.await.unwrap_or(Err(IngestError::Closed))
+    }
+
+    /// Queues what someone waits for.
+    fn call(&self, call: Call) -> Result<(), IngestError> {
         match self.available() {
             Ok(()) => {}
             Err(Unavailable::Recovering) => return Err(IngestError::Recovering),
             Err(Unavailable::Failed(detail)) => return Err(IngestError::Store(detail)),
         }
-        let (reply, answer) = oneshot::channel();
-        let request = Request {
-            agent: agent.as_str().into(),
-            batch,
-            reply,
-        };
-        self.queue.request(request).map_err(|error| match error {
+        self.queue.request(call).map_err(|error| match error {
             NotQueued::Full => IngestError::Busy,
             NotQueued::Closed => IngestError::Closed,
-        })?;
-        answer.await.unwrap_or(Err(IngestError::Closed))
+        })
     }
 
     /// Up to `limit` poses of an agent's causal trajectory with `from_ns <= stamp < to_ns`; of its

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cogmap_proto::{
-    Codec, Level, Marker, Relation, Sample, SampleBatch, SampleBody, Sighting, SkipReason,
-    SpaceSettings, StartPose, Target, Velocity,
+    Codec, Contact, ContactLevel, Level, Marker, ObjectLesson, Relation, Sample, SampleBatch,
+    SampleBody, Sighting, SkipReason, SpaceSettings, StartPose, Target, TouchNoise, Velocity,
 };
 use cognitive_map::CognitiveMap;
 use proptest::prelude::*;
@@ -307,5 +307,55 @@ fn a_space_that_is_gone_keeps_nobody_waiting() {
     snapshot
         .expect("an answer comes")
         .expect_err("there is no map any more");
+    engine.shutdown();
+}
+
+#[test]
+fn lessons_outlive_the_engine_with_and_without_a_checkpoint() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .expect("a runtime");
+    let lesson = |value: f64| ObjectLesson {
+        spacing_m: 0.01,
+        noise: TouchNoise::default(),
+        contacts: (0..9)
+            .map(|k| Contact {
+                position_m: [f64::from(k) * 0.02, 0.0, 0.0],
+                levels: vec![ContactLevel {
+                    channel: "touch".into(),
+                    value: value + f64::from(k),
+                }],
+                ..Contact::default()
+            })
+            .collect(),
+    };
+    let mut digests = Vec::new();
+    for round in 0..3_u8 {
+        let engine = open(directory.path(), EngineSettings::default());
+        let space = engine.space(SPACE).expect("the space is there");
+        let before = runtime.block_on(space.snapshot()).expect("a snapshot");
+        assert_eq!(digests.last(), (round > 0).then_some(&before.digest()));
+        assert_eq!(before.object_count(), usize::from(round));
+        let name = cognitive_map::Label::new(&format!("cup {round}")).expect("a label");
+        let lesson = lesson(f64::from(round));
+        let valid = crate::answer::lesson(&lesson).expect("a lesson");
+        runtime
+            .block_on(space.teach(&name, lesson, valid))
+            .expect("taught");
+        let after = runtime.block_on(space.snapshot()).expect("a snapshot");
+        assert!(after.object_by_name(&name).is_some());
+        digests.push(after.digest());
+        engine.shutdown();
+    }
+    // From the journal alone.
+    let store = FjallStore::open(directory.path()).expect("the store opens");
+    let number = crate::store::Store::spaces(&store).expect("spaces")[0].number;
+    crate::store::Store::drop_checkpoint(&store, number).expect("dropped");
+    drop(store);
+    let engine = open(directory.path(), EngineSettings::default());
+    let space = engine.space(SPACE).expect("the space is there");
+    let map = runtime.block_on(space.snapshot()).expect("a snapshot");
+    assert_eq!(digests.last(), Some(&map.digest()));
     engine.shutdown();
 }

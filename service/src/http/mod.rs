@@ -13,6 +13,7 @@ mod health;
 mod json;
 mod landmarks;
 mod listener;
+mod objects;
 mod openapi;
 mod page;
 mod places;
@@ -55,7 +56,7 @@ use state::{Service, Shared};
     tags(
         (name = "spaces", description = "Spaces, their events and exports"),
         (name = "agents", description = "Where agents are, where they were, and their samples"),
-        (name = "memory", description = "Places, percepts, trips and landmarks"),
+        (name = "memory", description = "Places, percepts, trips, landmarks and objects"),
         (name = "service", description = "Health and metrics")),
     components(schemas(cogmap_proto::Problem)))]
 struct Description;
@@ -77,6 +78,10 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(trips::get))
         .routes(routes!(landmarks::list))
         .routes(routes!(landmarks::get))
+        .routes(routes!(objects::list))
+        .routes(routes!(objects::get, objects::put, objects::delete))
+        .routes(routes!(objects::identify))
+        .routes(routes!(objects::of_agent))
         .routes(routes!(events::get))
         .routes(routes!(export::get))
         .routes(routes!(health::healthz))

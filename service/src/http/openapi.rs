@@ -25,7 +25,7 @@ const WITH_BODY: [(&str, &str); 2] = [
 ];
 
 /// Lengths of arrays, by the names of the fields that hold them.
-const LENGTHS: [(&str, usize); 20] = [
+const LENGTHS: [(&str, usize); 21] = [
     ("translation_m", 3),
     ("rotation_xyzw", 4),
     ("translation_sd_m", 3),
@@ -37,6 +37,7 @@ const LENGTHS: [(&str, usize); 20] = [
     ("sd_m", 3),
     ("position_m", 3),
     ("position_sd_m", 3),
+    ("approach", 3),
     ("reference", 3),
     ("reference_m", 3),
     ("phase", 3),

@@ -7,7 +7,7 @@ use axum::response::IntoResponse;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::answer::{InvalidPrediction, InvalidQuery};
+use crate::answer::{InvalidContacts, InvalidPrediction, InvalidQuery};
 use crate::engine::{IngestError, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
 
@@ -223,6 +223,12 @@ impl From<Unavailable> for Problem {
 
 impl From<InvalidQuery> for Problem {
     fn from(error: InvalidQuery) -> Self {
+        Self::new(Kind::InvalidQuery, error.to_string())
+    }
+}
+
+impl From<InvalidContacts> for Problem {
+    fn from(error: InvalidContacts) -> Self {
         Self::new(Kind::InvalidQuery, error.to_string())
     }
 }

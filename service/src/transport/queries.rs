@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use cogmap_proto::{Codec, PredictQuery, Problem, RecallQuery, Verb, WatermarkQuery, query_key};
+use cogmap_proto::{
+    Codec, IdentifyQuery, PredictQuery, Problem, RecallQuery, Verb, WatermarkQuery, query_key,
+};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
@@ -24,7 +26,7 @@ pub(crate) async fn declare(
 ) -> Result<Vec<Queryable<()>>, TransportError> {
     let mut queryables = Vec::new();
     let room = Arc::new(Semaphore::new(QUERIES_MAX));
-    for verb in [Verb::Recall, Verb::Watermark, Verb::Predict] {
+    for verb in [Verb::Recall, Verb::Watermark, Verb::Predict, Verb::Identify] {
         let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(&room));
         let queryable = session
             .declare_queryable(query_key("*", verb.as_str()))
@@ -129,6 +131,20 @@ async fn answer(
             let predicted = answer::predict(space.name(), &map, desk.id(), &body);
             let predicted = predicted.map_err(|error| unpredictable(&error))?;
             Ok(encoded(codec, &predicted))
+        }
+        Verb::Identify => {
+            let body: IdentifyQuery = body(query, codec)?;
+            let map = space
+                .snapshot()
+                .await
+                .map_err(|error| problem("unavailable", 503, error.to_string()))?;
+            // It compares every object: not on a thread that others wait for.
+            let identify = move || answer::identify(space.name(), &map, &body);
+            let identified = tokio::task::spawn_blocking(identify)
+                .await
+                .map_err(|error| problem("internal", 500, error.to_string()))?
+                .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
+            Ok(encoded(codec, &identified))
         }
     }
 }

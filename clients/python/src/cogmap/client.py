@@ -29,8 +29,18 @@ from .answer import (
 )
 from .errors import ApiError
 from .event import Event
+from .object import (
+    AgentObject,
+    Contact,
+    Identification,
+    IdentifyQuery,
+    ObjectDetail,
+    ObjectLesson,
+    ObjectPage,
+    ObjectSummary,
+)
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
-from .sample import SampleBatch
+from .sample import NoTurn, Orientation, SampleBatch, TouchNoise
 from .settings import SpaceSettings
 from .sse import data_fields
 from .trajectory import StampedPose, Trajectory
@@ -233,6 +243,58 @@ class Client:
     def landmark(self, space: str, label: str) -> Landmark:
         """A landmark, by its label."""
         return self._get(Landmark, _path(space, "landmarks", label))
+
+    # Objects
+
+    def objects(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[ObjectSummary]:
+        """All objects of a space, by name. `filters` are passed on as query parameters."""
+        query: _Query = dict(filters)
+        while True:
+            page = self._get(ObjectPage, _path(space, "objects"), query)
+            yield from page.objects
+            if page.next is None:
+                return
+            query["after"] = page.next
+
+    def object(self, space: str, name: str) -> ObjectDetail:
+        """An object with its places."""
+        return self._get(ObjectDetail, _path(space, "objects", name))
+
+    def teach_object(
+        self,
+        space: str,
+        name: str,
+        contacts: Iterable[Contact],
+        *,
+        spacing_m: float = 0.004,
+        noise: TouchNoise = TouchNoise(),
+    ) -> ObjectSummary:
+        """Teaches an object at once, by contacts in its own frame, in place of what was known of it; returns
+        when that is on the service's disk."""
+        lesson = ObjectLesson(float(spacing_m), noise, tuple(contacts))
+        path = _path(space, "objects", name)
+        return self._send(ObjectSummary, "PUT", path, JSON, json.dumps(to_wire(lesson)).encode())
+
+    def forget_object(self, space: str, name: str) -> None:
+        """Forgets an object."""
+        self._request("DELETE", _path(space, "objects", name))
+
+    def identify(
+        self,
+        space: str,
+        contacts: Iterable[Contact],
+        *,
+        orientation: Orientation = NoTurn(),
+        noise: TouchNoise = TouchNoise(),
+    ) -> Identification:
+        """Which object a sequence of contacts is of, in which pose, and where the next touch would tell most."""
+        query = IdentifyQuery(orientation, noise, tuple(contacts))
+        path = _path(space, "objects", "identify")
+        return self._send(Identification, "POST", path, JSON, json.dumps(to_wire(query)).encode())
+
+    def agent_object(self, space: str, agent: str) -> AgentObject:
+        """What an agent's episode with an object says so far."""
+        return self._get(AgentObject, _path(space, "agents", agent, "object"))
 
     # Streams and files
 

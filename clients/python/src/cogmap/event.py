@@ -156,6 +156,52 @@ class AgentPlaced:
 
 
 @dataclass(frozen=True)
+class ObjectsNarrowed:
+    """Fewer objects come into question for what the agent touches."""
+
+    TAG: ClassVar[str] = "objects_narrowed"
+    live: int
+
+
+@dataclass(frozen=True)
+class ObjectRecognised:
+    """What the agent touches is known."""
+
+    TAG: ClassVar[str] = "object_recognised"
+    #: Name of the object.
+    object: str
+    #: How probable it is, 0.99 at least.
+    probability: float
+
+
+@dataclass(frozen=True)
+class ObjectUnknown:
+    """What the agent touches is none of the objects that were learned."""
+
+    TAG: ClassVar[str] = "object_unknown"
+
+
+@dataclass(frozen=True)
+class ObjectLearned:
+    """An object was learned, or more of it."""
+
+    TAG: ClassVar[str] = "object_learned"
+    #: Its name.
+    object: str
+    #: Contacts of the episode that taught it.
+    contacts: int
+
+
+@dataclass(frozen=True)
+class ObjectNotLearned:
+    """An episode was to teach an object and has not: it did not become clear how its frame lies in it."""
+
+    TAG: ClassVar[str] = "object_not_learned"
+    #: Contacts of the episode.
+    contacts: int
+
+
+@dataclass(frozen=True)
 class UnknownKind:
     """Something that this version of the package has no word for."""
 
@@ -179,6 +225,11 @@ EventKind = Union[
     PlaceForgotten,
     TripForgotten,
     AgentPlaced,
+    ObjectsNarrowed,
+    ObjectRecognised,
+    ObjectUnknown,
+    ObjectLearned,
+    ObjectNotLearned,
     UnknownKind,
 ]
 

@@ -13,6 +13,11 @@ from .scalar import COUNT_RANGE, STAMP_RANGE, one_of, text, whole
 from .vector import IDENTITY, Quaternion, Vec3, quaternion, single_precision, vec3
 
 
+def _set(instance: object, name: str, value: object) -> None:
+    """Normalises a field of a frozen dataclass while it is being built."""
+    object.__setattr__(instance, name, value)
+
+
 @dataclass(frozen=True)
 class MotionNoise:
     """Standard deviations along and about the body axes x, y, z."""
@@ -255,7 +260,112 @@ class Marker:
         _set(self, "ends_trip", bool(self.ends_trip))
 
 
-SampleBody = Union[Increment, Velocity, Level, Descriptor, Sighting, StartPose, Marker]
+@dataclass(frozen=True)
+class NoTurn:
+    """The frames of an episode and of an object are parallel."""
+
+    TAG: ClassVar[str] = "known"
+
+
+@dataclass(frozen=True)
+class CubeTurns:
+    """They are turned by one of the 24 turns that take a cube into itself."""
+
+    TAG: ClassVar[str] = "cube"
+
+
+@dataclass(frozen=True)
+class FiniteTurns:
+    """They are turned by one of these rotations, all equally likely."""
+
+    TAG: ClassVar[str] = "finite"
+    #: Unit quaternions `[x, y, z, w]`, from the episode's frame into the object's.
+    rotations_xyzw: Tuple[Quaternion, ...]
+
+    def __post_init__(self) -> None:
+        turns = tuple(quaternion("rotations_xyzw", turn) for turn in self.rotations_xyzw)
+        _set(self, "rotations_xyzw", turns)
+
+
+@dataclass(frozen=True)
+class AnyTurn:
+    """They are turned by any rotation. Contacts need normals then."""
+
+    TAG: ClassVar[str] = "free"
+
+
+#: How the frame of an episode may be turned against an object's.
+Orientation = Union[NoTurn, CubeTurns, FiniteTurns, AnyTurn]
+
+
+@dataclass(frozen=True)
+class TouchNoise:
+    """Standard deviations of what is felt."""
+
+    #: Of a contact's position per axis [m].
+    position_sd_m: float = 0.002
+    #: Of a normal's direction per axis [rad].
+    normal_sd_rad: float = 0.035
+    #: Of a level, in its channel's unit.
+    level_sd: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("position_sd_m", "normal_sd_rad", "level_sd"):
+            _set(self, name, float(getattr(self, name)))
+
+
+@dataclass(frozen=True)
+class LearnObject:
+    """What is felt from here on teaches an object."""
+
+    TAG: ClassVar[str] = "learn"
+    #: Its name. One that is known is extended if the episode shows how its frame lies in the object's. Without
+    #: a name it is the object that is recognised, or a new one.
+    name: Optional[str] = None
+    #: Contacts within this distance [m] are of one place of a new object.
+    spacing_m: float = 0.004
+    #: How the frame may be turned against that of an object known before.
+    orientation: Orientation = NoTurn()
+    #: How exactly is felt.
+    noise: TouchNoise = TouchNoise()
+
+    def __post_init__(self) -> None:
+        if self.name is not None:
+            text("name", self.name)
+        _set(self, "spacing_m", float(self.spacing_m))
+
+
+@dataclass(frozen=True)
+class IdentifyObject:
+    """What is felt from here on is to be recognised; if it is unknown, it is learned at the end."""
+
+    TAG: ClassVar[str] = "identify"
+    #: How the frame may be turned against an object's.
+    orientation: Orientation = NoTurn()
+    #: How exactly is felt.
+    noise: TouchNoise = TouchNoise()
+
+
+@dataclass(frozen=True)
+class EndObject:
+    """The episode with an object ends."""
+
+    TAG: ClassVar[str] = "end"
+
+
+@dataclass(frozen=True)
+class ObjectMark:
+    """An episode with an object begins or ends."""
+
+    TAG: ClassVar[str] = "object"
+    NEWTYPE: ClassVar[bool] = True
+    mark: Union[LearnObject, IdentifyObject, EndObject]
+
+    def __post_init__(self) -> None:
+        one_of("mark", self.mark, (LearnObject, IdentifyObject, EndObject))
+
+
+SampleBody = Union[Increment, Velocity, Level, Descriptor, Sighting, StartPose, Marker, ObjectMark]
 
 
 @dataclass(frozen=True)
@@ -292,8 +402,3 @@ class SampleBatch:
 def _check_noise(noise: Optional[MotionNoise]) -> None:
     if noise is not None:
         one_of("noise", noise, (MotionNoise,))
-
-
-def _set(instance: object, name: str, value: object) -> None:
-    """Normalises a field of a frozen dataclass while it is being built."""
-    object.__setattr__(instance, name, value)

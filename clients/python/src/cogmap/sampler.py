@@ -7,16 +7,23 @@ from typing import Iterable, Optional, Union
 
 from .sample import (
     Descriptor,
+    EndObject,
+    IdentifyObject,
     Increment,
     LandmarkTarget,
+    LearnObject,
     Level,
     Marker,
     MotionNoise,
+    NoTurn,
+    ObjectMark,
+    Orientation,
     Relation,
     SampleBody,
     Sighting,
     StartPose,
     Target,
+    TouchNoise,
     Velocity,
 )
 from .vector import IDENTITY, quaternion, single_precision, vec3
@@ -120,3 +127,29 @@ class Sampler(ABC):
     def marker(self, label: str, *, ends_trip: bool = False, stamp_ns: Optional[int] = None) -> int:
         """A named moment; may end the trip under way."""
         return self._send(Marker(label, ends_trip), stamp_ns)
+
+    def learn_object(
+        self,
+        name: Optional[str] = None,
+        *,
+        spacing_m: float = 0.004,
+        orientation: Orientation = NoTurn(),
+        noise: TouchNoise = TouchNoise(),
+        stamp_ns: Optional[int] = None,
+    ) -> int:
+        """What is felt from here on teaches an object, until `end_object`."""
+        return self._send(ObjectMark(LearnObject(name, spacing_m, orientation, noise)), stamp_ns)
+
+    def identify_object(
+        self,
+        *,
+        orientation: Orientation = NoTurn(),
+        noise: TouchNoise = TouchNoise(),
+        stamp_ns: Optional[int] = None,
+    ) -> int:
+        """What is felt from here on is to be recognised, until `end_object`."""
+        return self._send(ObjectMark(IdentifyObject(orientation, noise)), stamp_ns)
+
+    def end_object(self, *, stamp_ns: Optional[int] = None) -> int:
+        """The episode with an object ends."""
+        return self._send(ObjectMark(EndObject()), stamp_ns)

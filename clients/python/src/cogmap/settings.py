@@ -40,9 +40,9 @@ class NoiseSettings:
     #: Of the rotation, per square root of radian turned [rad/√rad].
     rotation_sd_per_sqrt_rad: float
     #: Of the lasting relative error of lengths, e.g. of a wheel's radius.
-    length_error_sd: float = 0.02
+    length_error_sd: float = 0.05
     #: Of the lasting relative error of angles, e.g. of a wheel base.
-    angle_error_sd: float = 0.05
+    angle_error_sd: float = 0.1
     #: Of the lasting bias about each axis, e.g. of a gyroscope [rad/s].
     bias_sd_rad_s: float = 0.004
 

@@ -84,7 +84,7 @@ def to_wire(value: Any) -> Any:
     tag: Optional[str] = getattr(cls, "TAG", None)
     content: Any
     if getattr(cls, "NEWTYPE", False):
-        content = getattr(value, _fields(cls)[0].name)
+        content = to_wire(getattr(value, _fields(cls)[0].name))
     else:
         content = {field.wire_name: to_wire(getattr(value, field.name)) for field in _fields(cls)}
     return content if tag is None else {tag: content}

@@ -1,20 +1,17 @@
-//! Where a body is: by its own motion, and by the estimate that everybody's sightings correct.
+//! Where a body is: by its own motion, and by the estimate that everybody's sightings correct, which keeps how sure that is.
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::geometry::PoseCovariance;
 use crate::grid::{GridModules, GridState};
 use crate::state::state_of_struct;
 
-/// Poses, their uncertainty, and the grid state that goes with them.
+/// Poses, and the grid state that goes with them.
 #[derive(Clone, Debug)]
 pub(crate) struct Body {
     /// Pose by motion alone since the session began.
     pub(super) in_odom: Isometry3<f64>,
     /// Pose in `map`.
     pub(super) in_map: Isometry3<f64>,
-    /// Covariance of the pose in `map`.
-    pub(super) covariance: PoseCovariance,
     pub(super) grid: GridState,
     /// The session's latest movement, along the axes of `map` \[m\].
     pub(super) latest: Option<Vector3<f64>>,
@@ -26,7 +23,6 @@ pub(crate) struct Body {
 state_of_struct!(Body {
     in_odom,
     in_map,
-    covariance,
     grid,
     latest,
     before_latest,
@@ -34,13 +30,12 @@ state_of_struct!(Body {
 });
 
 impl Body {
-    /// A body at identity, without any uncertainty.
+    /// A body at identity.
     pub(crate) fn new(modules: &GridModules) -> Self {
         let in_map = Isometry3::identity();
         Self {
             in_odom: Isometry3::identity(),
             in_map,
-            covariance: PoseCovariance::zero(),
             grid: modules.locate(&in_map.translation.vector.into()),
             latest: None,
             before_latest: None,
@@ -48,19 +43,9 @@ impl Body {
         }
     }
 
-    /// Pose in `odom`.
-    pub(crate) fn in_odom(&self) -> &Isometry3<f64> {
-        &self.in_odom
-    }
-
     /// Pose in `map`.
     pub(crate) fn in_map(&self) -> &Isometry3<f64> {
         &self.in_map
-    }
-
-    /// Covariance of the pose in `map`.
-    pub(crate) fn covariance(&self) -> &PoseCovariance {
-        &self.covariance
     }
 
     /// Whether the grid state has as many modules as the space.
@@ -97,27 +82,19 @@ impl Body {
     pub(crate) fn follow(
         &mut self,
         pose: &Isometry3<f64>,
-        covariance: &PoseCovariance,
         modules: &GridModules,
         entered: impl FnMut(usize, [i64; 3]),
     ) {
         let correction = pose.translation.vector - self.in_map.translation.vector;
         self.in_map = *pose;
-        self.covariance = *covariance;
         if correction != Vector3::zeros() {
             self.grid.advance(modules, &correction, entered);
         }
     }
 
     /// Puts the body where it turned out to stand.
-    pub(crate) fn place(
-        &mut self,
-        pose: &Isometry3<f64>,
-        covariance: &PoseCovariance,
-        modules: &GridModules,
-    ) {
+    pub(crate) fn place(&mut self, pose: &Isometry3<f64>, modules: &GridModules) {
         self.in_map = *pose;
-        self.covariance = *covariance;
         self.grid = modules.locate(&self.in_map.translation.vector.into());
     }
 

@@ -9,11 +9,10 @@ pub(crate) use body::Body;
 pub use status::Status;
 
 use crate::estimation::Evidence;
-use crate::geometry::PoseCovariance;
 use crate::grid::{GridModules, GridState, octant};
+use crate::object::Episode;
 use crate::place::PlaceId;
 use crate::sample::Label;
-use crate::settings::Settings;
 use crate::state::state_of_struct;
 use crate::trip::{LegUnderWay, Recorder, TripId};
 
@@ -45,6 +44,9 @@ pub struct Agent {
     pub(crate) recorder: Recorder,
     pub(crate) sightings: u64,
     pub(crate) percepts: u64,
+    /// The episode with an object that is under way.
+    pub(crate) episode: Option<Episode>,
+    pub(crate) forgotten_matches: u64,
 }
 
 state_of_struct!(Agent {
@@ -62,6 +64,8 @@ state_of_struct!(Agent {
     recorder,
     sightings,
     percepts,
+    episode,
+    forgotten_matches,
 });
 
 impl Agent {
@@ -82,6 +86,8 @@ impl Agent {
             recorder: Recorder::default(),
             sightings: 0,
             percepts: 0,
+            episode: None,
+            forgotten_matches: 0,
         }
     }
 
@@ -134,18 +140,6 @@ impl Agent {
     /// Pose in `odom`: by motion alone since the session began.
     pub fn odometry(&self) -> &Isometry3<f64> {
         &self.body.in_odom
-    }
-
-    /// Covariance of [`Agent::pose`].
-    pub fn covariance(&self) -> &PoseCovariance {
-        &self.body.covariance
-    }
-
-    /// How well the agent is localised.
-    pub fn status(&self, settings: &Settings) -> Status {
-        let position_sd_m = self.body.covariance.position_sd_m();
-        let refused = self.evidence.refused_in_a_row;
-        Status::of(self.placed, position_sd_m, refused, settings)
     }
 
     /// What became of its sightings, of all sessions.
@@ -202,5 +196,10 @@ impl Agent {
     /// others are counted and stay in the journal.
     pub fn percepts(&self) -> u64 {
         self.percepts
+    }
+
+    /// Matches so far whose earlier sample was not, or no longer, remembered, of all sessions. They are dropped.
+    pub fn forgotten_matches(&self) -> u64 {
+        self.forgotten_matches
     }
 }

@@ -1,5 +1,6 @@
 //! How well an agent is localised.
 
+use super::Agent;
 use crate::settings::Settings;
 
 /// From this many sightings on that were refused one after the other, an agent is not where it is thought
@@ -20,13 +21,9 @@ pub enum Status {
 
 impl Status {
     /// By the standard deviation of the position, and by how many of the latest sightings were refused.
-    pub(super) fn of(
-        placed: bool,
-        position_sd_m: f64,
-        refused_in_a_row: u32,
-        settings: &Settings,
-    ) -> Self {
-        let is_contradicted = refused_in_a_row >= REFUSED_MAX;
+    pub(crate) fn of(agent: &Agent, position_sd_m: f64, settings: &Settings) -> Self {
+        let is_contradicted = agent.evidence.refused_in_a_row >= REFUSED_MAX;
+        let placed = agent.placed;
         // A deviation that is not a number fails both comparisons, and so is lost.
         if placed && position_sd_m <= settings.localized_sd_m && !is_contradicted {
             Self::Localized

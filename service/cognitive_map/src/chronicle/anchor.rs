@@ -2,6 +2,7 @@
 
 use nalgebra::Isometry3;
 
+use crate::estimation::Calibrated;
 use crate::geometry::PoseCovariance;
 use crate::state::state_of_struct;
 
@@ -31,6 +32,8 @@ pub(super) struct Anchor {
     /// The motion from the anchor before, with the covariance of its error.
     pub(super) motion: Isometry3<f64>,
     pub(super) covariance: PoseCovariance,
+    /// How the motion was corrected.
+    pub(super) calibrated: Calibrated,
     /// Whether it begins a stretch: no motion leads there from the anchor before.
     pub(super) begins: bool,
     /// How far the way there deviates from an even motion, from what was thinned out of it \[m\].
@@ -53,6 +56,7 @@ state_of_struct!(Anchor {
     pose,
     motion,
     covariance,
+    calibrated,
     begins,
     unevenness_m
 });

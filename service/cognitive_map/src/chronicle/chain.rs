@@ -8,7 +8,7 @@ use super::life::is_within;
 use super::sighting::{Shown, Sighting};
 use super::slots::NONE;
 use super::tie::{Standing, Tie};
-use crate::geometry::PoseCovariance;
+use crate::geometry::{MotionSum, PoseCovariance};
 
 impl Chronicle {
     /// A new anchor where an agent is; its latest one if there is no room for another.
@@ -27,16 +27,22 @@ impl Chronicle {
         let is_first = newest == NONE || life.is_cut;
         let founds = life.founds;
         // An agent that rests came here before now.
-        let rests = !life.is_fresh && is_within(&life.rest.inv_mul(&life.since), REST.0, REST.1);
+        let rests =
+            !life.is_fresh && is_within(&life.rest.inv_mul(life.since.motion()), REST.0, REST.1);
         let (seq, stamp_ns) = if rests {
             (life.rest_seq, life.rest_ns)
         } else {
             (life.seq, life.stamp_ns)
         };
-        let (motion, covariance) = if is_first {
-            (Isometry3::identity(), PoseCovariance::zero())
+        let (motion, covariance, calibrated) = if is_first {
+            let nothing = (Isometry3::identity(), PoseCovariance::zero());
+            (nothing.0, nothing.1, life.calibrated.without_motion())
         } else {
-            (life.since, life.covariance)
+            (
+                *life.since.motion(),
+                life.since.covariance(),
+                life.calibrated,
+            )
         };
         let anchor = Anchor {
             agent,
@@ -54,6 +60,7 @@ impl Chronicle {
             pose: life.pose,
             motion,
             covariance,
+            calibrated,
             begins: is_first,
             unevenness_m: 0.0,
         };
@@ -68,12 +75,13 @@ impl Chronicle {
             life.is_cut = false;
             life.is_fresh = false;
             life.founds = false;
-            life.since = Isometry3::identity();
-            life.covariance = PoseCovariance::zero();
+            life.since = MotionSum::default();
+            life.calibrated = life.calibrated.without_motion();
             (life.until_seq, life.until_ns) = (life.seq, life.stamp_ns);
             life.rest = Isometry3::identity();
             (life.rest_seq, life.rest_ns) = (seq, stamp_ns);
         }
+        self.pass_milestone(agent, number);
         if founds {
             self.tie_to_map(number, pose, &PoseCovariance::zero(), Standing::Origin);
         }

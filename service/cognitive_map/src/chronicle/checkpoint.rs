@@ -8,6 +8,8 @@
 //! 3     page   up to 64 sightings
 //! 4     page   up to 32 ties
 //! 5     page   up to 64 landmarks
+//! 6     page   up to 16 views
+//! 7     page   what an agent saw lately
 //! ```
 
 use std::collections::BTreeMap;
@@ -26,6 +28,8 @@ const ANCHORS: u8 = 2;
 const SIGHTINGS: u8 = 3;
 const TIES: u8 = 4;
 const LANDMARKS: u8 = 5;
+const VIEWS: u8 = 6;
+const TRACKS: u8 = 7;
 
 /// One page of a chronicle's checkpoint. A later page of the same part and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,6 +57,8 @@ impl Chronicle {
             .chain(pages_of(SIGHTINGS, &self.sightings.pages, since))
             .chain(pages_of(TIES, &self.ties.pages, since))
             .chain(pages_of(LANDMARKS, &self.landmarks.slots.pages, since))
+            .chain(pages_of(VIEWS, &self.revisits.views, since))
+            .chain(pages_of(TRACKS, &self.revisits.tracks, since))
     }
 
     /// The chronicle of a checkpoint, which goes on like the one that wrote it. Its pages count as changed at `revision`.
@@ -83,6 +89,8 @@ impl Chronicle {
                 SIGHTINGS => chronicle.sightings.pages.push_page(&bytes, revision),
                 TIES => chronicle.ties.pages.push_page(&bytes, revision),
                 LANDMARKS => chronicle.landmarks.slots.pages.push_page(&bytes, revision),
+                VIEWS => chronicle.revisits.views.push_page(&bytes, revision),
+                TRACKS => chronicle.revisits.tracks.push_page(&bytes, revision),
                 _ => Err(CorruptState::Invalid),
             };
             pushed.map_err(|_| CorruptChronicle)?;
@@ -91,6 +99,7 @@ impl Chronicle {
         if read.is_err() || !chronicle.landmarks.sort() || !chronicle.is_sound() {
             return Err(CorruptChronicle);
         }
+        chronicle.set_milestones();
         Ok(chronicle)
     }
 
@@ -103,6 +112,8 @@ impl Chronicle {
         self.sightings.pages.write_digests(&mut out);
         self.ties.pages.write_digests(&mut out);
         self.landmarks.slots.pages.write_digests(&mut out);
+        self.revisits.views.write_digests(&mut out);
+        self.revisits.tracks.write_digests(&mut out);
         out.digest()
     }
 
@@ -113,6 +124,7 @@ impl Chronicle {
             + self.sightings.pages.bytes()
             + self.ties.pages.bytes()
             + self.landmarks.slots.pages.bytes()
+            + self.revisits.bytes()
     }
 
     fn head(&self) -> ChroniclePage {
@@ -128,6 +140,8 @@ impl Chronicle {
     fn write_head(&self, out: &mut StateWriter) {
         self.hand.write(out);
         (self.told, self.fresh_matches).write(out);
+        self.agreed.write(out);
+        self.revisits.write_head(out);
         self.anchors.vacancy().write(out);
         self.sightings.vacancy().write(out);
         self.ties.vacancy().write(out);
@@ -142,6 +156,8 @@ impl Chronicle {
         let mut input = StateReader::new(bytes);
         self.hand = State::read(&mut input)?;
         (self.told, self.fresh_matches) = State::read(&mut input)?;
+        self.agreed = State::read(&mut input)?;
+        self.revisits.read_head(&mut input)?;
         self.anchors.set_vacancy(State::read(&mut input)?);
         self.sightings.set_vacancy(State::read(&mut input)?);
         self.ties.set_vacancy(State::read(&mut input)?);
@@ -166,6 +182,7 @@ impl Chronicle {
         slots
             && waiting
             && self.hand <= self.anchors.numbers()
+            && self.revisits.is_sound(self.lives.len())
             && self.chains_are_sound()
             && self.sightings_are_sound()
             && self.ties_are_sound()

@@ -5,10 +5,13 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 use super::anchor::Anchor;
 use super::landmarks::Landmarks;
 use super::life::{Life, is_within};
+use super::milestones::Milestones;
+use super::revisit::Revisits;
 use super::settings::ChronicleSettings;
 use super::sighting::{SeenPoint, Shown, Sighting};
 use super::slots::{NONE, Slots};
 use super::tie::{Standing, Tie};
+use crate::estimation::Calibrated;
 use crate::geometry::{PoseCovariance, se3};
 use crate::paged::PagedVec;
 use crate::sample::{Label, Relation, StartPose};
@@ -83,6 +86,11 @@ pub struct Chronicle {
     /// Motions told since the last relaxation, and matches.
     pub(super) told: u32,
     pub(super) fresh_matches: u32,
+    /// Matches believed since then without waiting.
+    pub(super) agreed: u32,
+    /// What was seen, for who comes there again.
+    pub(super) revisits: Revisits,
+    pub(super) milestones: Milestones,
 }
 
 /// A place between anchors: an anchor, the motion from there, and the covariance of its error.
@@ -107,6 +115,9 @@ impl Chronicle {
             hand: 0,
             told: 0,
             fresh_matches: 0,
+            agreed: 0,
+            revisits: Revisits::default(),
+            milestones: Milestones::default(),
         }
     }
 
@@ -201,6 +212,7 @@ impl Chronicle {
         life.is_planar &= is_level(start.pose());
         let anchor = self.anchor_anew(moment.agent);
         let covariance = PoseCovariance::from_sd(start.noise().sd());
+        self.revisits.cut(moment.agent, self.revision);
         self.tie_to_map(anchor, *start.pose(), &covariance, Standing::Stated);
     }
 
@@ -210,7 +222,7 @@ impl Chronicle {
         let Some(life) = self.lives.get(agent as usize) else {
             return;
         };
-        if life.newest != NONE && life.since != Isometry3::identity() {
+        if life.newest != NONE && *life.since.motion() != Isometry3::identity() {
             self.anchor_anew(agent);
         }
         let Some(life) = self.lives.get_mut(agent as usize, revision) else {
@@ -218,14 +230,20 @@ impl Chronicle {
         };
         life.session += 1;
         life.is_fresh = true;
-        life.covariance.inflate(sd);
+        life.since.inflate(&sd.component_mul(sd));
         self.waiting
             .retain(|waiting| waiting.observer != agent && waiting.target != agent);
     }
 
     /// An agent moved by an increment in its own frame before, with these variances of the error on its right \[m², m²,
-    /// m², rad², rad², rad²\].
-    pub fn motion(&mut self, moment: &Moment, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
+    /// m², rad², rad², rad²\]; `calibrated` says how the increment was corrected.
+    pub fn motion(
+        &mut self,
+        moment: &Moment,
+        increment: &Isometry3<f64>,
+        variance: &Vector6<f64>,
+        calibrated: &Calibrated,
+    ) {
         let agent = moment.agent;
         self.told = self.told.saturating_add(1);
         let Some(life) = self.lives.get(agent as usize) else {
@@ -243,20 +261,20 @@ impl Chronicle {
         let Some(life) = self.lives.get_mut(agent as usize, revision) else {
             return;
         };
-        life.go(increment, variance);
+        life.go(increment, variance, calibrated);
         life.is_planar &= is_level(increment);
         life.pose = moment.pose;
         (life.seq, life.stamp_ns) = (moment.seq, moment.stamp_ns);
-        if is_within(&life.since, REST.0, REST.1) {
+        if is_within(life.since.motion(), REST.0, REST.1) {
             (life.until_seq, life.until_ns) = (moment.seq, moment.stamp_ns);
         }
-        let is_step = !is_within(&life.since, STEP.0, STEP.1);
+        let is_step = !is_within(life.since.motion(), STEP.0, STEP.1);
         let mut rests = false;
-        if is_within(&life.rest.inv_mul(&life.since), REST.0, REST.1) {
-            rests = !is_within(&life.since, NEAR.0, NEAR.1)
+        if is_within(&life.rest.inv_mul(life.since.motion()), REST.0, REST.1) {
+            rests = !is_within(life.since.motion(), NEAR.0, NEAR.1)
                 && moment.stamp_ns.saturating_sub(life.rest_ns) >= REST_NS;
         } else {
-            life.rest = life.since;
+            life.rest = *life.since.motion();
             (life.rest_seq, life.rest_ns) = (moment.seq, moment.stamp_ns);
         }
         if is_step || rests {
@@ -387,7 +405,7 @@ impl Chronicle {
         life.pose = moment.pose;
         life.seq = moment.seq;
         life.stamp_ns = life.stamp_ns.max(moment.stamp_ns);
-        if !life.is_fresh && is_within(&life.since, REST.0, REST.1) {
+        if !life.is_fresh && is_within(life.since.motion(), REST.0, REST.1) {
             (life.until_seq, life.until_ns) = (life.seq, life.stamp_ns);
         }
     }
@@ -395,17 +413,17 @@ impl Chronicle {
     /// Where an agent is: at its latest anchor, if that is near, or at a new one.
     pub(super) fn here(&mut self, agent: u32) -> Option<Beside> {
         let life = self.lives.get(agent as usize)?;
-        if life.is_fresh || !is_within(&life.since, NEAR.0, NEAR.1) {
+        if life.is_fresh || !is_within(life.since.motion(), NEAR.0, NEAR.1) {
             self.anchor_anew(agent);
         }
         let revision = self.revision;
         let life = self.lives.get(agent as usize)?;
-        let at = life.pose * life.since.inverse();
+        let at = life.pose * life.since.motion().inverse();
         let newest = life.newest;
         let here = Beside {
             anchor: newest,
-            motion: life.since,
-            covariance: life.covariance,
+            motion: *life.since.motion(),
+            covariance: life.since.covariance(),
         };
         // What is seen now has corrected the pose.
         let anchor = self.anchors.get_mut(newest, revision)?;
@@ -419,7 +437,7 @@ impl Chronicle {
         if stamp_ns >= life.stamp_ns {
             return self.here(agent);
         }
-        let mut later = (life.stamp_ns, life.since, life.covariance);
+        let mut later = (life.stamp_ns, *life.since.motion(), life.since.covariance());
         let (mut number, mut until_ns) = (life.newest, life.until_ns);
         for _ in 0..LOOK_BACK_MAX {
             let anchor = self.anchors.get(number)?;

@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Vector6};
 
 use super::slots::NONE;
-use crate::geometry::PoseCovariance;
+use crate::estimation::Calibrated;
+use crate::geometry::MotionSum;
 use crate::state::state_of_struct;
 
 /// An agent with its latest moment.
@@ -34,8 +35,9 @@ pub(super) struct Life {
     pub(super) until_seq: u64,
     pub(super) until_ns: i64,
     /// Motion since the latest anchor, with the covariance of its error.
-    pub(super) since: Isometry3<f64>,
-    pub(super) covariance: PoseCovariance,
+    pub(super) since: MotionSum,
+    /// How that motion was corrected.
+    pub(super) calibrated: Calibrated,
     /// Where it came to rest lately, by the motion since the latest anchor, and when.
     pub(super) rest: Isometry3<f64>,
     pub(super) rest_seq: u64,
@@ -58,7 +60,7 @@ state_of_struct!(Life {
     until_seq,
     until_ns,
     since,
-    covariance,
+    calibrated,
     rest,
     rest_seq,
     rest_ns,
@@ -80,8 +82,8 @@ impl Life {
             stamp_ns: 0,
             until_seq: 0,
             until_ns: 0,
-            since: Isometry3::identity(),
-            covariance: PoseCovariance::zero(),
+            since: MotionSum::default(),
+            calibrated: Calibrated::default(),
             rest: Isometry3::identity(),
             rest_seq: 0,
             rest_ns: 0,
@@ -90,12 +92,14 @@ impl Life {
     }
 
     /// The agent moved on from where it was.
-    pub(super) fn go(&mut self, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
-        self.since *= increment;
-        self.since.rotation.renormalize_fast();
-        self.covariance = self
-            .covariance
-            .after_motion(increment, &variance.map(f64::sqrt));
+    pub(super) fn go(
+        &mut self,
+        increment: &Isometry3<f64>,
+        variance: &Vector6<f64>,
+        calibrated: &Calibrated,
+    ) {
+        self.since.append(increment, variance);
+        self.calibrated = self.calibrated.then(calibrated);
     }
 }
 

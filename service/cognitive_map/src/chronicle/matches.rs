@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
 
-use super::chronicle::{Beside, Chronicle, Moment, beside};
+use super::chronicle::{Beside, Chronicle, Moment};
 use super::refine::{Among, Graph};
 use super::sighting::{SeenPoint, stated_variance};
 use super::slots::NONE;
@@ -70,7 +70,8 @@ impl Chronicle {
         let Some(now) = self.here(moment.agent) else {
             return false;
         };
-        let Some(then) = self.at_seq(moment.agent, earlier_seq) else {
+        let session = self.session(moment.agent);
+        let Some(then) = self.at_seq(moment.agent, session, earlier_seq) else {
             return false;
         };
         let place = |beside: &Beside| {
@@ -81,7 +82,21 @@ impl Chronicle {
             return false;
         };
         let (seen, noise) = seen_pose(relation, &pose_now.inv_mul(&pose_then));
-        let from_now = composed(&now.covariance, &seen, &noise);
+        let is_kept = self.tie_beside(&now, &then, &seen, &noise, Standing::Pending);
+        self.fresh_matches += u32::from(is_kept);
+        is_kept
+    }
+
+    /// Ties two places beside anchors by a match; answers whether there is room for it.
+    pub(super) fn tie_beside(
+        &mut self,
+        now: &Beside,
+        then: &Beside,
+        seen: &Isometry3<f64>,
+        noise: &PoseCovariance,
+        standing: Standing,
+    ) -> bool {
+        let from_now = composed(&now.covariance, seen, noise);
         let both = PoseCovariance::from_matrix(&(from_now.matrix() + then.covariance.matrix()));
         let back = then.motion.inverse();
         let tie = Tie {
@@ -91,7 +106,7 @@ impl Chronicle {
             next_to: NONE,
             transform: now.motion * seen * back,
             covariance: both.after_motion(&back, &Vector6::zeros()),
-            standing: Standing::Pending,
+            standing,
         };
         if self.ties.len() >= self.settings.ties_max as usize {
             let doubtful = |tie: &&(u32, &Tie)| {
@@ -104,9 +119,7 @@ impl Chronicle {
                 .map(|(at, _)| at);
             oldest.map(|at| self.untie(at));
         }
-        let is_kept = self.tie(tie) != NONE;
-        self.fresh_matches += u32::from(is_kept);
-        is_kept
+        self.tie(tie) != NONE
     }
 
     /// Number of matches that are believed.
@@ -129,18 +142,22 @@ impl Chronicle {
     pub fn relax(&mut self) -> Vec<Correction> {
         self.told = 0;
         self.fresh_matches = 0;
-        let changed = self.judge();
-        let (graph, _, refuted) = self.relaxed();
-        if changed + refuted == 0 {
+        let agreed = std::mem::take(&mut self.agreed) as usize;
+        let mut coarse = self.coarse();
+        let judged = coarse.judge();
+        let (graph, _, refuted) = coarse.relaxed();
+        if agreed + judged + refuted == 0 {
             return Vec::new();
         }
         let marginals = graph.map.marginals();
-        let corrections = self.corrections(&graph, &marginals);
-        self.move_anchors(&graph);
+        let corrections = coarse.corrections(&graph, &marginals);
+        coarse.move_anchors(&graph);
+        self.take_over(&coarse);
         corrections
     }
 
-    /// The relaxed graph, after matches that do not fit into it have ceased to be believed; their number.
+    /// The relaxed graph, after matches that do not fit into it have ceased to be believed; their number. Moves the anchors on
+    /// the way: for a copy.
     pub(super) fn relaxed(&mut self) -> (Graph, Relaxed, usize) {
         let mut refuted = 0;
         let revision = self.revision;
@@ -148,7 +165,11 @@ impl Chronicle {
         loop {
             rounds += 1;
             let mut graph = self.graph(Among::Believed);
-            let relaxed = graph.map.relax(&settings());
+            let mut settings = settings();
+            if self.fits(&graph) {
+                settings.graduation = Graduation::None;
+            }
+            let relaxed = graph.map.relax(&settings);
             let before = refuted;
             for number in 0..self.ties.numbers() {
                 let link = graph.ties.get(number as usize).copied().flatten();
@@ -165,10 +186,21 @@ impl Chronicle {
             if refuted == before || rounds >= ROUNDS_MAX {
                 return (graph, relaxed, refuted);
             }
+            self.move_anchors(&graph);
         }
     }
 
-    /// Finds waiting matches that agree with the map or with one another, and believes them; answers their number.
+    /// Whether a graph is near enough to where the matches that it believes have it for their kernels to pull.
+    fn fits(&self, graph: &Graph) -> bool {
+        let links = graph.ties.iter().zip(0..);
+        links
+            .filter_map(|(link, number)| Some(((*link)?, self.ties.get(number)?)))
+            .filter(|(_, tie)| tie.standing == Standing::Accepted)
+            .all(|(link, _)| graph.map.squared_error(link) <= CONTRADICTS)
+    }
+
+    /// Finds waiting matches that agree with the map or with one another, and believes them; answers their number. Moves the
+    /// anchors to where all that are believed have them: for a copy.
     pub(super) fn judge(&mut self) -> usize {
         if !self.ties.iter().any(|(_, tie)| waits(tie)) {
             return 0;
@@ -213,6 +245,9 @@ impl Chronicle {
             if let Some(tie) = self.ties.get_mut(number, revision) {
                 tie.standing = Standing::Accepted;
             }
+        }
+        if self.fits(&all) {
+            self.move_anchors(&all);
         }
         accepted.len()
     }
@@ -271,12 +306,12 @@ impl Chronicle {
             let Some(node) = node.filter(|_| !life.is_fresh) else {
                 continue;
             };
-            let covariance = marginals
-                .pose(node)
-                .map(|covariance| composed(&covariance, &life.since, &life.covariance));
+            let covariance = marginals.pose(node).map(|covariance| {
+                composed(&covariance, life.since.motion(), &life.since.covariance())
+            });
             corrections.push(Correction {
                 agent,
-                pose: graph.map.pose(node) * life.since,
+                pose: graph.map.pose(node) * life.since.motion(),
                 covariance,
             });
         }
@@ -294,45 +329,6 @@ impl Chronicle {
                 anchor.pose = *graph.map.pose(node);
                 anchor.is_in_map = true;
             }
-        }
-        for agent in 0..self.lives.len() {
-            let Some(life) = self.lives.get(agent) else {
-                continue;
-            };
-            let newest = self.anchors.get(life.newest).map(|anchor| anchor.pose);
-            if let (Some(pose), true) = (newest, life.is_in_map)
-                && let Some(life) = self.lives.get_mut(agent, revision)
-            {
-                life.pose = pose * life.since;
-            }
-        }
-    }
-
-    /// Where an agent was at a sample of its session. Walks back to it.
-    fn at_seq(&self, agent: u32, seq: u64) -> Option<Beside> {
-        let life = self.lives.get(agent as usize)?;
-        if seq > life.seq {
-            return None;
-        }
-        let mut later = (life.seq, life.since, life.covariance);
-        let (mut number, mut until_seq) = (life.newest, life.until_seq);
-        loop {
-            let anchor = self.anchors.get(number)?;
-            if anchor.session != life.session {
-                return None;
-            }
-            if anchor.seq <= seq {
-                let (end, motion, covariance) = later;
-                let way = end.saturating_sub(until_seq).max(1) as f64;
-                let share = seq.saturating_sub(until_seq) as f64 / way;
-                return Some(beside(number, &motion, &covariance, share));
-            }
-            if anchor.begins {
-                return None;
-            }
-            later = (anchor.seq, anchor.motion, anchor.covariance);
-            number = anchor.previous;
-            until_seq = self.anchors.get(number)?.until_seq;
         }
     }
 }
@@ -356,16 +352,22 @@ fn agrees_with(tie: &Tie, graph: &Graph, marginals: &Marginals<'_>) -> bool {
     let (Some(from), Some(to)) = (node(tie.from), node(tie.to)) else {
         return false;
     };
-    let Some(spread) = marginals.relative_pose(from, to) else {
-        return false;
-    };
     let own = tie.covariance.matrix();
     let least = DEVIATION_MIN * DEVIATION_MIN;
-    let is_known =
-        (0..6).all(|k| spread.matrix()[(k, k)] <= VAGUER_MAX * VAGUER_MAX * (own[(k, k)] + least));
     let expected = graph.map.pose(from).inv_mul(graph.map.pose(to));
     let (linear, angular) = se3::log(&expected.inv_mul(&tie.transform));
     let off = Vector6::from_iterator(linear.iter().chain(angular.iter()).copied());
+    // One that is too far off in one direction is so for every map that is sure enough: its covariance, which takes
+    // long to find, need not be known.
+    let vaguest = VAGUER_MAX * VAGUER_MAX + 1.0;
+    if (0..6).any(|k| off[k] * off[k] > AGREES * vaguest * (own[(k, k)] + least)) {
+        return false;
+    }
+    let Some(spread) = marginals.relative_pose(from, to) else {
+        return false;
+    };
+    let is_known =
+        (0..6).all(|k| spread.matrix()[(k, k)] <= VAGUER_MAX * VAGUER_MAX * (own[(k, k)] + least));
     let whole = spread.matrix() + own + Matrix6::from_diagonal_element(least);
     let inverse = whole.try_inverse();
     is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= AGREES)

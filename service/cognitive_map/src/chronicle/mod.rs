@@ -15,13 +15,18 @@ mod checkpoint;
     reason = "the noun of the module has a file of its own"
 )]
 mod chronicle;
+mod coarse;
 mod landmarks;
 mod life;
 mod matches;
+mod milestones;
 mod refine;
+mod revisit;
+mod revisited;
 mod settings;
 mod sighting;
 mod slots;
+mod smoothing;
 mod thinning;
 mod tie;
 
@@ -29,4 +34,5 @@ pub use checkpoint::{ChroniclePage, CorruptChronicle};
 pub use chronicle::{Chronicle, Moment};
 pub use matches::Correction;
 pub use refine::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
+pub use revisited::Viewed;
 pub use settings::ChronicleSettings;

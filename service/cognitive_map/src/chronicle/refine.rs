@@ -126,7 +126,7 @@ impl Chronicle {
         let mut number = life.newest;
         let mut later = RefinedPose {
             stamp_ns: life.stamp_ns,
-            pose: self.now(life.newest, &life.since, graph),
+            pose: self.now(life.newest, life.since.motion(), graph),
         };
         if life.newest != NONE {
             poses.push(later);
@@ -172,8 +172,9 @@ impl Chronicle {
         for (number, anchor) in self.anchors.iter() {
             graph.poses[number as usize] = self.add_pose(number, anchor, &mut graph.map);
         }
+        let motions = self.recalibrated();
         for (number, anchor) in self.anchors.iter() {
-            self.add_motion(number, anchor, &mut graph);
+            self.add_motion(number, anchor, motions[number as usize], &mut graph);
         }
         for (number, tie) in self.ties.iter() {
             graph.ties[number as usize] = self.add_tie(tie, among, &mut graph);
@@ -210,7 +211,13 @@ impl Chronicle {
         Some(map.add_pose(pose, freedom))
     }
 
-    fn add_motion(&self, number: u32, anchor: &Anchor, graph: &mut Graph) {
+    fn add_motion(
+        &self,
+        number: u32,
+        anchor: &Anchor,
+        transform: Isometry3<f64>,
+        graph: &mut Graph,
+    ) {
         let Some(life) = self.lives.get(anchor.agent as usize) else {
             return;
         };
@@ -222,7 +229,7 @@ impl Chronicle {
         let link = Link::Between {
             from,
             to,
-            transform: anchor.motion,
+            transform,
             information: information(&anchor.covariance, life.is_planar),
         };
         graph.map.add_link(link, Kernel::Gaussian).ok();

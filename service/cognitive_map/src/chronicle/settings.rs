@@ -5,7 +5,7 @@ use crate::settings::Settings;
 /// Limits of a chronicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChronicleSettings {
-    /// Anchors at most. An anchor with a motion takes about 400 bytes.
+    /// Anchors at most. An anchor with a motion takes about 600 bytes.
     pub anchors_max: u32,
     /// Sightings at most. One takes about 220 bytes.
     pub sightings_max: u32,

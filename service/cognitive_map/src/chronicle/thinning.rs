@@ -122,7 +122,7 @@ impl Chronicle {
     }
 
     /// Takes an anchor out of its chain.
-    fn dissolve(&mut self, number: u32) {
+    pub(super) fn dissolve(&mut self, number: u32) {
         let revision = self.revision;
         let Some(anchor) = self.anchors.get(number).cloned() else {
             return;
@@ -134,14 +134,19 @@ impl Chronicle {
         self.hand_over(number, &anchor, neighbour);
         if let Some(next) = self.anchors.get_mut(anchor.next, revision) {
             let (motion, covariance) = (next.motion, next.covariance);
+            let calibrated = next.calibrated;
             next.previous = anchor.previous;
             next.unevenness_m = unevenness_m;
             if anchor.begins {
                 next.begins = true;
                 next.motion = Isometry3::identity();
                 next.covariance = PoseCovariance::zero();
+                next.calibrated = calibrated.without_motion();
             } else if !next.begins {
-                next.motion = anchor.motion * motion;
+                let before =
+                    { anchor.calibrated }.corrected_by(&anchor.motion, &calibrated.calibration);
+                next.motion = before * motion;
+                next.calibrated = anchor.calibrated.then(&calibrated);
                 next.motion.rotation.renormalize_fast();
                 next.covariance = composed(&anchor.covariance, &motion, &covariance);
             }

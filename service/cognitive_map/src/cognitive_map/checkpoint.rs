@@ -13,6 +13,8 @@
 //! 8     channel · 2²⁶ + page      up to 16 KiB of places' memories of a channel of descriptors
 //! 9     0                         the joint estimate of agents and landmarks
 //! 10..  page                      the chronicle, by part
+//! 32    0                         objects: counts, names of channels
+//! 33    object                    an object
 //! ```
 //!
 //! A page is a count (u16) and its items one after the other, little endian, floats as their bits. Where
@@ -40,8 +42,8 @@ use crate::state::{CorruptState, State, StateReader, StateWriter};
 use crate::trip::LEG_PAGES_MAX;
 
 /// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps,
-/// version 3 no joint estimate and no chronicle.
-const VERSION: u16 = 4;
+/// version 3 no joint estimate and no chronicle, version 4 no views in it and no objects.
+const VERSION: u16 = 5;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;
@@ -55,6 +57,8 @@ const DESCRIPTORS: u8 = 8;
 const ESTIMATE: u8 = 9;
 /// The chronicle's part 0; its other parts are the next kinds.
 const CHRONICLE: u8 = 10;
+const OBJECTS: u8 = 32;
+const OBJECT: u8 = 33;
 
 /// One page of a checkpoint. A later page of the same kind and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -126,6 +130,7 @@ impl CognitiveMap {
             }))
             .chain(self.estimate_page(since))
             .chain(self.chronicle_pages(since))
+            .chain(self.object_pages(since))
     }
 
     /// The map of a checkpoint. It has the digest of the map that wrote it, and goes on like it.
@@ -158,6 +163,8 @@ impl CognitiveMap {
         let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
         map.places.skip_to(count(header.places));
         map.trips.skip_to(count(header.trips));
+        let objects = pages.split_off(&(OBJECTS, 0));
+        map.restore_objects(objects)?;
         let lived = pages.split_off(&(CHRONICLE, 0));
         map.restore_chronicle(lived)?;
         let mut trips = Vec::new();
@@ -257,6 +264,51 @@ impl CognitiveMap {
             .map_err(|_| CorruptCheckpoint::DamagedPage { kind, index })?;
         self.chronicle = Arc::new(chronicle);
         Ok(())
+    }
+
+    /// The objects that changed.
+    fn object_pages(&self, since_revision: u64) -> impl Iterator<Item = CheckpointPage> {
+        let is_new = self.revision > since_revision && !self.objects.is_untouched();
+        let head = is_new.then(|| {
+            let mut out = StateWriter::default();
+            self.objects.write_head(&mut out);
+            page_of(OBJECTS, 0, out)
+        });
+        let objects = self.objects.changed_since(since_revision);
+        head.into_iter()
+            .chain(objects.map(|(index, bytes)| CheckpointPage {
+                kind: OBJECT,
+                index,
+                bytes,
+            }))
+    }
+
+    /// Reads the objects; a map in which nothing has happened has none.
+    fn restore_objects(
+        &mut self,
+        mut pages: BTreeMap<(u8, u32), Vec<u8>>,
+    ) -> Result<(), CorruptCheckpoint> {
+        let damaged = |kind, index| CorruptCheckpoint::DamagedPage { kind, index };
+        let Some(head) = pages.remove(&(OBJECTS, 0)) else {
+            return match pages.keys().next() {
+                None => Ok(()),
+                Some(&(kind, index)) => Err(damaged(kind, index)),
+            };
+        };
+        let count = self.objects.read_head(&head);
+        let count = count.map_err(|_| damaged(OBJECTS, 0))?;
+        let mut objects = BTreeMap::new();
+        for ((kind, index), bytes) in pages {
+            if kind != OBJECT {
+                return Err(damaged(kind, index));
+            }
+            objects.insert(index, bytes);
+        }
+        if objects.len() != count as usize {
+            return Err(CorruptCheckpoint::DigestMismatch);
+        }
+        let restored = self.objects.restore(&objects);
+        restored.map_err(|_| damaged(OBJECT, 0))
     }
 
     /// Adds a page.

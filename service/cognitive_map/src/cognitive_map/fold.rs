@@ -10,6 +10,7 @@ use crate::estimation::Estimator;
 use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
 use crate::landmark::LandmarkMap;
+use crate::object::ObjectMemory;
 use crate::percept::PerceptMap;
 use crate::place::{PlaceId, PlaceMap};
 use crate::record::{AgentId, SkipReason};
@@ -33,6 +34,7 @@ pub(super) struct Fold<'a> {
     pub(super) trips: &'a mut TripMap,
     pub(super) landmarks: &'a mut LandmarkMap,
     pub(super) percepts: &'a mut PerceptMap,
+    pub(super) objects: &'a mut ObjectMemory,
     pub(super) estimator: &'a mut Estimator,
     pub(super) chronicle: &'a mut Chronicle,
     pub(super) names: &'a BTreeMap<Label, AgentId>,
@@ -70,6 +72,7 @@ impl Fold<'_> {
             self.stamp_ns = stamp_ns;
         }
         self.end_trip(TripEnd::SessionEnd);
+        self.end_episode();
         let before = self.agent.session.replace(session);
         self.agent.next_seq = 0;
         self.agent.stamp_ns = None;
@@ -93,6 +96,7 @@ impl Fold<'_> {
         // Motion was lost, so nothing measured joins what came before to what comes after.
         if reason == SkipReason::Lost {
             self.end_trip(TripEnd::Gap);
+            self.end_episode();
         }
         self.emit(EventKind::SamplesSkipped { from, to, reason });
     }
@@ -114,6 +118,7 @@ impl Fold<'_> {
             SampleBody::Sighting(sighting) => self.sighting(sighting),
             SampleBody::StartPose(start) => self.start_pose(start),
             SampleBody::Marker(marker) => self.marker(marker),
+            SampleBody::Object(mark) => self.object_mark(mark),
         }
         self.rest();
     }
@@ -184,7 +189,7 @@ impl Fold<'_> {
             self.emit(EventKind::AgentPlaced { position });
             return;
         }
-        let Some((pose, covariance)) = self.estimator.pose(number) else {
+        let Some(pose) = self.estimator.in_frame(number) else {
             return;
         };
         let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
@@ -192,9 +197,7 @@ impl Fold<'_> {
         let entered = |module, reference| {
             events.extend(cell_entered(placed, agent, stamp_ns, module, reference));
         };
-        self.agent
-            .body
-            .follow(&pose, &covariance, self.modules, entered);
+        self.agent.body.follow(pose, self.modules, entered);
         if let Some(evidence) = self.estimator.evidence(number) {
             self.agent.evidence = *evidence;
         }
@@ -202,8 +205,8 @@ impl Fold<'_> {
 
     /// Puts the agent where the estimate has it, without a way there.
     fn stand(&mut self) {
-        if let Some((pose, covariance)) = self.estimator.pose(self.agent_id.0) {
-            self.agent.body.place(&pose, &covariance, self.modules);
+        if let Some(pose) = self.estimator.in_frame(self.agent_id.0) {
+            self.agent.body.place(pose, self.modules);
         }
         self.agent.placed = true;
         self.agent.place = None;

@@ -6,6 +6,7 @@ mod fold;
 mod forget;
 mod header;
 mod motion;
+mod objects;
 mod predict;
 mod read;
 mod remember;
@@ -23,6 +24,7 @@ use crate::estimation::{Estimator, Parameters};
 use crate::event::{Event, EventKind};
 use crate::grid::GridModules;
 use crate::landmark::LandmarkMap;
+use crate::object::ObjectMemory;
 use crate::paged::PagedVec;
 use crate::percept::PerceptMap;
 use crate::place::PlaceMap;
@@ -61,6 +63,7 @@ pub struct CognitiveMap {
     trips: TripMap,
     landmarks: LandmarkMap,
     percepts: PerceptMap,
+    objects: ObjectMemory,
 }
 
 impl CognitiveMap {
@@ -79,13 +82,14 @@ impl CognitiveMap {
             trips: TripMap::default(),
             landmarks: LandmarkMap::default(),
             percepts: PerceptMap::default(),
+            objects: ObjectMemory::default(),
         }
     }
 
     /// Applies the next record of the journal, and appends to `events` what it brought about.
     ///
     /// Every record is legal. One that says nothing new has no effect at all: the enrolment of an
-    /// agent that is there (or is not next in line), a sample of an unknown agent, of an earlier
+    /// agent that is there (or is not next in line), a lesson that is not next in line, a sample of an unknown agent, of an earlier
     /// session, or with a sequence number that has been applied or skipped. A sample whose number is
     /// ahead first skips the missing ones as [`SkipReason::Lost`]. Work and memory per sample are
     /// bounded, whatever the size of the map.
@@ -148,6 +152,23 @@ impl CognitiveMap {
                 fold.skip(*to, *reason);
                 fold.finish();
             }
+            Record::TeachObject {
+                number,
+                name,
+                lesson,
+            } => {
+                if self.objects.awaits(*number) {
+                    self.revision += 1;
+                    let now = Clock::at(self.revision, &self.settings);
+                    self.objects.teach(name, lesson, now, self.revision);
+                }
+            }
+            Record::ForgetObject { number, name } => {
+                if self.objects.awaits(*number) {
+                    self.revision += 1;
+                    self.objects.forget(name, self.revision);
+                }
+            }
         }
     }
 
@@ -180,6 +201,7 @@ impl CognitiveMap {
             chronicle,
             names: &self.names,
             percepts: &mut self.percepts,
+            objects: &mut self.objects,
             agent_id,
             held: agent.holds(),
             stamp_ns: agent.stamp_ns.unwrap_or(0),

@@ -23,9 +23,16 @@ impl Fold<'_> {
         let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
         let increment = motion.increment();
         let step = self.estimator.motion(agent.0, stamp_ns, motion);
-        self.chronicle
-            .motion(&self.moment(), &step.increment, &step.variance);
+        self.chronicle.motion(
+            &self.moment(),
+            &step.increment,
+            &step.variance,
+            &step.calibrated,
+        );
         self.remember_what_was_settled();
+        if let Some(episode) = &mut self.agent.episode {
+            episode.go(&step.increment, &step.variance);
+        }
         let events = &mut *self.events;
         let entered = |module, reference| {
             events.extend(cell_entered(placed, agent, stamp_ns, module, reference));
@@ -38,8 +45,7 @@ impl Fold<'_> {
             return;
         }
         if let Some(leg) = &mut self.agent.recorder.leg {
-            let noise_sd = step.variance.map(f64::sqrt);
-            leg.extend(increment, &noise_sd, increment.translation.vector.norm());
+            leg.extend(increment, &step.variance);
         }
         let drawn = match self.settings.recruitment {
             Recruitment::Novelty => false,
@@ -129,8 +135,9 @@ impl Fold<'_> {
             return None;
         }
         let rotation = self.agent.body.in_map().rotation;
-        let covariance = self.agent.body.covariance().in_map_axes(&rotation);
+        let covariance = self.estimator.covariance(self.agent_id.0)?;
         let position_sd_m = covariance
+            .in_map_axes(&rotation)
             .diagonal()
             .fixed_rows::<3>(0)
             .map(|x| x.max(0.0).sqrt());
@@ -158,14 +165,14 @@ impl Fold<'_> {
             Some(leg) if leg.from() == place => return,
             Some(leg) => {
                 let body = &self.agent.body;
-                let done = leg.finish(place, self.stamp_ns, body.in_odom(), body.in_map());
+                let done = leg.finish(place, self.stamp_ns, body.in_map());
                 let start_stamp_ns = leg.start_stamp_ns();
                 self.record(done, start_stamp_ns);
             }
             None => {}
         }
         let body = &self.agent.body;
-        let leg = LegUnderWay::start(place, self.stamp_ns, body.in_odom(), body.in_map());
+        let leg = LegUnderWay::start(place, self.stamp_ns, body.in_map());
         self.agent.recorder.leg = Some(leg);
     }
 

@@ -4,8 +4,9 @@ use nalgebra::Point3;
 
 use super::CognitiveMap;
 use super::header::Header;
-use crate::agent::Agent;
+use crate::agent::{Agent, Status};
 use crate::digest::Digest;
+use crate::geometry::PoseCovariance;
 use crate::grid::GridModules;
 use crate::landmark::{Landmark, LandmarkId};
 use crate::percept::{Channel, ChannelId, Remembered};
@@ -49,6 +50,7 @@ impl CognitiveMap {
         self.percepts.write_digests(&mut out);
         self.estimator.write(&mut out);
         self.chronicle.digest().0.write(&mut out);
+        self.objects.write_digests(&mut out);
         out.digest()
     }
 
@@ -70,6 +72,21 @@ impl CognitiveMap {
     /// An agent.
     pub fn agent(&self, agent: AgentId) -> Option<&Agent> {
         self.agents.get(agent.0 as usize)
+    }
+
+    /// Covariance of an agent's pose, as of its latest record or of a later one that corrected it.
+    pub fn covariance(&self, agent: AgentId) -> Option<PoseCovariance> {
+        self.estimator.covariance(agent.0)
+    }
+
+    /// How well an agent is localised.
+    pub fn status(&self, agent: AgentId) -> Option<Status> {
+        let position_sd_m = self.covariance(agent)?.position_sd_m();
+        Some(Status::of(
+            self.agent(agent)?,
+            position_sd_m,
+            &self.settings,
+        ))
     }
 
     /// Number of places.

@@ -3,6 +3,7 @@
 use super::CognitiveMap;
 use super::fold::Fold;
 use crate::chronicle::{Moment, Refined};
+use crate::experience::ExperienceMap;
 
 /// Number of the frame that is the map's.
 const MAP: usize = 0;
@@ -69,5 +70,16 @@ impl CognitiveMap {
     /// relaxed. A function of the map alone; takes time in proportion to what is remembered.
     pub fn refined(&self) -> Refined {
         self.chronicle.refine()
+    }
+
+    /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in the making as
+    /// [`refined`](Self::refined).
+    pub fn experience_map(&self) -> ExperienceMap {
+        self.chronicle.experience_map()
+    }
+
+    /// Number of matches and revisits that are believed.
+    pub fn closure_count(&self) -> usize {
+        self.chronicle.n_matches_believed()
     }
 }

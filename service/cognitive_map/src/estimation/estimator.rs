@@ -154,8 +154,9 @@ impl Estimator {
         seat.stamp_ns = None;
         let widen = |traveller: &mut Traveller| {
             traveller.mover.history.clear();
+            let covariance = traveller.mover.covariance_mut();
             for k in 0..6 {
-                traveller.mover.covariance[(k, k)] += sd[k] * sd[k];
+                covariance[(k, k)] += sd[k] * sd[k];
             }
         };
         if let Some(apart) = &mut seat.apart {
@@ -166,7 +167,7 @@ impl Estimator {
             if let Some(index) = frame.member(agent) {
                 let member = &mut frame.members[index];
                 widen(member.traveller_mut());
-                let own = &member.traveller.mover.covariance;
+                let own = member.traveller.mover.covariance();
                 frame.covariance.set_diagonal(member.offset, own);
             }
         }
@@ -359,6 +360,11 @@ impl Estimator {
     pub fn pose(&self, agent: u32) -> Option<(Isometry3<f64>, PoseCovariance)> {
         let mover = self.mover(agent)?;
         Some((mover.pose, mover.pose_covariance()))
+    }
+
+    /// Covariance of the pose of an agent.
+    pub fn covariance(&self, agent: u32) -> Option<PoseCovariance> {
+        Some(self.mover(agent)?.pose_covariance())
     }
 
     /// Pose of an agent in its frame.

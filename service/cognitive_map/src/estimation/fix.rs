@@ -75,7 +75,7 @@ impl Frame {
         self.flush();
         let member = &self.members[index];
         let mover = member.mover();
-        let own: Matrix6<f64> = mover.covariance.fixed_view::<6, 6>(0, 0).into_owned();
+        let own: Matrix6<f64> = mover.covariance().fixed_view::<6, 6>(0, 0).into_owned();
         let (linear, angular) = se3::log(&mover.pose.inv_mul(told.pose));
         let innovation = Vector6::from_fn(|k, _| if k < 3 { linear[k] } else { angular[k - 3] });
         // What is known without error is left alone, e.g. the height of a robot on a floor.

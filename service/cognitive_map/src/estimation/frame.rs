@@ -74,10 +74,10 @@ impl Member {
 
 impl Frame {
     /// Lets an agent take part that nothing ties to the others yet.
-    pub(super) fn join(&mut self, agent: u32, traveller: Arc<Traveller>) {
+    pub(super) fn join(&mut self, agent: u32, mut traveller: Arc<Traveller>) {
         let offset = self.covariance.grow(BODY_DIM);
-        self.covariance
-            .set_diagonal(offset, &traveller.mover.covariance);
+        let own = Arc::make_mut(&mut traveller).mover.covariance_mut();
+        self.covariance.set_diagonal(offset, own);
         self.members.push(Member {
             agent,
             offset,
@@ -170,9 +170,9 @@ impl Frame {
     /// the others waits until it is needed.
     pub(super) fn flush(&mut self) {
         for member in &mut self.members {
-            if member.mover().is_stale {
+            if member.mover().is_stale() {
                 let transition = member.traveller_mut().mover.flush();
-                let own = &member.traveller.mover.covariance;
+                let own = member.traveller.mover.covariance();
                 self.covariance.transform(member.offset, &transition, own);
             }
         }
@@ -187,11 +187,11 @@ impl Frame {
             let out_of_plane = matches!(k, 2..=4);
             if !(mover.is_planar && out_of_plane) {
                 let sd = if k < 3 { sd_m } else { sd_rad };
-                mover.covariance[(k, k)] += sd * sd;
+                mover.covariance_mut()[(k, k)] += sd * sd;
             }
         }
         self.covariance
-            .set_diagonal(member.offset, &member.traveller.mover.covariance);
+            .set_diagonal(member.offset, member.traveller.mover.covariance());
     }
 
     /// Corrects everything by what an observer's sighting tells, and carries the errors over to the
@@ -249,8 +249,8 @@ impl Frame {
             let own = self.covariance.block(member.offset, member.offset);
             let own = axes * own * axes.transpose();
             self.covariance.transform(member.offset, &axes, &own);
-            member.traveller_mut().mover.covariance =
-                self.covariance.block(member.offset, member.offset);
+            let own = self.covariance.block(member.offset, member.offset);
+            *member.traveller_mut().mover.covariance_mut() = own;
         }
     }
 }

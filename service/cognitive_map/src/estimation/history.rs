@@ -1,5 +1,7 @@
 //! Where odometry was lately: other agents look back, and streams of agents interleave.
 
+use std::collections::VecDeque;
+
 use nalgebra::Isometry3;
 
 use crate::geometry::se3;
@@ -12,7 +14,7 @@ const INTERVAL_NS: i64 = 50_000_000;
 /// Odometry's poses at the latest instants, oldest first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct History {
-    pub(super) instants: Vec<(i64, Isometry3<f64>)>,
+    pub(super) instants: VecDeque<(i64, Isometry3<f64>)>,
     /// The latest instant of all, which need not be kept.
     pub(super) latest: Option<(i64, Isometry3<f64>)>,
 }
@@ -22,11 +24,11 @@ impl History {
     pub(super) fn note(&mut self, stamp_ns: i64, in_odom: &Isometry3<f64>) {
         self.latest = Some((stamp_ns, *in_odom));
         let is_due = |&(last, _): &(i64, _)| stamp_ns.saturating_sub(last) >= INTERVAL_NS;
-        if self.instants.last().is_none_or(is_due) {
+        if self.instants.back().is_none_or(is_due) {
             if self.instants.len() == KEPT {
-                self.instants.remove(0);
+                self.instants.pop_front();
             }
-            self.instants.push((stamp_ns, *in_odom));
+            self.instants.push_back((stamp_ns, *in_odom));
         }
     }
 

@@ -81,7 +81,7 @@ impl Frame {
         }
         for member in &mut self.members[newcomers..] {
             let own = self.covariance.block(member.offset, member.offset);
-            member.traveller_mut().mover.covariance = own;
+            *member.traveller_mut().mover.covariance_mut() = own;
         }
         for index in 0..twins.len() {
             self.equate(&mut twins, index, parameters);

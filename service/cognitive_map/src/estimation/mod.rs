@@ -27,6 +27,7 @@
 //! - **Frames.** Agents whose place in the map is unknown have frames of their own until enough points
 //!   are known in both.
 
+mod calibration;
 mod covariance;
 mod dormant;
 mod estimator;
@@ -45,6 +46,7 @@ mod sight;
 mod state;
 mod tie;
 
+pub use calibration::{Calibrated, Calibration};
 pub use estimator::Estimator;
 pub use outcome::{Evidence, Merged, Settled, Step, Taken};
 pub use parameters::Parameters;

@@ -1,12 +1,15 @@
 //! A body that moves: its pose, what its odometry gets wrong, and the covariance of both.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
+use std::ops::SubAssign;
 
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
+
+use super::calibration::{Calibrated, Calibration};
 use super::history::History;
 use super::outcome::Step;
 use super::parameters::Parameters;
 use super::tie::{Tie, body_by_tie};
-use crate::geometry::{PoseCovariance, se3};
+use crate::geometry::{MotionSum, PoseCovariance, se3};
 use crate::sample::Motion;
 
 /// Components of a body's error: translation and rotation of the pose (right perturbation), then
@@ -20,16 +23,10 @@ const CALIBRATION: usize = BODY_DIM - POSE;
 type BodyCovariance = SMatrix<f64, BODY_DIM, BODY_DIM>;
 type Tail = SMatrix<f64, POSE, CALIBRATION>;
 
-/// What odometry gets wrong all the time: reading = true · (1 + error) + bias.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Calibration {
-    /// Relative error of lengths.
-    pub(super) length: f64,
-    /// Relative error of angles.
-    pub(super) angle: f64,
-    /// Bias about the body axes \[rad/s\].
-    pub(super) bias_rad_s: Vector3<f64>,
-}
+/// Steps after which what a run added is carried over to the covariance.
+const RUN_STEPS_MAX: u32 = 64;
+/// Length of a run after which it is \[m\]: far from where it began, digits are lost.
+const RUN_LENGTH_MAX_M: f64 = 10.0;
 
 /// A body that moves.
 #[derive(Clone, Debug)]
@@ -37,18 +34,33 @@ pub(super) struct Mover {
     /// Pose in the frame of the estimate.
     pub(super) pose: Isometry3<f64>,
     pub(super) calibration: Calibration,
-    /// Covariance of the body's error, always up to date.
-    pub(super) covariance: BodyCovariance,
-    /// How the error of the pose since the last flush depends on that of the calibration then.
+    /// Covariance of the body's error where the run under way began.
+    pub(super) settled: BodyCovariance,
+    /// How the error of the pose there depends on that of the calibration at the last flush.
     pub(super) tail: Tail,
-    /// Motion since the last flush, as corrected.
+    /// Motion from the last flush until there, as corrected.
     pub(super) since_flush: Isometry3<f64>,
-    /// Whether there was any.
+    /// Whether there was any motion since the last flush, up to there.
     pub(super) is_stale: bool,
+    pub(super) run: Run,
     /// Where odometry was lately.
     pub(super) history: History,
     /// Whether all motion so far was in the body's x-y plane.
     pub(super) is_planar: bool,
+}
+
+/// Motion that has not been carried over to the covariance yet, about the axes of where it began.
+///
+/// To carry a covariance along with every step would be most of a step's work, and hardly any step is
+/// asked for it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Run {
+    pub(super) motion: MotionSum,
+    /// How its error depends on that of the calibration.
+    pub(super) tail: Tail,
+    /// Variances that the calibration gained. They count from the next run on: in one run, next to nothing.
+    pub(super) wander: SVector<f64, CALIBRATION>,
+    pub(super) steps: u32,
 }
 
 impl Mover {
@@ -61,36 +73,37 @@ impl Mover {
         let mut mover = Self {
             pose,
             calibration: Calibration::default(),
-            covariance: BodyCovariance::zeros(),
+            settled: BodyCovariance::zeros(),
             tail: Tail::zeros(),
             since_flush: Isometry3::identity(),
             is_stale: false,
+            run: Run::default(),
             history: History::default(),
             is_planar: true,
         };
         mover
-            .covariance
+            .settled
             .fixed_view_mut::<6, 6>(0, 0)
             .copy_from(covariance);
         let sd = parameters.calibration_sd();
         for (k, sd) in sd.iter().enumerate() {
-            mover.covariance[(POSE + k, POSE + k)] = sd * sd;
+            mover.settled[(POSE + k, POSE + k)] = sd * sd;
         }
         mover
     }
 
     /// The same body at another pose, whose error is correlated with nothing.
     pub(super) fn placed(mut self, pose: Isometry3<f64>, covariance: &Matrix6<f64>) -> Self {
+        self.flush();
         self.pose = pose;
-        let calibration: SMatrix<f64, 5, 5> = self.covariance.fixed_view::<5, 5>(6, 6).into_owned();
-        self.covariance = BodyCovariance::zeros();
-        self.covariance
+        let calibration: SMatrix<f64, 5, 5> = self.settled.fixed_view::<5, 5>(6, 6).into_owned();
+        self.settled = BodyCovariance::zeros();
+        self.settled
             .fixed_view_mut::<6, 6>(0, 0)
             .copy_from(covariance);
-        self.covariance
+        self.settled
             .fixed_view_mut::<5, 5>(6, 6)
             .copy_from(&calibration);
-        self.flush();
         self
     }
 
@@ -98,14 +111,36 @@ impl Mover {
     pub(super) fn carry_over(&mut self, tie: &Tie) {
         let by_tie = body_by_tie(&self.pose);
         let spread = by_tie * tie.covariance * by_tie.transpose();
-        let mut pose = self.covariance.fixed_view_mut::<6, 6>(0, 0);
+        let mut pose = self.covariance_mut().fixed_view_mut::<6, 6>(0, 0);
         pose += (spread + spread.transpose()) * 0.5;
         self.pose = tie.pose * self.pose;
     }
 
     /// Covariance of the pose.
     pub(super) fn pose_covariance(&self) -> PoseCovariance {
-        PoseCovariance::from_matrix(&self.covariance.fixed_view::<6, 6>(0, 0).into_owned())
+        let covariance = if self.run.steps == 0 {
+            self.settled
+        } else {
+            self.moved().0
+        };
+        PoseCovariance::from_matrix(&covariance.fixed_view::<6, 6>(0, 0).into_owned())
+    }
+
+    /// Covariance of the body's error, which nothing waits to be added to.
+    pub(super) fn covariance(&self) -> &BodyCovariance {
+        debug_assert!(self.run.steps == 0, "the run must be settled before");
+        &self.settled
+    }
+
+    /// The same, up to date and to be changed.
+    pub(super) fn covariance_mut(&mut self) -> &mut BodyCovariance {
+        self.settle();
+        &mut self.settled
+    }
+
+    /// Whether there was any motion since the last flush.
+    pub(super) fn is_stale(&self) -> bool {
+        self.is_stale || self.run.steps > 0
     }
 
     /// Moves the body by what odometry read, over `duration_s`.
@@ -115,6 +150,12 @@ impl Mover {
     /// ```text
     /// ξ′ = Ad(Δ⁻¹) ξ + B c + n      B = | −Rᵀ t   0    0  |
     ///                                   |   0    −r   −Δt |
+    /// ```
+    ///
+    /// Gathered about the axes of where the run began, with its motion T until after the step:
+    ///
+    /// ```text
+    /// ξ_run = Ad(T) ξ′      tail += Ad(T) B
     /// ```
     pub(super) fn step(
         &mut self,
@@ -143,87 +184,109 @@ impl Mover {
         let corrected = lengths * (1.0 - self.calibration.length);
         let increment = Isometry3::from_parts(corrected.into(), rotation);
 
-        let matrix = rotation.to_rotation_matrix().into_inner();
-        let inverse = matrix.transpose();
-        let mut by_calibration = Tail::zeros();
-        by_calibration
-            .fixed_view_mut::<3, 1>(0, 0)
-            .copy_from(&-(inverse * lengths));
-        by_calibration
-            .fixed_view_mut::<3, 1>(3, 1)
-            .copy_from(&-angles);
-        for axis in 0..3 {
-            by_calibration[(3 + axis, 2 + axis)] = -time[axis];
-        }
-
         let noise_sd = parameters.motion_noise_sd(motion);
         let variance = noise_sd.component_mul(&noise_sd);
-        let path_m = lengths.norm();
-        let angle_rad = angles.norm();
-        self.propagate(&increment, &by_calibration, &variance);
+        let ahead = self.run.motion.motion().rotation * lengths;
+        let axes = self.run.motion.append(&increment, &variance);
+        let lever = self.run.motion.motion().translation.vector;
+        let mut turn = |column: usize, axis: &Vector3<f64>| {
+            let mut tail = self.run.tail.column_mut(column);
+            tail.fixed_rows_mut::<3>(0).sub_assign(&lever.cross(axis));
+            tail.fixed_rows_mut::<3>(3).sub_assign(axis);
+        };
+        turn(1, &(axes * angles));
+        for axis in 0..3 {
+            if time[axis] > 0.0 {
+                turn(2 + axis, &(axes.column(axis) * time[axis]));
+            }
+        }
+        let mut lengths_tail = self.run.tail.fixed_view_mut::<3, 1>(0, 0);
+        lengths_tail -= ahead;
         let wander = parameters.calibration_wander(
-            path_m,
-            angle_rad,
+            lengths.norm(),
+            angles.norm(),
             if is_rest { 0.0 } else { duration_s },
         );
-        for (k, variance) in wander.iter().enumerate() {
-            // Out of the plane a planar robot learns nothing, and so forgets nothing.
-            if k < 2 || free[k - 2] > 0.0 {
-                self.covariance[(POSE + k, POSE + k)] += variance;
-            }
+        // Out of the plane a planar robot learns nothing, and so forgets nothing.
+        let learns = SVector::<f64, CALIBRATION>::from([1.0, 1.0, free.x, free.y, free.z]);
+        let wander = wander.component_mul(&learns);
+        self.run.wander += wander;
+        self.run.steps += 1;
+        if self.run.steps >= RUN_STEPS_MAX
+            || lever.norm_squared() > RUN_LENGTH_MAX_M * RUN_LENGTH_MAX_M
+        {
+            self.settle();
         }
         let displacement = self.pose.rotation * increment.translation.vector;
         self.pose.translation.vector += displacement;
         self.pose.rotation *= increment.rotation;
         self.pose.rotation.renormalize_fast();
-        self.since_flush *= increment;
-        self.since_flush.rotation.renormalize_fast();
-        self.is_stale = true;
         Step {
             displacement,
             increment,
             variance,
+            calibrated: Calibrated {
+                calibration: self.calibration,
+                variance: SVector::from_fn(|k, _| self.settled[(POSE + k, POSE + k)]),
+                wander,
+                moving_s: if is_rest { 0.0 } else { duration_s },
+            },
         }
     }
 
-    /// Moves the covariance and the tail.
-    fn propagate(
-        &mut self,
-        increment: &Isometry3<f64>,
-        by_calibration: &Tail,
-        variance: &Vector6<f64>,
-    ) {
-        let pose: Matrix6<f64> = self.covariance.fixed_view::<6, 6>(0, 0).into_owned();
-        let cross: Tail = self.covariance.fixed_view::<6, 5>(0, 6).into_owned();
-        let own: SMatrix<f64, 5, 5> = self.covariance.fixed_view::<5, 5>(6, 6).into_owned();
-        let back = Shift::of_inverse(increment);
-        let moved_cross_only = back.times(&cross);
-        let spread = by_calibration * own;
-        let mixed = moved_cross_only * by_calibration.transpose();
-        let moved_rows = back.times(&pose);
-        let mut moved = back.times(&moved_rows.transpose());
-        moved += mixed + mixed.transpose() + spread * by_calibration.transpose();
-        for k in 0..6 {
-            moved[(k, k)] += variance[k];
-        }
-        let moved_cross = moved_cross_only + spread;
-        for row in 0..6 {
-            for column in row..6 {
-                let entry = moved[(row, column)];
-                self.covariance[(row, column)] = entry;
-                self.covariance[(column, row)] = entry;
+    /// The covariance after the run under way, and how the error of the pose then depends on that of the
+    /// calibration where the run began.
+    fn moved(&self) -> (BodyCovariance, Tail) {
+        let run = &self.run;
+        let pose: Matrix6<f64> = self.settled.fixed_view::<6, 6>(0, 0).into_owned();
+        let cross: Tail = self.settled.fixed_view::<6, 5>(0, 6).into_owned();
+        let own: SMatrix<f64, 5, 5> = self.settled.fixed_view::<5, 5>(6, 6).into_owned();
+        let back = Shift::of_inverse(run.motion.motion());
+        let spread = run.tail * own;
+        let mixed = cross * run.tail.transpose();
+        let gathered = pose
+            + run.motion.at_the_beginning()
+            + mixed
+            + mixed.transpose()
+            + spread * run.tail.transpose();
+        let pose = back.times(&back.times(&gathered).transpose());
+        let cross = back.times(&(cross + spread));
+        let mut covariance = self.settled;
+        for row in 0..POSE {
+            for column in row..POSE {
+                let entry = pose[(row, column)];
+                covariance[(row, column)] = entry;
+                covariance[(column, row)] = entry;
             }
             for column in 0..CALIBRATION {
-                let entry = moved_cross[(row, column)];
-                self.covariance[(row, POSE + column)] = entry;
-                self.covariance[(POSE + column, row)] = entry;
+                let entry = cross[(row, column)];
+                covariance[(row, POSE + column)] = entry;
+                covariance[(POSE + column, row)] = entry;
             }
         }
-        self.tail = back.times(&self.tail) + by_calibration;
+        for (k, wander) in run.wander.iter().enumerate() {
+            covariance[(POSE + k, POSE + k)] += wander;
+        }
+        (covariance, back.times(&run.tail))
+    }
+
+    /// Carries the run under way over to the covariance, and begins another one.
+    pub(super) fn settle(&mut self) {
+        if self.run.steps == 0 {
+            return;
+        }
+        let (covariance, tail) = self.moved();
+        let run = std::mem::take(&mut self.run);
+        self.settled = covariance;
+        self.tail = Shift::of_inverse(run.motion.motion()).times(&self.tail) + tail;
+        self.since_flush *= run.motion.motion();
+        self.since_flush.rotation.renormalize_fast();
+        self.is_stale = true;
     }
 
     /// The transition of the error since the last flush, which forgets it.
     pub(super) fn flush(&mut self) -> BodyCovariance {
+        self.settle();
         let mut transition = BodyCovariance::identity();
         let back = se3::adjoint(&self.since_flush.inverse());
         transition.fixed_view_mut::<6, 6>(0, 0).copy_from(&back);

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
+use super::calibration::Calibrated;
 use crate::sample::Relation;
 
 /// What became of an agent's sightings.
@@ -30,6 +31,8 @@ pub struct Step {
     /// Variances of the increment's noise along and about the body axes at its end \[m², rad²\]. The
     /// lasting errors of odometry come on top.
     pub variance: Vector6<f64>,
+    /// How the increment was corrected.
+    pub calibrated: Calibrated,
 }
 
 impl Step {
@@ -39,6 +42,7 @@ impl Step {
             displacement: Vector3::zeros(),
             increment: Isometry3::identity(),
             variance: Vector6::zeros(),
+            calibrated: Calibrated::default(),
         }
     }
 }

@@ -37,8 +37,8 @@ pub struct Parameters {
 impl Default for Parameters {
     fn default() -> Self {
         Self {
-            length_error_sd: 0.02,
-            angle_error_sd: 0.05,
+            length_error_sd: 0.05,
+            angle_error_sd: 0.1,
             bias_sd_rad_s: 0.004,
             calibration_renewal: 0.01,
             translation_sd_per_sqrt_m: 0.04,

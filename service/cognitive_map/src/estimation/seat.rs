@@ -78,7 +78,7 @@ impl Apart {
         // Nothing waits for what happened to the errors.
         mover.flush();
         if self.was_joint {
-            mover.covariance *= RETURN_WIDENING * RETURN_WIDENING;
+            *mover.covariance_mut() *= RETURN_WIDENING * RETURN_WIDENING;
         }
         self.traveller
     }

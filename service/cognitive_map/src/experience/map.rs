@@ -107,6 +107,17 @@ impl ExperienceMap {
         self.nodes[id.0 as usize].pose.translation.vector.into()
     }
 
+    /// Whether a pose stays where it is.
+    pub fn is_held(&self, id: PoseId) -> bool {
+        self.nodes[id.0 as usize].freedom() == Freedom::Held
+    }
+
+    /// Whether no pose moves out of the plane.
+    pub fn is_planar(&self) -> bool {
+        let mut poses = self.nodes.iter().filter(|node| !node.is_point());
+        poses.all(|node| node.freedom() != Freedom::Full)
+    }
+
     /// The links that count, in the order in which they were added.
     pub fn links(&self) -> impl Iterator<Item = &Link> {
         let on = self.links.iter().filter(|slot| slot.is_on);

@@ -1,8 +1,10 @@
 //! Geometry: rigid motions and their uncertainty.
 
 mod covariance;
+mod motion_sum;
 pub mod se3;
 mod se3_jacobian;
 
 pub use covariance::{PoseCovariance, upper_triangle};
+pub(crate) use motion_sum::MotionSum;
 pub use se3_jacobian::log_jacobian;

@@ -381,7 +381,7 @@ fn cosine(product: f32, scale: f32) -> f64 {
 }
 
 /// Scalar product of two vectors of one length.
-fn dot(a: &[f32], b: &[f32]) -> f32 {
+pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let (a, a_rest) = a.as_chunks::<LANES>();
     let (b, b_rest) = b.as_chunks::<LANES>();
     let mut sums = [0.0; LANES];

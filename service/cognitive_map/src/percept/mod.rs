@@ -13,7 +13,9 @@ mod moments;
 mod sketch;
 
 pub use channel::{Channel, ChannelId, ChannelKind};
+pub(crate) use descriptor::dot;
 pub(crate) use map::{CHANNEL_PAGES_MAX, Compared, PerceptMap};
+pub(crate) use moments::Moments;
 
 use crate::place::PlaceId;
 use crate::sample::{Descriptor, Label};

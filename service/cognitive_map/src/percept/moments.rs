@@ -27,7 +27,7 @@ state_of_struct!(Moments {
 
 impl Moments {
     /// Adds a value with a weight above zero.
-    pub(super) fn add(&mut self, value: f64, weight: f64) {
+    pub(crate) fn add(&mut self, value: f64, weight: f64) {
         self.count += 1;
         self.weight += weight;
         let off = value - self.mean;
@@ -36,28 +36,28 @@ impl Moments {
     }
 
     /// Lets all values so far count so much less: `keep` in \(0, 1\].
-    pub(super) fn fade(&mut self, keep: f64) {
+    pub(crate) fn fade(&mut self, keep: f64) {
         self.weight *= keep;
         self.squares *= keep;
     }
 
     /// Number of values.
-    pub(super) fn count(&self) -> u64 {
+    pub(crate) fn count(&self) -> u64 {
         self.count
     }
 
     /// Sum of the weights.
-    pub(super) fn weight(&self) -> f64 {
+    pub(crate) fn weight(&self) -> f64 {
         self.weight
     }
 
     /// Mean; 0 before the first value.
-    pub(super) fn mean(&self) -> f64 {
+    pub(crate) fn mean(&self) -> f64 {
         self.mean
     }
 
     /// Standard deviation √(S/W); 0 before the second value.
-    pub(super) fn sd(&self) -> f64 {
+    pub(crate) fn sd(&self) -> f64 {
         if self.weight > 0.0 {
             (self.squares.max(0.0) / self.weight).sqrt()
         } else {

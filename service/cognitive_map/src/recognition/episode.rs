@@ -126,15 +126,16 @@ impl Recognition {
                 *log = prior;
             }
         } else {
-            none += worth * self.none_log(library);
+            let best = objects.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+            none += worth * self.none_log(library, best.map(|&(object, _)| object));
             let fit = self.fit(library).min(0.0);
-            let best = objects
+            let most = objects
                 .iter()
                 .map(|object| object.1)
                 .fold(f64::NEG_INFINITY, f64::max);
             // The fit of what was learned is a normal number, that of anything else about evenly spread
             // below: the ratio of the two densities.
-            let misfit = UNKNOWN_PRIOR.ln() + best + prior + 0.5 * fit * fit - MISFIT_LOG;
+            let misfit = UNKNOWN_PRIOR.ln() + most + prior + 0.5 * fit * fit - MISFIT_LOG;
             if fit < 0.0 {
                 none = log_sum([none, misfit].into_iter());
             }
@@ -271,8 +272,9 @@ impl Recognition {
         (steps > 0).then(|| REACH_PER_STEP * self.steps_m[steps / 2])
     }
 
-    /// Log-likelihood of the contacts under something that was never learned, in the measure of the hypotheses.
-    fn none_log(&self, library: &ObjectLibrary) -> f64 {
+    /// Log-likelihood of the contacts under something that was never learned, in the measure of the hypotheses. `best` is the
+    /// object that it would be taken for.
+    fn none_log(&self, library: &ObjectLibrary, best: Option<ObjectId>) -> f64 {
         let extent_m = library.extent_m().max(1e-6);
         let asked = -(self.aimed as f64) * extent_m.ln();
         let steps = self.steps_m.len() as f64;
@@ -284,7 +286,8 @@ impl Recognition {
                         .map(|(_, s)| s.share(reach_m).max(1e-9).ln());
                     logs.sum::<f64>() / library.len().max(1) as f64
                 });
-                shifts.stranger - steps * shares + asked
+                let stranger = best.and_then(|best| shifts.strangers.get(&best));
+                stranger.copied().unwrap_or(0.0) - steps * shares + asked
             }
             // Of something of which only the size is known: anywhere within a step of the contact before, and any normal.
             Hypotheses::Poses(_) => {

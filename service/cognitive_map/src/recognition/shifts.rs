@@ -23,6 +23,8 @@ const OUTLIERS: f64 = 0.02;
 const PART_SHARE: f64 = 0.005;
 /// Most parts.
 const PARTS_MAX: usize = 16;
+/// Least share of the weight that places of other objects must have before they say what is beside them.
+const WEIGHT_MIN: f64 = 1e-9;
 /// Squared distance, in variances, beyond which a place is not the one that was touched: e⁻²⁵.
 const DISTANCE_MAX: f64 = 50.0;
 
@@ -72,8 +74,9 @@ pub(super) struct Shifts {
     pub(super) rotations: Vec<UnitQuaternion<f64>>,
     pub(super) all: Vec<Shift>,
     /// Log-likelihood of the contacts so far, but for those asked for, with something whose surface is
-    /// like those of the library; without the share of it within a step.
-    pub(super) stranger: f64,
+    /// like those of the library, but for the one that it would be taken for; without the share of it
+    /// within a step.
+    pub(super) strangers: BTreeMap<ObjectId, f64>,
 }
 
 impl Shifts {
@@ -81,7 +84,7 @@ impl Shifts {
         Self {
             rotations,
             all: Vec::new(),
-            stranger: 0.0,
+            strangers: BTreeMap::new(),
         }
     }
 
@@ -96,7 +99,9 @@ impl Shifts {
                 let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
                 let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
                 if let Some(nearest) = nearest {
-                    self.stranger += self.stranger_log(library, nearest, contact, drift);
+                    for (object, log) in self.stranger_logs(library, nearest, contact, drift) {
+                        *self.strangers.entry(object).or_default() += log;
+                    }
                 }
             }
             let all = std::mem::take(&mut self.all);
@@ -121,23 +126,25 @@ impl Shifts {
         self.prune(KEPT_MAX.max(BIRTHS_MAX >> before.len().min(31)));
     }
 
-    /// Log-density of a contact with something that was never learned, whose surface is like those of the library: the mean
-    /// over places of it, each taken for the one touched by `other`, weighed by how well it explains what was felt there.
+    /// Log-density of a contact with something that was never learned: the mean over places of the library, each taken for
+    /// the one touched by `other`, weighed by how well it explains what was felt there. By the object that it would be
+    /// taken for, whose own places do not count: what is felt nowhere else would otherwise be as like something
+    /// unknown as it is like that one.
     ///
     /// It is what a hypothesis that knows nothing else would expect, so that evidence for a map begins
     /// where the map explains more than a surface of its kind. Space filled evenly would be no rival: a step along
     /// any surface ends on most others, and neighbouring places feel alike on most.
-    fn stranger_log(
+    fn stranger_logs(
         &self,
         library: &ObjectLibrary,
         other: &Contact,
         contact: &Contact,
         drift: f64,
-    ) -> f64 {
+    ) -> BTreeMap<ObjectId, f64> {
         let step = contact.position_m - other.position_m;
         let noise = contact.position_sd_m * contact.position_sd_m + drift;
         let wide = library.wide();
-        let (mut sum, mut weights) = (0.0, 0.0);
+        let mut sums: BTreeMap<ObjectId, [f64; 4]> = BTreeMap::new();
         let mut turns = self.rotations.iter().cycle();
         for &(object, place) in library.samples() {
             let (Some(surface), Some(rotation)) = (library.surface(object), turns.next()) else {
@@ -158,11 +165,33 @@ impl Shifts {
                     density += (normal + felt - 0.5 * squared).exp() / (TAU * variance).powf(1.5);
                 }
             }
-            sum += weight * density / surface.patches.len() as f64;
-            weights += weight;
+            let density = density / surface.patches.len() as f64;
+            let [sum, weights, plain, count] = sums.entry(object).or_default();
+            *sum += weight * density;
+            *weights += weight;
+            *plain += density;
+            *count += 1.0;
         }
-        let typical = if weights > 0.0 { sum / weights } else { 0.0 };
-        ((1.0 - OUTLIERS) * typical + OUTLIERS * library.elsewhere()).ln()
+        let all = { sums.values() }.fold([0.0; 4], |all, own| {
+            std::array::from_fn(|k| all[k] + own[k])
+        });
+        // Of places of no other object, how a surface goes on is all that is known.
+        let [_, _, plain, count] = all;
+        let elsewhere = OUTLIERS * library.elsewhere();
+        { sums.into_iter() }
+            .map(|(object, [sum, weights, ..])| {
+                let (sum, weights) = (all[0] - sum, all[1] - weights);
+                let typical = if weights > WEIGHT_MIN * all[1] {
+                    sum / weights
+                } else {
+                    plain / count
+                };
+                (
+                    object,
+                    ((1.0 - OUTLIERS) * typical.max(0.0) + elsewhere).ln(),
+                )
+            })
+            .collect()
     }
 
     /// Every place taken for the one that was touched.

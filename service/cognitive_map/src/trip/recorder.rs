@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector6};
 
 use super::{Leg, TripId};
-use crate::geometry::PoseCovariance;
+use crate::geometry::MotionSum;
 use crate::place::PlaceId;
 use crate::state::state_of_struct;
 
@@ -21,12 +21,10 @@ pub(crate) struct Recorder {
 pub(crate) struct LegUnderWay {
     from: PlaceId,
     start_stamp_ns: i64,
-    /// Pose in `odom` at the start.
-    start_in_odom: Isometry3<f64>,
     /// Position in `map` at the start.
     start_in_map: Point3<f64>,
-    /// Covariance of the motion since the start.
-    covariance: PoseCovariance,
+    /// The motion since the start.
+    motion: MotionSum,
     length_m: f64,
 }
 
@@ -34,26 +32,19 @@ state_of_struct!(Recorder { trip, leg });
 state_of_struct!(LegUnderWay {
     from,
     start_stamp_ns,
-    start_in_odom,
     start_in_map,
-    covariance,
+    motion,
     length_m,
 });
 
 impl LegUnderWay {
     /// A leg that starts at a place, with the agent's present poses.
-    pub(crate) fn start(
-        from: PlaceId,
-        stamp_ns: i64,
-        in_odom: &Isometry3<f64>,
-        in_map: &Isometry3<f64>,
-    ) -> Self {
+    pub(crate) fn start(from: PlaceId, stamp_ns: i64, in_map: &Isometry3<f64>) -> Self {
         Self {
             from,
             start_stamp_ns: stamp_ns,
-            start_in_odom: *in_odom,
             start_in_map: in_map.translation.vector.into(),
-            covariance: PoseCovariance::zero(),
+            motion: MotionSum::default(),
             length_m: 0.0,
         }
     }
@@ -68,33 +59,22 @@ impl LegUnderWay {
         self.start_stamp_ns
     }
 
-    /// The agent moved.
+    /// The agent moved, with noise of these variances.
     ///
-    /// Only the covariance is accumulated. It could also be had from the agent's covariances at both
-    /// ends, but as a small difference of two numbers that grow without bound.
-    pub(crate) fn extend(
-        &mut self,
-        increment: &Isometry3<f64>,
-        noise_sd: &Vector6<f64>,
-        path_m: f64,
-    ) {
-        self.covariance = self.covariance.after_motion(increment, noise_sd);
-        self.length_m += path_m;
+    /// The covariance could also be had from the agent's covariances at both ends, but as a small
+    /// difference of two numbers that grow without bound.
+    pub(crate) fn extend(&mut self, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
+        self.motion.append(increment, variance);
+        self.length_m += increment.translation.vector.norm();
     }
 
     /// The leg, now that the next place is reached.
-    pub(crate) fn finish(
-        &self,
-        to: PlaceId,
-        stamp_ns: i64,
-        in_odom: &Isometry3<f64>,
-        in_map: &Isometry3<f64>,
-    ) -> Leg {
+    pub(crate) fn finish(&self, to: PlaceId, stamp_ns: i64, in_map: &Isometry3<f64>) -> Leg {
         Leg {
             from: self.from,
             to,
-            relative: self.start_in_odom.inv_mul(in_odom),
-            covariance: self.covariance,
+            relative: *self.motion.motion(),
+            covariance: self.motion.covariance(),
             displacement: in_map.translation.vector - self.start_in_map.coords,
             duration_s: interval_s(self.start_stamp_ns, stamp_ns),
             length_m: self.length_m,

@@ -1,6 +1,7 @@
 //! Laws of the chronicle.
 
 use cognitive_map::chronicle::{Chronicle, ChronicleSettings, Moment, Refined};
+use cognitive_map::estimation::Calibrated;
 use cognitive_map::experience::{
     ExperienceMap, Freedom, Kernel, Link, PoseInformation, PositionInformation, RelaxationSettings,
     Scale, SightingTarget,
@@ -91,7 +92,8 @@ impl Walk {
             let (t, r) = STEP_SD;
             let variance = Vector6::new(t * t, t * t, 0.0, 0.0, 0.0, r * r) / 3.0;
             let moment = self.moment(robot);
-            self.chronicle.motion(&moment, &read, &variance);
+            self.chronicle
+                .motion(&moment, &read, &variance, &Calibrated::default());
             self.paths[robot].push(self.truth[robot]);
         }
         if self.seq.is_multiple_of(3) {
@@ -357,14 +359,24 @@ fn an_agent_that_finds_its_place_takes_its_past_along() {
     let mut pose = Isometry3::identity();
     for seq in 1..=10 {
         pose *= step;
-        chronicle.motion(&moment(agent, seq, &pose), &step, &variance);
+        chronicle.motion(
+            &moment(agent, seq, &pose),
+            &step,
+            &variance,
+            &Calibrated::default(),
+        );
     }
     assert!(!chronicle.refine().agents[0].is_in_map);
     pose = tie * pose;
     chronicle.placed(agent, &tie);
     for seq in 11..=20 {
         pose *= step;
-        chronicle.motion(&moment(agent, seq, &pose), &step, &variance);
+        chronicle.motion(
+            &moment(agent, seq, &pose),
+            &step,
+            &variance,
+            &Calibrated::default(),
+        );
     }
     let refined = &chronicle.refine().agents[0];
     assert!(refined.is_in_map && refined.poses.len() == 20);
@@ -409,6 +421,7 @@ fn rest_is_remembered_as_rest() {
             &moment(agent, seq, &pose),
             &increment,
             &if moves { variance } else { Vector6::zeros() },
+            &Calibrated::default(),
         );
         truth.push(pose);
     }

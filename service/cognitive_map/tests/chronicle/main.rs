@@ -5,5 +5,7 @@
     reason = "clippy knows test functions, but not what they call"
 )]
 
+mod calibration; // what odometry gets wrong all the time
 mod laws; // what holds of every chronicle
-mod matches; // places taken for one another
+mod matches;
+mod revisits; // places taken for one another

@@ -1,6 +1,7 @@
 //! Matches: true ones correct, false ones do not bend.
 
 use cognitive_map::chronicle::{Chronicle, ChronicleSettings, Correction, Moment};
+use cognitive_map::estimation::Calibrated;
 use cognitive_map::{PoseNoise, Relation, RelativePose};
 use nalgebra::{Isometry3, Vector3, Vector6};
 
@@ -44,8 +45,12 @@ impl Rounds {
             .push(self.truth[self.truth.len() - 1] * true_step);
         self.told *= read;
         let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-4);
-        self.chronicle
-            .motion(&moment(seq, &self.told), &read, &variance);
+        self.chronicle.motion(
+            &moment(seq, &self.told),
+            &read,
+            &variance,
+            &Calibrated::default(),
+        );
         if self.chronicle.is_due() {
             self.corrections = self.chronicle.relax();
             if let Some(correction) = self.corrections.first() {

@@ -2,10 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use cognitive_map::{CheckpointPage, CognitiveMap, CorruptCheckpoint, Settings};
+use cognitive_map::recognition::Orientation;
+use cognitive_map::{
+    CheckpointPage, CognitiveMap, CorruptCheckpoint, Lesson, ObjectMark, Record, SampleBody,
+    Settings, Spacing, Touch, TouchNoise,
+};
 use proptest::prelude::*;
 
-use crate::journal::{Robot, any_settings, descriptor, journals, level, run, settings, sighting};
+use crate::journal::{
+    Robot, any_settings, descriptor, journals, label, level, run, settings, sighting,
+};
 
 type Store = BTreeMap<(u8, u32), Vec<u8>>;
 
@@ -55,6 +61,27 @@ fn rich_map() -> CognitiveMap {
             robot.sample(&mut map, descriptor("camera", &view));
         }
     }
+    let noise = TouchNoise::new(0.002, 0.03, 0.1).unwrap();
+    for (name, number) in [("cup", 0), ("ball", 1)].map(|(name, number)| (label(name), number)) {
+        let touches = (0..9).map(|k| Touch::new([f64::from(k), 0.0, 0.0], noise).unwrap());
+        let lesson = Lesson::new(Spacing::default(), touches.collect());
+        run(
+            &mut map,
+            &[Record::TeachObject {
+                number,
+                name,
+                lesson,
+            }],
+        );
+    }
+    robots[0].sample(
+        &mut map,
+        SampleBody::Object(ObjectMark::Identify {
+            orientation: Orientation::Known,
+            noise,
+        }),
+    );
+    robots[0].sample(&mut map, level("touch", 1.0, [0.0; 3]));
     assert!(map.place_count() > 64 && map.landmark_count() > 64 && map.trip_count() >= 6);
     let remembering = map
         .places()
@@ -179,16 +206,17 @@ fn only_what_changed_is_saved_again() {
     let mut robot = Robot {
         id: cognitive_map::AgentId(0),
         session: 1,
-        seq: 241,
-        stamp_ns: 24_100_000_000,
+        seq: 243,
+        stamp_ns: 24_300_000_000,
     };
     robot.sample(&mut map, crate::journal::marker("here", false));
     let kinds: Vec<_> = map
         .checkpoint(saved)
         .map(|page| (page.kind, page.index))
         .collect();
-    let expected = [(0, 0), (1, 0), (9, 0), (10, 0)];
-    assert_eq!(kinds, expected, "header, agent's page, estimate, chronicle");
+    let expected = [(0, 0), (1, 0), (9, 0), (10, 0), (32, 0)];
+    let named = "header, agent's page, estimate, chronicle, head of the objects";
+    assert_eq!(kinds, expected, "{named}");
 }
 
 #[test]

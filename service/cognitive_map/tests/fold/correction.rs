@@ -120,10 +120,7 @@ fn a_newcomer_that_sees_what_the_map_knows_finds_its_place() {
     for _ in 0..40 {
         let mut events = late.step(&mut map);
         if placed.is_empty() {
-            assert_eq!(
-                map.agent(late.robot.id).unwrap().status(map.settings()),
-                Status::Lost
-            );
+            assert_eq!(map.status(late.robot.id).unwrap(), Status::Lost);
             events.extend(late.look_around(&mut map));
         }
         let place = |event: &EventKind| match event {
@@ -144,8 +141,7 @@ fn a_newcomer_that_sees_what_the_map_knows_finds_its_place() {
     );
     late.look_around(&mut map);
     assert!(late.error_m(&map) < 0.05, "{}", late.error_m(&map));
-    let agent = map.agent(late.robot.id).unwrap();
-    assert_eq!(agent.status(map.settings()), Status::Localized);
+    assert_eq!(map.status(late.robot.id), Some(Status::Localized));
     let of_late = map
         .places()
         .filter(|(_, place)| place.founder() == late.robot.id);
@@ -187,25 +183,19 @@ fn an_agent_whose_sightings_contradict_the_map_says_so_and_finds_back() {
         driver.look_around(&mut map);
         driver.step(&mut map);
     }
-    assert_eq!(
-        map.agent(driver.robot.id).unwrap().status(map.settings()),
-        Status::Localized
-    );
+    assert_eq!(map.status(driver.robot.id).unwrap(), Status::Localized);
     // Someone carries it away.
     driver.truth.translation.vector += Vector3::new(-2.0, 1.0, 0.0);
     driver.look_around(&mut map);
     let agent = map.agent(driver.robot.id).unwrap();
     assert!(agent.evidence().refused >= 4, "{:?}", agent.evidence());
-    assert_eq!(agent.status(map.settings()), Status::Uncertain);
+    assert_eq!(map.status(driver.robot.id), Some(Status::Uncertain));
     for _ in 0..30 {
         driver.step(&mut map);
         driver.look_around(&mut map);
     }
     assert!(driver.error_m(&map) < 0.1, "{}", driver.error_m(&map));
-    assert_eq!(
-        map.agent(driver.robot.id).unwrap().status(map.settings()),
-        Status::Localized
-    );
+    assert_eq!(map.status(driver.robot.id).unwrap(), Status::Localized);
 }
 
 /// A robot is nudged on its way, and sees at the end what it saw at the start: then it is known better

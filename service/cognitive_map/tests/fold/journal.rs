@@ -1,9 +1,11 @@
 //! Journals: arbitrary ones, and a robot to write readable ones.
 
+use cognitive_map::recognition::Orientation;
 use cognitive_map::{
-    AgentId, CognitiveMap, Descriptor, Event, EventKind, InvalidSample, Label, Level, Marker,
-    Motion, PoseNoise, RangeBearing, Record, Recruitment, Relation, RelativePose, RelativePosition,
-    Sample, SampleBody, Settings, SettingsValues, Sighting, SkipReason, StartPose, Target,
+    AgentId, CognitiveMap, Descriptor, Event, EventKind, InvalidSample, Label, Lesson, Level,
+    Marker, Motion, ObjectMark, PoseNoise, RangeBearing, Record, Recruitment, Relation,
+    RelativePose, RelativePosition, Sample, SampleBody, Settings, SettingsValues, Sighting,
+    SkipReason, Spacing, StartPose, Target, Touch, TouchNoise,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -317,6 +319,13 @@ fn junk() -> impl Strategy<Value = Record> {
             let sample = Sample { stamp_ns: i64::MIN, body };
             Record::Sample { agent: AgentId(agent), session, seq, sample }
         }),
+        1 => (0u64..4, "[a-c]", prop::array::uniform3(-1.0..1.0f64)).prop_map(|(number, name, at)| {
+            let touch = Touch::new(at, TouchNoise::new(0.002, 0.03, 0.1).unwrap()).unwrap();
+            let lesson = Lesson::new(Spacing::default(), vec![touch]);
+            Record::TeachObject { number, name: label(&name), lesson }
+        }),
+        1 => (0u64..4, "[a-c]")
+            .prop_map(|(number, name)| Record::ForgetObject { number, name: label(&name) }),
         1 => (2u32..4, number(), number(), number(), reasons())
             .prop_map(|(agent, session, from, to, reason)| {
                 Record::Skip { agent: AgentId(agent), session, from, to, reason }
@@ -362,6 +371,24 @@ fn bodies() -> impl Strategy<Value = SampleBody> {
         4 => sightings().prop_map(SampleBody::Sighting),
         1 => start.prop_map(SampleBody::StartPose),
         1 => marker,
+        2 => object_marks().prop_map(SampleBody::Object),
+    ]
+}
+
+fn object_marks() -> impl Strategy<Value = ObjectMark> {
+    let noise = || TouchNoise::new(0.002, 0.03, 0.1).unwrap();
+    let orientation = prop::sample::select(vec![Orientation::Known, Orientation::cube()]);
+    let name = prop::option::of("[a-c]");
+    prop_oneof![
+        2 => (name, orientation.clone()).prop_map(move |(name, orientation)| ObjectMark::Learn {
+            name: name.map(|name| label(&name)),
+            spacing: Spacing::new(0.1).unwrap(),
+            orientation,
+            noise: noise(),
+        }),
+        2 => orientation
+            .prop_map(move |orientation| ObjectMark::Identify { orientation, noise: noise() }),
+        1 => Just(ObjectMark::End),
     ]
 }
 

@@ -6,12 +6,13 @@
 )]
 
 mod budgets; // what is forgotten, and when
-mod checkpoint;
-mod correction; // pages out and in, damaged ones too
+mod checkpoint; // pages out and in, damaged ones too
+mod correction; // what others see of an agent
 mod determinism; // the same records, the same map
 mod journal; // arbitrary journals, and a robot to write readable ones
 mod landmarks; // what sightings teach
 mod motion; // path integration against closed forms
+mod objects; // what is taught and known again
 mod percepts; // what places learn of percepts, and what they predict
 mod places; // recruitment, revisits
 mod recall; // recall against an exhaustive scan

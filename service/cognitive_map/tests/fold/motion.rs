@@ -130,10 +130,7 @@ fn far_away_the_grid_keeps_millimetres() {
         let expected = lattice.phase_displacement(&Vector3::new(1e-6, 0.0, 0.0));
         assert!((b.phase.turns() - a.phase.turns() - expected).norm() < 1e-12);
     }
-    assert_eq!(
-        map.agent(robot.id).unwrap().status(map.settings()),
-        Status::Localized
-    );
+    assert_eq!(map.status(robot.id).unwrap(), Status::Localized);
 }
 
 /// A map whose robots' odometry has noise and no lasting errors.
@@ -155,7 +152,7 @@ fn uncertainty_grows_as_the_closed_form_says() {
     let (mut map, mut robot) = well_calibrated();
     let (n, step) = (200, 0.05);
     robot.ahead(&mut map, step, n);
-    let covariance = *map.agent(robot.id).unwrap().covariance().matrix();
+    let covariance = *map.covariance(robot.id).unwrap().matrix();
     let of_translation = map.settings().translation_sd_per_sqrt_m.powi(2) * step;
     let of_rotation = map.settings().rotation_sd_per_sqrt_m.powi(2) * step;
     let squares: f64 = (0..n).map(|j| (j as f64).powi(2)).sum();
@@ -180,7 +177,7 @@ fn a_lasting_error_of_lengths_grows_with_the_way() {
         }));
         let mut robot = Robot::enrol(&mut map);
         robot.ahead(&mut map, 0.05, 200);
-        let covariance = map.agent(robot.id).unwrap().covariance();
+        let covariance = map.covariance(robot.id).unwrap();
         covariance.matrix()[(0, 0)]
     };
     let added = variance_along(0.03) - variance_along(0.0);
@@ -194,7 +191,7 @@ fn noise_of_the_sample_comes_before_the_settings() {
     let noise = PoseNoise::new([0.1, 0.2, 0.3], [0.0; 3]).unwrap();
     let step = Motion::from_increment([1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], Some(noise)).unwrap();
     robot.sample(&mut map, SampleBody::Motion(step));
-    let covariance = map.agent(robot.id).unwrap().covariance();
+    let covariance = map.covariance(robot.id).unwrap();
     assert!((covariance.position_sd_m() - 0.14f64.sqrt()).abs() < 1e-12);
 }
 
@@ -204,7 +201,7 @@ fn an_agent_becomes_uncertain_and_then_lost() {
     let mut seen = Vec::new();
     for _ in 0..400 {
         robot.ahead(&mut map, 0.5, 1);
-        let status = map.agent(robot.id).unwrap().status(map.settings());
+        let status = map.status(robot.id).unwrap();
         if seen.last() != Some(&status) {
             seen.push(status);
         }
@@ -241,8 +238,8 @@ fn the_first_to_move_defines_the_frame() {
     assert!(agent(&second).placed());
     assert!(!agent(&first).placed());
     assert_eq!(second.position(&map), Point3::new(1.0, 0.0, 0.0));
-    assert_eq!(agent(&second).status(map.settings()), Status::Localized);
-    assert_eq!(agent(&first).status(map.settings()), Status::Lost);
+    assert_eq!(map.status(second.id), Some(Status::Localized));
+    assert_eq!(map.status(first.id), Some(Status::Lost));
 }
 
 #[test]
@@ -284,7 +281,8 @@ fn a_start_pose_moves_pose_grid_and_uncertainty() {
     assert_near(&robot.pose(&map), [7.0, -3.0, 1.0], FRAC_PI_2);
     let agent = map.agent(robot.id).unwrap();
     assert!((agent.grid().decode(map.modules()) - robot.position(&map)).norm() < 1e-9);
-    assert!((agent.covariance().position_sd_m() - 0.5).abs() < 1e-12);
+    let covariance = map.covariance(robot.id).unwrap();
+    assert!((covariance.position_sd_m() - 0.5).abs() < 1e-12);
     assert!(
         (agent.odometry().translation.x - 50.0).abs() < 1e-9,
         "odometry is smooth"
@@ -296,7 +294,7 @@ fn a_session_goes_on_where_the_one_before_ended() {
     let (mut map, mut robot) = new_map();
     robot.ahead(&mut map, 0.1, 20);
     let before = robot.pose(&map);
-    let sd_m = map.agent(robot.id).unwrap().covariance().position_sd_m();
+    let sd_m = map.covariance(robot.id).unwrap().position_sd_m();
     (robot.session, robot.seq, robot.stamp_ns) = (2, 0, 0);
     robot.go(&mut map, [0.0; 3], [0.0; 3]);
     let agent = map.agent(robot.id).unwrap();
@@ -305,10 +303,10 @@ fn a_session_goes_on_where_the_one_before_ended() {
     assert_eq!((agent.session(), agent.next_seq()), (2, 1));
     let expected = (sd_m * sd_m + 3.0).sqrt();
     assert!(
-        (agent.covariance().position_sd_m() - expected).abs() < 1e-9,
+        (map.covariance(robot.id).unwrap().position_sd_m() - expected).abs() < 1e-9,
         "a metre per axis"
     );
-    assert_eq!(agent.status(map.settings()), Status::Uncertain);
+    assert_eq!(map.status(robot.id), Some(Status::Uncertain));
     assert!(agent.travelled_m() < f64::MIN_POSITIVE);
 }
 

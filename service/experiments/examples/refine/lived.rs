@@ -86,7 +86,7 @@ impl Lived {
         match (&sample.body, step, taken) {
             (SampleBody::Motion(_), Some(step), _) => {
                 self.chronicle
-                    .motion(&moment, &step.increment, &step.variance);
+                    .motion(&moment, &step.increment, &step.variance, &step.calibrated);
             }
             (SampleBody::StartPose(start), ..) => self.chronicle.start_pose(&moment, start),
             (SampleBody::Sighting(sighting), _, Some(taken)) if taken.accepted => {

@@ -6,6 +6,7 @@ use std::time::Instant;
 use cogmap_experiments::metrics::{Alignment, Span, StampedPose, Trajectory, ate_rmse_m};
 use cogmap_experiments::tuc::{Match, Tuc};
 use cognitive_map::chronicle::{Chronicle, ChronicleSettings, Moment};
+use cognitive_map::estimation::Calibrated;
 use cognitive_map::experience::Link;
 use cognitive_map::{PoseNoise, Relation, RelativePose};
 use nalgebra::Isometry3;
@@ -56,7 +57,12 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
             pose,
         };
         let variance = step.noise_sd.component_mul(&step.noise_sd);
-        chronicle.motion(&moment(pose), &step.motion, &variance);
+        chronicle.motion(
+            &moment(pose),
+            &step.motion,
+            &variance,
+            &Calibrated::default(),
+        );
         while let Some(found) = next.next_if(|found| step_of(found.later_ns) <= index) {
             let earlier = step_of(found.earlier_ns) as u64 + 1;
             chronicle.closure(&moment(pose), earlier, &relation);

@@ -18,6 +18,13 @@ const CHANNEL: &str = "view";
 /// Numbers of a view.
 const VIEW_NUMBERS: usize = 64;
 
+/// Stamp of a step \[ns\].
+pub(super) fn stamp_ns(step: u64) -> i64 {
+    i64::try_from(step)
+        .unwrap_or(i64::MAX)
+        .saturating_mul(STEP_NS)
+}
+
 /// A body that walks in either way.
 #[derive(Clone, Debug)]
 enum Body {
@@ -78,9 +85,7 @@ impl Agent {
 
     /// Stamp of the latest step \[ns\].
     pub(super) fn stamp_ns(&self) -> i64 {
-        i64::try_from(self.steps)
-            .unwrap_or(i64::MAX)
-            .saturating_mul(STEP_NS)
+        stamp_ns(self.steps)
     }
 
     /// Where the agent stands, told before its first step, and what it sees from there: the frame of the

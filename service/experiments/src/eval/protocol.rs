@@ -28,8 +28,8 @@ pub enum Walk {
 pub enum Percept {
     /// Nothing.
     None,
-    /// Views of the room ([`crate::world::Scenery`]). Places remember them, and each recalls a place;
-    /// the map does not correct poses by them.
+    /// Views of the room ([`crate::world::Scenery`]). Places remember them, and each recalls a place; a
+    /// stretch of views that are like those of an earlier stretch corrects the pose.
     Descriptor(ViewSettings),
     /// The centres of obstacles, as landmarks. The map learns where they are and corrects poses by them.
     Sightings(SightingSettings),

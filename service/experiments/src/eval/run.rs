@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use cognitive_map::experience::ExperienceMap;
 use cognitive_map::grid::population::{TUNING_WIDTH, interference_pattern, population_vector};
 use cognitive_map::grid::similarity::{cosine, exponential_confidence};
 use cognitive_map::grid::{GridCode, GridModules, PartialCode, decode};
@@ -11,13 +12,13 @@ use cognitive_map::{
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::agent::Agent;
+use super::agent::{Agent, stamp_ns};
 use super::curve::Curve;
-use super::protocol::{InvalidProtocol, Protocol};
+use super::protocol::{InvalidProtocol, Percept, Protocol};
 use super::quantity::{Each, Quantity};
 use super::tally::Tally;
 use super::territory::Territory;
-use crate::metrics::{DeadReckoning, StampedPose};
+use crate::metrics::{DeadReckoning, StampedPose, Trajectory};
 use crate::reading::{Reading, ReadingBody};
 use crate::world::Cube;
 
@@ -50,6 +51,10 @@ pub(super) struct Run {
     pub(super) curves: Each<Curve>,
     /// Places gained in the last quarter of the walk, as a share of those before it.
     pub(super) growth_last_quarter: Option<f64>,
+    /// RMSE of the refined positions, given the whole walk \[m\].
+    pub(super) refined_rmse_m: Option<f64>,
+    /// Revisits that are believed at the end.
+    pub(super) closures: usize,
     pub(super) path: Option<Path>,
 }
 
@@ -66,6 +71,8 @@ pub struct Path {
     pub places_m: Vec<Vector3<f64>>,
     /// The obstacles.
     pub cubes: Vec<Cube>,
+    /// What is remembered of the walk, relaxed.
+    pub experience: ExperienceMap,
 }
 
 /// Whether a run keeps its path.
@@ -90,6 +97,8 @@ impl Run {
             tallies: Each::default(),
             curves: Each::from_fn(|_| Curve::new(protocol.steps)),
             growth_last_quarter: None,
+            refined_rmse_m: None,
+            closures: 0,
             path: (keep == Keep::Path).then(Path::default),
         };
         let before_last_quarter = protocol.steps - protocol.steps / 4;
@@ -109,7 +118,10 @@ impl Run {
             let places = trial.map.place_count() as f64;
             run.growth_last_quarter = Some(places / places_before as f64 - 1.0);
         }
+        run.refined_rmse_m = trial.refined_rmse_m();
+        run.closures = trial.map.closure_count();
         if let Some(path) = &mut run.path {
+            path.experience = trial.map.experience_map();
             let places = trial.map.places();
             path.places_m = places.map(|(_, place)| place.position().coords).collect();
             path.cubes = trial.agent.world().cubes().to_vec();
@@ -140,6 +152,9 @@ struct Trial {
     growth_steps: u64,
     /// σ of the pseudo-activation.
     sigma: f64,
+    /// The true positions after each step \[m\], if the agent perceives anything that may refine its own.
+    truth_m: Vec<Vector3<f64>>,
+    perceives: bool,
     /// Radius of the ball around the room's centre in which codes are decoded \[m\].
     room_radius_m: f64,
 }
@@ -157,6 +172,8 @@ impl Trial {
             agent,
             map,
             reckoning: DeadReckoning::default(),
+            truth_m: Vec::new(),
+            perceives: protocol.percept != Percept::None,
             territory: Territory::new(field_radius_m),
             next_seq: 0,
             steps: 0,
@@ -204,6 +221,9 @@ impl Trial {
         self.steps += 1;
         let pose = self.agent.pose();
         let truth_m = pose.translation.vector;
+        if self.perceives {
+            self.truth_m.push(truth_m);
+        }
         let mut surprises = events.iter().filter_map(|event| match event.kind {
             EventKind::PerceptCompared { surprise, .. } => Some(surprise),
             _ => None,
@@ -216,6 +236,32 @@ impl Trial {
             self.note(&pose, winner, path);
         }
         Ok(values)
+    }
+
+    /// RMSE of the positions after relaxation \[m\]; `None` where nothing but motion was read.
+    fn refined_rmse_m(&self) -> Option<f64> {
+        if !self.perceives {
+            return None;
+        }
+        let refined = self.map.refined();
+        let poses: Vec<StampedPose> = refined
+            .agents
+            .first()?
+            .poses
+            .iter()
+            .map(|row| StampedPose {
+                stamp_ns: row.stamp_ns,
+                pose: row.pose,
+            })
+            .collect();
+        let trajectory = Trajectory::from_poses(&poses).ok()?;
+        let mut tally = Tally::default();
+        for (step, truth_m) in (1..).zip(&self.truth_m) {
+            if let Some(position_m) = trajectory.at(stamp_ns(step)) {
+                tally.add((position_m - truth_m).norm());
+            }
+        }
+        tally.rmse()
     }
 
     /// How far the estimates of the pose lie from the truth.

@@ -334,3 +334,33 @@ fn figures_are_whole_and_name_the_paper() {
     let table = Table::of(&experiment).to_string();
     assert!(table.contains("ORB-SLAM2") && table.contains("0.42"));
 }
+
+#[test]
+fn views_of_places_seen_before_refine_the_walk_and_its_graph_can_be_read() {
+    let mut protocol = protocol_with_views();
+    protocol.steps = 600;
+    let experiment = Experiment::run(&protocol, 1, 11, NonZeroUsize::MIN, &|_| {}).unwrap();
+    let report = Report::of(&experiment);
+    assert!(report.mean("closures").unwrap() >= 0.0);
+    assert!(report.mean("refined_ate_rmse_m").unwrap() > 0.0);
+    let path = experiment.path().unwrap();
+    let text = crate::g2o::write_g2o(&path.experience);
+    let graph = crate::g2o::PoseGraph::read(&text).unwrap();
+    assert_eq!(graph.poses().len(), path.experience.poses().count());
+    let between = path
+        .experience
+        .links()
+        .filter(|link| matches!(link, cognitive_map::experience::Link::Between { .. }));
+    assert_eq!(graph.edges().len(), between.count());
+}
+
+fn protocol_with_views() -> Protocol {
+    let mut protocol = Protocol::of_paper(Environment::ObstacleRich);
+    protocol.walk = Walk::Persistent;
+    protocol.percept = Percept::Descriptor(ViewSettings {
+        every: 5,
+        noise: 0.05,
+    });
+    protocol.odometry = OdometryNoise::default();
+    protocol
+}

@@ -23,10 +23,12 @@ mod graph;
 mod parse;
 mod recording;
 mod reference;
+mod write;
 
 pub use error::{G2oError, LineReason};
 pub use graph::{Edge, PointEdge, PoseGraph};
 pub use reference::{Reference, ReferenceError};
+pub use write::write_g2o;
 
 #[cfg(test)]
 mod tests;

@@ -9,6 +9,7 @@ use cogmap_experiments::eval::{
     Environment, Experiment, PAPER_P_NEW, PLACES_MAX, Percept, Protocol, Report, SightingSettings,
     Table, ViewSettings, Walk, figures,
 };
+use cogmap_experiments::g2o::write_g2o;
 use cogmap_experiments::metrics::StampedPose;
 use cogmap_experiments::tum::write_tum;
 use cogmap_experiments::world::OdometryNoise;
@@ -85,6 +86,9 @@ pub(in crate::cli) struct RoomArgs {
     /// Write figures, report, and the trajectories of the first run into this directory.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write what the first run remembers as a graph, with the revisits that are believed, in the g2o format.
+    #[arg(long, value_name = "FILE")]
+    export_g2o: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -110,7 +114,7 @@ enum WalkKind {
 enum PerceptKind {
     /// Nothing.
     None,
-    /// Views of the room, which places remember and are recalled by. They do not correct poses.
+    /// Views of the room, which places remember and are recalled by. Where they resemble earlier ones they correct poses.
     Descriptor,
     /// The centres of obstacles, as landmarks, which correct poses (env2).
     Sightings,
@@ -130,6 +134,10 @@ pub(super) fn run(environment: Environment, args: &RoomArgs) -> anyhow::Result<(
     if let Some(directory) = &args.out {
         write(directory, &experiment)
             .with_context(|| format!("write into {}", directory.display()))?;
+    }
+    if let (Some(file), Some(path)) = (&args.export_g2o, experiment.path()) {
+        std::fs::write(file, write_g2o(&path.experience))
+            .with_context(|| format!("write {}", file.display()))?;
     }
     if args.json {
         output::json(&Report::of(&experiment))

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use cogmap_proto::{SampleBatch, SpaceSettings};
-use cognitive_map::{Agent, CognitiveMap, Record};
+use cognitive_map::{AgentId, CognitiveMap, Record};
 
 use super::mrclam::TeamBatch;
 use super::outcome::{Outcome, RobotOutcome, Timing};
@@ -63,9 +63,7 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
                 map.apply(&record, &mut events);
                 times_s.push(begin.elapsed().as_secs_f64());
                 events.clear();
-                if let Some(agent) = map.agent(cognitive_map::AgentId(robot.agent)) {
-                    robot.note(&record, agent, interval_ns);
-                }
+                robot.note(&record, &map, interval_ns);
             },
         );
     }
@@ -74,7 +72,7 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
         let rest = robot.recorder.rows();
         robot.outcome.causal.extend_from_slice(rest);
         robot.outcome.refined = refined.remove(name).unwrap_or_default();
-        let agent = map.agent(cognitive_map::AgentId(robot.agent));
+        let agent = map.agent(AgentId(robot.agent));
         robot.outcome.evidence = agent.map(evidence).unwrap_or_default();
         (name.to_owned(), robot.outcome)
     };
@@ -99,7 +97,11 @@ struct Robot {
 
 impl Robot {
     /// Notes where the agent is after a record.
-    fn note(&mut self, record: &Record, agent: &Agent, interval_ns: i64) {
+    fn note(&mut self, record: &Record, map: &CognitiveMap, interval_ns: i64) {
+        let id = AgentId(self.agent);
+        let Some((agent, covariance)) = map.agent(id).zip(map.covariance(id)) else {
+            return;
+        };
         if let Some(chunk) = self.recorder.note(record, agent, interval_ns) {
             self.outcome.causal.extend(chunk.rows);
         }
@@ -111,7 +113,7 @@ impl Robot {
             stamp_ns.saturating_sub(last.stamp_ns) >= BELIEF_INTERVAL_NS
         };
         if beliefs.last().is_none_or(is_due) {
-            beliefs.push((stamped(stamp_ns, agent.pose()), *agent.covariance()));
+            beliefs.push((stamped(stamp_ns, agent.pose()), covariance));
         }
     }
 }

@@ -5,6 +5,7 @@
 //! the committer makes the block durable beside the next one.
 
 mod journal;
+mod objects;
 mod publish;
 mod receive;
 
@@ -21,6 +22,7 @@ use super::checkpointer::Checkpointer;
 use super::committer::{Answer, Commit};
 use super::counters::SpaceCounters;
 use super::desk::AgentDesk;
+use super::message::{Call, ObjectReply};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
 use super::sequencer::{Sequencer, Window};
@@ -53,6 +55,8 @@ pub(crate) struct Writer {
     by_name: BTreeMap<Box<str>, usize>,
     next_block: u64,
     interval_ns: i64,
+    /// Number of the next lesson about an object, or wish to forget one.
+    next_lesson: u64,
     /// How many samples of all agents wait for earlier ones, and what they take.
     waiting: Window,
 
@@ -60,6 +64,7 @@ pub(crate) struct Writer {
     block: BlockWriter,
     records: Vec<Record>,
     answers: Vec<Answer>,
+    objects: Vec<ObjectReply>,
     events: Vec<Event>,
     /// Samples that it has applied.
     applied: u64,
@@ -92,6 +97,7 @@ impl Writer {
         } = recovered;
         let counters = SpaceCounters::new(&shared.name);
         let interval_ns = shared.interval_ns;
+        let next_lesson = map.lessons();
         let mut writer = Self {
             shared,
             commits,
@@ -102,10 +108,12 @@ impl Writer {
             by_name: BTreeMap::new(),
             next_block,
             interval_ns,
+            next_lesson,
             waiting: Window::NONE,
             block: BlockWriter::new(),
             records: Vec::new(),
             answers: Vec::new(),
+            objects: Vec::new(),
             events: Vec::new(),
             applied: 0,
         };
@@ -171,7 +179,8 @@ impl Writer {
                     codec,
                     payload,
                 }) => self.receive(agent, codec, payload, now),
-                Some(Message::Request(request)) => self.receive_request(request, now),
+                Some(Message::Call(Call::Samples(request))) => self.receive_request(request, now),
+                Some(Message::Call(Call::Object(request))) => self.receive_object(request),
                 None => break,
             }
             if self.records.len() >= ROUND_RECORDS_MAX {
@@ -212,7 +221,10 @@ impl Writer {
             self.applied += u64::from(matches!(record, Record::Sample { .. }));
             let (Record::Sample { agent, .. }
             | Record::Skip { agent, .. }
-            | Record::Enrol { agent, .. }) = record;
+            | Record::Enrol { agent, .. }) = record
+            else {
+                continue; // of no agent
+            };
             let slot = &mut self.agents[agent.0 as usize];
             slot.applied = true;
             let Some(agent_in_map) = self.map.agent(*agent) else {

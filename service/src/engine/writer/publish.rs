@@ -12,9 +12,8 @@ impl Writer {
     pub(super) fn greet(&self) {
         self.counters.sizes(&self.map, 0);
         for slot in &self.agents {
-            if let Some(agent) = self.map.agent(slot.desk.id())
-                && let Some(readout) = readout::readout(&self.shared.name, agent, &self.map)
-            {
+            let id = slot.desk.id();
+            if let Some(readout) = readout::readout(&self.shared.name, &self.map, id) {
                 slot.desk.publish(readout);
             }
             self.remind(slot);
@@ -29,6 +28,7 @@ impl Writer {
             samples: std::mem::take(&mut self.applied),
             marks: Vec::new(),
             answers: std::mem::take(&mut self.answers),
+            objects: std::mem::take(&mut self.objects),
         };
         for slot in &mut self.agents {
             if !slot.applied && !slot.remind {
@@ -43,7 +43,7 @@ impl Writer {
             };
             let (session, next) = (agent.session(), agent.next_seq());
             if applied {
-                if let Some(readout) = readout::readout(space, agent, &self.map) {
+                if let Some(readout) = readout::readout(space, &self.map, slot.desk.id()) {
                     let readout = slot.desk.publish(readout);
                     self.shared.outlet.estimate(&readout.estimate);
                 }
@@ -76,7 +76,7 @@ impl Writer {
             .revision
             .store(self.map.revision(), Ordering::Release);
         self.publish_events();
-        if !commit.marks.is_empty() || !commit.answers.is_empty() {
+        if !commit.marks.is_empty() || !commit.answers.is_empty() || !commit.objects.is_empty() {
             // The committer outlives the writers; without it nothing could be acknowledged anyway.
             let _ = self.commits.send(commit);
         }

@@ -16,7 +16,7 @@ use super::estimator::Estimator;
 use super::frame::{Frame, MARK_DIM, MARKS_MAX, MEMBERS_MAX, Mark, Member};
 use super::history::{History, KEPT};
 use super::meeting::{MEETINGS_MAX, Meeting, PENDING_MAX, Pending};
-use super::mover::{BODY_DIM, Calibration, Mover};
+use super::mover::{BODY_DIM, Mover, Run};
 use super::outcome::Evidence;
 use super::parameters::Parameters;
 use super::seat::{Apart, Seat, Traveller};
@@ -36,18 +36,20 @@ state_of_struct!(Evidence {
     nis,
     components
 });
-state_of_struct!(Calibration {
-    length,
-    angle,
-    bias_rad_s
+state_of_struct!(Run {
+    motion,
+    tail,
+    wander,
+    steps
 });
 state_of_struct!(Mover {
     pose,
     calibration,
-    covariance,
+    settled,
     tail,
     since_flush,
     is_stale,
+    run,
     history,
     is_planar
 });
@@ -69,7 +71,7 @@ impl State for History {
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let instants = read_all(input, KEPT)?;
+        let instants = read_all(input, KEPT)?.into();
         let latest = State::read(input)?;
         Ok(Self { instants, latest })
     }

@@ -1,0 +1,281 @@
+"""Objects: what is touched, learned and known again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import ClassVar, Optional, Tuple, Union
+
+from .sample import Orientation, TouchNoise
+from .scalar import text
+from .vector import Quaternion, Vec3, single_precision, vec3
+
+
+class Reached(Enum):
+    """How a contact was come by, which says what its place tells about the object."""
+
+    #: It was come upon, within a step of the contact before.
+    FOUND = "found"
+    #: It was asked for: where it lies is the asker's choice.
+    AIMED = "aimed"
+    #: It was drawn evenly from the whole surface.
+    DRAWN = "drawn"
+
+
+@dataclass(frozen=True)
+class ContactLevel:
+    """A level that was felt at a contact."""
+
+    #: Name of the channel.
+    channel: str
+    #: The value, in the channel's own unit.
+    value: float
+
+    def __post_init__(self) -> None:
+        text("channel", self.channel)
+        object.__setattr__(self, "value", float(self.value))
+
+
+@dataclass(frozen=True)
+class ContactDescriptor:
+    """A descriptor that was seen at a contact."""
+
+    #: Name of the channel.
+    channel: str
+    #: The vector, of 8 to 4096 numbers, in single precision; normalised by the service.
+    vector: Tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        text("channel", self.channel)
+        object.__setattr__(self, "vector", single_precision("vector", self.vector))
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact."""
+
+    #: Position [m].
+    position_m: Vec3
+    #: The surface's outward normal there, a unit vector.
+    normal: Optional[Vec3] = None
+    #: What was felt, at most one level of each channel.
+    levels: Tuple[ContactLevel, ...] = ()
+    #: What was seen, at most one descriptor of each channel.
+    descriptors: Tuple[ContactDescriptor, ...] = ()
+    #: What path integration has drifted since the first contact, per axis [m].
+    drift_sd_m: float = 0.0
+    #: How it was come by.
+    reached: Reached = Reached.FOUND
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position_m", vec3("position_m", self.position_m))
+        if self.normal is not None:
+            object.__setattr__(self, "normal", vec3("normal", self.normal))
+        object.__setattr__(self, "levels", tuple(self.levels))
+        object.__setattr__(self, "descriptors", tuple(self.descriptors))
+        object.__setattr__(self, "drift_sd_m", float(self.drift_sd_m))
+
+
+@dataclass(frozen=True)
+class ObjectLesson:
+    """Teaches an object at once, in place of what was known of it."""
+
+    #: Contacts within this distance [m] are of one place.
+    spacing_m: float
+    #: How exactly was felt.
+    noise: TouchNoise
+    #: The contacts, in the object's own frame; 1 to 4096.
+    contacts: Tuple[Contact, ...]
+
+
+@dataclass(frozen=True)
+class IdentifyQuery:
+    """Asks which object a sequence of contacts is of."""
+
+    #: How the frame of the contacts may be turned against an object's.
+    orientation: Orientation
+    #: How exactly was felt.
+    noise: TouchNoise
+    #: The contacts, in the order in which they were felt, in a frame of their own; 1 to 256.
+    contacts: Tuple[Contact, ...]
+
+
+@dataclass(frozen=True)
+class ObjectSummary:
+    """What is known of an object."""
+
+    name: str
+    #: How many places it has.
+    places: int
+    #: Distance within which contacts are of one place [m].
+    spacing_m: float
+    #: Corners of the box around its places [m], in its own frame.
+    min_m: Vec3
+    max_m: Vec3
+    #: How many contacts taught it.
+    contacts: int
+    #: In how many episodes and lessons.
+    visits: int
+
+
+@dataclass(frozen=True)
+class ObjectPage:
+    """One page of objects."""
+
+    #: The objects, by name.
+    objects: Tuple[ObjectSummary, ...]
+    next: Optional[str] = None
+
+
+@dataclass(frozen=True)
+class ObjectLevel:
+    """What was felt at a place of an object."""
+
+    channel: str
+    mean: float
+    #: Standard deviation of what will be felt there, beside the sensor's noise.
+    sd: float
+
+
+@dataclass(frozen=True)
+class ObjectPlace:
+    """A place of an object."""
+
+    #: Mean position of its contacts [m], in the object's frame.
+    position_m: Vec3
+    #: Mean outward normal, if one was felt.
+    normal: Optional[Vec3]
+    #: How many contacts there were.
+    contacts: float
+    #: What was felt, by channel.
+    levels: Tuple[ObjectLevel, ...]
+
+
+@dataclass(frozen=True)
+class ObjectDetail:
+    """An object with its places."""
+
+    summary: ObjectSummary
+    #: Its places, in the order in which they were first touched.
+    places: Tuple[ObjectPlace, ...]
+
+
+@dataclass(frozen=True)
+class Undecided:
+    """More contacts are needed."""
+
+    TAG: ClassVar[str] = "undecided"
+
+
+@dataclass(frozen=True)
+class KnownObject:
+    """It is this one."""
+
+    TAG: ClassVar[str] = "object"
+    name: str
+
+
+@dataclass(frozen=True)
+class UnknownObject:
+    """It is none that was learned."""
+
+    TAG: ClassVar[str] = "unknown"
+
+
+ObjectVerdict = Union[Undecided, KnownObject, UnknownObject]
+
+
+@dataclass(frozen=True)
+class ObjectProbability:
+    """Probability of an object."""
+
+    name: str
+    probability: float
+
+
+@dataclass(frozen=True)
+class OtherPose:
+    """Another pose that explains the contacts."""
+
+    translation_m: Vec3
+    rotation_xyzw: Quaternion
+    #: Its share of the evidence.
+    share: float
+
+
+@dataclass(frozen=True)
+class ObjectPose:
+    """Where the frame of the contacts lies in an object's."""
+
+    object: str
+    #: Origin of the contacts' frame in the object's [m].
+    translation_m: Vec3
+    #: Its orientation there, unit quaternion `[x, y, z, w]`.
+    rotation_xyzw: Quaternion
+    #: Covariance of its error along and about its own axes: upper triangle, row by row.
+    covariance: Tuple[float, ...]
+    #: Share of the object's evidence that this pose holds.
+    share: float
+    #: Other poses with a share: of something symmetric, the symmetric ones.
+    others: Tuple[OtherPose, ...]
+
+
+@dataclass(frozen=True)
+class NextTouch:
+    """A touch that would tell much."""
+
+    #: Where to touch [m], in the frame of the contacts.
+    position_m: Vec3
+    #: The way to move on the approach, in the same frame.
+    approach: Optional[Vec3]
+    #: Information expected from it [nats].
+    gain_nats: float
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a sequence of contacts says."""
+
+    space: str
+    map_revision: int
+    #: The answer, once one is at least 99 % probable.
+    verdict: ObjectVerdict
+    #: Probability of each object that has a noticeable one, most probable first.
+    objects: Tuple[ObjectProbability, ...]
+    #: Probability that it is none of them.
+    unknown: float
+    #: How many objects have a probability above one hundredth.
+    live_objects: int
+    #: How many hypotheses, each an object in a pose, hold 99 % of all evidence.
+    live_hypotheses: int
+    #: Entropy over objects and unknown [nats].
+    entropy_nats: float
+    #: Contacts that were taken in.
+    contacts: int
+    #: How well the best explanation fits, in standard deviations of what a right one does.
+    fit: float
+    #: Pose in the most probable object.
+    pose: Optional[ObjectPose]
+    #: Where the next touch would tell most.
+    next_touch: Optional[NextTouch]
+
+
+class EpisodeKind(Enum):
+    """What an episode with an object is for."""
+
+    #: It teaches an object.
+    LEARN = "learn"
+    #: It is to recognise one.
+    IDENTIFY = "identify"
+
+
+@dataclass(frozen=True)
+class AgentObject:
+    """The episode of an agent with an object."""
+
+    space: str
+    agent: str
+    #: What the episode under way is for; absent when there is none.
+    episode: Optional[EpisodeKind]
+    #: What its contacts say; in the frame of the body when the episode began.
+    identification: Optional[Identification]

@@ -1,0 +1,314 @@
+//! What agents saw, and where they see it again.
+
+use nalgebra::Isometry3;
+
+use super::passage::Passage;
+use super::reach::Reach;
+use super::track::{RECENT_MAX, Track, read_all, write_all};
+use super::view::{View, angle_rad};
+use crate::paged::PagedVec;
+use crate::sample::Descriptor;
+use crate::state::{CorruptState, StateReader, StateWriter};
+
+/// Channels whose views are remembered.
+const CHANNELS_MAX: usize = 64;
+/// Views that are remembered.
+const VIEWS_MAX: usize = 16_384;
+/// Numbers in them, all of which a view that is news is compared with: 8 MiB.
+const NUMBERS_MAX: usize = 1 << 21;
+/// Motion between two views that are compared \[m, rad\].
+const MOVED: (f64, f64) = (0.05, 0.1);
+/// Motion after which a view may be news \[m, rad\]: an anchor's.
+const STEP: (f64, f64) = (0.1, 0.1);
+/// Of an agent's own views those count as earlier that lie so many before the present one.
+const EARLIER: u32 = 16;
+/// Ordinals left out where an agent was put somewhere else.
+const APART: u32 = 64;
+/// Views that a new one is taken to be like at most, the most alike first.
+const ALIKE_MAX: usize = 32;
+/// Passages of an agent under way.
+const PASSAGES_MAX: usize = 4;
+
+/// What agents saw lately and long ago.
+#[derive(Clone, Debug, Default)]
+pub(in crate::chronicle) struct Revisits {
+    reaches: Vec<Reach>,
+    pub(in crate::chronicle) tracks: PagedVec<Track, 1>,
+    pub(in crate::chronicle) views: PagedVec<View, 16>,
+    /// Numbers in all views.
+    numbers: u64,
+}
+
+/// Where an agent is when it sees something.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::chronicle) struct Felt {
+    pub(in crate::chronicle) agent: u32,
+    pub(in crate::chronicle) session: u32,
+    pub(in crate::chronicle) seq: u64,
+    pub(in crate::chronicle) in_odom: Isometry3<f64>,
+    pub(in crate::chronicle) spread: [f64; 2],
+}
+
+impl Revisits {
+    /// An agent sees something; answers the passages that are over with that.
+    pub(in crate::chronicle) fn feel(
+        &mut self,
+        felt: &Felt,
+        descriptor: &Descriptor,
+        revision: u64,
+    ) -> Vec<Passage> {
+        let vector = descriptor.vector();
+        let Some(channel) = self.channel(descriptor) else {
+            return Vec::new();
+        };
+        let at = self.track(felt, channel, revision);
+        let Some(track) = self.tracks.get_mut(at, revision) else {
+            return Vec::new();
+        };
+        let has_moved = track
+            .last
+            .is_none_or(|last| is_beyond(&last.inv_mul(&felt.in_odom), MOVED));
+        if !has_moved {
+            return Vec::new();
+        }
+        track.last = Some(felt.in_odom);
+        let reach = &mut self.reaches[usize::from(channel)];
+        let mut is_news = true;
+        for (index, recent) in track.recent.iter().enumerate() {
+            let angle_rad = angle_rad(&recent.vector, vector);
+            let way = recent.in_odom.inv_mul(&felt.in_odom);
+            reach.learn(angle_rad, way.translation.vector.norm());
+            if index + 1 == track.recent.len() {
+                is_news = angle_rad > reach.news_rad() && is_beyond(&way, STEP);
+            }
+        }
+        if !is_news {
+            return Vec::new();
+        }
+        track.note(&felt.in_odom, vector);
+        let view = View {
+            channel,
+            agent: felt.agent,
+            session: felt.session,
+            seq: felt.seq,
+            ordinal: track.next,
+            in_odom: felt.in_odom,
+            spread: felt.spread,
+            vector: vector.into(),
+        };
+        track.next = track.next.saturating_add(1);
+        let (alike, is_known) = self.alike(&view);
+        let over = self.pass(at, &view, &alike, revision);
+        if !is_known {
+            self.remember(view, revision);
+        }
+        over
+    }
+
+    /// An agent has been put somewhere else: what it sees from now on is not beside what it saw.
+    pub(in crate::chronicle) fn cut(&mut self, agent: u32, revision: u64) {
+        for number in 0..self.tracks.len() {
+            if self
+                .tracks
+                .get(number)
+                .is_none_or(|track| track.agent != agent)
+            {
+                continue;
+            }
+            if let Some(track) = self.tracks.get_mut(number, revision) {
+                track.recent.clear();
+                track.passages.clear();
+                track.next = track.next.saturating_add(APART);
+            }
+        }
+    }
+
+    /// The earlier views that one is like, by number, with their distances; and whether one of them is as good as the same.
+    fn alike(&mut self, view: &View) -> (Vec<(usize, super::reach::Distance)>, bool) {
+        let reach = &mut self.reaches[usize::from(view.channel)];
+        let mut alike = Vec::new();
+        let mut is_known = false;
+        for (number, other) in self.views.iter().enumerate() {
+            let is_recent = other.agent == view.agent
+                && other.session == view.session
+                && other.ordinal.saturating_add(EARLIER) >= view.ordinal;
+            if other.channel != view.channel || is_recent {
+                continue;
+            }
+            let angle_rad = angle_rad(&other.vector, &view.vector);
+            reach.learn_unrelated(angle_rad);
+            if let Some(distance) = reach.distance(angle_rad) {
+                is_known |= angle_rad < reach.news_rad();
+                alike.push((number, distance));
+            }
+        }
+        if alike.len() > ALIKE_MAX {
+            alike.sort_by(|a, b| a.1.mean_m.total_cmp(&b.1.mean_m).then(a.0.cmp(&b.0)));
+            alike.truncate(ALIKE_MAX);
+            alike.sort_by_key(|(number, _)| *number);
+        }
+        (alike, is_known)
+    }
+
+    /// Takes a view and those that it is like into the passages under way; answers those that are over.
+    fn pass(
+        &mut self,
+        track: usize,
+        view: &View,
+        alike: &[(usize, super::reach::Distance)],
+        revision: u64,
+    ) -> Vec<Passage> {
+        let Some(track) = self.tracks.get_mut(track, revision) else {
+            return Vec::new();
+        };
+        let mut is_met = vec![false; track.passages.len()];
+        for &(number, distance) in alike {
+            let Some(other) = self.views.get(number) else {
+                continue;
+            };
+            let known = track
+                .passages
+                .iter()
+                .position(|passage| passage.leads_to(other));
+            match known {
+                Some(index) => {
+                    is_met[index] = true;
+                    track.passages[index].add(view, other, distance);
+                }
+                None if track.passages.len() < PASSAGES_MAX => {
+                    is_met.push(true);
+                    track.passages.push(Passage::new(view, other, distance));
+                }
+                None => {}
+            }
+        }
+        for (passage, is_met) in track.passages.iter_mut().zip(is_met) {
+            if !is_met {
+                passage.miss();
+            }
+        }
+        let (over, open) = std::mem::take(&mut track.passages)
+            .into_iter()
+            .partition::<Vec<_>, _>(Passage::is_over);
+        track.passages = open;
+        over.into_iter().filter(Passage::is_telling).collect()
+    }
+
+    /// Remembers a view; every second one is forgotten when there is no room for it.
+    fn remember(&mut self, view: View, revision: u64) {
+        self.numbers += view.vector.len() as u64;
+        self.views.push(view, revision);
+        if self.views.len() <= VIEWS_MAX && self.numbers <= NUMBERS_MAX as u64 {
+            return;
+        }
+        let mut kept = 0;
+        self.numbers = 0;
+        for number in 0..self.views.len() {
+            let Some(mut view) = self.views.get(number).cloned() else {
+                continue;
+            };
+            if !view.ordinal.is_multiple_of(2) {
+                continue;
+            }
+            // So that neighbours are still told by their ordinals.
+            view.ordinal /= 2;
+            self.numbers += view.vector.len() as u64;
+            if let Some(slot) = self.views.get_mut(kept, revision) {
+                *slot = view;
+            }
+            kept += 1;
+        }
+        while self.views.len() > kept {
+            self.views.pop(revision);
+        }
+        for number in 0..self.tracks.len() {
+            if let Some(track) = self.tracks.get_mut(number, revision) {
+                track.next = track.next.div_ceil(2);
+                track.passages.clear();
+            }
+        }
+    }
+
+    /// The number of a descriptor's channel; a new one if there is room for it.
+    fn channel(&mut self, descriptor: &Descriptor) -> Option<u8> {
+        let dimension = u16::try_from(descriptor.vector().len()).ok()?;
+        let known = self
+            .reaches
+            .iter()
+            .position(|reach| reach.dimension == dimension && &reach.label == descriptor.channel());
+        let number = known.or_else(|| {
+            (self.reaches.len() < CHANNELS_MAX).then(|| {
+                let reach = Reach::new(descriptor.channel().clone(), dimension);
+                self.reaches.push(reach);
+                self.reaches.len() - 1
+            })
+        })?;
+        u8::try_from(number).ok()
+    }
+
+    /// The number of the track of an agent on a channel, in its present session.
+    fn track(&mut self, felt: &Felt, channel: u8, revision: u64) -> usize {
+        let known = self
+            .tracks
+            .iter()
+            .position(|track| track.agent == felt.agent && track.channel == channel);
+        let Some(number) = known else {
+            self.tracks
+                .push(Track::new(felt.agent, channel, felt.session), revision);
+            return self.tracks.len() - 1;
+        };
+        if let Some(track) = self.tracks.get_mut(number, revision)
+            && track.session != felt.session
+        {
+            *track = Track::new(felt.agent, channel, felt.session);
+        }
+        number
+    }
+
+    /// Bytes of memory that it takes.
+    pub(in crate::chronicle) fn bytes(&self) -> usize {
+        let numbers = usize::try_from(self.numbers).unwrap_or(usize::MAX);
+        let recent = self.tracks.iter().map(|track| {
+            let numbers = track.recent.iter().map(|recent| recent.vector.len());
+            numbers.sum::<usize>()
+        });
+        let recent: usize = recent.sum();
+        self.views.bytes() + self.tracks.bytes() + 4 * (numbers + recent)
+    }
+
+    pub(in crate::chronicle) fn write_head(&self, out: &mut StateWriter) {
+        write_all(&self.reaches, out);
+    }
+
+    pub(in crate::chronicle) fn read_head(
+        &mut self,
+        input: &mut StateReader<'_>,
+    ) -> Result<(), CorruptState> {
+        self.reaches = read_all(input)?;
+        self.numbers = self.views.iter().map(|view| view.vector.len() as u64).sum();
+        Ok(())
+    }
+
+    /// Whether everything that it names is there, and all views of a channel are of one length.
+    pub(in crate::chronicle) fn is_sound(&self, agents: usize) -> bool {
+        let is_channel = |channel: u8, length: usize| {
+            let reach = self.reaches.get(usize::from(channel));
+            reach.is_some_and(|reach| usize::from(reach.dimension) == length)
+        };
+        let views = self.views.iter().all(|view| {
+            (view.agent as usize) < agents && is_channel(view.channel, view.vector.len())
+        });
+        let tracks = self.tracks.iter().all(|track| {
+            let mut recent = track.recent.iter();
+            (track.agent as usize) < agents
+                && track.recent.len() <= RECENT_MAX
+                && recent.all(|recent| is_channel(track.channel, recent.vector.len()))
+        });
+        views && tracks
+    }
+}
+
+/// Whether a motion is longer than these \[m, rad\].
+fn is_beyond(motion: &Isometry3<f64>, (length_m, angle_rad): (f64, f64)) -> bool {
+    !crate::chronicle::life::is_within(motion, length_m, angle_rad)
+}

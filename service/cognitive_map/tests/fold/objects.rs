@@ -1,0 +1,252 @@
+//! Objects: taught, known again, learned on the spot, forgotten.
+
+use cognitive_map::recognition::{Orientation, Verdict};
+use cognitive_map::{
+    CognitiveMap, EventKind, Lesson, Motion, ObjectMark, PoseNoise, Record, SampleBody, Settings,
+    Spacing, Touch, TouchLevel, TouchNoise,
+};
+
+use crate::journal::{Robot, label, level, run};
+
+/// Levels along three rods whose places are 2 cm apart.
+const RODS: [(&str, [f64; 12]); 3] = [
+    (
+        "fork",
+        [
+            1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0,
+        ],
+    ),
+    (
+        "knife",
+        [
+            1.0, 3.0, 2.0, 12.0, 4.0, 8.0, 6.0, 5.0, 11.0, 7.0, 10.0, 9.0,
+        ],
+    ),
+    (
+        "spoon",
+        [
+            8.0, 2.0, 6.0, 11.0, 5.0, 3.0, 12.0, 4.0, 7.0, 9.0, 1.0, 10.0,
+        ],
+    ),
+];
+const PITCH_M: f64 = 0.02;
+/// From one end to the other.
+const UP: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+
+fn noise() -> TouchNoise {
+    TouchNoise::new(0.001, 0.02, 0.2).unwrap()
+}
+
+fn learn(name: Option<&str>) -> SampleBody {
+    SampleBody::Object(ObjectMark::Learn {
+        name: name.map(label),
+        spacing: Spacing::new(0.01).unwrap(),
+        orientation: Orientation::Known,
+        noise: noise(),
+    })
+}
+
+fn identify() -> SampleBody {
+    SampleBody::Object(ObjectMark::Identify {
+        orientation: Orientation::Known,
+        noise: noise(),
+    })
+}
+
+fn end() -> SampleBody {
+    SampleBody::Object(ObjectMark::End)
+}
+
+/// Feels the places of a rod one after the other; answers what happened.
+fn feel(map: &mut CognitiveMap, hand: &mut Robot, rod: &[f64], order: &[usize]) -> Vec<EventKind> {
+    let mut events = Vec::new();
+    let mut at = order[0];
+    for &place in order {
+        let way_m = (place as f64 - at as f64) * PITCH_M;
+        // The joints of an arm are more exact than wheels.
+        let noise = PoseNoise::new([0.0003; 3], [0.0; 3]).unwrap();
+        let upright = [0.0, 0.0, 0.0, 1.0];
+        let motion = Motion::from_increment([way_m, 0.0, 0.0], upright, Some(noise));
+        hand.sample(map, SampleBody::Motion(motion.unwrap()));
+        at = place;
+        events.extend(hand.sample(map, level("touch", rod[place], [0.0; 3])));
+    }
+    events
+        .into_iter()
+        .filter(|event| !matches!(event, EventKind::PerceptCompared { .. }))
+        .collect()
+}
+
+/// A map that knows the rods, and a hand.
+fn taught() -> (CognitiveMap, Robot) {
+    let mut map = CognitiveMap::new(Settings::default());
+    let mut hand = Robot::enrol(&mut map);
+    for (name, rod) in &RODS {
+        hand.sample(&mut map, learn(Some(name)));
+        feel(&mut map, &mut hand, rod, &UP);
+        let events = hand.sample(&mut map, end());
+        assert!(
+            matches!(&events[..], [EventKind::ObjectLearned { name: learned, contacts: 12, .. }] if learned.as_str() == *name),
+            "{events:?}"
+        );
+    }
+    assert_eq!(map.object_count(), 3);
+    (map, hand)
+}
+
+fn recognised(events: &[EventKind]) -> Vec<&str> {
+    let names = events.iter().filter_map(|event| match event {
+        EventKind::ObjectRecognised { name, .. } => Some(name.as_str()),
+        _ => None,
+    });
+    names.collect()
+}
+
+#[test]
+fn what_was_learned_by_touch_is_known_again_from_an_unknown_start() {
+    let (mut map, mut hand) = taught();
+    for (name, rod) in &RODS {
+        hand.sample(&mut map, identify());
+        let events = feel(&mut map, &mut hand, rod, &[10, 9, 8, 7, 6, 5, 4, 3, 2, 1]);
+        assert_eq!(recognised(&events), [*name], "{events:?}");
+        let (teaches, identified) = map.episode(hand.id).unwrap();
+        assert!(!teaches);
+        // The episode began at the rod's eleventh place.
+        let pose = identified.posterior.pose.unwrap();
+        let off = pose.map_from_episode.translation.vector.x - 10.0 * PITCH_M;
+        assert!(off.abs() < 0.003, "{off}");
+        hand.sample(&mut map, end());
+        assert!(map.episode(hand.id).is_none());
+    }
+    assert_eq!(map.object_count(), 3, "what is known is not learned anew");
+}
+
+#[test]
+fn something_unknown_is_said_to_be_and_learned() {
+    let (mut map, mut hand) = taught();
+    let strange = RODS[2].1.map(|level| level + 20.0);
+    hand.sample(&mut map, identify());
+    let events = feel(&mut map, &mut hand, &strange, &UP);
+    assert!(events.contains(&EventKind::ObjectUnknown), "{events:?}");
+    let events = hand.sample(&mut map, end());
+    let [EventKind::ObjectLearned { name, .. }] = &events[..] else {
+        panic!("{events:?}");
+    };
+    assert_eq!(name.as_str(), "object-3");
+    hand.sample(&mut map, identify());
+    let events = feel(
+        &mut map,
+        &mut hand,
+        &strange,
+        &[10, 9, 8, 7, 6, 5, 4, 3, 2, 1],
+    );
+    assert_eq!(recognised(&events), ["object-3"]);
+}
+
+#[test]
+fn another_visit_extends_an_object_in_its_own_frame() {
+    let (mut map, mut hand) = taught();
+    let fork = map.object_by_name(&label("fork")).unwrap();
+    let mut longer = RODS[0].1.to_vec();
+    longer.extend([13.0, 14.0]);
+    // It begins elsewhere, and goes beyond what was known.
+    hand.sample(&mut map, learn(Some("fork")));
+    feel(
+        &mut map,
+        &mut hand,
+        &longer,
+        &[3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13],
+    );
+    let events = hand.sample(&mut map, end());
+    assert!(matches!(&events[..], [EventKind::ObjectLearned { object, .. }] if *object == fork));
+    assert_eq!(map.object_places(fork).len(), 14);
+    let farthest = map
+        .object_places(fork)
+        .iter()
+        .map(|place| place.position_m.x);
+    let off_m = farthest.fold(0.0, f64::max) - 13.0 * PITCH_M;
+    assert!(off_m.abs() < 0.5 * PITCH_M, "{off_m} m");
+    // Something else under that name changes nothing.
+    hand.sample(&mut map, learn(Some("fork")));
+    feel(
+        &mut map,
+        &mut hand,
+        &[70.0, 50.0, 90.0, 60.0],
+        &[0, 1, 2, 3],
+    );
+    let events = hand.sample(&mut map, end());
+    assert_eq!(events, [EventKind::ObjectNotLearned { contacts: 4 }]);
+    assert_eq!(map.object_places(fork).len(), 14);
+}
+
+/// A lesson of a rod.
+fn lesson(rod: &[f64]) -> Lesson {
+    let touches = rod.iter().zip(0..).map(|(value, k)| {
+        let felt = TouchLevel::new(label("touch"), *value, 0.2).unwrap();
+        let at = [f64::from(k) * PITCH_M, 0.0, 0.0];
+        Touch::new(at, noise()).unwrap().with_levels(vec![felt])
+    });
+    Lesson::new(Spacing::new(0.01).unwrap(), touches.collect())
+}
+
+#[test]
+fn a_lesson_teaches_at_once_and_what_is_forgotten_is_unknown() {
+    let mut map = CognitiveMap::new(Settings::default());
+    for ((name, rod), number) in RODS.iter().zip(0..) {
+        let (name, lesson) = (label(name), lesson(rod));
+        let record = Record::TeachObject {
+            number,
+            name,
+            lesson,
+        };
+        run(&mut map, &[record]);
+    }
+    let order = [2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+    let felt = order.map(|k: u8| (k, RODS[1].1[usize::from(k)]));
+    let asked: Vec<Touch> = felt
+        .map(|(k, value)| {
+            let felt = TouchLevel::new(label("touch"), value, 0.2).unwrap();
+            let at = [f64::from(k) * PITCH_M - 7.0, 1.0, 2.0];
+            Touch::new(at, noise()).unwrap().with_levels(vec![felt])
+        })
+        .to_vec();
+    let knife = map.object_by_name(&label("knife")).unwrap();
+    let posterior = map.identify(&Orientation::Known, &asked).posterior;
+    assert_eq!(posterior.verdict(), Verdict::Object(knife));
+    let name = label("knife");
+    let forgetting = Record::ForgetObject {
+        number: 3,
+        name: name.clone(),
+    };
+    run(&mut map, &[forgetting.clone()]);
+    assert!(map.object_by_name(&name).is_none() && map.object_count() == 2);
+    let posterior = map.identify(&Orientation::Known, &asked).posterior;
+    assert_ne!(posterior.verdict(), Verdict::Object(knife));
+    // The name may be given again; the number is another one.
+    let lesson = lesson(&RODS[1].1);
+    let teaching = Record::TeachObject {
+        number: 4,
+        name: name.clone(),
+        lesson,
+    };
+    // What comes again has been heard.
+    run(&mut map, &[teaching, forgetting]);
+    assert_ne!(map.object_by_name(&name), Some(knife));
+}
+
+#[test]
+fn an_episode_goes_on_where_a_checkpoint_was_taken() {
+    let (mut map, mut hand) = taught();
+    hand.sample(&mut map, identify());
+    let rod = &RODS[2].1;
+    feel(&mut map, &mut hand, rod, &[10]);
+    let mut restored = CognitiveMap::restore(Settings::default(), map.checkpoint(0)).unwrap();
+    assert_eq!(restored.digest(), map.digest());
+    let mut twin = Robot { ..hand };
+    let rest = [10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0];
+    let on = feel(&mut map, &mut hand, rod, &rest);
+    let again = feel(&mut restored, &mut twin, rod, &rest);
+    assert_eq!(on, again);
+    assert_eq!(recognised(&on).last(), Some(&"spoon"));
+    assert_eq!(restored.digest(), map.digest());
+}

@@ -1,0 +1,193 @@
+//! Objects: what was learned by touch, taught at once, and known again.
+
+use std::sync::Arc;
+
+use axum::body::Body;
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+use axum::http::{Response, StatusCode};
+use cogmap_proto::{
+    AgentObject, Identification, IdentifyQuery, ObjectDetail, ObjectLesson, ObjectPage,
+    ObjectSummary,
+};
+use cognitive_map::{CognitiveMap, Label};
+use serde::Deserialize;
+
+use super::extract::{
+    AgentOfPath, AgentParams, Json, NoQuery, Query, SpaceOfPath, SpaceParam, path, space,
+};
+use super::page;
+use super::places::unknown;
+use super::problem::{Kind, Problem};
+use super::reply;
+use super::state::Service;
+use crate::answer;
+use crate::engine::Space;
+
+/// An object of a space in a path.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Path)]
+pub(crate) struct ObjectParams {
+    /// Name of the space.
+    #[param(
+        pattern = "^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+        min_length = 1,
+        max_length = 64
+    )]
+    space: String,
+    /// Name of the object.
+    #[param(min_length = 1, max_length = 128)]
+    name: String,
+}
+
+/// Which objects.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct ObjectsQuery {
+    /// Only objects whose names come after this one.
+    after: Option<String>,
+    /// Most objects in the answer; 100 when absent.
+    #[param(minimum = 1, maximum = 1000)]
+    limit: Option<u32>,
+}
+
+/// The objects of a space.
+#[utoipa::path(get, path = "/v1/spaces/{space}/objects", tag = "memory",
+    operation_id = "list_objects", params(SpaceParam, ObjectsQuery),
+    responses(
+        (status = 200, description = "The objects, by name", body = ObjectPage),
+        (status = 404, description = "There is no such space")))]
+pub(crate) async fn list(
+    SpaceOfPath(space): SpaceOfPath,
+    Query(query): Query<ObjectsQuery>,
+) -> Result<Response<Body>, Problem> {
+    let limit = page::limit(query.limit)?;
+    let map = space.snapshot().await?;
+    let after = query.after.as_deref().unwrap_or_default();
+    let mut objects: Vec<_> = map
+        .objects()
+        .filter(|(_, known, _)| known.name().as_str() > after)
+        .collect();
+    objects.sort_by(|a, b| a.1.name().cmp(b.1.name()));
+    let summaries = objects
+        .iter()
+        .map(|(_, known, model)| answer::object_summary(known, model));
+    let (objects, next) = page::cut(summaries, limit, |summary| summary.name.clone());
+    Ok(reply::json(&ObjectPage { objects, next }))
+}
+
+/// An object, with its places.
+#[utoipa::path(get, path = "/v1/spaces/{space}/objects/{name}", tag = "memory",
+    operation_id = "get_object", params(ObjectParams),
+    responses(
+        (status = 200, description = "The object", body = ObjectDetail),
+        (status = 404, description = "There is no such space or object")))]
+pub(crate) async fn get(
+    ObjectOfPath(space, name): ObjectOfPath,
+    _: NoQuery,
+) -> Result<Response<Body>, Problem> {
+    let map = space.snapshot().await?;
+    detail(&map, &name)
+        .map(|object| reply::json(&object))
+        .ok_or_else(|| unknown("object"))
+}
+
+/// Teach an object at once, by contacts in its own frame, in place of what was known of it. Answers when the lesson is on disk.
+#[utoipa::path(put, path = "/v1/spaces/{space}/objects/{name}", tag = "memory",
+    operation_id = "teach_object", params(ObjectParams), request_body = ObjectLesson,
+    responses(
+        (status = 200, description = "The object is known", body = ObjectSummary),
+        (status = 404, description = "There is no such space"),
+        (status = 422, description = "The lesson makes no sense"),
+        (status = 507, description = "The store is full")))]
+pub(crate) async fn put(
+    ObjectOfPath(space, name): ObjectOfPath,
+    _: NoQuery,
+    Json(lesson): Json<ObjectLesson>,
+) -> Result<Response<Body>, Problem> {
+    let valid = answer::lesson(&lesson)?;
+    space.teach(&name, lesson, valid).await?;
+    let map = space.snapshot().await?;
+    detail(&map, &name)
+        .map(|object| reply::json(&object.summary))
+        .ok_or_else(|| unknown("object"))
+}
+
+/// Forget an object.
+#[utoipa::path(delete, path = "/v1/spaces/{space}/objects/{name}", tag = "memory",
+    operation_id = "forget_object", params(ObjectParams),
+    responses(
+        (status = 204, description = "The object is gone"),
+        (status = 404, description = "There is no such space or object")))]
+pub(crate) async fn delete(
+    ObjectOfPath(space, name): ObjectOfPath,
+    _: NoQuery,
+) -> Result<StatusCode, Problem> {
+    let map = space.snapshot().await?;
+    if map.object_by_name(&name).is_none() {
+        return Err(unknown("object"));
+    }
+    space.forget_object(&name).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Which object a sequence of contacts is of, in which pose, and where the next touch would tell most. Changes nothing.
+#[utoipa::path(post, path = "/v1/spaces/{space}/objects/identify", tag = "memory",
+    operation_id = "identify", params(SpaceParam), request_body = IdentifyQuery,
+    responses(
+        (status = 200, description = "What the contacts say", body = Identification),
+        (status = 404, description = "There is no such space"),
+        (status = 422, description = "The query makes no sense")))]
+pub(crate) async fn identify(
+    SpaceOfPath(space): SpaceOfPath,
+    _: NoQuery,
+    Json(query): Json<IdentifyQuery>,
+) -> Result<Response<Body>, Problem> {
+    let map = space.snapshot().await?;
+    // Every object is compared: work for a thread that may be busy.
+    let answered = tokio::task::spawn_blocking(move || {
+        answer::identify(space.name(), &map, &query).map(|answer| reply::json(&answer))
+    });
+    Ok(answered.await.map_err(|_| Problem::interrupted())??)
+}
+
+/// What an agent's episode with an object says so far.
+#[utoipa::path(get, path = "/v1/spaces/{space}/agents/{agent}/object", tag = "agents",
+    operation_id = "get_agent_object", params(AgentParams),
+    responses(
+        (status = 200, description = "The episode under way, if there is one", body = AgentObject),
+        (status = 404, description = "There is no such space or agent")))]
+pub(crate) async fn of_agent(
+    AgentOfPath(space, desk): AgentOfPath,
+    _: NoQuery,
+) -> Result<Response<Body>, Problem> {
+    let map = space.snapshot().await?;
+    let answered = tokio::task::spawn_blocking(move || {
+        let answer = answer::agent_object(space.name(), &map, desk.id(), desk.name());
+        reply::json(&answer)
+    });
+    answered.await.map_err(|_| Problem::interrupted())
+}
+
+fn detail(map: &CognitiveMap, name: &Label) -> Option<ObjectDetail> {
+    let id = map.object_by_name(name)?;
+    let (_, known, model) = map.objects().find(|(object, ..)| *object == id)?;
+    Some(answer::object_detail(map, known, model))
+}
+
+/// The space that the path names, and the name of an object that may be there or not.
+pub(crate) struct ObjectOfPath(Arc<Space>, Label);
+
+impl FromRequestParts<Service> for ObjectOfPath {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
+        let params: ObjectParams = path(parts, service).await?;
+        let space = space(service, &params.space)?;
+        let name = Label::new(&params.name).map_err(|error| {
+            Problem::new(Kind::InvalidPath, format!("{:?}: {error}", params.name))
+        })?;
+        Ok(Self(space, name))
+    }
+}

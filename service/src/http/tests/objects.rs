@@ -1,0 +1,204 @@
+//! Objects: taught at once or by touch, asked for, recognised, forgotten.
+
+use cogmap_proto::{
+    Contact, ContactLevel, IdentifyQuery, Level, ObjectLesson, ObjectMark, Orientation, TouchNoise,
+};
+use serde_json::json;
+
+use super::*;
+
+const JSON: &str = "application/json";
+/// Levels along two rods whose places are 2 cm apart.
+const FORK: [f64; 8] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
+const KNIFE: [f64; 8] = [1.0, 3.0, 2.0, 7.0, 4.0, 8.0, 6.0, 5.0];
+const PITCH_M: f64 = 0.02;
+
+fn noise() -> TouchNoise {
+    TouchNoise {
+        position_sd_m: 0.001,
+        normal_sd_rad: 0.02,
+        level_sd: 0.2,
+    }
+}
+
+/// Contacts at some places of a rod, from an origin `offset_m` along it.
+fn contacts(rod: &[f64; 8], places: &[u8], offset_m: f64) -> Vec<Contact> {
+    let contact = |&place: &u8| Contact {
+        position_m: [f64::from(place) * PITCH_M - offset_m, 0.5, -0.5],
+        levels: vec![ContactLevel {
+            channel: "touch".to_owned(),
+            value: rod[usize::from(place)],
+        }],
+        ..Contact::default()
+    };
+    places.iter().map(contact).collect()
+}
+
+fn lesson(rod: &[f64; 8]) -> Vec<u8> {
+    Codec::Json.encode(&ObjectLesson {
+        spacing_m: 0.01,
+        noise: noise(),
+        contacts: contacts(rod, &[0, 1, 2, 3, 4, 5, 6, 7], 0.0),
+    })
+}
+
+/// A rig that knows both rods.
+async fn taught() -> Rig {
+    let rig = rig();
+    for (name, rod) in [("fork", &FORK), ("knife", &KNIFE)] {
+        let path = format!("/v1/spaces/lab/objects/{name}");
+        let summary = rig.send(Method::PUT, &path, JSON, lesson(rod)).await.good();
+        assert_eq!(
+            (&summary["name"], &summary["places"]),
+            (&name.into(), &8.into())
+        );
+    }
+    rig
+}
+
+#[tokio::test]
+async fn objects_are_taught_listed_shown_and_forgotten() {
+    let rig = taught().await;
+    let page = rig.get("/v1/spaces/lab/objects?limit=1").await.good();
+    assert_eq!(
+        (&page["objects"][0]["name"], &page["next"]),
+        (&"fork".into(), &"fork".into())
+    );
+    let page = rig.get("/v1/spaces/lab/objects?after=fork").await.good();
+    assert_eq!(page["objects"].as_array().map(Vec::len), Some(1));
+    let knife = rig.get("/v1/spaces/lab/objects/knife").await.good();
+    assert_eq!(knife["summary"]["contacts"], 8);
+    let place = &knife["places"][3];
+    assert_eq!(
+        place["levels"][0],
+        json!({"channel": "touch", "mean": 7.0, "sd": 0.2})
+    );
+    // Taught anew in place of what was known.
+    let path = "/v1/spaces/lab/objects/knife";
+    let summary = rig
+        .send(Method::PUT, path, JSON, lesson(&FORK))
+        .await
+        .good();
+    assert_eq!(
+        (&summary["visits"], &summary["places"]),
+        (&1.into(), &8.into())
+    );
+    let gone = Request::delete(path)
+        .body(Body::empty())
+        .expect("a request");
+    assert_eq!(rig.ask(gone).await.status, 204);
+    rig.get(path).await.problem(404, "unknown-memory");
+    let again = Request::delete(path)
+        .body(Body::empty())
+        .expect("a request");
+    rig.ask(again).await.problem(404, "unknown-memory");
+}
+
+#[tokio::test]
+async fn contacts_tell_the_object_and_its_pose() {
+    let rig = taught().await;
+    let query = |contacts| {
+        Codec::Json.encode(&IdentifyQuery {
+            orientation: Orientation::Known {},
+            noise: noise(),
+            contacts,
+        })
+    };
+    let path = "/v1/spaces/lab/objects/identify";
+    let told = contacts(&KNIFE, &[2, 3, 1, 4, 5, 6, 7, 0], 7.0);
+    let answer = rig.send(Method::POST, path, JSON, query(told)).await.good();
+    assert_eq!(answer["verdict"], json!({"object": {"name": "knife"}}));
+    let x = answer["pose"]["translation_m"][0]
+        .as_f64()
+        .expect("a number");
+    assert!((x - 7.0).abs() < 0.005, "{x}");
+    // Nothing is known after one contact whose level both have.
+    let told = contacts(&KNIFE, &[0], 0.0);
+    let answer = rig.send(Method::POST, path, JSON, query(told)).await.good();
+    assert_eq!(answer["verdict"], json!({"undecided": {}}));
+    rig.send(Method::POST, path, JSON, query(Vec::new()))
+        .await
+        .problem(422, "invalid-query");
+    let mut wrong = contacts(&KNIFE, &[0, 1], 0.0);
+    wrong[1].normal = Some([2.0, 0.0, 0.0]);
+    let refused = rig.send(Method::POST, path, JSON, query(wrong)).await;
+    let problem = refused.problem(422, "invalid-query");
+    assert!(
+        problem["detail"]
+            .as_str()
+            .is_some_and(|text| text.starts_with("contact 1:"))
+    );
+}
+
+#[tokio::test]
+async fn an_agent_learns_and_recognises_by_touch() {
+    let rig = rig();
+    let mut seq = 0;
+    let mut next = |body| {
+        seq += 1;
+        at(1, seq - 1, body)
+    };
+    let step = |way_m: f64| {
+        SampleBody::Increment(Increment {
+            translation_m: [way_m, 0.0, 0.0],
+            rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+            noise: None,
+        })
+    };
+    let feel = |value| {
+        SampleBody::Level(Level {
+            channel: "touch".to_owned(),
+            value,
+            offset_m: [0.0; 3],
+            normal: None,
+        })
+    };
+    for (name, rod) in [("fork", FORK), ("knife", KNIFE)] {
+        let learn = ObjectMark::Learn {
+            name: Some(name.to_owned()),
+            spacing_m: 0.01,
+            orientation: Orientation::Known {},
+            noise: noise(),
+        };
+        rig.samples("arm", &next(SampleBody::Object(learn)))
+            .await
+            .good();
+        for value in rod {
+            rig.samples("arm", &next(feel(value))).await.good();
+            rig.samples("arm", &next(step(PITCH_M))).await.good();
+        }
+        let status = rig.get("/v1/spaces/lab/agents/arm/object").await.good();
+        assert_eq!(status["episode"], "learn");
+        let end = SampleBody::Object(ObjectMark::End {});
+        rig.samples("arm", &next(end)).await.good();
+    }
+    let identify = ObjectMark::Identify {
+        orientation: Orientation::Known {},
+        noise: noise(),
+    };
+    rig.samples("arm", &next(SampleBody::Object(identify)))
+        .await
+        .good();
+    for value in KNIFE.into_iter().rev() {
+        rig.samples("arm", &next(feel(value))).await.good();
+        rig.samples("arm", &next(step(-PITCH_M))).await.good();
+    }
+    let status = rig.get("/v1/spaces/lab/agents/arm/object").await.good();
+    assert_eq!(status["episode"], "identify");
+    let told = &status["identification"];
+    assert_eq!(
+        told["verdict"],
+        json!({"object": {"name": "knife"}}),
+        "{told}"
+    );
+    assert_eq!(told["contacts"], 8);
+    let end = SampleBody::Object(ObjectMark::End {});
+    rig.samples("arm", &next(end)).await.good();
+    let status = rig.get("/v1/spaces/lab/agents/arm/object").await.good();
+    assert_eq!(
+        (&status["episode"], &status["identification"]),
+        (&Value::Null, &Value::Null)
+    );
+    let objects = rig.get("/v1/spaces/lab/objects").await.good();
+    assert_eq!(objects["objects"].as_array().map(Vec::len), Some(2));
+}
