@@ -8,7 +8,7 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 20] = [
+const ROUTES: [(&str, &[&str]); 24] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
@@ -17,6 +17,7 @@ const ROUTES: [(&str, &[&str]); 20] = [
     ("/v1/spaces/{space}/agents", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/grid", &["get"]),
+    ("/v1/spaces/{space}/agents/{agent}/object", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/predict", &["post"]),
     ("/v1/spaces/{space}/agents/{agent}/samples", &["post"]),
     ("/v1/spaces/{space}/agents/{agent}/trajectory", &["get"]),
@@ -24,6 +25,12 @@ const ROUTES: [(&str, &[&str]); 20] = [
     ("/v1/spaces/{space}/export", &["get"]),
     ("/v1/spaces/{space}/landmarks", &["get"]),
     ("/v1/spaces/{space}/landmarks/{id}", &["get"]),
+    ("/v1/spaces/{space}/objects", &["get"]),
+    ("/v1/spaces/{space}/objects/identify", &["post"]),
+    (
+        "/v1/spaces/{space}/objects/{name}",
+        &["delete", "get", "put"],
+    ),
     ("/v1/spaces/{space}/places", &["get"]),
     ("/v1/spaces/{space}/places/{id}", &["get"]),
     ("/v1/spaces/{space}/recall", &["post"]),

@@ -395,6 +395,7 @@ async fn the_description_lists_every_route_with_every_status() {
     operations.sort();
     let expected = [
         "DELETE /v1/spaces/{space}",
+        "DELETE /v1/spaces/{space}/objects/{name}",
         "GET /healthz",
         "GET /metrics",
         "GET /readyz",
@@ -403,19 +404,24 @@ async fn the_description_lists_every_route_with_every_status() {
         "GET /v1/spaces/{space}/agents",
         "GET /v1/spaces/{space}/agents/{agent}",
         "GET /v1/spaces/{space}/agents/{agent}/grid",
+        "GET /v1/spaces/{space}/agents/{agent}/object",
         "GET /v1/spaces/{space}/agents/{agent}/trajectory",
         "GET /v1/spaces/{space}/events",
         "GET /v1/spaces/{space}/export",
         "GET /v1/spaces/{space}/landmarks",
         "GET /v1/spaces/{space}/landmarks/{id}",
+        "GET /v1/spaces/{space}/objects",
+        "GET /v1/spaces/{space}/objects/{name}",
         "GET /v1/spaces/{space}/places",
         "GET /v1/spaces/{space}/places/{id}",
         "GET /v1/spaces/{space}/trips",
         "GET /v1/spaces/{space}/trips/{id}",
         "POST /v1/spaces/{space}/agents/{agent}/predict",
         "POST /v1/spaces/{space}/agents/{agent}/samples",
+        "POST /v1/spaces/{space}/objects/identify",
         "POST /v1/spaces/{space}/recall",
         "PUT /v1/spaces/{space}",
+        "PUT /v1/spaces/{space}/objects/{name}",
     ];
     assert_eq!(operations, expected);
     let limit = &described["components"]["schemas"]["RecallQuery"]["properties"]["limit"];

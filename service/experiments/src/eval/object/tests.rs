@@ -68,7 +68,7 @@ fn figures_and_table_name_the_paper() {
     assert_eq!(names, ["active-objects", "object-confidence"]);
     for figure in &figures {
         assert!(figure.svg.starts_with("<svg") && figure.svg.trim_end().ends_with("</svg>"));
-        assert!(figure.svg.contains("Fig. 21") && figure.svg.contains("the paper's: 180"));
+        assert!(figure.svg.contains("Fig. 21") && figure.svg.contains("s: 180)"));
     }
     let table = ObjectTable(&reports).to_string();
     assert!(table.contains("98.2 %, 180 ± 25 steps"), "{table}");
