@@ -10,7 +10,7 @@ use cogmap_proto::{
     AgentObject, Identification, IdentifyQuery, ObjectDetail, ObjectLesson, ObjectPage,
     ObjectSummary,
 };
-use cognitive_map::{CognitiveMap, Label};
+use cognitive_map::{CognitiveMap, InvalidSample, Label};
 use serde::Deserialize;
 
 use super::extract::{
@@ -18,10 +18,10 @@ use super::extract::{
 };
 use super::page;
 use super::places::unknown;
-use super::problem::{Kind, Problem};
+use super::problem::Problem;
 use super::reply;
 use super::state::Service;
-use crate::answer;
+use crate::answer::{self, InvalidContacts};
 use crate::engine::Space;
 
 /// An object of a space in a path.
@@ -88,7 +88,8 @@ pub(crate) async fn get(
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    detail(&map, &name)
+    name.ok()
+        .and_then(|name| detail(&map, &name))
         .map(|object| reply::json(&object))
         .ok_or_else(|| unknown("object"))
 }
@@ -99,13 +100,14 @@ pub(crate) async fn get(
     responses(
         (status = 200, description = "The object is known", body = ObjectSummary),
         (status = 404, description = "There is no such space"),
-        (status = 422, description = "The lesson makes no sense"),
+        (status = 422, description = "The name or the lesson makes no sense"),
         (status = 507, description = "The store is full")))]
 pub(crate) async fn put(
     ObjectOfPath(space, name): ObjectOfPath,
     _: NoQuery,
     Json(lesson): Json<ObjectLesson>,
 ) -> Result<Response<Body>, Problem> {
+    let name = name.map_err(InvalidContacts::Name)?;
     let valid = answer::lesson(&lesson)?;
     space.teach(&name, lesson, valid).await?;
     let map = space.snapshot().await?;
@@ -125,6 +127,7 @@ pub(crate) async fn delete(
     _: NoQuery,
 ) -> Result<StatusCode, Problem> {
     let map = space.snapshot().await?;
+    let name = name.map_err(|_| unknown("object"))?;
     if map.object_by_name(&name).is_none() {
         return Err(unknown("object"));
     }
@@ -176,18 +179,15 @@ fn detail(map: &CognitiveMap, name: &Label) -> Option<ObjectDetail> {
     Some(answer::object_detail(map, known, model))
 }
 
-/// The space that the path names, and the name of an object that may be there or not.
-pub(crate) struct ObjectOfPath(Arc<Space>, Label);
+/// The space that the path names, and the name of an object that may be there or not, or none that an object can have.
+pub(crate) struct ObjectOfPath(Arc<Space>, Result<Label, InvalidSample>);
 
 impl FromRequestParts<Service> for ObjectOfPath {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: ObjectParams = path(parts, service).await?;
-        let space = space(service, &params.space)?;
-        let name = Label::new(&params.name).map_err(|error| {
-            Problem::new(Kind::InvalidPath, format!("{:?}: {error}", params.name))
-        })?;
-        Ok(Self(space, name))
+        let name = Label::new(&params.name);
+        Ok(Self(space(service, &params.space)?, name))
     }
 }

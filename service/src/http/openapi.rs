@@ -1,7 +1,10 @@
 //! The description of the interface: what the handlers say of themselves, completed by what holds
 //! for all of them.
 
-use cogmap_proto::limits::{BATCH_SAMPLES_MAX, GRID_MODULES_MAX, METRES_MAX, NAME_BYTES_MAX};
+use cogmap_proto::limits::{
+    BATCH_SAMPLES_MAX, GRID_MODULES_MAX, IDENTIFY_CONTACTS_MAX, LESSON_CONTACTS_MAX, METRES_MAX,
+    NAME_BYTES_MAX, ROTATIONS_MAX,
+};
 use serde_json::{Map, Value, json};
 
 use super::problem::PROBLEM_JSON;
@@ -214,6 +217,25 @@ fn constrain(schemas: &mut Value) {
         &json!({ "maximum": u64::MAX - 1 - BATCH_SAMPLES_MAX as u64 }),
     );
     merge(&mut batch["session"], &json!({ "maximum": u64::MAX - 1 }));
+    let turns = schemas["Orientation"]["oneOf"].as_array_mut();
+    for variant in turns.into_iter().flatten() {
+        let finite = "/properties/finite/properties/rotations_xyzw";
+        if let Some(rotations) = variant.pointer_mut(finite) {
+            merge(
+                rotations,
+                &json!({ "minItems": 1, "maxItems": ROTATIONS_MAX }),
+            );
+            merge_into_array(&mut rotations["items"], 4);
+        }
+    }
+    let contacts = [
+        ("ObjectLesson", LESSON_CONTACTS_MAX),
+        ("IdentifyQuery", IDENTIFY_CONTACTS_MAX),
+    ];
+    for (name, most) in contacts {
+        let contacts = &mut schemas[name]["properties"]["contacts"];
+        merge(contacts, &json!({ "minItems": 1, "maxItems": most }));
+    }
     let share = json!({ "minimum": 0.0, "maximum": 1.0 });
     let noise = &mut schemas["NoiseSettings"]["properties"];
     for (_, field) in entries(noise) {
