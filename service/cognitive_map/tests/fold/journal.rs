@@ -350,6 +350,15 @@ fn bodies() -> impl Strategy<Value = SampleBody> {
     let offset = prop_oneof![Just([0.0; 3]), prop::array::uniform3(-1.0..1.0f64)];
     let level = ("(touch|light)", value, offset)
         .prop_map(|(channel, value, offset)| level(&channel, value, offset));
+    // What a surface feels like, at whatever distance and with whatever normal.
+    let near = prop::array::uniform3(-0.1..0.1f64);
+    let touched = (near, prop::array::uniform3(-1.0..1.0f64)).prop_map(|(offset, normal)| {
+        let normal = Vector3::from(normal)
+            .try_normalize(1e-3)
+            .unwrap_or_else(Vector3::x);
+        let felt = Level::new(label("touch"), 1.0, offset, Some(normal.into()));
+        SampleBody::Level(felt.unwrap())
+    });
     // Two sorts of camera, and one that shares its channel's label with levels.
     let vector = prop::collection::vec(-1.0..1.0f32, 8..10);
     let descriptor = ("(camera|light)", vector).prop_map(|(channel, mut vector)| {
@@ -367,6 +376,7 @@ fn bodies() -> impl Strategy<Value = SampleBody> {
         2 => still.prop_map(SampleBody::Motion),
         1 => far.prop_map(SampleBody::Motion),
         5 => level,
+        5 => touched,
         5 => descriptor,
         4 => sightings().prop_map(SampleBody::Sighting),
         1 => start.prop_map(SampleBody::StartPose),
@@ -377,7 +387,11 @@ fn bodies() -> impl Strategy<Value = SampleBody> {
 
 fn object_marks() -> impl Strategy<Value = ObjectMark> {
     let noise = || TouchNoise::new(0.002, 0.03, 0.1).unwrap();
-    let orientation = prop::sample::select(vec![Orientation::Known, Orientation::cube()]);
+    let orientation = prop::sample::select(vec![
+        Orientation::Known,
+        Orientation::cube(),
+        Orientation::Free,
+    ]);
     let name = prop::option::of("[a-c]");
     prop_oneof![
         2 => (name, orientation.clone()).prop_map(move |(name, orientation)| ObjectMark::Learn {
