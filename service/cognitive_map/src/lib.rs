@@ -28,7 +28,10 @@ mod summary;
 mod trip;
 
 pub use agent::{Agent, Status};
-pub use cognitive_map::{CheckpointPage, CognitiveMap, CorruptCheckpoint, Predicted, Prediction};
+pub use chronicle::Guess;
+pub use cognitive_map::{
+    CheckpointPage, CognitiveMap, CorruptCheckpoint, Localization, Predicted, Prediction,
+};
 pub use digest::{Digest, InvalidDigest};
 pub use event::{Event, EventKind};
 pub use landmark::{Landmark, LandmarkId};

@@ -74,4 +74,5 @@ pub mod touch;
 pub mod tuc;
 pub mod tum;
 pub mod victoria;
+pub mod waking;
 pub mod world;

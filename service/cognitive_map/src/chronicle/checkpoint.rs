@@ -10,6 +10,7 @@
 //! 5     page   up to 64 landmarks
 //! 6     page   up to 16 views
 //! 7     page   what an agent saw lately
+//! 8     page   what an agent has seen that does not know where it is
 //! ```
 
 use std::collections::BTreeMap;
@@ -30,6 +31,7 @@ const TIES: u8 = 4;
 const LANDMARKS: u8 = 5;
 const VIEWS: u8 = 6;
 const TRACKS: u8 = 7;
+const SEARCHES: u8 = 8;
 
 /// One page of a chronicle's checkpoint. A later page of the same part and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -59,6 +61,7 @@ impl Chronicle {
             .chain(pages_of(LANDMARKS, &self.landmarks.slots.pages, since))
             .chain(pages_of(VIEWS, &self.revisits.views, since))
             .chain(pages_of(TRACKS, &self.revisits.tracks, since))
+            .chain(pages_of(SEARCHES, &self.searches, since))
     }
 
     /// The chronicle of a checkpoint, which goes on like the one that wrote it. Its pages count as changed at `revision`.
@@ -91,6 +94,7 @@ impl Chronicle {
                 LANDMARKS => chronicle.landmarks.slots.pages.push_page(&bytes, revision),
                 VIEWS => chronicle.revisits.views.push_page(&bytes, revision),
                 TRACKS => chronicle.revisits.tracks.push_page(&bytes, revision),
+                SEARCHES => chronicle.searches.push_page(&bytes, revision),
                 _ => Err(CorruptState::Invalid),
             };
             pushed.map_err(|_| CorruptChronicle)?;
@@ -114,6 +118,7 @@ impl Chronicle {
         self.landmarks.slots.pages.write_digests(&mut out);
         self.revisits.views.write_digests(&mut out);
         self.revisits.tracks.write_digests(&mut out);
+        self.searches.write_digests(&mut out);
         out.digest()
     }
 
@@ -183,9 +188,16 @@ impl Chronicle {
             && waiting
             && self.hand <= self.anchors.numbers()
             && self.revisits.is_sound(self.lives.len())
+            && self.searches_are_sound()
             && self.chains_are_sound()
             && self.sightings_are_sound()
             && self.ties_are_sound()
+    }
+
+    fn searches_are_sound(&self) -> bool {
+        let is_channel = |channel, length| self.revisits.is_channel(channel, length);
+        let mut searches = self.searches.iter();
+        searches.all(|search| search.is_sound(self.lives.len(), is_channel))
     }
 
     fn chains_are_sound(&self) -> bool {

@@ -6,6 +6,7 @@ use super::anchor::Anchor;
 use super::landmarks::Landmarks;
 use super::life::{Life, is_within};
 use super::milestones::Milestones;
+use super::relocalisation::Searches;
 use super::revisit::Revisits;
 use super::settings::ChronicleSettings;
 use super::sighting::{SeenPoint, Shown, Sighting};
@@ -90,6 +91,8 @@ pub struct Chronicle {
     pub(super) agreed: u32,
     /// What was seen, for who comes there again.
     pub(super) revisits: Revisits,
+    /// Who does not know where it is, and what it has seen since.
+    pub(super) searches: Searches,
     pub(super) milestones: Milestones,
 }
 
@@ -117,6 +120,7 @@ impl Chronicle {
             fresh_matches: 0,
             agreed: 0,
             revisits: Revisits::default(),
+            searches: Searches::default(),
             milestones: Milestones::default(),
         }
     }

@@ -39,6 +39,7 @@ impl Chronicle {
             session: self.session(moment.agent),
             seq: moment.seq,
             in_odom: viewed.in_odom,
+            in_map: moment.pose.translation.vector.into(),
             spread: spread(&viewed.covariance),
         };
         let revision = self.revision;

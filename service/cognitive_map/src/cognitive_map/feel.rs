@@ -4,11 +4,14 @@ use nalgebra::Point3;
 
 use super::fold::Fold;
 use super::motion::ANSWER_MIN;
-use crate::chronicle::Viewed;
+use crate::agent::Status;
+use crate::chronicle::{Relocalised, Viewed};
 use crate::event::EventKind;
+use crate::geometry::PoseCovariance;
 use crate::percept::Compared;
 use crate::place::{PlaceId, confidence};
 use crate::sample::{Descriptor, Level};
+use crate::trip::TripEnd;
 
 impl Fold<'_> {
     /// A level was felt, where the sensor is.
@@ -41,12 +44,10 @@ impl Fold<'_> {
         self.compared(place, compared);
     }
 
-    /// Remembers what an agent of the map saw, and finds out whether it has come where something like it was seen.
+    /// Remembers what an agent of the map saw, and finds out whether it has come where something like it was seen. One that
+    /// does not know where it is finds that out.
     fn look_back(&mut self, descriptor: &Descriptor) {
         let number = self.agent_id.0;
-        if !self.agent.placed {
-            return;
-        }
         let Some((_, covariance)) = self.estimator.pose(number) else {
             return;
         };
@@ -58,7 +59,46 @@ impl Fold<'_> {
             in_odom: *in_odom,
             covariance,
         };
-        self.chronicle.viewed(&self.moment(), &viewed);
+        let moment = self.moment();
+        let is_sought = self.chronicle.is_seeking(number);
+        if self.agent.placed && !is_sought && !self.is_lost(&viewed.covariance) {
+            self.chronicle.viewed(&moment, &viewed);
+            return;
+        }
+        let sd_max_m = 0.5 * self.settings.field_radius_m;
+        if let Some(found) = self.chronicle.seek(&moment, &viewed, sd_max_m) {
+            self.relocalised(&found);
+        }
+    }
+
+    /// Whether an agent in the map is known so little that it may be anywhere.
+    fn is_lost(&self, covariance: &PoseCovariance) -> bool {
+        Status::of(self.agent, covariance.position_sd_m(), self.settings) == Status::Lost
+    }
+
+    /// The agent recognised where it is.
+    fn relocalised(&mut self, found: &Relocalised) {
+        let number = self.agent_id.0;
+        let was_placed = self.agent.placed;
+        if found.is_first {
+            self.estimator
+                .recognised(number, &found.pose, &found.covariance);
+            self.remember_what_was_settled();
+        }
+        self.estimator.fix(number, &found.pose, &found.covariance);
+        if found.is_first || found.is_last {
+            let moment = self.moment();
+            let is_elsewhere = found.is_first && was_placed;
+            self.chronicle.relocalised(&moment, found, is_elsewhere);
+        }
+        if found.is_first && was_placed {
+            self.end_trip(TripEnd::StartPose);
+            self.stand();
+            let position = found.pose.translation.vector.into();
+            self.emit(EventKind::AgentPlaced { position });
+        } else {
+            self.follow();
+        }
     }
 
     /// The place that answers at a position, with its confidence; none for an agent that is not

@@ -128,6 +128,7 @@ impl Fold<'_> {
         self.end_trip(TripEnd::StartPose);
         self.estimator.start_pose(self.agent_id.0, start);
         self.chronicle.start_pose(&self.moment(), start);
+        self.chronicle.end_search(self.agent_id.0);
         *self.framed = true;
         self.stand();
     }
@@ -204,7 +205,7 @@ impl Fold<'_> {
     }
 
     /// Puts the agent where the estimate has it, without a way there.
-    fn stand(&mut self) {
+    pub(super) fn stand(&mut self) {
         if let Some(pose) = self.estimator.in_frame(self.agent_id.0) {
             self.agent.body.place(pose, self.modules);
         }

@@ -5,6 +5,7 @@ mod feel;
 mod fold;
 mod forget;
 mod header;
+mod localize;
 mod motion;
 mod objects;
 mod predict;
@@ -16,6 +17,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub use checkpoint::{CheckpointPage, CorruptCheckpoint};
+pub use localize::Localization;
 pub use predict::{Predicted, Prediction};
 
 use crate::agent::Agent;

@@ -115,6 +115,12 @@ impl Estimator {
 
     /// An agent was told where it stands in the map.
     pub fn start_pose(&mut self, agent: u32, start: &StartPose) {
+        let covariance = PoseCovariance::from_sd(start.noise().sd());
+        self.put(agent, start.pose(), covariance.matrix());
+    }
+
+    /// Puts an agent somewhere in the map, by itself.
+    pub(super) fn put(&mut self, agent: u32, pose: &Isometry3<f64>, covariance: &Matrix6<f64>) {
         let Some((from, traveller)) = self.leave(agent) else {
             return;
         };
@@ -125,7 +131,6 @@ impl Estimator {
             self.forget_meetings(from);
         }
         self.frame_mut(MAP).population += 1;
-        let covariance = *PoseCovariance::from_sd(start.noise().sd()).matrix();
         let Traveller {
             mover,
             mut sensor,
@@ -134,7 +139,7 @@ impl Estimator {
         // Numbers of landmarks change.
         sensor.latest.clear();
         let traveller = Traveller {
-            mover: mover.placed(*start.pose(), &covariance),
+            mover: mover.placed(*pose, covariance),
             sensor,
             refused: 0,
         };

@@ -10,6 +10,7 @@ use super::innovation::seen_at;
 use super::outcome::{Merged, Settled};
 use super::sight::{Glance, Verdict};
 use super::tie::{Pair, Tie, tie};
+use crate::geometry::{PoseCovariance, se3};
 use crate::sample::{Label, Relation};
 
 /// Sightings of agents that wait for the other agent's motion to come up to them.
@@ -207,6 +208,26 @@ impl Estimator {
             });
         }
         tie(&pairs, one.is_planar() && other.is_planar())
+    }
+
+    /// An agent turned out to be at a pose in the map, of which the error on its right has this covariance. Its frame is laid
+    /// into the map's, with all that is in it; one that was in the map is put there.
+    pub fn recognised(&mut self, agent: u32, pose: &Isometry3<f64>, covariance: &PoseCovariance) {
+        self.begin();
+        let (Some(own), Some(in_frame)) = (self.frame_of(agent), self.in_frame(agent)) else {
+            return;
+        };
+        if own == MAP {
+            self.put(agent, pose, covariance.matrix());
+            return;
+        }
+        // The error ξ of the body is Ad(T_b) ξ of the frame.
+        let adjoint = se3::adjoint(in_frame);
+        let tie = Tie {
+            pose: pose * in_frame.inverse(),
+            covariance: adjoint * covariance.matrix() * adjoint.transpose(),
+        };
+        self.merge(MAP, own, &tie);
     }
 
     /// Lays a frame into an older one.

@@ -1,8 +1,8 @@
 //! How one frame lies in another: the rigid motion that best lays points known in both over each other.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 
-use crate::geometry::se3;
+use crate::geometry::{align, centre, se3};
 
 /// Fewest points that tie two planar frames, and two frames in space.
 const POINTS_MIN: (usize, usize) = (3, 4);
@@ -48,13 +48,14 @@ pub(super) fn tie(pairs: &[Pair], is_planar: bool) -> Option<Tie> {
         return None;
     }
     let mut weights: Vec<f64> = pairs.iter().map(|pair| 1.0 / pair.variance).collect();
-    let mut pose = fit(pairs, &weights, is_planar)?;
+    let points: Vec<_> = pairs.iter().map(|pair| (pair.older, pair.newer)).collect();
+    let mut pose = align(&points, &weights, is_planar)?;
     for _ in 0..ROUNDS {
         for (weight, pair) in weights.iter_mut().zip(pairs) {
             let squared = (pose * pair.newer - pair.older).norm_squared() / pair.variance;
             *weight = 1.0 / (pair.variance * (1.0 + squared / (SOFT * SOFT)));
         }
-        pose = fit(pairs, &weights, is_planar)?;
+        pose = align(&points, &weights, is_planar)?;
     }
     let agrees = |pair: &&Pair| {
         let squared = (pose * pair.newer - pair.older).norm_squared() / pair.variance;
@@ -116,51 +117,6 @@ pub(super) fn point_by_tie(point: &Point3<f64>) -> Matrix6<f64> {
 /// How it adds to that of a body of the newer frame: `Ad(T_b⁻¹)`.
 pub(super) fn body_by_tie(pose: &Isometry3<f64>) -> Matrix6<f64> {
     se3::adjoint(&pose.inverse())
-}
-
-/// The motion of least squares. `None` when the points have no extent.
-fn fit(pairs: &[Pair], weights: &[f64], is_planar: bool) -> Option<Isometry3<f64>> {
-    let older = centre(pairs.iter().map(|pair| pair.older.coords), weights);
-    let newer = centre(pairs.iter().map(|pair| pair.newer.coords), weights);
-    let mut products = Matrix3::zeros();
-    for (pair, &weight) in pairs.iter().zip(weights) {
-        products += (pair.older.coords - older) * (pair.newer.coords - newer).transpose() * weight;
-    }
-    let rotation = if is_planar {
-        let sine = products[(1, 0)] - products[(0, 1)];
-        let cosine = products[(0, 0)] + products[(1, 1)];
-        if sine == 0.0 && cosine == 0.0 {
-            return None;
-        }
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sine.atan2(cosine))
-    } else {
-        let svd = products.svd(true, true);
-        let (u, v_t) = (svd.u?, svd.v_t?);
-        let sign = (u * v_t).determinant().signum();
-        let matrix = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
-        UnitQuaternion::from_matrix(&matrix)
-    };
-    let mut shift = older - rotation * newer;
-    if is_planar {
-        // Both move on one floor.
-        shift.z = 0.0;
-    }
-    let pose = Isometry3::from_parts(Translation3::from(shift), rotation);
-    let numbers = pose
-        .translation
-        .vector
-        .iter()
-        .chain(pose.rotation.coords.iter());
-    numbers.copied().all(f64::is_finite).then_some(pose)
-}
-
-/// Weighted mean.
-fn centre(points: impl Iterator<Item = Vector3<f64>>, weights: &[f64]) -> Vector3<f64> {
-    let sum: Vector3<f64> = points
-        .zip(weights)
-        .map(|(point, &weight)| point * weight)
-        .sum();
-    sum / weights.iter().sum::<f64>()
 }
 
 #[cfg(test)]

@@ -20,9 +20,9 @@ const SAME: f64 = 0.2;
 /// Steps of a solution at most.
 const STEPS_MAX: usize = 25;
 /// Deviation of a turn that the distances leave open \[rad\].
-const OPEN_RAD: f64 = 3.0;
+pub(in crate::chronicle) const OPEN_RAD: f64 = 3.0;
 /// The same of a shift, in mean distances.
-const OPEN_DISTANCES: f64 = 10.0;
+pub(in crate::chronicle) const OPEN_DISTANCES: f64 = 10.0;
 
 /// Two stretches laid over each other.
 #[derive(Clone, Debug)]
@@ -41,11 +41,11 @@ struct Prior {
 }
 
 /// A distance between a point of the present stretch and one of the earlier stretch.
-struct Range {
-    now: Vector3<f64>,
-    then: Point3<f64>,
-    mean_m: f64,
-    sd_m: f64,
+pub(in crate::chronicle) struct Range {
+    pub(in crate::chronicle) now: Vector3<f64>,
+    pub(in crate::chronicle) then: Point3<f64>,
+    pub(in crate::chronicle) mean_m: f64,
+    pub(in crate::chronicle) sd_m: f64,
 }
 
 /// A minimum.
@@ -57,10 +57,10 @@ struct Solution {
 }
 
 /// The normal equations of the distances at a pose.
-struct Equations {
-    hessian: Matrix6<f64>,
-    gradient: Vector6<f64>,
-    cost: f64,
+pub(in crate::chronicle) struct Equations {
+    pub(in crate::chronicle) hessian: Matrix6<f64>,
+    pub(in crate::chronicle) gradient: Vector6<f64>,
+    pub(in crate::chronicle) cost: f64,
 }
 
 impl Fit {
@@ -214,7 +214,7 @@ impl Prior {
 /// ```text
 /// e = now − T then    v = Rᵀ e / |e|    ∂|e|/∂(ρ, φ) = (−v, −then × v)
 /// ```
-fn equations(ranges: &[Range], pose: &Isometry3<f64>) -> Equations {
+pub(in crate::chronicle) fn equations(ranges: &[Range], pose: &Isometry3<f64>) -> Equations {
     let mut sum = Equations {
         hessian: Matrix6::zeros(),
         gradient: Vector6::zeros(),
@@ -244,14 +244,14 @@ fn equations(ranges: &[Range], pose: &Isometry3<f64>) -> Equations {
     sum
 }
 
-fn twist(motion: &Isometry3<f64>) -> Vector6<f64> {
+pub(in crate::chronicle) fn twist(motion: &Isometry3<f64>) -> Vector6<f64> {
     let (linear, angular) = se3::log(motion);
     Vector6::new(
         linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
     )
 }
 
-fn moved(pose: &Isometry3<f64>, twist: &Vector6<f64>) -> Isometry3<f64> {
+pub(in crate::chronicle) fn moved(pose: &Isometry3<f64>, twist: &Vector6<f64>) -> Isometry3<f64> {
     let (linear, angular) = (
         twist.fixed_rows::<3>(0).into_owned(),
         twist.fixed_rows::<3>(3).into_owned(),
@@ -278,6 +278,7 @@ mod tests {
             seq: ordinal.into(),
             ordinal,
             in_odom: Translation3::from(at).into(),
+            in_map: at.into(),
             spread: [1.0, 0.3],
             vector: Box::default(),
         }

@@ -12,6 +12,8 @@ mod revisits;
 mod track;
 mod view;
 
-pub(super) use fit::Fit;
+pub(super) use fit::{Fit, OPEN_DISTANCES, OPEN_RAD, Range, equations, moved, twist};
 pub(super) use passage::{Passage, Reference};
-pub(super) use revisits::{Felt, Revisits};
+pub(super) use revisits::{ALIKE_MAX, Felt, Revisits};
+pub(super) use track::{read_all, write_all};
+pub(super) use view::{Likeness, View, angle_rad, read_vector, write_vector};

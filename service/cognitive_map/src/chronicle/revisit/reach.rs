@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use crate::percept::Moments;
 use crate::sample::Label;
-use crate::state::{CorruptState, State, StateReader, StateWriter};
+use crate::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
 /// Classes of angles between two views, from 0 to a right angle.
 const CLASSES: usize = 32;
@@ -40,9 +40,9 @@ pub(super) struct Reach {
 
 /// A distance with its deviation \[m\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Distance {
-    pub(super) mean_m: f64,
-    pub(super) sd_m: f64,
+pub(in crate::chronicle) struct Distance {
+    pub(in crate::chronicle) mean_m: f64,
+    pub(in crate::chronicle) sd_m: f64,
 }
 
 impl Reach {
@@ -84,6 +84,24 @@ impl Reach {
         }
     }
 
+    /// Distance from which on two views are no more alike than unrelated ones may be \[m\]; nothing before that is known.
+    pub(super) fn reach_m(&self) -> Option<f64> {
+        let unrelated = &self.unrelated;
+        if unrelated.count() < UNRELATED_MIN {
+            return None;
+        }
+        let limit = class_of(unrelated.mean() - ALIKE * unrelated.sd()).min(CLASSES - 1);
+        let known = (0..=limit)
+            .rev()
+            .filter_map(|class| self.distances_m.get(class));
+        let farthest = known
+            .filter(|class| class.count() >= PAIRS_MIN)
+            .map(Moments::mean);
+        farthest
+            .max_by(f64::total_cmp)
+            .filter(|reach_m| *reach_m > 0.0)
+    }
+
     /// How far apart two views were taken; nothing where they are no more alike than unrelated ones may be.
     pub(super) fn distance(&self, angle_rad: f64) -> Option<Distance> {
         let unrelated = &self.unrelated;
@@ -120,6 +138,8 @@ impl Reach {
         Some(Distance::new(mean_m, sd_m))
     }
 }
+
+state_of_struct!(Distance { mean_m, sd_m });
 
 impl Distance {
     fn new(mean_m: f64, sd_m: f64) -> Self {

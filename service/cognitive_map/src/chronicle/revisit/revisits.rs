@@ -1,14 +1,14 @@
 //! What agents saw, and where they see it again.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 
 use super::passage::Passage;
-use super::reach::Reach;
+use super::reach::{Distance, Reach};
 use super::track::{RECENT_MAX, Track, read_all, write_all};
-use super::view::{View, angle_rad};
+use super::view::{Likeness, View, angle_rad};
 use crate::paged::PagedVec;
 use crate::sample::Descriptor;
-use crate::state::{CorruptState, StateReader, StateWriter};
+use crate::state::{CorruptState, State, StateReader, StateWriter};
 
 /// Channels whose views are remembered.
 const CHANNELS_MAX: usize = 64;
@@ -20,12 +20,14 @@ const NUMBERS_MAX: usize = 1 << 21;
 const MOVED: (f64, f64) = (0.05, 0.1);
 /// Motion after which a view may be news \[m, rad\]: an anchor's.
 const STEP: (f64, f64) = (0.1, 0.1);
+/// A view that is like none of those so near, in reaches, shows something that is not there: somebody who passes by.
+const BESIDE: f64 = 0.6;
 /// Of an agent's own views those count as earlier that lie so many before the present one.
 const EARLIER: u32 = 16;
 /// Ordinals left out where an agent was put somewhere else.
 const APART: u32 = 64;
 /// Views that a new one is taken to be like at most, the most alike first.
-const ALIKE_MAX: usize = 32;
+pub(in crate::chronicle) const ALIKE_MAX: usize = 32;
 /// Passages of an agent under way.
 const PASSAGES_MAX: usize = 4;
 
@@ -37,6 +39,8 @@ pub(in crate::chronicle) struct Revisits {
     pub(in crate::chronicle) views: PagedVec<View, 16>,
     /// Numbers in all views.
     numbers: u64,
+    /// Times that every second view was forgotten.
+    pub(in crate::chronicle) thinnings: u64,
 }
 
 /// Where an agent is when it sees something.
@@ -46,6 +50,7 @@ pub(in crate::chronicle) struct Felt {
     pub(in crate::chronicle) session: u32,
     pub(in crate::chronicle) seq: u64,
     pub(in crate::chronicle) in_odom: Isometry3<f64>,
+    pub(in crate::chronicle) in_map: Point3<f64>,
     pub(in crate::chronicle) spread: [f64; 2],
 }
 
@@ -73,16 +78,24 @@ impl Revisits {
         }
         track.last = Some(felt.in_odom);
         let reach = &mut self.reaches[usize::from(channel)];
-        let mut is_news = true;
+        let (mut is_news, mut is_stray) = (true, None);
         for (index, recent) in track.recent.iter().enumerate() {
             let angle_rad = angle_rad(&recent.vector, vector);
             let way = recent.in_odom.inv_mul(&felt.in_odom);
-            reach.learn(angle_rad, way.translation.vector.norm());
+            let distance_m = way.translation.vector.norm();
+            reach.learn(angle_rad, distance_m);
             if index + 1 == track.recent.len() {
                 is_news = angle_rad > reach.news_rad() && is_beyond(&way, STEP);
             }
+            if reach
+                .reach_m()
+                .is_some_and(|reach_m| distance_m < BESIDE * reach_m)
+            {
+                let is_unlike = reach.distance(angle_rad).is_none();
+                is_stray = Some(is_unlike && is_stray.unwrap_or(true));
+            }
         }
-        if !is_news {
+        if !is_news || is_stray == Some(true) {
             return Vec::new();
         }
         track.note(&felt.in_odom, vector);
@@ -93,6 +106,7 @@ impl Revisits {
             seq: felt.seq,
             ordinal: track.next,
             in_odom: felt.in_odom,
+            in_map: felt.in_map,
             spread: felt.spread,
             vector: vector.into(),
         };
@@ -124,7 +138,7 @@ impl Revisits {
     }
 
     /// The earlier views that one is like, by number, with their distances; and whether one of them is as good as the same.
-    fn alike(&mut self, view: &View) -> (Vec<(usize, super::reach::Distance)>, bool) {
+    fn alike(&mut self, view: &View) -> (Vec<(usize, Distance)>, bool) {
         let reach = &mut self.reaches[usize::from(view.channel)];
         let mut alike = Vec::new();
         let mut is_known = false;
@@ -155,7 +169,7 @@ impl Revisits {
         &mut self,
         track: usize,
         view: &View,
-        alike: &[(usize, super::reach::Distance)],
+        alike: &[(usize, Distance)],
         revision: u64,
     ) -> Vec<Passage> {
         let Some(track) = self.tracks.get_mut(track, revision) else {
@@ -202,6 +216,7 @@ impl Revisits {
             return;
         }
         let mut kept = 0;
+        self.thinnings += 1;
         self.numbers = 0;
         for number in 0..self.views.len() {
             let Some(mut view) = self.views.get(number).cloned() else {
@@ -232,18 +247,14 @@ impl Revisits {
     /// The number of a descriptor's channel; a new one if there is room for it.
     fn channel(&mut self, descriptor: &Descriptor) -> Option<u8> {
         let dimension = u16::try_from(descriptor.vector().len()).ok()?;
-        let known = self
-            .reaches
-            .iter()
-            .position(|reach| reach.dimension == dimension && &reach.label == descriptor.channel());
-        let number = known.or_else(|| {
-            (self.reaches.len() < CHANNELS_MAX).then(|| {
-                let reach = Reach::new(descriptor.channel().clone(), dimension);
-                self.reaches.push(reach);
-                self.reaches.len() - 1
-            })
-        })?;
-        u8::try_from(number).ok()
+        self.known_channel(descriptor).or_else(|| {
+            if self.reaches.len() >= CHANNELS_MAX {
+                return None;
+            }
+            let reach = Reach::new(descriptor.channel().clone(), dimension);
+            self.reaches.push(reach);
+            u8::try_from(self.reaches.len() - 1).ok()
+        })
     }
 
     /// The number of the track of an agent on a channel, in its present session.
@@ -278,6 +289,7 @@ impl Revisits {
 
     pub(in crate::chronicle) fn write_head(&self, out: &mut StateWriter) {
         write_all(&self.reaches, out);
+        self.thinnings.write(out);
     }
 
     pub(in crate::chronicle) fn read_head(
@@ -285,16 +297,64 @@ impl Revisits {
         input: &mut StateReader<'_>,
     ) -> Result<(), CorruptState> {
         self.reaches = read_all(input)?;
+        self.thinnings = State::read(input)?;
         self.numbers = self.views.iter().map(|view| view.vector.len() as u64).sum();
         Ok(())
     }
 
+    /// The remembered views from a number on that something seen on a channel is like, the most alike first.
+    pub(in crate::chronicle) fn likes(
+        &self,
+        channel: u8,
+        vector: &[f32],
+        from: usize,
+        is_left_out: impl Fn(&View) -> bool,
+    ) -> Vec<Likeness> {
+        let views = self.views.iter_from(from);
+        let mut likes: Vec<Likeness> = views
+            .filter(|view| view.channel == channel && !is_left_out(view))
+            .filter_map(|view| {
+                Some(Likeness {
+                    agent: view.agent,
+                    session: view.session,
+                    seq: view.seq,
+                    distance: self.distance(channel, angle_rad(&view.vector, vector))?,
+                })
+            })
+            .collect();
+        likes.sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
+        likes.truncate(ALIKE_MAX);
+        likes
+    }
+
+    /// How far apart two views of a channel were taken, if they are alike.
+    pub(in crate::chronicle) fn distance(&self, channel: u8, angle_rad: f64) -> Option<Distance> {
+        self.reaches.get(usize::from(channel))?.distance(angle_rad)
+    }
+
+    /// Distance from which on two views of a channel are no more alike than any \[m\].
+    pub(in crate::chronicle) fn reach_m(&self, channel: u8) -> Option<f64> {
+        self.reaches.get(usize::from(channel))?.reach_m()
+    }
+
+    /// The number of a descriptor's channel, if anything was remembered of it.
+    pub(in crate::chronicle) fn known_channel(&self, descriptor: &Descriptor) -> Option<u8> {
+        let dimension = u16::try_from(descriptor.vector().len()).ok()?;
+        let known = self.reaches.iter().position(|reach| {
+            reach.dimension == dimension && &reach.label == descriptor.channel()
+        })?;
+        u8::try_from(known).ok()
+    }
+
+    /// Whether a channel has views of so many numbers.
+    pub(in crate::chronicle) fn is_channel(&self, channel: u8, length: usize) -> bool {
+        let reach = self.reaches.get(usize::from(channel));
+        reach.is_some_and(|reach| usize::from(reach.dimension) == length)
+    }
+
     /// Whether everything that it names is there, and all views of a channel are of one length.
     pub(in crate::chronicle) fn is_sound(&self, agents: usize) -> bool {
-        let is_channel = |channel: u8, length: usize| {
-            let reach = self.reaches.get(usize::from(channel));
-            reach.is_some_and(|reach| usize::from(reach.dimension) == length)
-        };
+        let is_channel = |channel: u8, length: usize| self.is_channel(channel, length);
         let views = self.views.iter().all(|view| {
             (view.agent as usize) < agents && is_channel(view.channel, view.vector.len())
         });

@@ -95,13 +95,15 @@ impl State for Track {
     }
 }
 
-pub(super) fn write_all<T: State>(items: &[T], out: &mut StateWriter) {
+pub(in crate::chronicle) fn write_all<T: State>(items: &[T], out: &mut StateWriter) {
     (items.len() as u64).write(out);
     for item in items {
         item.write(out);
     }
 }
 
-pub(super) fn read_all<T: State>(input: &mut StateReader<'_>) -> Result<Vec<T>, CorruptState> {
+pub(in crate::chronicle) fn read_all<T: State>(
+    input: &mut StateReader<'_>,
+) -> Result<Vec<T>, CorruptState> {
     (0..u64::read(input)?).map(|_| T::read(input)).collect()
 }

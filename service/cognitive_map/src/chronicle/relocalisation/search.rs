@@ -1,0 +1,178 @@
+//! What an agent has seen since it does not know where it is.
+
+use nalgebra::Isometry3;
+
+use crate::chronicle::revisit::{
+    ALIKE_MAX, Likeness, Revisits, View, read_all, read_vector, write_all, write_vector,
+};
+use crate::paged::PagedVec;
+use crate::state::{CorruptState, State, StateReader, StateWriter};
+
+/// Looks that are kept: a way of some metres, beyond which odometry adds errors of its own.
+const LOOKS_MAX: usize = 48;
+/// Numbers in them: a quarter of a MiB.
+const NUMBERS_MAX: usize = 1 << 16;
+
+/// What was seen at a moment, and which remembered views it is like.
+#[derive(Clone, Debug)]
+pub(super) struct Look {
+    /// Where the agent was by motion alone.
+    pub(super) in_odom: Isometry3<f64>,
+    /// The way there since the search began \[m\].
+    pub(super) travelled_m: f64,
+    /// Number of the channel.
+    pub(super) channel: u8,
+    /// A unit vector.
+    pub(super) vector: Box<[f32]>,
+    /// The remembered views that it is like, the most alike first.
+    pub(super) alike: Vec<Likeness>,
+}
+
+/// A search under way.
+#[derive(Clone, Debug)]
+pub(in crate::chronicle) struct Search {
+    pub(super) agent: u32,
+    /// The sample of the agent's session from which on it does not know where it is.
+    pub(super) since_seq: u64,
+    pub(super) session: u32,
+    /// Views, and times that views were thinned, up to which the looks have been compared with them.
+    pub(super) compared: u64,
+    pub(super) thinnings: u64,
+    /// The way after which it was found \[m\]; it goes on until the heading is sure, too.
+    pub(super) found_m: Option<f64>,
+    /// Looks since the poses were sought.
+    pub(super) fresh: u32,
+    pub(super) looks: Vec<Look>,
+}
+
+/// The searches, at most one of an agent.
+pub(in crate::chronicle) type Searches = PagedVec<Search, 1>;
+
+impl Search {
+    pub(super) fn new(agent: u32, session: u32, seq: u64) -> Self {
+        Self {
+            agent,
+            since_seq: seq,
+            session,
+            compared: 0,
+            thinnings: 0,
+            found_m: None,
+            fresh: 0,
+            looks: Vec::new(),
+        }
+    }
+
+    /// Adds a look; the oldest go when there is no room.
+    pub(super) fn look(
+        &mut self,
+        in_odom: Isometry3<f64>,
+        channel: u8,
+        vector: &[f32],
+        alike: Vec<Likeness>,
+    ) {
+        let travelled_m = self.looks.last().map_or(0.0, |last| {
+            last.travelled_m + (in_odom.translation.vector - last.in_odom.translation.vector).norm()
+        });
+        self.looks.push(Look {
+            in_odom,
+            travelled_m,
+            channel,
+            vector: vector.into(),
+            alike,
+        });
+        let mut numbers: usize = self.looks.iter().map(|look| look.vector.len()).sum();
+        while self.looks.len() > LOOKS_MAX || numbers > NUMBERS_MAX.max(vector.len()) {
+            numbers -= self.looks.remove(0).vector.len();
+        }
+        self.fresh += 1;
+    }
+
+    /// Compares the looks with what others have seen since they were made.
+    pub(super) fn catch_up(&mut self, revisits: &Revisits) {
+        let views = revisits.views.len() as u64;
+        let from = if self.thinnings == revisits.thinnings {
+            self.compared
+        } else {
+            views
+        };
+        (self.compared, self.thinnings) = (views, revisits.thinnings);
+        let from = usize::try_from(from).unwrap_or(usize::MAX);
+        if from >= revisits.views.len() {
+            return;
+        }
+        let (agent, session, since_seq) = (self.agent, self.session, self.since_seq);
+        for look in &mut self.looks {
+            let is_own = |view: &View| view.is_of(agent, session, since_seq);
+            let fresh = revisits.likes(look.channel, &look.vector, from, is_own);
+            look.alike.extend(fresh);
+            look.alike
+                .sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
+            look.alike.truncate(ALIKE_MAX);
+        }
+    }
+
+    /// Whether the agent itself saw that, since it does not know where it is.
+    pub(super) fn is_own(&self, view: &View) -> bool {
+        view.is_of(self.agent, self.session, self.since_seq)
+    }
+
+    /// Whether it may have come from a checkpoint that this program wrote.
+    pub(in crate::chronicle) fn is_sound(
+        &self,
+        agents: usize,
+        is_channel: impl Fn(u8, usize) -> bool,
+    ) -> bool {
+        (self.agent as usize) < agents
+            && self.looks.len() <= LOOKS_MAX
+            && self
+                .looks
+                .iter()
+                .all(|look| is_channel(look.channel, look.vector.len()))
+    }
+}
+
+impl State for Look {
+    fn write(&self, out: &mut StateWriter) {
+        self.in_odom.write(out);
+        self.travelled_m.write(out);
+        self.channel.write(out);
+        write_vector(&self.vector, out);
+        write_all(&self.alike, out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        Ok(Self {
+            in_odom: State::read(input)?,
+            travelled_m: State::read(input)?,
+            channel: State::read(input)?,
+            vector: read_vector(input)?,
+            alike: read_all(input)?,
+        })
+    }
+}
+
+impl State for Search {
+    fn write(&self, out: &mut StateWriter) {
+        self.agent.write(out);
+        self.since_seq.write(out);
+        self.session.write(out);
+        self.compared.write(out);
+        self.thinnings.write(out);
+        self.found_m.write(out);
+        self.fresh.write(out);
+        write_all(&self.looks, out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        Ok(Self {
+            agent: State::read(input)?,
+            since_seq: State::read(input)?,
+            session: State::read(input)?,
+            compared: State::read(input)?,
+            thinnings: State::read(input)?,
+            found_m: State::read(input)?,
+            fresh: State::read(input)?,
+            looks: read_all(input)?,
+        })
+    }
+}

@@ -1,0 +1,53 @@
+//! Points laid over points.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+
+/// The rigid motion of least squares that takes the second point of each pair to the first (Horn 1987), by weight. `None`
+/// when the points have no extent. In the plane only a turn about z and a shift along x and y is sought.
+pub(crate) fn align(
+    pairs: &[(Point3<f64>, Point3<f64>)],
+    weights: &[f64],
+    is_planar: bool,
+) -> Option<Isometry3<f64>> {
+    let to = centre(pairs.iter().map(|pair| pair.0.coords), weights);
+    let from = centre(pairs.iter().map(|pair| pair.1.coords), weights);
+    let mut products = Matrix3::zeros();
+    for (pair, &weight) in pairs.iter().zip(weights) {
+        products += (pair.0.coords - to) * (pair.1.coords - from).transpose() * weight;
+    }
+    let rotation = if is_planar {
+        let sine = products[(1, 0)] - products[(0, 1)];
+        let cosine = products[(0, 0)] + products[(1, 1)];
+        if sine == 0.0 && cosine == 0.0 {
+            return None;
+        }
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sine.atan2(cosine))
+    } else {
+        let svd = products.svd(true, true);
+        let (u, v_t) = (svd.u?, svd.v_t?);
+        let sign = (u * v_t).determinant().signum();
+        let matrix = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
+        UnitQuaternion::from_matrix(&matrix)
+    };
+    let mut shift = to - rotation * from;
+    if is_planar {
+        // Both move on one floor.
+        shift.z = 0.0;
+    }
+    let pose = Isometry3::from_parts(Translation3::from(shift), rotation);
+    let numbers = pose
+        .translation
+        .vector
+        .iter()
+        .chain(pose.rotation.coords.iter());
+    numbers.copied().all(f64::is_finite).then_some(pose)
+}
+
+/// Weighted mean.
+pub(crate) fn centre(points: impl Iterator<Item = Vector3<f64>>, weights: &[f64]) -> Vector3<f64> {
+    let sum: Vector3<f64> = points
+        .zip(weights)
+        .map(|(point, &weight)| point * weight)
+        .sum();
+    sum / weights.iter().sum::<f64>()
+}

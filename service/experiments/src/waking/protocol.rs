@@ -1,0 +1,80 @@
+//! What is done, down to the last option.
+
+use serde::Serialize;
+
+/// One experiment.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WakingProtocol {
+    /// Robots that wake up.
+    pub trials: u32,
+    /// Of these, in one and the same building.
+    pub trials_per_building: u32,
+    /// Rooms of a building, which look alike up to three fifths of their height.
+    pub rooms: u32,
+    /// Steps of 0.1 m that the explorer makes in each room.
+    pub explorer_steps: u32,
+    /// How far a robot goes \[m\].
+    pub travel_m: f64,
+    /// The room is seen at every step whose number divides by this.
+    pub view_every: u32,
+    /// Length of a view's noise, as a share of the view's own.
+    pub view_noise: f64,
+    /// Share of views that show something else.
+    pub view_wrong: f64,
+    /// Number from which everything is drawn.
+    pub seed: u64,
+}
+
+/// A protocol that cannot be followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidWaking {
+    /// Nothing to do, or too much.
+    #[error(
+        "there are from 1 to 100000 trials, some of them in each building, 1 to 8 rooms and 1 to 10^7 steps of the explorer"
+    )]
+    Count,
+    /// A way that is none.
+    #[error("a robot goes from 0.1 m to 1000 m and sees the room at every step or more rarely")]
+    Travel,
+    /// Views that make no sense.
+    #[error("noise and wrong views are shares from 0 to 1")]
+    View,
+}
+
+impl Default for WakingProtocol {
+    fn default() -> Self {
+        Self {
+            trials: 200,
+            trials_per_building: 20,
+            rooms: 1,
+            explorer_steps: 20_000,
+            travel_m: 3.0,
+            view_every: 1,
+            view_noise: 0.1,
+            view_wrong: 0.05,
+            seed: 1,
+        }
+    }
+}
+
+impl WakingProtocol {
+    /// # Errors
+    /// Names the first option that makes no sense.
+    pub fn check(&self) -> Result<(), InvalidWaking> {
+        let counts = (1..=100_000).contains(&self.trials)
+            && self.trials_per_building >= 1
+            && (1..=8).contains(&self.rooms)
+            && (1..=10_000_000).contains(&self.explorer_steps);
+        if !counts {
+            return Err(InvalidWaking::Count);
+        }
+        if !(0.1..=1000.0).contains(&self.travel_m) || self.view_every == 0 {
+            return Err(InvalidWaking::Travel);
+        }
+        let share = |value: f64| (0.0..=1.0).contains(&value);
+        if !share(self.view_noise) || !share(self.view_wrong) {
+            return Err(InvalidWaking::View);
+        }
+        Ok(())
+    }
+}

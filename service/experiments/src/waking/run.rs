@@ -1,0 +1,243 @@
+//! An explorer, and robots that wake up.
+
+use std::num::NonZeroUsize;
+
+use cognitive_map::{AgentId, CognitiveMap, Label, Record, Sample, Settings, SettingsValues};
+use nalgebra::{Isometry3, Translation3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::building::Building;
+use super::protocol::{InvalidWaking, WakingProtocol};
+use super::report::{WakingReport, WakingTrial};
+use crate::eval::object::in_parallel;
+use crate::reading::{Reading, ReadingBody};
+use crate::world::{ObstacleWorld, Odometer, OdometryNoise, STEP_M, Walker};
+
+/// Time of a step: 10 Hz, which makes 1 m/s.
+const STEP_NS: i64 = 100_000_000;
+/// A robot wakes up so near to where the explorer was, along each axis \[m\].
+const BESIDE_M: f64 = 0.3;
+const CHANNEL: &str = "view";
+/// Below this share of the height a robot wakes up where several rooms look alike.
+const WAKES_BELOW: f64 = 0.4;
+/// Odometry of the robots: that of the obstacle-rich room's accuracy tables.
+const ODOMETRY: OdometryNoise = OdometryNoise {
+    translation_share: 0.05,
+    scale_bias: 0.01,
+    rotation_sd_rad: 0.5 * std::f64::consts::PI / 180.0,
+    gyro_bias_rad: 0.02 * std::f64::consts::PI / 180.0,
+};
+
+/// Follows a protocol, on so many threads. The same protocol gives the same report on any number of them.
+///
+/// # Errors
+/// The protocol makes no sense.
+pub fn run_waking(
+    protocol: &WakingProtocol,
+    threads: NonZeroUsize,
+    done: &(impl Fn() + Sync),
+) -> Result<WakingReport, InvalidWaking> {
+    protocol.check()?;
+    let buildings = protocol.trials.div_ceil(protocol.trials_per_building);
+    let trials = in_parallel(buildings as usize, threads, &|building| {
+        let before = u32::try_from(building).map_or(protocol.trials, |building| {
+            building.saturating_mul(protocol.trials_per_building)
+        });
+        let count = protocol
+            .trials_per_building
+            .min(protocol.trials.saturating_sub(before));
+        let site = Site::explored(protocol, protocol.seed.wrapping_add(building as u64));
+        let trials = (0..count).map(|number| {
+            let trial = site.wake(protocol, number);
+            done();
+            trial
+        });
+        trials.collect::<Vec<_>>()
+    });
+    let trials: Vec<WakingTrial> = trials.into_iter().flatten().collect();
+    Ok(WakingReport::of(protocol, &trials))
+}
+
+/// A building that has been explored.
+struct Site {
+    seed: u64,
+    world: ObstacleWorld,
+    building: Building,
+    map: CognitiveMap,
+    /// Where the explorer was in each room.
+    way: Vec<Vec<Vector3<f64>>>,
+}
+
+/// A robot in a room.
+struct Robot<'a> {
+    site: &'a Site,
+    room: usize,
+    walker: Walker,
+    odometer: Odometer,
+    eyes: ChaCha8Rng,
+    steps: u32,
+}
+
+impl Site {
+    fn explored(protocol: &WakingProtocol, seed: u64) -> Self {
+        let world = ObstacleWorld::new(seed);
+        let building = Building::new(seed, protocol.rooms, world.side_m());
+        let settings = Settings::new(SettingsValues::default())
+            .expect("the settings that a space has by default are valid");
+        let mut site = Self {
+            seed,
+            world,
+            building,
+            map: CognitiveMap::new(settings),
+            way: Vec::new(),
+        };
+        let mut map = site.map.clone();
+        let agent = enrol(&mut map, "explorer");
+        let (mut seq, mut way) = (0, Vec::new());
+        for room in 0..protocol.rooms as usize {
+            let walker = Walker::new(
+                &site.world,
+                site.world.centre_m(),
+                site.random(1 + room as u64),
+            )
+            .expect("the middle of a room is free");
+            let mut robot = site.robot(room, walker, OdometryNoise::none(), 100 + room as u64);
+            let mut positions = Vec::new();
+            let mut readings = vec![robot.start_pose()];
+            for _ in 0..protocol.explorer_steps {
+                readings.extend(robot.step(protocol));
+                for reading in readings.drain(..) {
+                    apply(&mut map, agent, seq, &reading);
+                    seq += 1;
+                }
+                positions.push(robot.walker.pose().translation.vector);
+            }
+            way.push(positions);
+        }
+        (site.map, site.way) = (map, way);
+        site
+    }
+
+    fn random(&self, stream: u64) -> ChaCha8Rng {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        random.set_stream(stream);
+        random
+    }
+
+    fn robot(&self, room: usize, walker: Walker, noise: OdometryNoise, stream: u64) -> Robot<'_> {
+        Robot {
+            site: self,
+            room,
+            walker,
+            odometer: Odometer::new(noise, self.random(2 * stream)).expect("the noise is valid"),
+            eyes: self.random(2 * stream + 1),
+            steps: 0,
+        }
+    }
+
+    /// A robot wakes up and walks.
+    fn wake(&self, protocol: &WakingProtocol, number: u32) -> WakingTrial {
+        let stream = 1000 + 10 * u64::from(number);
+        let mut random = self.random(stream);
+        let room = random.random_range(0..protocol.rooms as usize);
+        let walker = (0..10_000)
+            .find_map(|_| {
+                let positions = &self.way[room];
+                let beside = Vector3::from_fn(|_, _| random.random_range(-BESIDE_M..BESIDE_M));
+                let position_m = positions[random.random_range(0..positions.len())] + beside;
+                let walker = Walker::new(&self.world, position_m, self.random(random.random()))?;
+                let height_m = walker.pose().translation.vector.z;
+                let is_low = height_m <= WAKES_BELOW * self.world.side_m();
+                (protocol.rooms == 1 || is_low).then_some(walker)
+            })
+            .expect("most of a room is free");
+        let mut robot = self.robot(room, walker, ODOMETRY, stream + 1);
+        let mut map = self.map.clone();
+        let agent = enrol(&mut map, "woken");
+        let mut trial = WakingTrial::default();
+        let mut seq = 0;
+        let mut travelled_m = 0.0;
+        while travelled_m < protocol.travel_m - 1e-9 {
+            for reading in robot.step(protocol) {
+                apply(&mut map, agent, seq, &reading);
+                seq += 1;
+            }
+            travelled_m = f64::from(robot.steps) * STEP_M;
+            let woken = map.agent(agent).expect("it was enrolled");
+            if !woken.placed() {
+                continue;
+            }
+            let truth = robot.in_map();
+            let off = truth.inv_mul(woken.pose());
+            let is_told = robot.walker.pose().translation.vector.z >= self.building.told_from_m();
+            trial.note(travelled_m, &off, is_told);
+        }
+        trial
+    }
+}
+
+impl Robot<'_> {
+    fn in_map(&self) -> Isometry3<f64> {
+        Translation3::from(self.site.building.corner_m(self.room)) * self.walker.pose()
+    }
+
+    fn stamp_ns(&self) -> i64 {
+        i64::from(self.steps) * STEP_NS
+    }
+
+    fn start_pose(&self) -> Reading {
+        let pose = self.in_map();
+        Reading {
+            stamp_ns: self.stamp_ns(),
+            body: ReadingBody::StartPose {
+                translation_m: pose.translation.vector.into(),
+                rotation_xyzw: pose.rotation.coords.into(),
+            },
+        }
+    }
+
+    fn step(&mut self, protocol: &WakingProtocol) -> Vec<Reading> {
+        let step = self.walker.step(&self.site.world);
+        self.steps += 1;
+        let stamp_ns = self.stamp_ns();
+        let mut readings = vec![self.odometer.read(&step, stamp_ns, STEP_NS as f64 * 1e-9)];
+        if self.steps.is_multiple_of(protocol.view_every) {
+            let from_m = self.walker.pose().translation.vector;
+            let vector = self.site.building.view(
+                self.room,
+                &from_m,
+                protocol.view_noise,
+                protocol.view_wrong,
+                &mut self.eyes,
+            );
+            readings.push(Reading {
+                stamp_ns,
+                body: ReadingBody::Descriptor {
+                    channel: CHANNEL.to_owned(),
+                    vector,
+                },
+            });
+        }
+        readings
+    }
+}
+
+fn enrol(map: &mut CognitiveMap, name: &str) -> AgentId {
+    let number = u32::try_from(map.agent_count()).expect("there are two agents at most");
+    let agent = AgentId(number);
+    let name = Label::new(name).expect("it is a label");
+    map.apply(&Record::Enrol { agent, name }, &mut Vec::new());
+    agent
+}
+
+fn apply(map: &mut CognitiveMap, agent: AgentId, seq: u64, reading: &Reading) {
+    let sample = Sample::try_from(reading).expect("a walk's readings are valid");
+    let record = Record::Sample {
+        agent,
+        session: 1,
+        seq,
+        sample,
+    };
+    map.apply(&record, &mut Vec::new());
+}

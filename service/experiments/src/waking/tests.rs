@@ -1,0 +1,67 @@
+//! What a user of a woken robot would notice.
+
+use std::num::NonZeroUsize;
+
+use super::{InvalidWaking, WakingProtocol, WakingReport, run_waking};
+
+fn run(protocol: &WakingProtocol) -> WakingReport {
+    run_waking(protocol, NonZeroUsize::MIN, &|| {}).unwrap()
+}
+
+fn few(trials: u32) -> WakingProtocol {
+    WakingProtocol {
+        trials,
+        trials_per_building: 4,
+        explorer_steps: 6000,
+        ..WakingProtocol::default()
+    }
+}
+
+#[test]
+fn robots_find_out_where_they_woke_up() {
+    let report = run(&few(8));
+    assert!(report.relocalised >= 0.7, "{report:?}");
+    assert!(report.travel_m.p50.unwrap() < 3.0);
+}
+
+#[test]
+fn the_same_protocol_gives_the_same_report_on_any_number_of_threads() {
+    let protocol = few(6);
+    let two = run_waking(&protocol, NonZeroUsize::new(2).unwrap(), &|| {}).unwrap();
+    assert_eq!(run(&protocol), two);
+}
+
+#[test]
+fn nobody_is_put_anywhere_in_a_room_that_nobody_explored() {
+    let report = run(&WakingProtocol {
+        explorer_steps: 1,
+        ..few(4)
+    });
+    assert_eq!((report.uncertain, report.false_claims), (4, 0));
+}
+
+#[test]
+fn rooms_that_look_alike_are_not_told_apart() {
+    let report = run(&WakingProtocol { rooms: 3, ..few(8) });
+    assert_eq!(
+        (report.early_claims, report.false_claims),
+        (0, 0),
+        "{report:?}"
+    );
+}
+
+#[test]
+fn senseless_protocols_are_refused() {
+    let refused = |protocol: WakingProtocol| protocol.check().unwrap_err();
+    assert_eq!(refused(few(0)), InvalidWaking::Count);
+    let far = WakingProtocol {
+        travel_m: f64::NAN,
+        ..few(1)
+    };
+    assert_eq!(refused(far), InvalidWaking::Travel);
+    let blind = WakingProtocol {
+        view_wrong: 1.5,
+        ..few(1)
+    };
+    assert_eq!(refused(blind), InvalidWaking::View);
+}
