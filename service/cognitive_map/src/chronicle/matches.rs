@@ -32,7 +32,7 @@ const ANY_ANGLE_RAD: f64 = 3.0;
 /// Least deviation of a match \[m, rad\].
 const DEVIATION_MIN: f64 = 1e-3;
 /// A relaxation waits for one record for so many anchors: then it costs each record about as much as so many anchors.
-const ANCHORS_PER_RECORD: usize = 4;
+const ANCHORS_PER_RECORD: usize = 8;
 /// Rounds of relaxation and doubt at most.
 const ROUNDS_MAX: usize = 3;
 

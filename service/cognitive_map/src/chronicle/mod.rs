@@ -16,6 +16,7 @@ mod checkpoint;
 )]
 mod chronicle;
 mod coarse;
+mod field;
 mod landmarks;
 mod life;
 mod matches;

@@ -13,6 +13,9 @@ use crate::place::{PlaceId, confidence};
 use crate::sample::{Descriptor, Level};
 use crate::trip::TripEnd;
 
+/// An agent that is found more than so many deviations from where it was thought to be did not come there by itself.
+const DRIFTED: f64 = 3.0;
+
 impl Fold<'_> {
     /// A level was felt, where the sensor is.
     pub(super) fn level(&mut self, level: &Level) {
@@ -61,11 +64,13 @@ impl Fold<'_> {
         };
         let moment = self.moment();
         let is_sought = self.chronicle.is_seeking(number);
-        if self.agent.placed && !is_sought && !self.is_lost(&viewed.covariance) {
+        if self.agent.placed && !is_sought {
             self.chronicle.viewed(&moment, &viewed);
-            return;
+            if !self.is_lost(&viewed.covariance) {
+                return;
+            }
         }
-        let sd_max_m = 0.5 * self.settings.field_radius_m;
+        let sd_max_m = self.settings.field_radius_m;
         if let Some(found) = self.chronicle.seek(&moment, &viewed, sd_max_m) {
             self.relocalised(&found);
         }
@@ -80,7 +85,9 @@ impl Fold<'_> {
     fn relocalised(&mut self, found: &Relocalised) {
         let number = self.agent_id.0;
         let was_placed = self.agent.placed;
-        if found.is_first {
+        // One that only drifted is where it may have drifted to: its way leads there.
+        let is_elsewhere = was_placed && found.is_first && self.is_elsewhere(found);
+        if is_elsewhere || !was_placed {
             self.estimator
                 .recognised(number, &found.pose, &found.covariance);
             self.remember_what_was_settled();
@@ -88,10 +95,9 @@ impl Fold<'_> {
         self.estimator.fix(number, &found.pose, &found.covariance);
         if found.is_first || found.is_last {
             let moment = self.moment();
-            let is_elsewhere = found.is_first && was_placed;
             self.chronicle.relocalised(&moment, found, is_elsewhere);
         }
-        if found.is_first && was_placed {
+        if is_elsewhere {
             self.end_trip(TripEnd::StartPose);
             self.stand();
             let position = found.pose.translation.vector.into();
@@ -99,6 +105,18 @@ impl Fold<'_> {
         } else {
             self.follow();
         }
+    }
+
+    /// Whether an agent of the map was recognised where it cannot have come to.
+    fn is_elsewhere(&self, found: &Relocalised) -> bool {
+        let Some((pose, covariance)) = self.estimator.pose(self.agent_id.0) else {
+            return true;
+        };
+        let apart_m = (pose.translation.vector - found.pose.translation.vector).norm();
+        let sd_m = covariance
+            .position_sd_m()
+            .hypot(found.covariance.position_sd_m());
+        apart_m > DRIFTED * sd_m
     }
 
     /// The place that answers at a position, with its confidence; none for an agent that is not

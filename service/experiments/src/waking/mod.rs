@@ -1,7 +1,7 @@
 //! Woken up elsewhere: a robot without a start pose in a room that a team-mate has explored.
 //!
-//! An explorer walks through the obstacle-rich room of the seed paper (or through several rooms that look alike), told exactly how
-//! it moves, and sees the room ([`Scenery`](crate::world::Scenery)). Then robots wake up one by one anywhere in it, know
+//! An explorer walks through the obstacle-rich room of the seed paper (or through several rooms that look alike), told where it
+//! begins; it keeps to its place by obstacles that it sights, and sees the room ([`Scenery`](crate::world::Scenery)). Then robots wake up one by one anywhere in it, know
 //! neither where they are nor how they are turned, walk on by odometry of their own, and see the room as the explorer did: with noise,
 //! and now and then something that is not there at all. Each is a trial: is it found, after what way, how far off, and
 //! was any place announced that was wrong?

@@ -47,7 +47,7 @@ impl Default for WakingProtocol {
             trials: 200,
             trials_per_building: 20,
             rooms: 1,
-            explorer_steps: 20_000,
+            explorer_steps: 40_000,
             travel_m: 3.0,
             view_every: 1,
             view_noise: 0.1,

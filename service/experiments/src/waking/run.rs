@@ -11,16 +11,22 @@ use super::building::Building;
 use super::protocol::{InvalidWaking, WakingProtocol};
 use super::report::{WakingReport, WakingTrial};
 use crate::eval::object::in_parallel;
-use crate::reading::{Reading, ReadingBody};
-use crate::world::{ObstacleWorld, Odometer, OdometryNoise, STEP_M, Walker};
+use crate::reading::{Reading, ReadingBody, ReadingTarget};
+use crate::world::{ObstacleWorld, Odometer, OdometryNoise, STEP_M, Sensor, Walker};
 
 /// Time of a step: 10 Hz, which makes 1 m/s.
 const STEP_NS: i64 = 100_000_000;
 /// A robot wakes up so near to where the explorer was, along each axis \[m\].
 const BESIDE_M: f64 = 0.3;
+/// The explorer sights the centres of obstacles within this range \[m\] at every step whose number divides by that, with these
+/// deviations of distance (as a share) and direction \[rad\].
+const SURVEY_RANGE_M: f64 = 8.0;
+const SURVEY_EVERY: u32 = 5;
+const SURVEY_RANGE_SHARE: f64 = 0.05;
+const SURVEY_BEARING_SD_RAD: f64 = std::f64::consts::PI / 180.0;
 const CHANNEL: &str = "view";
 /// Below this share of the height a robot wakes up where several rooms look alike.
-const WAKES_BELOW: f64 = 0.4;
+const WAKES_BELOW: f64 = 0.55;
 /// Odometry of the robots: that of the obstacle-rich room's accuracy tables.
 const ODOMETRY: OdometryNoise = OdometryNoise {
     translation_share: 0.05,
@@ -96,17 +102,16 @@ impl Site {
         let agent = enrol(&mut map, "explorer");
         let (mut seq, mut way) = (0, Vec::new());
         for room in 0..protocol.rooms as usize {
-            let walker = Walker::new(
-                &site.world,
-                site.world.centre_m(),
-                site.random(1 + room as u64),
-            )
-            .expect("the middle of a room is free");
-            let mut robot = site.robot(room, walker, OdometryNoise::none(), 100 + room as u64);
+            // The same way in every room, so that none is known better than another.
+            let walker = Walker::new(&site.world, site.world.centre_m(), site.random(1))
+                .expect("the middle of a room is free");
+            let mut robot = site.robot(room, walker, ODOMETRY, 100 + room as u64);
             let mut positions = Vec::new();
             let mut readings = vec![robot.start_pose()];
+            robot.survey(&mut readings);
             for _ in 0..protocol.explorer_steps {
                 readings.extend(robot.step(protocol));
+                robot.survey(&mut readings);
                 for reading in readings.drain(..) {
                     apply(&mut map, agent, seq, &reading);
                     seq += 1;
@@ -194,6 +199,30 @@ impl Robot<'_> {
                 translation_m: pose.translation.vector.into(),
                 rotation_xyzw: pose.rotation.coords.into(),
             },
+        }
+    }
+
+    /// Sights the obstacles about, as an explorer does.
+    fn survey(&mut self, readings: &mut Vec<Reading>) {
+        if !self.steps.is_multiple_of(SURVEY_EVERY) {
+            return;
+        }
+        let site = self.site;
+        let (pose, stamp_ns) = (*self.walker.pose(), self.stamp_ns());
+        for (number, cube) in (1..).zip(site.world.cubes()) {
+            let range_m = (cube.centre_m - pose.translation.vector).norm();
+            if range_m > SURVEY_RANGE_M {
+                continue;
+            }
+            let sensor = Sensor {
+                range_sd_m: SURVEY_RANGE_SHARE * range_m,
+                bearing_sd_rad: SURVEY_BEARING_SD_RAD,
+                ..Sensor::default()
+            };
+            let label = format!("room-{}-cube-{number:02}", self.room);
+            let target = ReadingTarget::Landmark(label);
+            let body = sensor.read(&pose, target, &cube.centre_m, &mut self.eyes);
+            readings.push(Reading { stamp_ns, body });
         }
     }
 

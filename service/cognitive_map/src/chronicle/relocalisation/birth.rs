@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, Unit, UnitQuaternion, Vector3, Vector6};
 
 use super::problem::{Cue, Problem, Spot};
-use crate::chronicle::revisit::{OPEN_DISTANCES, OPEN_RAD, Range, equations, moved};
+use crate::chronicle::revisit::{Range, equations, moved};
 use crate::geometry::align;
 
 /// Places that one look may point to.
@@ -41,16 +41,14 @@ struct Node {
 
 /// A pose that explains distances.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Minimum {
+struct Minimum {
     /// Of the body in the map.
-    pub(super) pose: Isometry3<f64>,
-    /// Of the error on its right, by the distances.
-    pub(super) covariance: Matrix6<f64>,
+    pose: Isometry3<f64>,
     cost: f64,
 }
 
 /// The poses that several looks point to, in no particular order.
-pub(super) fn minima(problem: &Problem) -> Vec<Minimum> {
+pub(super) fn minima(problem: &Problem) -> Vec<Isometry3<f64>> {
     let nodes = nodes(problem);
     let mut starts: Vec<Isometry3<f64>> = Vec::new();
     for seed in seeds(&nodes, problem) {
@@ -77,7 +75,7 @@ pub(super) fn minima(problem: &Problem) -> Vec<Minimum> {
             keep(problem, &mut minima, &found);
         }
     }
-    minima
+    minima.into_iter().map(|minimum| minimum.pose).collect()
 }
 
 /// The places that the looks point to: views near one another are one place.
@@ -243,30 +241,11 @@ fn descend(problem: &Problem, start: &Isometry3<f64>, steps: usize) -> Option<Mi
         }
     }
     let pose = origin * inverse.inverse();
-    let sound = pose.translation.vector.iter().all(|x| x.is_finite());
-    let mean_m = ranges.iter().map(|range| range.mean_m).sum::<f64>() / ranges.len() as f64;
-    let (shift, turn) = (
-        1.0 / (OPEN_DISTANCES * mean_m).powi(2),
-        1.0 / (OPEN_RAD * OPEN_RAD),
-    );
-    let (mut none, mut hessian) = (Vector6::zeros(), here.hessian);
-    free(&mut none, &mut hessian);
-    hessian += Matrix6::from_diagonal(&Vector6::new(shift, shift, shift, turn, turn, turn));
-    let mut covariance = hessian.try_inverse()?;
-    if problem.is_planar {
-        for held in 2..5 {
-            covariance[(held, held)] = 0.0;
-        }
-    }
-    // The error of T⁻¹ = T̂⁻¹ exp(ξ) is one of T = exp(−ξ) T̂ = T̂ exp(−Ad(T̂⁻¹) ξ).
-    let adjoint = crate::geometry::se3::adjoint(&inverse);
-    let covariance = adjoint * covariance * adjoint.transpose();
-    let covered = ranges.len() as f64;
-    sound.then_some(Minimum {
+    let is_sound = pose.translation.vector.iter().all(|x| x.is_finite());
+    is_sound.then_some(Minimum {
         pose,
-        covariance: (covariance + covariance.transpose()) * 0.5,
         // Of two poses the one that explains more distances comes first.
-        cost: here.cost - covered,
+        cost: here.cost - ranges.len() as f64,
     })
 }
 

@@ -3,13 +3,13 @@
 //! It gathers *looks*: views with where it was by motion alone. How alike a look is to a remembered view says how far apart
 //! they were taken (as for [`revisit`](super::revisit)), so that every look is a trilateration. From places that several looks
 //! point to, poses of the agent in the map are begun ([`birth`]) and laid to rest among all distances. What counts for a pose is
-//! not how many views are like the looks, but that along its way nothing contradicts it ([`evidence`]): where the map is thin it
+//! not how many views are like the looks, but that along its way nothing contradicts it ([`scene`]): where the map is thin it
 //! says nothing. A pose is believed when no place elsewhere explains the looks about as well.
 
 mod birth;
-mod evidence;
 mod problem;
 mod relocalise;
+mod scene;
 mod search;
 
 pub use relocalise::{Guess, Relocalised};

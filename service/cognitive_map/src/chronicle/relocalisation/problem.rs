@@ -1,10 +1,11 @@
 //! A search, as points and distances.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 use super::search::Search;
 use crate::chronicle::chronicle::Chronicle;
-use crate::chronicle::revisit::Likeness;
+use crate::chronicle::field::Prior;
+use crate::chronicle::revisit::{Likeness, OPEN_DISTANCES, OPEN_RAD};
 
 /// Error of odometry's lengths, as a share of the way: that of a modest robot.
 const ODOMETRY_SHARE: f64 = 0.05;
@@ -61,6 +62,18 @@ impl Problem {
             is_planar,
             reach_m: chronicle.revisits.reach_m(newest.channel)?,
         })
+    }
+
+    /// Information that is always there \[m⁻², rad⁻²\]: a pose lies within some reaches of where it is begun.
+    pub(super) fn prior(&self) -> Prior {
+        let shift = 1.0 / (OPEN_DISTANCES * self.reach_m).powi(2);
+        let turn = 1.0 / (OPEN_RAD * OPEN_RAD);
+        let open = Matrix6::from_diagonal(&Vector6::new(shift, shift, shift, turn, turn, turn));
+        Prior {
+            pose: None,
+            information: open,
+            open,
+        }
     }
 
     /// The spots as a pose of the body in the map has them.

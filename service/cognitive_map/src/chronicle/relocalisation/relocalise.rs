@@ -1,13 +1,13 @@
 //! An agent that does not know where it is sees something.
 
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{Isometry3, Matrix6};
 
-use super::birth::{Minimum, minima};
-use super::evidence::{Evidence, Positions};
+use super::birth::minima;
 use super::problem::Problem;
+use super::scene::scene;
 use super::search::Search;
 use crate::chronicle::chronicle::{Beside, Chronicle, Moment};
-use crate::chronicle::revisit::{moved, twist};
+use crate::chronicle::field::{Evidence, Settled, together};
 use crate::chronicle::revisited::Viewed;
 use crate::chronicle::tie::Standing;
 use crate::geometry::PoseCovariance;
@@ -24,7 +24,7 @@ const SURE: f64 = 6.9;
 /// Poses nearer than this are the same place, in reaches.
 const PLACE: f64 = 0.5;
 /// Deviation of the heading from which on an agent is not put anywhere \[rad\].
-const HEADING_SD_MAX_RAD: f64 = 0.35;
+const HEADING_SD_MAX_RAD: f64 = 0.8;
 /// Deviation of the heading up to which the agent goes on looking around after it was found, so that its way does not lead it
 /// astray \[rad\].
 const HEADING_SD_RAD: f64 = 0.05;
@@ -220,37 +220,35 @@ impl Chronicle {
         let Some(problem) = Problem::of(search, self) else {
             return Vec::new();
         };
-        let mut positions = Positions::new(self);
-        let mut found: Vec<(Minimum, Evidence)> = minima(&problem)
-            .into_iter()
-            .map(|minimum| {
-                let evidence = Evidence::of(&minimum.pose, &problem, search, &mut positions);
-                (minimum, evidence)
-            })
-            .filter(|(_, evidence)| evidence.total() > 0.0)
+        let scene = scene(&problem, search, self);
+        let prior = problem.prior();
+        let mut found: Vec<Settled> = minima(&problem)
+            .iter()
+            .filter_map(|start| scene.settle(start, &prior))
+            .filter(|settled| settled.evidence.total() > 0.0)
             .collect();
-        found.sort_by(|a, b| b.1.total().total_cmp(&a.1.total()));
-        let mut places: Vec<(Evidence, Vec<(Minimum, f64)>)> = Vec::new();
-        for (minimum, evidence) in found {
-            let known = places.iter_mut().find(|(_, poses)| {
+        found.sort_by(|a, b| b.evidence.total().total_cmp(&a.evidence.total()));
+        let mut places: Vec<Vec<(Settled, f64)>> = Vec::new();
+        for settled in found {
+            let known = places.iter_mut().find(|poses| {
                 let best = &poses[0].0.pose;
-                let apart = best.translation.vector - minimum.pose.translation.vector;
+                let apart = best.translation.vector - settled.pose.translation.vector;
                 apart.norm() < PLACE * problem.reach_m
             });
             match known {
-                Some((best, poses)) => {
-                    let above = best.against(&evidence).max(0.0);
-                    poses.push((minimum, (-above).exp()));
+                Some(poses) => {
+                    let above = poses[0].0.evidence.against(&settled.evidence).max(0.0);
+                    poses.push((settled, (-above).exp()));
                 }
-                None => places.push((evidence, vec![(minimum, 1.0)])),
+                None => places.push(vec![(settled, 1.0)]),
             }
         }
         let mut places: Vec<Place> = places
             .into_iter()
-            .map(|(evidence, poses)| {
+            .map(|poses| {
                 let (mean, covariance) = together(&poses);
                 Place {
-                    evidence,
+                    evidence: poses[0].0.evidence.clone(),
                     mean,
                     covariance,
                 }
@@ -301,7 +299,7 @@ impl Chronicle {
     }
 
     /// Whether an agent and all that are in the map move in one plane.
-    pub(super) fn is_planar(&self, agent: u32) -> bool {
+    pub(in crate::chronicle) fn is_planar(&self, agent: u32) -> bool {
         let own = self
             .lives
             .get(agent as usize)
@@ -311,21 +309,4 @@ impl Chronicle {
             .iter()
             .all(|life| life.is_planar || !life.is_in_map)
     }
-}
-
-/// Mean and covariance of poses by their weights.
-fn together(poses: &[(Minimum, f64)]) -> (Isometry3<f64>, Matrix6<f64>) {
-    let base = poses[0].0.pose;
-    let whole: f64 = poses.iter().map(|(_, weight)| weight).sum();
-    let (mut mean, mut second) = (Vector6::zeros(), Matrix6::zeros());
-    for (minimum, weight) in poses {
-        let off = twist(&base.inv_mul(&minimum.pose));
-        mean += off * (*weight / whole);
-        second += (minimum.covariance + off * off.transpose()) * (*weight / whole);
-    }
-    let covariance = second - mean * mean.transpose();
-    (
-        moved(&base, &mean),
-        (covariance + covariance.transpose()) * 0.5,
-    )
 }

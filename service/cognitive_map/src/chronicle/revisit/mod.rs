@@ -12,8 +12,9 @@ mod revisits;
 mod track;
 mod view;
 
-pub(super) use fit::{Fit, OPEN_DISTANCES, OPEN_RAD, Range, equations, moved, twist};
+pub(super) use fit::{NEAR, OPEN_DISTANCES, OPEN_RAD, Range, equations, lay_roughly, moved, twist};
 pub(super) use passage::{Passage, Reference};
+pub(super) use reach::Kernel;
 pub(super) use revisits::{ALIKE_MAX, Felt, Revisits};
 pub(super) use track::{read_all, write_all};
-pub(super) use view::{Likeness, View, angle_rad, read_vector, write_vector};
+pub(super) use view::{Likeness, View, read_vector, write_vector};

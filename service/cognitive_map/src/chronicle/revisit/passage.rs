@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3};
 
 use super::reach::Distance;
-use super::track::{read_all, write_all};
+use super::track::{Recent, read_all, write_all};
 use super::view::View;
 use crate::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
@@ -48,7 +48,7 @@ pub(in crate::chronicle) struct Reference {
     pub(in crate::chronicle) session: u32,
     pub(in crate::chronicle) seq: u64,
     /// Where the agent was by motion alone.
-    pub(super) in_odom: Isometry3<f64>,
+    pub(in crate::chronicle) in_odom: Isometry3<f64>,
     /// How sure it was then \[m, rad\].
     pub(in crate::chronicle) spread: [f64; 2],
 }
@@ -71,7 +71,10 @@ pub(in crate::chronicle) struct Passage {
     high: u32,
     /// Views since the latest pair.
     misses: u32,
+    channel: u8,
     pub(super) pairs: Vec<Pair>,
+    /// What was seen along the present stretch, once the passage is over; nothing before.
+    pub(in crate::chronicle) looks: Vec<Recent>,
 }
 
 impl Reference {
@@ -95,7 +98,9 @@ impl Passage {
             low: then.ordinal,
             high: then.ordinal,
             misses: 0,
+            channel: now.channel,
             pairs: Vec::new(),
+            looks: Vec::new(),
         };
         passage.add(now, then, distance);
         passage
@@ -132,6 +137,21 @@ impl Passage {
         self.misses += 1;
     }
 
+    /// The number of the channel.
+    pub(in crate::chronicle) fn channel(&self) -> u8 {
+        self.channel
+    }
+
+    /// The ordinal of the first view of the present stretch.
+    pub(super) fn first_now(&self) -> u32 {
+        self.pairs.first().map_or(0, |pair| pair.now_ordinal)
+    }
+
+    /// Whether an earlier view was seen on the earlier stretch, or beside it.
+    pub(in crate::chronicle) fn is_beside(&self, then: &View) -> bool {
+        then.channel == self.channel && self.leads_to(then)
+    }
+
     /// Whether it is over.
     pub(super) fn is_over(&self) -> bool {
         self.misses >= MISSES_MAX || self.count(|pair| pair.now_ordinal) >= VIEWS_MAX
@@ -160,6 +180,7 @@ impl State for Passage {
         self.low.write(out);
         self.high.write(out);
         self.misses.write(out);
+        self.channel.write(out);
         write_all(&self.pairs, out);
     }
 
@@ -170,7 +191,9 @@ impl State for Passage {
             low: State::read(input)?,
             high: State::read(input)?,
             misses: State::read(input)?,
+            channel: State::read(input)?,
             pairs: read_all(input)?,
+            looks: Vec::new(),
         })
     }
 }

@@ -27,6 +27,22 @@ const SD_M_MIN: f64 = 0.02;
 /// Share of the angle between unrelated views from which on one is worth remembering beside another.
 const NEWS: f64 = 0.25;
 
+/// Least cosine that says how it falls with the distance: views farther apart may be as alike by chance.
+const KERNEL_LIKENESS_MIN: f64 = 0.5;
+/// Cosine of two views of one place at most: views have some noise.
+const LIKENESS_MAX: f64 = 0.999;
+
+/// How the cosine of two views of a channel falls with the distance between them: c exp(−d² / 2ℓ²).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::chronicle) struct Kernel {
+    /// c: of two views from one place.
+    pub(in crate::chronicle) likeness: f64,
+    /// ℓ \[m\].
+    pub(in crate::chronicle) length_m: f64,
+    /// Independent numbers of a view: unrelated ones have cosines of deviation 1/√n.
+    pub(in crate::chronicle) numbers: f64,
+}
+
 /// What the likeness of two views of a channel says of the distance between them.
 #[derive(Clone, Debug)]
 pub(super) struct Reach {
@@ -82,6 +98,39 @@ impl Reach {
         } else {
             NEWS * FRAC_PI_2
         }
+    }
+
+    /// How the likeness of two views falls with the distance between them; nothing before that is known.
+    pub(super) fn kernel(&self) -> Option<Kernel> {
+        let sd = self.unrelated.sd();
+        if self.unrelated.count() < UNRELATED_MIN || sd <= 0.0 {
+            return None;
+        }
+        // Least squares of ln cos = ln c − d² / 2ℓ², over the classes that say something.
+        let (mut weights, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (class, known) in self.distances_m.iter().enumerate() {
+            let likeness = ((class as f64 + 0.5) * WIDTH_RAD).cos();
+            if known.count() < PAIRS_MIN || likeness < KERNEL_LIKENESS_MIN {
+                continue;
+            }
+            let squared = known.mean().powi(2);
+            let weight = known.weight() * likeness * likeness;
+            weights += weight;
+            x += weight * squared;
+            y += weight * likeness.ln();
+            xx += weight * squared * squared;
+            xy += weight * squared * likeness.ln();
+        }
+        let spread = weights * xx - x * x;
+        let slope = (weights * xy - x * y) / spread;
+        if slope >= 0.0 || !slope.is_finite() {
+            return None;
+        }
+        Some(Kernel {
+            likeness: ((y - slope * x) / weights).exp().clamp(0.5, LIKENESS_MAX),
+            length_m: (-0.5 / slope).sqrt(),
+            numbers: (1.0 / (sd * sd)).max(1.0),
+        })
     }
 
     /// Distance from which on two views are no more alike than unrelated ones may be \[m\]; nothing before that is known.

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3};
 
 use super::passage::Passage;
-use super::reach::{Distance, Reach};
+use super::reach::{Distance, Kernel, Reach};
 use super::track::{RECENT_MAX, Track, read_all, write_all};
 use super::view::{Likeness, View, angle_rad};
 use crate::paged::PagedVec;
@@ -205,7 +205,16 @@ impl Revisits {
             .into_iter()
             .partition::<Vec<_>, _>(Passage::is_over);
         track.passages = open;
-        over.into_iter().filter(Passage::is_telling).collect()
+        let telling = over.into_iter().filter(Passage::is_telling);
+        let last = track.next.saturating_sub(1);
+        telling
+            .map(|mut passage| {
+                let count = last.saturating_sub(passage.first_now()) as usize + 1;
+                let from = track.recent.len().saturating_sub(count);
+                passage.looks = track.recent[from..].to_vec();
+                passage
+            })
+            .collect()
     }
 
     /// Remembers a view; every second one is forgotten when there is no room for it.
@@ -330,6 +339,11 @@ impl Revisits {
     /// How far apart two views of a channel were taken, if they are alike.
     pub(in crate::chronicle) fn distance(&self, channel: u8, angle_rad: f64) -> Option<Distance> {
         self.reaches.get(usize::from(channel))?.distance(angle_rad)
+    }
+
+    /// How the likeness of views of a channel falls with distance, if that is known.
+    pub(in crate::chronicle) fn kernel(&self, channel: u8) -> Option<Kernel> {
+        self.reaches.get(usize::from(channel))?.kernel()
     }
 
     /// Distance from which on two views of a channel are no more alike than any \[m\].

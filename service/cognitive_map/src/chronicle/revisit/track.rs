@@ -27,9 +27,9 @@ pub(in crate::chronicle) struct Track {
 
 /// One of the latest views.
 #[derive(Clone, Debug)]
-pub(super) struct Recent {
-    pub(super) in_odom: Isometry3<f64>,
-    pub(super) vector: Box<[f32]>,
+pub(in crate::chronicle) struct Recent {
+    pub(in crate::chronicle) in_odom: Isometry3<f64>,
+    pub(in crate::chronicle) vector: Box<[f32]>,
 }
 
 impl Track {

@@ -17,7 +17,7 @@ pub(in crate::chronicle) struct View {
     /// Its place among the agent's views of the channel.
     pub(super) ordinal: u32,
     /// Where the agent was by motion alone, since its session began.
-    pub(super) in_odom: Isometry3<f64>,
+    pub(in crate::chronicle) in_odom: Isometry3<f64>,
     /// Where the agent was thought to be in the map.
     pub(in crate::chronicle) in_map: Point3<f64>,
     /// How sure it was of its place and heading then: roots of the traces of their covariances \[m, rad\].

@@ -1,0 +1,10 @@
+//! What is to be seen where, by what was seen about there; and where somebody is, by what they see.
+
+mod neighbourhood;
+mod scene;
+
+pub(super) use neighbourhood::Seen;
+/// Views with the numbers of their channels.
+pub(super) type Views<'a> = Vec<(u8, Seen<'a>)>;
+
+pub(super) use scene::{Evidence, Glimpse, Prior, Scene, Settled, together};
