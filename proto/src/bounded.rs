@@ -1,4 +1,4 @@
-//! Reading a batch without holding more samples than a batch may have.
+//! Reading samples without holding more of them than a message may have.
 //!
 //! A postcard sample can be as short as four bytes, and is some forty times as long in memory: a
 //! hostile message of the allowed length would fill forty megabytes before its samples were
@@ -6,10 +6,10 @@
 
 use std::fmt;
 
-use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
+use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 
 use crate::codec::DecodeError;
-use crate::limits::BATCH_SAMPLES_MAX;
+use crate::limits::{BATCH_SAMPLES_MAX, LOCALIZE_SAMPLES_MAX};
 use crate::sample::{Sample, SampleBatch};
 
 /// A [`SampleBatch`] on its way in. The fields are the same, in the same order.
@@ -35,6 +35,18 @@ impl BoundedBatch {
         batch.check()?;
         Ok(batch)
     }
+}
+
+/// The samples of a question where they were taken.
+pub(crate) fn localize_samples<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Vec<Sample>, D::Error> {
+    let BoundedSamples { kept, count } = BoundedSamples::deserialize(deserializer)?;
+    if count > LOCALIZE_SAMPLES_MAX {
+        let detail = format!("{count} samples, the limit is {LOCALIZE_SAMPLES_MAX}");
+        return Err(D::Error::custom(detail));
+    }
+    Ok(kept)
 }
 
 /// The first [`BATCH_SAMPLES_MAX`] samples, and how many there were.

@@ -20,6 +20,7 @@ mod estimate;
 mod event;
 mod key;
 pub mod limits;
+mod localize;
 mod name;
 mod narrow;
 mod object;
@@ -38,6 +39,7 @@ pub use codec::{CBOR, Codec, DecodeError, JSON, POSTCARD_V1};
 pub use estimate::{Estimate, Status};
 pub use event::{Event, EventKind, PerceptKind, TripEnd};
 pub use key::{AgentKey, KeyError, durable_key, estimate_key, events_key, query_key, samples_key};
+pub use localize::{Localization, LocalizationHypothesis, LocalizeQuery, LocalizedPose};
 pub use name::{Name, NameError};
 pub use object::{
     AgentObject, Contact, ContactLevel, EpisodeKind, Identification, IdentifyQuery, NextTouch,

@@ -50,5 +50,8 @@ pub const LESSON_CONTACTS_MAX: usize = 4096;
 /// Most contacts of one question which object it is: each is compared with every object.
 pub const IDENTIFY_CONTACTS_MAX: usize = 256;
 
+/// Most samples of one question where they were taken: as many as come in one batch.
+pub const LOCALIZE_SAMPLES_MAX: usize = BATCH_SAMPLES_MAX;
+
 /// Most rotations by which the frame of an episode may be turned against an object's.
 pub const ROTATIONS_MAX: usize = 1000;

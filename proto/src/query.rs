@@ -15,6 +15,8 @@ pub enum Verb {
     Predict,
     /// [`crate::IdentifyQuery`] → [`crate::Identification`].
     Identify,
+    /// [`crate::LocalizeQuery`] → [`crate::Localization`].
+    Localize,
 }
 
 impl Verb {
@@ -25,6 +27,7 @@ impl Verb {
             Self::Watermark => "watermark",
             Self::Predict => "predict",
             Self::Identify => "identify",
+            Self::Localize => "localize",
         }
     }
 }

@@ -8,10 +8,10 @@ use std::fmt::Debug;
 
 use cogmap_proto::{
     AgentDetail, AgentObject, AgentPage, Codec, DecodeError, Estimate, Event, GridState,
-    Identification, IdentifyQuery, IngestAnswer, LandmarkPage, Name, ObjectDetail, ObjectLesson,
-    ObjectPage, PlacePage, PredictAnswer, PredictQuery, Problem, RecallAnswer, RecallQuery,
-    SampleBatch, SpaceList, SpaceSettings, Trajectory, TripDetail, TripPage, Watermark,
-    WatermarkQuery,
+    Identification, IdentifyQuery, IngestAnswer, LandmarkPage, Localization, LocalizeQuery, Name,
+    ObjectDetail, ObjectLesson, ObjectPage, PlacePage, PredictAnswer, PredictQuery, Problem,
+    RecallAnswer, RecallQuery, SampleBatch, SpaceList, SpaceSettings, Trajectory, TripDetail,
+    TripPage, Watermark, WatermarkQuery,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -36,6 +36,8 @@ fn decode_as_everything(bytes: &[u8]) {
     decode_as::<IdentifyQuery>(bytes);
     decode_as::<IngestAnswer>(bytes);
     decode_as::<LandmarkPage>(bytes);
+    decode_as::<Localization>(bytes);
+    decode_as::<LocalizeQuery>(bytes);
     decode_as::<Name>(bytes);
     decode_as::<ObjectDetail>(bytes);
     decode_as::<ObjectLesson>(bytes);

@@ -1,9 +1,9 @@
 //! What a decoder takes, what it refuses, and by what name.
 
-use cogmap_proto::limits::{BATCH_SAMPLES_MAX, MESSAGE_BYTES_MAX};
+use cogmap_proto::limits::{BATCH_SAMPLES_MAX, LOCALIZE_SAMPLES_MAX, MESSAGE_BYTES_MAX};
 use cogmap_proto::{
-    Codec, DecodeError, Descriptor, Increment, Level, Marker, RecallQuery, Relation, Sample,
-    SampleBatch, SampleBody, SpaceSettings, StartPose, Velocity, WatermarkQuery,
+    Codec, DecodeError, Descriptor, Increment, Level, LocalizeQuery, Marker, RecallQuery, Relation,
+    Sample, SampleBatch, SampleBody, SpaceSettings, StartPose, Velocity, WatermarkQuery,
 };
 
 const CODECS: [Codec; 3] = [Codec::Postcard, Codec::Cbor, Codec::Json];
@@ -132,6 +132,19 @@ fn a_batch_is_bounded_in_samples() {
         Codec::Postcard.decode_batch(&many),
         Err(DecodeError::TooManySamples(200_000))
     );
+}
+
+#[test]
+fn a_question_where_samples_were_taken_is_bounded_in_samples() {
+    for codec in CODECS {
+        let decode = |count| {
+            let samples = vec![marker(); count];
+            codec.decode::<LocalizeQuery>(&codec.encode(&LocalizeQuery { samples }))
+        };
+        let read = decode(LOCALIZE_SAMPLES_MAX).unwrap();
+        assert_eq!(read.samples.len(), LOCALIZE_SAMPLES_MAX);
+        assert_malformed(&decode(LOCALIZE_SAMPLES_MAX + 1), "too many samples");
+    }
 }
 
 #[test]

@@ -106,6 +106,10 @@ fn the_limits_are_those_of_the_code() {
             format!("| {} |", limits::GRID_MODULES_MAX),
         ),
         (
+            "LOCALIZE_SAMPLES_MAX",
+            format!("| 1 to {} |", limits::LOCALIZE_SAMPLES_MAX),
+        ),
+        (
             "WATERMARK_REJECTIONS_MAX",
             format!("| {} |", limits::WATERMARK_REJECTIONS_MAX),
         ),

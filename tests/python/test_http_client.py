@@ -119,6 +119,17 @@ def test_places_and_their_recall(client: cogmap.Client) -> None:
     assert client.recall("default", agent="nobody").places == ()
 
 
+def test_samples_of_nobody_are_localised(client: cogmap.Client) -> None:
+    nothing_known = [cogmap.Sample(0, cogmap.Increment((0.1, 0, 0)))]
+    lost = client.localize("default", nothing_known)
+    assert (lost.status, lost.pose, lost.found_after) == (cogmap.Status.LOST, None, None)
+    assert lost.map_revision == client.space("default").map_revision
+    with pytest.raises(cogmap.ApiError) as raised:
+        client.localize("default", [cogmap.Sample(0, cogmap.StartPose((0, 0, 0)))])
+    assert (raised.value.status, raised.value.kind) == (422, "/problems/invalid-query")
+    assert raised.value.detail.startswith("sample 0: ")
+
+
 def test_trips_and_landmarks(client: cogmap.Client) -> None:
     (trip,) = client.trips("default", agent=AGENT)
     assert (trip.agent, trip.session, trip.ended) == (AGENT, SESSION, cogmap.TripEnd.MARKER)

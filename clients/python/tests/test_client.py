@@ -177,6 +177,19 @@ def test_recall_sends_only_what_was_asked(server: Server, client: cogmap.Client)
     }
 
 
+def test_samples_are_localised(server: Server, client: cogmap.Client) -> None:
+    server.answer("POST /v1/spaces/lab/localize", golden("localization"))
+    samples = decode(cogmap.LocalizeQuery, json.dumps(golden("localize_query")).encode(), JSON).samples
+    found = client.localize("lab", iter(samples))
+    assert json.loads(server.seen[0].body) == golden("localize_query")
+    assert (found.status, found.found_after) == (cogmap.Status.LOCALIZED, 41)
+    assert found.pose is not None and len(found.pose.covariance) == 21
+    server.answer("POST /v1/spaces/lab/localize", golden("localization_uncertain"))
+    unsure = client.localize("lab", samples)
+    assert unsure.pose is None
+    assert [guess.probability for guess in unsure.hypotheses] == [0.5, 0.375]
+
+
 def test_memories_are_iterated_and_shown_one_by_one(server: Server, client: cogmap.Client) -> None:
     places = dict(golden("place_page"), next=None)
     server.answer("GET /v1/spaces/lab/places", places)

@@ -29,6 +29,8 @@ TYPES: Dict[str, type] = {
     "identify_query": cogmap.IdentifyQuery,
     "ingest_answer": cogmap.IngestAnswer,
     "landmark_page": cogmap.LandmarkPage,
+    "localization": cogmap.Localization,
+    "localize_query": cogmap.LocalizeQuery,
     "object_detail": cogmap.ObjectDetail,
     "object_lesson": cogmap.ObjectLesson,
     "object_page": cogmap.ObjectPage,

@@ -5,10 +5,10 @@ use std::time::Duration;
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
     AgentDetail, AgentObject, AgentPage, AgentSummary, Codec, GridState, Identification,
-    IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Name, NameError, ObjectDetail,
-    ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage, PredictAnswer, PredictQuery,
-    Problem, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo, SpaceList, SpaceSettings,
-    Trajectory, Trip, TripDetail, TripPage,
+    IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization, LocalizeQuery, Name,
+    NameError, ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage,
+    PredictAnswer, PredictQuery, Problem, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo,
+    SpaceList, SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -221,6 +221,14 @@ impl Api {
     /// See [`ApiError`].
     pub fn recall(&self, space: &str, query: &RecallQuery) -> Result<RecallAnswer, ApiError> {
         self.send(Method::POST, &path(space, "/recall")?, &json(query))
+    }
+
+    /// Where a sequence of samples was taken, which needs no agent and changes nothing.
+    ///
+    /// # Errors
+    /// See [`ApiError`]. A service that is at several of these already asks to come back (503).
+    pub fn localize(&self, space: &str, query: &LocalizeQuery) -> Result<Localization, ApiError> {
+        self.send(Method::POST, &path(space, "/localize")?, &json(query))
     }
 
     /// What an agent would feel after a motion from where it is now.

@@ -4,6 +4,7 @@
 //! JSON, and halves, quarters and so on in the `f32` vectors.
 
 mod answers;
+mod localize;
 mod objects;
 mod published;
 mod samples;
@@ -35,4 +36,5 @@ pub(crate) fn each(visit: &mut impl Visit) {
     published::each(visit);
     answers::each(visit);
     objects::each(visit);
+    localize::each(visit);
 }

@@ -2,6 +2,7 @@
 
 mod grid;
 mod landmark;
+mod localize;
 mod object;
 mod place;
 mod predict;
@@ -11,6 +12,7 @@ mod trip;
 
 pub use grid::grid_state;
 pub use landmark::landmark;
+pub use localize::{InvalidSequence, localization, samples_to_localize};
 pub use object::{InvalidContacts, agent_object, identify, lesson, object_detail, object_summary};
 pub use place::place;
 pub use predict::{InvalidPrediction, predict};

@@ -16,6 +16,7 @@ use clap::{Args, Parser, Subcommand};
 use cogmap_experiments::eval::InvalidProtocol;
 use cogmap_experiments::eval::object::InvalidObjectProtocol;
 use cogmap_experiments::touch::InvalidTouchProtocol;
+use cogmap_experiments::waking::InvalidWaking;
 
 use crate::config::{Config, ConfigError};
 
@@ -107,7 +108,8 @@ pub fn main() -> ExitCode {
             let wrong_usage = error.is::<ConfigError>()
                 || error.is::<InvalidProtocol>()
                 || error.is::<InvalidObjectProtocol>()
-                || error.is::<InvalidTouchProtocol>();
+                || error.is::<InvalidTouchProtocol>()
+                || error.is::<InvalidWaking>();
             ExitCode::from(if wrong_usage { 2 } else { 1 })
         }
     }

@@ -16,6 +16,7 @@ mod counters;
 mod desk;
 mod fold;
 mod health;
+mod localization;
 mod message;
 mod outlet;
 mod queue;
@@ -43,10 +44,11 @@ use cognitive_map::InvalidSettings;
 pub use block::{CorruptBlock, Entry, entries};
 pub use desk::AgentDesk;
 pub use fold::{core_settings, records_of, trajectory_interval_ns};
+pub use localization::LocalizeError;
 pub use message::IngestError;
 pub use outlet::{Outlet, Silent};
 pub use readout::evidence;
-pub(crate) use readout::trip_end;
+pub(crate) use readout::{status, trip_end};
 pub use refinement::refined_trajectories;
 pub use settings::EngineSettings;
 pub use space::{Space, TrajectoryError, Unavailable};
@@ -56,6 +58,7 @@ pub use trajectory::{Chunk, Recorder};
 use crate::store::{Store, StoreError};
 use counters::{Drop, IntakeCounters};
 use health::Health;
+use localization::LocalizationRoom;
 use queue::NotQueued;
 use space::Surroundings;
 
@@ -146,6 +149,7 @@ impl Engine {
             health: Arc::clone(&health),
             commits,
             jobs,
+            localizations: LocalizationRoom::default(),
             settings,
         };
         let mut spaces = BTreeMap::new();

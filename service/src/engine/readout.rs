@@ -53,7 +53,8 @@ pub fn evidence(agent: &Agent) -> wire::Evidence {
     }
 }
 
-fn status(status: Status) -> wire::Status {
+/// How an agent is localised, as the wire has it.
+pub(crate) fn status(status: Status) -> wire::Status {
     match status {
         Status::Localized => wire::Status::Localized,
         Status::Uncertain => wire::Status::Uncertain,

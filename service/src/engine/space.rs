@@ -17,6 +17,7 @@ use super::checkpointer::{Checkpointer, Job};
 use super::committer::Commit;
 use super::desk::AgentDesk;
 use super::health::Health;
+use super::localization::LocalizationRoom;
 use super::message::{Call, IngestError, ObjectRequest, Request};
 use super::outlet::Outlet;
 use super::queue::{Inbox, NotQueued, Queue, queue};
@@ -64,6 +65,7 @@ pub(crate) struct Shared {
     wishes: Mutex<Option<Vec<Wish>>>,
     /// The map relaxed for those who asked for the past.
     refinements: Refinements,
+    localizations: LocalizationRoom,
     /// Set when the writer ended although the space was not closing.
     broken: AtomicBool,
 }
@@ -104,6 +106,7 @@ pub(crate) struct Surroundings {
     pub(crate) health: Arc<Health>,
     pub(crate) commits: std::sync::mpsc::Sender<Commit>,
     pub(crate) jobs: std::sync::mpsc::Sender<Job>,
+    pub(crate) localizations: LocalizationRoom,
     pub(crate) settings: EngineSettings,
 }
 
@@ -135,6 +138,7 @@ impl Space {
             snapshot: ArcSwapOption::empty(),
             wishes: Mutex::new(Some(Vec::new())),
             refinements: Refinements::default(),
+            localizations: around.localizations.clone(),
             broken: AtomicBool::new(false),
         });
         let thread = {
@@ -335,6 +339,11 @@ impl Space {
     /// The map relaxed for those who asked for the past.
     pub(super) fn refinements(&self) -> &Refinements {
         &self.shared.refinements
+    }
+
+    /// Room for localisations that are under way, of all spaces.
+    pub(crate) fn localization_room(&self) -> &LocalizationRoom {
+        &self.shared.localizations
     }
 
     /// Takes what is queued, checkpoints, and ends the thread.

@@ -11,7 +11,9 @@ use cogmap_proto::{
 use cognitive_map::CognitiveMap;
 use proptest::prelude::*;
 
-use super::{Engine, EngineSettings, Entry, Readiness, Silent, core_settings, records_of};
+use super::{
+    Engine, EngineSettings, Entry, LocalizeError, Readiness, Silent, core_settings, records_of,
+};
 use crate::store::FjallStore;
 
 const SPACE: &str = "lab";
@@ -357,5 +359,48 @@ fn lessons_outlive_the_engine_with_and_without_a_checkpoint() {
     let space = engine.space(SPACE).expect("the space is there");
     let map = runtime.block_on(space.snapshot()).expect("a snapshot");
     assert_eq!(digests.last(), Some(&map.digest()));
+    engine.shutdown();
+}
+
+#[test]
+fn a_localisation_that_takes_too_long_is_given_up_and_makes_room() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let engine = open(directory.path(), EngineSettings::default());
+    offer(&engine, 0, &drive());
+    wait_for(|| applied(&engine) == SAMPLES);
+    let space = engine.space(SPACE).expect("the space is there");
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_time()
+        .build()
+        .expect("a runtime");
+    let driven = drive();
+    let step = crate::decode::sample(&driven[1]).expect("a motion");
+    let samples: Vec<_> = (0..4096)
+        .map(|stamp_ns| cognitive_map::Sample {
+            stamp_ns,
+            ..step.clone()
+        })
+        .collect();
+    let localize = |time_max| {
+        let localized = space.localize_within(samples.clone(), time_max);
+        runtime.block_on(localized).map(|(_, found)| found.status)
+    };
+    let room = || {
+        let taken = std::iter::from_fn(|| space.localization_room().enter().ok());
+        // All are held until they are counted.
+        taken.collect::<Vec<_>>().len()
+    };
+    let whole = room();
+    let overdue = Err(LocalizeError::Overdue(Duration::ZERO));
+    // A machine that is busy elsewhere may have the answer before it looks at the clock, but not each time.
+    let told: Vec<_> = (0..20)
+        .map(|_| {
+            let told = localize(Duration::ZERO);
+            wait_for(|| room() == whole);
+            told
+        })
+        .collect();
+    assert!(told.contains(&overdue), "{told:?}");
+    assert!(localize(PATIENCE).is_ok());
     engine.shutdown();
 }

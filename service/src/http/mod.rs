@@ -13,6 +13,7 @@ mod health;
 mod json;
 mod landmarks;
 mod listener;
+mod localize;
 mod objects;
 mod openapi;
 mod page;
@@ -71,6 +72,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(trajectory::get))
         .routes(routes!(samples::post))
         .routes(routes!(recall::post))
+        .routes(routes!(localize::post))
         .routes(routes!(predict::post))
         .routes(routes!(places::list))
         .routes(routes!(places::get))

@@ -2,8 +2,8 @@
 //! for all of them.
 
 use cogmap_proto::limits::{
-    BATCH_SAMPLES_MAX, GRID_MODULES_MAX, IDENTIFY_CONTACTS_MAX, LESSON_CONTACTS_MAX, METRES_MAX,
-    NAME_BYTES_MAX, ROTATIONS_MAX,
+    BATCH_SAMPLES_MAX, GRID_MODULES_MAX, IDENTIFY_CONTACTS_MAX, LESSON_CONTACTS_MAX,
+    LOCALIZE_SAMPLES_MAX, METRES_MAX, NAME_BYTES_MAX, ROTATIONS_MAX,
 };
 use serde_json::{Map, Value, json};
 
@@ -209,10 +209,6 @@ fn constrain(schemas: &mut Value) {
     merge_into_array(&mut schemas["Landmark"]["properties"]["covariance"], 6);
     let batch = &mut schemas["SampleBatch"]["properties"];
     merge(
-        &mut batch["samples"],
-        &json!({ "minItems": 1, "maxItems": BATCH_SAMPLES_MAX }),
-    );
-    merge(
         &mut batch["first_seq"],
         &json!({ "maximum": u64::MAX - 1 - BATCH_SAMPLES_MAX as u64 }),
     );
@@ -228,13 +224,15 @@ fn constrain(schemas: &mut Value) {
             merge_into_array(&mut rotations["items"], 4);
         }
     }
-    let contacts = [
-        ("ObjectLesson", LESSON_CONTACTS_MAX),
-        ("IdentifyQuery", IDENTIFY_CONTACTS_MAX),
+    let lists = [
+        ("SampleBatch", "samples", BATCH_SAMPLES_MAX),
+        ("LocalizeQuery", "samples", LOCALIZE_SAMPLES_MAX),
+        ("ObjectLesson", "contacts", LESSON_CONTACTS_MAX),
+        ("IdentifyQuery", "contacts", IDENTIFY_CONTACTS_MAX),
     ];
-    for (name, most) in contacts {
-        let contacts = &mut schemas[name]["properties"]["contacts"];
-        merge(contacts, &json!({ "minItems": 1, "maxItems": most }));
+    for (name, field, most) in lists {
+        let list = &mut schemas[name]["properties"][field];
+        merge(list, &json!({ "minItems": 1, "maxItems": most }));
     }
     let share = json!({ "minimum": 0.0, "maximum": 1.0 });
     let noise = &mut schemas["NoiseSettings"]["properties"];

@@ -7,8 +7,8 @@ use axum::response::IntoResponse;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::answer::{InvalidContacts, InvalidPrediction, InvalidQuery};
-use crate::engine::{IngestError, SpaceError, TrajectoryError, Unavailable};
+use crate::answer::{InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence};
+use crate::engine::{IngestError, LocalizeError, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
 
 /// Media type of problems.
@@ -230,6 +230,24 @@ impl From<InvalidQuery> for Problem {
 impl From<InvalidContacts> for Problem {
     fn from(error: InvalidContacts) -> Self {
         Self::new(Kind::InvalidQuery, error.to_string())
+    }
+}
+
+impl From<InvalidSequence> for Problem {
+    fn from(error: InvalidSequence) -> Self {
+        Self::new(Kind::InvalidQuery, error.to_string())
+    }
+}
+
+impl From<LocalizeError> for Problem {
+    fn from(error: LocalizeError) -> Self {
+        let kind = match error {
+            LocalizeError::Busy => Kind::Busy,
+            LocalizeError::Overdue(_) => Kind::Timeout,
+            LocalizeError::Interrupted => Kind::Internal,
+            LocalizeError::Unavailable(error) => return error.into(),
+        };
+        Self::new(kind, error.to_string())
     }
 }
 

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use cogmap_proto::{
-    Codec, IdentifyQuery, PredictQuery, Problem, RecallQuery, Verb, WatermarkQuery, query_key,
+    Codec, IdentifyQuery, LocalizeQuery, PredictQuery, Problem, RecallQuery, Verb, WatermarkQuery,
+    query_key,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -14,7 +15,7 @@ use zenoh::query::{Query, Queryable};
 
 use super::session::TransportError;
 use crate::answer::{self, InvalidPrediction};
-use crate::engine::Engine;
+use crate::engine::{Engine, LocalizeError};
 
 /// Most queries under way; further ones are told to come back.
 const QUERIES_MAX: usize = 64;
@@ -26,7 +27,13 @@ pub(crate) async fn declare(
 ) -> Result<Vec<Queryable<()>>, TransportError> {
     let mut queryables = Vec::new();
     let room = Arc::new(Semaphore::new(QUERIES_MAX));
-    for verb in [Verb::Recall, Verb::Watermark, Verb::Predict, Verb::Identify] {
+    for verb in [
+        Verb::Recall,
+        Verb::Watermark,
+        Verb::Predict,
+        Verb::Identify,
+        Verb::Localize,
+    ] {
         let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(&room));
         let queryable = session
             .declare_queryable(query_key("*", verb.as_str()))
@@ -146,6 +153,15 @@ async fn answer(
                 .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
             Ok(encoded(codec, &identified))
         }
+        Verb::Localize => {
+            let body: LocalizeQuery = body(query, codec)?;
+            let samples = answer::samples_to_localize(&body)
+                .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
+            let found = space.localize(samples).await;
+            let (map, found) = found.map_err(|error| not_localized(&error))?;
+            let answer = answer::localization(space.name(), &map, &found);
+            Ok(encoded(codec, &answer))
+        }
     }
 }
 
@@ -168,6 +184,16 @@ fn unpredictable(error: &InvalidPrediction) -> Problem {
         InvalidPrediction::NotPlaced => problem("not-placed", 409, error.to_string()),
         _ => problem("invalid-query", 422, error.to_string()),
     }
+}
+
+fn not_localized(error: &LocalizeError) -> Problem {
+    let (kind, status) = match error {
+        LocalizeError::Busy => ("busy", 503),
+        LocalizeError::Overdue(_) => ("timeout", 504),
+        LocalizeError::Interrupted => ("internal", 500),
+        LocalizeError::Unavailable(_) => ("unavailable", 503),
+    };
+    problem(kind, status, error.to_string())
 }
 
 fn problem(kind: &str, status: u16, detail: String) -> Problem {

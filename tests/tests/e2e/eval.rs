@@ -71,3 +71,27 @@ fn objects_are_told_apart_and_figures_are_written() {
     let refused = run(&[&small[..], &["--value-noise", "-1"]].concat());
     assert_eq!(refused.code(), 2, "{refused:?}");
 }
+
+#[test]
+fn robots_that_wake_up_are_found_on_any_number_of_threads() {
+    let small = ["--trials", "2", "--trials-per-building", "1"];
+    let small = [&["eval", "waking"][..], &small, &["--explorer-steps", "60"]].concat();
+    let report = |threads| run(&[&small[..], &["--json", "--threads", threads]].concat()).json();
+    let alone = report("1");
+    assert_eq!(alone, report("2"));
+    assert_eq!(alone["protocol"]["trials"], 2, "{alone}");
+    let share = alone["relocalised"].as_f64().unwrap();
+    assert!((0.0..=1.0).contains(&share), "{alone}");
+    // Nobody is put where it is not.
+    assert_eq!(alone["false_claims"], 0, "{alone}");
+    let table = run(&small);
+    assert!(table.text().contains("error at the end [m]"), "{table:?}");
+    for senseless in [
+        ["--view-wrong", "1.5"],
+        ["--rooms", "9"],
+        ["--travel-m", "0"],
+    ] {
+        let refused = run(&[&small[..], &senseless].concat());
+        assert_eq!(refused.code(), 2, "{refused:?}");
+    }
+}

@@ -19,6 +19,7 @@ mod eval; // the experiments
 mod http; // samples in, answers out
 mod http_guard; // who is let in, and how the service goes
 mod http_ingest; // samples over HTTP alone
+mod localize; // where samples of nobody were taken
 mod percepts; // what was felt and seen, recalled and predicted
 mod replay; // graphs and recordings through the experience map
 mod replay_objects; // objects learned and recognised, from files

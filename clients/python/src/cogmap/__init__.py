@@ -72,6 +72,7 @@ from .event import (
     UnknownKind,
 )
 from .link import DEFAULT_ENDPOINT, open_session
+from .localize import Localization, LocalizationHypothesis, LocalizedPose, LocalizeQuery
 from .object import (
     AgentObject,
     Contact,
@@ -177,6 +178,10 @@ __all__ = [
     "LearnObject",
     "Leg",
     "Level",
+    "Localization",
+    "LocalizationHypothesis",
+    "LocalizeQuery",
+    "LocalizedPose",
     "Marker",
     "MarkerPassed",
     "MotionNoise",

@@ -29,6 +29,7 @@ from .answer import (
 )
 from .errors import ApiError
 from .event import Event
+from .localize import Localization, LocalizeQuery
 from .object import (
     AgentObject,
     Contact,
@@ -40,7 +41,7 @@ from .object import (
     ObjectSummary,
 )
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
-from .sample import NoTurn, Orientation, SampleBatch, TouchNoise
+from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
 from .settings import SpaceSettings
 from .sse import data_fields
 from .trajectory import StampedPose, Trajectory
@@ -185,6 +186,14 @@ class Client:
         body = {name: value for name, value in to_wire(query).items() if value is not None}
         path = _path(space, "recall")
         return self._send(RecallAnswer, "POST", path, JSON, json.dumps(body).encode())
+
+    def localize(self, space: str, samples: Iterable[Sample]) -> Localization:
+        """Where a sequence of samples of one robot was taken, 1 to 4096 of them. They need no agent and change
+        nothing. Start poses and episodes with objects are refused; a service that is at several of these already
+        asks to come back (503)."""
+        query = LocalizeQuery(tuple(samples))
+        path = _path(space, "localize")
+        return self._send(Localization, "POST", path, JSON, json.dumps(to_wire(query)).encode())
 
     def predict(
         self,

@@ -6,7 +6,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 
 use cogmap_proto::{
-    Codec, Marker, Problem, RecallQuery, Sample, SampleBatch, SampleBody, StampedPose, Trajectory,
+    Codec, LocalizeQuery, Marker, Problem, RecallQuery, Sample, SampleBatch, SampleBody,
+    StampedPose, Status, Trajectory,
 };
 
 use super::{Api, ApiError};
@@ -156,6 +157,29 @@ fn samples_go_out_as_postcard_with_the_token() {
             .contains(&format!("content-type: {}", Codec::Postcard.encoding()))
     );
     assert_eq!(Codec::Postcard.decode_batch(&seen.body), Ok(batch));
+}
+
+#[test]
+fn samples_are_localised() {
+    let answer = r#"{"space":"demo","frame":"map","map_revision":7,"status":"uncertain","pose":null,
+        "found_after":null,"hypotheses":[{"pose":{"translation_m":[1,2,0],"rotation_xyzw":[0,0,0,1],
+        "covariance":[1,0,0,0,0,0,1,0,0,0,0,1,0,0,0,1,0,0,1,0,1]},"probability":0.5,"looks":3}]}"#;
+    let (base, seen) = serve(vec![(200, answer.to_owned())]);
+    let query = LocalizeQuery {
+        samples: vec![Sample {
+            stamp_ns: 9,
+            body: SampleBody::Marker(Marker {
+                label: "dock".to_owned(),
+                ends_trip: false,
+            }),
+        }],
+    };
+    let found = Api::new(&base, None).localize("demo", &query).unwrap();
+    assert_eq!((found.status, found.pose), (Status::Uncertain, None));
+    assert_eq!(found.hypotheses[0].looks, 3);
+    let seen = seen.recv().unwrap();
+    assert_eq!(seen.head[0], "POST /v1/spaces/demo/localize HTTP/1.1");
+    assert_eq!(Codec::Json.decode(&seen.body), Ok(query));
 }
 
 #[test]

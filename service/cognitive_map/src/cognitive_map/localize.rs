@@ -28,14 +28,15 @@ impl CognitiveMap {
     ///
     /// Nothing is told that is not believed: where the map does not know what was seen, or knows it of several places, the status
     /// is not [`Status::Localized`].
-    pub fn localize(&self, samples: &[Sample]) -> Localization {
+    pub fn localize<'a>(&self, samples: impl IntoIterator<Item = &'a Sample>) -> Localization {
         let nowhere = Localization {
             status: Status::Lost,
             pose: None,
             since: None,
             guesses: Vec::new(),
         };
-        let (true, Ok(name)) = (self.framed, Label::new("localize")) else {
+        // No agent of a service has this name, so no target of a sighting is taken for it.
+        let (true, Ok(name)) = (self.framed, Label::new("(localize)")) else {
             return nowhere;
         };
         let Ok(number) = u32::try_from(self.agents.len()) else {

@@ -4,6 +4,7 @@ mod code;
 mod object;
 mod progress;
 mod room;
+mod waking;
 
 pub(super) use object::Turns;
 pub(super) use progress::Progress;
@@ -21,6 +22,8 @@ pub(in crate::cli) enum EvalCommand {
     Env3(object::ObjectArgs),
     /// How well a grid code tells places apart: whole, beside the place, noisy, with modules erased.
     Code(code::CodeArgs),
+    /// Robots that wake up somewhere in a room that a team-mate has explored: are they found, how soon, and how far off?
+    Waking(waking::WakingArgs),
 }
 
 pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
@@ -29,5 +32,6 @@ pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
         EvalCommand::Env2(args) => room::run(Environment::ObstacleRich, args),
         EvalCommand::Env3(args) => object::run(args),
         EvalCommand::Code(args) => code::run(args),
+        EvalCommand::Waking(args) => waking::run(args),
     }
 }

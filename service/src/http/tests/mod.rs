@@ -2,6 +2,7 @@
 
 mod forgetting;
 mod guarding;
+mod localize;
 mod objects;
 mod problems;
 mod resources;

@@ -418,6 +418,7 @@ async fn the_description_lists_every_route_with_every_status() {
         "GET /v1/spaces/{space}/trips/{id}",
         "POST /v1/spaces/{space}/agents/{agent}/predict",
         "POST /v1/spaces/{space}/agents/{agent}/samples",
+        "POST /v1/spaces/{space}/localize",
         "POST /v1/spaces/{space}/objects/identify",
         "POST /v1/spaces/{space}/recall",
         "PUT /v1/spaces/{space}",

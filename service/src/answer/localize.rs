@@ -1,0 +1,90 @@
+//! Localisation: from the question to samples, and from what is found to the answer.
+
+use cogmap_proto as wire;
+use cogmap_proto::limits::LOCALIZE_SAMPLES_MAX;
+use cognitive_map::geometry::{PoseCovariance, upper_triangle};
+use cognitive_map::{CognitiveMap, Guess, InvalidSample, Localization, Sample};
+use nalgebra::Isometry3;
+
+use super::FRAME;
+use crate::decode;
+use crate::engine::status;
+
+/// Why samples cannot be localised.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidSequence {
+    /// There are none, or too many.
+    #[error("samples must be 1 to {LOCALIZE_SAMPLES_MAX}, not {0}")]
+    Count(usize),
+    /// A sample makes no sense.
+    #[error("sample {0}: {1}")]
+    Sample(usize, InvalidSample),
+    /// A stamp is earlier than the one before.
+    #[error("sample {0}: the stamp runs backwards")]
+    TimeBackwards(usize),
+    /// A sample tells where the robot is, which is what was asked.
+    #[error("sample {0}: a start pose has no place where a pose is asked for")]
+    StartPose(usize),
+    /// A sample begins or ends an episode with an object, of which nothing would be learned.
+    #[error("sample {0}: an episode with an object has no place where a pose is asked for")]
+    Object(usize),
+}
+
+/// The samples of a question, as the map takes them.
+///
+/// # Errors
+/// Says which sample breaks which rule, by its place in the list.
+pub fn samples_to_localize(query: &wire::LocalizeQuery) -> Result<Vec<Sample>, InvalidSequence> {
+    let count = query.samples.len();
+    if !(1..=LOCALIZE_SAMPLES_MAX).contains(&count) {
+        return Err(InvalidSequence::Count(count));
+    }
+    let mut latest_ns = i64::MIN;
+    let samples = query.samples.iter().enumerate().map(|(at, sample)| {
+        match &sample.body {
+            wire::SampleBody::StartPose(_) => return Err(InvalidSequence::StartPose(at)),
+            wire::SampleBody::Object(_) => return Err(InvalidSequence::Object(at)),
+            _ if sample.stamp_ns < latest_ns => return Err(InvalidSequence::TimeBackwards(at)),
+            _ => latest_ns = sample.stamp_ns,
+        }
+        decode::sample(sample).map_err(|error| InvalidSequence::Sample(at, error))
+    });
+    samples.collect()
+}
+
+/// Where samples were taken, as the wire has it.
+pub fn localization(space: &str, map: &CognitiveMap, found: &Localization) -> wire::Localization {
+    let Localization {
+        status: known,
+        pose: found_pose,
+        since,
+        guesses,
+    } = found;
+    wire::Localization {
+        space: space.to_owned(),
+        frame: FRAME.to_owned(),
+        map_revision: map.revision(),
+        status: status(*known),
+        pose: found_pose
+            .as_ref()
+            .map(|(found, covariance)| pose(found, covariance)),
+        found_after: since.map(|since| since as u64),
+        hypotheses: guesses.iter().map(hypothesis).collect(),
+    }
+}
+
+fn hypothesis(guess: &Guess) -> wire::LocalizationHypothesis {
+    wire::LocalizationHypothesis {
+        pose: pose(&guess.pose, &guess.covariance),
+        probability: guess.probability,
+        looks: guess.looks.into(),
+    }
+}
+
+fn pose(pose: &Isometry3<f64>, covariance: &PoseCovariance) -> wire::LocalizedPose {
+    wire::LocalizedPose {
+        translation_m: pose.translation.vector.into(),
+        rotation_xyzw: pose.rotation.coords.into(),
+        covariance: upper_triangle(&covariance.in_map_axes(&pose.rotation)),
+    }
+}
