@@ -1,7 +1,7 @@
 //! An episode: contacts come in, hypotheses gain and lose.
 
 use std::collections::BTreeMap;
-use std::f64::consts::{FRAC_PI_6, PI};
+use std::f64::consts::{FRAC_PI_6, PI, TAU};
 
 use nalgebra::{Isometry3, Matrix6, Translation3};
 
@@ -21,9 +21,9 @@ const CONTACTS_MAX: usize = 128;
 const REACH_PER_STEP: f64 = 2.0;
 /// Prior probability that it is none of the objects.
 const UNKNOWN_PRIOR: f64 = 0.1;
-/// Log of the range over which the fit of something else is spread, 20 deviations, against the width of a
-/// normal number's, √(2π).
-const MISFIT_LOG: f64 = 2.076_8;
+/// How far below what a right map does the best of the wrong ones explains each contact with something
+/// that was never learned, in deviations: the most likely depth, of a Rayleigh distribution.
+const STRANGE_SD: f64 = 1.5;
 /// What the evidence of a contact counts in a free pose, against one that is independent of all others.
 const POSES_WORTH: f64 = 0.6;
 /// Other poses that an answer names.
@@ -133,12 +133,8 @@ impl Recognition {
                 .iter()
                 .map(|object| object.1)
                 .fold(f64::NEG_INFINITY, f64::max);
-            // The fit of what was learned is a normal number, that of anything else about evenly spread
-            // below: the ratio of the two densities.
-            let misfit = UNKNOWN_PRIOR.ln() + most + prior + 0.5 * fit * fit - MISFIT_LOG;
-            if fit < 0.0 {
-                none = log_sum([none, misfit].into_iter());
-            }
+            let strange = strange_log(fit, self.contacts.len());
+            none = log_sum([none, UNKNOWN_PRIOR.ln() + most + prior + strange].into_iter());
             for (_, log) in &mut objects {
                 *log += prior;
             }
@@ -319,6 +315,28 @@ impl Recognition {
         }
         next_touch(library, rivals, self.contacts.last()?)
     }
+}
+
+/// Log of how much more likely this fit is of something that was never learned than of what was, after so many
+/// contacts.
+///
+/// The fit of what was learned is a standard normal number g. That of anything else is g − x, x of a
+/// Rayleigh distribution of scale S = `STRANGE_SD` √contacts; with t = −fit S/√(1 + S²) the ratio of both
+/// densities is (1 + t √(2π) Φ(t) exp(t²/2)) / (1 + S²).
+fn strange_log(fit: f64, contacts: usize) -> f64 {
+    let scale2 = 1.0 + STRANGE_SD * STRANGE_SD * contacts as f64;
+    // A fit above what is expected is no better a sign than the expected one.
+    let t = -fit.min(0.0) * (1.0 - 1.0 / scale2).sqrt();
+    // Φ(t) by Zelen and Severo's approximation (Abramowitz and Stegun 26.2.17), good to 1e-7.
+    let k = 1.0 / (1.0 + 0.231_641_9 * t);
+    let series = k
+        * (0.319_381_53
+            + k * (-0.356_563_782
+                + k * (1.781_477_937 + k * (-1.821_255_978 + k * 1.330_274_429))));
+    let half = 0.5 * t * t;
+    // √(2π) Φ(t) exp(t²/2) = √(2π) exp(t²/2) − series; in logs, since a bad fit is far below.
+    let bulk = half + (t.max(1e-300) * TAU.sqrt()).ln();
+    log_sum([bulk, (1.0 - t * series).max(1e-12).ln()].into_iter()) - scale2.ln()
 }
 
 /// Log of each object's mass.

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Unit, Vector3, Vector6};
 
 use super::cells::Cells;
 use super::contact::Contact;
-use super::facet::{ALONG_MAX, Facet, Noise, facets};
+use super::facet::{ALONG_MAX, Facet, Noise, ROUGH_DEPTH, ROUGH_RAD, facets};
 use super::model::ObjectModel;
 use super::pairs::Pairs;
 use super::surface::{Patch, Wide};
@@ -210,7 +210,7 @@ impl Relief {
                 depth_m * depth_m / depth + (apart.norm_squared() - depth_m * depth_m) / tangent;
             if let Some(normal) = &normal {
                 let own = facet.normal + facet.bend * apart;
-                let angle = (facet.angle + noise.normal) * noise.widen;
+                let angle = facet.angles(noise)[0];
                 half += (normal.into_inner() - own).norm_squared() / angle;
             }
             best = best.max(-0.5 * half);
@@ -274,7 +274,7 @@ impl Relief {
             total += density;
             // Both parts of the mixture see the same distance, with their own precision.
             let depth = (facet.depth_m2 + noise.position_m2) * widen;
-            let weight = (tight + loose / 9.0) / depth;
+            let weight = (tight + loose / (ROUGH_DEPTH * ROUGH_DEPTH)) / depth;
             let lever = point.coords.cross(&against.through);
             let row = Vector6::new(
                 against.through.x,
@@ -287,12 +287,18 @@ impl Relief {
             information += row * row.transpose() * weight;
             gradient -= row * (weight * against.depth_m);
             if let Some(normal) = normal {
-                let angle = (facet.angle + noise.normal) * widen;
-                let weight = tight / angle + loose / (angle + 0.1225);
-                let turn = normal.cross(&against.normal) * weight;
+                let angles = facet.angles(&noise);
+                let wide = loose / (0.5 * (angles[0] + angles[1]) + ROUGH_RAD * ROUGH_RAD);
+                let weights = angles.map(|angle| tight / angle + wide);
+                // A turn about the axis across the first moves the normal along the first.
+                let off = normal.cross(&against.normal);
+                let first = facet.axes[1];
+                let second = normal.cross(&first);
                 let mut turns = gradient.fixed_rows_mut::<3>(3);
-                turns += turn;
-                let across = (Matrix3::identity() - normal * normal.transpose()) * weight;
+                turns += first * (first.dot(&off) * weights[0])
+                    + second * (second.dot(&off) * weights[1]);
+                let across = first * first.transpose() * weights[0]
+                    + second * second.transpose() * weights[1];
                 let mut corner = information.fixed_view_mut::<3, 3>(3, 3);
                 corner += across;
             }

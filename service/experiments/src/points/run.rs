@@ -270,7 +270,7 @@ fn look(
         fit: posterior.fit,
         live: posterior.live_hypotheses,
         rotation_rad: pose.filter(|_| first == Some(ObjectId(truth))).map(|pose| {
-            let tolerance_m = 0.5 * settings.noise_m;
+            let tolerance_m = settings.noise_m;
             symmetry::error_rad(
                 cloud,
                 &pose.map_from_episode,

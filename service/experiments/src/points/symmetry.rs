@@ -10,7 +10,7 @@ const POINTS: usize = 200;
 /// Points among which the nearest is looked for.
 const TARGETS: usize = 4096;
 /// Steps of refining.
-const STEPS: usize = 10;
+const STEPS: usize = 30;
 
 /// The angle \[rad\] between an estimated pose and the true one, or the true one moved by a symmetry of
 /// the object.
