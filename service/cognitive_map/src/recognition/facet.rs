@@ -10,9 +10,9 @@ use super::model::ModelPlace;
 /// Neighbours by which the density of places is told: their number varies by a third.
 const DENSITY_NEIGHBOURS: usize = 10;
 /// Neighbours by which a place is smoothed.
-const SMOOTH_NEIGHBOURS: usize = 16;
+pub(super) const SMOOTH_NEIGHBOURS: usize = 16;
 /// Normals within 45° are of one patch; beyond lies an edge.
-const PATCH_COS: f64 = 0.707;
+pub(super) const PATCH_COS: f64 = 0.707;
 /// Reach of a facet along the surface, as a standard deviation, per spacing of places: so wide that the
 /// sum over random places is even to two fifths.
 const TANGENT_PER_SPACING: f64 = 0.55;

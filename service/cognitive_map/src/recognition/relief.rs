@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Unit, Vector3, Vector6};
 
 use super::cells::Cells;
 use super::contact::Contact;
-use super::facet::{ALONG_MAX, Facet, Noise, ROUGH_DEPTH, ROUGH_RAD, facets};
+use super::facet::{ALONG_MAX, Facet, Noise, ROUGH_DEPTH, ROUGH_RAD, SMOOTH_NEIGHBOURS, facets};
 use super::model::ObjectModel;
 use super::pairs::Pairs;
 use super::surface::{Patch, Wide};
@@ -33,6 +33,8 @@ pub(super) struct Relief {
     pub(super) pairs: Pairs,
     pub(super) area_m2: f64,
     pub(super) extent_m: f64,
+    /// Radius of the disc of places that make a patch \[m\].
+    pub(super) alike_m: f64,
     cells: Cells,
     expected: (f64, f64),
 }
@@ -98,6 +100,7 @@ impl Relief {
             cells: Cells::new(&positions, &reaches, CELL_PER_REACH),
             area_m2,
             extent_m,
+            alike_m: 0.0,
             facets,
             expected: (0.0, 1.0),
         };
@@ -105,6 +108,8 @@ impl Relief {
             relief.even(noise_m2);
         }
         relief.area_m2 = relief.facets.iter().map(|facet| facet.area_m2).sum::<f64>();
+        let place_m2 = relief.area_m2 / relief.facets.len() as f64;
+        relief.alike_m = (SMOOTH_NEIGHBOURS as f64 * place_m2 * FRAC_1_PI).sqrt();
         relief.expected = relief.rehearse(model);
         Some(relief)
     }

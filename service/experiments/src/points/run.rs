@@ -225,6 +225,8 @@ impl Scene<'_> {
             let mut contact = felt(cloud, at, &episode_from_object, self.settings, &mut rng);
             if next.is_some() {
                 contact = contact.aimed();
+            } else if self.settings.exploration != Exploration::Walk {
+                contact = contact.drawn();
             }
             let before = (self.clock)();
             recognition.touch(library, contact);
