@@ -318,7 +318,7 @@ impl Recognition {
                 weight: (mass.log - own + sum - all).exp(),
             }));
         }
-        next_touch(library, rivals, self.contacts.last()?)
+        next_touch(library, rivals, &self.contacts)
     }
 }
 

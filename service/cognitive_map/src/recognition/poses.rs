@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 use super::contact::Contact;
-use super::facet::{Noise, PATCH_COS};
+use super::facet::Noise;
 use super::library::{ObjectId, ObjectLibrary};
 use super::pairs::{Pair, Pairs};
 use super::relief::{Relief, Scene, local};
@@ -352,22 +352,15 @@ impl Poses {
     }
 
     /// How many contacts, on average, are with a contact where the map errs alike, itself among them:
-    /// Σ ρ / n. Patches that share places err alike; ρ has fallen to 1/e where their discs part.
+    /// Σ ρ / n.
     fn together(&self, relief: &Relief) -> f64 {
-        let scale = 0.25 / (relief.alike_m * relief.alike_m);
-        let mut sum = 0.0;
-        for (at, one) in self.contacts.iter().enumerate() {
-            for other in &self.contacts[..at] {
-                let one_side = match (one.normal, other.normal) {
-                    (Some(one), Some(other)) => one.dot(&other) > PATCH_COS,
-                    _ => true,
-                };
-                if one_side {
-                    sum += (-scale * (one.position_m - other.position_m).norm_squared()).exp();
-                }
-            }
-        }
-        1.0 + 2.0 * sum / self.contacts.len().max(1) as f64
+        let pairs = self.contacts.iter().enumerate().map(|(at, one)| {
+            let alike = self.contacts[..at]
+                .iter()
+                .map(|other| relief.alike(one, other));
+            alike.sum::<f64>()
+        });
+        1.0 + 2.0 * pairs.sum::<f64>() / self.contacts.len().max(1) as f64
     }
 }
 

@@ -6,7 +6,9 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Unit, Vector3, Vector6};
 
 use super::cells::Cells;
 use super::contact::Contact;
-use super::facet::{ALONG_MAX, Facet, Noise, ROUGH_DEPTH, ROUGH_RAD, SMOOTH_NEIGHBOURS, facets};
+use super::facet::{
+    ALONG_MAX, Facet, Noise, PATCH_COS, ROUGH_DEPTH, ROUGH_RAD, SMOOTH_NEIGHBOURS, facets,
+};
 use super::model::ObjectModel;
 use super::pairs::Pairs;
 use super::surface::{Patch, Wide};
@@ -34,7 +36,7 @@ pub(super) struct Relief {
     pub(super) area_m2: f64,
     pub(super) extent_m: f64,
     /// Radius of the disc of places that make a patch \[m\].
-    pub(super) alike_m: f64,
+    alike_m: f64,
     cells: Cells,
     expected: (f64, f64),
 }
@@ -117,6 +119,20 @@ impl Relief {
     /// Mean and standard deviation of the log density of a contact with this map in the right pose.
     pub(super) fn expected(&self) -> (f64, f64) {
         self.expected
+    }
+
+    /// How much two contacts share the errors of this map, 0 to 1. Patches that share places err alike; it has
+    /// fallen to 1/e where their discs part.
+    pub(super) fn alike(&self, one: &Contact, other: &Contact) -> f64 {
+        let one_side = match (one.normal, other.normal) {
+            (Some(one), Some(other)) => one.dot(&other) > PATCH_COS,
+            _ => true,
+        };
+        if !one_side {
+            return 0.0;
+        }
+        let apart = one.position_m - other.position_m;
+        (-0.25 * apart.norm_squared() / (self.alike_m * self.alike_m)).exp()
     }
 
     /// Makes the sum of the facets one at every place: where places are dense each stands for less area, at
