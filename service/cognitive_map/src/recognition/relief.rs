@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_1_PI, TAU};
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Unit, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Unit, Vector3, Vector6};
 
 use super::cells::Cells;
 use super::contact::Contact;
