@@ -38,19 +38,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let clouds = Cloud::load(Path::new(&folder))?;
     let start = Instant::now();
-    let report = run(
-        &clouds,
-        &settings,
-        &mut || start.elapsed(),
-        &mut |done, of| {
-            if done % 39 == 0 {
-                eprintln!(
-                    "{done} of {of} trials, {:.0} s",
-                    start.elapsed().as_secs_f64()
-                );
-            }
-        },
-    );
+    let report = run(&clouds, &settings, &|| start.elapsed(), &mut |done, of| {
+        if done % 39 == 0 {
+            eprintln!(
+                "{done} of {of} trials, {:.0} s",
+                start.elapsed().as_secs_f64()
+            );
+        }
+    });
     println!("{}", serde_json::to_string_pretty(&report)?);
     Ok(())
 }

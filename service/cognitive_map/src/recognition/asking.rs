@@ -37,13 +37,14 @@ pub(super) struct Rival {
     pub(super) weight: f64,
 }
 
-/// The best touch on the surface of one rival to tell it from the others; `like` is a contact as they come,
-/// for its noise.
+/// The best touch on the surface of one rival to tell it from the others, after these contacts; the last
+/// is one as they come, for its noise.
 pub(super) fn next_touch(
     library: &ObjectLibrary,
     mut rivals: Vec<Rival>,
-    like: &Contact,
+    contacts: &[Contact],
 ) -> Option<NextTouch> {
+    let like = contacts.last()?;
     rivals.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     // One pose of every map that is in question, then further poses.
     let mut chosen: Vec<Rival> = Vec::with_capacity(RIVALS_MAX);
@@ -88,7 +89,12 @@ pub(super) fn next_touch(
                     .map_or(here, |surface| log(library, surface, other, &touch));
                 other.weight * worth * (here - there).clamp(0.0, TOLD_MAX)
             });
-            let gain_nats = own.weight * told.sum::<f64>();
+            // A patch errs alike at every touch: what it tells, it has told by and by.
+            let before = surface.relief.as_ref().map_or(0.0, |relief| {
+                let alike = contacts.iter().map(|before| relief.alike(&touch, before));
+                alike.sum()
+            });
+            let gain_nats = own.weight * told.sum::<f64>() / (1.0 + before);
             if gain_nats > best.map_or(0.0, |best| best.gain_nats) {
                 best = Some(NextTouch {
                     point_m: touch.position_m,

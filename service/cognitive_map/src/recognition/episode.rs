@@ -1,7 +1,7 @@
 //! An episode: contacts come in, hypotheses gain and lose.
 
 use std::collections::BTreeMap;
-use std::f64::consts::{FRAC_PI_6, PI};
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_6, PI, TAU};
 
 use nalgebra::{Isometry3, Matrix6, Translation3};
 
@@ -11,6 +11,7 @@ use super::library::{ObjectId, ObjectLibrary};
 use super::orientation::Orientation;
 use super::poses::{Hypothesis as PoseHypothesis, Poses};
 use super::posterior::{PoseEstimate, Posterior, entropy_nats};
+use super::relief::Relief;
 use super::shifts::{Shifts, log_sum};
 use super::surface::Surface;
 use crate::geometry::{PoseCovariance, se3};
@@ -21,11 +22,9 @@ const CONTACTS_MAX: usize = 128;
 const REACH_PER_STEP: f64 = 2.0;
 /// Prior probability that it is none of the objects.
 const UNKNOWN_PRIOR: f64 = 0.1;
-/// Log of the range over which the fit of something else is spread, 20 deviations, against the width of a
-/// normal number's, √(2π).
-const MISFIT_LOG: f64 = 2.076_8;
-/// What the evidence of a contact counts in a free pose, against one that is independent of all others.
-const POSES_WORTH: f64 = 0.6;
+/// Per contact, how far below what a right map does the best of the wrong ones explains something that was
+/// never learned, in deviations in depth and in both angles each.
+const STRANGE_SD: f64 = 1.2;
 /// Other poses that an answer names.
 const OTHERS_MAX: usize = 24;
 
@@ -89,11 +88,18 @@ impl Recognition {
                 self.steps_m.insert(at, step_m);
             }
         }
+        self.count += 1;
+        let (steps, reach_m) = (self.steps_m.len(), self.reach_m());
+        let spread = (self.count - self.aimed) as f64;
         match &mut self.hypotheses {
             Hypotheses::Shifts(shifts) => shifts.touch(library, &self.contacts, &contact),
-            Hypotheses::Poses(poses) => poses.touch(library, &contact, CONTACTS_MAX),
+            Hypotheses::Poses(poses) => {
+                let size_log = |surface: &Surface, relief: &Relief| {
+                    found_log(surface, steps, reach_m) - spread * relief.area_m2.ln()
+                };
+                poses.touch(library, &contact, CONTACTS_MAX, &size_log);
+            }
         }
-        self.count += 1;
         if self.contacts.len() >= CONTACTS_MAX {
             self.contacts.remove(0);
         }
@@ -111,10 +117,13 @@ impl Recognition {
         let mut objects = sums(library, &logs);
         // A surface's errors are shared by the contacts near one another: those in a free pose, which is fitted to
         // them, are worth fewer independent ones.
-        let worth = match &self.hypotheses {
-            Hypotheses::Shifts(_) => 1.0,
-            Hypotheses::Poses(_) => POSES_WORTH,
+        let best = objects.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let best = best.map(|&(object, _)| object);
+        let worth = match (&self.hypotheses, best) {
+            (Hypotheses::Poses(poses), Some(best)) => poses.worth(library, best),
+            _ => 1.0,
         };
+        let fit = self.fit(library, best);
         for (_, log) in &mut objects {
             *log *= worth;
         }
@@ -126,19 +135,13 @@ impl Recognition {
                 *log = prior;
             }
         } else {
-            let best = objects.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-            none += worth * self.none_log(library, best.map(|&(object, _)| object));
-            let fit = self.fit(library).min(0.0);
+            none += worth * self.none_log(library, best);
             let most = objects
                 .iter()
                 .map(|object| object.1)
                 .fold(f64::NEG_INFINITY, f64::max);
-            // The fit of what was learned is a normal number, that of anything else about evenly spread
-            // below: the ratio of the two densities.
-            let misfit = UNKNOWN_PRIOR.ln() + most + prior + 0.5 * fit * fit - MISFIT_LOG;
-            if fit < 0.0 {
-                none = log_sum([none, misfit].into_iter());
-            }
+            let strange = strange_log(fit, self.contacts.len());
+            none = log_sum([none, UNKNOWN_PRIOR.ln() + most + prior + strange].into_iter());
             for (_, log) in &mut objects {
                 *log += prior;
             }
@@ -167,7 +170,7 @@ impl Recognition {
             unknown,
             pose,
             contacts: self.count,
-            fit: self.fit(library),
+            fit,
         }
     }
 
@@ -178,7 +181,10 @@ impl Recognition {
                 let reach_m = self.reach_m();
                 let shares = library.surfaces().map(|(object, surface)| {
                     let asked = self.aimed as f64 * surface.area_m2.ln();
-                    (object, asked + self.found_log(surface, reach_m))
+                    (
+                        object,
+                        asked + found_log(surface, self.steps_m.len(), reach_m),
+                    )
                 });
                 let shares: BTreeMap<ObjectId, f64> = shares.collect();
                 let logs = shifts.all.iter().filter_map(|shift| {
@@ -197,19 +203,13 @@ impl Recognition {
         }
     }
 
-    /// Of one that was found, the density is per part of the map within reach; of one that was asked for only the distance
-    /// counts: per metre, not per place.
-    fn found_log(&self, surface: &Surface, reach_m: Option<f64>) -> f64 {
-        let share = reach_m.map_or(0.0, |reach_m| surface.share(reach_m).max(1e-9).ln());
-        -(self.steps_m.len() as f64) * share
-    }
-
     fn pose_log(&self, library: &ObjectLibrary, hypothesis: &PoseHypothesis) -> Option<f64> {
         let surface = library.surface(hypothesis.object)?;
         let relief = surface.relief.as_ref()?;
         let count = (self.count - self.aimed) as f64;
         Some(
-            hypothesis.evidence() - (8.0 * PI * PI).ln() + self.found_log(surface, self.reach_m())
+            hypothesis.evidence() - (8.0 * PI * PI).ln()
+                + found_log(surface, self.steps_m.len(), self.reach_m())
                 - count * relief.area_m2.ln(),
         )
     }
@@ -256,12 +256,13 @@ impl Recognition {
         }
     }
 
-    /// How well the best hypothesis explains the contacts.
-    fn fit(&self, library: &ObjectLibrary) -> f64 {
+    /// How well the best hypothesis of an object explains the contacts.
+    fn fit(&self, library: &ObjectLibrary, object: Option<ObjectId>) -> f64 {
         let Hypotheses::Poses(poses) = &self.hypotheses else {
             return 0.0;
         };
-        let best = poses.all.iter().max_by(|a, b| a.score.total_cmp(&b.score));
+        let own = poses.all.iter().filter(|h| Some(h.object) == object);
+        let best = own.max_by(|a, b| a.score.total_cmp(&b.score));
         best.and_then(|best| poses.fit(library, best))
             .unwrap_or(0.0)
     }
@@ -317,8 +318,39 @@ impl Recognition {
                 weight: (mass.log - own + sum - all).exp(),
             }));
         }
-        next_touch(library, rivals, self.contacts.last()?)
+        next_touch(library, rivals, &self.contacts)
     }
+}
+
+/// Log of how much more likely this fit is of something that was never learned than of what was, after so many
+/// contacts.
+///
+/// The fit of what was learned is a standard normal number g. That of anything else is g − x, where x is
+/// a length in three dimensions (depth and two angles) of scale S = `STRANGE_SD` √contacts, Maxwell
+/// distributed. With t = −fit S/√(1 + S²) the ratio of both densities is
+/// √(2/π) ((t² + 1) √(2π) Φ(t) exp(t²/2) + t) (1 + S²)^(−3/2).
+fn strange_log(fit: f64, contacts: usize) -> f64 {
+    let scale2 = 1.0 + STRANGE_SD * STRANGE_SD * contacts as f64;
+    // A fit above what is expected is no better a sign than the expected one.
+    let t = -fit.min(0.0) * (1.0 - 1.0 / scale2).sqrt();
+    // Φ(t) by Zelen and Severo's approximation (Abramowitz and Stegun 26.2.17), good to 1e-7.
+    let k = 1.0 / (1.0 + 0.231_641_9 * t);
+    let tail = k
+        * (0.319_381_53
+            + k * (-0.356_563_782
+                + k * (1.781_477_937 + k * (-1.821_255_978 + k * 1.330_274_429))));
+    let half = 0.5 * t * t;
+    let fall = (-half).exp();
+    // The factor exp(t²/2) stays a logarithm, since a bad fit is far below.
+    let rest = (t * t + 1.0) * (TAU.sqrt() - tail * fall) + t * fall;
+    half + ((2.0 * FRAC_1_PI).sqrt() * rest).ln() - 1.5 * scale2.ln()
+}
+
+/// Of contacts that were found within reach of the one before, the density is per part of the map within
+/// reach.
+fn found_log(surface: &Surface, steps: usize, reach_m: Option<f64>) -> f64 {
+    let share = reach_m.map_or(0.0, |reach_m| surface.share(reach_m).max(1e-9).ln());
+    -(steps as f64) * share
 }
 
 /// Log of each object's mass.

@@ -10,18 +10,20 @@ use super::model::ModelPlace;
 /// Neighbours by which the density of places is told: their number varies by a third.
 const DENSITY_NEIGHBOURS: usize = 10;
 /// Neighbours by which a place is smoothed.
-const SMOOTH_NEIGHBOURS: usize = 20;
+pub(super) const SMOOTH_NEIGHBOURS: usize = 16;
 /// Normals within 45° are of one patch; beyond lies an edge.
-const PATCH_COS: f64 = 0.707;
+pub(super) const PATCH_COS: f64 = 0.707;
 /// Reach of a facet along the surface, as a standard deviation, per spacing of places: so wide that the
-/// sum over random places is even to a third.
-const TANGENT_PER_SPACING: f64 = 0.7;
+/// sum over random places is even to two fifths.
+const TANGENT_PER_SPACING: f64 = 0.55;
+/// No patch turns farther than this sine, 53°, within its reach.
+const BENT_MAX: f64 = 0.8;
 /// Share of contacts that are as the smooth patch predicts; the rest are about edges and seams.
 const SMOOTH_SHARE: f64 = 0.85;
 /// Standard deviation of a normal about an edge or seam \[rad\], 20°.
-const ROUGH_RAD: f64 = 0.35;
+pub(super) const ROUGH_RAD: f64 = 0.35;
 /// How much wider than the patch's the depths about an edge or seam are, as a standard deviation.
-const ROUGH_DEPTH: f64 = 3.0;
+pub(super) const ROUGH_DEPTH: f64 = 2.0;
 /// Facets count up to here along the surface, as half a squared number of deviations.
 pub(super) const ALONG_MAX: f64 = 3.0;
 /// And up to here in depth, as a squared number of deviations.
@@ -31,7 +33,7 @@ const AREA_MAX: f64 = 4.0;
 /// A facet scatters no more than so many times the usual variance.
 const SPREAD_MAX: f64 = 16.0;
 /// Weight of what is usual on the map in a facet's own scatter, in neighbours.
-const SHRINK: f64 = 8.0;
+const SHRINK: f64 = 4.0;
 
 /// A curved patch of surface.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +42,10 @@ pub(super) struct Facet {
     pub(super) normal: Vector3<f64>,
     /// The normal at a small displacement u is `normal` + `bend` u.
     pub(super) bend: Matrix3<f64>,
+    /// The direction in which the patch bends most, and the one across it.
+    pub(super) axes: [Vector3<f64>; 2],
+    /// Curvatures along them \[1/m\].
+    pub(super) curves: [f64; 2],
     /// Variance of the surface about the patch, along the normal \[m²\].
     pub(super) depth_m2: f64,
     /// Variance of the normal about the patch's, per axis \[rad²\].
@@ -66,21 +72,37 @@ pub(super) struct Against {
 }
 
 impl Facet {
-    /// A point against the patch. A parabola's height at u is that over the plane that halves the angle
-    /// between the normals at both ends (Rusinkiewicz 2019, "A symmetric objective function for ICP").
+    /// A point against the patch. The height is that over the plane that halves the angle between the normals
+    /// at both ends, which is exact on a sphere or a cylinder (Rusinkiewicz 2019, "A symmetric objective
+    /// function for ICP").
     pub(super) fn against(&self, point: &Point3<f64>) -> Against {
         let apart = point - self.position;
-        let bent = self.bend * apart;
-        // The bend lies across the normal, so this is the length of the sum.
-        let scale = 1.0 / (1.0 + 0.25 * bent.norm_squared()).sqrt();
-        let through = (self.normal + bent * 0.5) * scale;
+        // The bend lies across the normal: on a circle of radius r it is the chord's part along the
+        // tangent over r, the sine of the turn.
+        let mut bent = self.bend * apart;
+        let mut sine2 = bent.norm_squared();
+        if sine2 > BENT_MAX * BENT_MAX {
+            bent *= BENT_MAX / sine2.sqrt();
+            sine2 = BENT_MAX * BENT_MAX;
+        }
+        let cosine = (1.0 - sine2).sqrt();
+        let normal = self.normal * cosine + bent;
+        let through = (self.normal + normal) / (2.0 + 2.0 * cosine).sqrt();
         let depth_m = apart.dot(&through);
         Against {
             depth_m,
             along_m2: (apart.norm_squared() - depth_m * depth_m).max(0.0),
-            normal: (self.normal + bent) * scale,
+            normal,
             through,
         }
+    }
+
+    /// Variances of a contact's normal about the patch's, along the first axis and across it \[rad²\]. A contact
+    /// is not where it seems to be, and where the surface bends its normal is that of elsewhere.
+    pub(super) fn angles(&self, noise: &Noise) -> [f64; 2] {
+        self.curves.map(|curve| {
+            (self.angle + noise.normal + noise.position_m2 * curve * curve) * noise.widen
+        })
     }
 
     /// Density of a contact at this patch, per metre of depth and steradian, times the part of the
@@ -110,11 +132,14 @@ impl Facet {
                 // The other side of something thin.
                 return (0.0, 0.0);
             }
-            let angle = (self.angle + noise.normal) * noise.widen;
-            let wide = angle + ROUGH_RAD * ROUGH_RAD;
-            tight_half += 0.5 * apart / angle;
+            let angles = self.angles(noise);
+            let wide = 0.5 * (angles[0] + angles[1]) + ROUGH_RAD * ROUGH_RAD;
+            let off = normal - against.normal;
+            let first = off.dot(&self.axes[0]);
+            let second = apart - first * first;
+            tight_half += 0.5 * (first * first / angles[0] + second / angles[1]);
             loose_half += 0.5 * apart / wide;
-            tight /= angle * TAU;
+            tight /= (angles[0] * angles[1]).sqrt() * TAU;
             loose /= wide * TAU;
         } else {
             tight *= 0.25 * FRAC_1_PI;
@@ -188,6 +213,8 @@ pub(super) fn facets(places: &[ModelPlace]) -> Vec<Facet> {
             position: fit.position,
             normal: fit.normal,
             bend: fit.bend,
+            axes: fit.axes,
+            curves: fit.curves,
             depth_m2: (shrunk(fit.depth_m2, usual_depth, fit.weight) - raw.noise_m2).max(0.0)
                 + raw.noise_m2 / (0.5 * fit.weight + 1.0),
             angle: (shrunk(fit.angle, usual_angle, fit.weight) - raw.noise_normal).max(0.0)
@@ -220,6 +247,8 @@ struct Fit {
     position: Point3<f64>,
     normal: Vector3<f64>,
     bend: Matrix3<f64>,
+    axes: [Vector3<f64>; 2],
+    curves: [f64; 2],
     depth_m2: f64,
     angle: f64,
     area_m2: f64,
@@ -268,6 +297,8 @@ fn fit(raw: &[Raw], at: usize, neighbours: &Neighbours) -> Fit {
         position: own.position,
         normal: own.normal.into_inner(),
         bend: Matrix3::zeros(),
+        axes: tangents(&own.normal).into(),
+        curves: [0.0; 2],
         depth_m2: own.noise_m2,
         angle: own.noise_normal,
         area_m2: area_m2.max(1e-18),
@@ -299,9 +330,9 @@ fn fit(raw: &[Raw], at: usize, neighbours: &Neighbours) -> Fit {
                 weigh(near, *robust),
             );
         }
-        // A ridge of one neighbour at one scale: without neighbours the patch is flat.
-        normal_matrix[(1, 1)] += scale_m2;
-        normal_matrix[(2, 2)] += scale_m2;
+        // A ridge of a tenth of a neighbour at one scale: without neighbours the patch is flat.
+        normal_matrix[(1, 1)] += 0.1 * scale_m2;
+        normal_matrix[(2, 2)] += 0.1 * scale_m2;
         let Some(inverse) = normal_matrix.try_inverse() else {
             break;
         };
@@ -311,6 +342,10 @@ fn fit(raw: &[Raw], at: usize, neighbours: &Neighbours) -> Fit {
         let axes = nalgebra::Matrix3x2::from_columns(&[east, north]);
         fit.bend = axes * shape * axes.transpose();
         fit.normal = normal;
+        let eigen = shape.symmetric_eigen();
+        let first = usize::from(eigen.eigenvalues.y.abs() > eigen.eigenvalues.x.abs());
+        fit.axes = [first, 1 - first].map(|axis| axes * eigen.eigenvectors.column(axis));
+        fit.curves = [first, 1 - first].map(|axis| eigen.eigenvalues[axis]);
         // Heights of the places over the patch, and how they scatter.
         let facet = fit.facet();
         let own_height = facet.against(&own.position).depth_m;
@@ -354,6 +389,8 @@ impl Fit {
             position: self.position,
             normal: self.normal,
             bend: self.bend,
+            axes: self.axes,
+            curves: self.curves,
             depth_m2: self.depth_m2,
             angle: self.angle,
             area_m2: self.area_m2,

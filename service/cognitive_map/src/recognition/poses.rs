@@ -40,6 +40,9 @@ const LIVE: f64 = 12.0;
 const FAR: f64 = 20.0;
 /// Two poses are one when their distance, squared and in deviations, is below this.
 const SAME: f64 = 6.0;
+/// Variance of a log density that a contact's own noise makes: half a squared number of deviations, in depth
+/// and both angles.
+const NOISE_VARIANCE: f64 = 1.5;
 /// Nearer than this no further pose is begun \[rad\].
 const NEAR_RAD: f64 = 0.12;
 /// And nearer than this part of the map's extent.
@@ -101,8 +104,15 @@ impl Poses {
         self.origin.unwrap_or_else(Point3::origin)
     }
 
-    /// One more contact; of those before, `kept` are remembered.
-    pub(super) fn touch(&mut self, library: &ObjectLibrary, contact: &Contact, kept: usize) {
+    /// One more contact; of those before, `kept` are remembered. `size_log` is what the contacts' number says of a
+    /// map of its size: what a score lacks of a log density.
+    pub(super) fn touch(
+        &mut self,
+        library: &ObjectLibrary,
+        contact: &Contact,
+        kept: usize,
+        size_log: &dyn Fn(&Surface, &Relief) -> f64,
+    ) {
         let origin = *self.origin.get_or_insert(contact.position_m);
         if self.contacts.len() >= kept {
             self.contacts.remove(0);
@@ -120,21 +130,23 @@ impl Poses {
         if self.contacts.len() < 3 {
             return;
         }
-        let tops: Vec<(ObjectId, f64)> = library
+        let tops: Vec<(f64, f64)> = library
             .surfaces()
-            .map(|(object, _)| {
+            .map(|(object, surface)| {
                 let own = self.all.iter().filter(|h| h.object == object);
-                (
-                    object,
-                    own.map(|h| h.score).fold(f64::NEG_INFINITY, f64::max),
-                )
+                let most = own.map(|h| h.score).fold(f64::NEG_INFINITY, f64::max);
+                let size_log = surface
+                    .relief
+                    .as_ref()
+                    .map(|relief| size_log(surface, relief));
+                (most + size_log.unwrap_or(0.0), size_log.unwrap_or(0.0))
             })
             .collect();
         let best = tops
             .iter()
-            .map(|top| top.1)
+            .map(|top| top.0)
             .fold(f64::NEG_INFINITY, f64::max);
-        let rivals = tops.iter().filter(|top| top.1 > best - LIVE).count() > 1;
+        let rivals = tops.iter().filter(|top| top.0 > best - LIVE).count() > 1;
         let busy = rivals || self.count <= EARLY || self.count.is_multiple_of(4);
         let mut all = std::mem::take(&mut self.all);
         for (at, (object, surface)) in library.surfaces().enumerate() {
@@ -152,11 +164,11 @@ impl Poses {
             };
             for (rank, hypothesis) in own.iter_mut().enumerate() {
                 let turn = rank < 3 || (self.count + rank).is_multiple_of(4);
-                if turn && hypothesis.score > best - LIVE {
+                if turn && hypothesis.score + tops[at].1 > best - LIVE {
                     self.refine(&map, hypothesis, &[1.0]);
                 }
             }
-            let near = busy && tops[at].1 > best - FAR;
+            let near = busy && tops[at].0 > best - FAR;
             if own.is_empty() || near || (self.count + at).is_multiple_of(8) {
                 self.search(&map, &mut own);
             }
@@ -325,9 +337,30 @@ impl Poses {
             .contacts
             .iter()
             .map(|c| relief.log(&hypothesis.pose, c, scene));
-        let expected = relief.expected();
+        let (mean, sd) = relief.expected();
         let (sum, count) = (logs.sum::<f64>(), self.contacts.len() as f64);
-        Some((sum - count * expected.0) / (count.sqrt() * expected.1))
+        // What the contacts' own noise makes of a log density is each contact's, the rest is shared.
+        let shared = (1.0 - NOISE_VARIANCE / (sd * sd)).max(0.0);
+        let times = 1.0 + shared * (self.together(relief) - 1.0);
+        Some((sum - count * mean) / ((count * times).sqrt() * sd))
+    }
+
+    /// What a contact's evidence in this map is worth, against one whose errors are independent of all
+    /// others'.
+    pub(super) fn worth(&self, library: &ObjectLibrary, object: ObjectId) -> f64 {
+        found(library, object).map_or(1.0, |(_, relief)| 1.0 / self.together(relief))
+    }
+
+    /// How many contacts, on average, are with a contact where the map errs alike, itself among them:
+    /// Σ ρ / n.
+    fn together(&self, relief: &Relief) -> f64 {
+        let pairs = self.contacts.iter().enumerate().map(|(at, one)| {
+            let alike = self.contacts[..at]
+                .iter()
+                .map(|other| relief.alike(one, other));
+            alike.sum::<f64>()
+        });
+        1.0 + 2.0 * pairs.sum::<f64>() / self.contacts.len().max(1) as f64
     }
 }
 

@@ -2,11 +2,13 @@
 
 use std::f64::consts::{FRAC_1_PI, TAU};
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Unit, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Unit, Vector3, Vector6};
 
 use super::cells::Cells;
 use super::contact::Contact;
-use super::facet::{ALONG_MAX, Facet, Noise, facets};
+use super::facet::{
+    ALONG_MAX, Facet, Noise, PATCH_COS, ROUGH_DEPTH, ROUGH_RAD, SMOOTH_NEIGHBOURS, facets,
+};
 use super::model::ObjectModel;
 use super::pairs::Pairs;
 use super::surface::{Patch, Wide};
@@ -33,6 +35,8 @@ pub(super) struct Relief {
     pub(super) pairs: Pairs,
     pub(super) area_m2: f64,
     pub(super) extent_m: f64,
+    /// Radius of the disc of places that make a patch \[m\].
+    alike_m: f64,
     cells: Cells,
     expected: (f64, f64),
 }
@@ -98,6 +102,7 @@ impl Relief {
             cells: Cells::new(&positions, &reaches, CELL_PER_REACH),
             area_m2,
             extent_m,
+            alike_m: 0.0,
             facets,
             expected: (0.0, 1.0),
         };
@@ -105,6 +110,8 @@ impl Relief {
             relief.even(noise_m2);
         }
         relief.area_m2 = relief.facets.iter().map(|facet| facet.area_m2).sum::<f64>();
+        let place_m2 = relief.area_m2 / relief.facets.len() as f64;
+        relief.alike_m = (SMOOTH_NEIGHBOURS as f64 * place_m2 * FRAC_1_PI).sqrt();
         relief.expected = relief.rehearse(model);
         Some(relief)
     }
@@ -112,6 +119,20 @@ impl Relief {
     /// Mean and standard deviation of the log density of a contact with this map in the right pose.
     pub(super) fn expected(&self) -> (f64, f64) {
         self.expected
+    }
+
+    /// How much two contacts share the errors of this map, 0 to 1. Patches that share places err alike; it has
+    /// fallen to 1/e where their discs part.
+    pub(super) fn alike(&self, one: &Contact, other: &Contact) -> f64 {
+        let one_side = match (one.normal, other.normal) {
+            (Some(one), Some(other)) => one.dot(&other) > PATCH_COS,
+            _ => true,
+        };
+        if !one_side {
+            return 0.0;
+        }
+        let apart = one.position_m - other.position_m;
+        (-0.25 * apart.norm_squared() / (self.alike_m * self.alike_m)).exp()
     }
 
     /// Makes the sum of the facets one at every place: where places are dense each stands for less area, at
@@ -210,7 +231,7 @@ impl Relief {
                 depth_m * depth_m / depth + (apart.norm_squared() - depth_m * depth_m) / tangent;
             if let Some(normal) = &normal {
                 let own = facet.normal + facet.bend * apart;
-                let angle = (facet.angle + noise.normal) * noise.widen;
+                let angle = facet.angles(noise)[0];
                 half += (normal.into_inner() - own).norm_squared() / angle;
             }
             best = best.max(-0.5 * half);
@@ -274,7 +295,7 @@ impl Relief {
             total += density;
             // Both parts of the mixture see the same distance, with their own precision.
             let depth = (facet.depth_m2 + noise.position_m2) * widen;
-            let weight = (tight + loose / 9.0) / depth;
+            let weight = (tight + loose / (ROUGH_DEPTH * ROUGH_DEPTH)) / depth;
             let lever = point.coords.cross(&against.through);
             let row = Vector6::new(
                 against.through.x,
@@ -287,12 +308,18 @@ impl Relief {
             information += row * row.transpose() * weight;
             gradient -= row * (weight * against.depth_m);
             if let Some(normal) = normal {
-                let angle = (facet.angle + noise.normal) * widen;
-                let weight = tight / angle + loose / (angle + 0.1225);
-                let turn = normal.cross(&against.normal) * weight;
+                let angles = facet.angles(&noise);
+                let wide = loose / (0.5 * (angles[0] + angles[1]) + ROUGH_RAD * ROUGH_RAD);
+                let weights = angles.map(|angle| tight / angle + wide);
+                // A turn about the axis across the first moves the normal along the first.
+                let off = normal.cross(&against.normal);
+                let first = facet.axes[1];
+                let second = normal.cross(&first);
                 let mut turns = gradient.fixed_rows_mut::<3>(3);
-                turns += turn;
-                let across = (Matrix3::identity() - normal * normal.transpose()) * weight;
+                turns += first * (first.dot(&off) * weights[0])
+                    + second * (second.dot(&off) * weights[1]);
+                let across = first * first.transpose() * weights[0]
+                    + second * second.transpose() * weights[1];
                 let mut corner = information.fixed_view_mut::<3, 3>(3, 3);
                 corner += across;
             }

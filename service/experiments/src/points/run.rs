@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
 use std::time::Duration;
 
 use cognitive_map::recognition::{
@@ -66,6 +68,8 @@ struct Trial {
     /// At each look: most probable object, whether unknown is more probable, fit, rotation error.
     looks: Vec<Look>,
     stop: Option<(usize, Verdict)>,
+    /// Of each contact with its answer.
+    times_ms: Vec<f64>,
 }
 
 struct Look {
@@ -76,12 +80,12 @@ struct Look {
     rotation_rad: Option<f64>,
 }
 
-/// Learns all clouds and runs the trials. `clock` tells the time since any instant; `progress` is told how
-/// many trials of how many are done.
+/// Learns all clouds and runs the trials, on as many threads as the machine has. `clock` tells the time
+/// since any instant; `progress` is told how many trials of how many are done.
 pub fn run(
     clouds: &[Cloud],
     settings: &PointsSettings,
-    clock: &mut dyn FnMut() -> Duration,
+    clock: &(dyn Fn() -> Duration + Sync),
     progress: &mut dyn FnMut(usize, usize),
 ) -> Report {
     let mut library = ObjectLibrary::default();
@@ -103,113 +107,148 @@ pub fn run(
         .iter()
         .map(|(_, model)| model.places().len())
         .sum::<usize>();
+    let scene = Scene {
+        clouds,
+        held: &held,
+        settings,
+        clock,
+    };
     let group = settings.leave_out;
-    let total = clouds.len() * settings.trials * if group > 0 { 2 } else { 1 };
-    let mut times = Vec::new();
-    let mut known = Vec::new();
+    let count = clouds.len() * settings.trials;
+    let total = count * if group > 0 { 2 } else { 1 };
+    let mut known = all(count, &mut |done| progress(done, total), &|number| {
+        scene.one(&library, number % clouds.len(), number / clouds.len())
+    });
     let mut left_out = Vec::new();
-    for trial in 0..settings.trials {
-        for truth in 0..clouds.len() {
-            known.push(one(
-                &library, clouds, &held, truth, trial, settings, clock, &mut times,
-            ));
-            progress(known.len(), total);
-        }
-    }
     if group > 0 {
-        for first in (0..clouds.len()).step_by(group) {
-            let out = first..(first + group).min(clouds.len());
-            let mut others = library.clone();
-            for object in out.clone() {
-                others.remove(ObjectId(number_of(object)));
-            }
-            for truth in out {
-                for trial in 0..settings.trials {
-                    let trial = one(
-                        &others,
-                        clouds,
-                        &held,
-                        truth,
-                        trial,
-                        settings,
-                        clock,
-                        &mut Vec::new(),
-                    );
-                    left_out.push(trial);
-                    progress(known.len() + left_out.len(), total);
+        let others: Vec<_> = (0..clouds.len())
+            .step_by(group)
+            .map(|first| {
+                let mut others = library.clone();
+                for object in first..(first + group).min(clouds.len()) {
+                    others.remove(ObjectId(number_of(object)));
                 }
-            }
-        }
+                others
+            })
+            .collect();
+        left_out = all(
+            count,
+            &mut |done| progress(count + done, total),
+            &|number| {
+                let truth = number % clouds.len();
+                scene.one(&others[truth / group], truth, number / clouds.len())
+            },
+        );
     }
+    let mut times: Vec<f64> = known
+        .iter_mut()
+        .flat_map(|trial| std::mem::take(&mut trial.times_ms))
+        .collect();
     let mut report = summary(clouds, settings, &known, &left_out, &mut times);
     report.places_mean = places as f64 / clouds.len() as f64;
     report
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "all that a trial is made of, once"
-)]
-fn one(
-    library: &ObjectLibrary,
-    clouds: &[Cloud],
-    held: &[Vec<usize>],
-    truth: usize,
-    trial: usize,
-    settings: &PointsSettings,
-    clock: &mut dyn FnMut() -> Duration,
-    times: &mut Vec<f64>,
-) -> Trial {
-    let cloud = &clouds[truth];
-    let number = number_of(truth);
-    let mut rng = generator(settings.seed, number, trial as u64 + 1);
-    let rotation = {
-        let mut normal = || rng.sample::<f64, _>(StandardNormal);
-        UnitQuaternion::new_normalize(Quaternion::new(normal(), normal(), normal(), normal()))
-    };
-    let mut offset = || rng.random_range(-OFFSET_M..OFFSET_M);
-    let translation = Translation3::new(offset(), offset(), offset());
-    let object_from_episode = Isometry3::from_parts(translation, rotation);
-    let episode_from_object = object_from_episode.inverse();
-    let mut probe = Probe::new(cloud, &held[truth]);
-    let mut recognition = Recognition::new(&Orientation::Free);
-    let mut outcome = Trial {
-        truth,
-        looks: Vec::new(),
-        stop: None,
-    };
-    let last = settings.looks.last().copied().unwrap_or(0);
-    for count in 1..=last {
-        let next = (settings.exploration == Exploration::Policy && count > BEFORE_ASKING)
-            .then(|| recognition.next_touch(library))
-            .flatten();
-        let at = match (&next, settings.exploration) {
-            (Some(next), _) => probe.asked(next, &object_from_episode),
-            (None, Exploration::Walk) => probe.step(&mut rng),
-            _ => probe.anywhere(&mut rng),
+/// The trials of these numbers, in order. Each is by itself, so it does not matter which thread runs it.
+fn all(
+    count: usize,
+    progress: &mut dyn FnMut(usize),
+    trial: &(dyn Fn(usize) -> Trial + Sync),
+) -> Vec<Trial> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicUsize::new(0);
+    let (send, receive) = mpsc::channel();
+    let mut trials: Vec<(usize, Trial)> = Vec::with_capacity(count);
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(count) {
+            let (send, next) = (send.clone(), &next);
+            scope.spawn(move || {
+                loop {
+                    let number = next.fetch_add(1, Ordering::Relaxed);
+                    if number >= count || send.send((number, trial(number))).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(send);
+        for done in receive {
+            trials.push(done);
+            progress(trials.len());
+        }
+    });
+    trials.sort_by_key(|(number, _)| *number);
+    trials.into_iter().map(|(_, trial)| trial).collect()
+}
+
+/// What trials are made of.
+struct Scene<'a> {
+    clouds: &'a [Cloud],
+    /// Points of each that were not learned.
+    held: &'a [Vec<usize>],
+    settings: &'a PointsSettings,
+    clock: &'a (dyn Fn() -> Duration + Sync),
+}
+
+impl Scene<'_> {
+    /// One trial with an object.
+    fn one(&self, library: &ObjectLibrary, truth: usize, trial: usize) -> Trial {
+        let cloud = &self.clouds[truth];
+        let number = number_of(truth);
+        let mut rng = generator(self.settings.seed, number, trial as u64 + 1);
+        let rotation = {
+            let mut normal = || rng.sample::<f64, _>(StandardNormal);
+            UnitQuaternion::new_normalize(Quaternion::new(normal(), normal(), normal(), normal()))
         };
-        let mut contact = felt(cloud, at, &episode_from_object, settings, &mut rng);
-        if next.is_some() {
-            contact = contact.aimed();
+        let mut offset = || rng.random_range(-OFFSET_M..OFFSET_M);
+        let translation = Translation3::new(offset(), offset(), offset());
+        let object_from_episode = Isometry3::from_parts(translation, rotation);
+        let episode_from_object = object_from_episode.inverse();
+        let mut probe = Probe::new(cloud, &self.held[truth]);
+        let mut recognition = Recognition::new(&Orientation::Free);
+        let mut outcome = Trial {
+            truth,
+            looks: Vec::new(),
+            stop: None,
+            times_ms: Vec::new(),
+        };
+        let last = self.settings.looks.last().copied().unwrap_or(0);
+        for count in 1..=last {
+            let next = (self.settings.exploration == Exploration::Policy && count > BEFORE_ASKING)
+                .then(|| recognition.next_touch(library))
+                .flatten();
+            let at = match (&next, self.settings.exploration) {
+                (Some(next), _) => probe.asked(next, &object_from_episode),
+                (None, Exploration::Walk) => probe.step(&mut rng),
+                _ => probe.anywhere(&mut rng),
+            };
+            let mut contact = felt(cloud, at, &episode_from_object, self.settings, &mut rng);
+            if next.is_some() {
+                contact = contact.aimed();
+            } else if self.settings.exploration != Exploration::Walk {
+                contact = contact.drawn();
+            }
+            let before = (self.clock)();
+            recognition.touch(library, contact);
+            let posterior = recognition.posterior(library);
+            outcome
+                .times_ms
+                .push((self.clock)().saturating_sub(before).as_secs_f64() * 1e3);
+            if outcome.stop.is_none() && posterior.verdict() != Verdict::Undecided {
+                outcome.stop = Some((count, posterior.verdict()));
+            }
+            if self.settings.looks.contains(&count) {
+                outcome.looks.push(look(
+                    &posterior,
+                    cloud,
+                    number,
+                    &object_from_episode,
+                    self.settings,
+                ));
+            }
         }
-        let before = clock();
-        recognition.touch(library, contact);
-        let posterior = recognition.posterior(library);
-        times.push(clock().saturating_sub(before).as_secs_f64() * 1e3);
-        if outcome.stop.is_none() && posterior.verdict() != Verdict::Undecided {
-            outcome.stop = Some((count, posterior.verdict()));
-        }
-        if settings.looks.contains(&count) {
-            outcome.looks.push(look(
-                &posterior,
-                cloud,
-                number,
-                &object_from_episode,
-                settings,
-            ));
-        }
+        outcome
     }
-    outcome
 }
 
 fn look(
@@ -233,7 +272,7 @@ fn look(
         fit: posterior.fit,
         live: posterior.live_hypotheses,
         rotation_rad: pose.filter(|_| first == Some(ObjectId(truth))).map(|pose| {
-            let tolerance_m = 0.5 * settings.noise_m;
+            let tolerance_m = settings.noise_m;
             symmetry::error_rad(
                 cloud,
                 &pose.map_from_episode,

@@ -75,17 +75,12 @@ pub(super) fn run(args: &PointsArgs) -> anyhow::Result<()> {
     let clouds = Cloud::load(&args.directory)?;
     let begin = Instant::now();
     let mut progress: Option<(Progress, usize)> = None;
-    let report = points::run(
-        &clouds,
-        &settings,
-        &mut || begin.elapsed(),
-        &mut |done, of| {
-            let (bar, before) =
-                progress.get_or_insert_with(|| (Progress::new(of as u64, "explorations"), 0));
-            bar.add(done.saturating_sub(*before) as u64);
-            *before = done;
-        },
-    );
+    let report = points::run(&clouds, &settings, &|| begin.elapsed(), &mut |done, of| {
+        let (bar, before) =
+            progress.get_or_insert_with(|| (Progress::new(of as u64, "explorations"), 0));
+        bar.add(done.saturating_sub(*before) as u64);
+        *before = done;
+    });
     if let Some((bar, _)) = progress {
         bar.finish();
     }
