@@ -90,6 +90,9 @@ pub struct AgentDetail {
     pub lag_samples: u64,
     /// Path travelled in this session \[m\].
     pub travelled_m: f64,
+    /// Sightings of its own earlier samples that were dropped, because those were not remembered, or no longer; over
+    /// all sessions.
+    pub forgotten_matches: u64,
 }
 
 /// What became of an agent's sightings of landmarks and of other agents, over all sessions.

@@ -120,6 +120,7 @@ fn agent() -> AgentDetail {
         watermark: watermark(),
         lag_samples: 12,
         travelled_m: 31.75,
+        forgotten_matches: 3,
     }
 }
 
@@ -130,6 +131,7 @@ fn silent_agent() -> AgentDetail {
         evidence: Evidence::default(),
         lag_samples: 0,
         travelled_m: 0.0,
+        forgotten_matches: 0,
         ..agent()
     }
 }

@@ -29,6 +29,7 @@ pub(crate) struct Readout {
     pub(crate) odometry: StampedPose,
     pub(crate) evidence: Evidence,
     pub(crate) travelled_m: f64,
+    pub(crate) forgotten_matches: u64,
     /// Its part of the agent's JSON, once someone has asked for it.
     json: OnceLock<Vec<u8>>,
 }
@@ -48,6 +49,7 @@ struct DetailTail {
     watermark: Watermark,
     lag_samples: u64,
     travelled_m: f64,
+    forgotten_matches: u64,
 }
 
 /// How far an agent's samples have come.
@@ -115,6 +117,7 @@ impl AgentDesk {
             watermark,
             lag_samples,
             travelled_m,
+            forgotten_matches,
         } = self.tail(readout.as_deref());
         AgentDetail {
             name: self.name.clone(),
@@ -124,6 +127,7 @@ impl AgentDesk {
             watermark,
             lag_samples,
             travelled_m,
+            forgotten_matches,
         }
     }
 
@@ -161,6 +165,7 @@ impl AgentDesk {
             watermark: marks.watermark(),
             lag_samples: marks.applied.saturating_sub(marks.durable) + marks.waiting,
             travelled_m: readout.map_or(0.0, |readout| readout.travelled_m),
+            forgotten_matches: readout.map_or(0, |readout| readout.forgotten_matches),
         }
     }
 
@@ -191,12 +196,14 @@ impl Readout {
         odometry: StampedPose,
         evidence: Evidence,
         travelled_m: f64,
+        forgotten_matches: u64,
     ) -> Self {
         Self {
             estimate,
             odometry,
             evidence,
             travelled_m,
+            forgotten_matches,
             json: OnceLock::new(),
         }
     }

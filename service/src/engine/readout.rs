@@ -37,8 +37,13 @@ pub(crate) fn readout(space: &str, map: &CognitiveMap, id: AgentId) -> Option<Re
     };
     let odometry = stamped(stamp_ns, agent.odometry());
     let evidence = evidence(agent);
-    let travelled_m = agent.travelled_m();
-    Some(Readout::new(estimate, odometry, evidence, travelled_m))
+    Some(Readout::new(
+        estimate,
+        odometry,
+        evidence,
+        agent.travelled_m(),
+        agent.forgotten_matches(),
+    ))
 }
 
 /// What became of an agent's sightings, as the wire has it.

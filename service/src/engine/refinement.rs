@@ -16,7 +16,7 @@ const PAGES_LAST: Duration = Duration::from_secs(60);
 
 /// A space's latest relaxation, and the place where those queue who want another one.
 #[derive(Debug, Default)]
-pub(super) struct Refinements(Mutex<Option<Arc<Refinement>>>);
+pub(super) struct Refinements(Arc<Mutex<Option<Arc<Refinement>>>>);
 
 /// The trajectories of a relaxed map.
 #[derive(Debug)]
@@ -74,9 +74,28 @@ impl Space {
         })
     }
 
+    /// What `of` makes of the map by relaxing it. Waits for its turn: the map is relaxed for one at a time.
+    ///
+    /// # Errors
+    /// The space cannot be read.
+    pub(crate) async fn relaxed<T: Send + 'static>(
+        &self,
+        of: impl FnOnce(&CognitiveMap) -> T + Send + 'static,
+    ) -> Result<T, Unavailable> {
+        let turn = Arc::clone(&self.refinements().0).lock_owned().await;
+        let map = self.snapshot().await?;
+        let relax = move || {
+            let made = of(&map);
+            drop(turn);
+            made
+        };
+        let relaxed = tokio::task::spawn_blocking(relax).await;
+        relaxed.map_err(|_| interrupted())
+    }
+
     /// The relaxed map of now, or for a later page that of the first one.
-    async fn refinement(&self, is_later_page: bool) -> Result<Arc<Refinement>, TrajectoryError> {
-        let mut latest = self.refinements().0.lock().await;
+    async fn refinement(&self, is_later_page: bool) -> Result<Arc<Refinement>, Unavailable> {
+        let mut latest = Arc::clone(&self.refinements().0).lock_owned().await;
         let map = self.snapshot().await?;
         if let Some(latest) = &*latest
             && (latest.revision == map.revision()
@@ -84,16 +103,21 @@ impl Space {
         {
             return Ok(Arc::clone(latest));
         }
-        let relax = move || Refinement {
-            revision: map.revision(),
-            made: Instant::now(),
-            agents: refined_trajectories(&map),
+        // The turn goes with the work: who stops waiting for it does not let a second one begin beside it.
+        let relax = move || {
+            let relaxed = Arc::new(Refinement {
+                revision: map.revision(),
+                made: Instant::now(),
+                agents: refined_trajectories(&map),
+            });
+            *latest = Some(Arc::clone(&relaxed));
+            relaxed
         };
-        let relaxed = tokio::task::spawn_blocking(move || Arc::new(relax())).await;
-        let relaxed = relaxed.map_err(|_| {
-            Unavailable::Failed("the relaxation of the map was interrupted".to_owned())
-        })?;
-        *latest = Some(Arc::clone(&relaxed));
-        Ok(relaxed)
+        let relaxed = tokio::task::spawn_blocking(relax).await;
+        relaxed.map_err(|_| interrupted())
     }
+}
+
+fn interrupted() -> Unavailable {
+    Unavailable::Failed("the relaxation of the map was interrupted".to_owned())
 }

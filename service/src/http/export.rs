@@ -7,6 +7,7 @@ use std::sync::Arc;
 use axum::body::{Body, Bytes};
 use axum::http::Response;
 use axum::http::header::{CONTENT_DISPOSITION, HeaderValue};
+use cogmap_experiments::g2o::write_g2o;
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{AgentSummary, Landmark, Place, SpaceInfo, TripDetail};
 use cognitive_map::{CognitiveMap, LandmarkId, PlaceId, TripId};
@@ -35,6 +36,8 @@ pub(crate) enum ExportFormat {
     Ply,
     /// The causal trajectory of one agent as lines `t x y z qx qy qz qw`.
     Tum,
+    /// What agents did and saw as a graph of poses and landmarks, relaxed.
+    G2o,
 }
 
 /// What to export.
@@ -42,7 +45,8 @@ pub(crate) enum ExportFormat {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct ExportQuery {
-    /// `json` (the map; when absent), `ply` (the places) or `tum` (the trajectory of `agent`).
+    /// `json` (the map; when absent), `ply` (the places), `tum` (the trajectory of `agent`) or `g2o` (what agents did
+    /// and saw as a graph of poses and landmarks, relaxed).
     #[param(inline)]
     format: Option<ExportFormat>,
     /// Name of the agent, for `tum`.
@@ -68,7 +72,8 @@ pub(crate) struct MapExport {
 
 /// Export the map of a space.
 ///
-/// The map is as it was when the request came, whatever happens while it is sent.
+/// The map is as it was when the request came, whatever happens while it is sent. For a graph the whole map is
+/// relaxed, which may take seconds, and for one request at a time.
 #[utoipa::path(get, path = "/v1/spaces/{space}/export", tag = "spaces", operation_id = "export_space",
     params(SpaceParam, ExportQuery),
     responses(
@@ -82,6 +87,7 @@ pub(crate) async fn get(
 ) -> Result<Response<Body>, Problem> {
     let (mut response, file) = match query.format.unwrap_or_default() {
         ExportFormat::Json => (map(&space).await?, format!("{}.json", space.name())),
+        ExportFormat::G2o => (graph(&space).await?, format!("{}.g2o", space.name())),
         ExportFormat::Ply => (cloud(&space).await?, format!("{}.ply", space.name())),
         ExportFormat::Tum => {
             let detail = "format=tum needs agent";
@@ -161,6 +167,12 @@ async fn map(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
         .chain(lists)
         .chain(std::iter::once("}".to_owned()));
     Ok(reply::with_type("application/json", streamed(texts)))
+}
+
+/// The graph, in the memory of its whole text: that of the relaxation is larger.
+async fn graph(space: &Space) -> Result<Response<Body>, Problem> {
+    let graph = space.relaxed(|map| write_g2o(&map.experience_map()));
+    Ok(reply::with_type(TUM, Body::from(graph.await?)))
 }
 
 async fn cloud(space: &Arc<Space>) -> Result<Response<Body>, Problem> {

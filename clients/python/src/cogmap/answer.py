@@ -222,6 +222,9 @@ class AgentDetail:
     lag_samples: int
     #: Path travelled in this session [m].
     travelled_m: float
+    #: Sightings of its own earlier samples that were dropped, because those were not remembered, or no longer;
+    #: over all sessions.
+    forgotten_matches: int
 
 
 @dataclass(frozen=True)

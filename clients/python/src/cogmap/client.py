@@ -328,8 +328,9 @@ class Client:
 
         Args:
             space: Name of the space.
-            format: `json` (the whole map), `ply` (the places as a point cloud) or `tum` (the causal
-                trajectory of an agent).
+            format: `json` (the whole map), `ply` (the places as a point cloud), `tum` (the causal
+                trajectory of an agent) or `g2o` (what agents did and saw as a graph of poses and
+                landmarks, relaxed).
             agent: Whose trajectory; `tum` needs it.
             session: Which run of the agent; the current one when absent.
         """

@@ -1,5 +1,6 @@
 //! What the interface answers when all is well.
 
+use cogmap_experiments::g2o::PoseGraph;
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 
 use super::*;
@@ -264,6 +265,26 @@ async fn recall_answers_by_position() {
 }
 
 #[tokio::test]
+async fn matches_with_samples_that_nobody_remembers_are_counted() {
+    let rig = travelled().await;
+    let seen_again = |seq| {
+        SampleBody::Sighting(Sighting {
+            target: Target::OwnSample(seq),
+            relation: Relation::Position {
+                translation_m: [0.1, 0.0, 0.0],
+                sd_m: [0.1; 3],
+            },
+        })
+    };
+    for (seq, target, forgotten) in [(53, 20, 0), (54, 1_000_000, 1), (55, 2_000_000, 2)] {
+        let sighting = at(1, seq, seen_again(target));
+        rig.samples("rover", &sighting).await.good();
+        let agent = rig.get("/v1/spaces/lab/agents/rover").await.good();
+        assert_eq!(agent["forgotten_matches"], forgotten, "{agent}");
+    }
+}
+
+#[tokio::test]
 async fn exports_hold_everything() {
     let rig = travelled().await;
     let export = rig.get("/v1/spaces/lab/export").await;
@@ -299,6 +320,16 @@ async fn exports_hold_everything() {
         .get("/v1/spaces/lab/export?format=tum&agent=rover")
         .await;
     assert_eq!(tum.text().lines().count(), 52);
+
+    let g2o = rig.get("/v1/spaces/lab/export?format=g2o").await;
+    assert_eq!(
+        g2o.header("content-disposition"),
+        "attachment; filename=\"lab.g2o\""
+    );
+    let graph = PoseGraph::read(g2o.text()).expect("the format");
+    let way_m = { graph.edges().iter() }.map(|edge| edge.transform.translation.vector.norm());
+    assert!((way_m.sum::<f64>() - 5.0).abs() < 1e-6, "{}", g2o.text());
+    assert_eq!(graph.point_edges().len(), 2, "two posts were seen");
 }
 
 #[tokio::test]
