@@ -13,7 +13,10 @@ mod trip;
 pub use grid::grid_state;
 pub use landmark::landmark;
 pub use localize::{InvalidSequence, localization, samples_to_localize};
-pub use object::{InvalidContacts, agent_object, identify, lesson, object_detail, object_summary};
+pub use object::{
+    InvalidContacts, agent_object, identification, lesson, object_detail, object_summary,
+    touches_to_identify,
+};
 pub use place::place;
 pub use predict::{InvalidPrediction, predict};
 pub use recall::{InvalidQuery, cue, recall};

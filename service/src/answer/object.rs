@@ -4,9 +4,9 @@ use cogmap_proto as wire;
 use cogmap_proto::limits::{IDENTIFY_CONTACTS_MAX, LESSON_CONTACTS_MAX};
 use cognitive_map::geometry::upper_triangle;
 use cognitive_map::recognition::{
-    LevelMemory, ModelPlace, ObjectId, ObjectModel, PoseEstimate, Posterior, Verdict,
+    LevelMemory, ModelPlace, ObjectId, ObjectModel, Orientation, PoseEstimate, Posterior, Verdict,
 };
-use cognitive_map::{AgentId, CognitiveMap, Identified, InvalidSample, KnownObject, Lesson};
+use cognitive_map::{AgentId, CognitiveMap, Identified, InvalidSample, KnownObject, Lesson, Touch};
 
 use crate::decode;
 
@@ -45,15 +45,13 @@ pub fn lesson(lesson: &wire::ObjectLesson) -> Result<Lesson, InvalidContacts> {
     Ok(Lesson::new(spacing, touches))
 }
 
-/// Which object a sequence of contacts is of.
+/// A sequence of contacts whose object is asked for, and what is known of how it is turned.
 ///
 /// # Errors
 /// Says which rule the query breaks.
-pub fn identify(
-    space: &str,
-    map: &CognitiveMap,
+pub fn touches_to_identify(
     query: &wire::IdentifyQuery,
-) -> Result<wire::Identification, InvalidContacts> {
+) -> Result<(Orientation, Vec<Touch>), InvalidContacts> {
     check_count(query.contacts.len(), IDENTIFY_CONTACTS_MAX)?;
     let orientation = decode::orientation(&query.orientation);
     let orientation = orientation.map_err(|error| InvalidContacts::Field("orientation", error))?;
@@ -61,11 +59,7 @@ pub fn identify(
     let noise = noise.map_err(|error| InvalidContacts::Field("noise", error))?;
     let touches = decode::touches(&query.contacts, noise);
     let touches = touches.map_err(|(at, error)| InvalidContacts::Contact(at, error))?;
-    Ok(identification(
-        space,
-        map,
-        &map.identify(&orientation, &touches),
-    ))
+    Ok((orientation, touches))
 }
 
 /// The episode of an agent.
@@ -138,7 +132,8 @@ fn object_place(map: &CognitiveMap, place: &ModelPlace) -> wire::ObjectPlace {
     }
 }
 
-fn identification(
+/// What is recognised of an object.
+pub fn identification(
     space: &str,
     map: &CognitiveMap,
     identified: &Identified,

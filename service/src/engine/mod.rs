@@ -16,9 +16,9 @@ mod counters;
 mod desk;
 mod fold;
 mod health;
-mod localization;
 mod message;
 mod outlet;
+mod question;
 mod queue;
 mod readout;
 mod recovery;
@@ -44,9 +44,9 @@ use cognitive_map::InvalidSettings;
 pub use block::{CorruptBlock, Entry, entries};
 pub use desk::AgentDesk;
 pub use fold::{core_settings, records_of, trajectory_interval_ns};
-pub use localization::LocalizeError;
 pub use message::IngestError;
 pub use outlet::{Outlet, Silent};
+pub use question::QuestionError;
 pub use readout::evidence;
 pub(crate) use readout::{status, trip_end};
 pub use refinement::refined_trajectories;
@@ -58,7 +58,7 @@ pub use trajectory::{Chunk, Recorder};
 use crate::store::{Store, StoreError};
 use counters::{Drop, IntakeCounters};
 use health::Health;
-use localization::LocalizationRoom;
+use question::QuestionRoom;
 use queue::NotQueued;
 use space::Surroundings;
 
@@ -149,7 +149,7 @@ impl Engine {
             health: Arc::clone(&health),
             commits,
             jobs,
-            localizations: LocalizationRoom::default(),
+            questions: QuestionRoom::default(),
             settings,
         };
         let mut spaces = BTreeMap::new();

@@ -17,9 +17,9 @@ use super::checkpointer::{Checkpointer, Job};
 use super::committer::Commit;
 use super::desk::AgentDesk;
 use super::health::Health;
-use super::localization::LocalizationRoom;
 use super::message::{Call, IngestError, ObjectRequest, Request};
 use super::outlet::Outlet;
+use super::question::QuestionRoom;
 use super::queue::{Inbox, NotQueued, Queue, queue};
 use super::recovery;
 use super::refinement::Refinements;
@@ -65,7 +65,7 @@ pub(crate) struct Shared {
     wishes: Mutex<Option<Vec<Wish>>>,
     /// The map relaxed for those who asked for the past.
     refinements: Refinements,
-    localizations: LocalizationRoom,
+    questions: QuestionRoom,
     /// Set when the writer ended although the space was not closing.
     broken: AtomicBool,
 }
@@ -106,7 +106,7 @@ pub(crate) struct Surroundings {
     pub(crate) health: Arc<Health>,
     pub(crate) commits: std::sync::mpsc::Sender<Commit>,
     pub(crate) jobs: std::sync::mpsc::Sender<Job>,
-    pub(crate) localizations: LocalizationRoom,
+    pub(crate) questions: QuestionRoom,
     pub(crate) settings: EngineSettings,
 }
 
@@ -138,7 +138,7 @@ impl Space {
             snapshot: ArcSwapOption::empty(),
             wishes: Mutex::new(Some(Vec::new())),
             refinements: Refinements::default(),
-            localizations: around.localizations.clone(),
+            questions: around.questions.clone(),
             broken: AtomicBool::new(false),
         });
         let thread = {
@@ -342,8 +342,8 @@ impl Space {
     }
 
     /// Room for localisations that are under way, of all spaces.
-    pub(crate) fn localization_room(&self) -> &LocalizationRoom {
-        &self.shared.localizations
+    pub(crate) fn question_room(&self) -> &QuestionRoom {
+        &self.shared.questions
     }
 
     /// Takes what is queued, checkpoints, and ends the thread.

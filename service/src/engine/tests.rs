@@ -12,7 +12,7 @@ use cognitive_map::CognitiveMap;
 use proptest::prelude::*;
 
 use super::{
-    Engine, EngineSettings, Entry, LocalizeError, Readiness, Silent, core_settings, records_of,
+    Engine, EngineSettings, Entry, QuestionError, Readiness, Silent, core_settings, records_of,
 };
 use crate::store::FjallStore;
 
@@ -386,12 +386,12 @@ fn a_localisation_that_takes_too_long_is_given_up_and_makes_room() {
         runtime.block_on(localized).map(|(_, found)| found.status)
     };
     let room = || {
-        let taken = std::iter::from_fn(|| space.localization_room().enter().ok());
+        let taken = std::iter::from_fn(|| space.question_room().enter().ok());
         // All are held until they are counted.
         taken.collect::<Vec<_>>().len()
     };
     let whole = room();
-    let overdue = Err(LocalizeError::Overdue(Duration::ZERO));
+    let overdue = Err(QuestionError::Overdue(Duration::ZERO));
     // A machine that is busy elsewhere may have the answer before it looks at the clock, but not each time.
     let told: Vec<_> = (0..20)
         .map(|_| {

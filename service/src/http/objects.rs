@@ -136,6 +136,8 @@ pub(crate) async fn delete(
 }
 
 /// Which object a sequence of contacts is of, in which pose, and where the next touch would tell most. Changes nothing.
+///
+/// A few such questions are answered at once; further ones are told to come back.
 #[utoipa::path(post, path = "/v1/spaces/{space}/objects/identify", tag = "memory",
     operation_id = "identify", params(SpaceParam), request_body = IdentifyQuery,
     responses(
@@ -147,12 +149,10 @@ pub(crate) async fn identify(
     _: NoQuery,
     Json(query): Json<IdentifyQuery>,
 ) -> Result<Response<Body>, Problem> {
-    let map = space.snapshot().await?;
-    // Every object is compared: work for a thread that may be busy.
-    let answered = tokio::task::spawn_blocking(move || {
-        answer::identify(space.name(), &map, &query).map(|answer| reply::json(&answer))
-    });
-    Ok(answered.await.map_err(|_| Problem::interrupted())??)
+    let (orientation, touches) = answer::touches_to_identify(&query)?;
+    let (map, identified) = space.identify(orientation, touches).await?;
+    let answer = answer::identification(space.name(), &map, &identified);
+    Ok(reply::json(&answer))
 }
 
 /// What an agent's episode with an object says so far.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::answer::{InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence};
-use crate::engine::{IngestError, LocalizeError, SpaceError, TrajectoryError, Unavailable};
+use crate::engine::{IngestError, QuestionError, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
 
 /// Media type of problems.
@@ -239,13 +239,13 @@ impl From<InvalidSequence> for Problem {
     }
 }
 
-impl From<LocalizeError> for Problem {
-    fn from(error: LocalizeError) -> Self {
+impl From<QuestionError> for Problem {
+    fn from(error: QuestionError) -> Self {
         let kind = match error {
-            LocalizeError::Busy => Kind::Busy,
-            LocalizeError::Overdue(_) => Kind::Timeout,
-            LocalizeError::Interrupted => Kind::Internal,
-            LocalizeError::Unavailable(error) => return error.into(),
+            QuestionError::Busy => Kind::Busy,
+            QuestionError::Overdue(_) => Kind::Timeout,
+            QuestionError::Interrupted => Kind::Internal,
+            QuestionError::Unavailable(error) => return error.into(),
         };
         Self::new(kind, error.to_string())
     }

@@ -15,7 +15,7 @@ use zenoh::query::{Query, Queryable};
 
 use super::session::TransportError;
 use crate::answer::{self, InvalidPrediction};
-use crate::engine::{Engine, LocalizeError};
+use crate::engine::{Engine, QuestionError};
 
 /// Most queries under way; further ones are told to come back.
 const QUERIES_MAX: usize = 64;
@@ -141,24 +141,19 @@ async fn answer(
         }
         Verb::Identify => {
             let body: IdentifyQuery = body(query, codec)?;
-            let map = space
-                .snapshot()
-                .await
-                .map_err(|error| problem("unavailable", 503, error.to_string()))?;
-            // It compares every object: not on a thread that others wait for.
-            let identify = move || answer::identify(space.name(), &map, &body);
-            let identified = tokio::task::spawn_blocking(identify)
-                .await
-                .map_err(|error| problem("internal", 500, error.to_string()))?
+            let (orientation, touches) = answer::touches_to_identify(&body)
                 .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
-            Ok(encoded(codec, &identified))
+            let identified = space.identify(orientation, touches).await;
+            let (map, identified) = identified.map_err(|error| unanswered(&error))?;
+            let answer = answer::identification(space.name(), &map, &identified);
+            Ok(encoded(codec, &answer))
         }
         Verb::Localize => {
             let body: LocalizeQuery = body(query, codec)?;
             let samples = answer::samples_to_localize(&body)
                 .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
             let found = space.localize(samples).await;
-            let (map, found) = found.map_err(|error| not_localized(&error))?;
+            let (map, found) = found.map_err(|error| unanswered(&error))?;
             let answer = answer::localization(space.name(), &map, &found);
             Ok(encoded(codec, &answer))
         }
@@ -186,12 +181,12 @@ fn unpredictable(error: &InvalidPrediction) -> Problem {
     }
 }
 
-fn not_localized(error: &LocalizeError) -> Problem {
+fn unanswered(error: &QuestionError) -> Problem {
     let (kind, status) = match error {
-        LocalizeError::Busy => ("busy", 503),
-        LocalizeError::Overdue(_) => ("timeout", 504),
-        LocalizeError::Interrupted => ("internal", 500),
-        LocalizeError::Unavailable(_) => ("unavailable", 503),
+        QuestionError::Busy => ("busy", 503),
+        QuestionError::Overdue(_) => ("timeout", 504),
+        QuestionError::Interrupted => ("internal", 500),
+        QuestionError::Unavailable(_) => ("unavailable", 503),
     };
     problem(kind, status, error.to_string())
 }

@@ -140,8 +140,10 @@ impl Recognition {
                 .iter()
                 .map(|object| object.1)
                 .fold(f64::NEG_INFINITY, f64::max);
-            let strange = strange_log(fit, self.contacts.len());
-            none = log_sum([none, UNKNOWN_PRIOR.ln() + most + prior + strange].into_iter());
+            if matches!(self.hypotheses, Hypotheses::Poses(_)) {
+                let strange = strange_log(fit, self.contacts.len());
+                none = log_sum([none, UNKNOWN_PRIOR.ln() + most + prior + strange].into_iter());
+            }
             for (_, log) in &mut objects {
                 *log += prior;
             }

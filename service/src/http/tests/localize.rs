@@ -178,7 +178,7 @@ async fn samples_that_make_no_sense_here_are_refused_by_their_place_in_the_list(
 async fn more_than_there_is_room_for_are_told_to_come_back() {
     let rig = explored().await;
     let space = rig.engine.space("lab").expect("it is there");
-    let taken: Vec<_> = std::iter::from_fn(|| space.localization_room().enter().ok()).collect();
+    let taken: Vec<_> = std::iter::from_fn(|| space.question_room().enter().ok()).collect();
     assert!(!taken.is_empty());
     let query = walk([5.0, -1.0, 0.0], &[0, 1, 2]);
     let busy = rig
@@ -186,6 +186,11 @@ async fn more_than_there_is_room_for_are_told_to_come_back() {
         .await;
     busy.problem(503, "busy");
     assert_eq!(busy.header("retry-after"), "1");
+    let touched = r#"{"contacts":[{"position_m":[0.0,0.0,0.0]}]}"#;
+    let identify = "/v1/spaces/lab/objects/identify";
+    let busy = rig.send(Method::POST, identify, JSON, touched).await;
+    busy.problem(503, "busy");
     drop(taken);
+    rig.send(Method::POST, identify, JSON, touched).await.good();
     localized(&rig, &query).await;
 }

@@ -135,3 +135,115 @@ impl Kernel {
         self.likeness * (-0.5 * distance_squared / self.length_m.powi(2)).exp()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NUMBERS: usize = 48;
+    const KERNEL: Kernel = Kernel {
+        likeness: 0.99,
+        length_m: 1.0,
+        numbers: 48.0,
+    };
+
+    /// A view of a smooth scenery, of length 1.
+    fn view(at: &Point3<f64>) -> Vec<f32> {
+        let wave = |k: usize, axis: usize| ((k * 3 + axis) as f64 * 12.9898).sin() * 1.7;
+        let number = |k: usize| {
+            (wave(k, 0) * at.x + wave(k, 1) * at.y + wave(k, 2) * at.z + k as f64 * 2.4).cos()
+        };
+        let numbers: Vec<f64> = (0..NUMBERS).map(number).collect();
+        let length = numbers.iter().map(|x| x * x).sum::<f64>().sqrt();
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a view needs no more digits"
+        )]
+        let short = |x: &f64| (x / length) as f32;
+        numbers.iter().map(short).collect()
+    }
+
+    fn points() -> Vec<Point3<f64>> {
+        let point = |k: u32| {
+            let k = f64::from(k);
+            Point3::new(0.5 * k.sin(), 0.4 * (1.7 * k).cos(), 0.3 * (0.6 * k).sin())
+        };
+        (0..7).map(point).collect()
+    }
+
+    fn neighbourhood(look: &[f32], points: &[Point3<f64>]) -> Neighbourhood {
+        let vectors: Vec<Vec<f32>> = points.iter().map(view).collect();
+        let seen = points.iter().zip(&vectors);
+        let seen: Vec<Seen<'_>> = seen.map(|(&at, vector)| Seen { at, vector }).collect();
+        Neighbourhood::of(look, &Point3::origin(), &seen, KERNEL).unwrap()
+    }
+
+    /// Against the sum over the views themselves.
+    #[test]
+    fn what_is_off_is_the_distance_to_what_is_expected() {
+        let points = points();
+        let look = view(&Point3::new(0.1, 0.2, -0.1));
+        let near = neighbourhood(&look, &points);
+        for at in [
+            Point3::new(0.1, 0.2, -0.1),
+            Point3::new(-0.4, 0.0, 0.3),
+            Point3::origin(),
+        ] {
+            let kernel = near
+                .points
+                .iter()
+                .map(|p| KERNEL.at((p - at).norm_squared()));
+            let weights = &near.inverse * DVector::from_iterator(points.len(), kernel);
+            let mut squared = 0.0;
+            for number in 0..NUMBERS {
+                let views = near
+                    .points
+                    .iter()
+                    .map(|point| f64::from(view(point)[number]));
+                let expected: f64 = views.zip(weights.iter()).map(|(x, w)| x * w).sum();
+                squared += (f64::from(look[number]) - expected).powi(2);
+            }
+            let found = near.expect(&at, 0.0).unwrap();
+            assert!((found.off * found.open - squared).abs() < 1e-5, "{squared}");
+        }
+    }
+
+    #[test]
+    fn the_gradient_is_that_of_half_the_square() {
+        let look = view(&Point3::new(0.1, 0.2, -0.1));
+        let near = neighbourhood(&look, &points());
+        let at = Point3::new(-0.2, 0.3, 0.1);
+        let here = near.expect(&at, 0.0).unwrap();
+        let step = 1e-5;
+        for axis in 0..3 {
+            let mut moved = at;
+            moved[axis] += step;
+            let there = near.expect(&moved, 0.0).unwrap();
+            let slope = 0.5 * (there.off * there.open - here.off * here.open) / step / here.open;
+            let error = (slope - here.gradient[axis]).abs();
+            assert!(
+                error < 1e-3 * slope.abs().max(1.0),
+                "{slope} {}",
+                here.gradient[axis]
+            );
+        }
+    }
+
+    #[test]
+    fn a_look_is_expected_where_it_was_made_and_nowhere_else() {
+        let at = Point3::new(0.1, 0.2, -0.1);
+        let near = neighbourhood(&view(&at), &points());
+        let off = |at: &Point3<f64>| near.expect(at, 0.0).unwrap().off;
+        for apart in [Vector3::x(), Vector3::y(), -Vector3::z(), -Vector3::x()] {
+            assert!(off(&at) < off(&(at + apart * 0.4)));
+        }
+    }
+
+    #[test]
+    fn far_from_all_views_nothing_is_expected() {
+        let near = neighbourhood(&view(&Point3::origin()), &points());
+        assert!(near.expect(&Point3::new(9.0, 0.0, 0.0), 0.0).is_none());
+        let alone = Neighbourhood::of(&[1.0], &Point3::origin(), &[], KERNEL);
+        assert!(alone.is_none());
+    }
+}

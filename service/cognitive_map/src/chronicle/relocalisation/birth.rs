@@ -2,7 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use nalgebra::{Isometry3, Matrix6, Point3, Translation3, Unit, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{
+    Isometry3, Matrix6, Point3, SymmetricEigen, Translation3, Unit, UnitQuaternion, Vector3,
+    Vector6,
+};
 
 use super::problem::{Cue, Problem, Spot};
 use crate::chronicle::revisit::{Range, equations, moved};
@@ -20,6 +23,8 @@ const AGREE: f64 = 2.5;
 const ROUNDS: usize = 5;
 /// Turns about the way that are tried: a straight way does not say.
 const TURNS: u32 = 6;
+/// Steps of a decomposition, which needs some ten.
+const EIGEN_STEPS_MAX: usize = 200;
 /// Steps from a start, and to the end.
 const STEPS: (usize, usize) = (6, 20);
 /// Poses that go on to the end.
@@ -179,7 +184,9 @@ fn turns(problem: &Problem, pose: &Isometry3<f64>) -> Vec<Isometry3<f64>> {
         .iter()
         .map(|point| (point.coords - middle) * (point.coords - middle).transpose())
         .sum::<nalgebra::Matrix3<f64>>();
-    let eigen = spread.symmetric_eigen();
+    let Some(eigen) = SymmetricEigen::try_new(spread, f64::EPSILON, EIGEN_STEPS_MAX) else {
+        return vec![*pose];
+    };
     let axis = Unit::new_normalize(
         eigen
             .eigenvectors
