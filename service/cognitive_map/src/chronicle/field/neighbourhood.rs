@@ -195,13 +195,13 @@ mod tests {
                 .map(|p| KERNEL.at((p - at).norm_squared()));
             let weights = &near.inverse * DVector::from_iterator(points.len(), kernel);
             let mut squared = 0.0;
-            for number in 0..NUMBERS {
+            for (number, seen) in look.iter().enumerate() {
                 let views = near
                     .points
                     .iter()
                     .map(|point| f64::from(view(point)[number]));
                 let expected: f64 = views.zip(weights.iter()).map(|(x, w)| x * w).sum();
-                squared += (f64::from(look[number]) - expected).powi(2);
+                squared += (f64::from(*seen) - expected).powi(2);
             }
             let found = near.expect(&at, 0.0).unwrap();
             assert!((found.off * found.open - squared).abs() < 1e-5, "{squared}");
