@@ -18,7 +18,7 @@ pub(in crate::cli) struct WakingArgs {
     #[arg(long, default_value_t = WakingProtocol::default().trials_per_building, value_name = "N")]
     trials_per_building: u32,
     /// Rooms of a building, 1 to 8, which look alike up to three fifths of their height. In several, robots wake
-    /// up below two fifths of it.
+    /// up below 55 % of it.
     #[arg(long, default_value_t = WakingProtocol::default().rooms, value_name = "N")]
     rooms: u32,
     /// Steps of 0.1 m that the explorer makes in each room.
