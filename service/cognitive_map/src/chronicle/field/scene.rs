@@ -78,7 +78,7 @@ impl Glimpse<'_> {
     /// Independent numbers of it that count beside others made so far from one another.
     fn numbers(&self, spacing_m: f64) -> f64 {
         self.kernel.map_or(0.0, |kernel| {
-            kernel.numbers * (spacing_m / kernel.length_m).min(COUNTED_MAX)
+            kernel.numbers * (0.5 * spacing_m / kernel.length_m).min(COUNTED_MAX)
         })
     }
 }

@@ -24,6 +24,8 @@ const STEP: (f64, f64) = (0.1, 0.1);
 const BESIDE: f64 = 0.6;
 /// Of an agent's own views those count as earlier that lie so many before the present one.
 const EARLIER: u32 = 16;
+/// Two views are of one place if they are nearer than so many deviations of where they were seen.
+const APART_SD: f64 = 3.0;
 /// Ordinals left out where an agent was put somewhere else.
 const APART: u32 = 64;
 /// Views that a new one is taken to be like at most, the most alike first.
@@ -152,7 +154,10 @@ impl Revisits {
             let angle_rad = angle_rad(&other.vector, &view.vector);
             reach.learn_unrelated(angle_rad);
             if let Some(distance) = reach.distance(angle_rad) {
-                is_known |= angle_rad < reach.news_rad();
+                // What looks the same somewhere else is not known here.
+                let apart_m = (other.in_map - view.in_map).norm();
+                let unsure_m = APART_SD * other.spread[0].hypot(view.spread[0]);
+                is_known |= angle_rad < reach.news_rad() && apart_m <= distance.mean_m + unsure_m;
                 alike.push((number, distance));
             }
         }
