@@ -128,8 +128,10 @@ impl Chronicle {
     pub fn is_seeking(&self, agent: u32) -> bool {
         let number = self.search_number(agent);
         let search = number.and_then(|number| self.searches.get(number));
-        search
-            .is_some_and(|search| search.found_m.is_some() && search.session == self.session(agent))
+        search.is_some_and(|search| {
+            let is_found = search.found_m.is_some();
+            is_found && !search.is_over(ON_M) && search.session == self.session(agent)
+        })
     }
 
     /// The agent knows where it is, from now on. `is_elsewhere` says that it was thought to be in the map, but somewhere else.
@@ -268,7 +270,7 @@ impl Chronicle {
             return self.searches.len() - 1;
         };
         if let Some(search) = self.searches.get_mut(number, revision)
-            && (search.session != session || search.looks.is_empty())
+            && (search.session != session || search.looks.is_empty() || search.is_over(ON_M))
         {
             *search = fresh;
         }

@@ -87,6 +87,13 @@ impl Search {
         self.fresh += 1;
     }
 
+    /// Whether the agent has gone so far since it was found, whether it knew again where it was or not \[m\].
+    pub(super) fn is_over(&self, on_m: f64) -> bool {
+        let way_m = self.looks.last().map(|look| look.travelled_m);
+        let since = way_m.zip(self.found_m);
+        since.is_some_and(|(way_m, found_m)| way_m - found_m >= on_m)
+    }
+
     /// Compares the looks with what others have seen since they were made.
     pub(super) fn catch_up(&mut self, revisits: &Revisits) {
         let views = revisits.views.len() as u64;
