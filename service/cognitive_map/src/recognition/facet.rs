@@ -1,6 +1,6 @@
 //! A learned map's surface: curved patches about its places.
 
-use std::f64::consts::{FRAC_1_PI, PI, TAU};
+use std::f64::consts::PI;
 
 use nalgebra::{Matrix2, Matrix3, Point3, Unit, Vector2, Vector3};
 
@@ -18,16 +18,12 @@ pub(super) const PATCH_COS: f64 = 0.707;
 const TANGENT_PER_SPACING: f64 = 0.55;
 /// No patch turns farther than this sine, 53°, within its reach.
 const BENT_MAX: f64 = 0.8;
-/// Share of contacts that are as the smooth patch predicts; the rest are about edges and seams.
-const SMOOTH_SHARE: f64 = 0.85;
 /// Standard deviation of a normal about an edge or seam \[rad\], 20°.
 pub(super) const ROUGH_RAD: f64 = 0.35;
 /// How much wider than the patch's the depths about an edge or seam are, as a standard deviation.
 pub(super) const ROUGH_DEPTH: f64 = 2.0;
 /// Facets count up to here along the surface, as half a squared number of deviations.
 pub(super) const ALONG_MAX: f64 = 3.0;
-/// And up to here in depth, as a squared number of deviations.
-const DEPTH_MAX: f64 = 100.0;
 /// A facet stands for no more than so many times the usual area: beyond, nothing is known.
 const AREA_MAX: f64 = 4.0;
 /// A facet scatters no more than so many times the usual variance.
@@ -40,12 +36,12 @@ const SHRINK: f64 = 4.0;
 pub(super) struct Facet {
     pub(super) position: Point3<f64>,
     pub(super) normal: Vector3<f64>,
+    /// The place's own normal, not smoothed: of what lies about an edge.
+    pub(super) own_normal: Vector3<f64>,
     /// The normal at a small displacement u is `normal` + `bend` u.
     pub(super) bend: Matrix3<f64>,
-    /// The direction in which the patch bends most, and the one across it.
-    pub(super) axes: [Vector3<f64>; 2],
-    /// Curvatures along them \[1/m\].
-    pub(super) curves: [f64; 2],
+    /// Its greatest curvature, either way \[1/m\].
+    curve: f64,
     /// Variance of the surface about the patch, along the normal \[m²\].
     pub(super) depth_m2: f64,
     /// Variance of the normal about the patch's, per axis \[rad²\].
@@ -97,60 +93,11 @@ impl Facet {
         }
     }
 
-    /// Variances of a contact's normal about the patch's, along the first axis and across it \[rad²\]. A contact
-    /// is not where it seems to be, and where the surface bends its normal is that of elsewhere.
-    pub(super) fn angles(&self, noise: &Noise) -> [f64; 2] {
-        self.curves.map(|curve| {
-            (self.angle + noise.normal + noise.position_m2 * curve * curve) * noise.widen
-        })
-    }
-
-    /// Density of a contact at this patch, per metre of depth and steradian, times the part of the
-    /// facet's area that lies there: of contacts as the smooth patch predicts, and of those about an edge or
-    /// seam. `normal` is the contact's, in the map's axes.
-    pub(super) fn density(
-        &self,
-        against: &Against,
-        normal: Option<&Vector3<f64>>,
-        noise: &Noise,
-    ) -> (f64, f64) {
-        let tangent = self.tangent_m2 + noise.position_m2;
-        let along = 0.5 * against.along_m2 / tangent;
-        let depth = (self.depth_m2 + noise.position_m2) * noise.widen;
-        let squared = against.depth_m * against.depth_m / depth;
-        if along > ALONG_MAX || squared > DEPTH_MAX {
-            return (0.0, 0.0);
-        }
-        let weight = self.area_m2 / (tangent * TAU) * (-along).exp() / (depth * TAU).sqrt();
-        let mut tight = SMOOTH_SHARE;
-        let mut loose = (1.0 - SMOOTH_SHARE) / ROUGH_DEPTH;
-        let (mut tight_half, mut loose_half) =
-            (0.5 * squared, 0.5 * squared / (ROUGH_DEPTH * ROUGH_DEPTH));
-        if let Some(normal) = normal {
-            let apart = (normal - against.normal).norm_squared();
-            if apart > 2.0 {
-                // The other side of something thin.
-                return (0.0, 0.0);
-            }
-            let angles = self.angles(noise);
-            let wide = 0.5 * (angles[0] + angles[1]) + ROUGH_RAD * ROUGH_RAD;
-            let off = normal - against.normal;
-            let first = off.dot(&self.axes[0]);
-            let second = apart - first * first;
-            tight_half += 0.5 * (first * first / angles[0] + second / angles[1]);
-            loose_half += 0.5 * apart / wide;
-            tight /= (angles[0] * angles[1]).sqrt() * TAU;
-            loose /= wide * TAU;
-        } else {
-            tight *= 0.25 * FRAC_1_PI;
-            loose *= 0.25 * FRAC_1_PI;
-        }
-        let tight = if tight_half < 30.0 {
-            tight * (-tight_half).exp()
-        } else {
-            0.0
-        };
-        (weight * tight, weight * loose * (-loose_half).exp())
+    /// Variance of a contact's normal about the patch's, along the direction in which the patch bends most
+    /// \[rad²\]. A contact is not where it seems to be, and where the surface bends its normal is that of
+    /// elsewhere.
+    pub(super) fn angle_along(&self, noise: &Noise) -> f64 {
+        (self.angle + noise.normal + noise.position_m2 * self.curve * self.curve) * noise.widen
     }
 }
 
@@ -212,9 +159,9 @@ pub(super) fn facets(places: &[ModelPlace]) -> Vec<Facet> {
         .map(|(fit, raw)| Facet {
             position: fit.position,
             normal: fit.normal,
+            own_normal: raw.normal.into_inner(),
             bend: fit.bend,
-            axes: fit.axes,
-            curves: fit.curves,
+            curve: fit.curve,
             depth_m2: (shrunk(fit.depth_m2, usual_depth, fit.weight) - raw.noise_m2).max(0.0)
                 + raw.noise_m2 / (0.5 * fit.weight + 1.0),
             angle: (shrunk(fit.angle, usual_angle, fit.weight) - raw.noise_normal).max(0.0)
@@ -247,8 +194,7 @@ struct Fit {
     position: Point3<f64>,
     normal: Vector3<f64>,
     bend: Matrix3<f64>,
-    axes: [Vector3<f64>; 2],
-    curves: [f64; 2],
+    curve: f64,
     depth_m2: f64,
     angle: f64,
     area_m2: f64,
@@ -297,8 +243,7 @@ fn fit(raw: &[Raw], at: usize, neighbours: &Neighbours) -> Fit {
         position: own.position,
         normal: own.normal.into_inner(),
         bend: Matrix3::zeros(),
-        axes: tangents(&own.normal).into(),
-        curves: [0.0; 2],
+        curve: 0.0,
         depth_m2: own.noise_m2,
         angle: own.noise_normal,
         area_m2: area_m2.max(1e-18),
@@ -342,10 +287,7 @@ fn fit(raw: &[Raw], at: usize, neighbours: &Neighbours) -> Fit {
         let axes = nalgebra::Matrix3x2::from_columns(&[east, north]);
         fit.bend = axes * shape * axes.transpose();
         fit.normal = normal;
-        let eigen = shape.symmetric_eigen();
-        let first = usize::from(eigen.eigenvalues.y.abs() > eigen.eigenvalues.x.abs());
-        fit.axes = [first, 1 - first].map(|axis| axes * eigen.eigenvectors.column(axis));
-        fit.curves = [first, 1 - first].map(|axis| eigen.eigenvalues[axis]);
+        fit.curve = shape.symmetric_eigenvalues().amax();
         // Heights of the places over the patch, and how they scatter.
         let facet = fit.facet();
         let own_height = facet.against(&own.position).depth_m;
@@ -388,9 +330,9 @@ impl Fit {
         Facet {
             position: self.position,
             normal: self.normal,
+            own_normal: self.normal,
             bend: self.bend,
-            axes: self.axes,
-            curves: self.curves,
+            curve: self.curve,
             depth_m2: self.depth_m2,
             angle: self.angle,
             area_m2: self.area_m2,

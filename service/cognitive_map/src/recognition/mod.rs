@@ -37,6 +37,7 @@
 mod asking;
 mod cells;
 mod contact;
+mod encounter;
 mod episode;
 mod facet;
 mod library;

@@ -339,16 +339,22 @@ impl Poses {
             .map(|c| relief.log(&hypothesis.pose, c, scene));
         let (mean, sd) = relief.expected();
         let (sum, count) = (logs.sum::<f64>(), self.contacts.len() as f64);
-        // What the contacts' own noise makes of a log density is each contact's, the rest is shared.
-        let shared = (1.0 - NOISE_VARIANCE / (sd * sd)).max(0.0);
-        let times = 1.0 + shared * (self.together(relief) - 1.0);
-        Some((sum - count * mean) / ((count * times).sqrt() * sd))
+        Some((sum - count * mean) / ((count * self.shared(relief)).sqrt() * sd))
     }
 
     /// What a contact's evidence in this map is worth, against one whose errors are independent of all
     /// others'.
     pub(super) fn worth(&self, library: &ObjectLibrary, object: ObjectId) -> f64 {
-        found(library, object).map_or(1.0, |(_, relief)| 1.0 / self.together(relief))
+        found(library, object).map_or(1.0, |(_, relief)| 1.0 / self.shared(relief))
+    }
+
+    /// How much wider the sum of the contacts' log densities scatters, as a variance, than if none shared an
+    /// error with another: what their own noise makes of a log density is each contact's, the rest is the
+    /// map's.
+    fn shared(&self, relief: &Relief) -> f64 {
+        let (_, sd) = relief.expected();
+        let map = (1.0 - NOISE_VARIANCE / (sd * sd)).max(0.0);
+        1.0 + map * (self.together(relief) - 1.0)
     }
 
     /// How many contacts, on average, are with a contact where the map errs alike, itself among them:

@@ -6,9 +6,8 @@ use nalgebra::{Isometry3, Matrix6, Point3, Unit, Vector3, Vector6};
 
 use super::cells::Cells;
 use super::contact::Contact;
-use super::facet::{
-    ALONG_MAX, Facet, Noise, PATCH_COS, ROUGH_DEPTH, ROUGH_RAD, SMOOTH_NEIGHBOURS, facets,
-};
+use super::encounter::Encounter;
+use super::facet::{ALONG_MAX, Facet, Noise, PATCH_COS, SMOOTH_NEIGHBOURS, facets};
 use super::model::ObjectModel;
 use super::pairs::Pairs;
 use super::surface::{Patch, Wide};
@@ -163,6 +162,7 @@ impl Relief {
     /// The places taken for contacts, each explained by the others.
     fn rehearse(&self, model: &ObjectModel) -> (f64, f64) {
         let step = self.facets.len().div_ceil(REHEARSED).max(1);
+        let floor = 1e-3 * self.area_m2 / self.extent_m.powi(3);
         let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
         for own in (0..self.facets.len()).step_by(step) {
             let place = &model.places()[self.facets[own].place as usize];
@@ -174,15 +174,11 @@ impl Relief {
                 normal: place.normal_variance / place.count,
                 widen: 1.0,
             };
-            let mut total = 0.0;
-            for &number in self.cells.near(&point) {
-                let facet = &self.facets[number as usize];
-                if number as usize != own {
-                    let (tight, loose) = facet.density(&facet.against(&point), normal, &noise);
-                    total += tight + loose;
-                }
-            }
-            let floor = 1e-3 * self.area_m2 / self.extent_m.powi(3);
+            let others = { self.cells.near(&point).iter() }
+                .filter(|&&number| number as usize != own)
+                .map(|&number| &self.facets[number as usize]);
+            let met = Encounter::new(&point, normal, &noise, others, |_| 1.0);
+            let total = met.map_or(0.0, |met| met.densities(normal, &noise).sum());
             let log = ((1.0 - OUTLIERS) * total + floor).ln();
             count += 1.0;
             sum += log;
@@ -203,15 +199,9 @@ impl Relief {
         let normal = contact.normal.map(|normal| pose * normal);
         let normal = normal.as_ref().map(Unit::as_ref);
         let noise = Noise::of(contact, 1.0);
-        let mut total = 0.0;
-        for &number in self.cells.near(&point) {
-            let facet = &self.facets[number as usize];
-            let (tight, loose) = facet.density(&facet.against(&point), normal, &noise);
-            let density = tight + loose;
-            if density > 0.0 {
-                total += density * percept(facet, contact, scene);
-            }
-        }
+        let percept = |facet: &Facet| percept(facet, contact, scene);
+        let met = Encounter::new(&point, normal, &noise, self.about(&point), percept);
+        let total = met.map_or(0.0, |met| met.densities(normal, &noise).sum());
         ((1.0 - OUTLIERS) * total + self.outlier(scene)).ln()
     }
 
@@ -231,7 +221,7 @@ impl Relief {
                 depth_m * depth_m / depth + (apart.norm_squared() - depth_m * depth_m) / tangent;
             if let Some(normal) = &normal {
                 let own = facet.normal + facet.bend * apart;
-                let angle = facet.angles(noise)[0];
+                let angle = facet.angle_along(noise);
                 half += (normal.into_inner() - own).norm_squared() / angle;
             }
             best = best.max(-0.5 * half);
@@ -277,81 +267,25 @@ impl Relief {
         let turned = contact.normal.map(|normal| pose * normal);
         let normal = turned.as_ref().map(Unit::as_ref);
         let noise = Noise::of(contact, widen);
-        let mut total = 0.0;
-        let mut pull = Vector3::zeros();
-        let mut pulled = 0.0;
-        let mut information = Matrix6::zeros();
-        let mut gradient = Vector6::zeros();
-        for &number in self.cells.near(&point) {
-            let facet = &self.facets[number as usize];
-            let against = facet.against(&point);
-            let (tight, loose) = facet.density(&against, normal, &noise);
-            if tight + loose <= 0.0 {
-                continue;
-            }
-            let felt = percept(facet, contact, scene);
-            let (tight, loose) = (tight * felt, loose * felt);
-            let density = tight + loose;
-            total += density;
-            // Both parts of the mixture see the same distance, with their own precision.
-            let depth = (facet.depth_m2 + noise.position_m2) * widen;
-            let weight = (tight + loose / (ROUGH_DEPTH * ROUGH_DEPTH)) / depth;
-            let lever = point.coords.cross(&against.through);
-            let row = Vector6::new(
-                against.through.x,
-                against.through.y,
-                against.through.z,
-                lever.x,
-                lever.y,
-                lever.z,
-            );
-            information += row * row.transpose() * weight;
-            gradient -= row * (weight * against.depth_m);
-            if let Some(normal) = normal {
-                let angles = facet.angles(&noise);
-                let wide = loose / (0.5 * (angles[0] + angles[1]) + ROUGH_RAD * ROUGH_RAD);
-                let weights = angles.map(|angle| tight / angle + wide);
-                // A turn about the axis across the first moves the normal along the first.
-                let off = normal.cross(&against.normal);
-                let first = facet.axes[1];
-                let second = normal.cross(&first);
-                let mut turns = gradient.fixed_rows_mut::<3>(3);
-                turns += first * (first.dot(&off) * weights[0])
-                    + second * (second.dot(&off) * weights[1]);
-                let across = first * first.transpose() * weights[0]
-                    + second * second.transpose() * weights[1];
-                let mut corner = information.fixed_view_mut::<3, 3>(3, 3);
-                corner += across;
-            }
-            let apart = point - facet.position;
-            let along = apart - against.through * against.depth_m;
-            let weight = density / (facet.tangent_m2 + noise.position_m2);
-            pull -= along * weight;
-            pulled += weight;
-        }
-        let all = (1.0 - OUTLIERS) * total + self.outlier(scene);
-        explained.score += all.ln();
-        if total <= 0.0 {
+        let percept = |facet: &Facet| percept(facet, contact, scene);
+        let Some(met) = Encounter::new(&point, normal, &noise, self.about(&point), percept) else {
+            explained.score += self.outlier(scene).ln();
             return;
-        }
-        let share = (1.0 - OUTLIERS) / all;
-        explained.information += information * share;
-        explained.gradient += gradient * share;
-        // Beyond the map's edge the facets all pull the same way; within, their pulls cancel.
-        let lever = point.coords.cross(&pull);
-        let pull = Vector6::new(pull.x, pull.y, pull.z, lever.x, lever.y, lever.z);
-        explained.gradient += pull * (0.5 * share);
-        let hold = 0.25 * share * pulled;
-        let cross = point.coords.cross_matrix();
-        for axis in 0..3 {
-            explained.normal_matrix[(axis, axis)] += hold;
-        }
-        let mut corner = explained.normal_matrix.fixed_view_mut::<3, 3>(3, 3);
-        corner += -(cross * cross) * hold;
-        let mut corner = explained.normal_matrix.fixed_view_mut::<3, 3>(0, 3);
-        corner += -cross * hold;
-        let mut corner = explained.normal_matrix.fixed_view_mut::<3, 3>(3, 0);
-        corner += cross * hold;
+        };
+        let densities = met.densities(normal, &noise);
+        let total = (1.0 - OUTLIERS) * densities.sum();
+        let all = total + self.outlier(scene);
+        explained.score += all.ln();
+        let motion = met.motion(&point, normal, &densities, total / all);
+        explained.information += motion.information;
+        explained.normal_matrix += motion.held;
+        explained.gradient += motion.gradient;
+    }
+
+    /// The facets whose reach a point may lie in.
+    fn about(&self, point: &Point3<f64>) -> impl Iterator<Item = &Facet> + Clone {
+        let near = self.cells.near(point).iter();
+        near.map(|&number| &self.facets[number as usize])
     }
 }
 
