@@ -66,14 +66,13 @@ pub(super) fn next_touch(
             continue;
         };
         let back = own.map_from_episode.inverse();
-        let step = surface.patches.len().div_ceil(TOUCHES_MAX).max(1);
-        for patch in surface.patches.iter().step_by(step) {
+        for spot in spots(surface) {
             let mut touch = like.clone();
-            touch.position_m = back * patch.position;
-            touch.normal = patch.normal.map(|normal| back * normal);
+            touch.position_m = back * spot.position;
+            touch.normal = spot.normal.map(|normal| back * normal);
             touch.levels.clear();
             touch.descriptors.clear();
-            for level in &patch.levels {
+            for level in &surface.patches[spot.place].levels {
                 let sd = level.variance().sqrt();
                 touch = touch.with_level(level.channel, level.mean, sd);
             }
@@ -105,6 +104,36 @@ pub(super) fn next_touch(
         }
     }
     best
+}
+
+/// Where a map could be touched.
+struct Spot {
+    position: Point3<f64>,
+    normal: Option<Unit<Vector3<f64>>>,
+    place: usize,
+}
+
+/// Some of a map's places, evenly: where its surface is thought to lie, not where it was felt. Of places as they
+/// were felt those with the greatest errors would seem to tell most.
+fn spots(surface: &Surface) -> Vec<Spot> {
+    if let Some(relief) = &surface.relief {
+        let step = relief.facets.len().div_ceil(TOUCHES_MAX).max(1);
+        let facets = relief.facets.iter().step_by(step);
+        let spots = facets.map(|facet| Spot {
+            position: facet.position + relief.middle,
+            normal: Some(Unit::new_normalize(facet.normal)),
+            place: facet.place as usize,
+        });
+        return spots.collect();
+    }
+    let step = surface.patches.len().div_ceil(TOUCHES_MAX).max(1);
+    let patches = surface.patches.iter().enumerate().step_by(step);
+    let spots = patches.map(|(place, patch)| Spot {
+        position: patch.position,
+        normal: patch.normal,
+        place,
+    });
+    spots.collect()
 }
 
 /// Log density of a touch under one hypothesis.
