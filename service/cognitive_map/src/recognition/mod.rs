@@ -37,18 +37,24 @@
 mod asking;
 mod cells;
 mod contact;
+mod crowd;
 mod episode;
 mod facet;
+mod feeling;
 mod library;
 mod model;
+mod nearest;
 mod orientation;
 mod pairs;
 mod poses;
 mod posterior;
+mod ranks;
 mod reaches;
 
 mod relief;
 mod shifts;
+mod spots;
+mod strangers;
 mod surface;
 #[cfg(test)]
 mod tests;

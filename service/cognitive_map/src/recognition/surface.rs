@@ -2,10 +2,11 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::contact::{Contact, Seen};
+use super::contact::{Contact, Felt, Seen};
 use super::model::{LevelMemory, ObjectModel};
 use super::reaches::Reaches;
 use super::relief::Relief;
+use super::spots::Spots;
 
 /// A place's field is uniform over one spacing; that is its standard deviation in spacings, 1/√12.
 const FIELD_PER_SPACING: f64 = 0.288_675;
@@ -27,10 +28,12 @@ pub(super) struct Patch {
     pub(super) descriptors: Vec<Seen>,
 }
 
-/// A map ready for recognition: its patches, their index, and what share of it lies how near.
+/// A map ready for recognition: its patches, their indexes, and what share of it lies how near.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     pub(super) patches: Vec<Patch>,
+    /// The same places, packed.
+    pub(super) spots: Spots,
     reaches: Reaches,
     /// Diameter of a ball about the map's middle that holds all of it \[m\].
     pub(super) extent_m: f64,
@@ -73,6 +76,7 @@ impl Surface {
             .fold(model.spacing_m(), f64::max);
         let extent_m = 2.0 * radius_m;
         Self {
+            spots: Spots::new(&patches, model.spacing_m(), extent_m, noise_m2),
             reaches: Reaches::new(&positions, &own_m, least_m, extent_m),
             shares: shares(&positions, extent_m),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
@@ -136,12 +140,7 @@ impl Patch {
                 let variance = own.variance() + felt.sd * felt.sd + wide.variance * 1e-6;
                 let apart = felt.value - own.mean;
                 let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
-                let apart = felt.value - wide.mean;
-                let wide_variance = wide.variance + felt.sd * felt.sd;
-                let anywhere = (-0.5 * apart * apart / wide_variance).exp() / wide_variance.sqrt();
-                // A value far off both is wrong, and tells nothing.
-                let anywhere = anywhere + 1e-3 / wide_variance.sqrt();
-                sum += ((1.0 - WRONG_SHARE) * here / anywhere + WRONG_SHARE).ln();
+                sum += ((1.0 - WRONG_SHARE) * here / wide.density(felt) + WRONG_SHARE).ln();
             }
         }
         for seen in &contact.descriptors {
@@ -176,6 +175,16 @@ pub(super) struct Wide {
     pub(super) channel: u16,
     pub(super) mean: f64,
     pub(super) variance: f64,
+}
+
+impl Wide {
+    /// Density of a level anywhere, times √(2π).
+    pub(super) fn density(&self, felt: &Felt) -> f64 {
+        let apart = felt.value - self.mean;
+        let variance = self.variance + felt.sd * felt.sd;
+        // A value far off all is wrong, and tells nothing.
+        ((-0.5 * apart * apart / variance).exp() + 1e-3) / variance.sqrt()
+    }
 }
 
 /// Over all places of these maps, each counted once.

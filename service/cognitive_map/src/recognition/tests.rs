@@ -268,13 +268,7 @@ fn the_evidence_is_that_of_all_assignments_of_contacts_to_places() {
         for (count, contact) in contacts.iter().enumerate() {
             shifts.touch(&library, &contacts[..count], contact);
         }
-        let found = |id: u32| {
-            let own = shifts
-                .all
-                .iter()
-                .filter(|shift| shift.object == ObjectId(id));
-            log_sum(own.map(|shift| shift.evidence))
-        };
+        let found = |id: u32| shifts.object_logs()[&ObjectId(id)];
         let (one, two) = (
             by_assignment(&library, 1, &contacts),
             by_assignment(&library, 2, &contacts),

@@ -1,0 +1,167 @@
+//! Which place of a map is nearest, roughly: one number for each cell of a box.
+
+/// Most cells; they are larger rather than more.
+const CELLS_MAX: f32 = 65_536.0;
+/// No place is near.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Cells over the box of a map, each with the place that is nearest to its middle, if one is within reach of any of its points. The
+/// outermost cells are empty, and stand for all that is beyond.
+#[derive(Clone, Debug)]
+pub(super) struct Nearest {
+    /// Middle of the first cell, from the map's middle \[m\].
+    low: [f32; 3],
+    per_m: f32,
+    /// Cells along each axis, as numbers to multiply by.
+    size: [f32; 3],
+    places: Vec<u32>,
+}
+
+impl Nearest {
+    /// Of places at these positions, axis by axis \[m\].
+    pub(super) fn new(axes: [&[f32]; 3], reach_m: f32, edge_m: f32) -> Self {
+        let least = |at: &[f32]| at.iter().copied().fold(f32::INFINITY, f32::min);
+        let most = |at: &[f32]| at.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let (mut low, mut high) = (axes.map(least), axes.map(most));
+        if axes[0].is_empty() {
+            (low, high) = ([0.0; 3], [0.0; 3]);
+        }
+        let mut edge_m = edge_m.max(1e-9);
+        // Half the diagonal of a cell belongs to its reach.
+        let reach = |edge_m: f32| reach_m + 0.87 * edge_m;
+        let size = |edge_m: f32| -> [f32; 3] {
+            std::array::from_fn(|axis| {
+                ((high[axis] - low[axis] + 2.0 * reach(edge_m)) / edge_m).ceil() + 3.0
+            })
+        };
+        while size(edge_m).iter().product::<f32>() > CELLS_MAX {
+            edge_m *= 1.1;
+        }
+        let (reach_m, size) = (reach(edge_m), size(edge_m));
+        let mut nearest = Self {
+            low: low.map(|low| low - reach_m - edge_m),
+            per_m: 1.0 / edge_m,
+            size,
+            places: vec![NONE; index(size.iter().product())],
+        };
+        let mut squares = vec![f32::INFINITY; nearest.places.len()];
+        for (place, ((x, y), z)) in (0..).zip(axes[0].iter().zip(axes[1]).zip(axes[2])) {
+            nearest.notice(place, [*x, *y, *z], reach_m, &mut squares);
+        }
+        nearest
+    }
+
+    /// Writes a place into all cells whose middle is within reach and to which none was nearer.
+    fn notice(&mut self, place: u32, at: [f32; 3], reach_m: f32, squares: &mut [f32]) {
+        let at: [f32; 3] = std::array::from_fn(|axis| (at[axis] - self.low[axis]) * self.per_m);
+        let reach = reach_m * self.per_m;
+        let range = |axis: usize| {
+            let last = index(self.size[axis]) - 2;
+            index((at[axis] - reach).max(1.0).ceil())..=index(at[axis] + reach).min(last)
+        };
+        let [_, rows, columns] = self.size.map(index);
+        for i in range(0) {
+            for j in range(1) {
+                for k in range(2) {
+                    let apart: [f32; 3] = [i as f32 - at[0], j as f32 - at[1], k as f32 - at[2]];
+                    let squared: f32 = apart.iter().map(|x| x * x).sum();
+                    let cell = (i * rows + j) * columns + k;
+                    if squared <= reach * reach && squared < squares[cell] {
+                        squares[cell] = squared;
+                        self.places[cell] = place;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Numbers of the cells of these points, moved so; axis by axis \[m\].
+    pub(super) fn cells(&self, axes: [&[f32]; 3], shift: [f32; 3], out: &mut Vec<u32>) {
+        /// Adding it leaves the nearest whole number in the low bits.
+        const WHOLE: f32 = 8_388_608.0;
+        let from: [f32; 3] = std::array::from_fn(|axis| shift[axis] - self.low[axis]);
+        let last = self.size.map(|size| size - 1.0);
+        let whole = |at: f32, axis: usize| {
+            let at = (at + from[axis]) * self.per_m;
+            // What is no number is in the first cell.
+            let at = if at > 0.0 { at } else { 0.0 };
+            let at = if at < last[axis] { at } else { last[axis] };
+            (at + WHOLE) - WHOLE
+        };
+        let points = axes[0].iter().zip(axes[1]).zip(axes[2]);
+        out.clear();
+        out.extend(points.map(|((x, y), z)| {
+            let cell = (whole(*x, 0) * self.size[1] + whole(*y, 1)) * self.size[2] + whole(*z, 2);
+            (cell + WHOLE).to_bits() & 0x007F_FFFF
+        }));
+    }
+
+    /// The place of a cell, or [`NONE`].
+    pub(super) fn place(&self, cell: u32) -> u32 {
+        self.places[cell as usize]
+    }
+}
+
+/// A whole number that is positive.
+fn index(x: f32) -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "rounds down, and saturates"
+    )]
+    let index = x as usize;
+    index
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_near_is_noticed_and_what_is_far_is_not() {
+        let noise = |k: u64| {
+            let uniform = crate::random::uniform(5, crate::record::AgentId(0), 0, k);
+            crate::recognition::spots::narrow(uniform) * 0.2 - 0.1
+        };
+        let axis =
+            |from: u64, count: u64| -> Vec<f32> { (from..from + count).map(noise).collect() };
+        let [x, y, z] = [axis(0, 200), axis(1000, 200), axis(2000, 200)];
+        let (reach_m, edge_m) = (0.01, 0.004);
+        let nearest = Nearest::new([&x, &y, &z], reach_m, edge_m);
+        let [qx, qy, qz] = [axis(5000, 2000), axis(7000, 2000), axis(9000, 2000)];
+        let shift = [0.01, -0.02, 0.005];
+        let mut cells = Vec::new();
+        nearest.cells([&qx, &qy, &qz], shift, &mut cells);
+        let mut noticed = 0;
+        for (k, cell) in cells.iter().enumerate() {
+            let to = |place: usize| {
+                let apart = [
+                    qx[k] + shift[0] - x[place],
+                    qy[k] + shift[1] - y[place],
+                    qz[k] + shift[2] - z[place],
+                ];
+                apart.iter().map(|x| x * x).sum::<f32>().sqrt()
+            };
+            let least = (0..200).map(to).fold(f32::INFINITY, f32::min);
+            match nearest.place(*cell) {
+                NONE => assert!(least > reach_m),
+                place => {
+                    noticed += 1;
+                    // It is nearest to the cell's middle.
+                    assert!(to(place as usize) < least + 1.74 * edge_m);
+                    assert!(least < reach_m + 1.74 * edge_m);
+                }
+            }
+        }
+        assert!((200..1900).contains(&noticed), "{noticed}");
+        nearest.cells(
+            [&[f32::NAN, 1e30, -1e30], &[0.0; 3], &[0.0; 3]],
+            [0.0; 3],
+            &mut cells,
+        );
+        assert!(cells.iter().all(|cell| nearest.place(*cell) == NONE));
+        let empty = Nearest::new([&[], &[], &[]], 0.01, 0.004);
+        empty.cells([&[0.0], &[0.0], &[0.0]], [0.0; 3], &mut cells);
+        assert_eq!(empty.place(cells[0]), NONE);
+    }
+}
