@@ -1,13 +1,13 @@
 //! Hypotheses that nobody has looked at yet: every place, taken for the one that was touched first.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::UnitQuaternion;
 
 use super::contact::Contact;
-use super::feeling::{Facing, Feeling, exp};
+use super::feeling::{Feeling, exp};
 use super::library::{Known, ObjectId, ObjectLibrary};
-use super::nearest::NONE;
 use super::ranks::Ranks;
 use super::shifts::{Shift, Taken};
 use super::spots::narrow;
@@ -48,11 +48,11 @@ pub(super) struct Crowd {
     log: f64,
 }
 
-/// One that is worth a look.
+/// One of them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate {
-    group: u32,
-    root: u32,
+pub(super) struct Root {
+    group: usize,
+    root: usize,
     weight: f32,
 }
 
@@ -62,8 +62,9 @@ struct Lists {
     gathered: [Vec<f32>; 3],
     cells: Vec<u32>,
     likelihoods: Vec<f32>,
-    near: Vec<(u32, u32)>,
+    /// Of the nearest place: squared distance \[m²\], and likelihood of what was felt there.
     squares: Vec<f32>,
+    felt: Vec<f32>,
 }
 
 impl Crowd {
@@ -87,16 +88,11 @@ impl Crowd {
         let mut likelihoods = Vec::new();
         for (object, known) in library.all() {
             let surface = &known.surface;
-            feeling.likelihoods(&surface.spots, &surface.patches, &mut likelihoods);
             let each = stride as f64 / (surface.patches.len() * rotations.len()).max(1) as f64;
             let each = narrow(each);
             for (rotation, turn) in (0u16..).zip(rotations) {
-                let facing = feeling.facing(turn);
-                let normal = |normal: &[f32; 3]| {
-                    facing.map_or(1.0, |facing: Facing| facing.likelihood(normal))
-                };
-                let all = likelihoods.iter().zip(&surface.spots.normals);
-                let weights = all.map(|(felt, own)| each * felt * normal(own));
+                feeling.at(surface, turn).likelihoods(&mut likelihoods);
+                let weights = likelihoods.iter().map(|felt| each * felt);
                 let mut group = Group {
                     object,
                     rotation,
@@ -144,164 +140,99 @@ impl Crowd {
         }
     }
 
-    /// Takes a touch in, and says which of them it makes worth a look: those that are explained by a place.
+    /// Takes a touch in, and gives the weight of each that it makes worth a look, group after group: of those that are explained by
+    /// a place. That of others is nothing.
     pub(super) fn sift(
         &mut self,
         library: &ObjectLibrary,
         rotations: &[UnitQuaternion<f64>],
         touch: &Taken<'_>,
-    ) -> Vec<Candidate> {
-        let mut candidates = Vec::new();
+    ) -> Vec<f32> {
+        let roots = self.groups.iter().map(|group| group.weights.len());
+        let mut worth = Vec::with_capacity(roots.sum());
         let Some(first) = &self.first else {
-            return candidates;
+            return worth;
         };
-        let contact = touch.feeling.contact;
         let mut lists = Lists::default();
-        let mut filled = None;
-        for (number, group) in (0u32..).zip(&mut self.groups) {
+        for group in &mut self.groups {
             if library.surface(group.object).is_none() {
                 group.weights.clear();
-                continue;
-            }
-            let surface = &group.known.surface;
-            let spots = &surface.spots;
-            if filled != Some(group.object) {
-                touch
-                    .feeling
-                    .likelihoods(spots, &surface.patches, &mut lists.likelihoods);
-                filled = Some(group.object);
             }
             let rotation = &rotations[usize::from(group.rotation)];
-            // Drift was nothing, and is what the contact says, or was something and has grown.
-            let drift = (contact.drift_sd_m.powi(2) - first.drift_sd_m.powi(2)).max(0.0);
-            let noise = contact.position_sd_m.powi(2) + spots.variance_m2;
-            let variance = first.variance_m2() + spots.variance_m2 + drift + noise;
-            let nearest = spots.nearest(variance);
-            let step = rotation * (contact.position_m - first.position_m);
-            let step = [narrow(step.x), narrow(step.y), narrow(step.z)];
-            let axes = if self.stride == 1 {
-                [&spots.x[..], &spots.y[..], &spots.z[..]]
-            } else {
-                for (list, all) in lists
-                    .gathered
-                    .iter_mut()
-                    .zip([&spots.x, &spots.y, &spots.z])
-                {
-                    list.clear();
-                    list.extend(all.iter().step_by(self.stride));
-                }
-                let [x, y, z] = &lists.gathered;
-                [&x[..], &y[..], &z[..]]
-            };
-            nearest.cells(axes, step, &mut lists.cells);
-            // Whether a place is near is as good as random: no branch.
-            lists.near.clear();
-            lists.near.resize(group.weights.len(), (0, 0));
-            let mut near = 0;
-            for ((root, weight), cell) in (0u32..).zip(&group.weights).zip(&lists.cells) {
-                let place = nearest.place(*cell);
-                lists.near[near] = (root, place);
-                near += usize::from((place != NONE) & (*weight > 0.0));
-            }
-            lists.near.truncate(near);
-            let (x, y, z) = (&spots.x, &spots.y, &spots.z);
-            lists.squares.clear();
-            lists.squares.extend(lists.near.iter().map(|(root, place)| {
-                let (root, place) = (*root as usize, *place as usize);
-                let apart = [
-                    axes[0][root] + step[0] - x[place],
-                    axes[1][root] + step[1] - y[place],
-                    axes[2][root] + step[2] - z[place],
-                ];
-                apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]
-            }));
-            let per = narrow(-0.5 / variance);
-            for square in &mut lists.squares {
-                *square = exp(per * *square);
-            }
-            let share = touch.share(surface.patches.len());
-            let peak = narrow(share / (touch.outlier * gauss_volume(variance)));
-            let facing = touch.feeling.facing(rotation);
-            for ((root, place), fall) in lists.near.iter().zip(&lists.squares) {
-                let place = *place as usize;
-                let normal = facing.map_or(1.0, |own| own.likelihood(&spots.normals[place]));
-                let gain = peak * fall * lists.likelihoods[place] * normal;
-                let weight = &mut group.weights[*root as usize];
-                *weight *= 1.0 + gain.min(GAIN_MAX);
-                if gain > LOOK_LEAST {
-                    candidates.push(Candidate {
-                        group: number,
-                        root: *root,
-                        weight: *weight,
-                    });
-                }
-            }
+            group.sift(
+                first,
+                (rotation, self.stride),
+                touch,
+                &mut lists,
+                &mut worth,
+            );
             group.weigh(0.0);
         }
         // All were taken for hypotheses whose touch was an outlier.
         self.log += touch.outlier.ln();
-        candidates
+        worth
     }
 
-    /// The candidates that hold most: so many at most, and not more than leave next to nothing of this mass to the others.
-    pub(super) fn heaviest(
-        &self,
-        candidates: Vec<Candidate>,
-        most: usize,
-        rest_log: f64,
-    ) -> Vec<Candidate> {
-        let top = self
-            .groups
-            .iter()
-            .map(|group| group.most)
-            .fold(0.0, f32::max);
-        if top <= 0.0 || most == 0 {
+    /// The roots that hold most of those that are worth a look: so many at most, and not more than leave next to nothing,
+    /// e^`rest_log`, to the others.
+    pub(super) fn heaviest(&self, worth: &[f32], most: usize, rest_log: f64) -> Vec<Root> {
+        let top = self.groups.iter().map(|group| group.most);
+        let per_top = 1.0 / top.fold(0.0, f32::max);
+        if !per_top.is_finite() || most == 0 {
             return Vec::new();
         }
         let mut ranks = Ranks::new();
-        for candidate in &candidates {
-            ranks.add(candidate.weight / top);
+        for weight in worth {
+            ranks.add(weight * per_top);
         }
-        let rest = (rest_log - self.log).exp() / f64::from(top);
+        let rest = (rest_log - self.log).exp() * f64::from(per_top);
         let count = ranks.holding((ranks.sum() - rest).max(0.0)).min(most);
         let (least, mut some) = ranks.least(count);
-        let mut heaviest = candidates;
-        heaviest.retain(|candidate| {
-            let rank = Ranks::of(candidate.weight / top);
-            let is_one = rank == least && some > 0;
-            some -= usize::from(is_one);
-            rank > least || is_one
-        });
+        let mut heaviest = Vec::with_capacity(count);
+        let mut from = 0;
+        for (number, group) in self.groups.iter().enumerate() {
+            let own = &worth[from..from + group.weights.len()];
+            from += own.len();
+            for (root, weight) in own.iter().enumerate() {
+                let rank = Ranks::of(weight * per_top);
+                if rank >= least && *weight > 0.0 && (rank > least || some > 0) {
+                    some -= usize::from(rank == least);
+                    heaviest.push(Root {
+                        group: number,
+                        root,
+                        weight: *weight,
+                    });
+                }
+            }
+        }
         heaviest
     }
 
     /// Takes one out, as it was after the first touch, with the map that it is in.
     pub(super) fn take(
         &mut self,
-        candidate: &Candidate,
+        root: &Root,
         rotations: &[UnitQuaternion<f64>],
         first: &Feeling<'_>,
     ) -> (Shift, &Known) {
         let stride = self.stride;
-        let group = &mut self.groups[candidate.group as usize];
-        group.weights[candidate.root as usize] = 0.0;
-        let shift = group.shift(candidate.root as usize, stride, rotations, first);
+        let group = &mut self.groups[root.group];
+        group.weights[root.root] = 0.0;
+        let shift = group.shift(root.root, stride, rotations, first);
         (shift, &group.known)
     }
 
     /// The heaviest of each object, as they would be taken.
-    pub(super) fn best_of(&self, object: ObjectId, most: usize) -> Vec<(Candidate, f64)> {
-        let groups = (0u32..)
-            .zip(&self.groups)
-            .filter(|(_, group)| group.object == object);
-        let mut all: Vec<(Candidate, f64)> = Vec::new();
+    pub(super) fn best_of(&self, object: ObjectId, most: usize) -> Vec<(Root, f64)> {
+        let groups = { self.groups.iter().enumerate() }.filter(|(_, group)| group.object == object);
+        let mut all: Vec<(Root, f64)> = Vec::new();
         for (number, group) in groups {
-            for (root, weight) in (0u32..).zip(&group.weights) {
+            for (root, weight) in group.weights.iter().enumerate() {
                 if *weight <= 0.0 || all.len() >= most && f64::from(*weight) <= all[all.len() - 1].1
                 {
                     continue;
                 }
-                let candidate = Candidate {
+                let candidate = Root {
                     group: number,
                     root,
                     weight: *weight,
@@ -318,16 +249,12 @@ impl Crowd {
     }
 
     /// What one would be as a hypothesis of its own, with its mass so far.
-    pub(super) fn as_shift(
-        &self,
-        candidate: &Candidate,
-        rotations: &[UnitQuaternion<f64>],
-    ) -> Option<Shift> {
+    pub(super) fn as_shift(&self, root: &Root, rotations: &[UnitQuaternion<f64>]) -> Option<Shift> {
         let first = Feeling::new(self.first.as_ref()?, &[]);
-        let group = self.groups.get(candidate.group as usize)?;
-        let shift = group.shift(candidate.root as usize, self.stride, rotations, &first);
+        let group = self.groups.get(root.group)?;
+        let shift = group.shift(root.root, self.stride, rotations, &first);
         Some(Shift {
-            evidence: f64::from(candidate.weight).ln() + self.log,
+            evidence: f64::from(root.weight).ln() + self.log,
             ..shift
         })
     }
@@ -385,6 +312,81 @@ impl Group {
         self.most = mosts.iter().copied().fold(0.0, f32::max);
     }
 
+    /// Takes a touch in.
+    fn sift(
+        &mut self,
+        first: &Contact,
+        (rotation, stride): (&UnitQuaternion<f64>, usize),
+        touch: &Taken<'_>,
+        lists: &mut Lists,
+        worth: &mut Vec<f32>,
+    ) {
+        let contact = touch.feeling.contact;
+        let surface = &self.known.surface;
+        let spots = &surface.spots;
+        let drift = (contact.drift_sd_m.powi(2) - first.drift_sd_m.powi(2)).max(0.0);
+        let noise = contact.position_sd_m.powi(2) + spots.variance_m2;
+        let variance = first.variance_m2() + spots.variance_m2 + drift + noise;
+        let nearest = spots.nearest(variance);
+        let step = rotation * (contact.position_m - first.position_m);
+        let step = [narrow(step.x), narrow(step.y), narrow(step.z)];
+        if stride > 1 {
+            for (list, all) in lists.gathered.iter_mut().zip(&spots.axes) {
+                list.clear();
+                list.extend(all.iter().step_by(stride));
+            }
+        }
+        let [x, y, z] = if stride > 1 {
+            &lists.gathered
+        } else {
+            &spots.axes
+        };
+        let roots = self.weights.len();
+        let (x, y, z) = (&x[..roots], &y[..roots], &z[..roots]);
+        nearest.cells([x, y, z], step, &mut lists.cells);
+        touch
+            .feeling
+            .at(surface, rotation)
+            .likelihoods(&mut lists.likelihoods);
+        // Where no place is near, nothing was felt of any: without a branch, since that is as good as random.
+        lists.likelihoods.push(0.0);
+        let last = spots.all.len().saturating_sub(1);
+        lists.squares.clear();
+        lists.felt.clear();
+        let points = x.iter().zip(y).zip(z).zip(&lists.cells);
+        let places = points.map(|(((x, y), z), cell)| {
+            let place = nearest.place(*cell).min(last + 1);
+            let at = &spots.all[place.min(last)].at;
+            let apart = [
+                x + step[0] - at[0],
+                y + step[1] - at[1],
+                z + step[2] - at[2],
+            ];
+            let square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
+            (square, lists.likelihoods[place])
+        });
+        for (square, felt) in places {
+            lists.squares.push(square);
+            lists.felt.push(felt);
+        }
+        let per = narrow(-0.5 / variance);
+        let area = TAU * variance;
+        let peak = touch.share(surface.patches.len()) / (touch.outlier * area * area.sqrt());
+        let peak = narrow(peak);
+        let lists = lists.squares.iter().zip(&lists.felt);
+        worth.extend(
+            self.weights
+                .iter_mut()
+                .zip(lists)
+                .map(|(weight, (square, felt))| {
+                    let gain = peak * felt * exp(per * square);
+                    let gain = if gain < GAIN_MAX { gain } else { GAIN_MAX };
+                    *weight *= 1.0 + gain;
+                    if gain > LOOK_LEAST { *weight } else { 0.0 }
+                }),
+        );
+    }
+
     fn shift(
         &self,
         root: usize,
@@ -393,23 +395,20 @@ impl Group {
         first: &Feeling<'_>,
     ) -> Shift {
         let surface = &self.known.surface;
-        let patch = &surface.patches[root * stride];
+        let spot = root * stride;
+        let patch = &surface.patches[surface.spots.patch(spot)];
         let rotation = &rotations[usize::from(self.rotation)];
         let contact = first.contact;
         let each = stride as f64 / (surface.patches.len() * rotations.len()) as f64;
-        let normal = super::feeling::normal_likelihood(rotation, contact, patch.normal.as_ref());
+        let felt = first
+            .at(surface, rotation)
+            .likelihood(spot, &surface.spots.all[spot]);
         Shift {
             object: self.object,
             rotation: self.rotation,
             translation: patch.position.coords - rotation * contact.position_m.coords,
             variance_m2: contact.variance_m2() + patch.variance_m2,
-            evidence: (each * first.likelihood(patch) * normal).ln(),
+            evidence: (each * f64::from(felt)).ln(),
         }
     }
-}
-
-/// Volume by which a Gaussian's peak is divided, of this variance per axis \[m³\].
-pub(super) fn gauss_volume(variance: f64) -> f64 {
-    let area = std::f64::consts::TAU * variance;
-    area * area.sqrt()
 }

@@ -1,10 +1,10 @@
 //! What a contact's percepts say of places, with all that does not depend on the place worked out once.
 
-use nalgebra::{Unit, UnitQuaternion, Vector3};
+use nalgebra::UnitQuaternion;
 
 use super::contact::Contact;
-use super::spots::Spots;
-use super::surface::{Patch, WRONG_SHARE, Wide};
+use super::spots::{Spot, Spots, narrow};
+use super::surface::{Surface, WRONG_SHARE, Wide};
 
 /// Variance of a normal between places, per axis \[rad²\]: a surface turns there, and a fifth of a radian is a good part of
 /// what voxels and hands differ by.
@@ -13,25 +13,46 @@ const NORMAL_TURN: f64 = 0.04;
 const NORMAL_WRONG: f64 = 0.1;
 
 /// Percepts of one contact.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Feeling<'a> {
     pub(super) contact: &'a Contact,
     wide: &'a [Wide],
+    levels: Vec<Level>,
 }
 
-/// A level that was felt on the channel of a map.
+/// A level that was felt on a channel that was learned.
 #[derive(Clone, Copy, Debug)]
 struct Level {
+    channel: u16,
     value: f64,
     /// Variance of its noise.
     noise: f64,
-    /// What the density here is multiplied by.
+    /// What the density at a place is multiplied by.
     scale: f64,
 }
 
-/// A normal that was felt, in a map's axes.
+/// The same for the places of one map in one rotation. Numbers are good to six digits.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Facing {
+pub(super) struct Local<'a> {
+    feeling: &'a Feeling<'a>,
+    surface: &'a Surface,
+    percepts: Percepts,
+    facing: Option<Facing>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Percepts {
+    /// Nothing that the map knows.
+    Nothing,
+    /// One level, from the middle of those of the map.
+    Level { value: f32, noise: f32, scale: f32 },
+    /// More than that: the places are asked themselves.
+    Several,
+}
+
+/// A normal that was felt, in the map's axes.
+#[derive(Clone, Copy, Debug)]
+struct Facing {
     normal: [f32; 3],
     per_variance: f32,
 }
@@ -39,90 +60,121 @@ pub(super) struct Facing {
 impl<'a> Feeling<'a> {
     /// Of a contact, where levels are like these anywhere.
     pub(super) fn new(contact: &'a Contact, wide: &'a [Wide]) -> Self {
-        Self { contact, wide }
-    }
-
-    /// Likelihood of what was felt at a place but for its normal, against that of it anywhere: the exponential of
-    /// [`Patch::percept_log`].
-    pub(super) fn likelihood(&self, patch: &Patch) -> f64 {
-        if self.contact.levels.is_empty() && self.contact.descriptors.is_empty() {
-            return 1.0;
+        let level = |felt: &super::contact::Felt| {
+            let wide = wide.iter().find(|wide| wide.channel == felt.channel)?;
+            Some(Level {
+                channel: felt.channel,
+                value: felt.value,
+                noise: felt.sd * felt.sd + wide.variance * 1e-6,
+                scale: (1.0 - WRONG_SHARE) / wide.density(felt),
+            })
+        };
+        Self {
+            contact,
+            wide,
+            levels: contact.levels.iter().filter_map(level).collect(),
         }
-        patch.percept_log(self.contact, self.wide).exp()
     }
 
-    /// The same for all places of a map, to six digits or so.
-    pub(super) fn likelihoods(&self, spots: &Spots, patches: &[Patch], out: &mut Vec<f32>) {
+    /// At the places of a map that is turned so.
+    pub(super) fn at(&'a self, surface: &'a Surface, rotation: &UnitQuaternion<f64>) -> Local<'a> {
+        let Self {
+            contact, levels, ..
+        } = self;
+        let percepts = match surface.spots.levels() {
+            _ if levels.is_empty() && contact.descriptors.is_empty() => Percepts::Nothing,
+            None => Percepts::Several,
+            Some((channel, middle)) => { levels.iter() }
+                .find(|level| level.channel == channel)
+                .map_or(Percepts::Nothing, |level| Percepts::Level {
+                    value: narrow(level.value - middle),
+                    noise: narrow(level.noise),
+                    scale: narrow(level.scale),
+                }),
+        };
+        let variance = contact.normal_sd_rad * contact.normal_sd_rad + NORMAL_TURN;
+        let facing = contact.normal.map(|normal| Facing {
+            normal: (rotation * normal.into_inner()).map(narrow).into(),
+            per_variance: narrow(1.0 / variance),
+        });
+        Local {
+            feeling: self,
+            surface,
+            percepts,
+            facing,
+        }
+    }
+}
+
+impl Local<'_> {
+    /// Likelihood of what was felt at a place, against that of it anywhere: the exponential of
+    /// [`Patch::percept_log`](super::surface::Patch::percept_log), and the density of the normal per steradian against that of one anywhere.
+    pub(super) fn likelihood(&self, number: usize, spot: &Spot) -> f32 {
+        let felt = match &self.percepts {
+            Percepts::Nothing => 1.0,
+            Percepts::Level {
+                value,
+                noise,
+                scale,
+            } => level_likelihood(value - spot.level, spot.level_variance + noise, *scale),
+            Percepts::Several => self.asked(number),
+        };
+        match &self.facing {
+            None => felt,
+            Some(facing) => felt * facing.likelihood(&self.surface.spots.normals[number]),
+        }
+    }
+
+    /// The same of all places of the map.
+    pub(super) fn likelihoods(&self, out: &mut Vec<f32>) {
+        let Spots { all, normals, .. } = &self.surface.spots;
         out.clear();
-        #[expect(clippy::cast_possible_truncation, reason = "six digits are enough")]
-        match spots.levels() {
-            Some(levels) => match self.level(levels.channel) {
-                None => out.resize(patches.len(), 1.0),
-                Some(level) => {
-                    let value = (level.value - levels.middle) as f32;
-                    let (noise, scale) = (level.noise as f32, level.scale as f32);
-                    let likelihood = |(mean, variance): (&f32, &f32)| {
-                        let apart = value - mean;
-                        let per = 1.0 / (variance + noise);
-                        scale * exp(-0.5 * apart * apart * per) * per.sqrt() + WRONG_SHARE as f32
-                    };
-                    out.extend(levels.means.iter().zip(&levels.variances).map(likelihood));
-                }
-            },
-            None => out.extend({ patches.iter() }.map(|patch| self.likelihood(patch) as f32)),
+        match &self.percepts {
+            Percepts::Nothing => out.resize(all.len(), 1.0),
+            Percepts::Level {
+                value,
+                noise,
+                scale,
+            } => {
+                let [levels, variances] = &self.surface.spots.level_lists;
+                let levels = levels.iter().zip(variances);
+                out.extend(levels.map(|(level, variance)| {
+                    level_likelihood(value - level, variance + noise, *scale)
+                }));
+            }
+            Percepts::Several => out.extend((0..all.len()).map(|number| self.asked(number))),
+        }
+        if let Some(facing) = &self.facing {
+            for (felt, normal) in out.iter_mut().zip(normals) {
+                *felt *= facing.likelihood(normal);
+            }
         }
     }
 
-    fn level(&self, channel: u16) -> Option<Level> {
-        let felt = { self.contact.levels.iter() }.find(|felt| felt.channel == channel)?;
-        let wide = { self.wide.iter() }.find(|wide| wide.channel == channel)?;
-        Some(Level {
-            value: felt.value,
-            noise: felt.sd * felt.sd + wide.variance * 1e-6,
-            scale: (1.0 - WRONG_SHARE) / wide.density(felt),
-        })
+    fn asked(&self, number: usize) -> f32 {
+        let patch = &self.surface.patches[self.surface.spots.patch(number)];
+        narrow(
+            patch
+                .percept_log(self.feeling.contact, self.feeling.wide)
+                .exp(),
+        )
     }
+}
 
-    /// The normal in the axes of a map that is turned so, if one was felt.
-    pub(super) fn facing(&self, rotation: &UnitQuaternion<f64>) -> Option<Facing> {
-        let normal = rotation * self.contact.normal?.into_inner();
-        #[expect(clippy::cast_possible_truncation, reason = "six digits are enough")]
-        Some(Facing {
-            normal: normal.map(|x| x as f32).into(),
-            per_variance: (1.0 / normal_variance(self.contact)) as f32,
-        })
-    }
+fn level_likelihood(apart: f32, variance: f32, scale: f32) -> f32 {
+    let per = 1.0 / variance;
+    scale * exp(-0.5 * apart * apart * per) * per.sqrt() + narrow(WRONG_SHARE)
 }
 
 impl Facing {
-    /// [`normal_likelihood`] to six digits or so; a place of which none is known has none of any length.
-    pub(super) fn likelihood(&self, own: &[f32; 3]) -> f32 {
+    /// A place of which no normal is known has one of no length.
+    fn likelihood(&self, own: &[f32; 3]) -> f32 {
         let dot = self.normal[0] * own[0] + self.normal[1] * own[1] + self.normal[2] * own[2];
-        if own.iter().all(|x| *x == 0.0) {
-            return 1.0;
-        }
-        #[expect(clippy::cast_possible_truncation, reason = "six digits are enough")]
-        let (right, wrong) = (2.0 * (1.0 - NORMAL_WRONG) as f32, NORMAL_WRONG as f32);
-        right * self.per_variance * exp(-(1.0 - dot) * self.per_variance) + wrong
+        let right = 2.0 * narrow(1.0 - NORMAL_WRONG) * self.per_variance;
+        let likelihood = right * exp((dot - 1.0) * self.per_variance) + narrow(NORMAL_WRONG);
+        let is_known = own[0] != 0.0 || own[1] != 0.0 || own[2] != 0.0;
+        if is_known { likelihood } else { 1.0 }
     }
-}
-
-fn normal_variance(contact: &Contact) -> f64 {
-    contact.normal_sd_rad * contact.normal_sd_rad + NORMAL_TURN
-}
-
-/// Density of a contact's normal at a place, per steradian, against that of one anywhere.
-pub(super) fn normal_likelihood(
-    rotation: &UnitQuaternion<f64>,
-    contact: &Contact,
-    normal: Option<&Unit<Vector3<f64>>>,
-) -> f64 {
-    let (Some(felt), Some(own)) = (&contact.normal, normal) else {
-        return 1.0;
-    };
-    let variance = normal_variance(contact);
-    let apart = 2.0 * (1.0 - (rotation * felt.into_inner()).dot(own));
-    (1.0 - NORMAL_WRONG) * 2.0 / variance * (-0.5 * apart / variance).exp() + NORMAL_WRONG
 }
 
 /// eˣ to six digits, in steps that a compiler lays side by side: 2ⁿ by its exponent's bits, and a polynomial for the rest (the
@@ -145,7 +197,11 @@ pub(super) fn exp(x: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Point3, Unit, Vector3};
+
     use super::*;
+    use crate::recognition::model::{LevelMemory, ModelPlace};
+    use crate::recognition::{ModelSettings, ObjectModel};
 
     #[test]
     fn powers_are_right_to_six_digits() {
@@ -159,5 +215,79 @@ mod tests {
             );
         }
         assert!(exp(-1e30) < 1e-37 && exp(1e30).is_finite() && exp(f32::NAN) < 1e-37);
+    }
+
+    #[test]
+    fn a_packed_place_feels_like_the_place_itself() {
+        let level = |channel, mean| LevelMemory {
+            channel,
+            count: 3.0,
+            mean,
+            squares: 0.2,
+            noise: 0.03,
+        };
+        // Where the level is far from nothing, what is left of its digits has to do.
+        let lists = [
+            vec![vec![], vec![]],
+            vec![vec![level(0, 1000.3)], vec![level(0, 1000.9)]],
+            vec![vec![level(1, 0.3)], vec![level(1, 0.3)]],
+            vec![vec![level(0, 1000.9)], vec![]],
+            vec![
+                vec![level(0, 1000.9), level(1, 2.0)],
+                vec![level(1, 1.0), level(0, 1000.0)],
+            ],
+        ];
+        let surfaces: Vec<Surface> = { lists.into_iter() }
+            .map(|lists| {
+                let places = lists.into_iter().zip(0..).map(|(levels, at)| ModelPlace {
+                    position_m: Point3::new(f64::from(at), 0.0, 0.0),
+                    normals: Vector3::new(f64::from(at), 0.0, 0.5 * f64::from(at)),
+                    count: 3.0,
+                    variance_m2: 1e-6,
+                    normal_variance: 0.0,
+                    levels,
+                    descriptors: Vec::new(),
+                });
+                let settings = ModelSettings::default();
+                let model = ObjectModel::with_places(settings, 0.004, places.collect());
+                Surface::new(&model)
+            })
+            .collect();
+        let wide = crate::recognition::surface::wide(surfaces.iter());
+        let bare = Contact::at(Point3::origin(), 0.001);
+        let contacts = [
+            bare.clone(),
+            bare.clone().with_level(0, 1000.5, 0.1),
+            bare.clone().with_level(0, 9000.0, 0.1),
+            bare.clone().with_level(7, 0.5, 0.1),
+            { bare.clone() }
+                .with_level(0, 1000.5, 0.1)
+                .with_level(1, 1.0, 0.2),
+            bare.clone().with_level(1, 0.5, 0.0),
+            bare.with_normal(Unit::new_normalize(Vector3::new(1.0, 0.2, 0.0)), 0.1),
+        ];
+        for contact in &contacts {
+            let feeling = Feeling::new(contact, &wide);
+            for surface in &surfaces {
+                let turn = UnitQuaternion::new(Vector3::new(0.0, -0.2, 0.1));
+                let local = feeling.at(surface, &turn);
+                let mut all = Vec::new();
+                local.likelihoods(&mut all);
+                for (number, spot) in surface.spots.all.iter().enumerate() {
+                    let patch = &surface.patches[surface.spots.patch(number)];
+                    let packed = local.likelihood(number, spot);
+                    assert!((all[number] / packed - 1.0).abs() < 1e-6);
+                    let mut full = patch.percept_log(contact, &wide);
+                    if let (Some(felt), Some(own)) = (contact.normal, patch.normal) {
+                        let variance = 0.1 * 0.1 + NORMAL_TURN;
+                        let apart = 2.0 * (1.0 - (turn * felt.into_inner()).dot(&own));
+                        let right = 0.9 * 2.0 / variance * (-0.5 * apart / variance).exp();
+                        full += (right + 0.1).ln();
+                    }
+                    let packed = f64::from(packed).ln();
+                    assert!((packed - full).abs() < 1e-3, "{packed} {full} {contact:?}");
+                }
+            }
+        }
     }
 }

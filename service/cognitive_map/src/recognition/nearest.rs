@@ -3,7 +3,7 @@
 /// Most cells; they are larger rather than more.
 const CELLS_MAX: f32 = 65_536.0;
 /// No place is near.
-pub(super) const NONE: u32 = u32::MAX;
+const NONE: u16 = u16::MAX;
 
 /// Cells over the box of a map, each with the place that is nearest to its middle, if one is within reach of any of its points. The
 /// outermost cells are empty, and stand for all that is beyond.
@@ -14,15 +14,18 @@ pub(super) struct Nearest {
     per_m: f32,
     /// Cells along each axis, as numbers to multiply by.
     size: [f32; 3],
-    places: Vec<u32>,
+    /// Numbers of the places, over `step`.
+    places: Vec<u16>,
+    /// How many places one number stands for: they lie side by side.
+    step: usize,
 }
 
 impl Nearest {
-    /// Of places at these positions, axis by axis \[m\].
-    pub(super) fn new(axes: [&[f32]; 3], reach_m: f32, edge_m: f32) -> Self {
-        let least = |at: &[f32]| at.iter().copied().fold(f32::INFINITY, f32::min);
-        let most = |at: &[f32]| at.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        let (mut low, mut high) = (axes.map(least), axes.map(most));
+    /// Of places at these positions, axis by axis \[m\], neighbours one after the other.
+    pub(super) fn new(axes: &[Vec<f32>; 3], reach_m: f32, edge_m: f32) -> Self {
+        let least = |at: &Vec<f32>| at.iter().copied().fold(f32::INFINITY, f32::min);
+        let most = |at: &Vec<f32>| at.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let (mut low, mut high) = (axes.each_ref().map(least), axes.each_ref().map(most));
         if axes[0].is_empty() {
             (low, high) = ([0.0; 3], [0.0; 3]);
         }
@@ -43,16 +46,19 @@ impl Nearest {
             per_m: 1.0 / edge_m,
             size,
             places: vec![NONE; index(size.iter().product())],
+            step: axes[0].len().div_ceil(usize::from(NONE)).max(1),
         };
         let mut squares = vec![f32::INFINITY; nearest.places.len()];
-        for (place, ((x, y), z)) in (0..).zip(axes[0].iter().zip(axes[1]).zip(axes[2])) {
-            nearest.notice(place, [*x, *y, *z], reach_m, &mut squares);
+        let [x, y, z] = axes;
+        for (number, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate() {
+            let number = u16::try_from(number / nearest.step).unwrap_or(NONE);
+            nearest.notice(number, [*x, *y, *z], reach_m, &mut squares);
         }
         nearest
     }
 
     /// Writes a place into all cells whose middle is within reach and to which none was nearer.
-    fn notice(&mut self, place: u32, at: [f32; 3], reach_m: f32, squares: &mut [f32]) {
+    fn notice(&mut self, number: u16, at: [f32; 3], reach_m: f32, squares: &mut [f32]) {
         let at: [f32; 3] = std::array::from_fn(|axis| (at[axis] - self.low[axis]) * self.per_m);
         let reach = reach_m * self.per_m;
         let range = |axis: usize| {
@@ -68,7 +74,7 @@ impl Nearest {
                     let cell = (i * rows + j) * columns + k;
                     if squared <= reach * reach && squared < squares[cell] {
                         squares[cell] = squared;
-                        self.places[cell] = place;
+                        self.places[cell] = number;
                     }
                 }
             }
@@ -96,9 +102,9 @@ impl Nearest {
         }));
     }
 
-    /// The place of a cell, or [`NONE`].
-    pub(super) fn place(&self, cell: u32) -> u32 {
-        self.places[cell as usize]
+    /// The place of a cell, or a number beyond all places.
+    pub(super) fn place(&self, cell: u32) -> usize {
+        usize::from(self.places[cell as usize]) * self.step
     }
 }
 
@@ -127,7 +133,9 @@ mod tests {
             |from: u64, count: u64| -> Vec<f32> { (from..from + count).map(noise).collect() };
         let [x, y, z] = [axis(0, 200), axis(1000, 200), axis(2000, 200)];
         let (reach_m, edge_m) = (0.01, 0.004);
-        let nearest = Nearest::new([&x, &y, &z], reach_m, edge_m);
+        let axes = [x, y, z];
+        let nearest = Nearest::new(&axes, reach_m, edge_m);
+        let [x, y, z] = &axes;
         let [qx, qy, qz] = [axis(5000, 2000), axis(7000, 2000), axis(9000, 2000)];
         let shift = [0.01, -0.02, 0.005];
         let mut cells = Vec::new();
@@ -144,11 +152,11 @@ mod tests {
             };
             let least = (0..200).map(to).fold(f32::INFINITY, f32::min);
             match nearest.place(*cell) {
-                NONE => assert!(least > reach_m),
+                200.. => assert!(least > reach_m),
                 place => {
                     noticed += 1;
                     // It is nearest to the cell's middle.
-                    assert!(to(place as usize) < least + 1.74 * edge_m);
+                    assert!(to(place) < least + 1.74 * edge_m);
                     assert!(least < reach_m + 1.74 * edge_m);
                 }
             }
@@ -159,9 +167,9 @@ mod tests {
             [0.0; 3],
             &mut cells,
         );
-        assert!(cells.iter().all(|cell| nearest.place(*cell) == NONE));
-        let empty = Nearest::new([&[], &[], &[]], 0.01, 0.004);
+        assert!(cells.iter().all(|cell| nearest.place(*cell) >= 200));
+        let empty = Nearest::new(&[vec![], vec![], vec![]], 0.01, 0.004);
         empty.cells([&[0.0], &[0.0], &[0.0]], [0.0; 3], &mut cells);
-        assert_eq!(empty.place(cells[0]), NONE);
+        assert!(empty.place(cells[0]) > 0);
     }
 }

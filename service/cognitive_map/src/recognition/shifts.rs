@@ -7,10 +7,10 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::contact::{Contact, Reached};
 use super::crowd::Crowd;
-use super::feeling::{Feeling, normal_likelihood};
+use super::feeling::{Feeling, Local};
 use super::library::{ObjectId, ObjectLibrary};
 use super::ranks::Ranks;
-use super::spots::narrow;
+use super::spots::{Answer, narrow};
 use super::strangers::stranger_logs;
 use super::surface::Surface;
 
@@ -32,8 +32,6 @@ pub(super) const OUTLIERS: f64 = 0.02;
 const PART_SHARE: f64 = 0.005;
 /// Most parts.
 const PARTS_MAX: usize = 16;
-/// Squared distance, in variances, beyond which a place is not the one that was touched: e⁻²⁵.
-pub(super) const DISTANCE_MAX: f64 = 50.0;
 
 /// One hypothesis: a Gaussian over the translation, its mass being e^`evidence`.
 #[derive(Clone, Copy, Debug)]
@@ -110,8 +108,12 @@ impl Shifts {
         let all = std::mem::take(&mut self.all);
         for own in all.chunk_by(|a, b| a.object == b.object) {
             if let Some(surface) = library.surface(own[0].object) {
-                for shift in own {
-                    self.explain(surface, shift, &touch, &mut answers, &mut parts);
+                for own in own.chunk_by(|a, b| a.rotation == b.rotation) {
+                    let rotation = &self.rotations[usize::from(own[0].rotation)];
+                    let local = touch.feeling.at(surface, rotation);
+                    for shift in own {
+                        self.explain(surface, shift, (&touch, &local), &mut answers, &mut parts);
+                    }
                 }
             }
         }
@@ -132,7 +134,7 @@ impl Shifts {
         parts: &mut Vec<Shift>,
     ) {
         let mut crowd = std::mem::take(&mut self.crowd);
-        let candidates = crowd.sift(library, &self.rotations, touch);
+        let worth = crowd.sift(library, &self.rotations, touch);
         let all = crowd.masses().map(|(_, log)| log);
         let all = log_sum(
             all.chain(parts.iter().map(|part| part.evidence))
@@ -140,7 +142,7 @@ impl Shifts {
                 .into_iter(),
         );
         let looks = LOOKS_MAX / before.len();
-        let heaviest = crowd.heaviest(candidates, looks, all + UNLOOKED.ln());
+        let heaviest = crowd.heaviest(&worth, looks, all + UNLOOKED.ln());
         let first = Feeling::new(&before[0], library.wide());
         let way: Vec<Taken<'_>> = before
             .windows(2)
@@ -171,13 +173,13 @@ impl Shifts {
     }
 
     /// What becomes of a hypothesis with one more contact: one or more parts, each with its place taken for
-    /// the one that was touched. `answers` is a list to be used: density, displacement and variance of the places that answer.
+    /// the one that was touched. `answers` is a list to be used.
     fn explain(
         &self,
         surface: &Surface,
         shift: &Shift,
-        touch: &Taken<'_>,
-        answers: &mut Vec<(f64, Vector3<f64>, f64)>,
+        (touch, local): (&Taken<'_>, &Local<'_>),
+        answers: &mut Vec<Answer>,
         parts: &mut Vec<Shift>,
     ) {
         let rotation = &self.rotations[usize::from(shift.rotation)];
@@ -185,33 +187,20 @@ impl Shifts {
         let prior = shift.variance_m2 + touch.drift_m2;
         let noise = contact.position_sd_m * contact.position_sd_m;
         let query = Point3::from(rotation * contact.position_m.coords + shift.translation);
-        let share = touch.share(surface.patches.len());
-        let mut total = touch.outlier;
-        answers.clear();
-        for &place in surface.near(&query, prior + noise) {
-            let patch = &surface.patches[place as usize];
-            let apart = patch.position - query;
-            let variance = noise + patch.variance_m2;
-            let squared = apart.norm_squared() / (prior + variance);
-            if squared > DISTANCE_MAX {
-                continue;
-            }
-            let felt = touch.feeling.likelihood(patch)
-                * normal_likelihood(rotation, contact, patch.normal.as_ref());
-            let area = TAU * (prior + variance);
-            let density = share * felt * (-0.5 * squared).exp() / (area * area.sqrt());
-            total += density;
-            answers.push((density, apart, variance));
-        }
+        let spots = &surface.spots;
+        let densities = spots.answers(&query, (prior, noise), local, answers);
+        let share = touch.share(surface.patches.len()) / TAU.powf(1.5);
+        let outlier = touch.outlier / share;
+        let total = outlier + densities;
         let least = PART_SHARE * total;
-        answers.retain(|answer| answer.0 >= least);
+        answers.retain(|answer| answer.density >= least);
         if answers.len() > PARTS_MAX {
-            answers.sort_by(|a, b| b.0.total_cmp(&a.0));
+            answers.sort_by(|a, b| b.density.total_cmp(&a.density));
             answers.truncate(PARTS_MAX);
         }
-        let best = answers.iter().map(|answer| answer.0);
-        let evidence = shift.evidence + total.ln();
-        if best.fold(0.0, f64::max) < touch.outlier {
+        let best = answers.iter().map(|answer| answer.density);
+        let evidence = shift.evidence + (share * total).ln();
+        if best.fold(0.0, f64::max) < outlier {
             // Most likely an outlier: the hypothesis stays where it is.
             parts.push(Shift {
                 variance_m2: prior,
@@ -220,8 +209,13 @@ impl Shifts {
             });
             return;
         }
-        let sum = answers.iter().map(|answer| answer.0).sum::<f64>();
-        for (density, apart, variance) in answers {
+        let sum = answers.iter().map(|answer| answer.density).sum::<f64>();
+        for Answer {
+            density,
+            apart,
+            variance,
+        } in answers
+        {
             let gain = prior / (prior + *variance);
             parts.push(Shift {
                 translation: shift.translation + gain * *apart,
@@ -345,7 +339,7 @@ impl Shifts {
 /// Lists that are filled again and again.
 #[derive(Default)]
 struct Looker {
-    answers: Vec<(f64, Vector3<f64>, f64)>,
+    answers: Vec<Answer>,
     now: Vec<Shift>,
     next: Vec<Shift>,
 }
@@ -362,9 +356,12 @@ impl Looker {
     ) {
         self.now.clear();
         self.now.push(root);
+        let rotation = &shifts.rotations[usize::from(root.rotation)];
         for touch in way {
             self.next.clear();
+            let local = touch.feeling.at(surface, rotation);
             for shift in &self.now {
+                let touch = (*touch, &local);
                 shifts.explain(surface, shift, touch, &mut self.answers, &mut self.next);
             }
             if self.next.len() > PARTS_MAX {

@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 use nalgebra::UnitQuaternion;
 
 use super::contact::Contact;
-use super::feeling::{Feeling, normal_likelihood};
+use super::feeling::Feeling;
 use super::library::{ObjectId, ObjectLibrary};
-use super::shifts::{DISTANCE_MAX, OUTLIERS};
+use super::shifts::OUTLIERS;
 
 /// Least share of the weight that places of other objects must have before they say what is beside them.
 const WEIGHT_MIN: f64 = 1e-9;
@@ -32,26 +32,20 @@ pub(super) fn stranger_logs(
     let felt_before = Feeling::new(other, library.wide());
     let felt = Feeling::new(contact, library.wide());
     let mut sums: BTreeMap<ObjectId, [f64; 4]> = BTreeMap::new();
+    let mut answers = Vec::new();
     let mut turns = rotations.iter().cycle();
-    for &(object, place) in library.samples() {
+    for &(object, spot) in library.samples() {
         let (Some(surface), Some(rotation)) = (library.surface(object), turns.next()) else {
             continue;
         };
-        let here = &surface.patches[place as usize];
-        let normal = normal_likelihood(rotation, other, here.normal.as_ref());
-        let weight = felt_before.likelihood(here) * normal;
-        let query = here.position + rotation * step;
-        let mut density = 0.0;
-        for &near in surface.near(&query, noise) {
-            let patch = &surface.patches[near as usize];
-            let variance = noise + patch.variance_m2;
-            let squared = (patch.position - query).norm_squared() / variance;
-            if squared < DISTANCE_MAX {
-                let normal = normal_likelihood(rotation, contact, patch.normal.as_ref());
-                density += normal * felt.likelihood(patch) * (-0.5 * squared).exp()
-                    / (TAU * variance).powf(1.5);
-            }
-        }
+        let here = felt_before.at(surface, rotation);
+        let weight = f64::from(here.likelihood(spot as usize, &surface.spots.all[spot as usize]));
+        let here = surface.patches[surface.spots.patch(spot as usize)].position;
+        let local = felt.at(surface, rotation);
+        let point = here + rotation * step;
+        let spots = &surface.spots;
+        let density = spots.answers(&point, (0.0, noise), &local, &mut answers);
+        let density = density / TAU.powf(1.5);
         let density = density / surface.patches.len() as f64;
         let [sum, weights, plain, count] = sums.entry(object).or_default();
         *sum += weight * density;

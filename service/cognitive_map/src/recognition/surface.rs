@@ -4,14 +4,11 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use super::contact::{Contact, Felt, Seen};
 use super::model::{LevelMemory, ObjectModel};
-use super::reaches::Reaches;
 use super::relief::Relief;
 use super::spots::Spots;
 
 /// A place's field is uniform over one spacing; that is its standard deviation in spacings, 1/√12.
 const FIELD_PER_SPACING: f64 = 0.288_675;
-/// How many standard deviations a field reaches.
-const REACH_SD: f64 = 4.0;
 /// Distances at which the share of the map within them is tabled, per extent.
 const SHARES: usize = 32;
 /// Most places from which the shares are counted: their error is then a few hundredths.
@@ -34,7 +31,6 @@ pub(super) struct Surface {
     pub(super) patches: Vec<Patch>,
     /// The same places, packed.
     pub(super) spots: Spots,
-    reaches: Reaches,
     /// Diameter of a ball about the map's middle that holds all of it \[m\].
     pub(super) extent_m: f64,
     /// Area that it takes for \[m²\]: one spacing squared per place.
@@ -59,13 +55,9 @@ impl Surface {
                 descriptors: place.descriptors.clone(),
             })
             .collect();
-        // Touches are about as noisy as those that were learned; hypotheses add as much again.
         let noise_m2 = model.places().iter().map(|p| p.variance_m2 / p.count);
         let noise_m2 = noise_m2.sum::<f64>() / patches.len().max(1) as f64;
-        let reach = |patch: &Patch| REACH_SD * patch.variance_m2.sqrt() + 0.5 * model.spacing_m();
         let positions: Vec<_> = patches.iter().map(|patch| patch.position).collect();
-        let own_m: Vec<_> = patches.iter().map(reach).collect();
-        let least_m = REACH_SD * (2.0 * noise_m2).sqrt() + 0.5 * model.spacing_m();
         let middle = positions
             .iter()
             .fold(Vector3::zeros(), |sum, p| sum + p.coords)
@@ -77,19 +69,12 @@ impl Surface {
         let extent_m = 2.0 * radius_m;
         Self {
             spots: Spots::new(&patches, model.spacing_m(), extent_m, noise_m2),
-            reaches: Reaches::new(&positions, &own_m, least_m, extent_m),
             shares: shares(&positions, extent_m),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
             relief: Relief::new(model),
             extent_m,
             patches,
         }
-    }
-
-    /// All places that a point could be of whose variance along each axis is `variance_m2` at most
-    /// \[m²\], and some others, in order.
-    pub(super) fn near(&self, point: &Point3<f64>, variance_m2: f64) -> &[u32] {
-        self.reaches.near(point, REACH_SD * variance_m2.sqrt())
     }
 
     /// The share of the map within `reach_m` \[m\] of a place of it, on average.
