@@ -127,22 +127,29 @@ impl Local<'_> {
 
     /// The same of all places of the map.
     pub(super) fn likelihoods(&self, out: &mut Vec<f32>) {
-        let Spots { all, normals, .. } = &self.surface.spots;
+        let Spots {
+            normals,
+            level_lists: [levels, variances],
+            ..
+        } = &self.surface.spots;
         out.clear();
-        match &self.percepts {
-            Percepts::Nothing => out.resize(all.len(), 1.0),
+        out.resize(normals.len(), 1.0);
+        match self.percepts {
+            Percepts::Nothing => {}
             Percepts::Level {
                 value,
                 noise,
                 scale,
             } => {
-                let [levels, variances] = &self.surface.spots.level_lists;
-                let levels = levels.iter().zip(variances);
-                out.extend(levels.map(|(level, variance)| {
-                    level_likelihood(value - level, variance + noise, *scale)
-                }));
+                for ((felt, level), variance) in out.iter_mut().zip(levels).zip(variances) {
+                    *felt = level_likelihood(value - level, variance + noise, scale);
+                }
             }
-            Percepts::Several => out.extend((0..all.len()).map(|number| self.asked(number))),
+            Percepts::Several => {
+                for (number, felt) in out.iter_mut().enumerate() {
+                    *felt = self.asked(number);
+                }
+            }
         }
         if let Some(facing) = &self.facing {
             for (felt, normal) in out.iter_mut().zip(normals) {

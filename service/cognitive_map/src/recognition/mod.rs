@@ -41,6 +41,7 @@ mod crowd;
 mod episode;
 mod facet;
 mod feeling;
+mod group;
 mod library;
 mod model;
 mod nearest;

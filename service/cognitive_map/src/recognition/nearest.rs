@@ -1,7 +1,7 @@
 //! Which place of a map is nearest, roughly: one number for each cell of a box.
 
-/// Most cells; they are larger rather than more.
-const CELLS_MAX: f32 = 65_536.0;
+/// Most cells; they are larger rather than more, so that they stay in a processor's caches.
+const CELLS_MAX: f32 = 32_768.0;
 /// No place is near.
 const NONE: u16 = u16::MAX;
 
@@ -82,24 +82,25 @@ impl Nearest {
     }
 
     /// Numbers of the cells of these points, moved so; axis by axis \[m\].
-    pub(super) fn cells(&self, axes: [&[f32]; 3], shift: [f32; 3], out: &mut Vec<u32>) {
+    pub(super) fn cells(&self, [x, y, z]: [&[f32]; 3], shift: [f32; 3], out: &mut [u32]) {
         /// Adding it leaves the nearest whole number in the low bits.
         const WHOLE: f32 = 8_388_608.0;
-        let from: [f32; 3] = std::array::from_fn(|axis| shift[axis] - self.low[axis]);
-        let last = self.size.map(|size| size - 1.0);
-        let whole = |at: f32, axis: usize| {
-            let at = (at + from[axis]) * self.per_m;
+        let per_m = self.per_m;
+        let whole = |at: f32, from: f32, last: f32| {
+            let at = (at + from) * per_m;
             // What is no number is in the first cell.
             let at = if at > 0.0 { at } else { 0.0 };
-            let at = if at < last[axis] { at } else { last[axis] };
+            let at = if at < last { at } else { last };
             (at + WHOLE) - WHOLE
         };
-        let points = axes[0].iter().zip(axes[1]).zip(axes[2]);
-        out.clear();
-        out.extend(points.map(|((x, y), z)| {
-            let cell = (whole(*x, 0) * self.size[1] + whole(*y, 1)) * self.size[2] + whole(*z, 2);
-            (cell + WHOLE).to_bits() & 0x007F_FFFF
-        }));
+        let [fx, fy, fz] = std::array::from_fn(|axis| shift[axis] - self.low[axis]);
+        let [lx, ly, lz] = self.size.map(|size| size - 1.0);
+        let [_, rows, columns] = self.size;
+        for (((x, y), z), out) in x.iter().zip(y).zip(z).zip(out) {
+            let row = whole(*x, fx, lx) * rows + whole(*y, fy, ly);
+            let cell = row * columns + whole(*z, fz, lz);
+            *out = (cell + WHOLE).to_bits() & 0x007F_FFFF;
+        }
     }
 
     /// The place of a cell, or a number beyond all places.
@@ -138,7 +139,7 @@ mod tests {
         let [x, y, z] = &axes;
         let [qx, qy, qz] = [axis(5000, 2000), axis(7000, 2000), axis(9000, 2000)];
         let shift = [0.01, -0.02, 0.005];
-        let mut cells = Vec::new();
+        let mut cells = vec![0; 2000];
         nearest.cells([&qx, &qy, &qz], shift, &mut cells);
         let mut noticed = 0;
         for (k, cell) in cells.iter().enumerate() {
@@ -167,7 +168,7 @@ mod tests {
             [0.0; 3],
             &mut cells,
         );
-        assert!(cells.iter().all(|cell| nearest.place(*cell) >= 200));
+        assert!(cells[..3].iter().all(|cell| nearest.place(*cell) >= 200));
         let empty = Nearest::new(&[vec![], vec![], vec![]], 0.01, 0.004);
         empty.cells([&[0.0], &[0.0], &[0.0]], [0.0; 3], &mut cells);
         assert!(empty.place(cells[0]) > 0);

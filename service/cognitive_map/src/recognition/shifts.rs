@@ -14,10 +14,13 @@ use super::spots::{Answer, narrow};
 use super::strangers::stranger_logs;
 use super::surface::Surface;
 
-/// Most hypotheses kept of those that were looked at.
-const KEPT_MAX: usize = 2048;
-/// Most contacts explained at a touch by first places that are looked at: each is by all contacts so far.
-const LOOKS_MAX: usize = 1024;
+/// Most contacts explained at a touch, one for each hypothesis, and for first places that are looked at one for each contact
+/// so far.
+const EXPLAINED_MAX: usize = 2048;
+/// The fewer, the more first places there are at which a rough look is taken: so many of these cost as much as all of those.
+const ROUGH_MAX: usize = 150_000;
+/// Contacts explained at least.
+const EXPLAINED_MIN: usize = 384;
 /// What first places that are worth a look may hold together without being looked at, of all: an estimate is good
 /// enough for them.
 const UNLOOKED: f64 = 1e-3;
@@ -118,11 +121,19 @@ impl Shifts {
             }
         }
         if !self.crowd.is_empty() {
-            self.look(library, before, &touch, &mut parts);
+            let budget = self.budget();
+            let looks = budget.saturating_sub(all.len()).max(budget / 4) / before.len();
+            self.look(library, before, (&touch, looks), &mut parts);
         }
         self.all = parts;
         self.merge();
-        self.prune(KEPT_MAX);
+        let budget = self.budget();
+        // While there is a crowd half of the next touch's work is left for those who come from it.
+        self.prune(if self.crowd.is_empty() {
+            budget
+        } else {
+            budget / 2
+        });
     }
 
     /// Lets a touch tell which of the crowd are worth a look, and looks at the heaviest of these.
@@ -130,7 +141,7 @@ impl Shifts {
         &mut self,
         library: &ObjectLibrary,
         before: &[Contact],
-        touch: &Taken<'_>,
+        (touch, looks): (&Taken<'_>, usize),
         parts: &mut Vec<Shift>,
     ) {
         let mut crowd = std::mem::take(&mut self.crowd);
@@ -141,7 +152,6 @@ impl Shifts {
                 .collect::<Vec<_>>()
                 .into_iter(),
         );
-        let looks = LOOKS_MAX / before.len();
         let heaviest = crowd.heaviest(&worth, looks, all + UNLOOKED.ln());
         let first = Feeling::new(&before[0], library.wide());
         let way: Vec<Taken<'_>> = before
@@ -150,8 +160,8 @@ impl Shifts {
             .collect();
         let way: Vec<&Taken<'_>> = way.iter().chain([touch]).collect();
         let mut looker = Looker::default();
-        for candidate in &heaviest {
-            let (root, known) = crowd.take(candidate, &self.rotations, &first);
+        for root in &heaviest {
+            let (root, known) = crowd.take(root, &self.rotations, &first);
             looker.follow(self, &known.surface, root, &way, parts);
         }
         let best = parts.iter().map(|part| part.evidence);
@@ -163,8 +173,8 @@ impl Shifts {
             if parts.iter().any(|part| part.object == object) {
                 continue;
             }
-            for (candidate, _) in crowd.best_of(object, 1) {
-                let (root, known) = crowd.take(&candidate, &self.rotations, &first);
+            for root in crowd.best_of(object, 1) {
+                let (root, known) = crowd.take(&root, &self.rotations, &first);
                 looker.follow(self, &known.surface, root, &way, parts);
             }
         }
@@ -224,6 +234,12 @@ impl Shifts {
                 ..*shift
             });
         }
+    }
+
+    /// Most contacts that are explained at the next touch.
+    fn budget(&self) -> usize {
+        let rough = ROUGH_MAX.saturating_sub(self.crowd.len());
+        (EXPLAINED_MAX * rough / ROUGH_MAX).max(EXPLAINED_MIN)
     }
 
     /// Makes one of hypotheses that have become the same, and puts them in order of object, rotation and place.
@@ -310,7 +326,7 @@ impl Shifts {
             .filter_map(|(object, own)| Some(own + log(*object)?));
         let all = log_sum(all);
         let log = |object| Some(log(object)? - all);
-        let mut ranks = Ranks::new();
+        let mut ranks = Ranks::new(self.crowd.len());
         for own in self.all.chunk_by(|a, b| a.object == b.object) {
             if let Some(log) = log(own[0].object) {
                 for shift in own {
@@ -328,7 +344,7 @@ impl Shifts {
         let crowd = self.crowd.best_of(object, most);
         let crowd = crowd
             .iter()
-            .filter_map(|(root, _)| self.crowd.as_shift(root, &self.rotations));
+            .filter_map(|root| self.crowd.as_shift(root, &self.rotations));
         let mut all: Vec<Shift> = own.copied().chain(crowd).collect();
         all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         all.truncate(most);

@@ -1,0 +1,228 @@
+//! The roots of one map in one rotation.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use nalgebra::UnitQuaternion;
+
+use super::contact::Contact;
+use super::feeling::{Feeling, exp};
+use super::library::{Known, ObjectId};
+use super::shifts::{Shift, Taken};
+use super::spots::narrow;
+
+/// Most that a touch makes of a weight, so that numbers stay finite.
+const GAIN_MAX: f32 = 1e30;
+/// A root is worth a look only where a place is at least so likely against an outlier: what is less likely leaves a hypothesis
+/// where it is.
+const LOOK_LEAST: f32 = 0.5;
+/// When fewer of the roots than one in so many hold something, the others are left out of the list.
+const SPARSE: usize = 2;
+
+/// The places of a map in one rotation, each taken for the one that was touched first.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
+    pub(super) object: ObjectId,
+    pub(super) rotation: u16,
+    /// The map as it was then.
+    known: Arc<Known>,
+    /// Prior probability of each, without that of the map.
+    each: f64,
+    /// Mass of each, on the scale of the crowd; nothing for those that have been looked at or hold nothing.
+    pub(super) weights: Vec<f32>,
+    /// Which places they are, if not all.
+    some: Option<Chosen>,
+    pub(super) sum: f64,
+    pub(super) most: f32,
+    /// How many hold something.
+    live: usize,
+}
+
+/// Some places of a map.
+#[derive(Clone, Debug)]
+struct Chosen {
+    spots: Vec<u32>,
+    axes: [Vec<f32>; 3],
+}
+
+/// Lists that are filled again and again.
+#[derive(Debug, Default)]
+pub(super) struct Lists {
+    cells: Vec<u32>,
+    likelihoods: Vec<f32>,
+    /// Of the nearest place: squared distance \[m²\], and likelihood of what was felt there.
+    squares: Vec<f32>,
+    felt: Vec<f32>,
+}
+
+impl Group {
+    /// After the first touch, by which each place is so likely; of several side by side, `stride`, one stands for all.
+    pub(super) fn new(
+        (object, rotation): (ObjectId, u16),
+        known: Arc<Known>,
+        each: f64,
+        stride: usize,
+        likelihoods: &[f32],
+    ) -> Self {
+        let scale = narrow(each);
+        let mut group = Self {
+            object,
+            rotation,
+            known,
+            each,
+            weights: likelihoods.iter().map(|felt| scale * felt).collect(),
+            some: None,
+            sum: 0.0,
+            most: 0.0,
+            live: 0,
+        };
+        if stride > 1 {
+            group.keep(|spot, _| spot.is_multiple_of(stride));
+        }
+        group.drop_below(0.0);
+        group
+    }
+
+    /// Its map.
+    pub(super) fn known(&self) -> &Known {
+        &self.known
+    }
+
+    /// Takes a touch in, and writes the weights of those that it makes worth a look.
+    pub(super) fn sift(
+        &mut self,
+        first: &Contact,
+        rotation: &UnitQuaternion<f64>,
+        touch: &Taken<'_>,
+        lists: &mut Lists,
+        worth: &mut [f32],
+    ) {
+        let contact = touch.feeling.contact;
+        let surface = &self.known.surface;
+        let spots = &surface.spots;
+        let drift = (contact.drift_sd_m.powi(2) - first.drift_sd_m.powi(2)).max(0.0);
+        let noise = contact.position_sd_m.powi(2) + spots.variance_m2;
+        let variance = first.variance_m2() + spots.variance_m2 + drift + noise;
+        let step = rotation * (contact.position_m - first.position_m);
+        let step = [narrow(step.x), narrow(step.y), narrow(step.z)];
+        let [x, y, z] = { self.some.as_ref() }.map_or(&spots.axes, |some| &some.axes);
+        let count = self.weights.len();
+        for list in [&mut lists.squares, &mut lists.felt] {
+            list.resize(count, 0.0);
+        }
+        lists.cells.resize(count, 0);
+        let nearest = spots.nearest(variance);
+        nearest.cells([x, y, z], step, &mut lists.cells);
+        let local = touch.feeling.at(surface, rotation);
+        local.likelihoods(&mut lists.likelihoods);
+        // Where no place is near, nothing was felt of any: without a branch, since that is as good as random.
+        lists.likelihoods.push(0.0);
+        let last = spots.all.len().saturating_sub(1);
+        let points = x.iter().zip(y).zip(z).zip(&lists.cells);
+        let places = lists.squares.iter_mut().zip(&mut lists.felt);
+        for ((((x, y), z), cell), (square, felt)) in points.zip(places) {
+            let place = nearest.place(*cell).min(last + 1);
+            let at = &spots.all[place.min(last)].at;
+            let apart = [
+                x + step[0] - at[0],
+                y + step[1] - at[1],
+                z + step[2] - at[2],
+            ];
+            *square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
+            *felt = lists.likelihoods[place];
+        }
+        let per = narrow(-0.5 / variance);
+        let area = TAU * variance;
+        let peak = touch.share(surface.patches.len()) / (touch.outlier * area * area.sqrt());
+        let peak = narrow(peak);
+        let places = lists.squares.iter().zip(&lists.felt);
+        for ((weight, worth), (square, felt)) in self.weights.iter_mut().zip(worth).zip(places) {
+            let gain = peak * felt * exp(per * square);
+            let gain = if gain < GAIN_MAX { gain } else { GAIN_MAX };
+            *weight *= 1.0 + gain;
+            *worth = if gain > LOOK_LEAST { *weight } else { 0.0 };
+        }
+        self.weigh(0.0);
+    }
+
+    /// What a place would be as a hypothesis of its own, after the first touch.
+    pub(super) fn shift(
+        &self,
+        root: usize,
+        rotation: &UnitQuaternion<f64>,
+        first: &Feeling<'_>,
+    ) -> Shift {
+        let surface = &self.known.surface;
+        let spot = { self.some.as_ref() }.map_or(root, |some| some.spots[root] as usize);
+        let patch = &surface.patches[surface.spots.patch(spot)];
+        let contact = first.contact;
+        let local = first.at(surface, rotation);
+        let felt = local.likelihood(spot, &surface.spots.all[spot]);
+        Shift {
+            object: self.object,
+            rotation: self.rotation,
+            translation: patch.position.coords - rotation * contact.position_m.coords,
+            variance_m2: contact.variance_m2() + patch.variance_m2,
+            evidence: (self.each * f64::from(felt)).ln(),
+        }
+    }
+
+    /// Drops those that are below `least`.
+    pub(super) fn drop_below(&mut self, least: f32) {
+        self.weigh(least);
+        if SPARSE * self.live < self.weights.len() {
+            self.keep(|_, weight| weight > 0.0);
+        }
+    }
+
+    /// Divides all weights.
+    pub(super) fn divide(&mut self, by: f32) {
+        for weight in &mut self.weights {
+            *weight /= by;
+        }
+        self.weigh(0.0);
+    }
+
+    /// Drops all.
+    pub(super) fn forget(&mut self) {
+        self.weights.fill(0.0);
+        self.weigh(0.0);
+    }
+
+    /// Sums up those that are not below `least`, and makes nothing of the others.
+    fn weigh(&mut self, least: f32) {
+        // Eight sums side by side.
+        let (mut sums, mut mosts, mut lives) = ([0.0_f32; 8], [0.0_f32; 8], [0_u32; 8]);
+        for weights in self.weights.chunks_mut(8) {
+            let sums = sums.iter_mut().zip(&mut mosts).zip(&mut lives);
+            for (weight, ((sum, most), live)) in weights.iter_mut().zip(sums) {
+                *weight = if *weight < least { 0.0 } else { *weight };
+                *sum += *weight;
+                *most = if *weight > *most { *weight } else { *most };
+                *live += u32::from(*weight > 0.0);
+            }
+        }
+        self.sum = sums.iter().copied().map(f64::from).sum();
+        self.most = mosts.iter().copied().fold(0.0, f32::max);
+        self.live = lives.iter().sum::<u32>() as usize;
+    }
+
+    /// Leaves only some places in the lists, by their number and weight.
+    fn keep(&mut self, is_kept: impl Fn(usize, f32) -> bool) {
+        let spots = &self.known.surface.spots;
+        let own = self.some.take().map(|some| some.spots);
+        let number = |root: usize| own.as_ref().map_or(root, |own| own[root] as usize);
+        let kept = { self.weights.iter().enumerate() }
+            .map(|(root, weight)| (number(root), *weight))
+            .filter(|(spot, weight)| is_kept(*spot, *weight));
+        let (kept, weights): (Vec<usize>, Vec<f32>) = kept.unzip();
+        let axes =
+            { spots.axes.each_ref() }.map(|axis| kept.iter().map(|spot| axis[*spot]).collect());
+        let kept = kept.iter().filter_map(|spot| u32::try_from(*spot).ok());
+        self.weights = weights;
+        self.some = Some(Chosen {
+            spots: kept.collect(),
+            axes,
+        });
+    }
+}
