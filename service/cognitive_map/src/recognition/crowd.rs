@@ -194,10 +194,9 @@ impl Crowd {
     /// The heaviest of an object, heaviest first, so many at most.
     pub(super) fn best_of(&self, object: ObjectId, most: usize) -> Vec<Root> {
         let mut best: Vec<Root> = Vec::new();
-        for (number, group) in self.groups.iter().enumerate() {
-            if group.object != object {
-                continue;
-            }
+        let from = self.groups.partition_point(|group| group.object < object);
+        let to = self.groups.partition_point(|group| group.object <= object);
+        for (number, group) in (from..to).zip(&self.groups[from..to]) {
             for (root, weight) in group.weights.iter().enumerate() {
                 let least = best.get(most - 1).map_or(0.0, |least| least.weight);
                 if *weight > least {

@@ -19,6 +19,9 @@ const LOOK_LEAST: f32 = 0.5;
 /// When fewer of the roots than one in so many hold something, the others are left out of the list.
 const SPARSE: usize = 2;
 
+/// When they are fewer than one of so many places, percepts are only worked out where they are.
+const SPARSE_FELT: usize = 4;
+
 /// The places of a map in one rotation, each taken for the one that was touched first.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
@@ -48,6 +51,7 @@ struct Chosen {
 /// Lists that are filled again and again.
 #[derive(Debug, Default)]
 pub(super) struct Lists {
+    /// Cells, and then the places that are nearest there.
     cells: Vec<u32>,
     likelihoods: Vec<f32>,
     /// Of the nearest place: squared distance \[m²\], and likelihood of what was felt there.
@@ -113,23 +117,35 @@ impl Group {
         lists.cells.resize(count, 0);
         let nearest = spots.nearest(variance);
         nearest.cells([x, y, z], step, &mut lists.cells);
-        let local = touch.feeling.at(surface, rotation);
-        local.likelihoods(&mut lists.likelihoods);
-        // Where no place is near, nothing was felt of any: without a branch, since that is as good as random.
-        lists.likelihoods.push(0.0);
+        // The cells are far apart in memory: nothing else is done while they come.
         let last = spots.all.len().saturating_sub(1);
+        for cell in &mut lists.cells {
+            *cell = nearest.place(*cell);
+        }
         let points = x.iter().zip(y).zip(z).zip(&lists.cells);
-        let places = lists.squares.iter_mut().zip(&mut lists.felt);
-        for ((((x, y), z), cell), (square, felt)) in points.zip(places) {
-            let place = nearest.place(*cell).min(last + 1);
-            let at = &spots.all[place.min(last)].at;
+        for ((((x, y), z), place), square) in points.zip(&mut lists.squares) {
+            let at = &spots.all[(*place as usize).min(last)].at;
             let apart = [
                 x + step[0] - at[0],
                 y + step[1] - at[1],
                 z + step[2] - at[2],
             ];
             *square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
-            *felt = lists.likelihoods[place];
+        }
+        let local = touch.feeling.at(surface, rotation);
+        if count * SPARSE_FELT < spots.all.len() {
+            for (felt, place) in lists.felt.iter_mut().zip(&lists.cells) {
+                let place = *place as usize;
+                let spot = spots.all.get(place);
+                *felt = spot.map_or(0.0, |spot| local.likelihood(place, spot));
+            }
+        } else {
+            local.likelihoods(&mut lists.likelihoods);
+            // Where no place is near, nothing was felt of any: without a branch, since that is as good as random.
+            lists.likelihoods.push(0.0);
+            for (felt, place) in lists.felt.iter_mut().zip(&lists.cells) {
+                *felt = lists.likelihoods[(*place as usize).min(last + 1)];
+            }
         }
         let per = narrow(-0.5 / variance);
         let area = TAU * variance;
@@ -212,17 +228,18 @@ impl Group {
         let spots = &self.known.surface.spots;
         let own = self.some.take().map(|some| some.spots);
         let number = |root: usize| own.as_ref().map_or(root, |own| own[root] as usize);
-        let kept = { self.weights.iter().enumerate() }
-            .map(|(root, weight)| (number(root), *weight))
-            .filter(|(spot, weight)| is_kept(*spot, *weight));
-        let (kept, weights): (Vec<usize>, Vec<f32>) = kept.unzip();
-        let axes =
-            { spots.axes.each_ref() }.map(|axis| kept.iter().map(|spot| axis[*spot]).collect());
-        let kept = kept.iter().filter_map(|spot| u32::try_from(*spot).ok());
+        let mut kept = Vec::with_capacity(self.live);
+        let mut weights = Vec::with_capacity(self.live);
+        for (root, weight) in self.weights.iter().enumerate() {
+            let spot = number(root);
+            if is_kept(spot, *weight) {
+                kept.push(u32::try_from(spot).expect("a model has few places"));
+                weights.push(*weight);
+            }
+        }
+        let gather = |axis: &Vec<f32>| kept.iter().map(|spot| axis[*spot as usize]).collect();
+        let axes = spots.axes.each_ref().map(gather);
         self.weights = weights;
-        self.some = Some(Chosen {
-            spots: kept.collect(),
-            axes,
-        });
+        self.some = Some(Chosen { spots: kept, axes });
     }
 }

@@ -133,9 +133,9 @@ mod tests {
         let mut ranks = Ranks::new(10 * COUNTED);
         for _ in 0..COUNTED {
             ranks.add_all(&[0.5; 3], 1.0);
-            ranks.add_all(&[0.25; 7], 1.0);
+            ranks.add_all(&[0.25; 8], 1.0);
         }
-        let sum = ranks.sum() / (3.25 * COUNTED as f64);
+        let sum = ranks.sum() / (3.5 * COUNTED as f64);
         assert!((sum - 1.0).abs() < 0.03, "{sum}");
     }
 }

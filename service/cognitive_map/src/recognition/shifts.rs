@@ -169,8 +169,10 @@ impl Shifts {
         let is_over = before.len() >= CROWD_CONTACTS;
         let least = if is_over { f64::INFINITY } else { best - BELOW };
         // The last hypothesis of an object stays.
+        let mut held: Vec<ObjectId> = parts.iter().map(|part| part.object).collect();
+        held.sort_unstable();
         for object in crowd.fading(least) {
-            if parts.iter().any(|part| part.object == object) {
+            if held.binary_search(&object).is_ok() {
                 continue;
             }
             for root in crowd.best_of(object, 1) {
