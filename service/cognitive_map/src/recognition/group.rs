@@ -111,6 +111,9 @@ impl Group {
         let step = [narrow(step.x), narrow(step.y), narrow(step.z)];
         let [x, y, z] = { self.some.as_ref() }.map_or(&spots.axes, |some| &some.axes);
         let count = self.weights.len();
+        if count == 0 {
+            return;
+        }
         for list in [&mut lists.squares, &mut lists.felt] {
             list.resize(count, 0.0);
         }
@@ -118,17 +121,18 @@ impl Group {
         let nearest = spots.nearest(variance);
         nearest.cells([x, y, z], step, &mut lists.cells);
         // The cells are far apart in memory: nothing else is done while they come.
-        let last = spots.all.len().saturating_sub(1);
+        let last = spots.all.len() - 1;
         for cell in &mut lists.cells {
             *cell = nearest.place(*cell);
         }
+        let [to_x, to_y, to_z] = spots.axes.each_ref().map(|axis| &axis[..=last]);
         let points = x.iter().zip(y).zip(z).zip(&lists.cells);
         for ((((x, y), z), place), square) in points.zip(&mut lists.squares) {
-            let at = &spots.all[(*place as usize).min(last)].at;
+            let place = (*place as usize).min(last);
             let apart = [
-                x + step[0] - at[0],
-                y + step[1] - at[1],
-                z + step[2] - at[2],
+                x + step[0] - to_x[place],
+                y + step[1] - to_y[place],
+                z + step[2] - to_z[place],
             ];
             *square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
         }

@@ -5,6 +5,10 @@ const CELLS_MAX: f32 = 32_768.0;
 /// No place is near.
 const NONE: u16 = u16::MAX;
 
+/// Cells of a brick along each axis, as powers of two: the numbers of a brick fill a line of a processor's cache, and neighbours
+/// are mostly in one.
+const BRICK: [u32; 3] = [2, 2, 1];
+
 /// Cells over the box of a map, each with the place that is nearest to its middle, if one is within reach of any of its points. The
 /// outermost cells are empty, and stand for all that is beyond.
 #[derive(Clone, Debug)]
@@ -12,9 +16,11 @@ pub(super) struct Nearest {
     /// Middle of the first cell, from the map's middle \[m\].
     low: [f32; 3],
     per_m: f32,
-    /// Cells along each axis, as numbers to multiply by.
+    /// Cells along each axis.
     size: [f32; 3],
-    /// Numbers of the places, over `step`.
+    /// Bricks along each axis but the first.
+    bricks: [u32; 2],
+    /// Numbers of the places, over `step`, brick by brick.
     places: Vec<u16>,
     /// How many places one number stands for: they lie side by side.
     step: u32,
@@ -41,11 +47,14 @@ impl Nearest {
             edge_m *= 1.1;
         }
         let (reach_m, size) = (reach(edge_m), size(edge_m));
+        let bricks: [usize; 3] =
+            std::array::from_fn(|axis| (whole(size[axis]) as usize).div_ceil(1 << BRICK[axis]));
         let mut nearest = Self {
+            bricks: [1, 2].map(|axis| u32::try_from(bricks[axis]).unwrap_or(u32::MAX)),
             low: low.map(|low| low - reach_m - edge_m),
             per_m: 1.0 / edge_m,
             size,
-            places: vec![NONE; index(size.iter().product())],
+            places: vec![NONE; bricks.iter().product::<usize>() << BRICK.iter().sum::<u32>()],
             step: u32::try_from(axes[0].len().div_ceil(usize::from(NONE)))
                 .map_or(1, |step| step.max(1)),
         };
@@ -63,16 +72,15 @@ impl Nearest {
         let at: [f32; 3] = std::array::from_fn(|axis| (at[axis] - self.low[axis]) * self.per_m);
         let reach = reach_m * self.per_m;
         let range = |axis: usize| {
-            let last = index(self.size[axis]) - 2;
-            index((at[axis] - reach).max(1.0).ceil())..=index(at[axis] + reach).min(last)
+            let last = whole(self.size[axis]) - 2;
+            whole((at[axis] - reach).max(1.0).ceil())..=whole(at[axis] + reach).min(last)
         };
-        let [_, rows, columns] = self.size.map(index);
         for i in range(0) {
             for j in range(1) {
                 for k in range(2) {
                     let apart: [f32; 3] = [i as f32 - at[0], j as f32 - at[1], k as f32 - at[2]];
                     let squared: f32 = apart.iter().map(|x| x * x).sum();
-                    let cell = (i * rows + j) * columns + k;
+                    let cell = cell([i, j, k], self.bricks) as usize;
                     if squared <= reach * reach && squared < squares[cell] {
                         squares[cell] = squared;
                         self.places[cell] = number;
@@ -87,20 +95,18 @@ impl Nearest {
         /// Adding it leaves the nearest whole number in the low bits.
         const WHOLE: f32 = 8_388_608.0;
         let per_m = self.per_m;
-        let whole = |at: f32, from: f32, last: f32| {
+        let at = |at: f32, from: f32, last: f32| {
             let at = (at + from) * per_m;
             // What is no number is in the first cell.
             let at = if at > 0.0 { at } else { 0.0 };
             let at = if at < last { at } else { last };
-            (at + WHOLE) - WHOLE
+            (at + WHOLE).to_bits() & 0x007F_FFFF
         };
         let [fx, fy, fz] = std::array::from_fn(|axis| shift[axis] - self.low[axis]);
         let [lx, ly, lz] = self.size.map(|size| size - 1.0);
-        let [_, rows, columns] = self.size;
+        let bricks = self.bricks;
         for (((x, y), z), out) in x.iter().zip(y).zip(z).zip(out) {
-            let row = whole(*x, fx, lx) * rows + whole(*y, fy, ly);
-            let cell = row * columns + whole(*z, fz, lz);
-            *out = (cell + WHOLE).to_bits() & 0x007F_FFFF;
+            *out = cell([at(*x, fx, lx), at(*y, fy, ly), at(*z, fz, lz)], bricks);
         }
     }
 
@@ -110,15 +116,23 @@ impl Nearest {
     }
 }
 
+/// The number of a cell, by its place along each axis.
+fn cell([i, j, k]: [u32; 3], [rows, columns]: [u32; 2]) -> u32 {
+    let [a, b, c] = BRICK;
+    let within = |at: u32, power: u32| at & ((1 << power) - 1);
+    let brick = ((i >> a) * rows + (j >> b)) * columns + (k >> c);
+    brick << (a + b + c) | within(i, a) << (b + c) | within(j, b) << c | within(k, c)
+}
+
 /// A whole number that is positive.
-fn index(x: f32) -> usize {
+fn whole(x: f32) -> u32 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "rounds down, and saturates"
     )]
-    let index = x as usize;
-    index
+    let whole = x as u32;
+    whole
 }
 
 #[cfg(test)]

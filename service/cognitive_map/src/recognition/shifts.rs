@@ -16,11 +16,11 @@ use super::surface::Surface;
 
 /// Most contacts explained at a touch, one for each hypothesis, and for first places that are looked at one for each contact
 /// so far.
-const EXPLAINED_MAX: usize = 2048;
+const EXPLAINED_MAX: usize = 1280;
 /// The fewer, the more first places there are at which a rough look is taken: so many of these cost as much as all of those.
 const ROUGH_MAX: usize = 150_000;
 /// Contacts explained at least.
-const EXPLAINED_MIN: usize = 384;
+const EXPLAINED_MIN: usize = 256;
 /// What first places that are worth a look may hold together without being looked at, of all: an estimate is good
 /// enough for them.
 const UNLOOKED: f64 = 1e-3;
