@@ -14,8 +14,6 @@ use super::spots::narrow;
 
 /// Most roots; of larger libraries every second place stands for two, or every third for three.
 const ROOTS_MAX: usize = 1 << 22;
-/// While more than so many times as many are worth a look as can be looked at, all wait.
-const WAITING: usize = 8;
 /// Weights are brought back to one when the heaviest is so far from it.
 const HEAVY: f32 = 1_048_576.0;
 
@@ -36,7 +34,7 @@ pub(super) struct Crowd {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Root {
     group: usize,
-    root: usize,
+    number: usize,
     weight: f32,
 }
 
@@ -138,20 +136,17 @@ impl Crowd {
         worth
     }
 
-    /// The roots that hold most of those that are worth a look: so many at most, and not more than leave next to nothing,
-    /// e^`rest_log`, to the others. If that leaves far more than are looked at, none: estimates are as good for telling them apart, and
-    /// what is looked at has to be kept.
-    pub(super) fn heaviest(&self, worth: &[f32], most: usize, rest_log: f64) -> Vec<Root> {
-        let per_top = 1.0 / self.most();
-        let mut ranks = Ranks::new(worth.len());
-        ranks.add_all(worth, per_top);
+    /// How many roots hold all of the mass of those that are worth a look but next to nothing, e^`rest_log`.
+    pub(super) fn holding(&self, worth: &[f32], rest_log: f64) -> usize {
+        let (ranks, per_top) = self.ranks(worth);
         let rest = (rest_log - self.log).exp() * f64::from(per_top);
-        let count = ranks.holding((ranks.sum() - rest).max(0.0));
-        if count > WAITING * most {
-            return Vec::new();
-        }
-        let count = count.min(most);
-        if !per_top.is_finite() || count == 0 {
+        ranks.holding((ranks.sum() - rest).max(0.0))
+    }
+
+    /// Of the roots that are worth a look so many heaviest.
+    pub(super) fn heaviest(&self, worth: &[f32], count: usize) -> Vec<Root> {
+        let (ranks, per_top) = self.ranks(worth);
+        if count == 0 {
             return Vec::new();
         }
         let (least, heavy) = ranks.least(count);
@@ -167,7 +162,7 @@ impl Crowd {
                     if met % step == 0 {
                         heaviest.push(Root {
                             group: number,
-                            root,
+                            number: root,
                             weight: *weight,
                         });
                     }
@@ -178,6 +173,14 @@ impl Crowd {
         heaviest
     }
 
+    /// Weights by rank, and what they are multiplied by for that.
+    fn ranks(&self, worth: &[f32]) -> (Ranks, f32) {
+        let per_top = 1.0 / self.most().max(f32::MIN_POSITIVE);
+        let mut ranks = Ranks::new(worth.len());
+        ranks.add_all(worth, per_top);
+        (ranks, per_top)
+    }
+
     /// Takes one out, as it was after the first touch, with the map that it is in.
     pub(super) fn take(
         &mut self,
@@ -186,9 +189,9 @@ impl Crowd {
         first: &Feeling<'_>,
     ) -> (Shift, &Known) {
         let group = &mut self.groups[root.group];
-        group.weights[root.root] = 0.0;
+        group.weights[root.number] = 0.0;
         let rotation = &rotations[usize::from(group.rotation)];
-        (group.shift(root.root, rotation, first), group.known())
+        (group.shift(root.number, rotation, first), group.known())
     }
 
     /// The heaviest of an object, heaviest first, so many at most.
@@ -204,7 +207,7 @@ impl Crowd {
                     best.truncate(most - 1);
                     let root = Root {
                         group: number,
-                        root,
+                        number: root,
                         weight: *weight,
                     };
                     best.insert(at.min(best.len()), root);
@@ -221,7 +224,7 @@ impl Crowd {
         let rotation = &rotations[usize::from(group.rotation)];
         Some(Shift {
             evidence: f64::from(root.weight).ln() + self.log,
-            ..group.shift(root.root, rotation, &first)
+            ..group.shift(root.number, rotation, &first)
         })
     }
 

@@ -195,7 +195,7 @@ pub(super) fn exp(x: f32) -> f32 {
     let shifted = turns + WHOLE;
     let f = turns - (shifted - WHOLE);
     let series = 1.0
-        + f * (0.693_147_2
+        + f * (std::f32::consts::LN_2
             + f * (0.240_226_5
                 + f * (0.055_504_11
                     + f * (0.009_618_129 + f * (0.001_333_356 + f * 0.000_154_035)))));

@@ -8,7 +8,7 @@ use nalgebra::UnitQuaternion;
 use super::contact::Contact;
 use super::feeling::{Feeling, exp};
 use super::library::{Known, ObjectId};
-use super::shifts::{Shift, Taken};
+use super::shifts::{Shift, Taken, share};
 use super::spots::narrow;
 
 /// Most that a touch makes of a weight, so that numbers stay finite.
@@ -153,7 +153,7 @@ impl Group {
         }
         let per = narrow(-0.5 / variance);
         let area = TAU * variance;
-        let peak = touch.share(surface.patches.len()) / (touch.outlier * area * area.sqrt());
+        let peak = share(surface.patches.len()) / (touch.outlier * area * area.sqrt());
         let peak = narrow(peak);
         let places = lists.squares.iter().zip(&lists.felt);
         for ((weight, worth), (square, felt)) in self.weights.iter_mut().zip(worth).zip(places) {

@@ -52,8 +52,9 @@ impl Ranks {
 
     /// Ranks that have masses, with their number and what each is, about; heaviest first.
     fn masses(&self) -> impl Iterator<Item = (u32, u32, f64)> {
-        let ranks = (0..RANKS as u32).zip(&self.counts).rev();
+        let ranks = self.counts.iter().enumerate().rev();
         ranks.filter(|(_, count)| **count > 0).map(|(rank, count)| {
+            let rank = u32::try_from(rank).unwrap_or(u32::MAX);
             let middle = (rank << DROPPED_BITS) + (1 << (DROPPED_BITS - 1));
             (rank, *count, f64::from(f32::from_bits(middle)))
         })

@@ -14,13 +14,17 @@ use super::spots::{Answer, narrow};
 use super::strangers::stranger_logs;
 use super::surface::Surface;
 
-/// Most contacts explained at a touch, one for each hypothesis, and for first places that are looked at one for each contact
-/// so far.
-const EXPLAINED_MAX: usize = 1280;
+/// Most hypotheses kept of those that were looked at.
+const KEPT_MAX: usize = 4096;
+/// Most contacts explained at a touch by first places that are looked at, each by all contacts so far.
+const LOOKS_MAX: usize = 1280;
 /// The fewer, the more first places there are at which a rough look is taken: so many of these cost as much as all of those.
 const ROUGH_MAX: usize = 150_000;
 /// Contacts explained at least.
-const EXPLAINED_MIN: usize = 256;
+const LOOKS_MIN: usize = 256;
+/// First places wait until all that are worth a look can be looked at, but not longer than so many contacts: meanwhile
+/// estimates tell them apart nearly as well, and what is looked at has to be kept.
+const WAITING_CONTACTS: usize = 12;
 /// What first places that are worth a look may hold together without being looked at, of all: an estimate is good
 /// enough for them.
 const UNLOOKED: f64 = 1e-3;
@@ -121,19 +125,11 @@ impl Shifts {
             }
         }
         if !self.crowd.is_empty() {
-            let budget = self.budget();
-            let looks = budget.saturating_sub(all.len()).max(budget / 4) / before.len();
-            self.look(library, before, (&touch, looks), &mut parts);
+            self.look(library, before, &touch, &mut parts);
         }
         self.all = parts;
         self.merge();
-        let budget = self.budget();
-        // While there is a crowd half of the next touch's work is left for those who come from it.
-        self.prune(if self.crowd.is_empty() {
-            budget
-        } else {
-            budget / 2
-        });
+        self.prune();
     }
 
     /// Lets a touch tell which of the crowd are worth a look, and looks at the heaviest of these.
@@ -141,7 +137,7 @@ impl Shifts {
         &mut self,
         library: &ObjectLibrary,
         before: &[Contact],
-        (touch, looks): (&Taken<'_>, usize),
+        touch: &Taken<'_>,
         parts: &mut Vec<Shift>,
     ) {
         let mut crowd = std::mem::take(&mut self.crowd);
@@ -152,7 +148,13 @@ impl Shifts {
                 .collect::<Vec<_>>()
                 .into_iter(),
         );
-        let heaviest = crowd.heaviest(&worth, looks, all + UNLOOKED.ln());
+        let rough = ROUGH_MAX.saturating_sub(worth.len());
+        let looks = (LOOKS_MAX * rough / ROUGH_MAX).max(LOOKS_MIN) / before.len();
+        let mut heaviest = Vec::new();
+        let wanted = crowd.holding(&worth, all + UNLOOKED.ln());
+        if wanted <= looks || before.len() >= WAITING_CONTACTS {
+            heaviest = crowd.heaviest(&worth, wanted.min(looks));
+        }
         let first = Feeling::new(&before[0], library.wide());
         let way: Vec<Taken<'_>> = before
             .windows(2)
@@ -201,8 +203,8 @@ impl Shifts {
         let query = Point3::from(rotation * contact.position_m.coords + shift.translation);
         let spots = &surface.spots;
         let densities = spots.answers(&query, (prior, noise), local, answers);
-        let share = touch.share(surface.patches.len()) / TAU.powf(1.5);
-        let outlier = touch.outlier / share;
+        let one = share(surface.patches.len()) / TAU.powf(1.5);
+        let outlier = touch.outlier / one;
         let total = outlier + densities;
         let least = PART_SHARE * total;
         answers.retain(|answer| answer.density >= least);
@@ -211,7 +213,7 @@ impl Shifts {
             answers.truncate(PARTS_MAX);
         }
         let best = answers.iter().map(|answer| answer.density);
-        let evidence = shift.evidence + (share * total).ln();
+        let evidence = shift.evidence + (one * total).ln();
         if best.fold(0.0, f64::max) < outlier {
             // Most likely an outlier: the hypothesis stays where it is.
             parts.push(Shift {
@@ -236,12 +238,6 @@ impl Shifts {
                 ..*shift
             });
         }
-    }
-
-    /// Most contacts that are explained at the next touch.
-    fn budget(&self) -> usize {
-        let rough = ROUGH_MAX.saturating_sub(self.crowd.len());
-        (EXPLAINED_MAX * rough / ROUGH_MAX).max(EXPLAINED_MIN)
     }
 
     /// Makes one of hypotheses that have become the same, and puts them in order of object, rotation and place.
@@ -275,7 +271,8 @@ impl Shifts {
     }
 
     /// Drops what holds no evidence, and the least beyond the budget; each object keeps its best.
-    fn prune(&mut self, most: usize) {
+    fn prune(&mut self) {
+        let most = KEPT_MAX;
         let evidences = self.all.iter().map(|shift| shift.evidence);
         let best = evidences.clone().fold(self.crowd.best_log(), f64::max);
         let mut least = best - BELOW;
@@ -400,11 +397,11 @@ impl<'a> Taken<'a> {
             outlier: OUTLIERS * library.elsewhere(),
         }
     }
+}
 
-    /// Share of touches that are of one of so many places.
-    pub(super) fn share(&self, places: usize) -> f64 {
-        (1.0 - OUTLIERS) / places as f64
-    }
+/// Share of touches that are of one of so many places.
+pub(super) fn share(places: usize) -> f64 {
+    (1.0 - OUTLIERS) / places as f64
 }
 
 impl Shift {
