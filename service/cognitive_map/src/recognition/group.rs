@@ -34,23 +34,18 @@ pub(super) struct Group {
     /// Mass of each, on the scale of the crowd; nothing for those that have been looked at or hold nothing.
     pub(super) weights: Vec<f32>,
     /// Which places they are, if not all.
-    some: Option<Chosen>,
+    some: Option<Vec<u32>>,
     pub(super) sum: f64,
     pub(super) most: f32,
     /// How many hold something.
     live: usize,
 }
 
-/// Some places of a map.
-#[derive(Clone, Debug)]
-struct Chosen {
-    spots: Vec<u32>,
-    axes: [Vec<f32>; 3],
-}
-
 /// Lists that are filled again and again.
 #[derive(Debug, Default)]
 pub(super) struct Lists {
+    /// Positions of some places of a map.
+    axes: [Vec<f32>; 3],
     /// Cells, and then the places that are nearest there.
     cells: Vec<u32>,
     likelihoods: Vec<f32>,
@@ -109,7 +104,6 @@ impl Group {
         let variance = first.variance_m2() + spots.variance_m2 + drift + noise;
         let step = rotation * (contact.position_m - first.position_m);
         let step = [narrow(step.x), narrow(step.y), narrow(step.z)];
-        let [x, y, z] = { self.some.as_ref() }.map_or(&spots.axes, |some| &some.axes);
         let count = self.weights.len();
         if count == 0 {
             return;
@@ -118,6 +112,19 @@ impl Group {
             list.resize(count, 0.0);
         }
         lists.cells.resize(count, 0);
+        if let Some(some) = &self.some {
+            for (list, axis) in lists.axes.iter_mut().zip(&spots.axes) {
+                list.resize(count, 0.0);
+                for (at, spot) in list.iter_mut().zip(some) {
+                    *at = axis[*spot as usize];
+                }
+            }
+        }
+        let [x, y, z] = if self.some.is_some() {
+            &lists.axes
+        } else {
+            &spots.axes
+        };
         let nearest = spots.nearest(variance);
         nearest.cells([x, y, z], step, &mut lists.cells);
         // The cells are far apart in memory: nothing else is done while they come.
@@ -173,7 +180,7 @@ impl Group {
         first: &Feeling<'_>,
     ) -> Shift {
         let surface = &self.known.surface;
-        let spot = { self.some.as_ref() }.map_or(root, |some| some.spots[root] as usize);
+        let spot = { self.some.as_ref() }.map_or(root, |some| some[root] as usize);
         let patch = &surface.patches[surface.spots.patch(spot)];
         let contact = first.contact;
         let local = first.at(surface, rotation);
@@ -229,21 +236,17 @@ impl Group {
 
     /// Leaves only some places in the lists, by their number and weight.
     fn keep(&mut self, is_kept: impl Fn(usize, f32) -> bool) {
-        let spots = &self.known.surface.spots;
-        let own = self.some.take().map(|some| some.spots);
-        let number = |root: usize| own.as_ref().map_or(root, |own| own[root] as usize);
+        let own = self.some.take();
         let mut kept = Vec::with_capacity(self.live);
-        let mut weights = Vec::with_capacity(self.live);
-        for (root, weight) in self.weights.iter().enumerate() {
-            let spot = number(root);
-            if is_kept(spot, *weight) {
+        for root in 0..self.weights.len() {
+            let spot = own.as_ref().map_or(root, |own| own[root] as usize);
+            let weight = self.weights[root];
+            if is_kept(spot, weight) {
+                self.weights[kept.len()] = weight;
                 kept.push(u32::try_from(spot).expect("a model has few places"));
-                weights.push(*weight);
             }
         }
-        let gather = |axis: &Vec<f32>| kept.iter().map(|spot| axis[*spot as usize]).collect();
-        let axes = spots.axes.each_ref().map(gather);
-        self.weights = weights;
-        self.some = Some(Chosen { spots: kept, axes });
+        self.weights.truncate(kept.len());
+        self.some = Some(kept);
     }
 }

@@ -1,7 +1,7 @@
 //! Which place of a map is nearest, roughly: one number for each cell of a box.
 
 /// Most cells; they are larger rather than more, so that they stay in a processor's caches.
-const CELLS_MAX: f32 = 32_768.0;
+const CELLS_MAX: f32 = 65_536.0;
 /// No place is near.
 const NONE: u16 = u16::MAX;
 

@@ -15,8 +15,6 @@ const NOTICED_SD: f64 = 3.5;
 const GROWTH: f64 = 3.0;
 /// Cells of a scale along a reach, at most.
 const CELLS_PER_REACH: f64 = 4.0;
-/// Edge of a cell in spacings, at least: places are a little farther apart than one.
-const SPACINGS_PER_CELL: f64 = 1.3;
 
 /// A place with what most places have: where it is, and one level.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +90,7 @@ impl Spots {
         let mut reach_m = (1.1 * NOTICED_SD * (2.0 * (noise_m2 + variance_m2)).sqrt()).max(1e-9);
         let mut nearest = Vec::new();
         loop {
-            let edge_m = (SPACINGS_PER_CELL * spacing_m).max(reach_m / CELLS_PER_REACH);
+            let edge_m = spacing_m.max(reach_m / CELLS_PER_REACH);
             let grid = Nearest::new(&axes, narrow(reach_m), narrow(edge_m));
             nearest.push((reach_m, grid));
             if reach_m > extent_m {
