@@ -107,8 +107,8 @@ impl Crowd {
         }
     }
 
-    /// Takes a touch in, and gives the weight of each that it makes worth a look, group after group: of those that are explained by
-    /// a place. That of others is nothing.
+    /// Takes a touch in, and gives the weight of each that it makes worth a look, group after group: of those that have a
+    /// place near. That of others is nothing.
     pub(super) fn sift(
         &mut self,
         library: &ObjectLibrary,

@@ -13,9 +13,6 @@ use super::spots::narrow;
 
 /// Most that a touch makes of a weight, so that numbers stay finite.
 const GAIN_MAX: f32 = 1e30;
-/// A root is worth a look only where a place is at least so likely against an outlier: what is less likely leaves a hypothesis
-/// where it is.
-const LOOK_LEAST: f32 = 0.5;
 /// When fewer of the roots than one in so many hold something, the others are left out of the list.
 const SPARSE: usize = 2;
 
@@ -87,7 +84,7 @@ impl Group {
         &self.known
     }
 
-    /// Takes a touch in, and writes the weights of those that it makes worth a look.
+    /// Takes a touch in, and writes the weights of those that it makes worth a look: where there is a place near.
     pub(super) fn sift(
         &mut self,
         first: &Contact,
@@ -167,7 +164,7 @@ impl Group {
             let gain = peak * felt * exp(per * square);
             let gain = if gain < GAIN_MAX { gain } else { GAIN_MAX };
             *weight *= 1.0 + gain;
-            *worth = if gain > LOOK_LEAST { *weight } else { 0.0 };
+            *worth = if *felt > 0.0 { *weight } else { 0.0 };
         }
         self.weigh(0.0);
     }

@@ -22,12 +22,13 @@ const LOOKS_MAX: usize = 1280;
 const ROUGH_MAX: usize = 150_000;
 /// Contacts explained at least.
 const LOOKS_MIN: usize = 256;
-/// First places wait until all that are worth a look can be looked at, but not longer than so many contacts: meanwhile
+/// First places wait until all that matter can be looked at, but not longer than so many contacts: meanwhile
 /// estimates tell them apart nearly as well, and what is looked at has to be kept.
 const WAITING_CONTACTS: usize = 12;
-/// What first places that are worth a look may hold together without being looked at, of all: an estimate is good
-/// enough for them.
-const UNLOOKED: f64 = 1e-3;
+/// Share of all mass that those who wait may hold when the others are looked at, and that of those which need not be looked
+/// at at all.
+const WAITING: f64 = 1e-3;
+const UNLOOKED: f64 = 1e-6;
 /// After so many contacts the places that nobody has looked at are given up.
 const CROWD_CONTACTS: usize = 32;
 /// A hypothesis this far below the best holds nothing worth its keep: e⁻²⁰.
@@ -151,8 +152,9 @@ impl Shifts {
         let rough = ROUGH_MAX.saturating_sub(worth.len());
         let looks = (LOOKS_MAX * rough / ROUGH_MAX).max(LOOKS_MIN) / before.len();
         let mut heaviest = Vec::new();
-        let wanted = crowd.holding(&worth, all + UNLOOKED.ln());
-        if wanted <= looks || before.len() >= WAITING_CONTACTS {
+        let is_time = before.len() >= WAITING_CONTACTS;
+        if is_time || crowd.holding(&worth, all + WAITING.ln()) <= looks {
+            let wanted = crowd.holding(&worth, all + UNLOOKED.ln());
             heaviest = crowd.heaviest(&worth, wanted.min(looks));
         }
         let first = Feeling::new(&before[0], library.wide());
