@@ -8,7 +8,7 @@
 //!
 //! Objects are those of environment 3, put together until they have 1,000 places, each learned from five touches; levels are felt with 10 % of
 //! noise, and on `plain` objects not at all. Each of 25 episodes is a random exploration of twelve touches from an unknown start. A touch is
-//! timed with its answer, on one thread; of five runs of the same episode the least time counts, so that other programs on the
+//! timed with its answer, on one thread; of three runs of the same episode the least time counts, so that other programs on the
 //! machine do so little.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
@@ -29,7 +29,7 @@ const PLACES: usize = 1000;
 const EPISODES: usize = 25;
 const TOUCHES: usize = 12;
 const TOUCHES_PER_PLACE: usize = 5;
-const RUNS: usize = 5;
+const RUNS: usize = 3;
 const SEED: u64 = 1;
 const NOISE: ExplorationNoise = ExplorationNoise {
     value: 0.1,
