@@ -148,12 +148,13 @@ fn log(library: &ObjectLibrary, surface: &Surface, rival: &Rival, touch: &Contac
         return relief.log(&(to_middle * rival.map_from_episode), touch, scene);
     }
     let point = rival.map_from_episode * touch.position_m;
-    let near = surface.near(&point, touch.variance_m2()).iter();
-    let logs = near.map(|&number| {
+    let mut best = -TOLD_MAX;
+    surface.spots.near(&point, touch.variance_m2(), |number| {
         let patch = &surface.patches[number as usize];
         let variance = patch.variance_m2 + touch.variance_m2();
-        patch.percept_log(touch, library.wide())
-            - 0.5 * (patch.position - point).norm_squared() / variance
+        let log = patch.percept_log(touch, library.wide())
+            - 0.5 * (patch.position - point).norm_squared() / variance;
+        best = f64::max(best, log);
     });
-    logs.fold(-TOLD_MAX, f64::max)
+    best
 }

@@ -12,7 +12,7 @@ use super::orientation::Orientation;
 use super::poses::{Hypothesis as PoseHypothesis, Poses};
 use super::posterior::{PoseEstimate, Posterior, entropy_nats};
 use super::relief::Relief;
-use super::shifts::{Shifts, log_sum};
+use super::shifts::{Shift, Shifts, log_sum};
 use super::surface::Surface;
 use crate::geometry::{PoseCovariance, se3};
 
@@ -25,13 +25,15 @@ const UNKNOWN_PRIOR: f64 = 0.1;
 /// Per contact, how far below what a right map does the best of the wrong ones explains something that was
 /// never learned, in deviations in depth and in both angles each.
 const STRANGE_SD: f64 = 1.2;
+/// Share of the mass that live hypotheses hold together.
+const LIVE: f64 = 0.99;
 /// Other poses that an answer names.
 const OTHERS_MAX: usize = 24;
 
 /// The state of one episode of recognition.
 ///
-/// All work is bounded per touch: by the number of places of the library at the first, by budgets of
-/// hypotheses and of poses tried after.
+/// All work is bounded per touch: by the number of places of the library, and by budgets of hypotheses and of
+/// poses tried.
 #[derive(Clone, Debug)]
 pub struct Recognition {
     contacts: Vec<Contact>,
@@ -113,8 +115,7 @@ impl Recognition {
 
     /// What it says so far.
     pub fn posterior(&self, library: &ObjectLibrary) -> Posterior {
-        let mut logs = self.logs(library);
-        let mut objects = sums(library, &logs);
+        let mut objects = self.object_logs(library);
         // A surface's errors are shared by the contacts near one another: those in a free pose, which is fitted to
         // them, are worth fewer independent ones.
         let best = objects.iter().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -129,7 +130,7 @@ impl Recognition {
         }
         let prior = (1.0 - UNKNOWN_PRIOR).ln() - (objects.len().max(1) as f64).ln();
         let mut none = UNKNOWN_PRIOR.ln();
-        if logs.is_empty() {
+        if self.is_empty() {
             // Too little was felt for any hypothesis: every object is as likely as any.
             for (_, log) in &mut objects {
                 *log = prior;
@@ -154,18 +155,9 @@ impl Recognition {
         }
         let unknown = (none - total).exp();
         objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let pose = objects
-            .first()
-            .and_then(|(object, _)| pose(*object, &self.masses(library, *object)));
-        logs.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
-        let all = log_sum(logs.iter().map(|(_, log)| *log));
-        let mut sum = 0.0;
-        let live = logs.iter().position(|(_, log)| {
-            sum += (log - all).exp();
-            sum >= 0.99
-        });
+        let pose = { objects.first() }.and_then(|(object, _)| self.pose(library, *object));
         Posterior {
-            live_hypotheses: live.map_or(logs.len(), |at| at + 1),
+            live_hypotheses: self.live_hypotheses(library),
             live_objects: objects.iter().filter(|object| object.1 > 0.01).count(),
             entropy_nats: entropy_nats(objects.iter().map(|object| object.1).chain([unknown])),
             objects,
@@ -176,33 +168,70 @@ impl Recognition {
         }
     }
 
-    /// Log of the mass of each hypothesis, in one measure.
-    fn logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
+    /// Whether there is no hypothesis yet.
+    fn is_empty(&self) -> bool {
+        match &self.hypotheses {
+            Hypotheses::Shifts(shifts) => shifts.is_empty(),
+            Hypotheses::Poses(poses) => poses.all.is_empty(),
+        }
+    }
+
+    /// Log of each object's mass, in one measure.
+    fn object_logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
         match &self.hypotheses {
             Hypotheses::Shifts(shifts) => {
-                let reach_m = self.reach_m();
-                let shares = library.surfaces().map(|(object, surface)| {
-                    let asked = self.aimed as f64 * surface.area_m2.ln();
-                    (
-                        object,
-                        asked + found_log(surface, self.steps_m.len(), reach_m),
-                    )
-                });
-                let shares: BTreeMap<ObjectId, f64> = shares.collect();
-                let logs = shifts.all.iter().filter_map(|shift| {
-                    let share = shares.get(&shift.object)?;
-                    Some((shift.object, shift.evidence + share))
-                });
-                logs.collect()
+                let logs = shifts.object_logs();
+                let shares = self.shift_shares(library).into_iter();
+                let log = |(object, share)| {
+                    let own = logs.get(&object).copied();
+                    (object, own.map_or(f64::NEG_INFINITY, |own| own + share))
+                };
+                shares.map(log).collect()
             }
-            Hypotheses::Poses(poses) => {
-                let logs = poses.all.iter().filter_map(|hypothesis| {
-                    let log = self.pose_log(library, hypothesis)?;
-                    Some((hypothesis.object, log))
-                });
-                logs.collect()
-            }
+            Hypotheses::Poses(_) => sums(library, &self.pose_logs(library)),
         }
+    }
+
+    /// What the mass of each object's shifts is multiplied by; logs.
+    fn shift_shares(&self, library: &ObjectLibrary) -> BTreeMap<ObjectId, f64> {
+        let reach_m = self.reach_m();
+        let shares = library.surfaces().map(|(object, surface)| {
+            let asked = self.aimed as f64 * surface.area_m2.ln();
+            (
+                object,
+                asked + found_log(surface, self.steps_m.len(), reach_m),
+            )
+        });
+        shares.collect()
+    }
+
+    /// Log of the mass of each pose, in one measure.
+    fn pose_logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
+        let Hypotheses::Poses(poses) = &self.hypotheses else {
+            return Vec::new();
+        };
+        let logs = poses.all.iter().filter_map(|hypothesis| {
+            let log = self.pose_log(library, hypothesis)?;
+            Some((hypothesis.object, log))
+        });
+        logs.collect()
+    }
+
+    /// How many hypotheses hold `LIVE` of the mass of all.
+    fn live_hypotheses(&self, library: &ObjectLibrary) -> usize {
+        if let Hypotheses::Shifts(shifts) = &self.hypotheses {
+            let shares = self.shift_shares(library);
+            return shifts.holding(LIVE, |object| shares.get(&object).copied());
+        }
+        let mut logs = self.pose_logs(library);
+        logs.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
+        let all = log_sum(logs.iter().map(|(_, log)| *log));
+        let mut sum = 0.0;
+        let live = logs.iter().position(|(_, log)| {
+            sum += (log - all).exp();
+            sum >= LIVE
+        });
+        live.map_or(logs.len(), |at| at + 1)
     }
 
     fn pose_log(&self, library: &ObjectLibrary, hypothesis: &PoseHypothesis) -> Option<f64> {
@@ -216,17 +245,14 @@ impl Recognition {
         )
     }
 
-    /// All hypotheses of an object with their masses, in one measure.
-    fn masses(&self, library: &ObjectLibrary, object: ObjectId) -> Vec<Mass> {
+    /// The heaviest hypotheses of an object with their masses in one measure, heaviest first, so many at most.
+    fn masses(&self, library: &ObjectLibrary, object: ObjectId, most: usize) -> Vec<Mass> {
         let Some(surface) = library.surface(object) else {
             return Vec::new();
         };
         match &self.hypotheses {
-            Hypotheses::Shifts(shifts) => shifts
-                .all
-                .iter()
-                .filter(|shift| shift.object == object)
-                .map(|shift| {
+            Hypotheses::Shifts(shifts) => {
+                let mass = |shift: Shift| {
                     let mut covariance = Matrix6::zeros();
                     let mut corner = covariance.fixed_view_mut::<3, 3>(0, 0);
                     corner.fill_diagonal(shift.variance_m2);
@@ -235,13 +261,14 @@ impl Recognition {
                         covariance,
                         log: shift.evidence,
                     }
-                })
-                .collect(),
-            Hypotheses::Poses(poses) => poses
-                .all
-                .iter()
-                .filter(|hypothesis| hypothesis.object == object)
-                .filter_map(|hypothesis| {
+                };
+                { shifts.heaviest(object, most).into_iter() }
+                    .map(mass)
+                    .collect()
+            }
+            Hypotheses::Poses(poses) => {
+                let own = poses.all.iter().filter(|pose| pose.object == object);
+                let masses = own.filter_map(|hypothesis| {
                     let relief = surface.relief.as_ref()?;
                     let origin = Translation3::from(-poses.origin().coords);
                     let middle = Translation3::from(relief.middle);
@@ -253,9 +280,52 @@ impl Recognition {
                             * lever.transpose(),
                         log: self.pose_log(library, hypothesis)?,
                     })
-                })
-                .collect(),
+                });
+                let mut masses: Vec<_> = masses.collect();
+                masses.sort_by(|a, b| b.log.total_cmp(&a.log));
+                masses.truncate(most);
+                masses
+            }
         }
+    }
+
+    /// Log of the mass of all hypotheses of an object, in the measure of [`masses`](Self::masses).
+    fn mass_log(&self, library: &ObjectLibrary, object: ObjectId) -> f64 {
+        match &self.hypotheses {
+            Hypotheses::Shifts(shifts) => {
+                let log = shifts.object_logs().get(&object).copied();
+                log.unwrap_or(f64::NEG_INFINITY)
+            }
+            Hypotheses::Poses(_) => {
+                let logs = self.pose_logs(library);
+                let own: Vec<f64> = { logs.iter() }
+                    .filter(|(other, _)| *other == object)
+                    .map(|(_, log)| *log)
+                    .collect();
+                log_sum(own.into_iter())
+            }
+        }
+    }
+
+    /// The most likely pose in one object, and those beside it.
+    fn pose(&self, library: &ObjectLibrary, object: ObjectId) -> Option<PoseEstimate> {
+        let masses = self.masses(library, object, OTHERS_MAX + 1);
+        let all = self.mass_log(library, object);
+        let (best, others) = masses.split_first()?;
+        let share = |log: f64| (log - all).exp();
+        let others = { others.iter() }
+            .map(|mass| (mass.map_from_episode, share(mass.log)))
+            .filter(|(_, share)| *share > 0.01);
+        // From an error on the left of the pose to one on its right.
+        let back = se3::adjoint(&best.map_from_episode.inverse());
+        let covariance = back * best.covariance * back.transpose();
+        Some(PoseEstimate {
+            object,
+            map_from_episode: best.map_from_episode,
+            covariance: PoseCovariance::from_matrix(&((covariance + covariance.transpose()) * 0.5)),
+            share: share(best.log),
+            others: others.collect(),
+        })
     }
 
     /// How well the best hypothesis of an object explains the contacts.
@@ -312,15 +382,14 @@ impl Recognition {
         if 2 * self.aimed >= self.count {
             return None;
         }
-        let mut objects = sums(library, &self.logs(library));
+        let mut objects = self.object_logs(library);
         objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let all = log_sum(objects.iter().map(|object| object.1));
         let mut rivals = Vec::new();
         for (object, sum) in objects.into_iter().take(RIVALS_MAX) {
-            let mut masses = self.masses(library, object);
-            masses.sort_by(|a, b| b.log.total_cmp(&a.log));
-            let own = log_sum(masses.iter().map(|mass| mass.log));
-            rivals.extend(masses.iter().take(RIVALS_MAX).map(|mass| Rival {
+            let masses = self.masses(library, object, RIVALS_MAX);
+            let own = self.mass_log(library, object);
+            rivals.extend(masses.iter().map(|mass| Rival {
                 object,
                 map_from_episode: mass.map_from_episode,
                 weight: (mass.log - own + sum - all).exp(),
@@ -382,29 +451,4 @@ fn sums(library: &ObjectLibrary, logs: &[(ObjectId, f64)]) -> Vec<(ObjectId, f64
         (object, if is_empty { most } else { most + sum.ln() })
     };
     sums.into_iter().map(sum).collect()
-}
-
-/// The most likely pose in one object, and those beside it.
-fn pose(object: ObjectId, masses: &[Mass]) -> Option<PoseEstimate> {
-    let all = log_sum(masses.iter().map(|mass| mass.log));
-    let best = masses.iter().max_by(|a, b| a.log.total_cmp(&b.log))?;
-    let share = |log: f64| (log - all).exp();
-    let mut others: Vec<_> = masses
-        .iter()
-        .filter(|mass| !std::ptr::eq(*mass, best))
-        .map(|mass| (mass.map_from_episode, share(mass.log)))
-        .filter(|(_, share)| *share > 0.01)
-        .collect();
-    others.sort_by(|a, b| b.1.total_cmp(&a.1));
-    others.truncate(OTHERS_MAX);
-    // From an error on the left of the pose to one on its right.
-    let back = se3::adjoint(&best.map_from_episode.inverse());
-    let covariance = back * best.covariance * back.transpose();
-    Some(PoseEstimate {
-        object,
-        map_from_episode: best.map_from_episode,
-        covariance: PoseCovariance::from_matrix(&((covariance + covariance.transpose()) * 0.5)),
-        share: share(best.log),
-        others,
-    })
 }

@@ -15,6 +15,13 @@ const SAMPLES: usize = 256;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ObjectId(pub u32);
 
+/// One map and its index.
+#[derive(Debug)]
+pub(super) struct Known {
+    model: ObjectModel,
+    pub(super) surface: Surface,
+}
+
 /// The maps that may be meant, each with its index.
 ///
 /// Putting a model makes its index, which takes some milliseconds per thousand places; recognising
@@ -22,7 +29,7 @@ pub struct ObjectId(pub u32);
 #[derive(Clone, Debug, Default)]
 pub struct ObjectLibrary {
     /// Shared with the library's clones, so that a snapshot costs a pointer per object.
-    objects: BTreeMap<ObjectId, Arc<(ObjectModel, Surface)>>,
+    objects: BTreeMap<ObjectId, Arc<Known>>,
     wide: Vec<Wide>,
     samples: Vec<(ObjectId, u32)>,
     extent_m: f64,
@@ -33,7 +40,7 @@ impl ObjectLibrary {
     /// with what they have gathered.
     pub fn put(&mut self, id: ObjectId, model: ObjectModel) {
         let surface = Surface::new(&model);
-        self.objects.insert(id, Arc::new((model, surface)));
+        self.objects.insert(id, Arc::new(Known { model, surface }));
         self.survey();
     }
 
@@ -46,12 +53,12 @@ impl ObjectLibrary {
 
     /// What was learned of an object.
     pub fn get(&self, id: ObjectId) -> Option<&ObjectModel> {
-        self.objects.get(&id).map(|object| &object.0)
+        self.objects.get(&id).map(|object| &object.model)
     }
 
     /// All objects, by number.
     pub fn iter(&self) -> impl Iterator<Item = (ObjectId, &ObjectModel)> {
-        self.objects.iter().map(|(id, object)| (*id, &object.0))
+        self.objects.iter().map(|(id, object)| (*id, &object.model))
     }
 
     /// How many there are.
@@ -75,15 +82,21 @@ impl ObjectLibrary {
         };
         let step = places().count().div_ceil(SAMPLES).max(1);
         self.samples = places().skip(step / 2).step_by(step).collect();
-        self.wide = wide(self.objects.values().map(|object| &object.1));
+        self.wide = wide(self.objects.values().map(|object| &object.surface));
+    }
+
+    pub(super) fn all(&self) -> impl Iterator<Item = (ObjectId, &Arc<Known>)> {
+        self.objects.iter().map(|(id, object)| (*id, object))
     }
 
     pub(super) fn surfaces(&self) -> impl Iterator<Item = (ObjectId, &Surface)> {
-        self.objects.iter().map(|(id, object)| (*id, &object.1))
+        self.objects
+            .iter()
+            .map(|(id, object)| (*id, &object.surface))
     }
 
     pub(super) fn surface(&self, id: ObjectId) -> Option<&Surface> {
-        self.objects.get(&id).map(|object| &object.1)
+        self.objects.get(&id).map(|object| &object.surface)
     }
 
     /// Some places, spread evenly over all maps: what a surface is like.

@@ -37,19 +37,26 @@
 mod asking;
 mod cells;
 mod contact;
+mod crowd;
 mod encounter;
 mod episode;
 mod facet;
+mod feeling;
+mod group;
 mod library;
 mod model;
+mod nearest;
 mod orientation;
 mod pairs;
 mod poses;
 mod posterior;
+mod ranks;
 mod reaches;
 
 mod relief;
 mod shifts;
+mod spots;
+mod strangers;
 mod surface;
 #[cfg(test)]
 mod tests;

@@ -1,61 +1,134 @@
 //! Which places of a map could be the one that was touched, however well that is known.
 
-use nalgebra::Point3;
+use std::ops::Range;
 
-use super::cells::Cells;
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-/// From one index to the next the reach grows so much.
-const GROWTH: f64 = 3.0;
+use crate::grid::Lattice;
 
-/// Cells of half a reach: each index of a thousand places takes a few hundred kilobytes.
-const CELL_PER_REACH: f64 = 0.5;
+/// Places of a cell, on average over the box that holds the map. A surface fills few of a box's cells, so those that
+/// hold any hold several times as many.
+const PLACES_PER_CELL: f64 = 0.3;
+/// Length of each row of the lattice's inverse, times its spacing: √(3/2).
+const ROW: f64 = 1.224_744_871_391_589;
+/// Most cells along an axis, whatever the shape of the map.
+const CELLS_MAX: f64 = 256.0;
 
-/// Indexes of the same places for reaches that grow by a factor of three, up to the extent of the map.
-///
-/// A touch is looked up by what it knows: a contact of 10 mm noise reaches far in a map that was learned to a
-/// tenth of a millimetre. Beyond the widest index all places are near.
+/// Places in the order of the cells of a grid module at the map's own scale: the reference grid point is the address, a
+/// displacement moves it by the lattice's inverse, and what is near any point, in however wide a reach, are a few runs
+/// of the order.
 #[derive(Clone, Debug)]
 pub(super) struct Reaches {
-    /// How uncertain a point may be \[m\], and the index for that.
-    indexes: Vec<(f64, Cells)>,
-    all: Vec<u32>,
+    lattice: Lattice,
+    /// Lattice index of the first cell.
+    low: Vector3<f64>,
+    /// Cells along each axis, at least one.
+    size: [usize; 3],
+    /// Start of each cell's places; one more at the end.
+    starts: Vec<u32>,
 }
 
 impl Reaches {
-    /// Of places at these positions \[m\], whose own fields reach so far \[m\]. The first index is for points
-    /// uncertain by `least_m`.
-    pub(super) fn new(
-        positions: &[Point3<f64>],
-        own_m: &[f64],
-        least_m: f64,
-        extent_m: f64,
-    ) -> Self {
-        let mut indexes = Vec::new();
-        let mut reach_m = least_m.max(1e-9);
-        loop {
-            let reaches: Vec<f64> = own_m.iter().map(|own_m| own_m.hypot(reach_m)).collect();
-            indexes.push((reach_m, Cells::new(positions, &reaches, CELL_PER_REACH)));
-            reach_m *= GROWTH;
-            // An index that finds a good part of the map everywhere is no better than all of it.
-            if reach_m > 0.25 * extent_m {
-                break;
-            }
+    /// Of places at these positions \[m\], and the order: numbers of the positions.
+    pub(super) fn new(positions: &[Point3<f64>]) -> (Self, Vec<u32>) {
+        let mut low_m = Vector3::repeat(f64::INFINITY);
+        let mut high_m = Vector3::repeat(f64::NEG_INFINITY);
+        for position in positions {
+            low_m = low_m.inf(&position.coords);
+            high_m = high_m.sup(&position.coords);
+        }
+        if positions.is_empty() {
+            (low_m, high_m) = (Vector3::zeros(), Vector3::zeros());
+        }
+        let extent_m = (high_m - low_m).add_scalar(1e-9);
+        // Something flat or straight fills a box of no volume, and has cells along it all the same.
+        let widest_m = extent_m.max();
+        let volume_m3: f64 = extent_m.iter().map(|x| x.max(0.05 * widest_m)).product();
+        let spacing_m = (volume_m3 * PLACES_PER_CELL / positions.len().max(1) as f64).cbrt();
+        let lattice = Lattice::new(
+            spacing_m.max(widest_m / CELLS_MAX),
+            UnitQuaternion::identity(),
+        );
+        let index = |position: &Point3<f64>| lattice.phase_displacement(&position.coords);
+        let mut low = Vector3::repeat(f64::INFINITY);
+        let mut high = Vector3::repeat(f64::NEG_INFINITY);
+        for position in positions {
+            let index = index(position).map(f64::floor);
+            (low, high) = (low.inf(&index), high.sup(&index));
+        }
+        if positions.is_empty() {
+            (low, high) = (Vector3::zeros(), Vector3::zeros());
+        }
+        let size = (high - low).map(cell);
+        let size = [size.x + 1, size.y + 1, size.z + 1];
+        let mut reaches = Self {
+            lattice,
+            low,
+            size,
+            starts: vec![0; size.iter().product::<usize>() + 1],
+        };
+        let cells: Vec<usize> = { positions.iter() }
+            .map(|position| {
+                let [i, j, k] = (reaches.lattice.phase_displacement(&position.coords) - low)
+                    .map(cell)
+                    .into();
+                (i * size[1] + j) * size[2] + k
+            })
+            .collect();
+        for &cell in &cells {
+            reaches.starts[cell + 1] += 1;
+        }
+        for cell in 1..reaches.starts.len() {
+            reaches.starts[cell] += reaches.starts[cell - 1];
         }
         let count = u32::try_from(positions.len()).expect("a model has few places");
-        Self {
-            indexes,
-            all: (0..count).collect(),
-        }
+        let mut order: Vec<u32> = (0..count).collect();
+        order.sort_by_key(|&place| cells[place as usize]);
+        (reaches, order)
     }
 
-    /// All places whose field reaches to within `reach_m` \[m\] of a point, and some others, in order.
-    pub(super) fn near(&self, point: &Point3<f64>, reach_m: f64) -> &[u32] {
-        let finest = self
-            .indexes
-            .iter()
-            .find(|(widest_m, _)| reach_m <= *widest_m);
-        finest.map_or(&self.all, |(_, cells)| cells.near(point))
+    /// Visits runs of the order that hold all places within `reach_m` \[m\] of a point, and some others.
+    pub(super) fn runs(
+        &self,
+        point: &Point3<f64>,
+        reach_m: f64,
+        mut visit: impl FnMut(Range<usize>),
+    ) {
+        let middle = self.lattice.phase_displacement(&point.coords) - self.low;
+        let half = ROW * reach_m / self.lattice.spacing_m();
+        let mut first = [0; 3];
+        let mut last = [0; 3];
+        for axis in 0..3 {
+            let (from, to) = (middle[axis] - half, middle[axis] + half);
+            // Not a number is in no cell either.
+            if !(to >= 0.0 && from < self.size[axis] as f64) {
+                return;
+            }
+            first[axis] = cell(from);
+            last[axis] = cell(to).min(self.size[axis] - 1);
+        }
+        for i in first[0]..=last[0] {
+            for j in first[1]..=last[1] {
+                let row = (i * self.size[1] + j) * self.size[2];
+                let from = self.starts[row + first[2]] as usize;
+                let to = self.starts[row + last[2] + 1] as usize;
+                if from < to {
+                    visit(from..to);
+                }
+            }
+        }
     }
+}
+
+/// The cell of an index along an axis, counted from the first; what lies before that one is in it.
+fn cell(index: f64) -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "rounds down, and saturates"
+    )]
+    let cell = index as usize;
+    cell
 }
 
 #[cfg(test)]
@@ -66,19 +139,42 @@ mod tests {
     fn no_place_within_reach_is_missed_at_any_reach() {
         let noise = |k: u64| crate::random::uniform(5, crate::record::AgentId(0), 0, k) * 0.2 - 0.1;
         let point = |k: u64| Point3::new(noise(3 * k), noise(3 * k + 1), noise(3 * k + 2));
-        let positions: Vec<_> = (0..200).map(point).collect();
-        let own_m = vec![0.002; 200];
-        let reaches = Reaches::new(&positions, &own_m, 0.001, 0.35);
-        for (k, reach_m) in (1000..1400).zip([0.0005, 0.004, 0.02, 0.08, 0.3].into_iter().cycle()) {
-            let query = point(k);
-            let near = reaches.near(&query, reach_m);
-            for (place, position) in (0u32..).zip(&positions) {
-                if (position - query).norm() <= reach_m.hypot(0.002) {
-                    assert!(near.contains(&place), "{reach_m}");
+        let flat = |k: u64| Point3::new(noise(3 * k), 0.03, noise(3 * k + 2));
+        let line = |k: u64| Point3::new(0.01, -5.0, noise(3 * k + 2));
+        let shapes: [Vec<Point3<f64>>; 5] = [
+            (0..200).map(point).collect(),
+            (0..200).map(flat).collect(),
+            (0..200).map(line).collect(),
+            vec![point(1)],
+            vec![point(1); 9],
+        ];
+        for positions in shapes {
+            let (reaches, order) = Reaches::new(&positions);
+            assert_eq!(order.len(), positions.len());
+            let mut listed = 0;
+            let near = |query: &Point3<f64>, reach_m| {
+                let mut near = Vec::new();
+                reaches.runs(query, reach_m, |run| near.extend_from_slice(&order[run]));
+                near
+            };
+            for (k, reach_m) in (1000..1400).zip([0.0, 0.004, 0.02, 0.08, 0.3].into_iter().cycle())
+            {
+                let query = positions[k % positions.len()] + point(k as u64).coords * 0.3;
+                let near = near(&query, reach_m);
+                listed += usize::from(reach_m < 0.01) * near.len();
+                for (place, position) in (0u32..).zip(&positions) {
+                    if (position - query).norm() <= reach_m {
+                        assert!(near.contains(&place), "{reach_m}");
+                    }
                 }
             }
+            assert!(listed <= 160 * (10 + positions.len() / 10), "{listed}");
+            let all = near(&positions[0], f64::INFINITY);
+            assert_eq!(all.len(), positions.len());
+            assert!(near(&Point3::new(1e300, 0.0, -1e300), 1.0).is_empty());
+            assert!(near(&Point3::new(f64::NAN, 0.0, 0.0), 1.0).is_empty());
         }
-        assert!(reaches.near(&point(1), 0.001).len() < 100);
-        assert_eq!(reaches.near(&point(1), f64::INFINITY).len(), 200);
+        let (none, _) = Reaches::new(&[]);
+        none.runs(&Point3::origin(), 1.0, |run| panic!("{run:?}"));
     }
 }

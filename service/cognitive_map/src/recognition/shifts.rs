@@ -6,27 +6,40 @@ use std::f64::consts::TAU;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::contact::{Contact, Reached};
+use super::crowd::Crowd;
+use super::feeling::{Feeling, Local};
 use super::library::{ObjectId, ObjectLibrary};
-use super::surface::{Surface, Wide};
+use super::ranks::Ranks;
+use super::spots::{Answer, narrow};
+use super::strangers::stranger_logs;
+use super::surface::Surface;
 
-/// Most hypotheses kept in the long run. Early on, when little tells them apart, more are: as many as were
-/// born, and half as many with each touch.
+/// Most hypotheses kept of those that were looked at.
 const KEPT_MAX: usize = 4096;
-/// Most births: places taken for the one that was touched first.
-const BIRTHS_MAX: usize = 65_536;
+/// Most contacts explained at a touch by first places that are looked at, each by all contacts so far.
+const LOOKS_MAX: usize = 1280;
+/// The fewer, the more first places there are at which a rough look is taken: so many of these cost as much as all of those.
+const ROUGH_MAX: usize = 150_000;
+/// Contacts explained at least.
+const LOOKS_MIN: usize = 256;
+/// First places wait until all that matter can be looked at, but not longer than so many contacts: meanwhile
+/// estimates tell them apart nearly as well, and what is looked at has to be kept.
+const WAITING_CONTACTS: usize = 12;
+/// Share of all mass that those who wait may hold when the others are looked at, and that of those which need not be looked
+/// at at all.
+const WAITING: f64 = 1e-3;
+const UNLOOKED: f64 = 1e-6;
+/// After so many contacts the places that nobody has looked at are given up.
+const CROWD_CONTACTS: usize = 32;
 /// A hypothesis this far below the best holds nothing worth its keep: e⁻²⁰.
 const BELOW: f64 = 20.0;
 /// Share of contacts that the map does not explain.
-const OUTLIERS: f64 = 0.02;
+pub(super) const OUTLIERS: f64 = 0.02;
 /// A hypothesis parts where several places could be the one touched, each with this share of the
 /// contact's likelihood at least.
 const PART_SHARE: f64 = 0.005;
 /// Most parts.
 const PARTS_MAX: usize = 16;
-/// Least share of the weight that places of other objects must have before they say what is beside them.
-const WEIGHT_MIN: f64 = 1e-9;
-/// Squared distance, in variances, beyond which a place is not the one that was touched: e⁻²⁵.
-const DISTANCE_MAX: f64 = 50.0;
 
 /// One hypothesis: a Gaussian over the translation, its mass being e^`evidence`.
 #[derive(Clone, Copy, Debug)]
@@ -42,37 +55,23 @@ pub(super) struct Shift {
 }
 
 /// A touch while it is taken in.
-struct Touched<'a> {
-    contact: &'a Contact,
+#[derive(Debug)]
+pub(super) struct Taken<'a> {
+    pub(super) feeling: Feeling<'a>,
     /// What path integration has drifted since the touch before, per axis \[m²\].
     drift_m2: f64,
-    wide: &'a [Wide],
-    /// Density of outliers, per m³.
-    elsewhere: f64,
-    felt: FeltLogs,
-    /// Density, displacement and variance of the places that answer one hypothesis.
-    answers: Vec<(f64, Vector3<f64>, f64)>,
-    parts: Vec<Shift>,
-}
-
-/// What the percepts of a touch say of each place, worked out when it is first asked for.
-#[derive(Default)]
-struct FeltLogs(BTreeMap<ObjectId, Vec<f64>>);
-
-impl FeltLogs {
-    /// Log-likelihoods at the places of an object; NaN where nobody has asked.
-    fn of(&mut self, object: ObjectId, places: usize) -> &mut [f64] {
-        self.0
-            .entry(object)
-            .or_insert_with(|| vec![f64::NAN; places])
-    }
+    /// Density of a touch that is an outlier, with the share of those, per m³.
+    pub(super) outlier: f64,
 }
 
 /// All hypotheses.
 #[derive(Clone, Debug)]
 pub(super) struct Shifts {
     pub(super) rotations: Vec<UnitQuaternion<f64>>,
-    pub(super) all: Vec<Shift>,
+    /// Those that have been looked at, by object.
+    all: Vec<Shift>,
+    /// The others.
+    crowd: Crowd,
     /// Log-likelihood of the contacts so far, but for those asked for, with something whose surface is
     /// like those of the library, but for the one that it would be taken for; without the share of it
     /// within a step.
@@ -84,283 +83,327 @@ impl Shifts {
         Self {
             rotations,
             all: Vec::new(),
+            crowd: Crowd::default(),
             strangers: BTreeMap::new(),
         }
     }
 
+    /// Whether there is none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.all.is_empty() && self.crowd.is_empty()
+    }
+
     /// One more contact; `before` are those kept of before.
     pub(super) fn touch(&mut self, library: &ObjectLibrary, before: &[Contact], contact: &Contact) {
-        if before.is_empty() {
-            self.all = self.births(library, contact, BIRTHS_MAX);
-        } else {
-            let grown = before.last().map_or(0.0, |last| last.drift_sd_m.powi(2));
-            let drift = (contact.drift_sd_m.powi(2) - grown).max(0.0);
-            if contact.reached != Reached::Aimed {
-                let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
-                let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
-                if let Some(nearest) = nearest {
-                    for (object, log) in self.stranger_logs(library, nearest, contact, drift) {
-                        *self.strangers.entry(object).or_default() += log;
+        let Some(last) = before.last() else {
+            self.crowd = Crowd::new(library, &self.rotations, contact);
+            return;
+        };
+        let touch = Taken::new(library, last, contact);
+        if contact.reached != Reached::Aimed {
+            let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
+            let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            if let Some(nearest) = nearest {
+                let pair = (nearest, contact);
+                let logs = stranger_logs(library, &self.rotations, pair, touch.drift_m2);
+                for (object, log) in logs {
+                    *self.strangers.entry(object).or_default() += log;
+                }
+            }
+        }
+        let mut answers = Vec::new();
+        let mut parts = Vec::with_capacity(2 * self.all.len());
+        let all = std::mem::take(&mut self.all);
+        for own in all.chunk_by(|a, b| a.object == b.object) {
+            if let Some(surface) = library.surface(own[0].object) {
+                for own in own.chunk_by(|a, b| a.rotation == b.rotation) {
+                    let rotation = &self.rotations[usize::from(own[0].rotation)];
+                    let local = touch.feeling.at(surface, rotation);
+                    for shift in own {
+                        self.explain(surface, shift, (&touch, &local), &mut answers, &mut parts);
                     }
                 }
             }
-            let all = std::mem::take(&mut self.all);
-            let mut touched = Touched {
-                contact,
-                drift_m2: drift,
-                wide: library.wide(),
-                elsewhere: library.elsewhere(),
-                felt: FeltLogs::default(),
-                answers: Vec::new(),
-                parts: Vec::with_capacity(2 * all.len()),
-            };
-            for shift in all {
-                if let Some(surface) = library.surface(shift.object) {
-                    self.explain(surface, shift, &mut touched);
-                }
-            }
-            self.all = touched.parts;
-            self.drop_faint();
-            self.merge();
         }
-        self.prune(KEPT_MAX.max(BIRTHS_MAX >> before.len().min(31)));
+        if !self.crowd.is_empty() {
+            self.look(library, before, &touch, &mut parts);
+        }
+        self.all = parts;
+        self.merge();
+        self.prune();
     }
 
-    /// Log-density of a contact with something that was never learned: the mean over places of the library, each taken for
-    /// the one touched by `other`, weighed by how well it explains what was felt there. By the object that it would be
-    /// taken for, whose own places do not count: what is felt nowhere else would otherwise be as like something
-    /// unknown as it is like that one.
-    ///
-    /// It is what a hypothesis that knows nothing else would expect, so that evidence for a map begins
-    /// where the map explains more than a surface of its kind. Space filled evenly would be no rival: a step along
-    /// any surface ends on most others, and neighbouring places feel alike on most.
-    fn stranger_logs(
-        &self,
+    /// Lets a touch tell which of the crowd are worth a look, and looks at the heaviest of these.
+    fn look(
+        &mut self,
         library: &ObjectLibrary,
-        other: &Contact,
-        contact: &Contact,
-        drift: f64,
-    ) -> BTreeMap<ObjectId, f64> {
-        let step = contact.position_m - other.position_m;
-        let noise = contact.position_sd_m * contact.position_sd_m + drift;
-        let wide = library.wide();
-        let mut sums: BTreeMap<ObjectId, [f64; 4]> = BTreeMap::new();
-        let mut turns = self.rotations.iter().cycle();
-        for &(object, place) in library.samples() {
-            let (Some(surface), Some(rotation)) = (library.surface(object), turns.next()) else {
+        before: &[Contact],
+        touch: &Taken<'_>,
+        parts: &mut Vec<Shift>,
+    ) {
+        let mut crowd = std::mem::take(&mut self.crowd);
+        let worth = crowd.sift(library, &self.rotations, touch);
+        let all = crowd.masses().map(|(_, log)| log);
+        let all = log_sum(
+            all.chain(parts.iter().map(|part| part.evidence))
+                .collect::<Vec<_>>()
+                .into_iter(),
+        );
+        let rough = ROUGH_MAX.saturating_sub(worth.len());
+        let looks = (LOOKS_MAX * rough / ROUGH_MAX).max(LOOKS_MIN) / before.len();
+        let mut heaviest = Vec::new();
+        let is_time = before.len() >= WAITING_CONTACTS;
+        if is_time || crowd.holding(&worth, all + WAITING.ln()) <= looks {
+            let wanted = crowd.holding(&worth, all + UNLOOKED.ln());
+            heaviest = crowd.heaviest(&worth, wanted.min(looks));
+        }
+        let first = Feeling::new(&before[0], library.wide());
+        let way: Vec<Taken<'_>> = before
+            .windows(2)
+            .map(|two| Taken::new(library, &two[0], &two[1]))
+            .collect();
+        let way: Vec<&Taken<'_>> = way.iter().chain([touch]).collect();
+        let mut looker = Looker::default();
+        for root in &heaviest {
+            let (root, known) = crowd.take(root, &self.rotations, &first);
+            looker.follow(self, &known.surface, root, &way, parts);
+        }
+        let best = parts.iter().map(|part| part.evidence);
+        let best = best.fold(crowd.best_log(), f64::max);
+        let is_over = before.len() >= CROWD_CONTACTS;
+        let least = if is_over { f64::INFINITY } else { best - BELOW };
+        // The last hypothesis of an object stays.
+        let mut held: Vec<ObjectId> = parts.iter().map(|part| part.object).collect();
+        held.sort_unstable();
+        for object in crowd.fading(least) {
+            if held.binary_search(&object).is_ok() {
                 continue;
-            };
-            let here = &surface.patches[place as usize];
-            let normal = normal_log(rotation, other, here.normal.as_ref());
-            let weight = (here.percept_log(other, wide) + normal).exp();
-            let query = here.position + rotation * step;
-            let mut density = 0.0;
-            for &near in surface.near(&query, noise) {
-                let patch = &surface.patches[near as usize];
-                let variance = noise + patch.variance_m2;
-                let squared = (patch.position - query).norm_squared() / variance;
-                if squared < DISTANCE_MAX {
-                    let normal = normal_log(rotation, contact, patch.normal.as_ref());
-                    let felt = patch.percept_log(contact, wide);
-                    density += (normal + felt - 0.5 * squared).exp() / (TAU * variance).powf(1.5);
-                }
             }
-            let density = density / surface.patches.len() as f64;
-            let [sum, weights, plain, count] = sums.entry(object).or_default();
-            *sum += weight * density;
-            *weights += weight;
-            *plain += density;
-            *count += 1.0;
-        }
-        let all = { sums.values() }.fold([0.0; 4], |all, own| {
-            std::array::from_fn(|k| all[k] + own[k])
-        });
-        // Of places of no other object, how a surface goes on is all that is known.
-        let [_, _, plain, count] = all;
-        let elsewhere = OUTLIERS * library.elsewhere();
-        { sums.into_iter() }
-            .map(|(object, [sum, weights, ..])| {
-                let (sum, weights) = (all[0] - sum, all[1] - weights);
-                let typical = if weights > WEIGHT_MIN * all[1] {
-                    sum / weights
-                } else {
-                    plain / count
-                };
-                (
-                    object,
-                    ((1.0 - OUTLIERS) * typical.max(0.0) + elsewhere).ln(),
-                )
-            })
-            .collect()
-    }
-
-    /// Every place taken for the one that was touched.
-    fn births(&self, library: &ObjectLibrary, contact: &Contact, most: usize) -> Vec<Shift> {
-        let places: usize = library
-            .surfaces()
-            .map(|(_, surface)| surface.patches.len())
-            .sum();
-        let step = (places * self.rotations.len()).div_ceil(most).max(1);
-        let rotations_log = (self.rotations.len() as f64).ln();
-        let mut births = Vec::new();
-        let mut at = 0usize;
-        for (object, surface) in library.surfaces() {
-            let each = -(surface.patches.len() as f64).ln() - rotations_log + (step as f64).ln();
-            let felt: Vec<_> = surface
-                .patches
-                .iter()
-                .map(|patch| patch.percept_log(contact, library.wide()))
-                .collect();
-            for (number, rotation) in (0u16..).zip(&self.rotations) {
-                let turned = rotation * contact.position_m.coords;
-                for (patch, felt) in surface.patches.iter().zip(&felt) {
-                    at += 1;
-                    if !at.is_multiple_of(step) {
-                        continue;
-                    }
-                    let variance = contact.variance_m2() + patch.variance_m2;
-                    let normal = normal_log(rotation, contact, patch.normal.as_ref());
-                    births.push(Shift {
-                        object,
-                        rotation: number,
-                        translation: patch.position.coords - turned,
-                        variance_m2: variance,
-                        evidence: each + felt + normal,
-                    });
-                }
+            for root in crowd.best_of(object, 1) {
+                let (root, known) = crowd.take(&root, &self.rotations, &first);
+                looker.follow(self, &known.surface, root, &way, parts);
             }
         }
-        births
+        crowd.drop_below(least);
+        self.crowd = crowd;
     }
 
     /// What becomes of a hypothesis with one more contact: one or more parts, each with its place taken for
-    /// the one that was touched.
-    fn explain(&self, surface: &Surface, shift: Shift, touch: &mut Touched<'_>) {
+    /// the one that was touched. `answers` is a list to be used.
+    fn explain(
+        &self,
+        surface: &Surface,
+        shift: &Shift,
+        (touch, local): (&Taken<'_>, &Local<'_>),
+        answers: &mut Vec<Answer>,
+        parts: &mut Vec<Shift>,
+    ) {
         let rotation = &self.rotations[usize::from(shift.rotation)];
-        let contact = touch.contact;
+        let contact = touch.feeling.contact;
         let prior = shift.variance_m2 + touch.drift_m2;
         let noise = contact.position_sd_m * contact.position_sd_m;
         let query = Point3::from(rotation * contact.position_m.coords + shift.translation);
-        let share_log = (1.0 - OUTLIERS).ln() - (surface.patches.len() as f64).ln();
-        let outlier = OUTLIERS * touch.elsewhere;
-        let felt = touch.felt.of(shift.object, surface.patches.len());
-        let mut total = outlier;
-        touch.answers.clear();
-        for &place in surface.near(&query, prior + noise) {
-            let patch = &surface.patches[place as usize];
-            let apart = patch.position - query;
-            let variance = noise + patch.variance_m2;
-            let squared = apart.norm_squared() / (prior + variance);
-            if squared > DISTANCE_MAX {
-                continue;
-            }
-            let felt = &mut felt[place as usize];
-            if felt.is_nan() {
-                *felt = patch.percept_log(contact, touch.wide);
-            }
-            let log = share_log - 0.5 * squared - 1.5 * (TAU * (prior + variance)).ln()
-                + *felt
-                + normal_log(rotation, contact, patch.normal.as_ref());
-            let density = log.exp();
-            total += density;
-            touch.answers.push((density, apart, variance));
-        }
-        let total_log = total.ln();
+        let spots = &surface.spots;
+        let densities = spots.answers(&query, (prior, noise), local, answers);
+        let one = share(surface.patches.len()) / TAU.powf(1.5);
+        let outlier = touch.outlier / one;
+        let total = outlier + densities;
         let least = PART_SHARE * total;
-        touch.answers.retain(|answer| answer.0 >= least);
-        if touch.answers.len() > PARTS_MAX {
-            touch.answers.sort_by(|a, b| b.0.total_cmp(&a.0));
-            touch.answers.truncate(PARTS_MAX);
+        answers.retain(|answer| answer.density >= least);
+        if answers.len() > PARTS_MAX {
+            answers.sort_by(|a, b| b.density.total_cmp(&a.density));
+            answers.truncate(PARTS_MAX);
         }
-        let best = touch.answers.iter().map(|answer| answer.0);
+        let best = answers.iter().map(|answer| answer.density);
+        let evidence = shift.evidence + (one * total).ln();
         if best.fold(0.0, f64::max) < outlier {
             // Most likely an outlier: the hypothesis stays where it is.
-            touch.parts.push(Shift {
+            parts.push(Shift {
                 variance_m2: prior,
-                evidence: shift.evidence + total_log,
-                ..shift
+                evidence,
+                ..*shift
             });
             return;
         }
-        let sum_log = touch
-            .answers
-            .iter()
-            .map(|answer| answer.0)
-            .sum::<f64>()
-            .ln();
-        for (density, apart, variance) in &touch.answers {
-            let gain = prior / (prior + variance);
-            touch.parts.push(Shift {
-                translation: shift.translation + gain * apart,
+        let sum = answers.iter().map(|answer| answer.density).sum::<f64>();
+        for Answer {
+            density,
+            apart,
+            variance,
+        } in answers
+        {
+            let gain = prior / (prior + *variance);
+            parts.push(Shift {
+                translation: shift.translation + gain * *apart,
                 variance_m2: prior - gain * prior,
-                evidence: shift.evidence + total_log + density.ln() - sum_log,
-                ..shift
+                evidence: evidence + (*density / sum).ln(),
+                ..*shift
             });
         }
     }
 
-    /// Drops what holds no evidence before it is sorted. The last hypothesis of an object waits for
-    /// [`prune`](Self::prune).
-    fn drop_faint(&mut self) {
-        let mut best: BTreeMap<ObjectId, f64> = BTreeMap::new();
-        for shift in &self.all {
-            let best = best.entry(shift.object).or_insert(f64::NEG_INFINITY);
-            *best = best.max(shift.evidence);
-        }
-        let most = best.values().copied().fold(f64::NEG_INFINITY, f64::max);
-        self.all
-            .retain(|shift| shift.evidence > most - BELOW || shift.evidence >= best[&shift.object]);
-    }
-
-    /// Makes one of hypotheses that have become the same.
+    /// Makes one of hypotheses that have become the same, and puts them in order of object, rotation and place.
     fn merge(&mut self) {
-        let key = |shift: &Shift| {
-            // Within a fifth of a deviation or so of one another, whose sum is one Gaussian again.
-            let cell = 0.4 * shift.variance_m2.sqrt().max(1e-12);
-            // Powers of two, so that hypotheses of about the same width have the same cells.
-            let cell = cell.log2().floor().exp2();
-            #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-            let at = shift.translation.map(|x| (x / cell).round() as i64);
-            (shift.object, shift.rotation, at.x, at.y, at.z)
-        };
-        let mut keyed: Vec<_> = self.all.iter().map(|shift| (key(shift), *shift)).collect();
-        keyed.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.evidence.total_cmp(&a.1.evidence)));
-        self.all.clear();
+        let mut keyed: Vec<_> = { self.all.iter() }
+            .zip(0u32..)
+            .map(|(shift, number)| (shift.key(), number))
+            .collect();
+        let evidence = |number: u32| self.all[number as usize].evidence;
+        keyed.sort_unstable_by(|(a, one), (b, other)| {
+            a.cmp(b)
+                .then_with(|| evidence(*other).total_cmp(&evidence(*one)))
+                .then(one.cmp(other))
+        });
+        let mut merged: Vec<Shift> = Vec::with_capacity(keyed.len());
         let mut last = None;
-        for (key, shift) in keyed {
-            match self.all.last_mut() {
+        for (key, number) in keyed {
+            let shift = self.all[number as usize];
+            match merged.last_mut() {
                 Some(kept) if last == Some(key) => {
                     let sum = log_sum([kept.evidence, shift.evidence].into_iter());
                     let share = (shift.evidence - sum).exp();
                     kept.translation += (shift.translation - kept.translation) * share;
                     kept.evidence = sum;
                 }
-                _ => self.all.push(shift),
+                _ => merged.push(shift),
             }
             last = Some(key);
         }
+        self.all = merged;
     }
 
     /// Drops what holds no evidence, and the least beyond the budget; each object keeps its best.
-    fn prune(&mut self, most: usize) {
-        self.all.sort_by(|a, b| {
-            b.evidence
-                .total_cmp(&a.evidence)
-                .then(a.object.cmp(&b.object))
-                .then(a.rotation.cmp(&b.rotation))
-        });
-        let Some(best) = self.all.first().map(|best| best.evidence) else {
-            return;
-        };
-        let mut kept = 0;
-        let mut seen = std::collections::BTreeSet::new();
-        self.all.retain(|shift| {
-            let first = seen.insert(shift.object);
-            let keep = first || kept < most && shift.evidence > best - BELOW;
-            kept += usize::from(keep);
-            keep
-        });
+    fn prune(&mut self) {
+        let most = KEPT_MAX;
+        let evidences = self.all.iter().map(|shift| shift.evidence);
+        let best = evidences.clone().fold(self.crowd.best_log(), f64::max);
+        let mut least = best - BELOW;
+        let mut evidences: Vec<f64> = evidences.filter(|evidence| *evidence > least).collect();
+        // How many of those that are exactly as heavy as the lightest have room.
+        let mut room = usize::MAX;
+        if evidences.len() > most {
+            let (heavier, lightest, _) =
+                evidences.select_nth_unstable_by(most - 1, |a, b| b.total_cmp(a));
+            least = *lightest;
+            room = most - heavier.iter().filter(|evidence| **evidence > least).count();
+        }
+        let mut kept = Vec::with_capacity(self.all.len().min(most));
+        for own in self.all.chunk_by(|a, b| a.object == b.object) {
+            let before = kept.len();
+            for shift in own {
+                let is_heavy = shift.evidence > least;
+                let is_lightest = !is_heavy && shift.evidence >= least && room > 0;
+                if is_heavy || is_lightest {
+                    room -= usize::from(is_lightest);
+                    kept.push(*shift);
+                }
+            }
+            if kept.len() == before {
+                kept.extend(own.iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence)));
+            }
+        }
+        self.all = kept;
     }
+
+    /// Log of the mass of each object that has any.
+    pub(super) fn object_logs(&self) -> BTreeMap<ObjectId, f64> {
+        let own = self.all.chunk_by(|a, b| a.object == b.object).map(|own| {
+            let logs = own.iter().map(|shift| shift.evidence);
+            (own[0].object, log_sum(logs))
+        });
+        let mut sums: BTreeMap<ObjectId, f64> = BTreeMap::new();
+        for (object, log) in own.chain(self.crowd.masses()) {
+            let sum = sums.entry(object).or_insert(f64::NEG_INFINITY);
+            *sum = log_sum([*sum, log].into_iter());
+        }
+        sums
+    }
+
+    /// How many hold a share of the mass of all, where that of an object is multiplied by e^`log`.
+    pub(super) fn holding(&self, share: f64, log: impl Fn(ObjectId) -> Option<f64>) -> usize {
+        let logs = self.object_logs();
+        let all = logs
+            .iter()
+            .filter_map(|(object, own)| Some(own + log(*object)?));
+        let all = log_sum(all);
+        let log = |object| Some(log(object)? - all);
+        let mut ranks = Ranks::new(self.crowd.len());
+        for own in self.all.chunk_by(|a, b| a.object == b.object) {
+            if let Some(log) = log(own[0].object) {
+                for shift in own {
+                    ranks.add(narrow((shift.evidence + log).exp()));
+                }
+            }
+        }
+        self.crowd.count(&mut ranks, log);
+        ranks.holding(share * ranks.sum())
+    }
+
+    /// The heaviest hypotheses of an object, so many at most, heaviest first.
+    pub(super) fn heaviest(&self, object: ObjectId, most: usize) -> Vec<Shift> {
+        let own = self.all.iter().filter(|shift| shift.object == object);
+        let crowd = self.crowd.best_of(object, most);
+        let crowd = crowd
+            .iter()
+            .filter_map(|root| self.crowd.as_shift(root, &self.rotations));
+        let mut all: Vec<Shift> = own.copied().chain(crowd).collect();
+        all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        all.truncate(most);
+        all
+    }
+}
+
+/// Lists that are filled again and again.
+#[derive(Default)]
+struct Looker {
+    answers: Vec<Answer>,
+    now: Vec<Shift>,
+    next: Vec<Shift>,
+}
+
+impl Looker {
+    /// Lets a first place explain all contacts so far.
+    fn follow(
+        &mut self,
+        shifts: &Shifts,
+        surface: &Surface,
+        root: Shift,
+        way: &[&Taken<'_>],
+        parts: &mut Vec<Shift>,
+    ) {
+        self.now.clear();
+        self.now.push(root);
+        let rotation = &shifts.rotations[usize::from(root.rotation)];
+        for touch in way {
+            self.next.clear();
+            let local = touch.feeling.at(surface, rotation);
+            for shift in &self.now {
+                let touch = (*touch, &local);
+                shifts.explain(surface, shift, touch, &mut self.answers, &mut self.next);
+            }
+            if self.next.len() > PARTS_MAX {
+                self.next.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+                self.next.truncate(PARTS_MAX);
+            }
+            std::mem::swap(&mut self.now, &mut self.next);
+        }
+        parts.extend_from_slice(&self.now);
+    }
+}
+
+impl<'a> Taken<'a> {
+    fn new(library: &'a ObjectLibrary, last: &Contact, contact: &'a Contact) -> Self {
+        Self {
+            feeling: Feeling::new(contact, library.wide()),
+            drift_m2: (contact.drift_sd_m.powi(2) - last.drift_sd_m.powi(2)).max(0.0),
+            outlier: OUTLIERS * library.elsewhere(),
+        }
+    }
+}
+
+/// Share of touches that are of one of so many places.
+pub(super) fn share(places: usize) -> f64 {
+    (1.0 - OUTLIERS) / places as f64
 }
 
 impl Shift {
@@ -371,22 +414,23 @@ impl Shift {
             rotations[usize::from(self.rotation)],
         )
     }
-}
 
-/// Log-density of a contact's normal at a place, per steradian, less that of one anywhere.
-fn normal_log(
-    rotation: &UnitQuaternion<f64>,
-    contact: &Contact,
-    normal: Option<&nalgebra::Unit<Vector3<f64>>>,
-) -> f64 {
-    let (Some(felt), Some(own)) = (&contact.normal, normal) else {
-        return 0.0;
-    };
-    // Between places a surface turns; a fifth of a radian is a good part of what voxels and hands
-    // differ by, and the rest is an outlier's.
-    let variance = contact.normal_sd_rad * contact.normal_sd_rad + 0.04;
-    let apart = 2.0 * (1.0 - (rotation * felt.into_inner()).dot(own));
-    (0.9 * 2.0 / variance * (-0.5 * apart / variance).exp() + 0.1).ln()
+    /// Object, rotation and cell of the translation: hypotheses of the same are one.
+    fn key(&self) -> u128 {
+        /// Bits of a cell's number along an axis; cells that differ by more are far beyond any map.
+        const BITS: u32 = 26;
+        // Within a fifth of a deviation or so of one another, whose sum is one Gaussian again. The cell is the power of
+        // two below, which is the exponent's bits alone, so that hypotheses of about the same width have the same cells.
+        const EXPONENT: u64 = 0x7FF0_0000_0000_0000;
+        let cell = 0.4 * self.variance_m2.sqrt().max(1e-12);
+        let per_cell = 1.0 / f64::from_bits(cell.to_bits() & EXPONENT);
+        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+        let at = self.translation.map(|x| (x * per_cell).round() as i64);
+        let map = u128::from(self.object.0) << 16 | u128::from(self.rotation);
+        at.iter().fold(map, |key, at| {
+            key << BITS | u128::from(at.cast_unsigned() & ((1 << BITS) - 1))
+        })
+    }
 }
 
 /// log Σ exp.

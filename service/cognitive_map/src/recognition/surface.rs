@@ -2,15 +2,13 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::contact::{Contact, Seen};
+use super::contact::{Contact, Felt, Seen};
 use super::model::{LevelMemory, ObjectModel};
-use super::reaches::Reaches;
 use super::relief::Relief;
+use super::spots::Spots;
 
 /// A place's field is uniform over one spacing; that is its standard deviation in spacings, 1/√12.
 const FIELD_PER_SPACING: f64 = 0.288_675;
-/// How many standard deviations a field reaches.
-const REACH_SD: f64 = 4.0;
 /// Distances at which the share of the map within them is tabled, per extent.
 const SHARES: usize = 32;
 /// Most places from which the shares are counted: their error is then a few hundredths.
@@ -27,11 +25,12 @@ pub(super) struct Patch {
     pub(super) descriptors: Vec<Seen>,
 }
 
-/// A map ready for recognition: its patches, their index, and what share of it lies how near.
+/// A map ready for recognition: its patches, their indexes, and what share of it lies how near.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     pub(super) patches: Vec<Patch>,
-    reaches: Reaches,
+    /// The same places, packed.
+    pub(super) spots: Spots,
     /// Diameter of a ball about the map's middle that holds all of it \[m\].
     pub(super) extent_m: f64,
     /// Area that it takes for \[m²\]: one spacing squared per place.
@@ -56,13 +55,9 @@ impl Surface {
                 descriptors: place.descriptors.clone(),
             })
             .collect();
-        // Touches are about as noisy as those that were learned; hypotheses add as much again.
         let noise_m2 = model.places().iter().map(|p| p.variance_m2 / p.count);
         let noise_m2 = noise_m2.sum::<f64>() / patches.len().max(1) as f64;
-        let reach = |patch: &Patch| REACH_SD * patch.variance_m2.sqrt() + 0.5 * model.spacing_m();
         let positions: Vec<_> = patches.iter().map(|patch| patch.position).collect();
-        let own_m: Vec<_> = patches.iter().map(reach).collect();
-        let least_m = REACH_SD * (2.0 * noise_m2).sqrt() + 0.5 * model.spacing_m();
         let middle = positions
             .iter()
             .fold(Vector3::zeros(), |sum, p| sum + p.coords)
@@ -73,19 +68,13 @@ impl Surface {
             .fold(model.spacing_m(), f64::max);
         let extent_m = 2.0 * radius_m;
         Self {
-            reaches: Reaches::new(&positions, &own_m, least_m, extent_m),
+            spots: Spots::new(&patches, model.spacing_m(), extent_m, noise_m2),
             shares: shares(&positions, extent_m),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
             relief: Relief::new(model),
             extent_m,
             patches,
         }
-    }
-
-    /// All places that a point could be of whose variance along each axis is `variance_m2` at most
-    /// \[m²\], and some others, in order.
-    pub(super) fn near(&self, point: &Point3<f64>, variance_m2: f64) -> &[u32] {
-        self.reaches.near(point, REACH_SD * variance_m2.sqrt())
     }
 
     /// The share of the map within `reach_m` \[m\] of a place of it, on average.
@@ -136,12 +125,7 @@ impl Patch {
                 let variance = own.variance() + felt.sd * felt.sd + wide.variance * 1e-6;
                 let apart = felt.value - own.mean;
                 let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
-                let apart = felt.value - wide.mean;
-                let wide_variance = wide.variance + felt.sd * felt.sd;
-                let anywhere = (-0.5 * apart * apart / wide_variance).exp() / wide_variance.sqrt();
-                // A value far off both is wrong, and tells nothing.
-                let anywhere = anywhere + 1e-3 / wide_variance.sqrt();
-                sum += ((1.0 - WRONG_SHARE) * here / anywhere + WRONG_SHARE).ln();
+                sum += ((1.0 - WRONG_SHARE) * here / wide.density(felt) + WRONG_SHARE).ln();
             }
         }
         for seen in &contact.descriptors {
@@ -176,6 +160,16 @@ pub(super) struct Wide {
     pub(super) channel: u16,
     pub(super) mean: f64,
     pub(super) variance: f64,
+}
+
+impl Wide {
+    /// Density of a level anywhere, times √(2π).
+    pub(super) fn density(&self, felt: &Felt) -> f64 {
+        let apart = felt.value - self.mean;
+        let variance = self.variance + felt.sd * felt.sd;
+        // A value far off all is wrong, and tells nothing.
+        ((-0.5 * apart * apart / variance).exp() + 1e-3) / variance.sqrt()
+    }
 }
 
 /// Over all places of these maps, each counted once.

@@ -215,8 +215,9 @@ fn the_touch_that_is_asked_for_tells_boxes_apart() {
         let at = frame().inverse() * contact.position_m;
         normal.z.abs() < 0.3 && at.z.abs() < 0.05
     });
-    for contact in on_sides.take(12) {
-        recognition.touch(&library, contact.aimed());
+    for (number, contact) in on_sides.take(12).enumerate() {
+        let is_aimed = number % 3 == 0;
+        recognition.touch(&library, if is_aimed { contact.aimed() } else { contact });
     }
     let asked = recognition.next_touch(&library).unwrap();
     let at = frame().inverse() * asked.point_m;
@@ -250,56 +251,72 @@ fn dotted(key: u64) -> ObjectModel {
 #[test]
 fn the_evidence_is_that_of_all_assignments_of_contacts_to_places() {
     let noise_m = 0.008;
-    for trial in 0..10 {
+    let quarter = |turns: u8| {
+        UnitQuaternion::new(Vector3::z() * std::f64::consts::FRAC_PI_2 * f64::from(turns))
+    };
+    // One orientation or four; and which of the contacts, if any, touches something else.
+    for (trial, stray) in (0..16).zip([9, 0, 1, 2].into_iter().cycle()) {
+        let rotations: Vec<_> = (0..if trial < 8 { 1 } else { 4 }).map(quarter).collect();
         let mut library = ObjectLibrary::default();
         library.put(ObjectId(1), dotted(1));
         library.put(ObjectId(2), dotted(2));
         let offset = Vector3::new(3.0, -2.0, 0.1);
+        let turn = rotations[rotations.len() - 1].inverse();
         let contacts: Vec<_> = [4u64, 1, 6]
             .iter()
-            .map(|at| {
+            .zip(0..)
+            .map(|(at, number)| {
                 let (point, level) = dots(1, 7)[usize::try_from(*at).unwrap()];
                 let noise = |k| noise_m * normal(7000 + 100 * trial + 10 * at + k);
                 let noise = Vector3::new(noise(0), noise(1), noise(2));
-                Contact::at(point + noise + offset, noise_m).with_level(0, level, 1.0)
+                let far = Vector3::new(0.0, 0.03, 0.05) * f64::from(u8::from(number == stray));
+                let at = turn * (point + noise + far) + offset;
+                Contact::at(at, noise_m).with_level(0, level, 1.0)
             })
             .collect();
-        let mut shifts = Shifts::new(vec![UnitQuaternion::identity()]);
+        let mut shifts = Shifts::new(rotations.clone());
         for (count, contact) in contacts.iter().enumerate() {
             shifts.touch(&library, &contacts[..count], contact);
+            let contacts = &contacts[..=count];
+            let found = |id: u32| shifts.object_logs()[&ObjectId(id)];
+            let told = |id: u32| by_assignment(&library, id, &rotations, contacts);
+            let (one, two) = (told(1), told(2));
+            let best = one.max(two);
+            for (own, id) in [(one, 1), (two, 2)] {
+                let apart = found(id) - own;
+                // Where an outlier is the most likely, a hypothesis does not part, and is a little off after that.
+                let most = if stray > 2 && id == 1 { 0.15 } else { 0.4 };
+                // What hardly explains the contacts is dropped some day, but never overrated.
+                let about = format!("{trial} {count} {id}: {} {one} {two}", found(id));
+                assert!(apart < most || found(id) < best - 8.0, "{about}");
+                assert!(apart > -most || own < best - 2.0, "{about}");
+            }
         }
-        let found = |id: u32| {
-            let own = shifts
-                .all
-                .iter()
-                .filter(|shift| shift.object == ObjectId(id));
-            log_sum(own.map(|shift| shift.evidence))
-        };
-        let (one, two) = (
-            by_assignment(&library, 1, &contacts),
-            by_assignment(&library, 2, &contacts),
-        );
-        assert!((found(1) - one).abs() < 0.15, "{} {one}", found(1));
-        // What hardly explains the contacts is dropped some day, but never overrated.
-        assert!(found(2) < two.max(one - 8.0) + 0.4, "{} {two}", found(2));
     }
 }
 
-/// Log evidence of a map: over all ways to take each contact for a place or an outlier, the integral over
+/// Log evidence of a map: over all rotations and all ways to take each contact for a place or an outlier, the integral over
 /// translations, which is a product of Gaussians.
-fn by_assignment(library: &ObjectLibrary, id: u32, contacts: &[Contact]) -> f64 {
+fn by_assignment(
+    library: &ObjectLibrary,
+    id: u32,
+    rotations: &[UnitQuaternion<f64>],
+    contacts: &[Contact],
+) -> f64 {
     let surface = library.surface(ObjectId(id)).unwrap();
     let count = surface.patches.len();
     let mut logs = Vec::new();
     let ways = (count + 1).pow(u32::try_from(contacts.len() - 1).unwrap());
-    for first in 0..count {
+    let firsts = (0..count).flat_map(|first| rotations.iter().map(move |turn| (first, turn)));
+    let prior = -((count * rotations.len()) as f64).ln();
+    for (first, turn) in firsts {
         for way in 0..ways {
             let mut rest = way;
             // The translation's Gaussian: mean and variance, begun by the first contact.
             let patch = &surface.patches[first];
-            let mut mean = patch.position - contacts[0].position_m;
+            let mut mean = patch.position - turn * contacts[0].position_m;
             let mut variance = patch.variance_m2 + contacts[0].variance_m2();
-            let mut log = patch.percept_log(&contacts[0], library.wide()) - (count as f64).ln();
+            let mut log = patch.percept_log(&contacts[0], library.wide()) + prior;
             for contact in &contacts[1..] {
                 let at = rest % (count + 1);
                 rest /= count + 1;
@@ -308,7 +325,7 @@ fn by_assignment(library: &ObjectLibrary, id: u32, contacts: &[Contact]) -> f64 
                     continue;
                 }
                 let patch = &surface.patches[at];
-                let apart = patch.position - contact.position_m - mean;
+                let apart = patch.position - turn * contact.position_m - mean;
                 let noise = patch.variance_m2 + contact.variance_m2();
                 let sum = variance + noise;
                 log += patch.percept_log(contact, library.wide()) + 0.98_f64.ln()

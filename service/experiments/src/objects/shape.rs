@@ -47,9 +47,15 @@ impl Body {
 
 /// A solid in one piece: boxes, ellipsoids and cylinders of random extents, the middle of each but the first in a voxel of those before.
 pub(super) fn solid(random: &mut ChaCha8Rng) -> BTreeSet<[i32; 3]> {
+    let bodies = random.random_range(BODIES);
+    solid_of(bodies, random)
+}
+
+/// The same of so many bodies.
+pub(super) fn solid_of(bodies: usize, random: &mut ChaCha8Rng) -> BTreeSet<[i32; 3]> {
     let mut voxels: Vec<Voxel> = vec![Voxel::zeros()];
     let mut filled = BTreeSet::from([[0; 3]]);
-    for _ in 0..random.random_range(BODIES) {
+    for _ in 0..bodies {
         let middle = voxels[random.random_range(0..voxels.len())];
         let body = Body::draw(random);
         let half: Vector3<f64> = Vector3::from_fn(|_, _| random.random_range(HALF_EXTENT));

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::shape::{Voxel, solid};
+use super::shape::{Voxel, solid, solid_of};
 
 /// Edge of a voxel \[m\]: objects are as large as things that a hand takes.
 pub const EDGE_M: f64 = 0.01;
@@ -63,6 +63,25 @@ impl VoxelObject {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(number);
         let filled = solid(&mut random);
+        Self::coloured(filled, &mut random)
+    }
+
+    /// The object of a number, put together from as many bodies as it takes for so many faces.
+    pub fn with_faces(seed: u64, number: u64, faces: usize) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(number);
+        let mut bodies = 2;
+        loop {
+            let filled = solid_of(bodies, &mut random);
+            let object = Self::coloured(filled, &mut random);
+            if object.faces.len() >= faces {
+                return object;
+            }
+            bodies += 1;
+        }
+    }
+
+    fn coloured(filled: BTreeSet<[i32; 3]>, random: &mut ChaCha8Rng) -> Self {
         let is_free = |voxel: Voxel| !filled.contains(&<[i32; 3]>::from(voxel));
         let sides: Vec<(Voxel, usize)> = filled
             .iter()
@@ -70,7 +89,7 @@ impl VoxelObject {
             .flat_map(|voxel| (0..DIRECTIONS.len()).map(move |direction| (voxel, direction)))
             .filter(|(voxel, direction)| is_free(voxel + DIRECTIONS[*direction]))
             .collect();
-        let levels = levels(&sides, &mut random);
+        let levels = levels(&sides, random);
         let faces = sides.iter().map(|(voxel, direction)| {
             let normal = DIRECTIONS[*direction].cast::<f64>();
             Face {
