@@ -14,8 +14,19 @@ use nalgebra::Vector2;
 /// Between two instants at which the covariance is compared with the error \[ns\].
 const CONSISTENCY_NS: i64 = 1_000_000_000;
 
+/// What the estimate is told.
+#[derive(Clone, Debug)]
+pub(crate) struct Told {
+    /// What robots see of one another.
+    pub(crate) sightings_of_robots: bool,
+    /// Where robots other than the first one start.
+    pub(crate) all_starts: bool,
+    /// The robots that have names of their own for landmarks.
+    pub(crate) anonymous: Vec<u32>,
+}
+
 /// Prints the errors; answers whether the set could be read.
-pub(crate) fn run(directory: &str, sees_robots: bool, unknown: bool) -> bool {
+pub(crate) fn run(directory: &str, told: &Told) -> bool {
     let Ok(set) = Mrclam::load(Path::new(directory)) else {
         return false;
     };
@@ -29,7 +40,10 @@ pub(crate) fn run(directory: &str, sees_robots: bool, unknown: bool) -> bool {
     let mut causal: BTreeMap<u32, Vec<StampedPose>> = BTreeMap::new();
     let mut times_s = Vec::new();
     let mut consistency = Consistency::default();
-    for entry in set.team_readings() {
+    for mut entry in set.team_readings() {
+        if told.anonymous.contains(&entry.robot) {
+            entry = entry.with_own_names();
+        }
         let Ok(sample) = Sample::try_from(&entry.reading) else {
             continue;
         };
@@ -39,14 +53,14 @@ pub(crate) fn run(directory: &str, sees_robots: bool, unknown: bool) -> bool {
             SampleBody::Motion(motion) => {
                 estimator.motion(agent, stamp_ns, motion);
             }
-            SampleBody::StartPose(start) if agent == 0 || !unknown => {
+            SampleBody::StartPose(start) if agent == 0 || told.all_starts => {
                 estimator.start_pose(agent, start);
             }
             SampleBody::Sighting(sighting) => match &sighting.target {
                 Target::Landmark(label) => {
                     estimator.landmark(agent, stamp_ns, label, &sighting.relation);
                 }
-                Target::Agent(name) if sees_robots => {
+                Target::Agent(name) if told.sightings_of_robots => {
                     let target = by_name[name.as_str()];
                     estimator.sighting(agent, stamp_ns, target, &sighting.relation);
                 }

@@ -1,0 +1,251 @@
+//! Constellations: two frames that know the same landmarks by other names, told by how these lie to one another.
+//!
+//! ```text
+//! hypotheses   rigid motions that lay two landmarks of one frame (three in space) over two of the other which are as
+//!              far from one another, within the deviations of both distances
+//! twins        landmarks that a motion lays within their deviations of one another, one to one; the motion is fitted to
+//!              them and the twins are sought again
+//! chance       H · m · P(at least k − 2 of m − 2 are so near by chance), the least over k; in space k − 3 of m − 3
+//! ```
+//!
+//! H is the number of hypotheses, m that of the landmarks that are sought, and how near something lies by chance
+//! follows from the density of the other frame's landmarks. That is the expected number of motions which are as good
+//! where nothing is the same (the number of false alarms of Desolneux, Moisan & Morel 2000; Moisan & Stival 2004 for
+//! such hypotheses). Landmarks in a regular order are no matter of chance: so no other motion may explain nearly as much.
+//! A mirrored constellation is another one.
+
+mod chance;
+mod hypotheses;
+mod sky;
+
+use nalgebra::{Isometry3, Point3};
+
+use crate::geometry::align;
+use chance::log10_by_chance;
+use hypotheses::{Hypothesis, hypotheses};
+use sky::{Twin, clear, one_to_one};
+
+pub(super) use chance::log10_at_least;
+pub(super) use sky::Sky;
+
+/// Landmarks of the newer frame that are sought in the older one.
+pub(super) const SOUGHT_MAX: usize = 24;
+/// Deviations within which two landmarks, or two distances, may be the same.
+pub(super) const GATE: f64 = 3.0;
+/// Fewest twins between planar frames, and between frames in space.
+const TWINS_MIN: (usize, usize) = (5, 6);
+/// Log₁₀ of the expected number of motions that are as good by chance, for one to be believed.
+const LOG10_CHANCE_MAX: f64 = -4.0;
+/// Part of its logarithm that another motion may have.
+const RIVAL_MAX: f64 = 0.5;
+/// Rough motions that are looked at closely.
+const CANDIDATES_MAX: usize = 16;
+/// Rounds of fitting a motion and seeking the twins again.
+const ROUNDS: usize = 4;
+
+/// Where a landmark is in its frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Star {
+    /// \[m\].
+    pub(super) position: Point3<f64>,
+    /// Along an axis, of those along which it has any \[m²\].
+    pub(super) variance: f64,
+}
+
+/// How the landmarks of one frame lie among those of an older one.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Likeness {
+    /// Pose of the newer frame in the older one.
+    pub(super) pose: Isometry3<f64>,
+    /// Numbers of the landmarks that are the same, in the older and in the newer frame.
+    pub(super) twins: Vec<(usize, usize)>,
+    /// Log₁₀ of the expected number of motions as good as this one by chance.
+    pub(super) log10_chance: f64,
+}
+
+/// Finds how the landmarks of a newer frame lie among those of an older one, if that is beyond chance and no other way
+/// explains nearly as much.
+///
+/// Of the newer ones the first [`SOUGHT_MAX`] count, so they come with the most telling first. Landmarks that are known less
+/// well than they are dense say nothing and are left out. Work is bounded: where too many pairs are equally far from one
+/// another, there is no answer.
+pub(super) fn likeness(older: &[Star], newer: &[Star], is_planar: bool) -> Option<Likeness> {
+    let newer = &newer[..newer.len().min(SOUGHT_MAX)];
+    let twins_min = if is_planar { TWINS_MIN.0 } else { TWINS_MIN.1 };
+    let sparsest = Sky::new(older, is_planar);
+    let is_telling = |star: &&Star| sparsest.chance_within(2.0 * star.variance.sqrt()) < 1.0;
+    let (older_at, newer_at) = (places(older, is_telling), places(newer, is_telling));
+    let only = |stars: &[Star], at: &[usize]| at.iter().map(|&at| stars[at]).collect();
+    let (older, newer): (Vec<Star>, Vec<Star>) = (only(older, &older_at), only(newer, &newer_at));
+    if older.len().min(newer.len()) < twins_min {
+        return None;
+    }
+    let hypotheses = hypotheses(&older, &newer, is_planar)?;
+    let sky = Sky::new(&older, is_planar);
+    let rough = candidates(&hypotheses, &sky, &newer, twins_min);
+    let mut found: Vec<Likeness> = Vec::new();
+    for pose in rough {
+        let Some((pose, twins)) = settle(pose, &sky, &older, &newer, is_planar) else {
+            continue;
+        };
+        if twins.len() >= twins_min {
+            found.push(Likeness {
+                pose,
+                log10_chance: log10_by_chance(
+                    &twins,
+                    &sky,
+                    hypotheses.len(),
+                    newer.len(),
+                    is_planar,
+                ),
+                twins: twins.iter().map(|twin| (twin.older, twin.newer)).collect(),
+            });
+        }
+    }
+    found.sort_by(|a, b| a.log10_chance.total_cmp(&b.log10_chance));
+    let mut found = found.into_iter();
+    let mut best = found.next()?;
+    let is_another = |other: &Likeness| {
+        let same = other.twins.iter().filter(|twin| best.twins.contains(twin));
+        2 * same.count() <= other.twins.len()
+    };
+    let rival = found.find(is_another);
+    let is_rivalled = rival.is_some_and(|rival| rival.log10_chance < RIVAL_MAX * best.log10_chance);
+    for twin in &mut best.twins {
+        *twin = (older_at[twin.0], newer_at[twin.1]);
+    }
+    (best.log10_chance < LOG10_CHANCE_MAX && !is_rivalled).then_some(best)
+}
+
+/// Where those are that fulfil a condition.
+fn places(stars: &[Star], condition: impl Fn(&&Star) -> bool) -> Vec<usize> {
+    let found = stars.iter().enumerate();
+    found
+        .filter(|(_, star)| condition(star))
+        .map(|(at, _)| at)
+        .collect()
+}
+
+/// The best of the motions, no two nearly the same, best first.
+fn candidates(
+    hypotheses: &[Hypothesis],
+    sky: &Sky<'_>,
+    newer: &[Star],
+    twins_min: usize,
+) -> Vec<Isometry3<f64>> {
+    let corners = corners(newer);
+    let near_m = 2.0 * GATE * mean_variance(newer).sqrt();
+    let mut candidates = Vec::new();
+    let mut twins = Vec::new();
+    for hypothesis in hypotheses {
+        sky.pairs(
+            &hypothesis.pose,
+            newer,
+            &|at| hypothesis.spread(at),
+            &mut twins,
+        );
+        one_to_one(&mut twins);
+        if twins.len() >= twins_min {
+            let candidate = Candidate {
+                pose: hypothesis.pose,
+                n_twins: twins.len(),
+                squares: twins.iter().map(|twin| twin.square).sum(),
+            };
+            let is_same =
+                |other: &Candidate| apart_m(&other.pose, &candidate.pose, &corners) < near_m;
+            propose(&mut candidates, candidate, is_same);
+        }
+    }
+    candidates.iter().map(|candidate| candidate.pose).collect()
+}
+
+/// Mean of the variances \[m²\].
+pub(super) fn mean_variance(stars: &[Star]) -> f64 {
+    stars.iter().map(|star| star.variance).sum::<f64>() / stars.len().max(1) as f64
+}
+
+/// How far a motion lays landmarks from where another one lays them, at most \[m\].
+pub(super) fn apart_m(one: &Isometry3<f64>, other: &Isometry3<f64>, stars: &[Star]) -> f64 {
+    let apart = |star: &Star| (one * star.position - other * star.position).norm();
+    stars.iter().map(apart).fold(0.0, f64::max)
+}
+
+/// Three landmarks far from one another: two motions that lay these alike are one.
+fn corners(stars: &[Star]) -> Vec<Star> {
+    let mut corners: Vec<Star> = Vec::new();
+    while corners.len() < stars.len().min(3) {
+        let far = |star: &Star| {
+            let distances = corners
+                .iter()
+                .map(|corner| (star.position - corner.position).norm());
+            distances.fold(f64::INFINITY, f64::min)
+        };
+        let farthest = stars.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
+        corners.extend(farthest);
+    }
+    corners
+}
+
+/// A motion that is to be looked at closely.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    pose: Isometry3<f64>,
+    n_twins: usize,
+    /// Sum of their normalised squares.
+    squares: f64,
+}
+
+impl Candidate {
+    fn is_better_than(&self, other: &Self) -> bool {
+        (self.n_twins, -self.squares) > (other.n_twins, -other.squares)
+    }
+}
+
+/// Keeps the best candidates, best first; of those that are nearly the same motion, the best one.
+fn propose(candidates: &mut Vec<Candidate>, new: Candidate, is_same: impl Fn(&Candidate) -> bool) {
+    let worst = candidates.last();
+    if candidates.len() >= CANDIDATES_MAX && worst.is_some_and(|worst| !new.is_better_than(worst)) {
+        return;
+    }
+    if let Some(at) = candidates.iter().position(is_same) {
+        if !new.is_better_than(&candidates[at]) {
+            return;
+        }
+        candidates.remove(at);
+    }
+    let at = candidates.partition_point(|other| other.is_better_than(&new));
+    candidates.insert(at, new);
+    candidates.truncate(CANDIDATES_MAX);
+}
+
+/// Fits a motion to its twins and seeks them again, until nothing changes.
+fn settle(
+    mut pose: Isometry3<f64>,
+    sky: &Sky<'_>,
+    older: &[Star],
+    newer: &[Star],
+    is_planar: bool,
+) -> Option<(Isometry3<f64>, Vec<Twin>)> {
+    let mut twins = Vec::new();
+    for round in 0..ROUNDS {
+        // At first the motion is only that of two or three landmarks.
+        let spread = if round == 0 {
+            mean_variance(newer)
+        } else {
+            0.0
+        };
+        sky.pairs(&pose, newer, &|_| spread, &mut twins);
+        one_to_one(&mut twins);
+        let pairs: Vec<_> = twins
+            .iter()
+            .map(|twin| (older[twin.older].position, newer[twin.newer].position))
+            .collect();
+        let weights: Vec<f64> = twins.iter().map(|twin| 1.0 / twin.variance).collect();
+        pose = align(&pairs, &weights, is_planar)?;
+    }
+    sky.pairs(&pose, newer, &|_| 0.0, &mut twins);
+    Some((pose, clear(&twins)))
+}
+
+#[cfg(test)]
+mod tests;
