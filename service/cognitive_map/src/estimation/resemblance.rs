@@ -16,6 +16,10 @@ use crate::sample::Label;
 const LOOK_EVERY: u64 = 31;
 /// Looks at which the same motion is found before it is believed.
 const LOOKS_MIN: u32 = 3;
+/// Rounds of looking whether pairs of twins fit better crosswise.
+const CROSSED_ROUNDS: usize = 3;
+/// Difference of squared distances over the variance from which it is sure which of two landmarks is meant: 400 to 1.
+const SURE_MARGIN: f64 = 12.0;
 /// Most pairs of frames of which it is remembered what was found.
 pub(super) const RESEMBLANCES_MAX: usize = 64;
 /// Frames among which the next one to look at is sought.
@@ -130,13 +134,14 @@ impl Estimator {
             newer: sought.stars[other].position,
             variance: known.stars[one].variance + sought.stars[other].variance,
         };
-        let pairs: Vec<Pair> = found.twins.iter().map(pair).collect();
+        let twins = self.sure_twins(older, newer, found, known, sought);
+        let pairs: Vec<Pair> = twins.iter().map(pair).collect();
         let is_planar = self.frame(older).is_planar() && self.frame(newer).is_planar();
         let Some(tie) = tie(&pairs, is_planar).filter(|_| self.aliases.has_room(pairs.len()))
         else {
             return;
         };
-        let twins = found.twins.iter();
+        let twins = twins.iter();
         let same: Vec<(Label, Label)> = twins
             .map(|&(one, other)| (sought.labels[other].clone(), known.labels[one].clone()))
             .collect();
@@ -146,6 +151,68 @@ impl Estimator {
         }
         self.merge(older, newer, &tie);
         self.same = same;
+    }
+
+    /// The twins of which it is sure which is which.
+    ///
+    /// How two landmarks close together lie to one another is known far better than where they are: two pairs are taken crosswise if
+    /// that fits better, and neither counts unless the other way fits much worse. The same holds of landmarks that are no
+    /// twins, of which only the positions can be compared.
+    fn sure_twins(
+        &self,
+        older: usize,
+        newer: usize,
+        found: &Likeness,
+        known: &Strangers,
+        sought: &Strangers,
+    ) -> Vec<(usize, usize)> {
+        let (older, newer) = (self.frame(older), self.frame(newer));
+        let is_planar = older.is_planar() && newer.is_planar();
+        let lies_at = |at: usize| found.pose * sought.stars[at].position;
+        let apart_m2 =
+            |one: usize, other: usize| (lies_at(other) - known.stars[one].position).norm_squared();
+        // By how much farther apart the differences are if two pairs are taken crosswise.
+        let margin = |&(p, i): &(usize, usize), &(q, j): &(usize, usize)| {
+            let there = known.stars[p].position - known.stars[q].position;
+            4.0 * there.dot(&(lies_at(i) - lies_at(j)))
+        };
+        let mut twins = found.twins.clone();
+        for _ in 0..CROSSED_ROUNDS {
+            for one in 0..twins.len() {
+                for other in 0..one {
+                    if margin(&twins[one], &twins[other]) < 0.0 {
+                        let (p, q) = (twins[one].0, twins[other].0);
+                        (twins[one].0, twins[other].0) = (q, p);
+                    }
+                }
+            }
+        }
+        let variance = |frame: &Frame, strangers: &Strangers, one: usize, other: usize| {
+            let marks = [one, other].map(|at| frame.marks.get(&strangers.labels[at]));
+            let [Some(one), Some(other)] = marks else {
+                return f64::INFINITY;
+            };
+            frame.apart(one, other, is_planar).sd_m.powi(2)
+        };
+        let is_sure = |&(p, i): &(usize, usize)| {
+            let is_crossed_worse = |&(q, j): &(usize, usize)| {
+                let variance = variance(older, known, p, q) + variance(newer, sought, i, j);
+                (p, i) == (q, j) || margin(&(p, i), &(q, j)) > SURE_MARGIN * variance
+            };
+            let here = apart_m2(p, i);
+            let is_worse = |one: usize, other: usize| {
+                let variance = known.stars[one].variance + sought.stars[other].variance;
+                apart_m2(one, other) - here > SURE_MARGIN * variance
+            };
+            let mut free_older =
+                (0..known.stars.len()).filter(|at| twins.iter().all(|twin| twin.0 != *at));
+            let mut free_newer =
+                (0..sought.stars.len()).filter(|at| twins.iter().all(|twin| twin.1 != *at));
+            twins.iter().all(is_crossed_worse)
+                && free_older.all(|at| is_worse(at, i))
+                && free_newer.all(|at| is_worse(p, at))
+        };
+        twins.iter().filter(|twin| is_sure(twin)).copied().collect()
     }
 
     /// A landmark goes by another name in every frame that does not know that yet.

@@ -18,7 +18,7 @@ use crate::sample::Label;
 const LOG10_CHANCE_MAX: f64 = -4.0;
 /// Largest probability that something lies by chance where a landmark would be taken for another. One that is known less well says
 /// nothing yet.
-const CHANCE_MAX: f64 = 0.1;
+const CHANCE_MAX: f64 = 0.25;
 
 impl Estimator {
     /// Looks whether an agent has names of its own for landmarks of its frame that others know.
@@ -101,16 +101,16 @@ impl Estimator {
 
 /// How far two landmarks are estimated to be from one another.
 #[derive(Clone, Copy, Debug)]
-struct Apart {
+pub(super) struct Apart {
     distance_m: f64,
     /// Deviation of it along an axis \[m\].
-    sd_m: f64,
+    pub(super) sd_m: f64,
     /// Whether they may be in one place.
     is_within_gate: bool,
 }
 
 impl Frame {
-    fn apart(&self, one: &Mark, other: &Mark, is_planar: bool) -> Apart {
+    pub(super) fn apart(&self, one: &Mark, other: &Mark, is_planar: bool) -> Apart {
         let mixed: Matrix3<f64> = self.covariance.block(one.offset, other.offset);
         let spread =
             self.mark_covariance(one) + self.mark_covariance(other) - mixed - mixed.transpose();

@@ -505,7 +505,7 @@ fn drive(
     let mut truth = *from;
     for step in 0..steps {
         let noise = PoseNoise::new([0.01, 0.01, 0.0], [0.0, 0.0, 0.005]).unwrap();
-        let turn = [0.0, 0.0, 0.3 * (0.05 * step as f64).sin()];
+        let turn = [0.0, 0.0, 0.1 + 0.05 * (0.03 * step as f64).sin()];
         let moved = Motion::from_velocity([0.4, 0.0, 0.0], turn, 1.0, Some(noise)).unwrap();
         truth *= moved.increment();
         let stamp_ns = i64::try_from(step + 1).unwrap() * SECOND_NS;

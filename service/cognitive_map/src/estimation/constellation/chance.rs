@@ -2,15 +2,24 @@
 
 use super::sky::{Sky, Twin};
 
+/// What was tried to find a motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tried {
+    /// Motions.
+    pub(super) n_hypotheses: usize,
+    /// Landmarks that were sought.
+    pub(super) n_sought: usize,
+    pub(super) is_planar: bool,
+}
+
 /// Log₁₀ of the expected number of motions that lay as many landmarks as near to others where nothing is the same, for the
 /// number of the nearest twins that makes it least. Nobody is nearer than both are known.
-pub(super) fn log10_by_chance(
-    twins: &[Twin],
-    sky: &Sky<'_>,
-    n_hypotheses: usize,
-    n_sought: usize,
-    is_planar: bool,
-) -> f64 {
+pub(super) fn log10_by_chance(twins: &[Twin], sky: &Sky<'_>, tried: &Tried) -> f64 {
+    let Tried {
+        n_hypotheses,
+        n_sought,
+        is_planar,
+    } = *tried;
     let free = if is_planar { 2 } else { 3 };
     // The motion was fitted to the twins, which takes half of its degrees of freedom off their distances.
     let n = twins.len() as f64;

@@ -6,9 +6,9 @@ use super::{GATE, Star};
 use crate::geometry::align;
 
 /// Landmarks of the newer frame from which motions are drawn, in a plane and in space.
-const SEEDS_MAX: (usize, usize) = (16, 12);
+const SEEDS_MAX: (usize, usize) = (12, 8);
 /// Most motions; of more, a constellation says nothing that could be found out at a bounded cost.
-const HYPOTHESES_MAX: usize = 1 << 14;
+const HYPOTHESES_MAX: usize = 1 << 13;
 /// Least distance of two landmarks that say how a frame is turned, in its own deviations.
 const DISTANCE_MIN: f64 = 5.0;
 
@@ -17,6 +17,8 @@ const DISTANCE_MIN: f64 = 5.0;
 pub(super) struct Hypothesis {
     /// Pose of the newer frame in the older one.
     pub(super) pose: Isometry3<f64>,
+    /// The landmarks, of the older and of the newer frame; in a plane the second pair comes twice.
+    pub(super) pairs: [(usize, usize); 3],
     /// Middle of the landmarks, in the older frame.
     middle: Point3<f64>,
     /// How far they are from there \[m\].
@@ -115,6 +117,7 @@ fn by_two(older: &[Star], newer: &[Star], [p, q]: [usize; 2], span: Span) -> Opt
         .all(|entry| entry.is_finite())
         .then(|| Hypothesis {
             pose: Isometry3::from_parts(shift.into(), turn),
+            pairs: [(p, i), (q, j), (q, j)],
             middle,
             radius_m: 0.5 * span.length_m,
             variance: 0.5 * variance,
@@ -172,6 +175,7 @@ fn by_three(
                 + other.variance;
             found.push(Hypothesis {
                 pose,
+                pairs: [(p, i), (q, j), (r, k)],
                 middle: middle.into(),
                 radius_m: 0.5 * height.min(span.length_m),
                 variance: variance / 3.0,

@@ -9,7 +9,8 @@
 //! ```
 //!
 //! H is the number of hypotheses, m that of the landmarks that are sought, and how near something lies by chance
-//! follows from the density of the other frame's landmarks. That is the expected number of motions which are as good
+//! follows from the density of the other frame's landmarks. Landmarks close together agree together: a group of them counts
+//! once, among the hypotheses, too. That is the expected number of motions which are as good
 //! where nothing is the same (the number of false alarms of Desolneux, Moisan & Morel 2000; Moisan & Stival 2004 for
 //! such hypotheses). Landmarks in a regular order are no matter of chance: so no other motion may explain nearly as much.
 //! A mirrored constellation is another one.
@@ -21,9 +22,9 @@ mod sky;
 use nalgebra::{Isometry3, Point3};
 
 use crate::geometry::align;
-use chance::log10_by_chance;
+use chance::{Tried, log10_by_chance};
 use hypotheses::{Hypothesis, hypotheses};
-use sky::{Twin, clear, one_to_one};
+use sky::{Twin, one_to_one};
 
 pub(super) use chance::log10_at_least;
 pub(super) use sky::Sky;
@@ -38,6 +39,8 @@ const TWINS_MIN: (usize, usize) = (5, 6);
 const LOG10_CHANCE_MAX: f64 = -4.0;
 /// Part of its logarithm that another motion may have.
 const RIVAL_MAX: f64 = 0.5;
+/// Part of the landmarks among the twins, of the frame that has fewer there, that must be twins.
+const AGREEING_MIN: f64 = 0.6;
 /// Rough motions that are looked at closely.
 const CANDIDATES_MAX: usize = 16;
 /// Rounds of fitting a motion and seeking the twins again.
@@ -57,7 +60,8 @@ pub(super) struct Star {
 pub(super) struct Likeness {
     /// Pose of the newer frame in the older one.
     pub(super) pose: Isometry3<f64>,
-    /// Numbers of the landmarks that are the same, in the older and in the newer frame.
+    /// Numbers of the landmarks that lie over one another, in the older and in the newer frame. Of landmarks close together it is
+    /// open which is which.
     pub(super) twins: Vec<(usize, usize)>,
     /// Log₁₀ of the expected number of motions as good as this one by chance.
     pub(super) log10_chance: f64,
@@ -77,27 +81,28 @@ pub(super) fn likeness(older: &[Star], newer: &[Star], is_planar: bool) -> Optio
     let (older_at, newer_at) = (places(older, is_telling), places(newer, is_telling));
     let only = |stars: &[Star], at: &[usize]| at.iter().map(|&at| stars[at]).collect();
     let (older, newer): (Vec<Star>, Vec<Star>) = (only(older, &older_at), only(newer, &newer_at));
-    if older.len().min(newer.len()) < twins_min {
+    let sky = Sky::new(&older, is_planar);
+    let apart_m = sky.spacing_m() / 2.0;
+    let groups = [groups(&older, apart_m), groups(&newer, apart_m)];
+    if groups.iter().any(|groups| n_different(groups) < twins_min) {
         return None;
     }
     let hypotheses = hypotheses(&older, &newer, is_planar)?;
-    let sky = Sky::new(&older, is_planar);
-    let rough = candidates(&hypotheses, &sky, &newer, twins_min);
+    let tried = Tried {
+        n_hypotheses: n_hypotheses(&hypotheses, &groups),
+        n_sought: n_different(&groups[1]),
+        is_planar,
+    };
     let mut found: Vec<Likeness> = Vec::new();
-    for pose in rough {
+    for pose in candidates(&hypotheses, &sky, &newer, twins_min) {
         let Some((pose, twins)) = settle(pose, &sky, &older, &newer, is_planar) else {
             continue;
         };
-        if twins.len() >= twins_min {
+        let alone = one_by_group(&twins, &groups);
+        if alone.len() >= twins_min && is_agreed(&pose, &twins, &sky, &older, &newer) {
             found.push(Likeness {
                 pose,
-                log10_chance: log10_by_chance(
-                    &twins,
-                    &sky,
-                    hypotheses.len(),
-                    newer.len(),
-                    is_planar,
-                ),
+                log10_chance: log10_by_chance(&alone, &sky, &tried),
                 twins: twins.iter().map(|twin| (twin.older, twin.newer)).collect(),
             });
         }
@@ -105,9 +110,13 @@ pub(super) fn likeness(older: &[Star], newer: &[Star], is_planar: bool) -> Optio
     found.sort_by(|a, b| a.log10_chance.total_cmp(&b.log10_chance));
     let mut found = found.into_iter();
     let mut best = found.next()?;
+    // Other twins of a group are no other motion.
     let is_another = |other: &Likeness| {
-        let same = other.twins.iter().filter(|twin| best.twins.contains(twin));
-        2 * same.count() <= other.twins.len()
+        let twins = other.twins.iter();
+        let near = twins.filter(|&&(one, other)| {
+            (best.pose * newer[other].position - older[one].position).norm() <= apart_m
+        });
+        2 * near.count() <= other.twins.len()
     };
     let rival = found.find(is_another);
     let is_rivalled = rival.is_some_and(|rival| rival.log10_chance < RIVAL_MAX * best.log10_chance);
@@ -115,6 +124,56 @@ pub(super) fn likeness(older: &[Star], newer: &[Star], is_planar: bool) -> Optio
         *twin = (older_at[twin.0], newer_at[twin.1]);
     }
     (best.log10_chance < LOG10_CHANCE_MAX && !is_rivalled).then_some(best)
+}
+
+/// Groups of landmarks: each is in that of the first one that is so near \[m\].
+fn groups(stars: &[Star], near_m: f64) -> Vec<usize> {
+    let mut groups: Vec<usize> = Vec::with_capacity(stars.len());
+    for (at, star) in stars.iter().enumerate() {
+        let is_near = |&first: &usize| (stars[first].position - star.position).norm() <= near_m;
+        let founders = (0..at).filter(|&first| groups[first] == first);
+        groups.push(founders.into_iter().find(is_near).unwrap_or(at));
+    }
+    groups
+}
+
+/// How many groups there are.
+fn n_different(groups: &[usize]) -> usize {
+    groups
+        .iter()
+        .enumerate()
+        .filter(|(at, group)| at == *group)
+        .count()
+}
+
+/// How many of the hypotheses are of different groups.
+fn n_hypotheses(hypotheses: &[Hypothesis], groups: &[Vec<usize>; 2]) -> usize {
+    let of_groups = |hypothesis: &Hypothesis| {
+        let mut pairs = hypothesis
+            .pairs
+            .map(|(one, other)| (groups[0][one], groups[1][other]));
+        pairs.sort_unstable();
+        pairs
+    };
+    let mut different: Vec<_> = hypotheses.iter().map(of_groups).collect();
+    different.sort_unstable();
+    different.dedup();
+    different.len()
+}
+
+/// The nearest twin of each group.
+fn one_by_group(twins: &[Twin], groups: &[Vec<usize>; 2]) -> Vec<Twin> {
+    let mut alone: Vec<Twin> = Vec::new();
+    for twin in twins {
+        let shares = |other: &Twin| {
+            groups[0][other.older] == groups[0][twin.older]
+                || groups[1][other.newer] == groups[1][twin.newer]
+        };
+        if !alone.iter().any(shares) {
+            alone.push(*twin);
+        }
+    }
+    alone
 }
 
 /// Where those are that fulfil a condition.
@@ -162,6 +221,28 @@ fn candidates(
 /// Mean of the variances \[m²\].
 pub(super) fn mean_variance(stars: &[Star]) -> f64 {
     stars.iter().map(|star| star.variance).sum::<f64>() / stars.len().max(1) as f64
+}
+
+/// Whether most landmarks that lie among the twins are twins: where one frame knows many that the other does not, the rest is alike
+/// by chance.
+fn is_agreed(
+    pose: &Isometry3<f64>,
+    twins: &[Twin],
+    sky: &Sky<'_>,
+    older: &[Star],
+    newer: &[Star],
+) -> bool {
+    let near_m = sky.spacing_m();
+    let is_among = |at: &Point3<f64>| {
+        let mut twins = twins.iter().map(|twin| &older[twin.older].position);
+        twins.any(|twin| (twin - at).norm() <= near_m)
+    };
+    let of_older = older.iter().filter(|star| is_among(&star.position)).count();
+    let of_newer = newer
+        .iter()
+        .filter(|star| is_among(&(pose * star.position)))
+        .count();
+    twins.len() as f64 >= AGREEING_MIN * of_older.min(of_newer) as f64
 }
 
 /// How far a motion lays landmarks from where another one lays them, at most \[m\].
@@ -244,7 +325,8 @@ fn settle(
         pose = align(&pairs, &weights, is_planar)?;
     }
     sky.pairs(&pose, newer, &|_| 0.0, &mut twins);
-    Some((pose, clear(&twins)))
+    one_to_one(&mut twins);
+    Some((pose, twins))
 }
 
 #[cfg(test)]

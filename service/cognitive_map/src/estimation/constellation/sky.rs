@@ -89,6 +89,17 @@ impl<'a> Sky<'a> {
         });
     }
 
+    /// Radius of the area or volume in which there is one of these on the average \[m\].
+    pub(super) fn spacing_m(&self) -> f64 {
+        if self.is_planar {
+            (self.density * std::f64::consts::PI).recip().sqrt()
+        } else {
+            (self.density * 4.0 / 3.0 * std::f64::consts::PI)
+                .recip()
+                .cbrt()
+        }
+    }
+
     /// Probability that something that lies anywhere among these is within a distance of one of them.
     pub(in super::super) fn chance_within(&self, distance_m: f64) -> f64 {
         let within = if self.is_planar {
@@ -111,12 +122,6 @@ pub(super) fn one_to_one(twins: &mut Vec<Twin>) {
         }
     }
     twins.truncate(taken);
-}
-
-/// The pairs of which neither landmark is in another one: where several lie close to one another, it is open which is which.
-pub(super) fn clear(pairs: &[Twin]) -> Vec<Twin> {
-    let is_clear = |twin: &&Twin| pairs.iter().filter(|other| other.shares_with(twin)).count() == 1;
-    pairs.iter().filter(is_clear).copied().collect()
 }
 
 /// How many landmarks there are by area or volume, that of the ellipse or ellipsoid with their spread:
