@@ -89,7 +89,7 @@ impl Estimator {
     /// The frame that one is compared with at a look: every second time that of the map, and the others in turn.
     fn next_to_look_at(&self, own: usize, look: u64) -> Option<usize> {
         let count = self.frames.len();
-        if look % 2 == 0 {
+        if look.is_multiple_of(2) {
             return (self.frame(MAP).population > 0).then_some(MAP);
         }
         let start = usize::try_from(look / 2 % count as u64).ok()?;
@@ -256,3 +256,6 @@ impl Frame {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,13 +7,13 @@ use crate::sample::{
     Label, Motion, PoseNoise, RangeBearing, Relation, RelativePosition, StartPose,
 };
 
-const SECOND_NS: i64 = 1_000_000_000;
+pub(super) const SECOND_NS: i64 = 1_000_000_000;
 
 fn label(number: usize) -> Label {
     Label::new(&format!("post-{number}")).unwrap()
 }
 
-fn start(pose: &Isometry3<f64>, sd: f64) -> StartPose {
+pub(super) fn start(pose: &Isometry3<f64>, sd: f64) -> StartPose {
     let noise = PoseNoise::new([sd; 3], [0.3 * sd; 3]).unwrap();
     StartPose::new(
         pose.translation.vector.into(),
@@ -30,7 +30,7 @@ fn motion(linear: [f64; 3], angular: [f64; 3]) -> Motion {
 }
 
 /// What is seen of a point from a pose, without error.
-fn polar(pose: &Isometry3<f64>, point: &Point3<f64>) -> Relation {
+pub(super) fn polar(pose: &Isometry3<f64>, point: &Point3<f64>) -> Relation {
     let seen = pose.inverse_transform_point(point).coords;
     let azimuth = seen.y.atan2(seen.x);
     let elevation = seen.z.atan2(seen.x.hypot(seen.y));
@@ -477,152 +477,4 @@ fn the_outcome_of_a_sample_is_told() {
     assert!(settled[0].accepted && settled[0].relation == seen);
     assert_eq!((settled[0].observer, settled[0].target), (observer, target));
     assert!(estimator.take_settled().is_empty(), "told once");
-}
-
-/// Posts in no order, on a floor.
-fn floor_posts(seed: u64, n: usize) -> Vec<Point3<f64>> {
-    let mut state = seed;
-    let mut number = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 11) as f64 / (1_u64 << 52) as f64) - 1.0
-    };
-    (0..n)
-        .map(|_| Point3::new(9.0 * number(), 6.0 * number(), 0.0))
-        .collect()
-}
-
-/// Drives about on a floor and looks around, with names of its own for the posts.
-fn drive(
-    estimator: &mut Estimator,
-    agent: u32,
-    from: &Isometry3<f64>,
-    posts: &[Point3<f64>],
-    name: &str,
-    steps: usize,
-) -> Isometry3<f64> {
-    let mut truth = *from;
-    for step in 0..steps {
-        let noise = PoseNoise::new([0.01, 0.01, 0.0], [0.0, 0.0, 0.005]).unwrap();
-        let turn = [0.0, 0.0, 0.1 + 0.05 * (0.03 * step as f64).sin()];
-        let moved = Motion::from_velocity([0.4, 0.0, 0.0], turn, 1.0, Some(noise)).unwrap();
-        truth *= moved.increment();
-        let stamp_ns = i64::try_from(step + 1).unwrap() * SECOND_NS;
-        estimator.motion(agent, stamp_ns, &moved);
-        let post = step % posts.len();
-        let label = Label::new(&format!("{name}-{post}")).unwrap();
-        estimator.landmark(agent, stamp_ns, &label, &polar(&truth, &posts[post]));
-    }
-    truth
-}
-
-#[test]
-fn landmarks_under_other_names_tie_frames_and_become_one() {
-    for seed in [1, 2, 3] {
-        for heading in [2.0, -0.7] {
-            let posts = floor_posts(seed, 14);
-            let mut estimator = Estimator::new(Parameters::default());
-            let [one, other] = [0, 1].map(|_| estimator.enrol());
-            estimator.found(one);
-            drive(
-                &mut estimator,
-                one,
-                &Isometry3::identity(),
-                &posts,
-                "a",
-                300,
-            );
-            let from = Isometry3::new(Vector3::new(-2.0, 1.0, 0.0), Vector3::z() * heading);
-            let truth = drive(&mut estimator, other, &from, &posts, "b", 600);
-            assert!(estimator.is_in_map(other), "seed {seed}, heading {heading}");
-            let (pose, covariance) = estimator.pose(other).unwrap();
-            let off = truth.inv_mul(&pose);
-            assert!(
-                off.translation.vector.norm() < 0.3 && off.rotation.angle() < 0.05,
-                "{off}"
-            );
-            assert!(covariance.matrix()[(0, 0)].sqrt() < 0.5);
-            // Both names are one landmark from then on, and what is seen under one moves the other.
-            assert_eq!(estimator.landmarks().count(), posts.len());
-            for (post, position) in posts.iter().enumerate() {
-                let [a, b] = ["a", "b"].map(|name| Label::new(&format!("{name}-{post}")).unwrap());
-                assert_eq!(estimator.name_of(&b), estimator.name_of(&a));
-                let name = estimator.name_of(&a);
-                let (_, found, _) = estimator.landmarks().find(|mark| mark.0 == name).unwrap();
-                assert!((found - position).norm() < 0.3, "{a:?}");
-            }
-        }
-    }
-}
-
-#[test]
-fn a_mirrored_or_regular_world_ties_nothing() {
-    let posts = floor_posts(4, 14);
-    let mirrored: Vec<_> = posts
-        .iter()
-        .map(|post| Point3::new(-post.x, post.y, 0.0))
-        .collect();
-    let grid: Vec<_> = (0..16)
-        .map(|k| Point3::new(f64::from(k % 4) * 2.5, f64::from(k / 4) * 2.5, 0.0))
-        .collect();
-    for (known, seen) in [(&posts, &mirrored), (&grid, &grid)] {
-        let mut estimator = Estimator::new(Parameters::default());
-        let [one, other] = [0, 1].map(|_| estimator.enrol());
-        estimator.found(one);
-        drive(&mut estimator, one, &Isometry3::identity(), known, "a", 300);
-        drive(
-            &mut estimator,
-            other,
-            &Isometry3::identity(),
-            seen,
-            "b",
-            600,
-        );
-        assert!(!estimator.is_in_map(other));
-        assert_eq!(estimator.landmarks().count(), known.len());
-        let label = Label::new("b-3").unwrap();
-        assert_eq!(estimator.name_of(&label), &label);
-    }
-}
-
-#[test]
-fn in_one_frame_an_agent_s_own_names_are_told_from_landmarks_of_its_own() {
-    let posts = floor_posts(6, 12);
-    let elsewhere: Vec<_> = floor_posts(7, 12)
-        .iter()
-        .map(|post| post + Vector3::x() * 40.0)
-        .collect();
-    for (seen, n_landmarks) in [(&posts, 12), (&elsewhere, 24)] {
-        let mut estimator = Estimator::new(Parameters::default());
-        let [one, other] = [0, 1].map(|_| estimator.enrol());
-        let from = Isometry3::new(Vector3::new(1.0, -2.0, 0.0), Vector3::z() * 0.4);
-        estimator.start_pose(one, &start(&Isometry3::identity(), 0.02));
-        estimator.start_pose(other, &start(&from, 0.02));
-        drive(
-            &mut estimator,
-            one,
-            &Isometry3::identity(),
-            &posts,
-            "a",
-            300,
-        );
-        drive(&mut estimator, other, &from, seen, "b", 400);
-        assert_eq!(estimator.landmarks().count(), n_landmarks);
-    }
-    // Of two posts close together that one agent tells apart, neither is the other.
-    let mut pairs = posts.clone();
-    pairs.extend(posts.iter().map(|post| post + Vector3::new(0.1, 0.05, 0.0)));
-    let mut estimator = Estimator::new(Parameters::default());
-    let one = estimator.enrol();
-    estimator.found(one);
-    drive(
-        &mut estimator,
-        one,
-        &Isometry3::identity(),
-        &pairs,
-        "a",
-        700,
-    );
-    assert_eq!(estimator.landmarks().count(), pairs.len());
 }

@@ -13,17 +13,21 @@
 //! once, among the hypotheses, too. That is the expected number of motions which are as good
 //! where nothing is the same (the number of false alarms of Desolneux, Moisan & Morel 2000; Moisan & Stival 2004 for
 //! such hypotheses). Landmarks in a regular order are no matter of chance: so no other motion may explain nearly as much.
-//! A mirrored constellation is another one.
+//! A mirrored constellation is another one, and nothing is believed that it would explain better.
 
+mod candidates;
 mod chance;
+mod groups;
 mod hypotheses;
 mod sky;
 
 use nalgebra::{Isometry3, Point3};
 
 use crate::geometry::align;
+use candidates::candidates;
 use chance::{Tried, log10_by_chance};
-use hypotheses::{Hypothesis, hypotheses};
+use groups::{groups, n_different, n_hypotheses, one_by_group};
+use hypotheses::hypotheses;
 use sky::{Twin, one_to_one};
 
 pub(super) use chance::log10_at_least;
@@ -39,10 +43,14 @@ const TWINS_MIN: (usize, usize) = (5, 6);
 const LOG10_CHANCE_MAX: f64 = -4.0;
 /// Part of its logarithm that another motion may have.
 const RIVAL_MAX: f64 = 0.5;
+/// By how much the logarithm of the mirror image may be better.
+const MIRRORED_MAX: f64 = 1.0;
+/// Distance up to which landmarks hang together, in their mean distance.
+const TOGETHER: f64 = 0.5;
 /// Part of the landmarks among the twins, of the frame that has fewer there, that must be twins.
-const AGREEING_MIN: f64 = 0.6;
-/// Rough motions that are looked at closely.
-const CANDIDATES_MAX: usize = 16;
+const AGREEING_MIN: f64 = 0.7;
+/// Distance from a twin up to which others are among the twins, in the landmarks' mean distance.
+const AMONG: f64 = 1.5;
 /// Rounds of fitting a motion and seeking the twins again.
 const ROUNDS: usize = 4;
 
@@ -75,31 +83,68 @@ pub(super) struct Likeness {
 /// another, there is no answer.
 pub(super) fn likeness(older: &[Star], newer: &[Star], is_planar: bool) -> Option<Likeness> {
     let newer = &newer[..newer.len().min(SOUGHT_MAX)];
-    let twins_min = if is_planar { TWINS_MIN.0 } else { TWINS_MIN.1 };
     let sparsest = Sky::new(older, is_planar);
     let is_telling = |star: &&Star| sparsest.chance_within(2.0 * star.variance.sqrt()) < 1.0;
     let (older_at, newer_at) = (places(older, is_telling), places(newer, is_telling));
     let only = |stars: &[Star], at: &[usize]| at.iter().map(|&at| stars[at]).collect();
     let (older, newer): (Vec<Star>, Vec<Star>) = (only(older, &older_at), only(newer, &newer_at));
-    let sky = Sky::new(&older, is_planar);
-    let apart_m = sky.spacing_m() / 2.0;
-    let groups = [groups(&older, apart_m), groups(&newer, apart_m)];
-    if groups.iter().any(|groups| n_different(groups) < twins_min) {
+    let found = motions(&older, &newer, is_planar);
+    let mut best = found.first()?.clone();
+    // Other twins of landmarks that lie close together are no other motion.
+    let near_m = Sky::new(&older, is_planar).spacing_m() * TOGETHER;
+    let is_another = |other: &&Likeness| {
+        let near = other.twins.iter().filter(|&&(one, other)| {
+            (best.pose * newer[other].position - older[one].position).norm() <= near_m
+        });
+        2 * near.count() <= other.twins.len()
+    };
+    let rival = found.iter().find(is_another);
+    let is_rivalled = rival.is_some_and(|rival| rival.log10_chance < RIVAL_MAX * best.log10_chance);
+    if best.log10_chance > LOG10_CHANCE_MAX || is_rivalled {
         return None;
     }
-    let hypotheses = hypotheses(&older, &newer, is_planar)?;
+    // What the mirror image explains better is a part of it that happens to look like its mirror image.
+    let mirrored: Vec<Star> = newer.iter().map(mirrored).collect();
+    let rival = motions(&older, &mirrored, is_planar).into_iter().next();
+    if rival.is_some_and(|rival| rival.log10_chance < best.log10_chance - MIRRORED_MAX) {
+        return None;
+    }
+    for twin in &mut best.twins {
+        *twin = (older_at[twin.0], newer_at[twin.1]);
+    }
+    Some(best)
+}
+
+fn mirrored(star: &Star) -> Star {
+    let mut star = *star;
+    star.position.x = -star.position.x;
+    star
+}
+
+/// The motions that are nearest to being believed, the best first.
+fn motions(older: &[Star], newer: &[Star], is_planar: bool) -> Vec<Likeness> {
+    let twins_min = if is_planar { TWINS_MIN.0 } else { TWINS_MIN.1 };
+    let sky = Sky::new(older, is_planar);
+    let near_m = TOGETHER * sky.spacing_m();
+    let groups = [groups(older, near_m), groups(newer, near_m)];
+    if groups.iter().any(|groups| n_different(groups) < twins_min) {
+        return Vec::new();
+    }
+    let Some(hypotheses) = hypotheses(older, newer, is_planar) else {
+        return Vec::new();
+    };
     let tried = Tried {
         n_hypotheses: n_hypotheses(&hypotheses, &groups),
         n_sought: n_different(&groups[1]),
         is_planar,
     };
     let mut found: Vec<Likeness> = Vec::new();
-    for pose in candidates(&hypotheses, &sky, &newer, twins_min) {
-        let Some((pose, twins)) = settle(pose, &sky, &older, &newer, is_planar) else {
+    for pose in candidates(&hypotheses, &sky, newer, twins_min) {
+        let Some((pose, twins)) = settle(pose, &sky, older, newer, is_planar) else {
             continue;
         };
         let alone = one_by_group(&twins, &groups);
-        if alone.len() >= twins_min && is_agreed(&pose, &twins, &sky, &older, &newer) {
+        if alone.len() >= twins_min && is_agreed(&pose, &twins, &sky, older, newer) {
             found.push(Likeness {
                 pose,
                 log10_chance: log10_by_chance(&alone, &sky, &tried),
@@ -108,72 +153,7 @@ pub(super) fn likeness(older: &[Star], newer: &[Star], is_planar: bool) -> Optio
         }
     }
     found.sort_by(|a, b| a.log10_chance.total_cmp(&b.log10_chance));
-    let mut found = found.into_iter();
-    let mut best = found.next()?;
-    // Other twins of a group are no other motion.
-    let is_another = |other: &Likeness| {
-        let twins = other.twins.iter();
-        let near = twins.filter(|&&(one, other)| {
-            (best.pose * newer[other].position - older[one].position).norm() <= apart_m
-        });
-        2 * near.count() <= other.twins.len()
-    };
-    let rival = found.find(is_another);
-    let is_rivalled = rival.is_some_and(|rival| rival.log10_chance < RIVAL_MAX * best.log10_chance);
-    for twin in &mut best.twins {
-        *twin = (older_at[twin.0], newer_at[twin.1]);
-    }
-    (best.log10_chance < LOG10_CHANCE_MAX && !is_rivalled).then_some(best)
-}
-
-/// Groups of landmarks: each is in that of the first one that is so near \[m\].
-fn groups(stars: &[Star], near_m: f64) -> Vec<usize> {
-    let mut groups: Vec<usize> = Vec::with_capacity(stars.len());
-    for (at, star) in stars.iter().enumerate() {
-        let is_near = |&first: &usize| (stars[first].position - star.position).norm() <= near_m;
-        let founders = (0..at).filter(|&first| groups[first] == first);
-        groups.push(founders.into_iter().find(is_near).unwrap_or(at));
-    }
-    groups
-}
-
-/// How many groups there are.
-fn n_different(groups: &[usize]) -> usize {
-    groups
-        .iter()
-        .enumerate()
-        .filter(|(at, group)| at == *group)
-        .count()
-}
-
-/// How many of the hypotheses are of different groups.
-fn n_hypotheses(hypotheses: &[Hypothesis], groups: &[Vec<usize>; 2]) -> usize {
-    let of_groups = |hypothesis: &Hypothesis| {
-        let mut pairs = hypothesis
-            .pairs
-            .map(|(one, other)| (groups[0][one], groups[1][other]));
-        pairs.sort_unstable();
-        pairs
-    };
-    let mut different: Vec<_> = hypotheses.iter().map(of_groups).collect();
-    different.sort_unstable();
-    different.dedup();
-    different.len()
-}
-
-/// The nearest twin of each group.
-fn one_by_group(twins: &[Twin], groups: &[Vec<usize>; 2]) -> Vec<Twin> {
-    let mut alone: Vec<Twin> = Vec::new();
-    for twin in twins {
-        let shares = |other: &Twin| {
-            groups[0][other.older] == groups[0][twin.older]
-                || groups[1][other.newer] == groups[1][twin.newer]
-        };
-        if !alone.iter().any(shares) {
-            alone.push(*twin);
-        }
-    }
-    alone
+    found
 }
 
 /// Where those are that fulfil a condition.
@@ -183,39 +163,6 @@ fn places(stars: &[Star], condition: impl Fn(&&Star) -> bool) -> Vec<usize> {
         .filter(|(_, star)| condition(star))
         .map(|(at, _)| at)
         .collect()
-}
-
-/// The best of the motions, no two nearly the same, best first.
-fn candidates(
-    hypotheses: &[Hypothesis],
-    sky: &Sky<'_>,
-    newer: &[Star],
-    twins_min: usize,
-) -> Vec<Isometry3<f64>> {
-    let corners = corners(newer);
-    let near_m = 2.0 * GATE * mean_variance(newer).sqrt();
-    let mut candidates = Vec::new();
-    let mut twins = Vec::new();
-    for hypothesis in hypotheses {
-        sky.pairs(
-            &hypothesis.pose,
-            newer,
-            &|at| hypothesis.spread(at),
-            &mut twins,
-        );
-        one_to_one(&mut twins);
-        if twins.len() >= twins_min {
-            let candidate = Candidate {
-                pose: hypothesis.pose,
-                n_twins: twins.len(),
-                squares: twins.iter().map(|twin| twin.square).sum(),
-            };
-            let is_same =
-                |other: &Candidate| apart_m(&other.pose, &candidate.pose, &corners) < near_m;
-            propose(&mut candidates, candidate, is_same);
-        }
-    }
-    candidates.iter().map(|candidate| candidate.pose).collect()
 }
 
 /// Mean of the variances \[m²\].
@@ -232,7 +179,7 @@ fn is_agreed(
     older: &[Star],
     newer: &[Star],
 ) -> bool {
-    let near_m = sky.spacing_m();
+    let near_m = AMONG * sky.spacing_m();
     let is_among = |at: &Point3<f64>| {
         let mut twins = twins.iter().map(|twin| &older[twin.older].position);
         twins.any(|twin| (twin - at).norm() <= near_m)
@@ -249,54 +196,6 @@ fn is_agreed(
 pub(super) fn apart_m(one: &Isometry3<f64>, other: &Isometry3<f64>, stars: &[Star]) -> f64 {
     let apart = |star: &Star| (one * star.position - other * star.position).norm();
     stars.iter().map(apart).fold(0.0, f64::max)
-}
-
-/// Three landmarks far from one another: two motions that lay these alike are one.
-fn corners(stars: &[Star]) -> Vec<Star> {
-    let mut corners: Vec<Star> = Vec::new();
-    while corners.len() < stars.len().min(3) {
-        let far = |star: &Star| {
-            let distances = corners
-                .iter()
-                .map(|corner| (star.position - corner.position).norm());
-            distances.fold(f64::INFINITY, f64::min)
-        };
-        let farthest = stars.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
-        corners.extend(farthest);
-    }
-    corners
-}
-
-/// A motion that is to be looked at closely.
-#[derive(Clone, Copy, Debug)]
-struct Candidate {
-    pose: Isometry3<f64>,
-    n_twins: usize,
-    /// Sum of their normalised squares.
-    squares: f64,
-}
-
-impl Candidate {
-    fn is_better_than(&self, other: &Self) -> bool {
-        (self.n_twins, -self.squares) > (other.n_twins, -other.squares)
-    }
-}
-
-/// Keeps the best candidates, best first; of those that are nearly the same motion, the best one.
-fn propose(candidates: &mut Vec<Candidate>, new: Candidate, is_same: impl Fn(&Candidate) -> bool) {
-    let worst = candidates.last();
-    if candidates.len() >= CANDIDATES_MAX && worst.is_some_and(|worst| !new.is_better_than(worst)) {
-        return;
-    }
-    if let Some(at) = candidates.iter().position(is_same) {
-        if !new.is_better_than(&candidates[at]) {
-            return;
-        }
-        candidates.remove(at);
-    }
-    let at = candidates.partition_point(|other| other.is_better_than(&new));
-    candidates.insert(at, new);
-    candidates.truncate(CANDIDATES_MAX);
 }
 
 /// Fits a motion to its twins and seeks them again, until nothing changes.

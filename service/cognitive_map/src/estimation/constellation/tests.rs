@@ -63,6 +63,12 @@ fn shuffled<T: Clone>(numbers: &mut Numbers, items: &[T]) -> (Vec<usize>, Vec<T>
     (order, items)
 }
 
+/// Whether the twins are the same points, or points so close to one another that it is open which is which.
+fn are_right(found: &Likeness, order: &[usize], points: &[Point3<f64>]) -> bool {
+    let off = |&(one, other): &(usize, usize)| (points[one] - points[order[other]]).norm();
+    found.twins.iter().all(|twin| off(twin) < 8.0 * SD_M)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
@@ -74,17 +80,15 @@ proptest! {
         let points = world(numbers, 15, FLOOR);
         let frame = motion([x, y, 0.0], Vector3::z() * heading);
         let older = stars(numbers, &Isometry3::identity(), &points, true);
-        let (order, points) = shuffled(numbers, &points);
-        let newer = stars(numbers, &frame, &points, true);
+        let (order, seen) = shuffled(numbers, &points);
+        let newer = stars(numbers, &frame, &seen, true);
         // A world may happen to be ambiguous; then nothing is claimed.
         if let Some(found) = likeness(&older, &newer, true) {
             let rest = frame.inv_mul(&found.pose);
             prop_assert!(rest.translation.vector.norm() < 0.5 && rest.rotation.angle() < 0.05, "{rest}");
             prop_assert!(found.pose.translation.z.abs() < 1e-12);
             prop_assert!(found.twins.len() >= 5);
-            for &(one, other) in &found.twins {
-                prop_assert_eq!(order[other], one);
-            }
+            prop_assert!(are_right(&found, &order, &points));
         }
     }
 
@@ -106,7 +110,8 @@ proptest! {
         let mirrored: Vec<_> = points.iter().map(|point| Point3::new(-point.x, point.y, point.z)).collect();
         let newer = stars(numbers, &motion([1.0, 2.0, 0.0], Vector3::z() * heading), &mirrored, true);
         prop_assert_eq!(likeness(&older, &newer, true), None);
-        let points = world(numbers, 15, HALL);
+        // As high as wide, for a flat world is much like its mirror image turned upside down.
+        let points = world(numbers, 15, [6.0; 3]);
         let older = stars(numbers, &Isometry3::identity(), &points, false);
         let mirrored: Vec<_> = points.iter().map(|point| Point3::new(-point.x, point.y, point.z)).collect();
         let newer = stars(numbers, &motion([1.0, 2.0, -1.0], Vector3::y() * heading), &mirrored, false);
@@ -121,14 +126,12 @@ proptest! {
         let points = world(numbers, 15, HALL);
         let frame = motion(shift, turn.into());
         let older = stars(numbers, &Isometry3::identity(), &points, false);
-        let (order, points) = shuffled(numbers, &points);
-        let newer = stars(numbers, &frame, &points, false);
+        let (order, seen) = shuffled(numbers, &points);
+        let newer = stars(numbers, &frame, &seen, false);
         if let Some(found) = likeness(&older, &newer, false) {
             let rest = frame.inv_mul(&found.pose);
             prop_assert!(rest.translation.vector.norm() < 1.0 && rest.rotation.angle() < 0.08, "{rest}");
-            for &(one, other) in &found.twins {
-                prop_assert_eq!(order[other], one);
-            }
+            prop_assert!(are_right(&found, &order, &points));
         }
     }
 }
