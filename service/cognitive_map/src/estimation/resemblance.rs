@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 
 use super::constellation::{GATE, Likeness, SOUGHT_MAX, Star, apart_m, likeness, mean_variance};
 use super::estimator::{Estimator, MAP};
-use super::frame::{Frame, MARKS_MAX, Mark};
+use super::frame::{Frame, Mark};
 use super::tie::{Pair, tie};
 use crate::sample::Label;
 
@@ -20,6 +20,8 @@ const LOOKS_MIN: u32 = 3;
 const CROSSED_ROUNDS: usize = 3;
 /// Difference of squared distances over the variance from which it is sure which of two landmarks is meant: 400 to 1.
 const SURE_MARGIN: f64 = 12.0;
+/// Landmarks of the older frame among which others are sought, in the plane and in space, where it takes three to a motion.
+const KNOWN_MAX: (usize, usize) = (64, 32);
 /// Most pairs of frames of which it is remembered what was found.
 pub(super) const RESEMBLANCES_MAX: usize = 64;
 /// Frames among which the next one to look at is sought.
@@ -69,8 +71,9 @@ impl Estimator {
     fn look_alike(&mut self, own: usize, other: usize) {
         let (older, newer) = (own.min(other), own.max(other));
         let is_planar = self.frame(older).is_planar() && self.frame(newer).is_planar();
+        let known_max = if is_planar { KNOWN_MAX.0 } else { KNOWN_MAX.1 };
         let [known, sought] =
-            [(older, newer, MARKS_MAX), (newer, older, SOUGHT_MAX)].map(|(one, other, most)| {
+            [(older, newer, known_max), (newer, older, SOUGHT_MAX)].map(|(one, other, most)| {
                 self.frame(one)
                     .strangers(self.frame(other), most, is_planar)
             });

@@ -6,7 +6,7 @@ use super::{GATE, Star};
 use crate::geometry::align;
 
 /// Landmarks of the newer frame from which motions are drawn, in a plane and in space.
-const SEEDS_MAX: (usize, usize) = (12, 8);
+const SEEDS_MAX: (usize, usize) = (10, 8);
 /// Most motions; of more, a constellation says nothing that could be found out at a bounded cost.
 const HYPOTHESES_MAX: usize = 1 << 13;
 /// Least distance of two landmarks that say how a frame is turned, in its own deviations.
