@@ -1,12 +1,12 @@
 //! The joint estimate by itself, without the map around it: errors on a data set or in the room.
 //!
 //! ```text
-//! cargo run --release -p cogmap-experiments --example estimate -- mrclam DIR [no-robots] [unknown]
+//! cargo run --release -p cogmap-experiments --example estimate -- mrclam DIR [no-robots] [unknown] [anonymous=N,N]
 //! cargo run --release -p cogmap-experiments --example estimate -- env2 [STEPS [RUNS [RANGE_M]]] [look]
 //! ```
 //!
-//! `no-robots` leaves out sightings of robots, `unknown` all start poses but the first robot's; `look` sights
-//! obstacles before the first step, too. An unaligned error of robots with unknown starts counts from
+//! `no-robots` leaves out sightings of robots, `unknown` all start poses but the first robot's; robots that are
+//! `anonymous` have names of their own for landmarks; `look` sights obstacles before the first step, too. An unaligned error of robots with unknown starts counts from
 //! when they came into the map.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
@@ -24,9 +24,20 @@ fn main() -> ExitCode {
     let count = |at: usize| arguments.get(at).and_then(|text| text.parse::<u32>().ok());
     let range_m = arguments.get(3).and_then(|text| text.parse().ok());
     let done = match arguments.first().map(String::as_str) {
-        Some("mrclam") => arguments
-            .get(1)
-            .is_some_and(|directory| mrclam::run(directory, !has("no-robots"), has("unknown"))),
+        Some("mrclam") => {
+            let names = arguments
+                .iter()
+                .find_map(|text| text.strip_prefix("anonymous="));
+            let numbers = names.unwrap_or_default().split(',');
+            let told = mrclam::Told {
+                sightings_of_robots: !has("no-robots"),
+                all_starts: !has("unknown"),
+                anonymous: numbers.filter_map(|text| text.parse().ok()).collect(),
+            };
+            arguments
+                .get(1)
+                .is_some_and(|directory| mrclam::run(directory, &told))
+        }
         Some("env2") => {
             let room = room::Room {
                 steps: count(1).map_or(1000, i64::from),
@@ -41,7 +52,7 @@ fn main() -> ExitCode {
         ExitCode::SUCCESS
     } else {
         eprintln!(
-            "estimate mrclam DIR [no-robots] [unknown] | env2 [STEPS [RUNS [RANGE_M]]] [look]"
+            "estimate mrclam DIR [no-robots] [unknown] [anonymous=N,N] | env2 [STEPS [RUNS [RANGE_M]]] [look]"
         );
         ExitCode::from(2)
     }

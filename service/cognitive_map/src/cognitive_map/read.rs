@@ -232,12 +232,24 @@ impl CognitiveMap {
 
     /// Number of landmarks.
     pub fn landmark_count(&self) -> usize {
-        self.landmarks.landmarks().len()
+        let known = self.landmarks.landmarks().len();
+        known
+            - self
+                .estimator
+                .other_names()
+                .filter(|label| self.landmarks.by_label(label.as_str()).is_some())
+                .count()
     }
 
-    /// The landmarks, in the order of learning.
+    /// The landmarks, in the order of learning; one with several names once.
     pub fn landmarks(&self) -> impl Iterator<Item = (LandmarkId, &Landmark)> {
-        (0..).map(LandmarkId).zip(self.landmarks.landmarks().iter())
+        let landmarks = (0..).map(LandmarkId).zip(self.landmarks.landmarks().iter());
+        landmarks.filter(|(_, landmark)| self.is_named_so(landmark))
+    }
+
+    /// Whether a landmark goes by its label, and not by another name.
+    fn is_named_so(&self, landmark: &Landmark) -> bool {
+        self.estimator.name_of(landmark.label()) == landmark.label()
     }
 
     /// The landmarks in the order of their labels (by bytes), from the first one after `label` on;
@@ -249,6 +261,7 @@ impl CognitiveMap {
         self.landmarks
             .after(label)
             .filter_map(|id| Some((id, self.landmarks.get(id)?)))
+            .filter(|(_, landmark)| self.is_named_so(landmark))
     }
 
     /// A landmark.
@@ -256,9 +269,12 @@ impl CognitiveMap {
         self.landmarks.get(landmark)
     }
 
-    /// The landmark with a label.
+    /// The landmark with a label, or with a label that turned out to be another name of it.
     pub fn landmark_by_label(&self, label: &str) -> Option<(LandmarkId, &Landmark)> {
-        let id = self.landmarks.by_label(label)?;
+        let known = Label::new(label).ok()?;
+        let id = self
+            .landmarks
+            .by_label(self.estimator.name_of(&known).as_str())?;
         Some((id, self.landmarks.get(id)?))
     }
 }

@@ -21,8 +21,8 @@ impl Fold<'_> {
         }
     }
 
-    /// Remembers the sightings of agents that counted with the latest call of the estimate, and the frames
-    /// that it laid into others.
+    /// Remembers the sightings of agents that counted with the latest call of the estimate, the landmarks that turned out to be one,
+    /// and the frames that it laid into others.
     pub(super) fn remember_what_was_settled(&mut self) {
         for settled in self.estimator.take_settled() {
             if settled.accepted {
@@ -33,6 +33,13 @@ impl Fold<'_> {
                     &settled.relation,
                     &settled.variance.fixed_rows::<3>(0).into_owned(),
                 );
+            }
+        }
+        let same = self.estimator.take_same();
+        if !same.is_empty() {
+            self.chronicle.same(&same);
+            for (label, name) in &same {
+                self.landmarks.unite(label, name, self.revision);
             }
         }
         for merged in self.estimator.take_merged() {

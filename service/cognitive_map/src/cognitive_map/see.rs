@@ -35,15 +35,17 @@ impl Fold<'_> {
         let taken = self
             .estimator
             .landmark(agent, self.stamp_ns, label, relation);
+        // It may just have turned out to be another one's.
+        let name = self.estimator.name_of(label).clone();
         if taken.accepted {
             let moment = self.moment();
             self.chronicle
-                .landmark(&moment, label, relation, &taken.variance);
+                .landmark(&moment, &name, relation, &taken.variance);
         }
         self.remember_what_was_settled();
         if taken.accepted
             && self.agent.placed
-            && let Some(landmark) = self.landmarks.by_label(label.as_str())
+            && let Some(landmark) = self.landmarks.by_label(name.as_str())
         {
             self.landmarks.see(landmark, self.stamp_ns, self.revision);
         }

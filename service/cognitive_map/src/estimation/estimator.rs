@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector6};
 
+use super::alias::Aliases;
 use super::frame::{Frame, MEMBERS_MAX};
 use super::meeting::{Meeting, Pending};
 use super::mover::Mover;
 use super::outcome::{Evidence, Merged, Settled, Step, Taken};
 use super::parameters::Parameters;
+use super::resemblance::Resemblance;
 use super::seat::{Apart, Seat, Traveller};
 use super::sight::{Glance, Verdict};
 use crate::geometry::PoseCovariance;
@@ -22,7 +24,8 @@ const DURATION_S_MAX: f64 = 10.0;
 ///
 /// Every agent begins in a frame of its own. The first frame is that of the map: an agent enters it by
 /// [`Estimator::found`] or by a start pose. Frames are laid into one another as soon as enough points
-/// are known in both: landmarks, and places where one agent saw the other. The older frame prevails.
+/// are known in both: landmarks, and places where one agent saw the other, or when the landmarks of both lie alike under
+/// other names. The older frame prevails.
 ///
 /// An agent takes part in the joint estimate of its frame from its first sighting on, or from when it is
 /// first seen; of more than 32, the one whose latest sighting is longest ago goes on by itself and comes
@@ -40,9 +43,15 @@ pub struct Estimator {
     pub(super) meetings: Vec<Meeting>,
     /// The frame from which on others are compared next.
     pub(super) turn: usize,
+    /// How frames seem to lie in one another by their landmarks, whatever these are called.
+    pub(super) resemblances: Vec<Resemblance>,
+    /// Landmarks that have more than one name.
+    pub(super) aliases: Aliases,
     /// What the latest call settled and merged.
     pub(super) settled: Vec<Settled>,
     pub(super) merged: Vec<Merged>,
+    /// What it found to be one landmark: the name that was given up, and the one that stays.
+    pub(super) same: Vec<(Label, Label)>,
 }
 
 /// The frame of the map.
@@ -60,8 +69,11 @@ impl Estimator {
             pending: Vec::new(),
             meetings: Vec::new(),
             turn: 0,
+            resemblances: Vec::new(),
+            aliases: Aliases::default(),
             settled: Vec::new(),
             merged: Vec::new(),
+            same: Vec::new(),
         }
     }
 
@@ -105,6 +117,8 @@ impl Estimator {
         let frame = std::mem::take(self.frame_mut(from));
         *self.frame_mut(MAP) = frame;
         self.move_seats(from, MAP);
+        self.resemblances
+            .retain(|resemblance| !resemblance.frames.contains(&from));
         for meeting in &mut self.meetings {
             for frame in meeting.frames.iter_mut().filter(|frame| **frame == from) {
                 *frame = MAP;
@@ -222,12 +236,14 @@ impl Estimator {
         relation: &Relation,
     ) -> Taken {
         self.begin();
-        let Some((frame, observer)) = self.admit(agent) else {
+        let Some((number, observer)) = self.admit(agent) else {
             return Taken::nothing();
         };
-        let Some(frame) = self.frames.get_mut(frame, 0) else {
+        let Some(frame) = self.frames.get_mut(number, 0) else {
             return Taken::nothing();
         };
+        let called = label;
+        let label = &self.aliases.name_of(called).clone();
         let glance = Glance {
             observer,
             back: &Isometry3::identity(),
@@ -238,7 +254,11 @@ impl Estimator {
         let weighed = frame.see_mark(&glance, label);
         let refused = frame.members[observer].traveller.refused;
         self.count(agent, weighed.verdict, refused);
+        self.aliases.weigh(called, weighed.verdict, refused);
         self.merge_with(agent, Some(label));
+        if self.frame_of(agent) == Some(number) {
+            self.look_at_names(number, agent);
+        }
         Taken {
             is_new: weighed.verdict == Verdict::Learned,
             accepted: weighed.verdict != Verdict::Refused,
@@ -250,6 +270,7 @@ impl Estimator {
     pub(super) fn begin(&mut self) {
         self.settled.clear();
         self.merged.clear();
+        self.same.clear();
     }
 
     /// Lets an agent take part in the joint estimate of its frame, as one that was just seen or saw;
@@ -397,6 +418,22 @@ impl Estimator {
     /// motion or sighting.
     pub fn take_merged(&mut self) -> Vec<Merged> {
         std::mem::take(&mut self.merged)
+    }
+
+    /// Takes which names the latest call found to be those of one landmark: each time the name that was given up, and the one that
+    /// stays. What is not taken is dropped by the next motion or sighting.
+    pub fn take_same(&mut self) -> Vec<(Label, Label)> {
+        std::mem::take(&mut self.same)
+    }
+
+    /// The one name of a landmark that may have several.
+    pub fn name_of<'a>(&'a self, label: &'a Label) -> &'a Label {
+        self.aliases.name_of(label)
+    }
+
+    /// The names of landmarks that go by another one.
+    pub fn other_names(&self) -> impl Iterator<Item = &Label> {
+        self.aliases.names.keys()
     }
 
     /// The landmarks of the map that are estimated jointly now, by label: position \[m\] and covariance

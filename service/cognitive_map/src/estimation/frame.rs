@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 use super::covariance::JointCovariance;
 use super::dormant::{Dormant, DormantMarks};
 use super::mover::{BODY_DIM, Mover};
+use super::observers::Observers;
 use super::seat::Traveller;
 use crate::sample::Label;
 
@@ -43,6 +44,8 @@ pub(super) struct Mark {
     pub(super) used: u64,
     /// Its sightings refused one after the other.
     pub(super) refused: u32,
+    /// Who has seen it.
+    pub(super) observers: Observers,
 }
 
 /// One frame. A clone shares what it holds.
@@ -143,6 +146,13 @@ impl Frame {
             self.drop_components(mark.offset, MARK_DIM);
         }
         self.dormant.remove(label);
+    }
+
+    /// Takes a landmark out of the list, and leaves its components.
+    pub(super) fn take_out(&mut self, label: &Label) -> Option<Mark> {
+        self.marks
+            .contains_key(label)
+            .then(|| Arc::make_mut(&mut self.marks).remove(label))?
     }
 
     /// Makes room for one more landmark: those seen longest ago keep their own covariance only.

@@ -231,7 +231,7 @@ impl Estimator {
     }
 
     /// Lays a frame into an older one.
-    fn merge(&mut self, older: usize, newer: usize, tie: &Tie) {
+    pub(super) fn merge(&mut self, older: usize, newer: usize, tie: &Tie) {
         let moved = std::mem::take(self.frame_mut(newer));
         let parameters = self.parameters.clone();
         self.frame_mut(older).merge(moved, tie, &parameters);
@@ -256,9 +256,11 @@ impl Estimator {
         });
     }
 
-    /// Forgets the sightings between a frame and others.
+    /// Forgets the sightings between a frame and others, and how it resembles them.
     pub(super) fn forget_meetings(&mut self, frame: usize) {
         self.meetings
             .retain(|meeting| !meeting.frames.contains(&frame));
+        self.resemblances
+            .retain(|resemblance| !resemblance.frames.contains(&frame));
     }
 }

@@ -32,6 +32,19 @@ impl Frame {
         self.marks.iter().filter_map(pair).collect()
     }
 
+    /// A landmark is called by another name, which is not known here.
+    pub(super) fn rename(&mut self, from: &Label, to: &Label) {
+        if self.marks.contains_key(from) {
+            let marks = Arc::make_mut(&mut self.marks);
+            if let Some(mark) = marks.remove(from) {
+                marks.insert(to.clone(), mark);
+            }
+        }
+        if let Some(mark) = self.dormant.remove(from) {
+            self.dormant.insert(to.clone(), mark);
+        }
+    }
+
     /// Lays a newer frame into this one. Landmarks known in both become one.
     ///
     /// With the newer frame's pose T in this one, whose error is τ, a body's error gains `Ad(T_b⁻¹) τ` and
@@ -118,8 +131,16 @@ impl Frame {
     }
 
     /// Two landmarks are one.
-    fn equate(&mut self, twins: &mut [(Label, Mark)], index: usize, parameters: &Parameters) {
+    pub(super) fn equate(
+        &mut self,
+        twins: &mut [(Label, Mark)],
+        index: usize,
+        parameters: &Parameters,
+    ) {
         let (label, other) = &twins[index];
+        if let Some(one) = Arc::make_mut(&mut self.marks).get_mut(label) {
+            one.observers.join(&other.observers);
+        }
         let Some(one) = self.marks.get(label) else {
             return;
         };

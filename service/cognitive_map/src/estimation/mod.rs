@@ -25,9 +25,11 @@
 //!   agent whose sightings are refused again and again searches farther around, and a landmark that only
 //!   contradicts is forgotten. The noise of each agent's sensor is learned, upwards from what it states.
 //! - **Frames.** Agents whose place in the map is unknown have frames of their own until enough points
-//!   are known in both.
+//!   are known in both, or their landmarks lie alike whatever they are called (`constellation`).
 
+mod alias;
 mod calibration;
+mod constellation;
 mod covariance;
 mod dormant;
 mod estimator;
@@ -38,12 +40,16 @@ mod innovation;
 mod meeting;
 mod merge;
 mod mover;
+mod observers;
 mod outcome;
 mod parameters;
+mod resemblance;
 mod seat;
 mod sensor;
+mod shape;
 mod sight;
 mod state;
+mod synonym;
 mod tie;
 
 pub use calibration::{Calibrated, Calibration};

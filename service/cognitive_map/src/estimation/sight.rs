@@ -8,6 +8,7 @@ use super::covariance::Block;
 use super::dormant::Dormant;
 use super::frame::{Frame, MARK_DIM, Mark, Member, point_by_pose, symmetric};
 use super::innovation::{PointInnovation, pose_innovation, seen_at};
+use super::observers::Observers;
 use super::parameters::Parameters;
 use super::sensor::Seen;
 use crate::geometry::se3;
@@ -94,12 +95,15 @@ impl Frame {
         let weighed = self.take_in(glance, &blocks, &innovation, Seen::Mark(mark.number));
         let observer_refused = self.members[glance.observer].traveller.refused;
         let sightings = self.sightings;
+        let agent = self.members[glance.observer].agent;
         if let Some(mark) = Arc::make_mut(&mut self.marks).get_mut(label) {
             mark.used = sightings;
-            mark.refused = match weighed.verdict {
-                Verdict::Refused => mark.refused + 1,
-                _ => 0,
-            };
+            if weighed.verdict == Verdict::Refused {
+                mark.refused += 1;
+            } else {
+                mark.refused = 0;
+                mark.observers.note(agent);
+            }
             // Of an agent that contradicts everything, the landmark is not to blame.
             if mark.refused >= REFUSED_TO_FORGET && observer_refused < REFUSED_TO_WIDEN / 2 {
                 self.forget(label);
@@ -163,12 +167,20 @@ impl Frame {
         let offset = self
             .covariance
             .append(&[side.block(&by_pose)], &symmetric(&noise));
+        // Who saw one that was asleep is forgotten.
+        let mut observers = if self.dormant.contains(label) {
+            Observers::unknown()
+        } else {
+            Observers::default()
+        };
+        observers.note(self.members[glance.observer].agent);
         let mark = Mark {
             number: self.numbered,
             position: side.pose * Point3::from(point),
             offset,
             used: self.sightings,
             refused: 0,
+            observers,
         };
         self.numbered += 1;
         Arc::make_mut(&mut self.marks).insert(label.clone(), mark);

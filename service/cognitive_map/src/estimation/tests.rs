@@ -7,13 +7,13 @@ use crate::sample::{
     Label, Motion, PoseNoise, RangeBearing, Relation, RelativePosition, StartPose,
 };
 
-const SECOND_NS: i64 = 1_000_000_000;
+pub(super) const SECOND_NS: i64 = 1_000_000_000;
 
 fn label(number: usize) -> Label {
     Label::new(&format!("post-{number}")).unwrap()
 }
 
-fn start(pose: &Isometry3<f64>, sd: f64) -> StartPose {
+pub(super) fn start(pose: &Isometry3<f64>, sd: f64) -> StartPose {
     let noise = PoseNoise::new([sd; 3], [0.3 * sd; 3]).unwrap();
     StartPose::new(
         pose.translation.vector.into(),
@@ -30,7 +30,7 @@ fn motion(linear: [f64; 3], angular: [f64; 3]) -> Motion {
 }
 
 /// What is seen of a point from a pose, without error.
-fn polar(pose: &Isometry3<f64>, point: &Point3<f64>) -> Relation {
+pub(super) fn polar(pose: &Isometry3<f64>, point: &Point3<f64>) -> Relation {
     let seen = pose.inverse_transform_point(point).coords;
     let azimuth = seen.y.atan2(seen.x);
     let elevation = seen.z.atan2(seen.x.hypot(seen.y));

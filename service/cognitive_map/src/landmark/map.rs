@@ -63,6 +63,17 @@ impl LandmarkMap {
         }
     }
 
+    /// A landmark turned out to be one that has another name: it was seen as often as both.
+    pub(crate) fn unite(&mut self, label: &Label, name: &Label, revision: u64) {
+        let both = [label, name].map(|label| self.by_label(label.as_str()));
+        if let [Some(one), Some(other)] = both
+            && let Some(seen) = self.get(one).cloned()
+            && let Some(landmark) = self.landmarks.get_mut(other.0 as usize, revision)
+        {
+            landmark.join(&seen);
+        }
+    }
+
     /// More is known about where a landmark is.
     pub(crate) fn place(
         &mut self,

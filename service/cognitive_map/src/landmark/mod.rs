@@ -64,6 +64,13 @@ impl Landmark {
         self.last_stamp_ns = self.last_stamp_ns.max(stamp_ns);
     }
 
+    /// It was also seen as often as another one, which is the same.
+    pub(crate) fn join(&mut self, other: &Self) {
+        self.sightings = self.sightings.saturating_add(other.sightings);
+        self.first_stamp_ns = self.first_stamp_ns.min(other.first_stamp_ns);
+        self.last_stamp_ns = self.last_stamp_ns.max(other.last_stamp_ns);
+    }
+
     /// Label.
     pub fn label(&self) -> &Label {
         &self.label

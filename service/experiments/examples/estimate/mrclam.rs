@@ -8,14 +8,25 @@ use cogmap_experiments::metrics::{Alignment, StampedPose, Trajectory, ate_rmse_m
 use cogmap_experiments::mrclam::Mrclam;
 use cogmap_experiments::reading::robot_name;
 use cognitive_map::estimation::{Estimator, Parameters};
-use cognitive_map::{Sample, SampleBody, Target};
+use cognitive_map::{Label, Sample, SampleBody, Target};
 use nalgebra::Vector2;
 
 /// Between two instants at which the covariance is compared with the error \[ns\].
 const CONSISTENCY_NS: i64 = 1_000_000_000;
 
+/// What the estimate is told.
+#[derive(Clone, Debug)]
+pub(crate) struct Told {
+    /// What robots see of one another.
+    pub(crate) sightings_of_robots: bool,
+    /// Where robots other than the first one start.
+    pub(crate) all_starts: bool,
+    /// The robots that have names of their own for landmarks.
+    pub(crate) anonymous: Vec<u32>,
+}
+
 /// Prints the errors; answers whether the set could be read.
-pub(crate) fn run(directory: &str, sees_robots: bool, unknown: bool) -> bool {
+pub(crate) fn run(directory: &str, told: &Told) -> bool {
     let Ok(set) = Mrclam::load(Path::new(directory)) else {
         return false;
     };
@@ -29,7 +40,10 @@ pub(crate) fn run(directory: &str, sees_robots: bool, unknown: bool) -> bool {
     let mut causal: BTreeMap<u32, Vec<StampedPose>> = BTreeMap::new();
     let mut times_s = Vec::new();
     let mut consistency = Consistency::default();
-    for entry in set.team_readings() {
+    for mut entry in set.team_readings() {
+        if told.anonymous.contains(&entry.robot) {
+            entry = entry.with_own_names();
+        }
         let Ok(sample) = Sample::try_from(&entry.reading) else {
             continue;
         };
@@ -39,14 +53,14 @@ pub(crate) fn run(directory: &str, sees_robots: bool, unknown: bool) -> bool {
             SampleBody::Motion(motion) => {
                 estimator.motion(agent, stamp_ns, motion);
             }
-            SampleBody::StartPose(start) if agent == 0 || !unknown => {
+            SampleBody::StartPose(start) if agent == 0 || told.all_starts => {
                 estimator.start_pose(agent, start);
             }
             SampleBody::Sighting(sighting) => match &sighting.target {
                 Target::Landmark(label) => {
                     estimator.landmark(agent, stamp_ns, label, &sighting.relation);
                 }
-                Target::Agent(name) if sees_robots => {
+                Target::Agent(name) if told.sightings_of_robots => {
                     let target = by_name[name.as_str()];
                     estimator.sighting(agent, stamp_ns, target, &sighting.relation);
                 }
@@ -75,10 +89,14 @@ pub(crate) fn run(directory: &str, sees_robots: bool, unknown: bool) -> bool {
         }
     }
     print(&set, &estimator, &agents, &causal);
+    if !told.anonymous.is_empty() {
+        print_names(&estimator);
+    }
     times_s.sort_by(f64::total_cmp);
     let total_s: f64 = times_s.iter().sum();
     println!(
-        "nees {:.2}, {} samples in {total_s:.2} s, p50 {:.1} us, p99 {:.1} us, max {:.2} ms",
+        "{} landmarks, nees {:.2}, {} samples in {total_s:.2} s, p50 {:.1} us, p99 {:.1} us, max {:.2} ms",
+        estimator.landmarks().count(),
         consistency.mean(),
         times_s.len(),
         times_s[times_s.len() / 2] * 1e6,
@@ -121,6 +139,21 @@ fn print(
     }
     let n = causal.len().max(1) as f64;
     println!("mean {:.4} m, aligned {:.4} m", sums[0] / n, sums[1] / n);
+}
+
+/// Prints how many names of landmarks were found to be others', and whether they are: `landmark-6-of-robot3` is `landmark-6`, or
+/// what another robot calls so.
+fn print_names(estimator: &Estimator) {
+    let is_right = |name: &&Label| {
+        let plain = |name: &Label| {
+            let name = name.as_str();
+            name.split("-of-").next().unwrap_or(name).to_owned()
+        };
+        plain(name) == plain(estimator.name_of(name))
+    };
+    let right = estimator.other_names().filter(is_right).count();
+    let all = estimator.other_names().count();
+    println!("{all} names are others', {right} of them rightly");
 }
 
 /// Normalised estimation errors squared, per component.

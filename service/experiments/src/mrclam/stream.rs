@@ -25,6 +25,23 @@ pub struct TeamReading {
     pub reading: Reading,
 }
 
+impl TeamReading {
+    /// The same reading, of a robot that gives landmarks names of its own, which nobody else uses: `landmark-6` is
+    /// `landmark-6-of-robot3` to robot 3. Other robots it calls as everybody does.
+    #[must_use]
+    pub fn with_own_names(mut self) -> Self {
+        if let ReadingBody::Sighting {
+            target: ReadingTarget::Landmark(name),
+            ..
+        } = &mut self.reading.body
+        {
+            name.push_str("-of-");
+            name.push_str(&robot_name(self.robot));
+        }
+        self
+    }
+}
+
 impl Mrclam {
     /// The readings of one robot over the common span `t0..t1`; empty for a robot that the set
     /// has not.

@@ -249,6 +249,32 @@ fn a_command_of_many_hours_is_split() {
     assert!((path.at(9_000_000_000_000).unwrap().x - 9.0).abs() < 1e-9);
 }
 
+#[test]
+fn a_robot_may_have_names_of_its_own_for_landmarks() {
+    let set = read(&files()).unwrap();
+    let mut n_renamed = 0;
+    for entry in set.team_readings() {
+        let own = entry.clone().with_own_names();
+        match (entry.reading.body, own.reading.body) {
+            (
+                ReadingBody::Sighting {
+                    target: ReadingTarget::Landmark(name),
+                    ..
+                },
+                ReadingBody::Sighting {
+                    target: ReadingTarget::Landmark(own),
+                    ..
+                },
+            ) => {
+                assert_eq!(own, format!("{name}-of-robot{}", entry.robot));
+                n_renamed += 1;
+            }
+            (body, own) => assert_eq!(body, own, "nothing else is called otherwise"),
+        }
+    }
+    assert!(n_renamed > 0);
+}
+
 proptest! {
     /// Sightings cut the motion into more pieces, but never lose or double any of it.
     #[test]

@@ -59,6 +59,10 @@ pub(in crate::cli) struct MrclamArgs {
     /// Tell only the first robot where it starts; the others have to find their place.
     #[arg(long)]
     unknown_starts: bool,
+    /// Robots that call landmarks by names of their own, by number; where they start is then told by geometry, and by what
+    /// robots see of one another.
+    #[arg(long, value_name = "N,N", value_delimiter = ',')]
+    anonymous: Vec<u32>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -73,6 +77,12 @@ pub(super) struct TeamBatch {
 
 pub(super) fn run(args: &MrclamArgs) -> anyhow::Result<()> {
     let set = Mrclam::load(&args.directory)?;
+    for robot in &args.anonymous {
+        anyhow::ensure!(
+            set.robots().contains_key(robot),
+            "the set has no robot {robot}"
+        );
+    }
     let batches = batches(&set, args);
     let settings = SpaceSettings::default();
     let outcome = match (&args.connect, &args.http) {
@@ -114,7 +124,10 @@ fn batches(set: &Mrclam, args: &MrclamArgs) -> Vec<TeamBatch> {
         _ => true,
     };
     let mut batches: Vec<TeamBatch> = Vec::new();
-    for reading in set.team_readings().into_iter().filter(is_asked_for) {
+    for mut reading in set.team_readings().into_iter().filter(is_asked_for) {
+        if args.anonymous.contains(&reading.robot) {
+            reading = reading.with_own_names();
+        }
         let robot = robot_name(reading.robot);
         let sample = sample_of(&reading.reading);
         match batches.last_mut() {

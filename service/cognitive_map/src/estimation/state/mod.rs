@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use lists::{read_all, read_count, read_map, write_all, write_count, write_map, write_pairs};
 
+use super::alias::{ALIASES_MAX, Alias, Aliases};
 use super::covariance::JointCovariance;
 use super::dormant::{Dormant, DormantMarks, PART_MAX, PARTS};
 use super::estimator::Estimator;
@@ -17,8 +18,10 @@ use super::frame::{Frame, MARK_DIM, MARKS_MAX, MEMBERS_MAX, Mark, Member};
 use super::history::{History, KEPT};
 use super::meeting::{MEETINGS_MAX, Meeting, PENDING_MAX, Pending};
 use super::mover::{BODY_DIM, Mover, Run};
+use super::observers::{OBSERVERS_MAX, Observers};
 use super::outcome::Evidence;
 use super::parameters::Parameters;
+use super::resemblance::{RESEMBLANCES_MAX, Resemblance};
 use super::seat::{Apart, Seat, Traveller};
 use super::sensor::{Seen, Sensor, TARGETS_MAX};
 use crate::paged::PagedVec;
@@ -175,6 +178,8 @@ impl State for Mark {
         write_count(self.offset, out);
         self.used.write(out);
         self.refused.write(out);
+        write_all(self.observers.agents.len(), &self.observers.agents, out);
+        self.observers.are_more.write(out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
@@ -184,6 +189,10 @@ impl State for Mark {
             offset: read_count(input, DIM_MAX)?,
             used: State::read(input)?,
             refused: State::read(input)?,
+            observers: Observers {
+                agents: read_all(input, OBSERVERS_MAX)?,
+                are_more: State::read(input)?,
+            },
         })
     }
 }
@@ -264,13 +273,14 @@ impl State for Frame {
         };
         // Everybody has components of his own, and there are no others.
         let bodies = frame.members.iter().map(|member| (member.offset, BODY_DIM));
+        let are_sorted = |mark: &Mark| mark.observers.agents.is_sorted_by(|one, next| one < next);
         let marks = frame.marks.values().map(|mark| (mark.offset, MARK_DIM));
         let mut parts: Vec<(usize, usize)> = bodies.chain(marks).collect();
         parts.sort_unstable();
         let end = parts.iter().try_fold(0, |end, &(offset, width)| {
             (offset == end).then_some(end + width)
         });
-        if end == Some(frame.covariance.dim()) {
+        if end == Some(frame.covariance.dim()) && frame.marks.values().all(are_sorted) {
             Ok(frame)
         } else {
             Err(CorruptState::Invalid)
@@ -309,6 +319,30 @@ impl State for Meeting {
     }
 }
 
+impl State for Resemblance {
+    fn write(&self, out: &mut StateWriter) {
+        let [older, newer] = self.frames;
+        write_count(older, out);
+        write_count(newer, out);
+        self.pose.write(out);
+        self.looks.write(out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        let frames = [
+            read_count(input, AGENTS_MAX)?,
+            read_count(input, AGENTS_MAX)?,
+        ];
+        Ok(Self {
+            frames,
+            pose: State::read(input)?,
+            looks: State::read(input)?,
+        })
+    }
+}
+
+state_of_struct!(Alias { name, refused });
+
 impl State for Estimator {
     fn write(&self, out: &mut StateWriter) {
         write_all(self.seats.len(), self.seats.iter(), out);
@@ -316,6 +350,8 @@ impl State for Estimator {
         write_all(self.pending.len(), &self.pending, out);
         write_all(self.meetings.len(), &self.meetings, out);
         write_count(self.turn, out);
+        write_all(self.resemblances.len(), &self.resemblances, out);
+        write_map(&self.aliases.names, out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
@@ -334,8 +370,13 @@ impl State for Estimator {
             pending: read_all(input, PENDING_MAX)?,
             meetings: read_all(input, MEETINGS_MAX)?,
             turn: read_count(input, AGENTS_MAX)?,
+            resemblances: read_all(input, RESEMBLANCES_MAX)?,
+            aliases: Aliases {
+                names: Arc::new(read_map(input, ALIASES_MAX)?),
+            },
             settled: Vec::new(),
             merged: Vec::new(),
+            same: Vec::new(),
         };
         if estimator.is_sound() {
             Ok(estimator)
@@ -369,12 +410,16 @@ impl Estimator {
         };
         let mut pending = self.pending.iter();
         let mut meetings = self.meetings.iter();
+        let mut resemblances = self.resemblances.iter();
+        let names = &self.aliases.names;
         frames == seats + 1
             && self.frames.iter().zip(&agents).all(is_whole)
             && pending.all(|one| {
                 is_seat(one.observer) && is_seat(one.target) && one.observer != one.target
             })
             && meetings.all(|one| one.frames.iter().all(|&frame| frame < frames))
+            && resemblances.all(|one| one.frames[0] < one.frames[1] && one.frames[1] < frames)
+            && names.values().all(|alias| !names.contains_key(&alias.name))
     }
 }
 

@@ -1,0 +1,146 @@
+//! The landmarks of one frame, to be found by where they are.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+use super::{GATE, Star};
+
+/// The landmarks of the older frame in the order of x, with how densely they lie.
+#[derive(Clone, Debug)]
+pub(in super::super) struct Sky<'a> {
+    stars: &'a [Star],
+    /// Numbers in the order of x.
+    order: Vec<usize>,
+    /// The largest variance of one \[m²\].
+    variance_max: f64,
+    /// In a plane or in space \[1/m², 1/m³\].
+    density: f64,
+    is_planar: bool,
+}
+
+/// Two landmarks that a motion lays over each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Twin {
+    pub(super) older: usize,
+    pub(super) newer: usize,
+    /// Their distance \[m\].
+    pub(super) distance_m: f64,
+    /// Variance of that along an axis \[m²\].
+    pub(super) variance: f64,
+    /// Its square over the variance.
+    pub(super) square: f64,
+}
+
+impl Twin {
+    /// Whether one of the landmarks is in both pairs.
+    fn shares_with(&self, other: &Self) -> bool {
+        self.older == other.older || self.newer == other.newer
+    }
+}
+
+impl<'a> Sky<'a> {
+    pub(in super::super) fn new(stars: &'a [Star], is_planar: bool) -> Self {
+        let mut order: Vec<usize> = (0..stars.len()).collect();
+        order.sort_by(|&a, &b| stars[a].position.x.total_cmp(&stars[b].position.x));
+        let variances = stars.iter().map(|star| star.variance);
+        Self {
+            stars,
+            order,
+            variance_max: variances.fold(0.0, f64::max),
+            density: density(stars, is_planar),
+            is_planar,
+        }
+    }
+
+    /// The landmarks that a motion lays over some of these, the nearest first; where landmarks lie close to one another, more than one.
+    /// `spread` is the variance that the motion's own error adds at a point \[m²\].
+    pub(super) fn pairs(
+        &self,
+        pose: &Isometry3<f64>,
+        newer: &[Star],
+        spread: &dyn Fn(&Point3<f64>) -> f64,
+        twins: &mut Vec<Twin>,
+    ) {
+        twins.clear();
+        for (number, star) in newer.iter().enumerate() {
+            let here = pose * star.position;
+            let own = star.variance + spread(&here);
+            let reach = GATE * (own + self.variance_max).sqrt();
+            let x_of = |at: &usize| self.stars[*at].position.x;
+            let first = self.order.partition_point(|at| x_of(at) < here.x - reach);
+            let near = self.order[first..].iter();
+            for &older in near.take_while(|at| x_of(at) <= here.x + reach) {
+                let other = &self.stars[older];
+                let squared = (other.position - here).norm_squared();
+                let variance = own + other.variance;
+                if squared <= GATE * GATE * variance {
+                    twins.push(Twin {
+                        older,
+                        newer: number,
+                        distance_m: squared.sqrt(),
+                        variance,
+                        square: squared / variance,
+                    });
+                }
+            }
+        }
+        twins.sort_by(|a, b| {
+            let order = a.square.total_cmp(&b.square);
+            order.then((a.newer, a.older).cmp(&(b.newer, b.older)))
+        });
+    }
+
+    /// Radius of the area or volume in which there is one of these on the average \[m\].
+    pub(super) fn spacing_m(&self) -> f64 {
+        if self.is_planar {
+            (self.density * std::f64::consts::PI).recip().sqrt()
+        } else {
+            (self.density * 4.0 / 3.0 * std::f64::consts::PI)
+                .recip()
+                .cbrt()
+        }
+    }
+
+    /// Probability that something that lies anywhere among these is within a distance of one of them.
+    pub(in super::super) fn chance_within(&self, distance_m: f64) -> f64 {
+        let within = if self.is_planar {
+            std::f64::consts::PI * distance_m.powi(2)
+        } else {
+            4.0 / 3.0 * std::f64::consts::PI * distance_m.powi(3)
+        };
+        (self.density * within).min(1.0)
+    }
+}
+
+/// Leaves the nearest pairs, each landmark in one.
+pub(super) fn one_to_one(twins: &mut Vec<Twin>) {
+    let mut taken = 0;
+    for at in 0..twins.len() {
+        let twin = twins[at];
+        if !twins[..taken].iter().any(|other| other.shares_with(&twin)) {
+            twins[taken] = twin;
+            taken += 1;
+        }
+    }
+    twins.truncate(taken);
+}
+
+/// How many landmarks there are by area or volume, that of the ellipse or ellipsoid with their spread:
+/// 4π √det Σ, (4/3)π 5^{3/2} √det Σ. What is known of each is part of its thickness.
+fn density(stars: &[Star], is_planar: bool) -> f64 {
+    let n = stars.len().max(1) as f64;
+    let sum: Vector3<f64> = stars.iter().map(|star| star.position.coords).sum();
+    let centre = sum / n;
+    let mut spread = Matrix3::zeros();
+    for star in stars {
+        let off = star.position.coords - centre;
+        spread += (off * off.transpose() + Matrix3::from_diagonal_element(star.variance)) / n;
+    }
+    let extent = if is_planar {
+        let plane = spread.fixed_view::<2, 2>(0, 0).determinant();
+        4.0 * std::f64::consts::PI * plane.max(0.0).sqrt()
+    } else {
+        let root = spread.determinant().max(0.0).sqrt();
+        4.0 / 3.0 * std::f64::consts::PI * 5.0_f64.powf(1.5) * root
+    };
+    n / extent
+}

@@ -1,0 +1,78 @@
+//! Which agents have seen a landmark.
+
+/// Agents that are remembered by number.
+pub(super) const OBSERVERS_MAX: usize = 8;
+
+/// The agents that have seen a landmark under the names that it has.
+///
+/// Two landmarks that one agent has seen and called by different names are two.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Observers {
+    /// Their numbers, ascending.
+    pub(super) agents: Vec<u32>,
+    /// Whether there were more, or who they were is forgotten: then it may have been anybody.
+    pub(super) are_more: bool,
+}
+
+impl Observers {
+    /// Of a landmark of which it is not known who has seen it.
+    pub(super) fn unknown() -> Self {
+        Self {
+            agents: Vec::new(),
+            are_more: true,
+        }
+    }
+
+    /// An agent has seen it, too.
+    pub(super) fn note(&mut self, agent: u32) {
+        let Err(at) = self.agents.binary_search(&agent) else {
+            return;
+        };
+        if self.agents.len() < OBSERVERS_MAX {
+            self.agents.insert(at, agent);
+        } else {
+            self.are_more = true;
+        }
+    }
+
+    /// It is also what others have seen.
+    pub(super) fn join(&mut self, others: &Self) {
+        self.are_more |= others.are_more;
+        for &agent in &others.agents {
+            self.note(agent);
+        }
+    }
+
+    /// Whether an agent is known to have seen it.
+    pub(super) fn contains(&self, agent: u32) -> bool {
+        self.agents.binary_search(&agent).is_ok()
+    }
+
+    /// Whether nobody can have seen both.
+    pub(super) fn is_apart_from(&self, others: &Self) -> bool {
+        let are_known = !self.are_more && !others.are_more;
+        are_known && self.agents.iter().all(|&agent| !others.contains(agent))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_has_seen_both_as_long_as_that_is_known() {
+        let (mut one, mut other) = (Observers::default(), Observers::default());
+        for agent in [7, 2, 7] {
+            one.note(agent);
+        }
+        other.note(3);
+        assert!(one.is_apart_from(&other) && other.is_apart_from(&one));
+        assert!(one.contains(2) && !one.contains(3));
+        other.note(2);
+        assert!(!one.is_apart_from(&other));
+        assert!(!Observers::unknown().is_apart_from(&Observers::default()));
+        let mut many = Observers::default();
+        (10..30).for_each(|agent| many.note(agent));
+        assert!(!many.is_apart_from(&one), "the ninth may have been anybody");
+    }
+}
