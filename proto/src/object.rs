@@ -62,6 +62,24 @@ impl Default for Orientation {
     }
 }
 
+impl ObjectMark {
+    /// What it holds of varying length: bytes of its name, and number of rotations.
+    pub fn lengths(&self) -> (usize, usize) {
+        let (name, orientation) = match self {
+            Self::Learn {
+                name, orientation, ..
+            } => (name.as_ref().map_or(0, String::len), orientation),
+            Self::Identify { orientation, .. } => (0, orientation),
+            Self::End {} => return (0, 0),
+        };
+        let rotations = match orientation {
+            Orientation::Finite { rotations_xyzw } => rotations_xyzw.len(),
+            Orientation::Known {} | Orientation::Cube {} | Orientation::Free {} => 0,
+        };
+        (name, rotations)
+    }
+}
+
 /// Standard deviations of what is felt.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]

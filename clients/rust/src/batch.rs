@@ -1,7 +1,7 @@
 //! Writing batches straight from the window, and how long a sample can become in a codec.
 
 use cogmap_proto::limits::MESSAGE_BYTES_MAX;
-use cogmap_proto::{Codec, ObjectMark, Orientation, Relation, Sample, SampleBody, Target};
+use cogmap_proto::{Codec, Relation, Sample, SampleBody, Target};
 use serde::{Serialize, Serializer};
 
 /// Most bytes that the samples of one batch may have, which leaves room for its head.
@@ -62,17 +62,7 @@ pub(crate) fn bytes_max(sample: &Sample, codec: Codec) -> usize {
         },
         SampleBody::Marker(marker) => (marker.label.len(), 0),
         SampleBody::Object(mark) => {
-            let (name, orientation) = match mark {
-                ObjectMark::Learn {
-                    name, orientation, ..
-                } => (name.as_ref().map_or(0, String::len), Some(orientation)),
-                ObjectMark::Identify { orientation, .. } => (0, Some(orientation)),
-                ObjectMark::End {} => (0, None),
-            };
-            let rotations = match orientation {
-                Some(Orientation::Finite { rotations_xyzw }) => rotations_xyzw.len(),
-                _ => 0,
-            };
+            let (name, rotations) = mark.lengths();
             // Four numbers each, twice as long as those of a vector, and their brackets.
             (name, rotations * 9)
         }

@@ -1,8 +1,6 @@
 //! Samples that someone waits for, and what the waiting can end with.
 
-use cogmap_proto::{
-    IngestAnswer, ObjectLesson, ObjectMark, Orientation, Sample, SampleBatch, SampleBody, Target,
-};
+use cogmap_proto::{IngestAnswer, ObjectLesson, Sample, SampleBatch, SampleBody, Target};
 use cognitive_map::{Label, Lesson};
 use tokio::sync::oneshot;
 
@@ -90,20 +88,8 @@ impl Weight for Sample {
             },
             SampleBody::Marker(marker) => marker.label.len(),
             SampleBody::Object(mark) => {
-                let (name, orientation) = match mark {
-                    ObjectMark::Learn {
-                        name, orientation, ..
-                    } => (name.as_ref().map_or(0, String::len), Some(orientation)),
-                    ObjectMark::Identify { orientation, .. } => (0, Some(orientation)),
-                    ObjectMark::End {} => (0, None),
-                };
-                let rotations = match orientation {
-                    Some(Orientation::Finite { rotations_xyzw }) => {
-                        size_of_val(rotations_xyzw.as_slice())
-                    }
-                    _ => 0,
-                };
-                name + rotations
+                let (name, rotations) = mark.lengths();
+                name + rotations * size_of::<[f64; 4]>()
             }
         };
         size_of::<Self>() + beside

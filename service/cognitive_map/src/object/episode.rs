@@ -174,7 +174,7 @@ impl Episode {
         }
         let learned = match &self.purpose {
             Purpose::Learn(Some(name)) => match memory.by_name(name) {
-                None => self.found(Some(name.clone()), memory, (now, revision)),
+                None => self.name_or_find(name, memory, (now, revision)),
                 Some(id) => memory
                     .align(id, &self.orientation, &self.contacts)
                     .map(|pose| self.extend(id, &pose, memory, (now, revision))),
@@ -213,6 +213,24 @@ impl Episode {
             posterior: fresh.posterior(memory.library()),
             next_touch: fresh.next_touch(memory.library()),
         }
+    }
+
+    /// Learns an object of a new name: one that was learned on the spot, if it is that, or a new one.
+    fn name_or_find(
+        &self,
+        name: &Label,
+        memory: &mut ObjectMemory,
+        when: (Clock, u64),
+    ) -> Option<ObjectId> {
+        if !memory.are_all_named()
+            && let Some((id, pose)) = memory.visited(&self.orientation, &self.contacts)
+            && memory.get(id).is_some_and(|known| !known.is_named())
+        {
+            self.extend(id, &pose, memory, when);
+            memory.rename(id, name, when.1);
+            return Some(id);
+        }
+        self.found(Some(name.clone()), memory, when)
     }
 
     fn found(

@@ -26,6 +26,8 @@ const ALIGNED_SHARE: f64 = 0.9;
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownObject {
     pub(super) name: Label,
+    /// Whether somebody has given it the name.
+    pub(super) is_named: bool,
     pub(super) visits: u64,
     pub(super) contacts: u64,
     pub(super) strength: Strength,
@@ -38,6 +40,11 @@ impl KnownObject {
     /// Its name.
     pub fn name(&self) -> &Label {
         &self.name
+    }
+
+    /// Whether somebody has given it the name; of one that was learned on the spot it follows from its number.
+    pub fn is_named(&self) -> bool {
+        self.is_named
     }
 
     /// How many episodes or lessons taught it.
@@ -152,6 +159,7 @@ impl ObjectMemory {
         let id = id.unwrap_or_else(|| self.number(revision));
         let known = KnownObject {
             name: name.clone(),
+            is_named: true,
             visits: 1,
             contacts,
             strength: Strength::new(now),
@@ -171,12 +179,14 @@ impl ObjectMemory {
         revision: u64,
     ) -> Option<ObjectId> {
         let id = self.number(revision);
+        let is_named = name.is_some();
         let name = match name {
             Some(name) => name,
             None => self.unused_name(id)?,
         };
         let known = KnownObject {
             name,
+            is_named,
             visits: 1,
             contacts,
             strength: Strength::new(now),
@@ -208,6 +218,15 @@ impl ObjectMemory {
         self.put(id, known, model, revision);
     }
 
+    /// An object that was learned on the spot is given a name that no other has.
+    pub(crate) fn rename(&mut self, id: ObjectId, name: &Label, revision: u64) {
+        if let Some(known) = Arc::make_mut(&mut self.known).get_mut(&id) {
+            known.name = name.clone();
+            known.is_named = true;
+            known.revision = revision;
+        }
+    }
+
     /// An object was recognised.
     pub(crate) fn used(&mut self, id: ObjectId, now: Clock, revision: u64) {
         if let Some(known) = Arc::make_mut(&mut self.known).get_mut(&id) {
@@ -235,6 +254,30 @@ impl ObjectMemory {
             posterior: recognition.posterior(&self.library),
             next_touch: recognition.next_touch(&self.library),
         }
+    }
+
+    /// Which object a visit was to, if its contacts say so, and where its frame lies in the object's.
+    pub(super) fn visited(
+        &self,
+        orientation: &Orientation,
+        contacts: &[Contact],
+    ) -> Option<(ObjectId, Isometry3<f64>)> {
+        let mut recognition = Recognition::new(orientation);
+        for contact in contacts {
+            recognition.touch(&self.library, contact.clone());
+        }
+        let posterior = recognition.posterior(&self.library);
+        let Verdict::Object(id) = posterior.verdict() else {
+            return None;
+        };
+        let pose = posterior.pose;
+        let pose = pose.filter(|pose| pose.object == id && pose.share > ALIGNED_SHARE)?;
+        Some((id, pose.map_from_episode))
+    }
+
+    /// Whether all objects were given names.
+    pub(super) fn are_all_named(&self) -> bool {
+        self.known.values().all(|known| known.is_named)
     }
 
     /// Where a visit's frame lies in an object's, if its contacts say so.

@@ -20,6 +20,7 @@ const ITEMS_MAX: u32 = 1 << 20;
 
 state_of_struct!(KnownObject {
     name,
+    is_named,
     visits,
     contacts,
     strength,

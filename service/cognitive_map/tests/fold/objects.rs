@@ -122,6 +122,44 @@ fn what_was_learned_by_touch_is_known_again_from_an_unknown_start() {
 }
 
 #[test]
+fn what_was_learned_on_the_spot_is_named_later() {
+    let (mut map, mut hand) = taught();
+    let strange = RODS[2].1.map(|level| level + 20.0);
+    hand.sample(&mut map, identify());
+    feel(&mut map, &mut hand, &strange, &UP);
+    hand.sample(&mut map, end());
+    let before = map.object_by_name(&label("object-3")).unwrap();
+    assert!(!map.object(before).unwrap().is_named());
+    hand.sample(&mut map, learn(Some("ladle")));
+    feel(
+        &mut map,
+        &mut hand,
+        &strange,
+        &[11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0],
+    );
+    let events = hand.sample(&mut map, end());
+    assert!(
+        matches!(&events[..], [EventKind::ObjectLearned { name, .. }] if name.as_str() == "ladle"),
+        "{events:?}"
+    );
+    assert_eq!(map.object_count(), 4, "it is no other object");
+    assert_eq!(map.object_by_name(&label("ladle")), Some(before));
+    assert_eq!(map.object_by_name(&label("object-3")), None);
+    let known = map.object(before).unwrap();
+    assert_eq!((known.is_named(), known.visits()), (true, 2));
+    assert_eq!(
+        map.object_places(before).len(),
+        12,
+        "laid into the same places"
+    );
+    // What has a name keeps it: another one is that of another object.
+    hand.sample(&mut map, learn(Some("scoop")));
+    feel(&mut map, &mut hand, &strange, &UP);
+    hand.sample(&mut map, end());
+    assert_eq!(map.object_count(), 5);
+}
+
+#[test]
 fn something_unknown_is_said_to_be_and_learned() {
     let (mut map, mut hand) = taught();
     let strange = RODS[2].1.map(|level| level + 20.0);
