@@ -65,7 +65,7 @@ async fn an_object_may_have_the_name_of_a_question() {
         .await
         .good();
     assert_eq!(summary["name"], "identify");
-    assert_eq!(rig.get(path).await.good()["name"], "identify");
+    assert_eq!(rig.get(path).await.good()["summary"]["name"], "identify");
     let query = IdentifyQuery {
         orientation: Orientation::Known {},
         noise: noise(),
