@@ -83,13 +83,6 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(objects::list))
         .routes(routes!(objects::get, objects::put, objects::delete))
         .routes(routes!(objects::identify))
-        // An object may have that name, too: it is described where all names are.
-        .route(
-            "/v1/spaces/{space}/objects/identify",
-            axum::routing::get(objects::get)
-                .put(objects::put)
-                .delete(objects::delete),
-        )
         .routes(routes!(objects::of_agent))
         .routes(routes!(events::get))
         .routes(routes!(export::get))

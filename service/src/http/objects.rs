@@ -37,13 +37,7 @@ pub(crate) struct ObjectParams {
     space: String,
     /// Name of the object.
     #[param(min_length = 1, max_length = 128)]
-    #[serde(default = "identify_too")]
     name: String,
-}
-
-/// The one name that stands in the path itself, since a question is asked there.
-fn identify_too() -> String {
-    "identify".to_owned()
 }
 
 /// Which objects.

@@ -57,25 +57,6 @@ async fn taught() -> Rig {
 }
 
 #[tokio::test]
-async fn an_object_may_have_the_name_of_a_question() {
-    let rig = taught().await;
-    let path = "/v1/spaces/lab/objects/identify";
-    let summary = rig
-        .send(Method::PUT, path, JSON, lesson(&FORK))
-        .await
-        .good();
-    assert_eq!(summary["name"], "identify");
-    assert_eq!(rig.get(path).await.good()["summary"]["name"], "identify");
-    let query = IdentifyQuery {
-        orientation: Orientation::Known {},
-        noise: noise(),
-        contacts: contacts(&KNIFE, &[1, 2, 3, 4, 5], 0.1),
-    };
-    let body = Codec::Json.encode(&query);
-    rig.send(Method::POST, path, JSON, body).await.good();
-}
-
-#[tokio::test]
 async fn objects_are_taught_listed_shown_and_forgotten() {
     let rig = taught().await;
     let page = rig.get("/v1/spaces/lab/objects?limit=1").await.good();
