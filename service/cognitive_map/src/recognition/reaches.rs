@@ -49,11 +49,15 @@ impl Reaches {
             spacing_m.max(widest_m / CELLS_MAX),
             UnitQuaternion::identity(),
         );
-        let index = |position: &Point3<f64>| lattice.phase_displacement(&position.coords);
+        // Whole numbers, so that no rounding of their differences leaves the box.
+        let index = |position: &Point3<f64>| {
+            let phase = lattice.phase_displacement(&position.coords);
+            phase.map(f64::floor)
+        };
         let mut low = Vector3::repeat(f64::INFINITY);
         let mut high = Vector3::repeat(f64::NEG_INFINITY);
         for position in positions {
-            let index = index(position).map(f64::floor);
+            let index = index(position);
             (low, high) = (low.inf(&index), high.sup(&index));
         }
         if positions.is_empty() {
@@ -61,20 +65,18 @@ impl Reaches {
         }
         let size = (high - low).map(cell);
         let size = [size.x + 1, size.y + 1, size.z + 1];
+        let cells: Vec<usize> = { positions.iter() }
+            .map(|position| {
+                let [i, j, k] = (index(position) - low).map(cell).into();
+                (i * size[1] + j) * size[2] + k
+            })
+            .collect();
         let mut reaches = Self {
             lattice,
             low,
             size,
             starts: vec![0; size.iter().product::<usize>() + 1],
         };
-        let cells: Vec<usize> = { positions.iter() }
-            .map(|position| {
-                let [i, j, k] = (reaches.lattice.phase_displacement(&position.coords) - low)
-                    .map(cell)
-                    .into();
-                (i * size[1] + j) * size[2] + k
-            })
-            .collect();
         for &cell in &cells {
             reaches.starts[cell + 1] += 1;
         }
@@ -176,5 +178,24 @@ mod tests {
         }
         let (none, _) = Reaches::new(&[]);
         none.runs(&Point3::origin(), 1.0, |run| panic!("{run:?}"));
+    }
+
+    #[test]
+    fn places_far_from_the_origin_have_cells_too() {
+        let noise = |k: u64| crate::random::uniform(7, crate::record::AgentId(0), 0, k) * 2.0 - 1.0;
+        for (k, offset) in (0..40u64).zip([0.0, 1.0, -1.0, 1e6, -1e6].into_iter().cycle()) {
+            for scale in [1e-12, 1e-6, 1e-3, 1.0, 1e3, 1e6] {
+                let at = |k: u64| offset + scale * noise(k);
+                let point = |n: u64| 3 * (50 * k + n);
+                let positions: Vec<_> = (0..2 + k)
+                    .map(point)
+                    .map(|k| Point3::new(at(k), at(k + 1), at(k + 2)))
+                    .collect();
+                let (reaches, _) = Reaches::new(&positions);
+                let mut found = 0;
+                reaches.runs(&positions[0], f64::INFINITY, |run| found += run.len());
+                assert_eq!(found, positions.len());
+            }
+        }
     }
 }
