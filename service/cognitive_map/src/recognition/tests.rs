@@ -430,3 +430,61 @@ fn a_model_stays_within_its_budget_and_keeps_its_extent() {
     let again = ObjectModel::with_places(settings, model.spacing_m(), model.places().to_vec());
     assert_eq!(again.places(), model.places());
 }
+
+#[test]
+fn numbers_of_any_size_stop_nothing() {
+    let pick = |list: &[f64], key: u64| {
+        let at = (uniform(key) * list.len() as f64).floor();
+        let sign = if uniform(key + 1) < 0.5 { -1.0 } else { 1.0 };
+        (
+            list[(0..list.len()).find(|k| *k as f64 >= at).unwrap_or(0)],
+            sign,
+        )
+    };
+    let metres = [0.0, 1e-300, 1e-9, 0.01, 1.0, 1e3, 1e6];
+    let levels = [0.0, 1e-300, 0.5, 1e10, 1e40, 1e300];
+    let deviations = [0.0, 1e-300, 1e-3, 1.0, 1e6];
+    let contact = |key: u64| {
+        let value = |list: &[f64], key| {
+            let (size, sign) = pick(list, key);
+            size * sign
+        };
+        let point = Point3::new(
+            value(&metres, key),
+            value(&metres, key + 2),
+            value(&metres, key + 4),
+        );
+        let mut contact = Contact::at(point, pick(&deviations, key + 6).0);
+        if uniform(key + 8) < 0.7 {
+            let (level, sd) = (value(&levels, key + 9), pick(&deviations, key + 11).0);
+            contact = contact.with_level(0, level, sd);
+        }
+        if uniform(key + 13) < 0.5 {
+            let (_, normal) = on_ball(1.0, key);
+            contact = contact.with_normal(normal, pick(&deviations, key + 14).0);
+        }
+        contact.with_drift(pick(&deviations, key + 16).0)
+    };
+    for world in 0..60_u64 {
+        let key = 1_000_000 * (world + 1);
+        let mut library = ObjectLibrary::default();
+        for object in 0..3 {
+            let mut model = ObjectModel::new(ModelSettings::default());
+            for touch in 0..=7 * u64::from(object) {
+                model.learn(&contact(key + 10_000 * u64::from(object) + 40 * touch));
+            }
+            library.put(ObjectId(object), model);
+        }
+        for orientation in [Orientation::Free, Orientation::Known] {
+            let mut recognition = Recognition::new(&orientation);
+            for touch in 0..14 {
+                recognition.touch(&library, contact(key + 500_000 + 40 * touch));
+                let posterior = recognition.posterior(&library);
+                let sum = posterior.objects.iter().map(|object| object.1).sum::<f64>();
+                let all = sum + posterior.unknown;
+                assert!((all - 1.0).abs() < 1e-6, "{all} of world {world}");
+                let _ = recognition.next_touch(&library);
+            }
+        }
+    }
+}
