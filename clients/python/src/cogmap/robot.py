@@ -429,7 +429,9 @@ class Robot(Sampler):
             _log.warning("watermark query of %s: %s", self.agent, error)
 
     def _receive(self) -> None:
-        # Estimates first: when a flush returns, the estimate published before is in place.
+        # Estimates first, and of the watermarks only those that are here by now: when a flush returns, the estimate
+        # published before is in place. What comes meanwhile wakes this thread again.
+        watermarks = len(self._watermarks_in)
         with self._changed:
             callbacks = list(self._on_estimate)
         while self._estimates_in:
@@ -443,7 +445,7 @@ class Robot(Sampler):
                     self._estimate = estimate
                     self._changed.notify_all()
                 _call(callbacks, estimate)
-        while self._watermarks_in:
+        for _ in range(min(watermarks, len(self._watermarks_in))):
             watermark = self._watermarks_in.take()
             if watermark is not None:
                 self._take_watermark(watermark)
