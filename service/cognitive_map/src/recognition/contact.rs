@@ -117,6 +117,15 @@ impl Contact {
         self
     }
 
+    /// The same without what it feels and looks like.
+    pub(super) fn bare(&self) -> Self {
+        Self {
+            levels: Vec::new(),
+            descriptors: Vec::new(),
+            ..*self
+        }
+    }
+
     /// Variance of its position in the episode's frame, per axis \[m²\].
     pub(super) fn variance_m2(&self) -> f64 {
         self.position_sd_m * self.position_sd_m + self.drift_sd_m * self.drift_sd_m

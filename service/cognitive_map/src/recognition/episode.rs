@@ -359,8 +359,8 @@ impl Recognition {
                         .map(|(_, s)| s.share(reach_m).max(1e-9).ln());
                     logs.sum::<f64>() / library.len().max(1) as f64
                 });
-                let stranger = best.and_then(|best| shifts.strangers.get(&best));
-                stranger.copied().unwrap_or(0.0) - steps * shares + asked
+                let stranger = best.and_then(|best| shifts.strangers.log(best));
+                stranger.unwrap_or(0.0) - steps * shares + asked
             }
             // Of something of which only the size is known: anywhere within a step of the contact before, and any normal.
             Hypotheses::Poses(_) => {

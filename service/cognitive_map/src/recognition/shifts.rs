@@ -11,7 +11,7 @@ use super::feeling::{Feeling, Local};
 use super::library::{ObjectId, ObjectLibrary};
 use super::ranks::Ranks;
 use super::spots::{Answer, narrow};
-use super::strangers::stranger_logs;
+use super::strangers::Strangers;
 use super::surface::Surface;
 
 /// Most hypotheses kept of those that were looked at.
@@ -75,7 +75,7 @@ pub(super) struct Shifts {
     /// Log-likelihood of the contacts so far, but for those asked for, with something whose surface is
     /// like those of the library, but for the one that it would be taken for; without the share of it
     /// within a step.
-    pub(super) strangers: BTreeMap<ObjectId, f64>,
+    pub(super) strangers: Strangers,
 }
 
 impl Shifts {
@@ -84,7 +84,7 @@ impl Shifts {
             rotations,
             all: Vec::new(),
             crowd: Crowd::default(),
-            strangers: BTreeMap::new(),
+            strangers: Strangers::default(),
         }
     }
 
@@ -105,10 +105,8 @@ impl Shifts {
             let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
             if let Some(nearest) = nearest {
                 let pair = (nearest, contact);
-                let logs = stranger_logs(library, &self.rotations, pair, touch.drift_m2);
-                for (object, log) in logs {
-                    *self.strangers.entry(object).or_default() += log;
-                }
+                let (rotations, drift_m2) = (&self.rotations, touch.drift_m2);
+                self.strangers.touch(library, rotations, pair, drift_m2);
             }
         }
         let mut answers = Vec::new();
