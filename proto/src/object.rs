@@ -12,7 +12,7 @@ pub enum ObjectMark {
     /// What is felt from here on teaches an object.
     Learn {
         /// Its name. One that is known is extended if the episode shows how its frame lies in the object's. Without a name
-        /// it is the object that is recognised, or a new one.
+        /// it is the object that is recognised, or a new one. Nothing can be called `identify`.
         #[serde(default)]
         name: Option<String>,
         /// Contacts within this distance \[m\], 10 µm to 1 km, are of one place of a new object.

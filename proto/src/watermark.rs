@@ -58,7 +58,8 @@ pub enum SkipReason {
     TimeBackwards,
     /// A descriptor has a wrong length or no direction.
     InvalidDescriptor,
-    /// A channel, landmark, agent or marker label is empty, too long or has forbidden characters.
+    /// A channel, landmark, agent, object or marker label is empty, too long or has forbidden characters, or is one that
+    /// nothing can be called.
     InvalidLabel,
     /// A surface normal is not a unit vector.
     InvalidNormal,

@@ -83,7 +83,7 @@ fn object_mark(mark: &wire::ObjectMark) -> Result<ObjectMark, InvalidSample> {
             orientation: turned,
             noise,
         } => ObjectMark::Learn {
-            name: name.as_deref().map(Label::new).transpose()?,
+            name: name.as_deref().map(object_name).transpose()?,
             spacing: spacing(*spacing_m)?,
             orientation: orientation(turned)?,
             noise: touch_noise(noise)?,
@@ -97,6 +97,17 @@ fn object_mark(mark: &wire::ObjectMark) -> Result<ObjectMark, InvalidSample> {
         },
         wire::ObjectMark::End {} => ObjectMark::End,
     })
+}
+
+/// Reads the name of an object. None is called as the question is asked, since its address would be that question's.
+///
+/// # Errors
+/// Nothing can be called so.
+fn object_name(name: &str) -> Result<Label, InvalidSample> {
+    if name == "identify" {
+        return Err(InvalidSample::InvalidLabel);
+    }
+    Label::new(name)
 }
 
 /// Reads how far apart the places of an object are \[m\].

@@ -4,8 +4,9 @@
 use cogmap_client::ClientError;
 use cogmap_proto::limits::{BATCH_SAMPLES_MAX, MESSAGE_BYTES_MAX};
 use cogmap_proto::{
-    Codec, Descriptor, Increment, Level, Rejection, Relation, Sample, SampleBatch, SampleBody,
-    SeqRange, Sighting, SkipReason, StartPose, Target, samples_key,
+    Codec, Descriptor, Increment, Level, ObjectMark, Orientation, Rejection, Relation, Sample,
+    SampleBatch, SampleBody, SeqRange, Sighting, SkipReason, StartPose, Target, TouchNoise,
+    samples_key,
 };
 use cogmap_tests::{Drive, LONG, Metrics, RawPublisher, Server, batch, eventually, seed, velocity};
 
@@ -183,7 +184,15 @@ fn senseless_samples() -> Vec<(SkipReason, &'static str, Vec<Sample>)> {
         start_pose(f64::NEG_INFINITY),
     ];
     let quaternions = vec![increment([0.0; 4]), increment([0.0, 0.0, 0.6, 0.6])];
-    let labels = vec![sighting("", [0.1; 3]), sighting(&"x".repeat(200), [0.1; 3])];
+    let learn = SampleBody::Object(ObjectMark::Learn {
+        // It would have the address of a question.
+        name: Some("identify".to_owned()),
+        spacing_m: 0.004,
+        orientation: Orientation::Known {},
+        noise: TouchNoise::default(),
+    });
+    let long = "x".repeat(200);
+    let labels = vec![sighting("", [0.1; 3]), sighting(&long, [0.1; 3]), learn];
     let descriptors = vec![descriptor(vec![0.0; 16]), descriptor(vec![1.0; 7])];
     let late = vec![at(9, step()), at(i64::MIN, step())];
     let noise = vec![sighting("post", [-0.1; 3])];
