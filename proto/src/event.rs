@@ -142,6 +142,20 @@ pub enum EventKind {
         /// Contacts of the episode.
         contacts: u64,
     },
+    /// Two objects turned out to be one.
+    ObjectsMerged {
+        /// Name of the one that they are.
+        object: String,
+        /// Name that the other one had; nothing is called so any more.
+        absorbed: String,
+    },
+    /// What had been joined to an object turned out to be another one.
+    ObjectSplit {
+        /// Name of the object, which is again what it was before.
+        object: String,
+        /// Name of the other one.
+        part: String,
+    },
 }
 
 /// What kind of percept a channel carries.

@@ -126,7 +126,7 @@ fn event(kind: EventKind) -> Event {
     }
 }
 
-fn object_events() -> [(&'static str, EventKind); 5] {
+fn object_events() -> [(&'static str, EventKind); 7] {
     [
         ("objects_narrowed", EventKind::ObjectsNarrowed { live: 2 }),
         (
@@ -147,6 +147,20 @@ fn object_events() -> [(&'static str, EventKind); 5] {
         (
             "object_not_learned",
             EventKind::ObjectNotLearned { contacts: 4 },
+        ),
+        (
+            "objects_merged",
+            EventKind::ObjectsMerged {
+                object: "mug".to_owned(),
+                absorbed: "object-7".to_owned(),
+            },
+        ),
+        (
+            "object_split",
+            EventKind::ObjectSplit {
+                object: "mug".to_owned(),
+                part: "object-9".to_owned(),
+            },
         ),
     ]
 }

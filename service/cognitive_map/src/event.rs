@@ -137,6 +137,26 @@ pub enum EventKind {
         /// Contacts of this episode.
         contacts: u64,
     },
+    /// Two objects turned out to be one.
+    ObjectsMerged {
+        /// The one that they are.
+        object: ObjectId,
+        /// Its name.
+        name: Label,
+        /// Name of the one that is no more.
+        absorbed: Label,
+    },
+    /// What had been joined to an object turned out to be another one.
+    ObjectSplit {
+        /// The object.
+        object: ObjectId,
+        /// Its name.
+        name: Label,
+        /// The other one.
+        part: ObjectId,
+        /// Its name.
+        part_name: Label,
+    },
     /// A percept was felt where a place remembers its channel; before the place learned from it.
     PerceptCompared {
         /// The place.

@@ -2,8 +2,8 @@
 
 use cogmap_proto as wire;
 use cognitive_map::{
-    Agent, AgentId, ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, SkipReason, Status,
-    TripEnd,
+    Agent, AgentId, ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, Label, SkipReason,
+    Status, TripEnd,
 };
 
 use super::desk::Readout;
@@ -112,23 +112,13 @@ pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wi
         EventKind::AgentPlaced { position } => wire::EventKind::AgentPlaced {
             translation_m: position.coords.into(),
         },
-        EventKind::ObjectsNarrowed { live } => wire::EventKind::ObjectsNarrowed {
-            live: (*live).into(),
-        },
-        EventKind::ObjectRecognised {
-            name, probability, ..
-        } => wire::EventKind::ObjectRecognised {
-            object: name.as_str().to_owned(),
-            probability: *probability,
-        },
-        EventKind::ObjectUnknown => wire::EventKind::ObjectUnknown {},
-        EventKind::ObjectLearned { name, contacts, .. } => wire::EventKind::ObjectLearned {
-            object: name.as_str().to_owned(),
-            contacts: *contacts,
-        },
-        EventKind::ObjectNotLearned { contacts } => wire::EventKind::ObjectNotLearned {
-            contacts: *contacts,
-        },
+        EventKind::ObjectsNarrowed { .. }
+        | EventKind::ObjectRecognised { .. }
+        | EventKind::ObjectUnknown
+        | EventKind::ObjectLearned { .. }
+        | EventKind::ObjectNotLearned { .. }
+        | EventKind::ObjectsMerged { .. }
+        | EventKind::ObjectSplit { .. } => object_event(&event.kind)?,
         EventKind::MarkerPassed { label } => wire::EventKind::MarkerPassed {
             label: label.as_str().to_owned(),
         },
@@ -160,6 +150,41 @@ pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wi
         map_revision: map.revision(),
         stamp_ns: event.stamp_ns,
         kind,
+    })
+}
+
+/// What happened with objects; none of anything else.
+fn object_event(kind: &EventKind) -> Option<wire::EventKind> {
+    let text = |name: &Label| name.as_str().to_owned();
+    Some(match kind {
+        EventKind::ObjectsNarrowed { live } => wire::EventKind::ObjectsNarrowed {
+            live: (*live).into(),
+        },
+        EventKind::ObjectRecognised {
+            name, probability, ..
+        } => wire::EventKind::ObjectRecognised {
+            object: text(name),
+            probability: *probability,
+        },
+        EventKind::ObjectUnknown => wire::EventKind::ObjectUnknown {},
+        EventKind::ObjectLearned { name, contacts, .. } => wire::EventKind::ObjectLearned {
+            object: text(name),
+            contacts: *contacts,
+        },
+        EventKind::ObjectNotLearned { contacts } => wire::EventKind::ObjectNotLearned {
+            contacts: *contacts,
+        },
+        EventKind::ObjectsMerged { name, absorbed, .. } => wire::EventKind::ObjectsMerged {
+            object: text(name),
+            absorbed: text(absorbed),
+        },
+        EventKind::ObjectSplit {
+            name, part_name, ..
+        } => wire::EventKind::ObjectSplit {
+            object: text(name),
+            part: text(part_name),
+        },
+        _ => return None,
     })
 }
 

@@ -202,6 +202,28 @@ class ObjectNotLearned:
 
 
 @dataclass(frozen=True)
+class ObjectsMerged:
+    """Two objects turned out to be one."""
+
+    TAG: ClassVar[str] = "objects_merged"
+    #: Name of the one that they are.
+    object: str
+    #: Name that the other one had; nothing is called so any more.
+    absorbed: str
+
+
+@dataclass(frozen=True)
+class ObjectSplit:
+    """What had been joined to an object turned out to be another one."""
+
+    TAG: ClassVar[str] = "object_split"
+    #: Name of the object, which is again what it was before.
+    object: str
+    #: Name of the other one.
+    part: str
+
+
+@dataclass(frozen=True)
 class UnknownKind:
     """Something that this version of the package has no word for."""
 
@@ -230,6 +252,8 @@ EventKind = Union[
     ObjectUnknown,
     ObjectLearned,
     ObjectNotLearned,
+    ObjectsMerged,
+    ObjectSplit,
     UnknownKind,
 ]
 

@@ -4,7 +4,7 @@ use super::CognitiveMap;
 use super::fold::Fold;
 use crate::event::EventKind;
 use crate::object::{
-    Episode, Identified, KnownObject, News, ObjectMark, ObjectMemory, Spacing, Touch,
+    Episode, Identified, Insight, KnownObject, News, ObjectMark, ObjectMemory, Spacing, Touch,
 };
 use crate::recognition::{ModelPlace, ObjectId, ObjectModel, Orientation};
 use crate::record::AgentId;
@@ -72,6 +72,22 @@ impl Fold<'_> {
                     name,
                     contacts,
                 }),
+                News::Insight(Insight::Merged { object, absorbed }) => {
+                    name(object).map(|name| EventKind::ObjectsMerged {
+                        object,
+                        name,
+                        absorbed,
+                    })
+                }
+                News::Insight(Insight::Split { object, part }) => {
+                    let names = name(object).zip(name(part));
+                    names.map(|(name, part_name)| EventKind::ObjectSplit {
+                        object,
+                        name,
+                        part,
+                        part_name,
+                    })
+                }
                 News::NotLearned => Some(EventKind::ObjectNotLearned { contacts }),
             };
             if let Some(kind) = kind {

@@ -4,17 +4,20 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3, Vector6};
 
+use super::joining::{Insight, is_clear};
 use super::mark::TouchNoise;
 use super::memory::{Identified, ObjectMemory};
 use crate::geometry::MotionSum;
 use crate::recognition::{
-    Contact, Felt, ObjectId, ObjectModel, Orientation, Recognition, Seen, Verdict,
+    Contact, Felt, ObjectId, ObjectModel, Orientation, Posterior, Recognition, Seen, Verdict,
 };
 use crate::sample::{Descriptor, Label, Level};
 use crate::strength::Clock;
 
 /// Contacts by which an episode recognises; further ones only teach.
 pub(super) const CONTACTS_MAX: usize = 128;
+/// Most objects that one episode makes one of two, or two of one.
+const REFLECTIONS_MAX: usize = 4;
 
 /// What an episode is for.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,6 +67,8 @@ pub(crate) enum News {
     },
     /// It is none that was learned.
     Unknown,
+    /// Two objects are one, or one is two.
+    Insight(Insight),
     /// An object was learned, or more of it.
     Learned {
         /// The object.
@@ -172,6 +177,7 @@ impl Episode {
         if self.count == 0 {
             return Vec::new();
         }
+        let mut news = self.reflect(memory, (now, revision));
         let learned = match &self.purpose {
             Purpose::Learn(Some(name)) => match memory.by_name(name) {
                 None => self.name_or_find(name, memory, (now, revision)),
@@ -180,11 +186,10 @@ impl Episode {
                     .map(|pose| self.extend(id, &pose, memory, (now, revision))),
             },
             Purpose::Learn(None) => {
-                let posterior = self.recognise(memory).posterior(memory.library());
+                let posterior = self.posterior(memory);
                 match (posterior.verdict(), posterior.pose) {
-                    (Verdict::Object(id), Some(pose)) if pose.object == id => {
-                        Some(self.extend(id, &pose.map_from_episode, memory, (now, revision)))
-                    }
+                    (Verdict::Object(id), Some(pose)) => (pose.object == id && is_clear(&pose))
+                        .then(|| self.extend(id, &pose.map_from_episode, memory, (now, revision))),
                     (Verdict::Unknown, _) => self.found(None, memory, (now, revision)),
                     _ if memory.library().is_empty() => self.found(None, memory, (now, revision)),
                     _ => None,
@@ -200,10 +205,41 @@ impl Episode {
             },
         };
         match learned {
-            Some(object) => vec![News::Learned { object }],
-            None if matches!(self.purpose, Purpose::Learn(_)) => vec![News::NotLearned],
-            None => Vec::new(),
+            Some(object) => news.push(News::Learned { object }),
+            None if self.teaches() => news.push(News::NotLearned),
+            None => {}
         }
+        news
+    }
+
+    /// What all contacts say of the objects that are known by now, in their own light.
+    fn reflect(&mut self, memory: &mut ObjectMemory, when: (Clock, u64)) -> Vec<News> {
+        let mut news = Vec::new();
+        // Each turn makes one object of two, or two of one that was in doubt.
+        for _ in 0..REFLECTIONS_MAX {
+            if memory.is_settled() {
+                break;
+            }
+            let posterior = self.posterior(memory);
+            let insight = memory.reflect(&posterior, &self.orientation, &self.contacts, when);
+            let Some(insight) = insight else {
+                break;
+            };
+            news.push(News::Insight(insight));
+        }
+        if matches!(self.purpose, Purpose::Identify) {
+            let posterior = self.posterior(memory);
+            news.extend(self.heed(&posterior));
+        }
+        news
+    }
+
+    /// What all contacts say now.
+    fn posterior(&mut self, memory: &ObjectMemory) -> Posterior {
+        let recognition = self.recognise(memory);
+        let posterior = recognition.posterior(memory.library());
+        self.recognition = Some((memory.changed(), recognition));
+        posterior
     }
 
     /// What its contacts say now, with what would tell more.
@@ -249,7 +285,7 @@ impl Episode {
         memory: &mut ObjectMemory,
         when: (Clock, u64),
     ) -> ObjectId {
-        memory.extend(id, &self.model, self.count, pose, when);
+        memory.extend(id, &self.model, (1, self.count), pose, when);
         id
     }
 
@@ -277,6 +313,11 @@ impl Episode {
         self.contacts.push(contact);
         let posterior = recognition.posterior(memory.library());
         self.recognition = Some((memory.changed(), recognition));
+        self.heed(&posterior)
+    }
+
+    /// Says what the contacts say now, if it is something else than before.
+    fn heed(&mut self, posterior: &Posterior) -> Vec<News> {
         let mut news = Vec::new();
         let live = u32::try_from(posterior.live_objects).unwrap_or(u32::MAX);
         if live < self.live {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
+use super::joining::{Joining, is_clear};
 use super::touch::{Lesson, Touch};
 use crate::recognition::{
     Contact, ModelPlace, NextTouch, ObjectId, ObjectLibrary, ObjectModel, Orientation, Posterior,
@@ -18,9 +19,6 @@ use crate::strength::{Clock, Strength};
 const OBJECTS_MAX: usize = 1024;
 /// Most channels that objects are felt on. What is felt on further ones does not count.
 const CHANNELS_MAX: usize = 256;
-
-/// Share of the evidence that a pose must hold before a visit is laid into an object.
-const ALIGNED_SHARE: f64 = 0.9;
 
 /// What is known of an object beside its places.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,6 +66,8 @@ impl KnownObject {
 pub(crate) struct ObjectMemory {
     pub(super) library: Arc<ObjectLibrary>,
     pub(super) known: Arc<BTreeMap<ObjectId, KnownObject>>,
+    /// What was joined last to an object and is still in doubt.
+    pub(super) joinings: Arc<BTreeMap<ObjectId, Joining>>,
     /// Names of the channels, by number.
     pub(super) channels: Arc<Vec<Label>>,
     /// Number of the next object; none is given twice.
@@ -166,7 +166,7 @@ impl ObjectMemory {
             revision,
             digest: 0,
         };
-        self.put(id, known, model, revision);
+        self.put(id, known, model, None, revision);
     }
 
     /// Remembers a new object that an episode felt; answers its number. Without a name it gets one by its number.
@@ -193,29 +193,37 @@ impl ObjectMemory {
             revision,
             digest: 0,
         };
-        self.put(id, known, model, revision);
+        self.put(id, known, model, None, revision);
         Some(id)
     }
 
-    /// Extends an object by what another visit felt, whose frame lies in the object's so.
+    /// Extends an object by what so many visits and contacts felt, whose frame lies in the object's so.
     pub(crate) fn extend(
         &mut self,
         id: ObjectId,
         visit: &ObjectModel,
-        contacts: u64,
+        taught: (u64, u64),
         object_from_visit: &Isometry3<f64>,
         (now, revision): (Clock, u64),
     ) {
         let (Some(known), Some(model)) = (self.known.get(&id), self.library.get(id)) else {
             return;
         };
-        let (mut known, mut model) = (known.clone(), model.clone());
-        model.extend(visit, object_from_visit);
-        known.visits += 1;
-        known.contacts += contacts;
+        let (mut known, before) = (known.clone(), model.clone());
+        let mut added = ObjectModel::new(*visit.settings());
+        added.extend(visit, object_from_visit);
+        let mut model = before.clone();
+        model.extend(&added, &Isometry3::identity());
+        known.visits += taught.0;
+        known.contacts += taught.1;
         known.strength.used(now, 1.0);
         known.revision = revision;
-        self.put(id, known, model, revision);
+        let joining = Joining {
+            before,
+            added,
+            taught,
+        };
+        self.put(id, known, model, Some(joining), revision);
     }
 
     /// An object that was learned on the spot is given a name that no other has.
@@ -271,7 +279,7 @@ impl ObjectMemory {
             return None;
         };
         let pose = posterior.pose;
-        let pose = pose.filter(|pose| pose.object == id && pose.share > ALIGNED_SHARE)?;
+        let pose = pose.filter(|pose| pose.object == id && is_clear(pose))?;
         Some((id, pose.map_from_episode))
     }
 
@@ -295,7 +303,7 @@ impl ObjectMemory {
             was_it |= recognition.posterior(&self.library).verdict() == Verdict::Object(id);
         }
         let pose = { recognition.posterior(&self.library).pose }
-            .filter(|pose| was_it && pose.object == id && pose.share > ALIGNED_SHARE)?;
+            .filter(|pose| was_it && pose.object == id && is_clear(pose))?;
         Some(pose.map_from_episode)
     }
 
@@ -309,17 +317,25 @@ impl ObjectMemory {
         id: ObjectId,
         mut known: KnownObject,
         model: ObjectModel,
+        joining: Option<Joining>,
         revision: u64,
     ) {
         let mut out = StateWriter::default();
         model.write(&mut out);
+        joining.write(&mut out);
         known.digest = out.digest().0;
+        let joinings = Arc::make_mut(&mut self.joinings);
+        match joining {
+            Some(joining) => drop(joinings.insert(id, joining)),
+            None => drop(joinings.remove(&id)),
+        }
         Arc::make_mut(&mut self.library).put(id, model);
         Arc::make_mut(&mut self.known).insert(id, known);
         self.changed = revision;
     }
 
-    fn remove(&mut self, id: ObjectId, revision: u64) {
+    pub(super) fn remove(&mut self, id: ObjectId, revision: u64) {
+        Arc::make_mut(&mut self.joinings).remove(&id);
         Arc::make_mut(&mut self.library).remove(id);
         Arc::make_mut(&mut self.known).remove(&id);
         Arc::make_mut(&mut self.gone).insert(id, revision);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Unit, Vector3};
 
 use super::episode::{CONTACTS_MAX, Episode, Purpose};
+use super::joining::Joining;
 use super::mark::TouchNoise;
 use super::memory::{KnownObject, ObjectMemory};
 use crate::recognition::{
@@ -26,6 +27,11 @@ state_of_struct!(KnownObject {
     strength,
     revision,
     digest
+});
+state_of_struct!(Joining {
+    before,
+    added,
+    taught
 });
 state_of_struct!(LevelMemory {
     channel,
@@ -282,6 +288,7 @@ impl ObjectMemory {
             let mut out = StateWriter::default();
             known.write(&mut out);
             model.write(&mut out);
+            self.joinings.get(&id).cloned().write(&mut out);
             (id.0, out.into_bytes())
         });
         let gone = self.gone.iter().filter(move |&(_, &at)| at > since);
@@ -313,9 +320,10 @@ impl ObjectMemory {
             let mut input = StateReader::new(bytes);
             let known = KnownObject::read(&mut input)?;
             let model = ObjectModel::read(&mut input)?;
+            let joining = State::read(&mut input)?;
             input.end()?;
             let changed = self.changed;
-            self.put(ObjectId(id), known, model, changed);
+            self.put(ObjectId(id), known, model, joining, changed);
         }
         Ok(())
     }

@@ -51,6 +51,19 @@ impl ObjectLibrary {
         removed
     }
 
+    /// A library of some of these objects, each under a number of its own.
+    #[must_use]
+    pub fn select(&self, objects: impl IntoIterator<Item = (ObjectId, ObjectId)>) -> Self {
+        let mut selected = Self::default();
+        for (id, number) in objects {
+            if let Some(object) = self.objects.get(&id) {
+                selected.objects.insert(number, Arc::clone(object));
+            }
+        }
+        selected.survey();
+        selected
+    }
+
     /// What was learned of an object.
     pub fn get(&self, id: ObjectId) -> Option<&ObjectModel> {
         self.objects.get(&id).map(|object| &object.model)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 
-use super::contact::{Contact, Seen};
+use super::contact::{Contact, Felt, Seen};
 use crate::grid::Lattice;
 
 /// Normals more than 60° apart are two sides of something thin, or of an edge: two places.
@@ -93,9 +93,24 @@ impl ModelPlace {
         Unit::try_new(self.normals, 1e-9)
     }
 
+    /// A contact with the place, as one of those that taught it.
+    pub fn felt(&self) -> Contact {
+        let mut contact = Contact::at(self.position_m, (self.variance_m2 / self.count).sqrt());
+        if let Some(normal) = self.normal() {
+            contact = contact.with_normal(normal, (self.normal_variance / self.count).sqrt());
+        }
+        contact.levels.extend(self.levels.iter().map(|level| Felt {
+            channel: level.channel,
+            value: level.mean,
+            sd: (level.noise / level.count).sqrt(),
+        }));
+        contact.descriptors.clone_from(&self.descriptors);
+        contact
+    }
+
     fn of(contact: &Contact) -> Self {
         let normals = contact.normal.map_or(Vector3::zeros(), Unit::into_inner);
-        let level = |felt: &super::contact::Felt| LevelMemory {
+        let level = |felt: &Felt| LevelMemory {
             channel: felt.channel,
             count: 1.0,
             mean: felt.value,
@@ -192,6 +207,10 @@ impl ObjectModel {
     /// Learns one contact, whose position is in the model's frame.
     pub fn learn(&mut self, contact: &Contact) {
         self.add(&ModelPlace::of(contact));
+        self.keep_budget();
+    }
+
+    fn keep_budget(&mut self) {
         while self.places.len() > self.settings.places_max.max(8) {
             self.spacing_m *= 2.0;
             self.by_cell.clear();
@@ -209,6 +228,7 @@ impl ObjectModel {
             place.normals = self_from_other * place.normals;
             self.add(&place);
         }
+        self.keep_budget();
     }
 
     /// Places.

@@ -217,6 +217,137 @@ fn another_visit_extends_an_object_in_its_own_frame() {
     assert_eq!(map.object_places(fork).len(), 14);
 }
 
+/// Feels places of a rod in an episode; answers what happened, to its end.
+fn visit(
+    map: &mut CognitiveMap,
+    hand: &mut Robot,
+    mark: SampleBody,
+    rod: &[f64],
+    order: &[usize],
+) -> Vec<EventKind> {
+    hand.sample(map, mark);
+    let mut events = feel(map, hand, rod, order);
+    events.extend(hand.sample(map, end()));
+    events
+}
+
+fn names(map: &CognitiveMap) -> Vec<String> {
+    let names = map
+        .objects()
+        .map(|(_, known, _)| known.name().as_str().to_owned());
+    names.collect()
+}
+
+#[test]
+fn what_two_hands_find_at_the_same_time_is_one_object() {
+    let (mut map, mut left) = taught();
+    let mut right = Robot::enrol(&mut map);
+    let strange = RODS[2].1.map(|level| level + 20.0);
+    for hand in [&mut left, &mut right] {
+        hand.sample(&mut map, identify());
+        let events = feel(&mut map, hand, &strange, &UP);
+        assert!(events.contains(&EventKind::ObjectUnknown), "{events:?}");
+    }
+    left.sample(&mut map, end());
+    let events = right.sample(&mut map, end());
+    assert_eq!(recognised(&events), ["object-3"]);
+    assert_eq!(map.object_count(), 4);
+}
+
+#[test]
+fn pieces_of_one_thing_become_one_object_once_the_whole_is_known() {
+    let (mut map, mut hand) = taught();
+    let mut strange = RODS[2].1.map(|level| level + 20.0).to_vec();
+    strange.extend(RODS[1].1.map(|level| level + 40.0));
+    let all: Vec<usize> = (0..strange.len()).collect();
+    visit(&mut map, &mut hand, learn(None), &strange, &all[..12]);
+    visit(&mut map, &mut hand, learn(None), &strange, &all[12..]);
+    assert_eq!(
+        map.object_count(),
+        5,
+        "nobody can know that they hang together"
+    );
+    visit(&mut map, &mut hand, learn(Some("ladle")), &strange, &all);
+    // What fits a piece as well as the whole.
+    let mut events = visit(&mut map, &mut hand, identify(), &strange, &all[..12]);
+    events.extend(visit(&mut map, &mut hand, identify(), &strange, &all[12..]));
+    let merged = events.iter().filter_map(|event| match event {
+        EventKind::ObjectsMerged { name, absorbed, .. } => Some((name.as_str(), absorbed.as_str())),
+        _ => None,
+    });
+    let merged: Vec<_> = merged.collect();
+    assert!(!merged.is_empty() && merged.iter().all(|(name, _)| *name == "ladle"));
+    assert_eq!(recognised(&events), ["ladle"; 2], "{events:?}");
+    assert_eq!(names(&map), ["fork", "knife", "spoon", "ladle"]);
+    let ladle = map.object_by_name(&label("ladle")).unwrap();
+    assert_eq!(map.object_places(ladle).len(), strange.len());
+}
+
+#[test]
+fn two_objects_that_were_named_apart_stay_two() {
+    let (mut map, mut hand) = taught();
+    visit(&mut map, &mut hand, learn(Some("gabel")), &RODS[0].1, &UP);
+    let events = visit(&mut map, &mut hand, identify(), &RODS[0].1, &UP);
+    assert_eq!(recognised(&events), [""; 0], "it may be either");
+    assert_eq!(names(&map), ["fork", "knife", "spoon", "gabel"]);
+}
+
+#[test]
+fn what_was_joined_in_error_comes_apart_again() {
+    let (mut map, mut hand) = taught();
+    let fork = map.object_by_name(&label("fork")).unwrap();
+    let levels = |map: &CognitiveMap| {
+        let places = map.object_places(fork).iter();
+        places.map(|place| place.levels[0].mean).collect::<Vec<_>>()
+    };
+    let before = levels(&map);
+    // Like the fork, but for its end.
+    let mut other = RODS[0].1;
+    other[9..].copy_from_slice(&[30.0, 40.0, 50.0]);
+    let events = visit(&mut map, &mut hand, learn(None), &other, &UP);
+    assert!(
+        matches!(&events[..], [EventKind::ObjectLearned { object, .. }] if *object == fork),
+        "{events:?}"
+    );
+    assert_ne!(levels(&map), before);
+    let mut restored = CognitiveMap::restore(Settings::default(), map.checkpoint(0)).unwrap();
+    assert_eq!(restored.digest(), map.digest());
+    let mut twin = Robot { ..hand };
+    let events = visit(&mut map, &mut hand, identify(), &RODS[0].1, &UP);
+    let split = { events.iter() }
+        .find_map(|event| match event {
+            EventKind::ObjectSplit {
+                object, part_name, ..
+            } => Some((*object, part_name.as_str().to_owned())),
+            _ => None,
+        })
+        .unwrap_or_else(|| panic!("{events:?}"));
+    assert_eq!(split, (fork, "object-3".to_owned()));
+    assert_eq!(levels(&map), before);
+    assert_eq!(map.object(fork).unwrap().visits(), 1);
+    let again = visit(&mut restored, &mut twin, identify(), &RODS[0].1, &UP);
+    assert_eq!(again, events);
+    assert_eq!(restored.digest(), map.digest());
+    let events = visit(&mut map, &mut hand, identify(), &other, &UP);
+    assert_eq!(recognised(&events), ["object-3"]);
+}
+
+#[test]
+fn a_visit_to_what_was_known_before_does_not_undo_what_was_added() {
+    let (mut map, mut hand) = taught();
+    let fork = map.object_by_name(&label("fork")).unwrap();
+    let mut longer = RODS[0].1.to_vec();
+    longer.extend([13.0, 14.0, 15.0, 16.0]);
+    let order: Vec<usize> = (3..16).collect();
+    visit(&mut map, &mut hand, learn(Some("fork")), &longer, &order);
+    for _ in 0..3 {
+        let events = visit(&mut map, &mut hand, identify(), &longer, &UP[..8]);
+        assert_eq!(recognised(&events), ["fork"], "{events:?}");
+    }
+    assert_eq!(map.object_places(fork).len(), longer.len());
+    assert_eq!(map.object_count(), 3);
+}
+
 /// A lesson of a rod.
 fn lesson(rod: &[f64]) -> Lesson {
     let touches = rod.iter().zip(0..).map(|(value, k)| {
