@@ -1,8 +1,7 @@
 //! Which place of a map is nearest, roughly: one number for each cell of a box.
 
-/// Most cells; they are larger rather than more, so that they stay in a processor's caches: waiting for them is most
-/// of what a rough look costs.
-const CELLS_MAX: f32 = 8_192.0;
+/// Most cells; they are larger rather than more, so that they stay in a processor's caches.
+const CELLS_MAX: f32 = 65_536.0;
 /// No place is near.
 const NONE: u16 = u16::MAX;
 
@@ -149,7 +148,7 @@ mod tests {
         let axis =
             |from: u64, count: u64| -> Vec<f32> { (from..from + count).map(noise).collect() };
         let [x, y, z] = [axis(0, 200), axis(1000, 200), axis(2000, 200)];
-        let (reach_m, edge_m) = (0.01, 0.016);
+        let (reach_m, edge_m) = (0.01, 0.009);
         let axes = [x, y, z];
         let nearest = Nearest::new(&axes, reach_m, edge_m);
         let [x, y, z] = &axes;
