@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_1_PI, TAU};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, Vector3, Vector6};
 
 use super::facet::{ALONG_MAX, Facet, Noise, ROUGH_DEPTH, ROUGH_RAD};
+use super::strain::Height;
 
 /// Share of contacts that are as the smooth surface foretells them; the rest are about edges and seams.
 const SMOOTH_SHARE: f64 = 0.85;
@@ -157,6 +158,17 @@ impl Encounter {
             densities.precisions = [precision, Matrix3::from_diagonal_element(loose)];
         }
         densities
+    }
+
+    /// How high the contact at this point lies, if `share` of its density is the map's.
+    pub(super) fn height(&self, point: &Point3<f64>, densities: &Densities, share: f64) -> Height {
+        Height {
+            point: *point,
+            normal: self.normal,
+            depth_m: self.depth_m,
+            variance_m2: densities.depth_m2,
+            share: densities.shares()[0] * share,
+        }
     }
 
     /// What the contact says of a motion, if `share` of its density is the map's.

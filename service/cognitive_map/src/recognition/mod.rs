@@ -38,11 +38,13 @@ mod asking;
 mod cells;
 mod contact;
 mod crowd;
+mod deviation;
 mod encounter;
 mod episode;
 mod facet;
 mod feeling;
 mod group;
+mod halves;
 mod library;
 mod model;
 mod nearest;
@@ -52,10 +54,10 @@ mod poses;
 mod posterior;
 mod ranks;
 mod reaches;
-
 mod relief;
 mod shifts;
 mod spots;
+mod strain;
 mod strangers;
 mod surface;
 #[cfg(test)]

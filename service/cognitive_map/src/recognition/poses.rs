@@ -2,11 +2,13 @@
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
-use super::contact::Contact;
+use super::contact::{Contact, Reached};
+use super::deviation;
 use super::facet::Noise;
 use super::library::{ObjectId, ObjectLibrary};
 use super::pairs::{Pair, Pairs};
 use super::relief::{Relief, Scene, local};
+use super::strain::Strain;
 use super::surface::Surface;
 use crate::geometry::se3;
 
@@ -329,17 +331,29 @@ impl Poses {
         found
     }
 
-    /// How far below what is right a hypothesis explains the contacts, in deviations.
+    /// How far below what is right a hypothesis explains the contacts, in deviations: by their densities, by what a strained
+    /// map would explain better, and by whether those that were drawn lie on all of the map.
     pub(super) fn fit(&self, library: &ObjectLibrary, hypothesis: &Hypothesis) -> Option<f64> {
         let (surface, relief) = found(library, hypothesis.object)?;
         let scene = scene(library, surface);
-        let logs = self
-            .contacts
-            .iter()
-            .map(|c| relief.log(&hypothesis.pose, c, scene));
+        let met: Vec<_> = { self.contacts.iter() }
+            .map(|contact| relief.meet(&hypothesis.pose, contact, scene))
+            .collect();
         let (mean, sd) = relief.expected();
-        let (sum, count) = (logs.sum::<f64>(), self.contacts.len() as f64);
-        Some((sum - count * mean) / ((count * self.shared(relief)).sqrt() * sd))
+        let sum: f64 = met.iter().map(|met| met.log).sum();
+        let count = self.contacts.len() as f64;
+        let densities = (sum - count * mean) / ((count * self.shared(relief)).sqrt() * sd);
+        let mut strain = Strain::new(relief.extent_m, relief.spacing_m);
+        for height in met.iter().filter_map(|met| met.height) {
+            strain.add(&height);
+        }
+        let drawn = { self.contacts.iter().zip(&met) }
+            .filter(|(contact, met)| contact.reached == Reached::Drawn && met.share > 0.5)
+            .map(|(contact, _)| hypothesis.pose * contact.position_m);
+        let evenness = relief.halves.evenness(drawn);
+        let strain = strain.deviation(relief.facets.len());
+        let all = [Some(densities), strain, evenness];
+        Some(deviation::together(all.into_iter().flatten()))
     }
 
     /// What a contact's evidence in this map is worth, against one whose errors are independent of all

@@ -8,8 +8,10 @@ use super::cells::Cells;
 use super::contact::Contact;
 use super::encounter::Encounter;
 use super::facet::{ALONG_MAX, Facet, Noise, PATCH_COS, SMOOTH_NEIGHBOURS, facets};
+use super::halves::Halves;
 use super::model::ObjectModel;
 use super::pairs::Pairs;
+use super::strain::Height;
 use super::surface::{Patch, Wide};
 use crate::geometry::se3;
 
@@ -34,6 +36,10 @@ pub(super) struct Relief {
     pub(super) pairs: Pairs,
     pub(super) area_m2: f64,
     pub(super) extent_m: f64,
+    /// Distance within which what is felt is of one place \[m\].
+    pub(super) spacing_m: f64,
+    /// Parts of equal area.
+    pub(super) halves: Halves,
     /// Radius of the disc of places that make a patch \[m\].
     alike_m: f64,
     cells: Cells,
@@ -49,6 +55,17 @@ pub(super) struct Scene<'a> {
     pub(super) wide: &'a [Wide],
     /// Density of contacts with something else, per m³.
     pub(super) elsewhere: f64,
+}
+
+/// One contact from one pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Met {
+    /// Log density, as in [`Explained::score`].
+    pub(super) log: f64,
+    /// Probability that it is one with this map.
+    pub(super) share: f64,
+    /// How it lies over the map, if it lies there.
+    pub(super) height: Option<Height>,
 }
 
 /// Contacts from one pose.
@@ -101,6 +118,8 @@ impl Relief {
             cells: Cells::new(&positions, &reaches, CELL_PER_REACH),
             area_m2,
             extent_m,
+            spacing_m: model.spacing_m(),
+            halves: Halves::default(),
             alike_m: 0.0,
             facets,
             expected: (0.0, 1.0),
@@ -111,6 +130,7 @@ impl Relief {
         relief.area_m2 = relief.facets.iter().map(|facet| facet.area_m2).sum::<f64>();
         let place_m2 = relief.area_m2 / relief.facets.len() as f64;
         relief.alike_m = (SMOOTH_NEIGHBOURS as f64 * place_m2 * FRAC_1_PI).sqrt();
+        relief.halves = Halves::new(&relief.facets);
         relief.expected = relief.rehearse(model);
         Some(relief)
     }
@@ -195,14 +215,34 @@ impl Relief {
 
     /// Log density of one contact, as in [`Explained::score`].
     pub(super) fn log(&self, pose: &Isometry3<f64>, contact: &Contact, scene: Scene<'_>) -> f64 {
+        self.meet(pose, contact, scene).log
+    }
+
+    /// One contact from a pose.
+    pub(super) fn meet(&self, pose: &Isometry3<f64>, contact: &Contact, scene: Scene<'_>) -> Met {
         let point = pose * contact.position_m;
         let normal = contact.normal.map(|normal| pose * normal);
         let normal = normal.as_ref().map(Unit::as_ref);
         let noise = Noise::of(contact, 1.0);
         let percept = |facet: &Facet| percept(facet, contact, scene);
+        let outlier = self.outlier(scene);
         let met = Encounter::new(&point, normal, &noise, self.about(&point), percept);
-        let total = met.map_or(0.0, |met| met.densities(normal, &noise).sum());
-        ((1.0 - OUTLIERS) * total + self.outlier(scene)).ln()
+        let Some(met) = met else {
+            return Met {
+                log: outlier.ln(),
+                share: 0.0,
+                height: None,
+            };
+        };
+        let densities = met.densities(normal, &noise);
+        let total = (1.0 - OUTLIERS) * densities.sum();
+        let all = total + outlier;
+        let share = total / all;
+        Met {
+            log: all.ln(),
+            share,
+            height: Some(met.height(&point, &densities, share)),
+        }
     }
 
     /// A rough score of one contact, cheap, for poses that are not yet right: of the one facet that
