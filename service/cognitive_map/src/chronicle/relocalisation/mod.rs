@@ -7,6 +7,8 @@
 //! says nothing. A pose is believed when no place elsewhere explains the looks about as well.
 
 mod birth;
+mod places;
+mod positions;
 mod problem;
 mod relocalise;
 mod scene;
