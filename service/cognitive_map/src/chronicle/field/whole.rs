@@ -41,11 +41,11 @@ struct Patch<'a> {
     points: Vec<Point3<f64>>,
     /// K⁻¹.
     inverse: DMatrix<f64>,
-    /// UUᵀ.
+    /// `UUᵀ`.
     gram: DMatrix<f64>,
-    /// UYᵀ.
+    /// `UYᵀ`.
     likeness: DMatrix<f64>,
-    /// YYᵀ.
+    /// `YYᵀ`.
     own: DMatrix<f64>,
 }
 
@@ -59,7 +59,7 @@ pub(in crate::chronicle) struct Whole<'a> {
 struct Fit {
     /// K⁻¹k.
     weights: DMatrix<f64>,
-    /// RRᵀ.
+    /// `RRᵀ`.
     off: DMatrix<f64>,
     /// C⁻¹.
     precision: DMatrix<f64>,

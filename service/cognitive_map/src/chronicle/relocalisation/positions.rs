@@ -7,10 +7,13 @@ use nalgebra::Point3;
 
 use crate::chronicle::chronicle::Chronicle;
 
+/// An agent, its session, and a sample of that.
+type Instant = (u32, u32, u64);
+
 /// Points of the map from which views were taken, each sought once for a question.
 pub(super) struct Positions<'a> {
     chronicle: &'a Chronicle,
-    known: RefCell<BTreeMap<(u32, u32, u64), Option<Point3<f64>>>>,
+    known: RefCell<BTreeMap<Instant, Option<Point3<f64>>>>,
 }
 
 impl<'a> Positions<'a> {
