@@ -310,15 +310,16 @@ fn thinning_keeps_the_loops() {
 fn what_is_seen_is_taken_in_though_there_is_room_for_anchors_only() {
     let whole = walked(1, 1500, roomy());
     let bounded = ChronicleSettings {
-        sightings_max: 800,
+        sightings_max: 500,
         ..roomy()
     };
     let bounded = walked(1, 1500, bounded);
-    assert!(whole.chronicle.n_sightings() > 2500);
-    assert!(bounded.chronicle.n_sightings() <= 800);
+    assert!(whole.chronicle.n_sightings() > 1000);
+    assert!(bounded.chronicle.n_sightings() <= 500);
     let error_m = |walk: &Walk| walk.error_m(&walk.chronicle.refine());
+    // Without room for what is seen anew it was 0.17 m.
     let (whole_m, bounded_m) = (error_m(&whole), error_m(&bounded));
-    assert!(bounded_m < 2.0 * whole_m, "{bounded_m} {whole_m}");
+    assert!(bounded_m < 0.12, "{bounded_m} {whole_m}");
 }
 
 #[test]

@@ -29,7 +29,7 @@ const HEADING_SD_RAD: f64 = 0.02;
 const ON_M: f64 = 5.0;
 /// How much less surely look by look than by all looks at once a place may be known: where that is little, the map is thin, and
 /// what all looks at once say rests upon what the map leaves open.
-const ROUGHLY: f64 = 1.2;
+const ROUGHLY: f64 = 2.0;
 /// How far all looks at once may be off what is expected, in squares, 1 on average: beyond that the map contradicts them, or itself.
 const WIDER_MAX: f64 = 2.0;
 /// Guesses that are told.
@@ -110,10 +110,11 @@ impl Chronicle {
                 .all(|other| best.evidence.against(&other.evidence) >= SURE);
         let covariance = PoseCovariance::from_matrix(&best.covariance);
         let turn_sd_rad = turn_sd_rad(&best.covariance);
-        let is_known = covariance.position_sd_m() <= sd_max_m
-            && best.rough_sd_m <= ROUGHLY * sd_max_m
-            && best.wider <= WIDER_MAX
-            && turn_sd_rad <= HEADING_SD_MAX_RAD;
+        // To one that was found, an answer from where the map is thin still says something.
+        let is_rough = search.found_m.is_none()
+            && (best.rough_sd_m > ROUGHLY * sd_max_m || turn_sd_rad > HEADING_SD_MAX_RAD);
+        let is_known =
+            covariance.position_sd_m() <= sd_max_m && best.wider <= WIDER_MAX && !is_rough;
         if !is_sure || !is_known {
             return None;
         }
