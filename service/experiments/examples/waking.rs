@@ -1,15 +1,17 @@
 //! Robots that wake up in a room that was explored.
 //!
 //! ```text
-//! cargo run --release -p cogmap-experiments --example waking -- [trials=N] [per=N] [rooms=N] [explorer=N] [travel=CM] [seed=N]
+//! cargo run --release -p cogmap-experiments --example waking -- [trials=N] [per=N] [rooms=N] [explorer=N] [travel=CM] [seed=N] [cost]
 //! ```
+//!
+//! `cost` tells instead how long a view takes to be taken in.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 
 use std::error::Error;
 use std::num::NonZeroUsize;
 
-use cogmap_experiments::waking::{WakingProtocol, run_waking};
+use cogmap_experiments::waking::{WakingProtocol, run_waking, time_waking};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -27,6 +29,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         seed: number("seed=", 1)?.into(),
         ..defaults
     };
+    if arguments.iter().any(|text| text == "cost") {
+        let took_ms = time_waking(&protocol)?;
+        let at = |percent: usize| took_ms[(took_ms.len() - 1) * percent / 100];
+        println!("{} views [ms]:", took_ms.len());
+        for percent in [50, 75, 90, 99, 100] {
+            println!("{percent:4} %  {:8.2}", at(percent));
+        }
+        return Ok(());
+    }
     let report = run_waking(&protocol, NonZeroUsize::MIN, &|| {})?;
     println!("{report:#?}");
     Ok(())

@@ -381,8 +381,15 @@ impl Chronicle {
         self.sight(waiting.anchor, Shown::Agent(there.anchor, lever), point);
     }
 
-    /// Remembers a sighting.
+    /// Remembers a sighting; where memory is full, another one makes room for it.
     fn sight(&mut self, anchor: u32, shown: Shown, point: SeenPoint) {
+        let is_full = |this: &Self| this.sightings.len() >= this.settings.sightings_max as usize;
+        if is_full(self) {
+            self.thin();
+        }
+        if is_full(self) {
+            self.forget_vaguest();
+        }
         let sighting = Sighting {
             anchor,
             next: NONE,
@@ -394,9 +401,6 @@ impl Chronicle {
             && let Shown::Landmark(landmark) = shown
         {
             self.landmarks.release(landmark, self.revision);
-        }
-        if self.sightings.len() >= self.settings.sightings_max as usize {
-            self.thin();
         }
     }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 use super::chronicle::{Beside, Chronicle, Moment, beside};
-use super::field::{Glimpse, Prior, Scene, Seen, Settled, together};
+use super::field::{Glimpse, Prior, Scene, Seen, Settled, together, weighed};
 use super::revisit::{Felt, NEAR, OPEN_DISTANCES, OPEN_RAD, Passage, View, lay_roughly, twist};
 use super::tie::Standing;
 use crate::geometry::{PoseCovariance, se3};
@@ -159,7 +159,7 @@ impl Chronicle {
         for (settled, cost) in &mut settled {
             *cost = (settled.evidence.total() - 0.5 * *cost - best).exp();
         }
-        let (pose, covariance) = together(&settled);
+        let (pose, covariance) = together(&weighed(&settled));
         // The error ξ of T = T̂ exp(ξ) is −Ad(T̂) ξ of its inverse.
         let adjoint = se3::adjoint(&pose);
         let covariance = adjoint * covariance * adjoint.transpose();

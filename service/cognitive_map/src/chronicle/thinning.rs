@@ -48,6 +48,46 @@ impl Chronicle {
         self.dissolve(least.1);
     }
 
+    /// Forgets a sighting: of the next few anchors from which something was seen, the vaguest one of that from which most was.
+    ///
+    /// Anchors may go without a sighting less, and then what is seen anew would find no room, and the way on from there would
+    /// be known by its motion alone.
+    pub(super) fn forget_vaguest(&mut self) {
+        let numbers = self.anchors.numbers();
+        let (mut most, mut compared) = ((1, NONE), 0);
+        for _ in 0..LOOKED_AT_MAX.min(numbers) {
+            if compared >= COMPARED && most.1 != NONE {
+                break;
+            }
+            let number = self.hand;
+            self.hand = (self.hand + 1) % numbers;
+            let (count, vaguest) = self.seen_from(number);
+            compared += u32::from(count > 0);
+            if count > most.0 {
+                most = (count, vaguest);
+            }
+        }
+        self.detach(most.1);
+    }
+
+    /// How many sightings hang on an anchor, and which is the vaguest.
+    fn seen_from(&self, anchor: u32) -> (u32, u32) {
+        let (mut count, mut vaguest) = (0, (0.0, NONE));
+        let mut at = self
+            .anchors
+            .get(anchor)
+            .map_or(NONE, |anchor| anchor.sightings);
+        while let Some(sighting) = self.sightings.get(at) {
+            let spread = sighting.point.covariance().trace();
+            if spread > vaguest.0 {
+                vaguest = (spread, at);
+            }
+            count += 1;
+            at = sighting.next;
+        }
+        (count, vaguest.1)
+    }
+
     /// How much is lost with an anchor; `None` if it must stay.
     fn loss(&self, number: u32) -> Option<f64> {
         let anchor = self.anchors.get(number)?;

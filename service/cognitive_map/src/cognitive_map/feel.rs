@@ -85,15 +85,21 @@ impl Fold<'_> {
     fn relocalised(&mut self, found: &Relocalised) {
         let number = self.agent_id.0;
         let was_placed = self.agent.placed;
-        // One that only drifted is where it may have drifted to: its way leads there.
-        let is_elsewhere = was_placed && found.is_first && self.is_elsewhere(found);
+        // One that only drifted is where it may have drifted to: its way leads there. One that was put astray, by looks that could
+        // be read in two ways, is put anew.
+        let is_refused = was_placed
+            && !found.is_first
+            && !self.estimator.fix(number, &found.pose, &found.covariance);
+        let is_elsewhere = is_refused || (was_placed && found.is_first && self.is_elsewhere(found));
         if is_elsewhere || !was_placed {
             self.estimator
                 .recognised(number, &found.pose, &found.covariance);
             self.remember_what_was_settled();
         }
-        self.estimator.fix(number, &found.pose, &found.covariance);
-        if found.is_first || found.is_last {
+        if found.is_first {
+            self.estimator.fix(number, &found.pose, &found.covariance);
+        }
+        if found.is_first || found.is_last || is_elsewhere {
             let moment = self.moment();
             self.chronicle.relocalised(&moment, found, is_elsewhere);
         }

@@ -14,7 +14,7 @@ mod run;
 pub use building::Building;
 pub use protocol::{InvalidWaking, WakingProtocol};
 pub use report::{WakingReport, WakingTrial};
-pub use run::run_waking;
+pub use run::{run_waking, time_waking};
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,7 @@
 //! An explorer, and robots that wake up.
 
 use std::num::NonZeroUsize;
+use std::time::Instant;
 
 use cognitive_map::{AgentId, CognitiveMap, Label, Record, Sample, Settings, SettingsValues};
 use nalgebra::{Isometry3, Translation3, Vector3};
@@ -55,7 +56,7 @@ pub fn run_waking(
             .min(protocol.trials.saturating_sub(before));
         let site = Site::explored(protocol, protocol.seed.wrapping_add(building as u64));
         let trials = (0..count).map(|number| {
-            let trial = site.wake(protocol, number);
+            let trial = site.wake(protocol, number, &mut Vec::new());
             done();
             trial
         });
@@ -63,6 +64,22 @@ pub fn run_waking(
     });
     let trials: Vec<WakingTrial> = trials.into_iter().flatten().collect();
     Ok(WakingReport::of(protocol, &trials))
+}
+
+/// How long each view of the robots of a protocol takes to be taken in [ms], those after which it is asked where they are
+/// included: on one thread, and all of one building.
+///
+/// # Errors
+/// The protocol makes no sense.
+pub fn time_waking(protocol: &WakingProtocol) -> Result<Vec<f64>, InvalidWaking> {
+    protocol.check()?;
+    let site = Site::explored(protocol, protocol.seed);
+    let mut took_ms = Vec::new();
+    for number in 0..protocol.trials {
+        site.wake(protocol, number, &mut took_ms);
+    }
+    took_ms.sort_by(f64::total_cmp);
+    Ok(took_ms)
 }
 
 /// A building that has been explored.
@@ -141,8 +158,8 @@ impl Site {
         }
     }
 
-    /// A robot wakes up and walks.
-    fn wake(&self, protocol: &WakingProtocol, number: u32) -> WakingTrial {
+    /// A robot wakes up and walks. Adds how long each of its views took.
+    fn wake(&self, protocol: &WakingProtocol, number: u32, took_ms: &mut Vec<f64>) -> WakingTrial {
         let stream = 1000 + 10 * u64::from(number);
         let mut random = self.random(stream);
         let room = random.random_range(0..protocol.rooms as usize);
@@ -165,8 +182,12 @@ impl Site {
         let mut travelled_m = 0.0;
         while travelled_m < protocol.travel_m - 1e-9 {
             for reading in robot.step(protocol) {
+                let before = Instant::now();
                 apply(&mut map, agent, seq, &reading);
                 seq += 1;
+                if matches!(reading.body, ReadingBody::Descriptor { .. }) {
+                    took_ms.push(before.elapsed().as_secs_f64() * 1e3);
+                }
             }
             travelled_m = f64::from(robot.steps) * STEP_M;
             let woken = map.agent(agent).expect("it was enrolled");

@@ -2,9 +2,11 @@
 
 mod neighbourhood;
 mod scene;
+mod whole;
 
 pub(super) use neighbourhood::Seen;
 /// Views with the numbers of their channels.
 pub(super) type Views<'a> = Vec<(u8, Seen<'a>)>;
 
-pub(super) use scene::{Evidence, Glimpse, Prior, Scene, Settled, together};
+pub(super) use scene::{Evidence, Glimpse, Prior, Scene, Settled, together, weighed};
+pub(super) use whole::Laid;

@@ -18,7 +18,7 @@ use crate::chronicle::revisit::Kernel;
 /// Views about a point that count, the nearest first.
 const NEAR_MAX: usize = 12;
 /// Part that is always left open: positions and kernel are not exact.
-const OPEN_MIN: f64 = 0.02;
+pub(super) const OPEN_MIN: f64 = 0.02;
 /// A point is known when no more than this is left open of what is seen there.
 const OPEN_MAX: f64 = 0.8;
 
@@ -131,7 +131,7 @@ impl Neighbourhood {
 }
 
 impl Kernel {
-    fn at(&self, distance_squared: f64) -> f64 {
+    pub(super) fn at(&self, distance_squared: f64) -> f64 {
         self.likeness * (-0.5 * distance_squared / self.length_m.powi(2)).exp()
     }
 }

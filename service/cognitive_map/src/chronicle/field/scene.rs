@@ -28,6 +28,8 @@ const OPEN: f64 = 0.1;
 const SOFT: f64 = 2.0;
 /// Rounds of finding the views about a pose anew, and steps of each.
 const ROUNDS: (usize, usize) = (3, 4);
+/// A round that moves a pose by less is the last one \[m, rad\].
+const AT_REST: f64 = 1e-3;
 
 /// Something seen along the way.
 #[derive(Clone, Copy, Debug)]
@@ -116,12 +118,16 @@ impl<'a, About: Fn(&[Point3<f64>]) -> Views<'a>> Scene<'a, About> {
         let mut pose = *start;
         let mut about = self.about(&pose);
         for _ in 0..ROUNDS.0 {
+            let begun = pose;
             for _ in 0..ROUNDS.1 {
                 let (gradient, hessian) = self.pull(&pose, &about, prior);
                 let Some(factor) = hessian.cholesky() else {
                     break;
                 };
                 pose = moved(&pose, &-factor.solve(&gradient));
+            }
+            if twist(&begun.inv_mul(&pose)).norm() < AT_REST {
+                break;
             }
             about = self.about(&pose);
         }
@@ -213,15 +219,26 @@ impl Evidence {
     }
 }
 
-/// Mean and covariance of poses by their weights.
-pub(in crate::chronicle) fn together(poses: &[(Settled, f64)]) -> (Isometry3<f64>, Matrix6<f64>) {
-    let base = poses[0].0.pose;
-    let whole: f64 = poses.iter().map(|(_, weight)| weight).sum();
+/// Poses that settled, with their covariances and weights.
+pub(in crate::chronicle) fn weighed(
+    poses: &[(Settled, f64)],
+) -> Vec<(Isometry3<f64>, Matrix6<f64>, f64)> {
+    let each = poses.iter();
+    each.map(|(settled, weight)| (settled.pose, settled.covariance, *weight))
+        .collect()
+}
+
+/// Mean and covariance of poses by their covariances and weights.
+pub(in crate::chronicle) fn together(
+    poses: &[(Isometry3<f64>, Matrix6<f64>, f64)],
+) -> (Isometry3<f64>, Matrix6<f64>) {
+    let base = poses[0].0;
+    let whole: f64 = poses.iter().map(|(.., weight)| weight).sum();
     let (mut mean, mut second) = (Vector6::zeros(), Matrix6::zeros());
-    for (settled, weight) in poses {
-        let off = twist(&base.inv_mul(&settled.pose));
+    for (pose, covariance, weight) in poses {
+        let off = twist(&base.inv_mul(pose));
         mean += off * (*weight / whole);
-        second += (settled.covariance + off * off.transpose()) * (*weight / whole);
+        second += (covariance + off * off.transpose()) * (*weight / whole);
     }
     let covariance = second - mean * mean.transpose();
     (

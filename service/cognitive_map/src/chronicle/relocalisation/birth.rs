@@ -173,7 +173,7 @@ fn begin(problem: &Problem, nodes: &[Node], seed: &Node) -> Option<Isometry3<f64
 }
 
 /// A pose, turned about the way where the way may leave that open.
-fn turns(problem: &Problem, pose: &Isometry3<f64>) -> Vec<Isometry3<f64>> {
+pub(super) fn turns(problem: &Problem, pose: &Isometry3<f64>) -> Vec<Isometry3<f64>> {
     if problem.is_planar {
         return vec![*pose];
     }
@@ -288,7 +288,7 @@ fn keep(problem: &Problem, known: &mut Vec<Minimum>, found: &Minimum) {
     }
 }
 
-fn is_same(problem: &Problem, one: &Isometry3<f64>, other: &Isometry3<f64>) -> bool {
+pub(super) fn is_same(problem: &Problem, one: &Isometry3<f64>, other: &Isometry3<f64>) -> bool {
     let apart = one.inv_mul(other);
     apart.translation.vector.norm() < SAME.0 * problem.reach_m
         && apart.rotation.angle() < SAME.1.min(FRAC_PI_2)

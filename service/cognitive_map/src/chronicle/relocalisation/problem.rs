@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
+use super::positions::Positions;
 use super::search::Search;
 use crate::chronicle::chronicle::Chronicle;
 use crate::chronicle::field::Prior;
@@ -43,7 +44,11 @@ pub(super) struct Problem {
 }
 
 impl Problem {
-    pub(super) fn of(search: &Search, chronicle: &Chronicle) -> Option<Self> {
+    pub(super) fn of(
+        search: &Search,
+        chronicle: &Chronicle,
+        positions: &Positions<'_>,
+    ) -> Option<Self> {
         let newest = search.looks.last()?;
         let back = newest.in_odom.inverse();
         let spots = search.looks.iter().enumerate().map(|(look, each)| Spot {
@@ -53,7 +58,7 @@ impl Problem {
             cues: each
                 .alike
                 .iter()
-                .filter_map(|likeness| Cue::of(likeness, chronicle))
+                .filter_map(|likeness| Cue::of(likeness, positions))
                 .collect(),
         });
         let is_planar = chronicle.is_planar(search.agent);
@@ -83,10 +88,9 @@ impl Problem {
 }
 
 impl Cue {
-    fn of(likeness: &Likeness, chronicle: &Chronicle) -> Option<Self> {
-        let pose = chronicle.pose_at(likeness.agent, likeness.session, likeness.seq)?;
+    fn of(likeness: &Likeness, positions: &Positions<'_>) -> Option<Self> {
         Some(Self {
-            target: pose.translation.vector.into(),
+            target: positions.at(likeness.agent, likeness.session, likeness.seq)?,
             mean_m: likeness.distance.mean_m,
             sd_m: likeness.distance.sd_m,
         })

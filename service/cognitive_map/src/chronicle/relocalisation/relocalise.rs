@@ -1,35 +1,37 @@
 //! An agent that does not know where it is sees something.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::Isometry3;
 
-use super::birth::minima;
-use super::problem::Problem;
-use super::scene::scene;
+use super::places::{Place, turn_sd_rad};
 use super::search::Search;
 use crate::chronicle::chronicle::{Beside, Chronicle, Moment};
-use crate::chronicle::field::{Evidence, Settled, together};
 use crate::chronicle::revisited::Viewed;
 use crate::chronicle::tie::Standing;
 use crate::geometry::PoseCovariance;
 use crate::geometry::se3;
 
 /// Motion between two looks \[m, rad\].
-const MOVED: (f64, f64) = (0.1, 0.2);
-/// Looks after which poses are sought anew.
-const FRESH: u32 = 4;
+const MOVED: (f64, f64) = (0.05, 0.2);
+/// Looks after which poses are sought anew, before and after the agent was found.
+const FRESH: (u32, u32) = (2, 3);
+/// One that is not found for long asks more rarely: after so many looks it waits for one more each time.
+const PATIENCE: usize = 12;
 /// Looks that there must be.
 const LOOKS_MIN: usize = 6;
 /// Odds at which a pose is believed: one wrong claim in a thousand [nats].
 const SURE: f64 = 6.9;
-/// Poses nearer than this are the same place, in reaches.
-const PLACE: f64 = 0.5;
 /// Deviation of the heading from which on an agent is not put anywhere \[rad\].
-const HEADING_SD_MAX_RAD: f64 = 0.8;
+const HEADING_SD_MAX_RAD: f64 = 0.3;
 /// Deviation of the heading up to which the agent goes on looking around after it was found, so that its way does not lead it
 /// astray \[rad\].
-const HEADING_SD_RAD: f64 = 0.05;
+const HEADING_SD_RAD: f64 = 0.02;
 /// Way after which it stops that in any case \[m\].
 const ON_M: f64 = 5.0;
+/// How much less surely look by look than by all looks at once a place may be known: where that is little, the map is thin, and
+/// what all looks at once say rests upon what the map leaves open.
+const ROUGHLY: f64 = 2.0;
+/// How far all looks at once may be off what is expected, in squares, 1 on average: beyond that the map contradicts them, or itself.
+const WIDER_MAX: f64 = 2.0;
 /// Guesses that are told.
 const GUESSES_MAX: usize = 8;
 
@@ -59,13 +61,6 @@ pub struct Guess {
     pub looks: u32,
 }
 
-/// A place where the agent may be: poses that differ by little.
-struct Place {
-    evidence: Evidence,
-    mean: Isometry3<f64>,
-    covariance: Matrix6<f64>,
-}
-
 impl Chronicle {
     /// An agent that does not know where it is saw something. Answers where it is, once that is known to better than `sd_max_m`.
     pub fn seek(
@@ -93,7 +88,15 @@ impl Chronicle {
                 search.is_own(view)
             });
         search.look(viewed.in_odom, channel, viewed.descriptor.vector(), alike);
-        if search.fresh < FRESH || search.looks.len() < LOOKS_MIN {
+        let looks = search.looks.len();
+        let fresh = if search.found_m.is_some() {
+            FRESH.1
+        } else {
+            FRESH
+                .0
+                .max(u32::try_from(looks / PATIENCE).unwrap_or(u32::MAX))
+        };
+        if search.fresh < fresh || looks < LOOKS_MIN {
             return None;
         }
         search.fresh = 0;
@@ -106,8 +109,12 @@ impl Chronicle {
                 .iter()
                 .all(|other| best.evidence.against(&other.evidence) >= SURE);
         let covariance = PoseCovariance::from_matrix(&best.covariance);
-        let turn_sd_rad = best.covariance.diagonal().rows(3, 3).max().max(0.0).sqrt();
-        let is_known = covariance.position_sd_m() <= sd_max_m && turn_sd_rad <= HEADING_SD_MAX_RAD;
+        let turn_sd_rad = turn_sd_rad(&best.covariance);
+        // To one that was found, an answer from where the map is thin still says something.
+        let is_rough = search.found_m.is_none()
+            && (best.rough_sd_m > ROUGHLY * sd_max_m || turn_sd_rad > HEADING_SD_MAX_RAD);
+        let is_known =
+            covariance.position_sd_m() <= sd_max_m && best.wider <= WIDER_MAX && !is_rough;
         if !is_sure || !is_known {
             return None;
         }
@@ -215,49 +222,6 @@ impl Chronicle {
                     .unwrap_or(u32::MAX),
             })
             .collect()
-    }
-
-    /// The places where an agent may be, the best first.
-    fn places_of(&self, search: &Search) -> Vec<Place> {
-        let Some(problem) = Problem::of(search, self) else {
-            return Vec::new();
-        };
-        let scene = scene(&problem, search, self);
-        let prior = problem.prior();
-        let mut found: Vec<Settled> = minima(&problem)
-            .iter()
-            .filter_map(|start| scene.settle(start, &prior))
-            .filter(|settled| settled.evidence.total() > 0.0)
-            .collect();
-        found.sort_by(|a, b| b.evidence.total().total_cmp(&a.evidence.total()));
-        let mut places: Vec<Vec<(Settled, f64)>> = Vec::new();
-        for settled in found {
-            let known = places.iter_mut().find(|poses| {
-                let best = &poses[0].0.pose;
-                let apart = best.translation.vector - settled.pose.translation.vector;
-                apart.norm() < PLACE * problem.reach_m
-            });
-            match known {
-                Some(poses) => {
-                    let above = poses[0].0.evidence.against(&settled.evidence).max(0.0);
-                    poses.push((settled, (-above).exp()));
-                }
-                None => places.push(vec![(settled, 1.0)]),
-            }
-        }
-        let mut places: Vec<Place> = places
-            .into_iter()
-            .map(|poses| {
-                let (mean, covariance) = together(&poses);
-                Place {
-                    evidence: poses[0].0.evidence.clone(),
-                    mean,
-                    covariance,
-                }
-            })
-            .collect();
-        places.sort_by(|a, b| b.evidence.total().total_cmp(&a.evidence.total()));
-        places
     }
 
     /// The number of the search of an agent in its present session; a new one if it has none.

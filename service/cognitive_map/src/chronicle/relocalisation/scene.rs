@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::positions::Positions;
 use super::problem::{Problem, Spot};
 use super::search::Search;
 use crate::chronicle::chronicle::Chronicle;
@@ -15,6 +16,7 @@ pub(super) fn scene<'a>(
     problem: &Problem,
     search: &'a Search,
     chronicle: &'a Chronicle,
+    positions: &'a Positions<'a>,
 ) -> Scene<'a, impl Fn(&[Point3<f64>]) -> Views<'a>> {
     let glimpse = |spot: &Spot| {
         let look = &search.looks[spot.look];
@@ -31,7 +33,7 @@ pub(super) fn scene<'a>(
     let longest_m = lengths_m.map(|kernel| kernel.length_m).fold(0.0, f64::max);
     Scene {
         glimpses,
-        views: move |way: &[Point3<f64>]| views(way, 2.0 * longest_m, search, chronicle),
+        views: move |way: &[Point3<f64>]| views(way, 2.0 * longest_m, search, chronicle, positions),
         is_planar: problem.is_planar,
     }
 }
@@ -42,6 +44,7 @@ fn views<'a>(
     about_m: f64,
     search: &Search,
     chronicle: &'a Chronicle,
+    positions: &Positions<'_>,
 ) -> Views<'a> {
     let Some(first) = way.first() else {
         return Vec::new();
@@ -59,8 +62,7 @@ fn views<'a>(
     let views = chronicle.revisits.views.iter();
     let near = views.filter(|view| is_within(&view.in_map, DISPLACED_M) && !search.is_own(view));
     near.filter_map(|view| {
-        let pose = chronicle.pose_at(view.agent, view.session, view.seq)?;
-        let at = Point3::from(pose.translation.vector);
+        let at = positions.at(view.agent, view.session, view.seq)?;
         let vector = &*view.vector;
         is_within(&at, 0.0).then_some((view.channel, Seen { at, vector }))
     })

@@ -8,8 +8,9 @@ use crate::chronicle::revisit::{
 use crate::paged::PagedVec;
 use crate::state::{CorruptState, State, StateReader, StateWriter};
 
-/// Looks that are kept: a way of some metres, beyond which odometry adds errors of its own.
+/// Looks that are kept, and the way over which they lie: beyond some metres odometry adds errors of its own \[m\].
 const LOOKS_MAX: usize = 48;
+const WAY_M_MAX: f64 = 5.0;
 /// Numbers in them: a quarter of a MiB.
 const NUMBERS_MAX: usize = 1 << 16;
 
@@ -62,7 +63,7 @@ impl Search {
         }
     }
 
-    /// Adds a look; the oldest go when there is no room.
+    /// Adds a look. When there is no room the oldest goes, or of a short way the one that lies nearest to its neighbours.
     pub(super) fn look(
         &mut self,
         in_odom: Isometry3<f64>,
@@ -82,9 +83,22 @@ impl Search {
         });
         let mut numbers: usize = self.looks.iter().map(|look| look.vector.len()).sum();
         while self.looks.len() > LOOKS_MAX || numbers > NUMBERS_MAX.max(vector.len()) {
-            numbers -= self.looks.remove(0).vector.len();
+            numbers -= self.looks.remove(self.dispensable()).vector.len();
         }
         self.fresh += 1;
+    }
+
+    /// The look that says least beside the others.
+    fn dispensable(&self) -> usize {
+        let way_m = |from: &Look, to: &Look| to.travelled_m - from.travelled_m;
+        if let [first, .., last] = &self.looks[..]
+            && way_m(first, last) > WAY_M_MAX
+        {
+            return 0;
+        }
+        let gaps = self.looks.windows(3).map(|at| way_m(&at[0], &at[2]));
+        let least = gaps.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        least.map_or(0, |(before, _)| before + 1)
     }
 
     /// Whether the agent has gone so far since it was found, whether it knew again where it was or not \[m\].
