@@ -1,8 +1,8 @@
 //! Where samples were taken that belong to no agent: over HTTP and Zenoh, in every codec.
 
 use cogmap_proto::{
-    Codec, Increment, Localization, LocalizeQuery, Problem, Relation, Sample, SampleBody, Sighting,
-    StartPose, Status, Target, query_key,
+    Codec, Descriptor, Increment, Localization, LocalizeQuery, MotionNoise, Problem, Relation,
+    Sample, SampleBody, Sighting, StartPose, Status, Target, query_key,
 };
 use cogmap_tests::{RawPublisher, Server, batch};
 
@@ -38,11 +38,57 @@ fn walk(from_m: [f64; 3], steps: u32) -> Vec<Sample> {
         });
         bodies.extend(posts);
     }
+    stamped(bodies)
+}
+
+/// Ten milliseconds apart.
+fn stamped(bodies: Vec<SampleBody>) -> Vec<Sample> {
     let stamps_ns = (1_800_000_000_000_000_000_i64..).step_by(10_000_000);
     stamps_ns
         .zip(bodies)
         .map(|(stamp_ns, body)| Sample { stamp_ns, body })
         .collect()
+}
+
+/// What is seen from here: 64 waves across the room, some metres long.
+fn view(at_m: [f64; 2]) -> SampleBody {
+    let wave = |number: u32| {
+        // Directions and phases that look random.
+        let random = |salt: f64| (f64::from(number) * 12.9898 + salt).sin() * 43_758.545;
+        let (bearing, phase) = (random(1.0), random(2.0));
+        let per_m = 1.0 + 0.5 * random(3.0).sin();
+        let along_m = at_m[0] * bearing.cos() + at_m[1] * bearing.sin();
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a view has single precision"
+        )]
+        let seen = (per_m * along_m + phase).cos() as f32;
+        seen
+    };
+    SampleBody::Descriptor(Descriptor {
+        channel: "eye".to_owned(),
+        vector: (0..64).map(wave).collect(),
+    })
+}
+
+/// Steps from a pose of which each goes ahead and then turns, with a view after each; and where they lead.
+fn stroll(mut at_m: [f64; 2], mut heading: f64, turns: &[f64]) -> (Vec<SampleBody>, [f64; 2]) {
+    let mut bodies = Vec::new();
+    for turn in turns {
+        bodies.push(SampleBody::Increment(Increment {
+            translation_m: [STEP_M, 0.0, 0.0],
+            rotation_xyzw: [0.0, 0.0, (0.5 * turn).sin(), (0.5 * turn).cos()],
+            noise: Some(MotionNoise {
+                translation_sd_m: [0.0005; 3],
+                rotation_sd_rad: [0.0002; 3],
+            }),
+        }));
+        at_m[0] += STEP_M * heading.cos();
+        at_m[1] += STEP_M * heading.sin();
+        heading += turn;
+        bodies.push(view(at_m));
+    }
+    (bodies, at_m)
 }
 
 fn pose_m(found: &Localization) -> [f64; 3] {
@@ -106,4 +152,44 @@ fn samples_are_found_in_the_map_over_http_and_zenoh_alike() {
     }
     // Nothing was learned from the questions.
     assert_eq!(api.space("default").unwrap(), before);
+}
+
+#[test]
+fn views_alone_tell_over_http_where_samples_were_taken() {
+    let server = Server::start(&[]);
+    let api = server.api();
+    // Up and down through the room, in rows that are 0.4 m apart.
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let mut turns = Vec::new();
+    for row in 0..14 {
+        let way = if row % 2 == 0 { quarter } else { -quarter };
+        turns.extend([0.0; 50]);
+        turns.extend([way, 0.0, 0.0, 0.0, way]);
+    }
+    let start = SampleBody::StartPose(StartPose {
+        translation_m: [0.0; 3],
+        rotation_xyzw: NO_TURN,
+        noise: None,
+    });
+    let mut bodies = vec![start];
+    bodies.extend(stroll([0.0; 2], 0.0, &turns).0);
+    api.post_samples("default", "ada", &batch(1, 0, stamped(bodies)))
+        .unwrap();
+
+    let (bodies, end_m) = stroll([1.7, 1.1], 0.6, &[0.03; 30]);
+    let samples = stamped(bodies);
+    let found = api.localize("default", &LocalizeQuery { samples }).unwrap();
+    assert_eq!(found.status, Status::Localized, "{found:?}");
+    let [x, y, _] = pose_m(&found);
+    let off_m = (x - end_m[0]).hypot(y - end_m[1]);
+    assert!(off_m < 0.2, "{off_m} m: {found:?}");
+
+    // From elsewhere, where nobody has been.
+    let (bodies, _) = stroll([40.0, -30.0], 0.6, &[0.03; 30]);
+    let samples = stamped(bodies);
+    let lost = api.localize("default", &LocalizeQuery { samples }).unwrap();
+    assert!(
+        lost.status != Status::Localized && lost.pose.is_none(),
+        "{lost:?}"
+    );
 }

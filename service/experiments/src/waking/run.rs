@@ -66,7 +66,7 @@ pub fn run_waking(
     Ok(WakingReport::of(protocol, &trials))
 }
 
-/// How long each view of the robots of a protocol takes to be taken in [ms], those after which it is asked where they are
+/// How long each view of the robots of a protocol takes to be taken in \[ms\], those after which it is asked where they are
 /// included: on one thread, and all of one building.
 ///
 /// # Errors
