@@ -167,6 +167,7 @@ impl Encounter {
             normal: self.normal,
             depth_m: self.depth_m,
             variance_m2: densities.depth_m2,
+            map_share: self.depth_m2 / densities.depth_m2,
             share: densities.shares()[0] * share,
         }
     }

@@ -351,7 +351,7 @@ impl Poses {
             .filter(|(contact, met)| contact.reached == Reached::Drawn && met.share > 0.5)
             .map(|(contact, _)| hypothesis.pose * contact.position_m);
         let evenness = relief.halves.evenness(drawn);
-        let strain = strain.deviation(relief.facets.len());
+        let strain = strain.deviation(relief.facets.len(), self.together(relief));
         let all = [Some(densities), strain, evenness];
         Some(deviation::together(all.into_iter().flatten()))
     }

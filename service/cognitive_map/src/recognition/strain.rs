@@ -22,6 +22,8 @@ pub(super) struct Height {
     pub(super) depth_m: f64,
     /// Its variance \[m²\].
     pub(super) variance_m2: f64,
+    /// Share of the map's own errors in that.
+    pub(super) map_share: f64,
     /// Probability that it is one over the smooth surface.
     pub(super) share: f64,
 }
@@ -41,6 +43,8 @@ pub(super) struct Strain {
     matrix: SMatrix<f64, ALL, ALL>,
     right: SVector<f64, ALL>,
     count: f64,
+    /// Shares of the map's own errors.
+    map_shares: f64,
 }
 
 impl Strain {
@@ -59,6 +63,7 @@ impl Strain {
             matrix,
             right: SVector::zeros(),
             count: 0.0,
+            map_shares: 0.0,
         }
     }
 
@@ -88,19 +93,22 @@ impl Strain {
         self.matrix += row * row.transpose() * weight;
         self.right += row * (weight * height.depth_m);
         self.count += height.share;
+        self.map_shares += height.share * height.map_share;
     }
 
     /// How much better a strained map explains the contacts than one of `places` places that is as it was learned, as a
-    /// deviation. `None` if nothing tells.
-    pub(super) fn deviation(&self, places: usize) -> Option<f64> {
+    /// deviation. `together` contacts on average are where the map errs alike. `None` if nothing tells.
+    pub(super) fn deviation(&self, places: usize, together: f64) -> Option<f64> {
         let matrix = &self.matrix;
         let pose = matrix.fixed_view::<POSE, POSE>(0, 0).try_inverse()?;
         let lever = matrix.fixed_view::<WAYS, POSE>(POSE, 0) * pose;
         let own = matrix.fixed_view::<WAYS, WAYS>(POSE, POSE)
             - lever * matrix.fixed_view::<POSE, WAYS>(0, POSE);
         let pull = self.right.fixed_rows::<WAYS>(POSE) - lever * self.right.fixed_rows::<POSE>(0);
-        // The map is as uncertain as so many contacts leave it.
-        let per = 1.0 / (1.0 + self.count / places.max(1) as f64);
+        // The map is as uncertain as so many contacts leave it, and its errors are those of all contacts near one another.
+        let map_share = self.map_shares / self.count.max(1e-9);
+        let alike = 1.0 + map_share * (together - 1.0).max(0.0);
+        let per = 1.0 / ((1.0 + self.count / places.max(1) as f64) * alike);
         let (own, pull) = (own * per, pull * per);
         let one = SMatrix::<f64, WAYS, WAYS>::identity();
         let inverse = (one + own).try_inverse()?;
@@ -139,10 +147,11 @@ mod tests {
                 normal: normal_at,
                 depth_m: differs_m(&normal_at) + NOISE_M * normal(key + 3),
                 variance_m2: NOISE_M * NOISE_M,
+                map_share: 0.0,
                 share: 1.0,
             });
         }
-        strain.deviation(1000).unwrap()
+        strain.deviation(1000, 1.0).unwrap()
     }
 
     #[test]
@@ -165,7 +174,35 @@ mod tests {
     }
 
     #[test]
+    fn errors_of_the_map_that_many_contacts_share_are_no_other_shape() {
+        let mean = |together: f64| {
+            let deviations = (0..100).map(|trial| {
+                let mut strain = Strain::new(0.08, 0.004);
+                // Where the map errs as much as a contact does, and eight contacts with each place.
+                for k in 0..64 {
+                    let place = 1_000_000 + 1000 * trial + 4 * (k / 8);
+                    let normal_at =
+                        Vector3::from_fn(|axis, _| normal(place + axis as u64)).normalize();
+                    let own = normal(2_000_000 + 1000 * trial + k);
+                    strain.add(&Height {
+                        point: Point3::from(normal_at * 0.04),
+                        normal: normal_at,
+                        depth_m: NOISE_M * (normal(place + 3) + own),
+                        variance_m2: 2.0 * NOISE_M * NOISE_M,
+                        map_share: 0.5,
+                        share: 1.0,
+                    });
+                }
+                strain.deviation(1_000_000, together).unwrap()
+            });
+            deviations.sum::<f64>() / 100.0
+        };
+        let (told, untold) = (mean(8.0), mean(1.0));
+        assert!(told.abs() < 0.5 && untold < -1.5, "{told} {untold}");
+    }
+
+    #[test]
     fn contacts_that_the_map_does_not_explain_tell_nothing_of_its_shape() {
-        assert!(Strain::new(0.08, 0.004).deviation(1000).is_none());
+        assert!(Strain::new(0.08, 0.004).deviation(1000, 1.0).is_none());
     }
 }
