@@ -202,9 +202,9 @@ pub struct IngestAnswer {
 pub struct Place {
     /// Identifier, counted from 0.
     pub id: u64,
-    /// Position in `map` \[m\].
+    /// Position in `map` \[m\]: where its founder stood, by what is known of the founder's way by now.
     pub translation_m: [f64; 3],
-    /// Orientation of the founder at the founding, unit quaternion `[x, y, z, w]`.
+    /// Orientation of the founder at the founding, likewise, unit quaternion `[x, y, z, w]`.
     pub rotation_xyzw: [f64; 4],
     /// Standard deviation of the position at the founding, along the axes of `map` \[m\].
     pub position_sd_m: [f64; 3],

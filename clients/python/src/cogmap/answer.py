@@ -271,8 +271,9 @@ class Place:
     """A place cell."""
 
     id: int
+    #: Where its founder stood [m], by what is known of the founder's way by now.
     translation_m: Vec3
-    #: Orientation of the founder at the founding.
+    #: Orientation of the founder at the founding, likewise.
     rotation_xyzw: Quaternion
     #: Standard deviation of the position at the founding, along the axes of `map` [m].
     position_sd_m: Vec3

@@ -17,6 +17,8 @@ pub(super) struct Anchor {
     pub(super) sightings: u32,
     pub(super) shown: u32,
     pub(super) ties: u32,
+    /// The first thing that lies beside it.
+    pub(super) moorings: u32,
     /// The run of the agent.
     pub(super) session: u32,
     /// The samples from which and up to which the agent was here.
@@ -47,6 +49,7 @@ state_of_struct!(Anchor {
     sightings,
     shown,
     ties,
+    moorings,
     session,
     seq,
     until_seq,

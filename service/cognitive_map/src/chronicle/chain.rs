@@ -51,6 +51,7 @@ impl Chronicle {
             sightings: NONE,
             shown: NONE,
             ties: NONE,
+            moorings: NONE,
             session: life.session,
             seq,
             until_seq: life.seq,
@@ -99,6 +100,16 @@ impl Chronicle {
             number = anchor.previous;
         }
         number
+    }
+
+    /// The pose in the map of an anchor of an agent that is in it.
+    pub(super) fn in_map(&self, number: u32) -> Option<Isometry3<f64>> {
+        let anchor = self.anchors.get(number)?;
+        if anchor.is_in_map {
+            return Some(anchor.pose);
+        }
+        let life = self.lives.get(anchor.agent as usize)?;
+        Some(life.own_frame.unwrap_or_default() * anchor.pose)
     }
 
     /// Ties an anchor to the map.

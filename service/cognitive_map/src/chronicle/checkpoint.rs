@@ -11,6 +11,7 @@
 //! 6     page   up to 16 views
 //! 7     page   what an agent saw lately
 //! 8     page   what an agent has seen that does not know where it is
+//! 9     page   up to 32 things that lie beside anchors
 //! ```
 
 use std::collections::BTreeMap;
@@ -32,6 +33,7 @@ const LANDMARKS: u8 = 5;
 const VIEWS: u8 = 6;
 const TRACKS: u8 = 7;
 const SEARCHES: u8 = 8;
+const MOORINGS: u8 = 9;
 
 /// One page of a chronicle's checkpoint. A later page of the same part and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,6 +64,7 @@ impl Chronicle {
             .chain(pages_of(VIEWS, &self.revisits.views, since))
             .chain(pages_of(TRACKS, &self.revisits.tracks, since))
             .chain(pages_of(SEARCHES, &self.searches, since))
+            .chain(pages_of(MOORINGS, &self.moorings.pages, since))
     }
 
     /// The chronicle of a checkpoint, which goes on like the one that wrote it. Its pages count as changed at `revision`.
@@ -95,6 +98,7 @@ impl Chronicle {
                 VIEWS => chronicle.revisits.views.push_page(&bytes, revision),
                 TRACKS => chronicle.revisits.tracks.push_page(&bytes, revision),
                 SEARCHES => chronicle.searches.push_page(&bytes, revision),
+                MOORINGS => chronicle.moorings.pages.push_page(&bytes, revision),
                 _ => Err(CorruptState::Invalid),
             };
             pushed.map_err(|_| CorruptChronicle)?;
@@ -119,6 +123,7 @@ impl Chronicle {
         self.revisits.views.write_digests(&mut out);
         self.revisits.tracks.write_digests(&mut out);
         self.searches.write_digests(&mut out);
+        self.moorings.pages.write_digests(&mut out);
         out.digest()
     }
 
@@ -129,6 +134,7 @@ impl Chronicle {
             + self.sightings.pages.bytes()
             + self.ties.pages.bytes()
             + self.landmarks.slots.pages.bytes()
+            + self.moorings.pages.bytes()
             + self.revisits.bytes()
     }
 
@@ -151,6 +157,8 @@ impl Chronicle {
         self.sightings.vacancy().write(out);
         self.ties.vacancy().write(out);
         self.landmarks.slots.vacancy().write(out);
+        self.moorings.vacancy().write(out);
+        (self.swung, self.adrift).write(out);
         (self.waiting.len() as u64).write(out);
         for waiting in &self.waiting {
             waiting.write(out);
@@ -167,6 +175,8 @@ impl Chronicle {
         self.sightings.set_vacancy(State::read(&mut input)?);
         self.ties.set_vacancy(State::read(&mut input)?);
         self.landmarks.slots.set_vacancy(State::read(&mut input)?);
+        self.moorings.set_vacancy(State::read(&mut input)?);
+        (self.swung, self.adrift) = State::read(&mut input)?;
         for _ in 0..u64::read(&mut input)? {
             self.waiting.push(Waiting::read(&mut input)?);
         }
@@ -178,7 +188,8 @@ impl Chronicle {
         let slots = self.anchors.is_sound()
             && self.sightings.is_sound()
             && self.ties.is_sound()
-            && self.landmarks.slots.is_sound();
+            && self.landmarks.slots.is_sound()
+            && self.moorings.is_sound();
         let is_agent = |agent: u32| (agent as usize) < self.lives.len();
         let waiting = self
             .waiting
@@ -192,6 +203,7 @@ impl Chronicle {
             && self.chains_are_sound()
             && self.sightings_are_sound()
             && self.ties_are_sound()
+            && self.moorings_are_sound()
     }
 
     fn searches_are_sound(&self) -> bool {

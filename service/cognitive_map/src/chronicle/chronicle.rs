@@ -6,6 +6,7 @@ use super::anchor::Anchor;
 use super::landmarks::Landmarks;
 use super::life::{Life, is_within};
 use super::milestones::Milestones;
+use super::mooring::Mooring;
 use super::relocalisation::Searches;
 use super::revisit::Revisits;
 use super::settings::ChronicleSettings;
@@ -81,6 +82,11 @@ pub struct Chronicle {
     pub(super) sightings: Slots<Sighting, 64>,
     pub(super) ties: Slots<Tie, 32>,
     pub(super) landmarks: Landmarks,
+    /// What lies beside anchors, by number.
+    pub(super) moorings: Slots<Mooring, 32>,
+    /// The latest mooring that was looked at, and how many are to be since anchors were moved.
+    pub(super) swung: u32,
+    pub(super) adrift: u32,
     pub(super) waiting: Vec<Waiting>,
     /// The number of the anchor at which the search for what may be thinned goes on.
     pub(super) hand: u32,
@@ -114,6 +120,9 @@ impl Chronicle {
             sightings: Slots::default(),
             ties: Slots::default(),
             landmarks: Landmarks::default(),
+            moorings: Slots::default(),
+            swung: 0,
+            adrift: 0,
             waiting: Vec::new(),
             hand: 0,
             told: 0,
@@ -427,7 +436,7 @@ impl Chronicle {
         let revision = self.revision;
         let life = self.lives.get(agent as usize)?;
         let at = life.pose * life.since.motion().inverse();
-        let newest = life.newest;
+        let (newest, is_in_map) = (life.newest, life.is_in_map);
         let here = Beside {
             anchor: newest,
             motion: *life.since.motion(),
@@ -435,7 +444,7 @@ impl Chronicle {
         };
         // What is seen now has corrected the pose.
         let anchor = self.anchors.get_mut(newest, revision)?;
-        anchor.pose = at;
+        (anchor.pose, anchor.is_in_map) = (at, is_in_map);
         Some(here)
     }
 

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 
 use super::chronicle::Chronicle;
 use super::life::is_within;
-use super::slots::NONE;
+use super::slots::{NONE, Slots};
 use super::tie::Standing;
 
 /// Motion between the anchors of the coarse past \[m, rad\]. Over so short a way the noise of odometry is less than what
@@ -20,6 +20,8 @@ impl Chronicle {
     /// Anchors and ties keep their numbers.
     pub(super) fn coarse(&self) -> Self {
         let mut coarse = self.clone();
+        // What is moored goes with the anchors afterwards.
+        coarse.moorings = Slots::default();
         for agent in 0..self.lives.len() {
             let newest = self.lives.get(agent).map_or(NONE, |life| life.newest);
             let mut way = Isometry3::identity();
@@ -90,6 +92,7 @@ impl Chronicle {
                 tie.standing = standing;
             }
         }
+        self.cast_off();
         for agent in 0..self.lives.len() {
             let Some(life) = self.lives.get(agent) else {
                 continue;
@@ -97,22 +100,16 @@ impl Chronicle {
             if !life.is_in_map {
                 continue;
             }
-            let own_frame = life.own_frame.unwrap_or_default();
             // The latest anchors of the coarse past that have been met on the way back, and how they have moved.
             let mut behind: Vec<u32> = Vec::new();
             let mut number = life.newest;
             while let Some(anchor) = self.anchors.get(number) {
                 let previous = anchor.previous;
                 behind.push(number);
-                if let Some(key) = coarse.anchors.get(number) {
-                    let was = if anchor.is_in_map {
-                        anchor.pose
-                    } else {
-                        own_frame * anchor.pose
-                    };
+                if let (Some(key), Some(was)) = (coarse.anchors.get(number), self.in_map(number)) {
                     let moved = key.pose * was.inverse();
                     for number in behind.drain(..) {
-                        self.move_anchor(number, &own_frame, &moved, revision);
+                        self.move_anchor(number, &moved);
                     }
                 }
                 number = previous;
@@ -125,19 +122,9 @@ impl Chronicle {
         }
     }
 
-    fn move_anchor(
-        &mut self,
-        number: u32,
-        own_frame: &Isometry3<f64>,
-        moved: &Isometry3<f64>,
-        revision: u64,
-    ) {
-        if let Some(anchor) = self.anchors.get_mut(number, revision) {
-            let was = if anchor.is_in_map {
-                anchor.pose
-            } else {
-                own_frame * anchor.pose
-            };
+    fn move_anchor(&mut self, number: u32, moved: &Isometry3<f64>) {
+        let was = self.in_map(number);
+        if let (Some(was), Some(anchor)) = (was, self.anchors.get_mut(number, self.revision)) {
             anchor.pose = moved * was;
             anchor.pose.rotation.renormalize_fast();
             anchor.is_in_map = true;

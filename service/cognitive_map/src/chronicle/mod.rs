@@ -21,6 +21,7 @@ mod landmarks;
 mod life;
 mod matches;
 mod milestones;
+mod mooring;
 mod names;
 mod refine;
 mod relocalisation;

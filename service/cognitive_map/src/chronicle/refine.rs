@@ -191,11 +191,7 @@ impl Chronicle {
         if !life.is_in_map {
             return None;
         }
-        let pose = if anchor.is_in_map {
-            anchor.pose
-        } else {
-            life.own_frame.unwrap_or_default() * anchor.pose
-        };
+        let pose = self.in_map(number)?;
         let mut tie = anchor.ties;
         let mut freedom = if life.is_planar {
             Freedom::Planar

@@ -221,6 +221,7 @@ impl Chronicle {
             }
         };
         let is_previous = matches!(neighbour, Neighbour::Previous(_));
+        self.moor_beside(number, to);
         while let Some(mut sighting) = self.take_sighting(number) {
             sighting.anchor = to;
             sighting.point = if is_previous {

@@ -43,8 +43,8 @@ use crate::trip::LEG_PAGES_MAX;
 
 /// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps,
 /// version 3 no joint estimate and no chronicle, version 4 no views in it and no objects, version 5 no searches,
-/// version 6 no other names of landmarks.
-const VERSION: u16 = 8;
+/// version 6 no other names of landmarks, version 7 none of what was joined into objects, version 8 no moorings.
+const VERSION: u16 = 9;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;
@@ -360,9 +360,14 @@ impl CognitiveMap {
                     .trip
                     .is_none_or(|trip| (trip.0 as usize) < recorded)
         });
-        let places = self.places().all(|(_, place)| {
-            is_agent(place.founder()) && place.trip.is_none_or(|trip| (trip.0 as usize) < recorded)
+        let is_moored = |id: PlaceId, mooring| self.chronicle.is_moored(mooring, id.0);
+        let places = self.places().all(|(id, place)| {
+            is_agent(place.founder())
+                && place.trip.is_none_or(|trip| (trip.0 as usize) < recorded)
+                && place.mooring.is_none_or(|mooring| is_moored(id, mooring))
         });
+        let moored = self.places().filter(|(_, place)| place.mooring.is_some());
+        let places = places && moored.count() == self.chronicle.n_moorings();
         let trips = self.trips().all(|(_, trip)| {
             is_agent(trip.agent())
                 && trip

@@ -175,6 +175,7 @@ impl Fold<'_> {
     /// Ends the record: the agent is where the estimate has it now, by all that has been seen until now.
     pub(super) fn finish(&mut self) {
         self.believe_matches();
+        self.move_places();
         self.follow();
         self.hold();
     }

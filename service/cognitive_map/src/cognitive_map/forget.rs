@@ -24,6 +24,9 @@ impl Fold<'_> {
             return false;
         };
         self.percepts.forget(place, self.revision);
+        if let Some(mooring) = forgotten.mooring {
+            self.chronicle.unmoor(mooring);
+        }
         let position = *forgotten.position();
         self.emit(EventKind::PlaceForgotten { place, position });
         true

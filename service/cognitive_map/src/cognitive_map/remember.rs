@@ -4,6 +4,7 @@ use super::CognitiveMap;
 use super::fold::Fold;
 use crate::chronicle::{Moment, Refined};
 use crate::experience::ExperienceMap;
+use crate::place::PlaceId;
 
 /// Number of the frame that is the map's.
 const MAP: usize = 0;
@@ -68,6 +69,15 @@ impl Fold<'_> {
                 self.estimator
                     .fix(correction.agent, &correction.pose, &covariance);
             }
+        }
+    }
+}
+
+impl Fold<'_> {
+    /// Moves some of the places that turned out to lie elsewhere.
+    pub(super) fn move_places(&mut self) {
+        for (place, at) in self.chronicle.drift() {
+            self.places.put(PlaceId(place), &at, self.revision);
         }
     }
 }

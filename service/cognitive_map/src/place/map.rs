@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 
 use super::explainer::PlaceExplainer;
 use super::index::SpatialIndex;
@@ -158,6 +158,28 @@ impl PlaceMap {
         if let Some(place) = self.places.get_mut(id.0 as usize, revision) {
             place.trip = Some(trip);
         }
+    }
+
+    /// Notes by what a place goes with the past of its founder.
+    pub(crate) fn set_mooring(&mut self, id: PlaceId, mooring: u32, revision: u64) {
+        if let Some(place) = self.places.get_mut(id.0 as usize, revision) {
+            place.mooring = Some(mooring);
+        }
+    }
+
+    /// A place turned out to lie elsewhere.
+    pub(crate) fn put(&mut self, id: PlaceId, at: &Isometry3<f64>, revision: u64) {
+        let Some(moved) = self.get(id).and_then(|place| place.moved(at)) else {
+            return;
+        };
+        if let Some(place) = self.places.get_mut(id.0 as usize, revision) {
+            self.index.remove(id, &place.position);
+            self.index.insert(id, &moved.position);
+            *place = moved;
+        }
+        self.summarise(id);
+        self.explainer
+            .fit(self.summaries.of_all().map(|all| all.extent));
     }
 
     /// Whether a place is the weakest of its page.

@@ -5,7 +5,7 @@ mod index;
 mod map;
 mod summary;
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 pub(crate) use map::PlaceMap;
 
@@ -14,6 +14,9 @@ use crate::record::AgentId;
 use crate::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 use crate::strength::{Clock, Strength};
 use crate::trip::TripId;
+
+/// What a place has to move for it to be noted \[m, rad\].
+const NOTICED: (f64, f64) = (0.01, 0.01);
 
 /// A place, counted from 0 in the order of recruitment. The number of a forgotten place is not given
 /// to another one.
@@ -35,6 +38,8 @@ pub struct Place {
     founder: AgentId,
     /// The first trip with a leg from or to here, or a later one if that has been forgotten.
     pub(crate) trip: Option<TripId>,
+    /// By what it goes with the past of its founder.
+    pub(crate) mooring: Option<u32>,
     pub(crate) strength: Strength,
 }
 
@@ -47,6 +52,7 @@ state_of_struct!(Place {
     last_stamp_ns,
     founder,
     trip,
+    mooring,
     strength,
 });
 
@@ -69,6 +75,7 @@ impl Place {
             last_stamp_ns: stamp_ns,
             founder,
             trip: None,
+            mooring: None,
             strength: Strength::new(now),
         }
     }
@@ -81,12 +88,24 @@ impl Place {
         self.last_stamp_ns = self.last_stamp_ns.max(stamp_ns);
     }
 
-    /// Position in `map` \[m\].
+    /// The place where it turned out to lie; none where that makes no difference.
+    fn moved(&self, at: &Isometry3<f64>) -> Option<Self> {
+        let position = Point3::from(at.translation.vector);
+        let is_same = (position - self.position).norm_squared() < NOTICED.0 * NOTICED.0
+            && self.rotation.angle_to(&at.rotation) < NOTICED.1;
+        (!is_same).then(|| Self {
+            position,
+            rotation: UnitQuaternion::new_normalize(at.rotation.into_inner()),
+            ..self.clone()
+        })
+    }
+
+    /// Position in `map` \[m\]: where its founder stood, by what is known of its way since.
     pub fn position(&self) -> &Point3<f64> {
         &self.position
     }
 
-    /// Orientation of the founder at the founding, in `map`.
+    /// Orientation of the founder at the founding, in `map`, likewise.
     pub fn rotation(&self) -> &UnitQuaternion<f64> {
         &self.rotation
     }

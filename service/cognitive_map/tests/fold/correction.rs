@@ -1,8 +1,8 @@
 //! What sightings do to the agents: poses are corrected, and newcomers find their place.
 
 use cognitive_map::{
-    CognitiveMap, EventKind, PoseNoise, RangeBearing, Relation, RelativePose, SampleBody, Settings,
-    Sighting, Status, Target,
+    CognitiveMap, EventKind, PlaceId, PoseNoise, RangeBearing, Relation, RelativePose, SampleBody,
+    Settings, Sighting, Status, Target,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
@@ -240,45 +240,106 @@ fn what_is_seen_at_the_end_corrects_the_way() {
     assert!(off.norm() < 0.05, "{off}");
 }
 
-/// A robot that drifts is told again and again that it is where it was a round ago, sometimes wrongly.
+/// A robot on a circle whose odometry turns 2 % too much, which is told again and again that it is where it was a round
+/// ago, sometimes wrongly.
+struct Circling {
+    driver: Driver,
+    /// By odometry alone.
+    blind: Isometry3<f64>,
+    /// Where it was at each step, and the sample that says so.
+    way: Vec<(Isometry3<f64>, u64)>,
+    /// The places that it founded, with where it was then and how far that was from where it thought to be \[m\].
+    founded: Vec<(PlaceId, Point3<f64>, f64)>,
+}
+
+impl Circling {
+    fn new(map: &mut CognitiveMap) -> Self {
+        let mut driver = Driver::new(map, at_start(), 1.0);
+        driver.start(map);
+        Self {
+            blind: driver.truth,
+            way: vec![(driver.truth, driver.robot.seq)],
+            driver,
+            founded: Vec::new(),
+        }
+    }
+
+    fn step(&mut self, map: &mut CognitiveMap) {
+        let (ahead, turn) = (Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, 0.0, 0.05));
+        self.driver.truth *= Isometry3::new(ahead, turn);
+        self.blind *= Isometry3::new(ahead, turn * 1.02);
+        let (truth, seq) = (self.driver.truth, self.driver.robot.seq);
+        let read = motion(ahead.into(), (turn * 1.02).into());
+        for event in self.driver.robot.sample(map, read) {
+            if let EventKind::PlaceRecruited { place, position } = event {
+                let at = Point3::from(truth.translation.vector);
+                self.founded.push((place, at, (position - at).norm()));
+            }
+        }
+        self.way.push((truth, seq));
+    }
+
+    /// Is told where it was a round ago, off by some error.
+    fn matched(&mut self, map: &mut CognitiveMap, error: &Isometry3<f64>) {
+        let (then, seq) = self.way[self.way.len() - 1 - 126];
+        let seen = error * self.driver.truth.inv_mul(&then);
+        let noise = PoseNoise::new([0.03; 3], [0.02; 3]).unwrap();
+        let at = (seen.translation.vector.into(), seen.rotation.coords.into());
+        let relation = Relation::Pose(RelativePose::new(at.0, at.1, noise).unwrap());
+        let target = Target::OwnSample(seq);
+        let sighting = Sighting { target, relation };
+        self.driver
+            .robot
+            .sample(map, SampleBody::Sighting(sighting));
+    }
+
+    fn go_round(&mut self, map: &mut CognitiveMap) {
+        for step in 0..400 {
+            self.step(map);
+            if step >= 130 && step % 5 == 0 {
+                let wrong = Isometry3::translation(3.0, -2.0, 0.0);
+                let right = Isometry3::identity();
+                self.matched(map, if step % 3 == 0 { &wrong } else { &right });
+            }
+        }
+    }
+}
+
 #[test]
 fn matches_that_agree_close_the_loop_and_wrong_ones_do_not_bend_it() {
     let mut map = new_map();
-    let mut driver = Driver::new(&mut map, at_start(), 1.0);
-    driver.start(&mut map);
-    let mut blind = driver.truth;
-    let mut seqs = vec![driver.robot.seq];
-    let mut way = vec![driver.truth];
-    for step in 0..400 {
-        // Odometry turns 2 % too much.
-        let (ahead, turn) = (Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, 0.0, 0.05));
-        driver.truth *= Isometry3::new(ahead, turn);
-        blind *= Isometry3::new(ahead, turn * 1.02);
-        seqs.push(driver.robot.seq);
-        driver
-            .robot
-            .sample(&mut map, motion(ahead.into(), (turn * 1.02).into()));
-        way.push(driver.truth);
-        if step >= 130 && step % 5 == 0 {
-            let then = step - 126;
-            let mut seen = driver.truth.inv_mul(&way[then]);
-            if step % 3 == 0 {
-                seen = Isometry3::translation(3.0, -2.0, 0.0) * seen;
-            }
-            let noise = PoseNoise::new([0.03; 3], [0.02; 3]).unwrap();
-            let at = (seen.translation.vector.into(), seen.rotation.coords.into());
-            let relation = Relation::Pose(RelativePose::new(at.0, at.1, noise).unwrap());
-            let target = Target::OwnSample(seqs[then]);
-            driver.robot.sample(
-                &mut map,
-                SampleBody::Sighting(Sighting { target, relation }),
-            );
-        }
-    }
-    let blind_m = (blind.translation.vector - driver.truth.translation.vector).norm();
-    let error_m = driver.error_m(&map);
+    let mut circling = Circling::new(&mut map);
+    circling.go_round(&mut map);
+    let truth = circling.driver.truth.translation.vector;
+    let blind_m = (circling.blind.translation.vector - truth).norm();
+    let error_m = circling.driver.error_m(&map);
     assert!(
         blind_m > 0.3 && error_m < blind_m / 3.0,
         "{error_m} m, blind {blind_m} m"
+    );
+}
+
+#[test]
+fn places_lie_where_the_past_turns_out_to_lie() {
+    let mut map = new_map();
+    let mut circling = Circling::new(&mut map);
+    circling.go_round(&mut map);
+    let (mut before, mut after) = (Vec::new(), Vec::new());
+    for &(place, truth, off_m) in &circling.founded {
+        let at = *map.place(place).unwrap().position();
+        before.push(off_m);
+        after.push((at - truth).norm());
+        let (nearest, distance_m) = map.nearest_place(&at).unwrap();
+        assert!(
+            nearest == place || distance_m == 0.0,
+            "{place:?} is found where it is, not {nearest:?}"
+        );
+    }
+    let mean = |off: &[f64]| off.iter().sum::<f64>() / off.len() as f64;
+    assert!(
+        mean(&before) > 0.1 && mean(&after) < 0.5 * mean(&before),
+        "{} m when they were founded, {} m now",
+        mean(&before),
+        mean(&after)
     );
 }
