@@ -83,6 +83,7 @@ peers: release $(PEERS)/.venv/installed ## cogmap beside its peers in the same r
 	cd $(PEERS) && .venv/bin/mypy .
 	$(PEERS)/.venv/bin/python $(PEERS)/recall.py --binary $(TARGET)/release/cogmap $(ARGS)
 	$(PEERS)/.venv/bin/python $(PEERS)/gridness.py --binary $(TARGET)/release/cogmap $(ARGS)
+	$(PEERS)/.venv/bin/python $(PEERS)/revisits.py --binary $(TARGET)/release/cogmap $(ARGS)
 ifdef DATA
 	$(PEERS)/.venv/bin/python $(PEERS)/graphs.py --binary $(TARGET)/release/cogmap $(ARGS) $(DATA)
 endif

@@ -131,7 +131,7 @@ def _graphs(paths: List[Path]) -> Iterator[Path]:
 
 def _compare(path: Path, args: argparse.Namespace) -> Row:
     graph = Graph(path)
-    chi2_half, batch_s, optimum = _whole(graph)
+    chi2_half, batch_s, optimum = whole(graph)
     beside = path.with_name(path.name.removesuffix(".g2o") + ".opt_xyz.txt")
     with tempfile.TemporaryDirectory() as home:
         if not beside.exists():
@@ -168,7 +168,7 @@ def _compare(path: Path, args: argparse.Namespace) -> Row:
     return Row(path.stem, ours["poses"], sum(closures.values()), cogmap, peer, ratios)
 
 
-def _whole(graph: Graph) -> Tuple[float, float, Floats]:
+def whole(graph: Graph) -> Tuple[float, float, Floats]:
     """Half of chi-squared, time of start and solution, and positions at the optimum."""
     begin = time.perf_counter()
     factors = gtsam.NonlinearFactorGraph(graph.factors)
