@@ -125,7 +125,7 @@ pub enum EventKind {
     ObjectRecognised {
         /// Name of the object.
         object: String,
-        /// How probable it is, 0.99 at least.
+        /// How probable it is, 0.995 at least.
         probability: f64,
     },
     /// What the agent touches is none of the objects that were learned.

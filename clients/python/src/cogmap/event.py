@@ -170,7 +170,7 @@ class ObjectRecognised:
     TAG: ClassVar[str] = "object_recognised"
     #: Name of the object.
     object: str
-    #: How probable it is, 0.99 at least.
+    #: How probable it is, 0.995 at least.
     probability: float
 
 

@@ -238,7 +238,7 @@ class Identification:
 
     space: str
     map_revision: int
-    #: The answer, once one is at least 99 % probable.
+    #: The answer, once one is at least 99.5 % probable.
     verdict: ObjectVerdict
     #: Probability of each object that has a noticeable one, most probable first.
     objects: Tuple[ObjectProbability, ...]

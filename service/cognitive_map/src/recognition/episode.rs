@@ -145,8 +145,10 @@ impl Recognition {
                 let strange = strange_log(fit, self.contacts.len());
                 none = log_sum([none, UNKNOWN_PRIOR.ln() + most + prior + strange].into_iter());
             }
+            let missed = self.missed();
+            let unfound = none - UNKNOWN_PRIOR.ln() + missed.ln();
             for (_, log) in &mut objects {
-                *log += prior;
+                *log = prior + log_sum([*log + (1.0 - missed).ln(), unfound].into_iter());
             }
         }
         let total = log_sum(objects.iter().map(|object| object.1).chain([none]));
@@ -165,6 +167,18 @@ impl Recognition {
             pose,
             contacts: self.count,
             fit,
+        }
+    }
+
+    /// Probability that the right pose in a map that was learned is not among the hypotheses. Then the contacts are as
+    /// much like that map as like something unknown.
+    ///
+    /// Shifts are looked for from every place of every map. Poses come from pairs of contacts that tell enough, and what
+    /// one contact leaves out the next finds half of the time.
+    fn missed(&self) -> f64 {
+        match self.hypotheses {
+            Hypotheses::Shifts(_) => 0.0,
+            Hypotheses::Poses(_) => 0.5_f64.powf(self.count.saturating_sub(2) as f64),
         }
     }
 

@@ -5,8 +5,8 @@ use nalgebra::Isometry3;
 use super::library::ObjectId;
 use crate::geometry::PoseCovariance;
 
-/// Least probability at which an answer is given: one in a hundred such answers may be wrong.
-const SURE: f64 = 0.99;
+/// Least probability at which an answer is given: one in two hundred such answers may be wrong.
+const SURE: f64 = 0.995;
 
 /// Answer of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub struct Posterior {
 }
 
 impl Posterior {
-    /// The answer, once one is at least 99 % probable.
+    /// The answer, once one is at least 99.5 % probable.
     pub fn verdict(&self) -> Verdict {
         match self.objects.first() {
             _ if self.unknown >= SURE => Verdict::Unknown,
