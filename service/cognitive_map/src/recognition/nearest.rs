@@ -1,5 +1,7 @@
 //! Which place of a map is nearest, roughly: one number for each cell of a box.
 
+use super::spots::whole;
+
 /// Most cells; they are larger rather than more, so that they stay in a processor's caches.
 const CELLS_MAX: f32 = 65_536.0;
 /// No place is near.
@@ -8,6 +10,10 @@ const NONE: u16 = u16::MAX;
 /// Cells of a brick along each axis, as powers of two: the numbers of a brick fill a line of a processor's cache, and neighbours
 /// are mostly in one.
 const BRICK: [u32; 3] = [2, 2, 1];
+/// The same of all axes together.
+const BRICK_CELLS: u32 = BRICK[0] + BRICK[1] + BRICK[2];
+/// Bits of a cell's number that are its place within the brick.
+const WITHIN: usize = (1 << BRICK_CELLS) - 1;
 
 /// Cells over the box of a map, each with the place that is nearest to its middle, if one is within reach of any of its points. The
 /// outermost cells are empty, and stand for all that is beyond.
@@ -19,12 +25,22 @@ pub(super) struct Nearest {
     /// Cells along each axis.
     size: [f32; 3],
     /// Bricks along each axis but the first.
-    bricks: [u32; 2],
-    /// Numbers of the places, over `step`, brick by brick.
-    places: Vec<u16>,
+    rows: [u32; 2],
+    /// Which of the kept bricks each is; most of a box is far from any place, and is the first one.
+    kept: Vec<u16>,
+    /// The bricks that hold a place, after an empty one: a surface's memory rather than its box's, of which more stays in a processor's
+    /// caches.
+    bricks: Vec<Brick>,
     /// How many places one number stands for: they lie side by side.
     step: u32,
 }
+
+/// Numbers of the places that are nearest to the cells of a brick, over a map's `step`: one line of a processor's cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Brick([u16; 1 << BRICK_CELLS]);
+
+const EMPTY: Brick = Brick([NONE; 1 << BRICK_CELLS]);
 
 impl Nearest {
     /// Of places at these positions, axis by axis \[m\], neighbours one after the other.
@@ -47,24 +63,39 @@ impl Nearest {
             edge_m *= 1.1;
         }
         let (reach_m, size) = (reach(edge_m), size(edge_m));
-        let bricks: [usize; 3] =
-            std::array::from_fn(|axis| (whole(size[axis]) as usize).div_ceil(1 << BRICK[axis]));
+        let bricks: [usize; 3] = std::array::from_fn(|axis| {
+            (whole(size[axis].into()) as usize).div_ceil(1 << BRICK[axis])
+        });
         let mut nearest = Self {
-            bricks: [1, 2].map(|axis| u32::try_from(bricks[axis]).unwrap_or(u32::MAX)),
+            rows: [1, 2].map(|axis| u32::try_from(bricks[axis]).unwrap_or(u32::MAX)),
             low: low.map(|low| low - reach_m - edge_m),
             per_m: 1.0 / edge_m,
             size,
-            places: vec![NONE; bricks.iter().product::<usize>() << BRICK.iter().sum::<u32>()],
+            kept: vec![0; bricks.iter().product()],
+            bricks: vec![EMPTY; bricks.iter().product()],
             step: u32::try_from(axes[0].len().div_ceil(usize::from(NONE)))
                 .map_or(1, |step| step.max(1)),
         };
-        let mut squares = vec![f32::INFINITY; nearest.places.len()];
+        let mut squares = vec![f32::INFINITY; nearest.bricks.len() << BRICK_CELLS];
         let [x, y, z] = axes;
         for (number, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate() {
             let number = u16::try_from(number / nearest.step as usize).unwrap_or(NONE);
             nearest.notice(number, [*x, *y, *z], reach_m, &mut squares);
         }
+        nearest.leave_out_empty();
         nearest
+    }
+
+    /// Keeps the bricks that hold a place.
+    fn leave_out_empty(&mut self) {
+        let mut bricks = vec![EMPTY];
+        for (kept, brick) in self.kept.iter_mut().zip(&self.bricks) {
+            if brick.0.iter().any(|place| *place != NONE) {
+                *kept = u16::try_from(bricks.len()).unwrap_or(0);
+                bricks.push(*brick);
+            }
+        }
+        self.bricks = bricks;
     }
 
     /// Writes a place into all cells whose middle is within reach and to which none was nearer.
@@ -72,18 +103,19 @@ impl Nearest {
         let at: [f32; 3] = std::array::from_fn(|axis| (at[axis] - self.low[axis]) * self.per_m);
         let reach = reach_m * self.per_m;
         let range = |axis: usize| {
-            let last = whole(self.size[axis]) - 2;
-            whole((at[axis] - reach).max(1.0).ceil())..=whole(at[axis] + reach).min(last)
+            let last = whole(self.size[axis].into()) - 2;
+            let first = (at[axis] - reach).max(1.0).ceil();
+            whole(first.into())..=whole((at[axis] + reach).into()).min(last)
         };
         for i in range(0) {
             for j in range(1) {
                 for k in range(2) {
                     let apart: [f32; 3] = [i as f32 - at[0], j as f32 - at[1], k as f32 - at[2]];
                     let squared: f32 = apart.iter().map(|x| x * x).sum();
-                    let cell = cell([i, j, k], self.bricks) as usize;
+                    let cell = cell([i, j, k], self.rows) as usize;
                     if squared <= reach * reach && squared < squares[cell] {
                         squares[cell] = squared;
-                        self.places[cell] = number;
+                        self.bricks[cell >> BRICK_CELLS].0[cell & WITHIN] = number;
                     }
                 }
             }
@@ -104,15 +136,17 @@ impl Nearest {
         };
         let [fx, fy, fz] = std::array::from_fn(|axis| shift[axis] - self.low[axis]);
         let [lx, ly, lz] = self.size.map(|size| size - 1.0);
-        let bricks = self.bricks;
+        let rows = self.rows;
         for (((x, y), z), out) in x.iter().zip(y).zip(z).zip(out) {
-            *out = cell([at(*x, fx, lx), at(*y, fy, ly), at(*z, fz, lz)], bricks);
+            *out = cell([at(*x, fx, lx), at(*y, fy, ly), at(*z, fz, lz)], rows);
         }
     }
 
     /// The place of a cell, or a number beyond all places.
     pub(super) fn place(&self, cell: u32) -> u32 {
-        u32::from(self.places[cell as usize]) * self.step
+        let cell = cell as usize;
+        let brick = self.kept[cell >> BRICK_CELLS];
+        u32::from(self.bricks[usize::from(brick)].0[cell & WITHIN]) * self.step
     }
 }
 
@@ -122,17 +156,6 @@ fn cell([i, j, k]: [u32; 3], [rows, columns]: [u32; 2]) -> u32 {
     let within = |at: u32, power: u32| at & ((1 << power) - 1);
     let brick = ((i >> a) * rows + (j >> b)) * columns + (k >> c);
     brick << (a + b + c) | within(i, a) << (b + c) | within(j, b) << c | within(k, c)
-}
-
-/// A whole number that is positive.
-fn whole(x: f32) -> u32 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "rounds down, and saturates"
-    )]
-    let whole = x as u32;
-    whole
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Places of a map, packed for look-ups by the thousand and for a rough look from all of them at once.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector3};
 
 use super::feeling::{Local, exp};
@@ -59,6 +61,24 @@ pub(super) struct Answer {
     pub(super) apart: Vector3<f64>,
     /// Variance of a touch of it, per axis \[m²\].
     pub(super) variance: f64,
+}
+
+/// A place near where a touch should be.
+#[derive(Clone, Copy, Debug, Default)]
+struct Near {
+    number: u32,
+    /// Where it lies from there \[m\].
+    apart: [f32; 3],
+    square: f32,
+    /// Variance of a touch of it about that, per axis \[m²\].
+    variance: f32,
+}
+
+/// Lists that are filled again and again.
+#[derive(Debug, Default)]
+pub(super) struct Nearby {
+    runs: Vec<Range<u32>>,
+    all: Vec<Near>,
 }
 
 impl Spots {
@@ -138,9 +158,11 @@ impl Spots {
     /// among the patches.
     pub(super) fn near(&self, point: &Point3<f64>, variance_m2: f64, mut visit: impl FnMut(u32)) {
         let reach_m = (DISTANCE_MAX * (variance_m2 + self.variance_max_m2)).sqrt();
-        self.reaches.runs(point, reach_m, |run| {
-            self.order[run].iter().for_each(|number| visit(*number));
-        });
+        let mut runs = Vec::new();
+        self.reaches.runs(point, reach_m, &mut runs);
+        for place in runs.into_iter().flatten() {
+            visit(self.order[place as usize]);
+        }
     }
 
     /// Lists the places that a touch could be of which should be at `point`, with a variance `prior` of that and `noise` of its own,
@@ -150,34 +172,92 @@ impl Spots {
         point: &Point3<f64>,
         (prior, noise): (f64, f64),
         local: &Local<'_>,
-        answers: &mut Vec<Answer>,
+        (nearby, answers): (&mut Nearby, &mut Vec<Answer>),
     ) -> f64 {
         answers.clear();
-        let scatter = prior + noise;
-        let reach_m = (DISTANCE_MAX * (scatter + self.variance_max_m2)).sqrt();
-        let at: [f32; 3] = (point - self.middle).map(narrow).into();
-        let wide = narrow(scatter);
         let mut total = 0.0;
-        self.reaches.runs(point, reach_m, |run| {
-            for (number, spot) in run.clone().zip(&self.all[run]) {
+        for near in self.nearby(point, prior + noise, nearby) {
+            let number = near.number as usize;
+            let spot = &self.all[number];
+            let density = f64::from(near.fall()) * f64::from(local.likelihood(number, spot));
+            total += density;
+            answers.push(Answer {
+                density,
+                apart: Vector3::from(near.apart).cast(),
+                variance: noise + f64::from(spot.variance_m2),
+            });
+        }
+        total
+    }
+
+    /// Density of a touch that should be at `point`, with this variance per axis \[m²\], for each of several percepts: as
+    /// [`answers`](Self::answers) has it.
+    pub(super) fn densities<const N: usize>(
+        &self,
+        point: &Point3<f64>,
+        variance_m2: f64,
+        locals: [&Local<'_>; N],
+        nearby: &mut Nearby,
+    ) -> [f64; N] {
+        let mut totals = [0.0; N];
+        for near in self.nearby(point, variance_m2, nearby) {
+            let number = near.number as usize;
+            let (fall, spot) = (f64::from(near.fall()), &self.all[number]);
+            for (total, local) in totals.iter_mut().zip(locals) {
+                *total += fall * f64::from(local.likelihood(number, spot));
+            }
+        }
+        totals
+    }
+
+    /// The places that a touch could be of which should be at `point`, with this variance per axis \[m²\].
+    fn nearby<'a>(
+        &self,
+        point: &Point3<f64>,
+        variance_m2: f64,
+        nearby: &'a mut Nearby,
+    ) -> &'a [Near] {
+        let Nearby { runs, all } = nearby;
+        let reach_m = (DISTANCE_MAX * (variance_m2 + self.variance_max_m2)).sqrt();
+        self.reaches.runs(point, reach_m, runs);
+        let at: [f32; 3] = (point - self.middle).map(narrow).into();
+        let wide = narrow(variance_m2);
+        let most = { runs.iter() }.map(|run| (run.end - run.start) as usize);
+        let most = most.sum::<usize>();
+        if all.len() < most {
+            all.resize(most, Near::default());
+        }
+        let mut count = 0;
+        for run in runs {
+            let spots = &self.all[run.start as usize..run.end as usize];
+            for (number, spot) in run.zip(spots) {
                 let apart: [f32; 3] = [spot.at[0] - at[0], spot.at[1] - at[1], spot.at[2] - at[2]];
                 let square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
                 let variance = wide + spot.variance_m2;
-                if square > narrow(DISTANCE_MAX) * variance {
-                    continue;
-                }
-                let per = 1.0 / variance;
-                let fall = exp(-0.5 * square * per) * per * per.sqrt();
-                let density = f64::from(fall) * f64::from(local.likelihood(number, spot));
-                total += density;
-                answers.push(Answer {
-                    density,
-                    apart: Vector3::from(apart).cast(),
-                    variance: noise + f64::from(spot.variance_m2),
-                });
+                // Which are within reach is as good as random: without a branch, the next ones come from memory meanwhile.
+                all[count] = Near {
+                    number,
+                    apart,
+                    square,
+                    variance,
+                };
+                count += usize::from(!is_beyond(square, variance));
             }
-        });
-        total
+        }
+        &all[..count]
+    }
+}
+
+/// Whether something that is so far away, squared, is not what was touched.
+fn is_beyond(square: f32, variance: f32) -> bool {
+    square > narrow(DISTANCE_MAX) * variance
+}
+
+impl Near {
+    /// Density of a touch there, times (2π)^1.5.
+    fn fall(&self) -> f32 {
+        let per = 1.0 / self.variance;
+        exp(-0.5 * self.square * per) * per * per.sqrt()
     }
 }
 
@@ -202,4 +282,15 @@ pub(super) fn narrow(x: f64) -> f32 {
     #[expect(clippy::cast_possible_truncation, reason = "meant to be rough")]
     let narrow = x as f32;
     narrow
+}
+
+/// A whole number that is positive.
+pub(super) fn whole(x: f64) -> u32 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "rounds down, and saturates"
+    )]
+    let whole = x as u32;
+    whole
 }
