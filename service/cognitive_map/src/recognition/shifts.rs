@@ -9,8 +9,9 @@ use super::contact::{Contact, Reached};
 use super::crowd::Crowd;
 use super::feeling::{Feeling, Local};
 use super::library::{ObjectId, ObjectLibrary};
+use super::nearby::{Answer, Nearby};
 use super::ranks::Ranks;
-use super::spots::{Answer, Nearby, narrow};
+use super::spots::narrow;
 use super::strangers::Strangers;
 use super::surface::Surface;
 
@@ -201,8 +202,7 @@ impl Shifts {
         let prior = shift.variance_m2 + touch.drift_m2;
         let noise = contact.position_sd_m * contact.position_sd_m;
         let query = Point3::from(rotation * contact.position_m.coords + shift.translation);
-        let spots = &surface.spots;
-        let densities = spots.answers(&query, (prior, noise), local, (nearby, answers));
+        let densities = nearby.answers(&surface.spots, &query, (prior, noise), local, answers);
         let one = share(surface.patches.len()) / TAU.powf(1.5);
         let outlier = touch.outlier / one;
         let total = outlier + densities;

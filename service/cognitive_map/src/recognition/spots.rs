@@ -1,16 +1,13 @@
 //! Places of a map, packed for look-ups by the thousand and for a rough look from all of them at once.
 
-use std::ops::Range;
-
 use nalgebra::{Point3, Vector3};
 
-use super::feeling::{Local, exp};
 use super::nearest::Nearest;
 use super::reaches::Reaches;
 use super::surface::Patch;
 
 /// Squared distance, in variances, beyond which a place is not the one that was touched: e⁻¹⁶.
-const DISTANCE_MAX: f64 = 32.0;
+pub(super) const DISTANCE_MAX: f64 = 32.0;
 /// Standard deviations to which a place is noticed in a rough look.
 const NOTICED_SD: f64 = 3.5;
 /// From one scale of rough looks to the next the reach grows so much.
@@ -24,7 +21,7 @@ pub(super) struct Spot {
     /// From the map's middle \[m\].
     pub(super) at: [f32; 3],
     /// Variance of a touch of this place, without the touch's noise, per axis \[m²\].
-    variance_m2: f32,
+    pub(super) variance_m2: f32,
     /// Mean level, from the middle of those of the map.
     pub(super) level: f32,
     pub(super) level_variance: f32,
@@ -41,44 +38,15 @@ pub(super) struct Spots {
     pub(super) normals: Vec<[f32; 3]>,
     /// Number of the patch that each is.
     order: Vec<u32>,
-    middle: Point3<f64>,
-    reaches: Reaches,
+    pub(super) middle: Point3<f64>,
+    pub(super) reaches: Reaches,
     /// Variance of a touch of a place without the touch's noise per axis, on average and at most \[m²\].
     pub(super) variance_m2: f64,
-    variance_max_m2: f64,
+    pub(super) variance_max_m2: f64,
     /// Channel and middle of the levels, if all places have one of the same and nothing else.
     levels: Option<(u16, f64)>,
     /// How uncertain a point may be \[m\], and what is nearest then.
     nearest: Vec<(f64, Nearest)>,
-}
-
-/// A place that could be the one touched.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Answer {
-    /// Density of the touch there \[m⁻³\], times (2π)^1.5 and as if it were the only place.
-    pub(super) density: f64,
-    /// Where it lies from where the touch should be \[m\].
-    pub(super) apart: Vector3<f64>,
-    /// Variance of a touch of it, per axis \[m²\].
-    pub(super) variance: f64,
-}
-
-/// A place near where a touch should be.
-#[derive(Clone, Copy, Debug, Default)]
-struct Near {
-    number: u32,
-    /// Where it lies from there \[m\].
-    apart: [f32; 3],
-    square: f32,
-    /// Variance of a touch of it about that, per axis \[m²\].
-    variance: f32,
-}
-
-/// Lists that are filled again and again.
-#[derive(Debug, Default)]
-pub(super) struct Nearby {
-    runs: Vec<Range<u32>>,
-    all: Vec<Near>,
 }
 
 impl Spots {
@@ -163,101 +131,6 @@ impl Spots {
         for place in runs.into_iter().flatten() {
             visit(self.order[place as usize]);
         }
-    }
-
-    /// Lists the places that a touch could be of which should be at `point`, with a variance `prior` of that and `noise` of its own,
-    /// per axis \[m²\], and gives the sum of their densities.
-    pub(super) fn answers(
-        &self,
-        point: &Point3<f64>,
-        (prior, noise): (f64, f64),
-        local: &Local<'_>,
-        (nearby, answers): (&mut Nearby, &mut Vec<Answer>),
-    ) -> f64 {
-        answers.clear();
-        let mut total = 0.0;
-        for near in self.nearby(point, prior + noise, nearby) {
-            let number = near.number as usize;
-            let spot = &self.all[number];
-            let density = f64::from(near.fall()) * f64::from(local.likelihood(number, spot));
-            total += density;
-            answers.push(Answer {
-                density,
-                apart: Vector3::from(near.apart).cast(),
-                variance: noise + f64::from(spot.variance_m2),
-            });
-        }
-        total
-    }
-
-    /// Density of a touch that should be at `point`, with this variance per axis \[m²\], for each of several percepts: as
-    /// [`answers`](Self::answers) has it.
-    pub(super) fn densities<const N: usize>(
-        &self,
-        point: &Point3<f64>,
-        variance_m2: f64,
-        locals: [&Local<'_>; N],
-        nearby: &mut Nearby,
-    ) -> [f64; N] {
-        let mut totals = [0.0; N];
-        for near in self.nearby(point, variance_m2, nearby) {
-            let number = near.number as usize;
-            let (fall, spot) = (f64::from(near.fall()), &self.all[number]);
-            for (total, local) in totals.iter_mut().zip(locals) {
-                *total += fall * f64::from(local.likelihood(number, spot));
-            }
-        }
-        totals
-    }
-
-    /// The places that a touch could be of which should be at `point`, with this variance per axis \[m²\].
-    fn nearby<'a>(
-        &self,
-        point: &Point3<f64>,
-        variance_m2: f64,
-        nearby: &'a mut Nearby,
-    ) -> &'a [Near] {
-        let Nearby { runs, all } = nearby;
-        let reach_m = (DISTANCE_MAX * (variance_m2 + self.variance_max_m2)).sqrt();
-        self.reaches.runs(point, reach_m, runs);
-        let at: [f32; 3] = (point - self.middle).map(narrow).into();
-        let wide = narrow(variance_m2);
-        let most = { runs.iter() }.map(|run| (run.end - run.start) as usize);
-        let most = most.sum::<usize>();
-        if all.len() < most {
-            all.resize(most, Near::default());
-        }
-        let mut count = 0;
-        for run in runs {
-            let spots = &self.all[run.start as usize..run.end as usize];
-            for (number, spot) in run.zip(spots) {
-                let apart: [f32; 3] = [spot.at[0] - at[0], spot.at[1] - at[1], spot.at[2] - at[2]];
-                let square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
-                let variance = wide + spot.variance_m2;
-                // Which are within reach is as good as random: without a branch, the next ones come from memory meanwhile.
-                all[count] = Near {
-                    number,
-                    apart,
-                    square,
-                    variance,
-                };
-                count += usize::from(!is_beyond(square, variance));
-            }
-        }
-        &all[..count]
-    }
-}
-
-/// Whether something that is so far away, squared, is not what was touched.
-fn is_beyond(square: f32, variance: f32) -> bool {
-    square > narrow(DISTANCE_MAX) * variance
-}
-
-impl Near {
-    /// Density of a touch there, times (2π)^1.5.
-    fn fall(&self) -> f32 {
-        let per = 1.0 / self.variance;
-        exp(-0.5 * self.square * per) * per * per.sqrt()
     }
 }
 

@@ -8,8 +8,8 @@ use nalgebra::UnitQuaternion;
 use super::contact::Contact;
 use super::feeling::Feeling;
 use super::library::{ObjectId, ObjectLibrary};
+use super::nearby::Nearby;
 use super::shifts::{OUTLIERS, log_sum};
-use super::spots::Nearby;
 
 /// Least share of the weight that places of other objects must have before they say what is beside them.
 const WEIGHT_MIN: f64 = 1e-9;
@@ -79,8 +79,7 @@ fn stranger_logs(
         });
         let [felt, bare] = now.each_ref().map(|feeling| feeling.at(surface, rotation));
         let point = sample.position + rotation * step;
-        let spots = &surface.spots;
-        let densities = spots.densities(&point, noise, [&felt, &bare], &mut nearby);
+        let densities = nearby.densities(&surface.spots, &point, noise, [&felt, &bare]);
         let sums = sums.entry(sample.object).or_default();
         for ((sums, weight), density) in sums.iter_mut().zip(weights).zip(densities) {
             let density = density / TAU.powf(1.5);
