@@ -60,7 +60,9 @@ impl Crowd {
             let each = stride as f64 / places.max(1) as f64;
             for (rotation, turn) in (0u16..).zip(rotations) {
                 let local = feeling.at(&known.surface, turn);
-                local.likelihoods(&mut likelihoods);
+                if rotation == 0 || !local.is_unturned() {
+                    local.likelihoods(&mut likelihoods);
+                }
                 let known = Arc::clone(known);
                 let group = Group::new((object, rotation), known, each, stride, &likelihoods);
                 crowd.groups.push(group);

@@ -1,6 +1,7 @@
 //! What a contact's percepts say of places, with all that does not depend on the place worked out once.
 
 use nalgebra::UnitQuaternion;
+use pulp::Arch;
 
 use super::contact::Contact;
 use super::spots::{Spot, Spots, narrow};
@@ -11,6 +12,13 @@ use super::surface::{Surface, WRONG_SHARE, Wide};
 const NORMAL_TURN: f64 = 0.04;
 /// Share of normals that are no place's.
 const NORMAL_WRONG: f64 = 0.1;
+
+/// Places that are asked at once.
+pub(super) const LANES: usize = 8;
+
+/// Of fewer places than one in so many, percepts are worked out one by one rather than of all places of the map side by side; the
+/// second, where all of a place's percepts have to be asked.
+const SPARSE: [usize; 2] = [16, 4];
 
 /// Percepts of one contact.
 #[derive(Clone, Debug)]
@@ -125,6 +133,44 @@ impl Local<'_> {
         }
     }
 
+    /// The same of the first so many of eight places.
+    #[expect(
+        clippy::inline_always,
+        reason = "only what is inlined into a dispatched closure is compiled for the vectors that it chose"
+    )]
+    #[inline(always)]
+    pub(super) fn likelihoods_of(&self, numbers: &[u32; LANES], count: usize) -> [f32; LANES] {
+        let spots = &self.surface.spots.all;
+        let mut felt = [1.0; LANES];
+        match (&self.percepts, &self.facing) {
+            (Percepts::Nothing, None) => {}
+            (
+                Percepts::Level {
+                    value,
+                    noise,
+                    scale,
+                },
+                None,
+            ) => {
+                let own = numbers.map(|number| &spots[number as usize]);
+                let (levels, variances) = (
+                    own.map(|spot| spot.level),
+                    own.map(|spot| spot.level_variance),
+                );
+                felt = std::array::from_fn(|k| {
+                    level_likelihood(value - levels[k], variances[k] + noise, *scale)
+                });
+            }
+            _ => {
+                for (felt, number) in felt.iter_mut().zip(&numbers[..count]) {
+                    let number = *number as usize;
+                    *felt = self.likelihood(number, &spots[number]);
+                }
+            }
+        }
+        felt
+    }
+
     /// The same of all places of the map.
     pub(super) fn likelihoods(&self, out: &mut Vec<f32>) {
         let Spots {
@@ -141,9 +187,14 @@ impl Local<'_> {
                 noise,
                 scale,
             } => {
-                for ((felt, level), variance) in out.iter_mut().zip(levels).zip(variances) {
-                    *felt = level_likelihood(value - level, variance + noise, scale);
-                }
+                Arch::new().dispatch(
+                    #[inline(always)]
+                    || {
+                        for ((felt, level), variance) in out.iter_mut().zip(levels).zip(variances) {
+                            *felt = level_likelihood(value - level, variance + noise, scale);
+                        }
+                    },
+                );
             }
             Percepts::Several => {
                 for (number, felt) in out.iter_mut().enumerate() {
@@ -152,10 +203,25 @@ impl Local<'_> {
             }
         }
         if let Some(facing) = &self.facing {
-            for (felt, normal) in out.iter_mut().zip(normals) {
-                *felt *= facing.likelihood(normal);
-            }
+            Arch::new().dispatch(
+                #[inline(always)]
+                || {
+                    for (felt, normal) in out.iter_mut().zip(normals) {
+                        *felt *= facing.likelihood(normal);
+                    }
+                },
+            );
         }
+    }
+
+    /// Fewer places than one in so many are better asked one by one.
+    pub(super) fn sparse(&self) -> usize {
+        SPARSE[usize::from(matches!(self.percepts, Percepts::Several))]
+    }
+
+    /// Whether they are the same in all rotations.
+    pub(super) fn is_unturned(&self) -> bool {
+        self.facing.is_none()
     }
 
     fn asked(&self, number: usize) -> f32 {
@@ -168,6 +234,11 @@ impl Local<'_> {
     }
 }
 
+#[expect(
+    clippy::inline_always,
+    reason = "only what is inlined into a dispatched closure is compiled for the vectors that it chose"
+)]
+#[inline(always)]
 fn level_likelihood(apart: f32, variance: f32, scale: f32) -> f32 {
     let per = 1.0 / variance;
     scale * exp(-0.5 * apart * apart * per) * per.sqrt() + narrow(WRONG_SHARE)
@@ -175,6 +246,11 @@ fn level_likelihood(apart: f32, variance: f32, scale: f32) -> f32 {
 
 impl Facing {
     /// A place of which no normal is known has one of no length.
+    #[expect(
+        clippy::inline_always,
+        reason = "only what is inlined into a dispatched closure is compiled for the vectors that it chose"
+    )]
+    #[inline(always)]
     fn likelihood(&self, own: &[f32; 3]) -> f32 {
         let dot = self.normal[0] * own[0] + self.normal[1] * own[1] + self.normal[2] * own[2];
         let right = 2.0 * narrow(1.0 - NORMAL_WRONG) * self.per_variance;
@@ -186,6 +262,7 @@ impl Facing {
 
 /// eˣ to six digits, in steps that a compiler lays side by side: 2ⁿ by its exponent's bits, and a polynomial for the rest (the
 /// series of 2ᶠ, f from −½ to ½).
+#[inline(always)]
 pub(super) fn exp(x: f32) -> f32 {
     /// Adding it leaves the nearest whole number in the low bits.
     const WHOLE: f32 = 12_582_912.0;

@@ -4,20 +4,19 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::UnitQuaternion;
+use pulp::Arch;
 
 use super::contact::Contact;
-use super::feeling::{Feeling, exp};
+use super::feeling::{Feeling, Local, exp};
 use super::library::{Known, ObjectId};
+use super::nearest::Nearest;
 use super::shifts::{Shift, Taken, share};
-use super::spots::narrow;
+use super::spots::{Spots, narrow};
 
 /// Most that a touch makes of a weight, so that numbers stay finite.
 const GAIN_MAX: f32 = 1e30;
 /// When fewer of the roots than one in so many hold something, the others are left out of the list.
 const SPARSE: usize = 2;
-
-/// When they are fewer than one of so many places, percepts are only worked out where they are.
-const SPARSE_FELT: usize = 4;
 
 /// The places of a map in one rotation, each taken for the one that was touched first.
 #[derive(Clone, Debug)]
@@ -38,6 +37,14 @@ pub(super) struct Group {
     live: usize,
 }
 
+/// Of weights: eight sums side by side, the greatest of each, and how many of each are something.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    all: [f32; 8],
+    most: [f32; 8],
+    live: [u32; 8],
+}
+
 /// Lists that are filled again and again.
 #[derive(Debug, Default)]
 pub(super) struct Lists {
@@ -45,10 +52,75 @@ pub(super) struct Lists {
     axes: [Vec<f32>; 3],
     /// Cells, and then the places that are nearest there.
     cells: Vec<u32>,
+    /// Likelihood of what was felt at each place of the map, and at none.
     likelihoods: Vec<f32>,
+    /// The map that they are of, if they are the same in all rotations of it.
+    likely_at: Option<ObjectId>,
     /// Of the nearest place: squared distance \[m²\], and likelihood of what was felt there.
     squares: Vec<f32>,
     felt: Vec<f32>,
+}
+
+impl Lists {
+    /// Finds the place nearest to each of some places, or of all, that are moved by a step \[m\].
+    fn find(&mut self, spots: &Spots, some: Option<&[u32]>, nearest: &Nearest, step: [f32; 3]) {
+        let count = some.map_or(spots.all.len(), <[u32]>::len);
+        self.cells.resize(count, 0);
+        self.squares.resize(count, 0.0);
+        if let Some(some) = some {
+            for (list, axis) in self.axes.iter_mut().zip(&spots.axes) {
+                list.resize(count, 0.0);
+                for (at, spot) in list.iter_mut().zip(some) {
+                    *at = axis[*spot as usize];
+                }
+            }
+        }
+        let [x, y, z] = if some.is_some() {
+            &self.axes
+        } else {
+            &spots.axes
+        };
+        nearest.cells([x, y, z], step, &mut self.cells);
+        // The cells are far apart in memory: nothing else is done while they come.
+        nearest.places(&mut self.cells);
+        let last = spots.all.len() - 1;
+        let [to_x, to_y, to_z] = spots.axes.each_ref().map(|axis| &axis[..=last]);
+        let points = x.iter().zip(y).zip(z).zip(&self.cells);
+        for ((((x, y), z), place), square) in points.zip(&mut self.squares) {
+            let place = (*place as usize).min(last);
+            let apart = [
+                x + step[0] - to_x[place],
+                y + step[1] - to_y[place],
+                z + step[2] - to_z[place],
+            ];
+            *square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
+        }
+    }
+
+    /// Works out how likely what was felt is at the places that were found.
+    fn feel(&mut self, spots: &Spots, object: ObjectId, local: &Local<'_>) {
+        let places = spots.all.len();
+        self.felt.resize(self.cells.len(), 0.0);
+        let felt = self.felt.iter_mut().zip(&self.cells);
+        if self.cells.len() * local.sparse() < places {
+            for (felt, place) in felt {
+                let place = *place as usize;
+                let spot = spots.all.get(place);
+                *felt = spot.map_or(0.0, |spot| local.likelihood(place, spot));
+            }
+            return;
+        }
+        if self.likely_at != Some(object) || !local.is_unturned() {
+            local.likelihoods(&mut self.likelihoods);
+            // Where no place is near, nothing was felt of any: without a branch, since that is as good as random.
+            self.likelihoods.push(0.0);
+            self.likely_at = Some(object);
+        }
+        let likelihoods = &self.likelihoods[..=places];
+        for (felt, place) in felt {
+            *felt = likelihoods[(*place as usize).min(places)];
+        }
+    }
 }
 
 impl Group {
@@ -101,71 +173,28 @@ impl Group {
         let variance = first.variance_m2() + spots.variance_m2 + drift + noise;
         let step = rotation * (contact.position_m - first.position_m);
         let step = [narrow(step.x), narrow(step.y), narrow(step.z)];
-        let count = self.weights.len();
-        if count == 0 {
+        if self.weights.is_empty() {
             return;
         }
-        for list in [&mut lists.squares, &mut lists.felt] {
-            list.resize(count, 0.0);
-        }
-        lists.cells.resize(count, 0);
-        if let Some(some) = &self.some {
-            for (list, axis) in lists.axes.iter_mut().zip(&spots.axes) {
-                list.resize(count, 0.0);
-                for (at, spot) in list.iter_mut().zip(some) {
-                    *at = axis[*spot as usize];
-                }
-            }
-        }
-        let [x, y, z] = if self.some.is_some() {
-            &lists.axes
-        } else {
-            &spots.axes
-        };
-        let nearest = spots.nearest(variance);
-        nearest.cells([x, y, z], step, &mut lists.cells);
-        // The cells are far apart in memory: nothing else is done while they come.
-        let last = spots.all.len() - 1;
-        for cell in &mut lists.cells {
-            *cell = nearest.place(*cell);
-        }
-        let [to_x, to_y, to_z] = spots.axes.each_ref().map(|axis| &axis[..=last]);
-        let points = x.iter().zip(y).zip(z).zip(&lists.cells);
-        for ((((x, y), z), place), square) in points.zip(&mut lists.squares) {
-            let place = (*place as usize).min(last);
-            let apart = [
-                x + step[0] - to_x[place],
-                y + step[1] - to_y[place],
-                z + step[2] - to_z[place],
-            ];
-            *square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
-        }
-        let local = touch.feeling.at(surface, rotation);
-        if count * SPARSE_FELT < spots.all.len() {
-            for (felt, place) in lists.felt.iter_mut().zip(&lists.cells) {
-                let place = *place as usize;
-                let spot = spots.all.get(place);
-                *felt = spot.map_or(0.0, |spot| local.likelihood(place, spot));
-            }
-        } else {
-            local.likelihoods(&mut lists.likelihoods);
-            // Where no place is near, nothing was felt of any: without a branch, since that is as good as random.
-            lists.likelihoods.push(0.0);
-            for (felt, place) in lists.felt.iter_mut().zip(&lists.cells) {
-                *felt = lists.likelihoods[(*place as usize).min(last + 1)];
-            }
-        }
+        lists.find(spots, self.some.as_deref(), spots.nearest(variance), step);
+        lists.feel(spots, self.object, &touch.feeling.at(surface, rotation));
         let per = narrow(-0.5 / variance);
         let area = TAU * variance;
         let peak = share(surface.patches.len()) / (touch.outlier * area * area.sqrt());
         let peak = narrow(peak);
-        let places = lists.squares.iter().zip(&lists.felt);
-        for ((weight, worth), (square, felt)) in self.weights.iter_mut().zip(worth).zip(places) {
-            let gain = peak * felt * exp(per * square);
-            let gain = if gain < GAIN_MAX { gain } else { GAIN_MAX };
-            *weight *= 1.0 + gain;
-            *worth = if *felt > 0.0 { *weight } else { 0.0 };
-        }
+        let (weights, Lists { squares, felt, .. }) = (&mut self.weights, lists);
+        Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                let places = squares.iter().zip(felt);
+                for ((weight, worth), (square, felt)) in weights.iter_mut().zip(worth).zip(places) {
+                    let gain = peak * *felt * exp(per * square);
+                    let gain = if gain < GAIN_MAX { gain } else { GAIN_MAX };
+                    *weight *= 1.0 + gain;
+                    *worth = if *felt > 0.0 { *weight } else { 0.0 };
+                }
+            },
+        );
         self.weigh(0.0);
     }
 
@@ -215,35 +244,59 @@ impl Group {
 
     /// Sums up those that are not below `least`, and makes nothing of the others.
     fn weigh(&mut self, least: f32) {
-        // Eight sums side by side.
-        let (mut sums, mut mosts, mut lives) = ([0.0_f32; 8], [0.0_f32; 8], [0_u32; 8]);
-        for weights in self.weights.chunks_mut(8) {
-            let sums = sums.iter_mut().zip(&mut mosts).zip(&mut lives);
-            for (weight, ((sum, most), live)) in weights.iter_mut().zip(sums) {
-                *weight = if *weight < least { 0.0 } else { *weight };
-                *sum += *weight;
-                *most = if *weight > *most { *weight } else { *most };
-                *live += u32::from(*weight > 0.0);
-            }
-        }
-        self.sum = sums.iter().copied().map(f64::from).sum();
-        self.most = mosts.iter().copied().fold(0.0, f32::max);
-        self.live = lives.iter().sum::<u32>() as usize;
+        let (weights, rest) = self.weights.as_chunks_mut::<8>();
+        let mut sums = Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                let mut sums = Sums::default();
+                for weights in weights {
+                    sums.add(weights, least);
+                }
+                sums
+            },
+        );
+        sums.add(rest, least);
+        self.sum = sums.all.iter().copied().map(f64::from).sum();
+        self.most = sums.most.iter().copied().fold(0.0, f32::max);
+        self.live = sums.live.iter().sum::<u32>() as usize;
     }
 
     /// Leaves only some places in the lists, by their number and weight.
     fn keep(&mut self, is_kept: impl Fn(usize, f32) -> bool) {
         let own = self.some.take();
-        let mut kept = Vec::with_capacity(self.live);
+        let mut kept = vec![0; self.weights.len()];
+        let mut count = 0;
         for root in 0..self.weights.len() {
             let spot = own.as_ref().map_or(root, |own| own[root] as usize);
             let weight = self.weights[root];
-            if is_kept(spot, weight) {
-                self.weights[kept.len()] = weight;
-                kept.push(u32::try_from(spot).expect("a model has few places"));
-            }
+            // Without a branch, since which are kept is as good as random.
+            self.weights[count] = weight;
+            kept[count] = u32::try_from(spot).expect("a model has few places");
+            count += usize::from(is_kept(spot, weight));
         }
-        self.weights.truncate(kept.len());
+        kept.truncate(count);
+        kept.shrink_to_fit();
+        self.weights.truncate(count);
         self.some = Some(kept);
+    }
+}
+
+impl Sums {
+    /// Adds eight weights at most, of which those below `least` become nothing.
+    #[expect(
+        clippy::inline_always,
+        reason = "only what is inlined into a dispatched closure is compiled for the vectors that it chose"
+    )]
+    #[inline(always)]
+    fn add(&mut self, weights: &mut [f32], least: f32) {
+        let sums = { self.all.iter_mut() }
+            .zip(&mut self.most)
+            .zip(&mut self.live);
+        for (weight, ((sum, most), live)) in weights.iter_mut().zip(sums) {
+            *weight = if *weight < least { 0.0 } else { *weight };
+            *sum += *weight;
+            *most = if *weight > *most { *weight } else { *most };
+            *live += u32::from(*weight > 0.0);
+        }
     }
 }

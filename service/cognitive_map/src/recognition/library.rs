@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_6;
 use std::sync::Arc;
 
+use nalgebra::Point3;
+
 use super::model::ObjectModel;
 use super::surface::{Surface, Wide, wide};
 
@@ -22,6 +24,15 @@ pub(super) struct Known {
     pub(super) surface: Surface,
 }
 
+/// A place of a map.
+#[derive(Clone, Debug)]
+pub(super) struct Sample {
+    pub(super) object: ObjectId,
+    /// Number among the map's spots.
+    pub(super) spot: u32,
+    pub(super) position: Point3<f64>,
+}
+
 /// The maps that may be meant, each with its index.
 ///
 /// Putting a model makes its index, which takes some milliseconds per thousand places; recognising
@@ -31,7 +42,7 @@ pub struct ObjectLibrary {
     /// Shared with the library's clones, so that a snapshot costs a pointer per object.
     objects: BTreeMap<ObjectId, Arc<Known>>,
     wide: Vec<Wide>,
-    samples: Vec<(ObjectId, u32)>,
+    samples: Vec<Sample>,
     extent_m: f64,
 }
 
@@ -94,7 +105,17 @@ impl ObjectLibrary {
             })
         };
         let step = places().count().div_ceil(SAMPLES).max(1);
-        self.samples = places().skip(step / 2).step_by(step).collect();
+        let samples = places().skip(step / 2).step_by(step);
+        let sample = |(object, spot): (ObjectId, u32)| {
+            let surface = self.surface(object)?;
+            let patch = surface.patches.get(surface.spots.patch(spot as usize))?;
+            Some(Sample {
+                object,
+                spot,
+                position: patch.position,
+            })
+        };
+        self.samples = samples.filter_map(sample).collect();
         self.wide = wide(self.objects.values().map(|object| &object.surface));
     }
 
@@ -113,7 +134,7 @@ impl ObjectLibrary {
     }
 
     /// Some places, spread evenly over all maps: what a surface is like.
-    pub(super) fn samples(&self) -> &[(ObjectId, u32)] {
+    pub(super) fn samples(&self) -> &[Sample] {
         &self.samples
     }
 

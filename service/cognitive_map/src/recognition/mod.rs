@@ -35,6 +35,7 @@
 //! ```
 
 mod asking;
+mod bricks;
 mod cells;
 mod contact;
 mod crowd;
@@ -47,6 +48,7 @@ mod group;
 mod halves;
 mod library;
 mod model;
+mod nearby;
 mod nearest;
 mod orientation;
 mod pairs;

@@ -1,13 +1,12 @@
 //! Which place of a map is nearest, roughly: one number for each cell of a box.
 
+use pulp::Arch;
+
+use super::bricks::{Bricks, NONE, cell};
+use super::spots::whole;
+
 /// Most cells; they are larger rather than more, so that they stay in a processor's caches.
 const CELLS_MAX: f32 = 65_536.0;
-/// No place is near.
-const NONE: u16 = u16::MAX;
-
-/// Cells of a brick along each axis, as powers of two: the numbers of a brick fill a line of a processor's cache, and neighbours
-/// are mostly in one.
-const BRICK: [u32; 3] = [2, 2, 1];
 
 /// Cells over the box of a map, each with the place that is nearest to its middle, if one is within reach of any of its points. The
 /// outermost cells are empty, and stand for all that is beyond.
@@ -19,9 +18,9 @@ pub(super) struct Nearest {
     /// Cells along each axis.
     size: [f32; 3],
     /// Bricks along each axis but the first.
-    bricks: [u32; 2],
-    /// Numbers of the places, over `step`, brick by brick.
-    places: Vec<u16>,
+    rows: [u32; 2],
+    /// Numbers of the places, over `step`.
+    places: Bricks,
     /// How many places one number stands for: they lie side by side.
     step: u32,
 }
@@ -47,43 +46,51 @@ impl Nearest {
             edge_m *= 1.1;
         }
         let (reach_m, size) = (reach(edge_m), size(edge_m));
-        let bricks: [usize; 3] =
-            std::array::from_fn(|axis| (whole(size[axis]) as usize).div_ceil(1 << BRICK[axis]));
+        let bricks = Bricks::along(size.map(|size| whole(size.into())));
+        let step = axes[0].len().div_ceil(usize::from(NONE));
         let mut nearest = Self {
-            bricks: [1, 2].map(|axis| u32::try_from(bricks[axis]).unwrap_or(u32::MAX)),
             low: low.map(|low| low - reach_m - edge_m),
             per_m: 1.0 / edge_m,
             size,
-            places: vec![NONE; bricks.iter().product::<usize>() << BRICK.iter().sum::<u32>()],
-            step: u32::try_from(axes[0].len().div_ceil(usize::from(NONE)))
-                .map_or(1, |step| step.max(1)),
+            rows: [bricks[1], bricks[2]],
+            places: Bricks::new(&[]),
+            step: u32::try_from(step).map_or(1, |step| step.max(1)),
         };
-        let mut squares = vec![f32::INFINITY; nearest.places.len()];
+        let mut places = vec![NONE; Bricks::cells(bricks)];
+        let mut squares = vec![f32::INFINITY; places.len()];
         let [x, y, z] = axes;
         for (number, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate() {
             let number = u16::try_from(number / nearest.step as usize).unwrap_or(NONE);
-            nearest.notice(number, [*x, *y, *z], reach_m, &mut squares);
+            nearest.notice(number, [*x, *y, *z], reach_m, (&mut places, &mut squares));
         }
+        nearest.places = Bricks::new(&places);
         nearest
     }
 
     /// Writes a place into all cells whose middle is within reach and to which none was nearer.
-    fn notice(&mut self, number: u16, at: [f32; 3], reach_m: f32, squares: &mut [f32]) {
+    fn notice(
+        &self,
+        number: u16,
+        at: [f32; 3],
+        reach_m: f32,
+        (places, squares): (&mut [u16], &mut [f32]),
+    ) {
         let at: [f32; 3] = std::array::from_fn(|axis| (at[axis] - self.low[axis]) * self.per_m);
         let reach = reach_m * self.per_m;
         let range = |axis: usize| {
-            let last = whole(self.size[axis]) - 2;
-            whole((at[axis] - reach).max(1.0).ceil())..=whole(at[axis] + reach).min(last)
+            let last = whole(self.size[axis].into()) - 2;
+            let first = (at[axis] - reach).max(1.0).ceil();
+            whole(first.into())..=whole((at[axis] + reach).into()).min(last)
         };
         for i in range(0) {
             for j in range(1) {
                 for k in range(2) {
                     let apart: [f32; 3] = [i as f32 - at[0], j as f32 - at[1], k as f32 - at[2]];
                     let squared: f32 = apart.iter().map(|x| x * x).sum();
-                    let cell = cell([i, j, k], self.bricks) as usize;
+                    let cell = cell([i, j, k], self.rows) as usize;
                     if squared <= reach * reach && squared < squares[cell] {
                         squares[cell] = squared;
-                        self.places[cell] = number;
+                        places[cell] = number;
                     }
                 }
             }
@@ -92,47 +99,39 @@ impl Nearest {
 
     /// Numbers of the cells of these points, moved so; axis by axis \[m\].
     pub(super) fn cells(&self, [x, y, z]: [&[f32]; 3], shift: [f32; 3], out: &mut [u32]) {
-        /// Adding it leaves the nearest whole number in the low bits.
-        const WHOLE: f32 = 8_388_608.0;
-        let per_m = self.per_m;
-        let at = |at: f32, from: f32, last: f32| {
-            let at = (at + from) * per_m;
-            // What is no number is in the first cell.
-            let at = if at > 0.0 { at } else { 0.0 };
-            let at = if at < last { at } else { last };
-            (at + WHOLE).to_bits() & 0x007F_FFFF
-        };
+        let (rows, per_m) = (self.rows, self.per_m);
         let [fx, fy, fz] = std::array::from_fn(|axis| shift[axis] - self.low[axis]);
         let [lx, ly, lz] = self.size.map(|size| size - 1.0);
-        let bricks = self.bricks;
-        for (((x, y), z), out) in x.iter().zip(y).zip(z).zip(out) {
-            *out = cell([at(*x, fx, lx), at(*y, fy, ly), at(*z, fz, lz)], bricks);
+        Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                for (((x, y), z), out) in x.iter().zip(y).zip(z).zip(out) {
+                    let (x, y, z) = ((x + fx) * per_m, (y + fy) * per_m, (z + fz) * per_m);
+                    *out = cell([rounded(x, lx), rounded(y, ly), rounded(z, lz)], rows);
+                }
+            },
+        );
+    }
+
+    /// Puts in place of each cell the place that is nearest, or a number beyond all places.
+    pub(super) fn places(&self, cells: &mut [u32]) {
+        self.places.read(cells);
+        if self.step > 1 {
+            for place in cells {
+                *place *= self.step;
+            }
         }
     }
-
-    /// The place of a cell, or a number beyond all places.
-    pub(super) fn place(&self, cell: u32) -> u32 {
-        u32::from(self.places[cell as usize]) * self.step
-    }
 }
 
-/// The number of a cell, by its place along each axis.
-fn cell([i, j, k]: [u32; 3], [rows, columns]: [u32; 2]) -> u32 {
-    let [a, b, c] = BRICK;
-    let within = |at: u32, power: u32| at & ((1 << power) - 1);
-    let brick = ((i >> a) * rows + (j >> b)) * columns + (k >> c);
-    brick << (a + b + c) | within(i, a) << (b + c) | within(j, b) << c | within(k, c)
-}
-
-/// A whole number that is positive.
-fn whole(x: f32) -> u32 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "rounds down, and saturates"
-    )]
-    let whole = x as u32;
-    whole
+/// The nearest whole number from nothing to `last`; of what is no number, nothing.
+#[inline(always)]
+fn rounded(x: f32, last: f32) -> u32 {
+    /// Adding it leaves the nearest whole number in the low bits.
+    const WHOLE: f32 = 8_388_608.0;
+    let x = if x > 0.0 { x } else { 0.0 };
+    let x = if x < last { x } else { last };
+    (x + WHOLE).to_bits() & 0x007F_FFFF
 }
 
 #[cfg(test)]
@@ -154,10 +153,11 @@ mod tests {
         let [x, y, z] = &axes;
         let [qx, qy, qz] = [axis(5000, 2000), axis(7000, 2000), axis(9000, 2000)];
         let shift = [0.01, -0.02, 0.005];
-        let mut cells = vec![0; 2000];
-        nearest.cells([&qx, &qy, &qz], shift, &mut cells);
+        let mut places = vec![0; 2000];
+        nearest.cells([&qx, &qy, &qz], shift, &mut places);
+        nearest.places(&mut places);
         let mut noticed = 0;
-        for (k, cell) in cells.iter().enumerate() {
+        for (k, place) in places.iter().enumerate() {
             let to = |place: usize| {
                 let apart = [
                     qx[k] + shift[0] - x[place],
@@ -167,7 +167,7 @@ mod tests {
                 apart.iter().map(|x| x * x).sum::<f32>().sqrt()
             };
             let least = (0..200).map(to).fold(f32::INFINITY, f32::min);
-            match nearest.place(*cell) {
+            match *place {
                 200.. => assert!(least > reach_m),
                 place => {
                     noticed += 1;
@@ -178,14 +178,15 @@ mod tests {
             }
         }
         assert!((200..2000).contains(&noticed), "{noticed}");
-        nearest.cells(
-            [&[f32::NAN, 1e30, -1e30], &[0.0; 3], &[0.0; 3]],
-            [0.0; 3],
-            &mut cells,
-        );
-        assert!(cells[..3].iter().all(|cell| nearest.place(*cell) >= 200));
+        let mut places = [0; 3];
+        let far = [f32::NAN, 1e30, -1e30];
+        nearest.cells([&far, &[0.0; 3], &[0.0; 3]], [0.0; 3], &mut places);
+        nearest.places(&mut places);
+        assert!(places.iter().all(|place| *place >= 200));
         let empty = Nearest::new(&[vec![], vec![], vec![]], 0.01, 0.004);
-        empty.cells([&[0.0], &[0.0], &[0.0]], [0.0; 3], &mut cells);
-        assert!(empty.place(cells[0]) > 0);
+        let mut places = [0];
+        empty.cells([&[0.0], &[0.0], &[0.0]], [0.0; 3], &mut places);
+        empty.places(&mut places);
+        assert!(places[0] > 0);
     }
 }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
+use super::spots::whole;
 use crate::grid::Lattice;
 
 /// Places of a cell, on average over the box that holds the map. A surface fills few of a box's cells, so those that
@@ -63,6 +64,7 @@ impl Reaches {
         if positions.is_empty() {
             (low, high) = (Vector3::zeros(), Vector3::zeros());
         }
+        let cell = |index: f64| whole(index) as usize;
         let size = (high - low).map(cell);
         let size = [size.x + 1, size.y + 1, size.z + 1];
         let cells: Vec<usize> = { positions.iter() }
@@ -89,13 +91,9 @@ impl Reaches {
         (reaches, order)
     }
 
-    /// Visits runs of the order that hold all places within `reach_m` \[m\] of a point, and some others.
-    pub(super) fn runs(
-        &self,
-        point: &Point3<f64>,
-        reach_m: f64,
-        mut visit: impl FnMut(Range<usize>),
-    ) {
+    /// Lists runs of the order that hold all places within `reach_m` \[m\] of a point, and some others.
+    pub(super) fn runs(&self, point: &Point3<f64>, reach_m: f64, runs: &mut Vec<Range<u32>>) {
+        runs.clear();
         let middle = self.lattice.phase_displacement(&point.coords) - self.low;
         let half = ROW * reach_m / self.lattice.spacing_m();
         let mut first = [0; 3];
@@ -106,31 +104,27 @@ impl Reaches {
             if !(to >= 0.0 && from < self.size[axis] as f64) {
                 return;
             }
-            first[axis] = cell(from);
-            last[axis] = cell(to).min(self.size[axis] - 1);
+            // What lies before the first cell is in it.
+            first[axis] = whole(from) as usize;
+            last[axis] = (whole(to) as usize).min(self.size[axis] - 1);
         }
+        runs.resize(
+            (last[0] + 1 - first[0]) * (last[1] + 1 - first[1]),
+            Range::default(),
+        );
+        let mut count = 0;
         for i in first[0]..=last[0] {
             for j in first[1]..=last[1] {
                 let row = (i * self.size[1] + j) * self.size[2];
-                let from = self.starts[row + first[2]] as usize;
-                let to = self.starts[row + last[2] + 1] as usize;
-                if from < to {
-                    visit(from..to);
-                }
+                let from = self.starts[row + first[2]];
+                let to = self.starts[row + last[2] + 1];
+                // Which rows have places is as good as random: without a branch, all of them come from memory at once.
+                runs[count] = from..to;
+                count += usize::from(from < to);
             }
         }
+        runs.truncate(count);
     }
-}
-
-/// The cell of an index along an axis, counted from the first; what lies before that one is in it.
-fn cell(index: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "rounds down, and saturates"
-    )]
-    let cell = index as usize;
-    cell
 }
 
 #[cfg(test)]
@@ -155,9 +149,10 @@ mod tests {
             assert_eq!(order.len(), positions.len());
             let mut listed = 0;
             let near = |query: &Point3<f64>, reach_m| {
-                let mut near = Vec::new();
-                reaches.runs(query, reach_m, |run| near.extend_from_slice(&order[run]));
-                near
+                let mut runs = Vec::new();
+                reaches.runs(query, reach_m, &mut runs);
+                let places = runs.into_iter().flatten();
+                places.map(|at| order[at as usize]).collect::<Vec<u32>>()
             };
             for (k, reach_m) in (1000..1400).zip([0.0, 0.004, 0.02, 0.08, 0.3].into_iter().cycle())
             {
@@ -177,7 +172,9 @@ mod tests {
             assert!(near(&Point3::new(f64::NAN, 0.0, 0.0), 1.0).is_empty());
         }
         let (none, _) = Reaches::new(&[]);
-        none.runs(&Point3::origin(), 1.0, |run| panic!("{run:?}"));
+        let mut runs = Vec::new();
+        none.runs(&Point3::origin(), 1.0, &mut runs);
+        assert!(runs.is_empty());
     }
 
     #[test]
@@ -192,9 +189,9 @@ mod tests {
                     .map(|k| Point3::new(at(k), at(k + 1), at(k + 2)))
                     .collect();
                 let (reaches, _) = Reaches::new(&positions);
-                let mut found = 0;
-                reaches.runs(&positions[0], f64::INFINITY, |run| found += run.len());
-                assert_eq!(found, positions.len());
+                let mut runs = Vec::new();
+                reaches.runs(&positions[0], f64::INFINITY, &mut runs);
+                assert_eq!(runs.into_iter().flatten().count(), positions.len());
             }
         }
     }

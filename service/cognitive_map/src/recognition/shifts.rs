@@ -9,8 +9,9 @@ use super::contact::{Contact, Reached};
 use super::crowd::Crowd;
 use super::feeling::{Feeling, Local};
 use super::library::{ObjectId, ObjectLibrary};
+use super::nearby::{Answer, Nearby};
 use super::ranks::Ranks;
-use super::spots::{Answer, narrow};
+use super::spots::narrow;
 use super::strangers::Strangers;
 use super::surface::Surface;
 
@@ -109,7 +110,7 @@ impl Shifts {
                 self.strangers.touch(library, rotations, pair, drift_m2);
             }
         }
-        let mut answers = Vec::new();
+        let mut looker = Looker::default();
         let mut parts = Vec::with_capacity(2 * self.all.len());
         let all = std::mem::take(&mut self.all);
         for own in all.chunk_by(|a, b| a.object == b.object) {
@@ -118,13 +119,14 @@ impl Shifts {
                     let rotation = &self.rotations[usize::from(own[0].rotation)];
                     let local = touch.feeling.at(surface, rotation);
                     for shift in own {
-                        self.explain(surface, shift, (&touch, &local), &mut answers, &mut parts);
+                        let lists = (&mut looker.nearby, &mut looker.answers);
+                        self.explain(surface, shift, (&touch, &local), lists, &mut parts);
                     }
                 }
             }
         }
         if !self.crowd.is_empty() {
-            self.look(library, before, &touch, &mut parts);
+            self.look(library, before, &touch, (&mut looker, &mut parts));
         }
         self.all = parts;
         self.merge();
@@ -137,7 +139,7 @@ impl Shifts {
         library: &ObjectLibrary,
         before: &[Contact],
         touch: &Taken<'_>,
-        parts: &mut Vec<Shift>,
+        (looker, parts): (&mut Looker, &mut Vec<Shift>),
     ) {
         let mut crowd = std::mem::take(&mut self.crowd);
         let worth = crowd.sift(library, &self.rotations, touch);
@@ -161,7 +163,6 @@ impl Shifts {
             .map(|two| Taken::new(library, &two[0], &two[1]))
             .collect();
         let way: Vec<&Taken<'_>> = way.iter().chain([touch]).collect();
-        let mut looker = Looker::default();
         for root in &heaviest {
             let (root, known) = crowd.take(root, &self.rotations, &first);
             looker.follow(self, &known.surface, root, &way, parts);
@@ -187,13 +188,13 @@ impl Shifts {
     }
 
     /// What becomes of a hypothesis with one more contact: one or more parts, each with its place taken for
-    /// the one that was touched. `answers` is a list to be used.
+    /// the one that was touched. The lists are to be used.
     fn explain(
         &self,
         surface: &Surface,
         shift: &Shift,
         (touch, local): (&Taken<'_>, &Local<'_>),
-        answers: &mut Vec<Answer>,
+        (nearby, answers): (&mut Nearby, &mut Vec<Answer>),
         parts: &mut Vec<Shift>,
     ) {
         let rotation = &self.rotations[usize::from(shift.rotation)];
@@ -201,8 +202,7 @@ impl Shifts {
         let prior = shift.variance_m2 + touch.drift_m2;
         let noise = contact.position_sd_m * contact.position_sd_m;
         let query = Point3::from(rotation * contact.position_m.coords + shift.translation);
-        let spots = &surface.spots;
-        let densities = spots.answers(&query, (prior, noise), local, answers);
+        let densities = nearby.answers(&surface.spots, &query, (prior, noise), local, answers);
         let one = share(surface.patches.len()) / TAU.powf(1.5);
         let outlier = touch.outlier / one;
         let total = outlier + densities;
@@ -354,6 +354,7 @@ impl Shifts {
 /// Lists that are filled again and again.
 #[derive(Default)]
 struct Looker {
+    nearby: Nearby,
     answers: Vec<Answer>,
     now: Vec<Shift>,
     next: Vec<Shift>,
@@ -377,7 +378,8 @@ impl Looker {
             let local = touch.feeling.at(surface, rotation);
             for shift in &self.now {
                 let touch = (*touch, &local);
-                shifts.explain(surface, shift, touch, &mut self.answers, &mut self.next);
+                let lists = (&mut self.nearby, &mut self.answers);
+                shifts.explain(surface, shift, touch, lists, &mut self.next);
             }
             if self.next.len() > PARTS_MAX {
                 self.next.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));

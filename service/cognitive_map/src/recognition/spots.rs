@@ -2,13 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::feeling::{Local, exp};
 use super::nearest::Nearest;
 use super::reaches::Reaches;
 use super::surface::Patch;
 
 /// Squared distance, in variances, beyond which a place is not the one that was touched: e⁻¹⁶.
-const DISTANCE_MAX: f64 = 32.0;
+pub(super) const DISTANCE_MAX: f64 = 32.0;
 /// Standard deviations to which a place is noticed in a rough look.
 const NOTICED_SD: f64 = 3.5;
 /// From one scale of rough looks to the next the reach grows so much.
@@ -22,7 +21,7 @@ pub(super) struct Spot {
     /// From the map's middle \[m\].
     pub(super) at: [f32; 3],
     /// Variance of a touch of this place, without the touch's noise, per axis \[m²\].
-    variance_m2: f32,
+    pub(super) variance_m2: f32,
     /// Mean level, from the middle of those of the map.
     pub(super) level: f32,
     pub(super) level_variance: f32,
@@ -39,26 +38,15 @@ pub(super) struct Spots {
     pub(super) normals: Vec<[f32; 3]>,
     /// Number of the patch that each is.
     order: Vec<u32>,
-    middle: Point3<f64>,
-    reaches: Reaches,
+    pub(super) middle: Point3<f64>,
+    pub(super) reaches: Reaches,
     /// Variance of a touch of a place without the touch's noise per axis, on average and at most \[m²\].
     pub(super) variance_m2: f64,
-    variance_max_m2: f64,
+    pub(super) variance_max_m2: f64,
     /// Channel and middle of the levels, if all places have one of the same and nothing else.
     levels: Option<(u16, f64)>,
     /// How uncertain a point may be \[m\], and what is nearest then.
     nearest: Vec<(f64, Nearest)>,
-}
-
-/// A place that could be the one touched.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Answer {
-    /// Density of the touch there \[m⁻³\], times (2π)^1.5 and as if it were the only place.
-    pub(super) density: f64,
-    /// Where it lies from where the touch should be \[m\].
-    pub(super) apart: Vector3<f64>,
-    /// Variance of a touch of it, per axis \[m²\].
-    pub(super) variance: f64,
 }
 
 impl Spots {
@@ -138,46 +126,11 @@ impl Spots {
     /// among the patches.
     pub(super) fn near(&self, point: &Point3<f64>, variance_m2: f64, mut visit: impl FnMut(u32)) {
         let reach_m = (DISTANCE_MAX * (variance_m2 + self.variance_max_m2)).sqrt();
-        self.reaches.runs(point, reach_m, |run| {
-            self.order[run].iter().for_each(|number| visit(*number));
-        });
-    }
-
-    /// Lists the places that a touch could be of which should be at `point`, with a variance `prior` of that and `noise` of its own,
-    /// per axis \[m²\], and gives the sum of their densities.
-    pub(super) fn answers(
-        &self,
-        point: &Point3<f64>,
-        (prior, noise): (f64, f64),
-        local: &Local<'_>,
-        answers: &mut Vec<Answer>,
-    ) -> f64 {
-        answers.clear();
-        let scatter = prior + noise;
-        let reach_m = (DISTANCE_MAX * (scatter + self.variance_max_m2)).sqrt();
-        let at: [f32; 3] = (point - self.middle).map(narrow).into();
-        let wide = narrow(scatter);
-        let mut total = 0.0;
-        self.reaches.runs(point, reach_m, |run| {
-            for (number, spot) in run.clone().zip(&self.all[run]) {
-                let apart: [f32; 3] = [spot.at[0] - at[0], spot.at[1] - at[1], spot.at[2] - at[2]];
-                let square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
-                let variance = wide + spot.variance_m2;
-                if square > narrow(DISTANCE_MAX) * variance {
-                    continue;
-                }
-                let per = 1.0 / variance;
-                let fall = exp(-0.5 * square * per) * per * per.sqrt();
-                let density = f64::from(fall) * f64::from(local.likelihood(number, spot));
-                total += density;
-                answers.push(Answer {
-                    density,
-                    apart: Vector3::from(apart).cast(),
-                    variance: noise + f64::from(spot.variance_m2),
-                });
-            }
-        });
-        total
+        let mut runs = Vec::new();
+        self.reaches.runs(point, reach_m, &mut runs);
+        for place in runs.into_iter().flatten() {
+            visit(self.order[place as usize]);
+        }
     }
 }
 
@@ -202,4 +155,15 @@ pub(super) fn narrow(x: f64) -> f32 {
     #[expect(clippy::cast_possible_truncation, reason = "meant to be rough")]
     let narrow = x as f32;
     narrow
+}
+
+/// A whole number that is positive.
+pub(super) fn whole(x: f64) -> u32 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "rounds down, and saturates"
+    )]
+    let whole = x as u32;
+    whole
 }

@@ -8,6 +8,7 @@ use nalgebra::UnitQuaternion;
 use super::contact::Contact;
 use super::feeling::Feeling;
 use super::library::{ObjectId, ObjectLibrary};
+use super::nearby::Nearby;
 use super::shifts::{OUTLIERS, log_sum};
 
 /// Least share of the weight that places of other objects must have before they say what is beside them.
@@ -25,16 +26,13 @@ impl Strangers {
         &mut self,
         library: &ObjectLibrary,
         rotations: &[UnitQuaternion<f64>],
-        (other, contact): (&Contact, &Contact),
+        pair: (&Contact, &Contact),
         drift_m2: f64,
     ) {
-        let like_others = stranger_logs(library, rotations, (other, contact), drift_m2);
-        let bare = [other, contact].map(Contact::bare);
-        let like_nothing = stranger_logs(library, rotations, (&bare[0], &bare[1]), drift_m2);
-        for (object, log) in like_others {
-            let [first, second] = self.0.entry(object).or_default();
-            *first += log;
-            *second += like_nothing.get(&object).copied().unwrap_or(log);
+        for (object, logs) in stranger_logs(library, rotations, pair, drift_m2) {
+            for (sum, log) in self.0.entry(object).or_default().iter_mut().zip(logs) {
+                *sum += log;
+            }
         }
     }
 
@@ -53,56 +51,83 @@ impl Strangers {
 /// It is what a hypothesis that knows nothing else would expect, so that evidence for a map begins
 /// where the map explains more than a surface of its kind. Space filled evenly would be no rival: a step along
 /// any surface ends on most others, and neighbouring places feel alike on most.
+///
+/// The second of each is the same if nothing had been felt.
 fn stranger_logs(
     library: &ObjectLibrary,
     rotations: &[UnitQuaternion<f64>],
     (other, contact): (&Contact, &Contact),
     drift_m2: f64,
-) -> BTreeMap<ObjectId, f64> {
+) -> BTreeMap<ObjectId, [f64; 2]> {
+    let bare = [other, contact].map(Contact::bare);
     let step = contact.position_m - other.position_m;
     let noise = contact.position_sd_m * contact.position_sd_m + drift_m2;
-    let felt_before = Feeling::new(other, library.wide());
-    let felt = Feeling::new(contact, library.wide());
-    let mut sums: BTreeMap<ObjectId, [f64; 4]> = BTreeMap::new();
-    let mut answers = Vec::new();
+    let before = [other, &bare[0]].map(|contact| Feeling::new(contact, library.wide()));
+    let now = [contact, &bare[1]].map(|contact| Feeling::new(contact, library.wide()));
+    let mut sums: BTreeMap<ObjectId, [Sums; 2]> = BTreeMap::new();
+    let mut nearby = Nearby::default();
     let mut turns = rotations.iter().cycle();
-    for &(object, spot) in library.samples() {
-        let (Some(surface), Some(rotation)) = (library.surface(object), turns.next()) else {
+    for sample in library.samples() {
+        let (Some(surface), Some(rotation)) = (library.surface(sample.object), turns.next()) else {
             continue;
         };
-        let here = felt_before.at(surface, rotation);
-        let weight = f64::from(here.likelihood(spot as usize, &surface.spots.all[spot as usize]));
-        let here = surface.patches[surface.spots.patch(spot as usize)].position;
-        let local = felt.at(surface, rotation);
-        let point = here + rotation * step;
-        let spots = &surface.spots;
-        let density = spots.answers(&point, (0.0, noise), &local, &mut answers);
-        let density = density / TAU.powf(1.5);
-        let density = density / surface.patches.len() as f64;
-        let [sum, weights, plain, count] = sums.entry(object).or_default();
-        *sum += weight * density;
-        *weights += weight;
-        *plain += density;
-        *count += 1.0;
+        let number = sample.spot as usize;
+        let spot = &surface.spots.all[number];
+        let weights = before.each_ref().map(|feeling| {
+            let likelihood = feeling.at(surface, rotation).likelihood(number, spot);
+            f64::from(likelihood)
+        });
+        let [felt, bare] = now.each_ref().map(|feeling| feeling.at(surface, rotation));
+        let point = sample.position + rotation * step;
+        let densities = nearby.densities(&surface.spots, &point, noise, [&felt, &bare]);
+        let sums = sums.entry(sample.object).or_default();
+        for ((sums, weight), density) in sums.iter_mut().zip(weights).zip(densities) {
+            let density = density / TAU.powf(1.5);
+            let density = density / surface.patches.len() as f64;
+            sums.add([weight * density, weight, density, 1.0]);
+        }
     }
-    let all = { sums.values() }.fold([0.0; 4], |all, own| {
-        std::array::from_fn(|k| all[k] + own[k])
-    });
-    // Of places of no other object, how a surface goes on is all that is known.
-    let [_, _, plain, count] = all;
+    let mut all = [Sums::default(); 2];
+    for own in sums.values() {
+        for (all, own) in all.iter_mut().zip(own) {
+            all.add(own.0);
+        }
+    }
     let elsewhere = OUTLIERS * library.elsewhere();
     { sums.into_iter() }
-        .map(|(object, [sum, weights, ..])| {
-            let (sum, weights) = (all[0] - sum, all[1] - weights);
-            let typical = if weights > WEIGHT_MIN * all[1] {
-                sum / weights
-            } else {
-                plain / count
-            };
-            let density = (1.0 - OUTLIERS) * typical.max(0.0) + elsewhere;
-            (object, density.ln())
+        .map(|(object, own)| {
+            let logs = std::array::from_fn(|k| {
+                let density = (1.0 - OUTLIERS) * all[k].typical_without(&own[k]) + elsewhere;
+                density.ln()
+            });
+            (object, logs)
         })
         .collect()
+}
+
+/// Sums over places: of the weighted densities, of the weights, of the densities, and how many they are.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums([f64; 4]);
+
+impl Sums {
+    fn add(&mut self, other: [f64; 4]) {
+        for (sum, own) in self.0.iter_mut().zip(other) {
+            *sum += own;
+        }
+    }
+
+    /// Mean density over the others than these.
+    fn typical_without(&self, own: &Self) -> f64 {
+        let [sum, weights, plain, count] = self.0;
+        let (others, weight) = (sum - own.0[0], weights - own.0[1]);
+        // Of places of no other object, how a surface goes on is all that is known.
+        let typical = if weight > WEIGHT_MIN * weights {
+            others / weight
+        } else {
+            plain / count
+        };
+        typical.max(0.0)
+    }
 }
 
 #[cfg(test)]
