@@ -11,6 +11,7 @@
 //! 6     page   up to 16 views
 //! 7     page   what an agent saw lately
 //! 8     page   what an agent has seen that does not know where it is
+//! 9     page   what an agent has seen that contradicts where it is believed to be
 //! ```
 
 use std::collections::BTreeMap;
@@ -32,6 +33,7 @@ const LANDMARKS: u8 = 5;
 const VIEWS: u8 = 6;
 const TRACKS: u8 = 7;
 const SEARCHES: u8 = 8;
+const DOUBTS: u8 = 9;
 
 /// One page of a chronicle's checkpoint. A later page of the same part and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,6 +64,7 @@ impl Chronicle {
             .chain(pages_of(VIEWS, &self.revisits.views, since))
             .chain(pages_of(TRACKS, &self.revisits.tracks, since))
             .chain(pages_of(SEARCHES, &self.searches, since))
+            .chain(pages_of(DOUBTS, &self.doubts, since))
     }
 
     /// The chronicle of a checkpoint, which goes on like the one that wrote it. Its pages count as changed at `revision`.
@@ -95,6 +98,7 @@ impl Chronicle {
                 VIEWS => chronicle.revisits.views.push_page(&bytes, revision),
                 TRACKS => chronicle.revisits.tracks.push_page(&bytes, revision),
                 SEARCHES => chronicle.searches.push_page(&bytes, revision),
+                DOUBTS => chronicle.doubts.push_page(&bytes, revision),
                 _ => Err(CorruptState::Invalid),
             };
             pushed.map_err(|_| CorruptChronicle)?;
@@ -119,6 +123,7 @@ impl Chronicle {
         self.revisits.views.write_digests(&mut out);
         self.revisits.tracks.write_digests(&mut out);
         self.searches.write_digests(&mut out);
+        self.doubts.write_digests(&mut out);
         out.digest()
     }
 
@@ -197,7 +202,9 @@ impl Chronicle {
     fn searches_are_sound(&self) -> bool {
         let is_channel = |channel, length| self.revisits.is_channel(channel, length);
         let mut searches = self.searches.iter();
+        let mut doubts = self.doubts.iter();
         searches.all(|search| search.is_sound(self.lives.len(), is_channel))
+            && doubts.all(|doubt| doubt.is_sound(self.lives.len(), is_channel))
     }
 
     fn chains_are_sound(&self) -> bool {
