@@ -2,16 +2,20 @@
 //!
 //! ```text
 //! cargo run --release -p cogmap-experiments --example waking -- [trials=N] [per=N] [rooms=N] [explorer=N] [travel=CM] [seed=N] [cost]
+//!     [carried] [stay=M] [after=M]
 //! ```
 //!
-//! `cost` tells instead how long a view takes to be taken in.
+//! `cost` tells instead how long a view takes to be taken in. `carried` robots go on for `stay` when they know where they are, are carried off
+//! then, and go on for `after`.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 
 use std::error::Error;
 use std::num::NonZeroUsize;
 
-use cogmap_experiments::waking::{WakingProtocol, run_waking, time_waking};
+use cogmap_experiments::waking::{
+    CarriedProtocol, WakingProtocol, run_carried, run_waking, time_waking,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -36,6 +40,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         for percent in [50, 75, 90, 99, 100] {
             println!("{percent:4} %  {:8.2}", at(percent));
         }
+        return Ok(());
+    }
+    if arguments.iter().any(|text| text == "carried") {
+        let protocol = CarriedProtocol {
+            waking: protocol,
+            stay_m: number("stay=", 0)?.into(),
+            after_m: number("after=", 5)?.into(),
+        };
+        let report = run_carried(&protocol, NonZeroUsize::MIN, &|| {})?;
+        println!("{report:#?}");
         return Ok(());
     }
     let report = run_waking(&protocol, NonZeroUsize::MIN, &|| {})?;

@@ -12,6 +12,7 @@
 //! 7     page   what an agent saw lately
 //! 8     page   what an agent has seen that does not know where it is
 //! 9     page   up to 32 things that lie beside anchors
+//! 10    page   what an agent has seen that contradicts where it is believed to be
 //! ```
 
 use std::collections::BTreeMap;
@@ -34,6 +35,7 @@ const VIEWS: u8 = 6;
 const TRACKS: u8 = 7;
 const SEARCHES: u8 = 8;
 const MOORINGS: u8 = 9;
+const DOUBTS: u8 = 10;
 
 /// One page of a chronicle's checkpoint. A later page of the same part and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,6 +67,7 @@ impl Chronicle {
             .chain(pages_of(TRACKS, &self.revisits.tracks, since))
             .chain(pages_of(SEARCHES, &self.searches, since))
             .chain(pages_of(MOORINGS, &self.moorings.pages, since))
+            .chain(pages_of(DOUBTS, &self.doubts, since))
     }
 
     /// The chronicle of a checkpoint, which goes on like the one that wrote it. Its pages count as changed at `revision`.
@@ -99,6 +102,7 @@ impl Chronicle {
                 TRACKS => chronicle.revisits.tracks.push_page(&bytes, revision),
                 SEARCHES => chronicle.searches.push_page(&bytes, revision),
                 MOORINGS => chronicle.moorings.pages.push_page(&bytes, revision),
+                DOUBTS => chronicle.doubts.push_page(&bytes, revision),
                 _ => Err(CorruptState::Invalid),
             };
             pushed.map_err(|_| CorruptChronicle)?;
@@ -124,6 +128,7 @@ impl Chronicle {
         self.revisits.tracks.write_digests(&mut out);
         self.searches.write_digests(&mut out);
         self.moorings.pages.write_digests(&mut out);
+        self.doubts.write_digests(&mut out);
         out.digest()
     }
 
@@ -209,7 +214,9 @@ impl Chronicle {
     fn searches_are_sound(&self) -> bool {
         let is_channel = |channel, length| self.revisits.is_channel(channel, length);
         let mut searches = self.searches.iter();
+        let mut doubts = self.doubts.iter();
         searches.all(|search| search.is_sound(self.lives.len(), is_channel))
+            && doubts.all(|doubt| doubt.is_sound(self.lives.len(), is_channel))
     }
 
     fn chains_are_sound(&self) -> bool {

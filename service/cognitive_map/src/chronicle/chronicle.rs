@@ -7,7 +7,7 @@ use super::landmarks::Landmarks;
 use super::life::{Life, is_within};
 use super::milestones::Milestones;
 use super::mooring::Mooring;
-use super::relocalisation::Searches;
+use super::relocalisation::{Doubts, Searches};
 use super::revisit::Revisits;
 use super::settings::ChronicleSettings;
 use super::sighting::{SeenPoint, Shown, Sighting};
@@ -99,6 +99,8 @@ pub struct Chronicle {
     pub(super) revisits: Revisits,
     /// Who does not know where it is, and what it has seen since.
     pub(super) searches: Searches,
+    /// Whether what agents of the map see contradicts where they are believed to be.
+    pub(super) doubts: Doubts,
     pub(super) milestones: Milestones,
 }
 
@@ -130,6 +132,7 @@ impl Chronicle {
             agreed: 0,
             revisits: Revisits::default(),
             searches: Searches::default(),
+            doubts: Doubts::default(),
             milestones: Milestones::default(),
         }
     }

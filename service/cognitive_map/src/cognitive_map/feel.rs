@@ -15,6 +15,8 @@ use crate::trip::TripEnd;
 
 /// An agent that is found more than so many deviations from where it was thought to be did not come there by itself.
 const DRIFTED: f64 = 3.0;
+/// How far from where it was believed to be an agent may be that was carried off, in deviations from which on it is lost.
+const ANYWHERE: f64 = 10.0;
 
 impl Fold<'_> {
     /// A level was felt, where the sensor is.
@@ -63,10 +65,20 @@ impl Fold<'_> {
             covariance,
         };
         let moment = self.moment();
+        let is_lost = self.is_lost(&viewed.covariance);
+        if self.agent.placed && !is_lost {
+            let accepted = self.agent.evidence.accepted;
+            if self.chronicle.is_contradicted(&moment, &viewed, accepted) {
+                return self.go_astray();
+            }
+        }
         let is_sought = self.chronicle.is_seeking(number);
         if self.agent.placed && !is_sought {
-            self.chronicle.viewed(&moment, &viewed);
-            if !self.is_lost(&viewed.covariance) {
+            // Nobody knows where that is seen.
+            if !(is_lost && self.chronicle.is_astray(number)) {
+                self.chronicle.viewed(&moment, &viewed);
+            }
+            if !is_lost {
                 return;
             }
         }
@@ -79,6 +91,17 @@ impl Fold<'_> {
     /// Whether an agent in the map is known so little that it may be anywhere.
     fn is_lost(&self, covariance: &PoseCovariance) -> bool {
         Status::of(self.agent, covariance.position_sd_m(), self.settings) == Status::Lost
+    }
+
+    /// What the agent sees contradicts where it is believed to be: it may be anywhere from now on.
+    fn go_astray(&mut self) {
+        let moment = self.moment();
+        self.end_trip(TripEnd::Gap);
+        self.end_episode();
+        let sd_m = ANYWHERE * self.settings.lost_sd_m;
+        self.estimator.lose(self.agent_id.0, sd_m);
+        self.chronicle.go_astray(&moment);
+        self.stand();
     }
 
     /// The agent recognised where it is.
@@ -103,6 +126,10 @@ impl Fold<'_> {
             let moment = self.moment();
             self.chronicle.relocalised(&moment, found, is_elsewhere);
         }
+        if found.is_first || is_elsewhere {
+            let seq = self.moment().seq;
+            self.chronicle.dispel_doubt(number, seq);
+        }
         if is_elsewhere {
             self.end_trip(TripEnd::StartPose);
             self.stand();
@@ -115,9 +142,13 @@ impl Fold<'_> {
 
     /// Whether an agent of the map was recognised where it cannot have come to.
     fn is_elsewhere(&self, found: &Relocalised) -> bool {
-        let Some((pose, covariance)) = self.estimator.pose(self.agent_id.0) else {
+        let number = self.agent_id.0;
+        let Some((pose, covariance)) = self.estimator.pose(number) else {
             return true;
         };
+        if self.chronicle.is_astray(number) {
+            return true;
+        }
         let apart_m = (pose.translation.vector - found.pose.translation.vector).norm();
         let sd_m = covariance
             .position_sd_m()

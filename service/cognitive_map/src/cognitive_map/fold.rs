@@ -129,6 +129,8 @@ impl Fold<'_> {
         self.estimator.start_pose(self.agent_id.0, start);
         self.chronicle.start_pose(&self.moment(), start);
         self.chronicle.end_search(self.agent_id.0);
+        let seq = self.agent.next_seq.saturating_sub(1);
+        self.chronicle.dispel_doubt(self.agent_id.0, seq);
         *self.framed = true;
         self.stand();
     }

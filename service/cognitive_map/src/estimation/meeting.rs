@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector6};
 
 use super::estimator::{Estimator, MAP};
 use super::frame::{Frame, MEMBERS_MAX};
@@ -23,6 +23,8 @@ pub(super) const MEETINGS_MAX: usize = 64;
 const MEETING_APART_M: f64 = 0.2;
 /// Frames that are compared with an agent's own after one of its sightings. Of more, others come next.
 const COMPARED_MAX: usize = 16;
+/// Deviation of a turn of which nothing is known \[rad\].
+const ANY_TURN_SD_RAD: f64 = 3.0;
 
 /// A sighting of an agent that has not moved up to it yet.
 #[derive(Clone, Debug)]
@@ -228,6 +230,25 @@ impl Estimator {
             covariance: adjoint * covariance.matrix() * adjoint.transpose(),
         };
         self.merge(MAP, own, &tie);
+    }
+
+    /// An agent of the map may be anywhere, about `sd_m` from where it was believed to be along each axis and turned in any way. One that
+    /// moves in a plane stays there.
+    pub fn lose(&mut self, agent: u32, sd_m: f64) {
+        self.begin();
+        let Some(mover) = self.mover(agent).filter(|_| self.is_in_map(agent)) else {
+            return;
+        };
+        let (pose, is_planar) = (mover.pose, mover.is_planar);
+        let sd = Vector6::from_fn(|k, _| {
+            let is_held = is_planar && matches!(k, 2..=4);
+            match (is_held, k < 3) {
+                (true, _) => 0.0,
+                (false, true) => sd_m,
+                (false, false) => ANY_TURN_SD_RAD,
+            }
+        });
+        self.put(agent, &pose, PoseCovariance::from_sd(&sd).matrix());
     }
 
     /// Lays a frame into an older one.

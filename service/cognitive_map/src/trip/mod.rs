@@ -34,7 +34,7 @@ pub struct TripId(pub u32);
 pub enum TripEnd {
     /// The agent stood still.
     Stillness,
-    /// Samples were lost, or none came for a long time on the sensor's clock.
+    /// Samples were lost, none came for a long time on the sensor's clock, or the agent turned out to have been carried off.
     Gap,
     /// The session ended.
     SessionEnd,

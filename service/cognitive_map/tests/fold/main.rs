@@ -5,6 +5,7 @@
     reason = "clippy knows test functions, but not what they call"
 )]
 
+mod astray; // robots that are carried off
 mod budgets; // what is forgotten, and when
 mod checkpoint; // pages out and in, damaged ones too
 mod correction; // what others see of an agent

@@ -6,9 +6,9 @@ use serde::Serialize;
 use super::protocol::WakingProtocol;
 
 /// A robot that was put farther from where it is than this was put somewhere wrong \[m\].
-const FALSE_M: f64 = 0.5;
+pub(super) const FALSE_M: f64 = 0.5;
 /// One that is nearer at the end was found \[m\].
-const FOUND_M: f64 = 0.2;
+pub(super) const FOUND_M: f64 = 0.2;
 
 /// One robot that woke up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -97,7 +97,7 @@ impl WakingReport {
 }
 
 impl Spread {
-    fn of(values: impl Iterator<Item = f64>) -> Self {
+    pub(super) fn of(values: impl Iterator<Item = f64>) -> Self {
         let mut values: Vec<f64> = values.collect();
         values.sort_by(f64::total_cmp);
         let at = |percent: usize| {

@@ -46,6 +46,19 @@ pub fn run_waking(
     done: &(impl Fn() + Sync),
 ) -> Result<WakingReport, InvalidWaking> {
     protocol.check()?;
+    let trials = in_buildings(protocol, threads, done, &|site, number| {
+        site.wake(protocol, number, &mut Vec::new())
+    });
+    Ok(WakingReport::of(protocol, &trials))
+}
+
+/// Explores the buildings of a protocol, and makes its trials in them.
+pub(super) fn in_buildings<Trial: Send>(
+    protocol: &WakingProtocol,
+    threads: NonZeroUsize,
+    done: &(impl Fn() + Sync),
+    trial: &(impl Fn(&Site, u32) -> Trial + Sync),
+) -> Vec<Trial> {
     let buildings = protocol.trials.div_ceil(protocol.trials_per_building);
     let trials = in_parallel(buildings as usize, threads, &|building| {
         let before = u32::try_from(building).map_or(protocol.trials, |building| {
@@ -56,14 +69,13 @@ pub fn run_waking(
             .min(protocol.trials.saturating_sub(before));
         let site = Site::explored(protocol, protocol.seed.wrapping_add(building as u64));
         let trials = (0..count).map(|number| {
-            let trial = site.wake(protocol, number, &mut Vec::new());
+            let trial = trial(&site, number);
             done();
             trial
         });
         trials.collect::<Vec<_>>()
     });
-    let trials: Vec<WakingTrial> = trials.into_iter().flatten().collect();
-    Ok(WakingReport::of(protocol, &trials))
+    trials.into_iter().flatten().collect()
 }
 
 /// How long each view of the robots of a protocol takes to be taken in \[ms\], those after which it is asked where they are
@@ -83,27 +95,27 @@ pub fn time_waking(protocol: &WakingProtocol) -> Result<Vec<f64>, InvalidWaking>
 }
 
 /// A building that has been explored.
-struct Site {
+pub(super) struct Site {
     seed: u64,
     world: ObstacleWorld,
     building: Building,
-    map: CognitiveMap,
+    pub(super) map: CognitiveMap,
     /// Where the explorer was in each room.
     way: Vec<Vec<Vector3<f64>>>,
 }
 
 /// A robot in a room.
-struct Robot<'a> {
+pub(super) struct Robot<'a> {
     site: &'a Site,
-    room: usize,
-    walker: Walker,
+    pub(super) room: usize,
+    pub(super) walker: Walker,
     odometer: Odometer,
     eyes: ChaCha8Rng,
-    steps: u32,
+    pub(super) steps: u32,
 }
 
 impl Site {
-    fn explored(protocol: &WakingProtocol, seed: u64) -> Self {
+    pub(super) fn explored(protocol: &WakingProtocol, seed: u64) -> Self {
         let world = ObstacleWorld::new(seed);
         let building = Building::new(seed, protocol.rooms, world.side_m());
         let settings = Settings::new(SettingsValues::default())
@@ -141,7 +153,7 @@ impl Site {
         site
     }
 
-    fn random(&self, stream: u64) -> ChaCha8Rng {
+    pub(super) fn random(&self, stream: u64) -> ChaCha8Rng {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(stream);
         random
@@ -158,23 +170,38 @@ impl Site {
         }
     }
 
-    /// A robot wakes up and walks. Adds how long each of its views took.
-    fn wake(&self, protocol: &WakingProtocol, number: u32, took_ms: &mut Vec<f64>) -> WakingTrial {
+    /// A robot that wakes up somewhere.
+    pub(super) fn woken(&self, protocol: &WakingProtocol, number: u32) -> Robot<'_> {
         let stream = 1000 + 10 * u64::from(number);
         let mut random = self.random(stream);
         let room = random.random_range(0..protocol.rooms as usize);
-        let walker = (0..10_000)
-            .find_map(|_| {
-                let positions = &self.way[room];
-                let beside = Vector3::from_fn(|_, _| random.random_range(-BESIDE_M..BESIDE_M));
-                let position_m = positions[random.random_range(0..positions.len())] + beside;
-                let walker = Walker::new(&self.world, position_m, self.random(random.random()))?;
-                let height_m = walker.pose().translation.vector.z;
-                let is_low = height_m <= WAKES_BELOW * self.world.side_m();
-                (protocol.rooms == 1 || is_low).then_some(walker)
-            })
-            .expect("most of a room is free");
-        let mut robot = self.robot(room, walker, ODOMETRY, stream + 1);
+        let is_anywhere = protocol.rooms == 1;
+        let walker = self.somewhere(room, is_anywhere, &mut random);
+        self.robot(room, walker, ODOMETRY, stream + 1)
+    }
+
+    /// Somebody near to where the explorer was in a room, anywhere or where several rooms look alike.
+    pub(super) fn somewhere(
+        &self,
+        room: usize,
+        is_anywhere: bool,
+        random: &mut ChaCha8Rng,
+    ) -> Walker {
+        let found = (0..10_000).find_map(|_| {
+            let positions = &self.way[room];
+            let beside = Vector3::from_fn(|_, _| random.random_range(-BESIDE_M..BESIDE_M));
+            let position_m = positions[random.random_range(0..positions.len())] + beside;
+            let walker = Walker::new(&self.world, position_m, self.random(random.random()))?;
+            let height_m = walker.pose().translation.vector.z;
+            let is_low = height_m <= WAKES_BELOW * self.world.side_m();
+            (is_anywhere || is_low).then_some(walker)
+        });
+        found.expect("most of a room is free")
+    }
+
+    /// A robot wakes up and walks. Adds how long each of its views took.
+    fn wake(&self, protocol: &WakingProtocol, number: u32, took_ms: &mut Vec<f64>) -> WakingTrial {
+        let mut robot = self.woken(protocol, number);
         let mut map = self.map.clone();
         let agent = enrol(&mut map, "woken");
         let mut trial = WakingTrial::default();
@@ -204,7 +231,7 @@ impl Site {
 }
 
 impl Robot<'_> {
-    fn in_map(&self) -> Isometry3<f64> {
+    pub(super) fn in_map(&self) -> Isometry3<f64> {
         Translation3::from(self.site.building.corner_m(self.room)) * self.walker.pose()
     }
 
@@ -247,7 +274,7 @@ impl Robot<'_> {
         }
     }
 
-    fn step(&mut self, protocol: &WakingProtocol) -> Vec<Reading> {
+    pub(super) fn step(&mut self, protocol: &WakingProtocol) -> Vec<Reading> {
         let step = self.walker.step(&self.site.world);
         self.steps += 1;
         let stamp_ns = self.stamp_ns();
@@ -273,7 +300,7 @@ impl Robot<'_> {
     }
 }
 
-fn enrol(map: &mut CognitiveMap, name: &str) -> AgentId {
+pub(super) fn enrol(map: &mut CognitiveMap, name: &str) -> AgentId {
     let number = u32::try_from(map.agent_count()).expect("there are two agents at most");
     let agent = AgentId(number);
     let name = Label::new(name).expect("it is a label");
@@ -281,7 +308,7 @@ fn enrol(map: &mut CognitiveMap, name: &str) -> AgentId {
     agent
 }
 
-fn apply(map: &mut CognitiveMap, agent: AgentId, seq: u64, reading: &Reading) {
+pub(super) fn apply(map: &mut CognitiveMap, agent: AgentId, seq: u64, reading: &Reading) {
     let sample = Sample::try_from(reading).expect("a walk's readings are valid");
     let record = Record::Sample {
         agent,

@@ -2,7 +2,9 @@
 
 use std::num::NonZeroUsize;
 
-use super::{InvalidWaking, WakingProtocol, WakingReport, run_waking};
+use super::{
+    CarriedProtocol, InvalidWaking, WakingProtocol, WakingReport, run_carried, run_waking,
+};
 
 fn run(protocol: &WakingProtocol) -> WakingReport {
     run_waking(protocol, NonZeroUsize::MIN, &|| {}).unwrap()
@@ -73,4 +75,20 @@ fn senseless_protocols_are_refused() {
         ..few(1)
     };
     assert_eq!(refused(blind), InvalidWaking::View);
+}
+
+#[test]
+fn robots_that_are_carried_off_notice_it_and_those_that_are_not_do_not() {
+    let protocol = CarriedProtocol {
+        waking: WakingProtocol {
+            explorer_steps: 20_000,
+            ..few(4)
+        },
+        stay_m: 2.0,
+        after_m: 5.0,
+    };
+    let report = run_carried(&protocol, NonZeroUsize::MIN, &|| {}).unwrap();
+    assert!(report.localized >= 2, "{report:?}");
+    assert!(report.noticed >= 0.5, "{report:?}");
+    assert_eq!((report.alarms, report.false_claims), (0, 0));
 }

@@ -21,6 +21,8 @@ const NEAR_MAX: usize = 12;
 pub(super) const OPEN_MIN: f64 = 0.02;
 /// A point is known when no more than this is left open of what is seen there.
 const OPEN_MAX: f64 = 0.8;
+/// A point is well known when no more than this is.
+const KNOWN_MAX: f64 = 0.5;
 
 /// A view with the point from which it was seen.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +33,7 @@ pub(in crate::chronicle) struct Seen<'a> {
 
 /// The views about a point, ready for what was seen near it.
 #[derive(Clone, Debug)]
-pub(super) struct Neighbourhood {
+pub(in crate::chronicle) struct Neighbourhood {
     kernel: Kernel,
     points: Vec<Point3<f64>>,
     /// K⁻¹.
@@ -56,9 +58,18 @@ pub(super) struct Expectation {
     pub(super) hessian: Matrix3<f64>,
 }
 
+/// How a look is expected where somebody is believed to be.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::chronicle) struct Foreseen {
+    /// Part of what is seen that is left open.
+    pub(in crate::chronicle) open: f64,
+    /// Square of how far off it is, 1 on average.
+    pub(in crate::chronicle) off: f64,
+}
+
 impl Neighbourhood {
     /// The views about a point, for a look; `None` where there are none.
-    pub(super) fn of(
+    pub(in crate::chronicle) fn of(
         look: &[f32],
         about: &Point3<f64>,
         views: &[Seen<'_>],
@@ -99,6 +110,41 @@ impl Neighbourhood {
             gram,
             misfit,
         })
+    }
+
+    /// How a look is expected at a point that is known with a covariance \[m²\]; `None` where little is known. The expectation is the mean
+    /// over where the point may be, which is one with another kernel:
+    ///
+    /// ```text
+    /// k̃ = E k = c |I + Σ/ℓ²|^−½ exp(−½ dᵀ (ℓ²I + Σ)⁻¹ d)        open  1 − k̃ᵀ K⁻¹ k̃
+    /// ```
+    pub(in crate::chronicle) fn foresee(
+        &self,
+        at: &Point3<f64>,
+        covariance: &Matrix3<f64>,
+    ) -> Option<Foreseen> {
+        let known = DVector::from_fn(self.points.len(), |row, _| {
+            self.kernel.at((self.points[row] - at).norm_squared())
+        });
+        if (1.0 - known.dot(&(&self.inverse * &known))) * self.misfit > KNOWN_MAX {
+            return None;
+        }
+        let length_squared = self.kernel.length_m.powi(2);
+        let spread = Matrix3::identity() * length_squared + covariance;
+        let factor = spread.cholesky()?;
+        let share = (length_squared.powi(3) / factor.determinant()).sqrt();
+        let kernel = DVector::from_fn(self.points.len(), |row, _| {
+            let apart = self.points[row] - at;
+            self.kernel.likeness * share * (-0.5 * apart.dot(&factor.solve(&apart))).exp()
+        });
+        let open = (1.0 - kernel.dot(&(&self.inverse * &kernel))).max(OPEN_MIN) * self.misfit;
+        if open > OPEN_MAX {
+            return None;
+        }
+        let expected = kernel.dot(&(&self.gram * &kernel));
+        let squared = (1.0 - 2.0 * kernel.dot(&self.likeness) + expected).max(0.0);
+        let off = squared / open;
+        Some(Foreseen { open, off })
     }
 
     /// What the look says of a point; `None` where nothing is known. The point itself is known to `spread_m`.

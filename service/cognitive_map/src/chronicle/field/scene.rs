@@ -78,7 +78,7 @@ pub(in crate::chronicle) struct Evidence {
 
 impl Glimpse<'_> {
     /// Independent numbers of it that count beside others made so far from one another.
-    fn numbers(&self, spacing_m: f64) -> f64 {
+    pub(in crate::chronicle) fn numbers(&self, spacing_m: f64) -> f64 {
         self.kernel.map_or(0.0, |kernel| {
             kernel.numbers * (0.5 * spacing_m / kernel.length_m).min(COUNTED_MAX)
         })
@@ -190,14 +190,23 @@ impl<'a, About: Fn(&[Point3<f64>]) -> Views<'a>> Scene<'a, About> {
             let expected = near
                 .as_ref()?
                 .expect(&(pose * glimpse.at), glimpse.drift_m)?;
-            let tells =
-                0.5 * glimpse.numbers(spacing_m) * (1.0 - expected.off - expected.open.ln());
-            Some(((1.0 - WRONG) * tells.min(TELLS_MAX).exp() + WRONG).ln())
+            Some(told(
+                glimpse.numbers(spacing_m),
+                expected.open,
+                expected.off,
+            ))
         };
         Evidence {
             looks: self.glimpses.iter().zip(about).map(say).collect(),
         }
     }
+}
+
+/// What a look says for a point, against somewhere that nobody has seen \[nats\]: of so many numbers that count, where so much of it is
+/// left open and it is off by that square.
+pub(in crate::chronicle) fn told(numbers: f64, open: f64, off: f64) -> f64 {
+    let tells = 0.5 * numbers * (1.0 - off - open.ln());
+    ((1.0 - WRONG) * tells.min(TELLS_MAX).exp() + WRONG).ln()
 }
 
 impl Evidence {

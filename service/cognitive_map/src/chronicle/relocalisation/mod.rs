@@ -7,7 +7,9 @@
 //! says nothing. A pose is believed when no place elsewhere explains the looks about as well. Where exactly that is, all looks at
 //! once say, and the map must know it surely enough look by look, too ([`places`]).
 
+mod astray;
 mod birth;
+mod doubt;
 mod places;
 mod positions;
 mod problem;
@@ -15,5 +17,6 @@ mod relocalise;
 mod scene;
 mod search;
 
+pub(super) use doubt::Doubts;
 pub use relocalise::{Guess, Relocalised};
 pub(super) use search::Searches;

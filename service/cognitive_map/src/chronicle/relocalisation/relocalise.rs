@@ -11,7 +11,7 @@ use crate::geometry::PoseCovariance;
 use crate::geometry::se3;
 
 /// Motion between two looks \[m, rad\].
-const MOVED: (f64, f64) = (0.05, 0.2);
+pub(super) const MOVED: (f64, f64) = (0.05, 0.2);
 /// Looks after which poses are sought anew, before and after the agent was found.
 const FRESH: (u32, u32) = (2, 3);
 /// One that is not found for long asks more rarely: after so many looks it waits for one more each time.
@@ -225,7 +225,7 @@ impl Chronicle {
     }
 
     /// The number of the search of an agent in its present session; a new one if it has none.
-    fn search_of(&mut self, moment: &Moment) -> usize {
+    pub(super) fn search_of(&mut self, moment: &Moment) -> usize {
         let session = self.session(moment.agent);
         let fresh = Search::new(moment.agent, session, moment.seq);
         let revision = self.revision;

@@ -108,6 +108,12 @@ impl Search {
         since.is_some_and(|(way_m, found_m)| way_m - found_m >= on_m)
     }
 
+    /// Its looks have been compared with nothing that is remembered now, and poses are to be sought with the next one.
+    pub(super) fn await_comparison(&mut self, revisits: &Revisits) {
+        (self.compared, self.thinnings) = (0, revisits.thinnings);
+        self.fresh = u32::try_from(self.looks.len()).unwrap_or(u32::MAX);
+    }
+
     /// Compares the looks with what others have seen since they were made.
     pub(super) fn catch_up(&mut self, revisits: &Revisits) {
         let views = revisits.views.len() as u64;

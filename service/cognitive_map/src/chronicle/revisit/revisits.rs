@@ -258,6 +258,40 @@ impl Revisits {
         }
     }
 
+    /// Forgets what an agent saw in a session, from a sample on.
+    pub(in crate::chronicle) fn forget_since(
+        &mut self,
+        agent: u32,
+        session: u32,
+        since_seq: u64,
+        revision: u64,
+    ) {
+        let is_gone = |view: &View| view.is_of(agent, session, since_seq);
+        let Some(first) = self.views.iter().position(is_gone) else {
+            return;
+        };
+        // Others are at other numbers from now on.
+        self.thinnings += 1;
+        let mut kept = first;
+        for number in first..self.views.len() {
+            let Some(view) = self.views.get(number) else {
+                continue;
+            };
+            if is_gone(view) {
+                self.numbers -= view.vector.len() as u64;
+                continue;
+            }
+            let view = view.clone();
+            if let Some(slot) = self.views.get_mut(kept, revision) {
+                *slot = view;
+            }
+            kept += 1;
+        }
+        while self.views.len() > kept {
+            self.views.pop(revision);
+        }
+    }
+
     /// The number of a descriptor's channel; a new one if there is room for it.
     fn channel(&mut self, descriptor: &Descriptor) -> Option<u8> {
         let dimension = u16::try_from(descriptor.vector().len()).ok()?;
@@ -339,6 +373,11 @@ impl Revisits {
         likes.sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
         likes.truncate(ALIKE_MAX);
         likes
+    }
+
+    /// Whether two views of a channel are more alike than unrelated ones.
+    pub(in crate::chronicle) fn is_alike(&self, channel: u8, one: &[f32], other: &[f32]) -> bool {
+        self.distance(channel, angle_rad(one, other)).is_some()
     }
 
     /// How far apart two views of a channel were taken, if they are alike.

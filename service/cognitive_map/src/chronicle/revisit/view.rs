@@ -21,7 +21,7 @@ pub(in crate::chronicle) struct View {
     /// Where the agent was thought to be in the map.
     pub(in crate::chronicle) in_map: Point3<f64>,
     /// How sure it was of its place and heading then: roots of the traces of their covariances \[m, rad\].
-    pub(super) spread: [f64; 2],
+    pub(in crate::chronicle) spread: [f64; 2],
     /// What it saw, a unit vector.
     pub(in crate::chronicle) vector: Box<[f32]>,
 }
