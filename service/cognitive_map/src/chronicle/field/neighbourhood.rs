@@ -285,6 +285,49 @@ mod tests {
         }
     }
 
+    /// Against what is expected at points drawn from the covariance.
+    #[test]
+    fn what_is_foreseen_is_the_mean_over_where_the_point_may_be() {
+        let (at, points) = (Point3::new(0.1, 0.2, -0.1), points());
+        let near = neighbourhood(&view(&at), &points);
+        let exact = near.foresee(&at, &Matrix3::zeros()).unwrap();
+        let expected = near.expect(&at, 0.0).unwrap();
+        assert!((exact.open - expected.open).abs() < 1e-9);
+        assert!((exact.off - expected.off).abs() < 1e-6);
+        // Five points along each axis, by Gauss and Hermite: exact up to the ninth power.
+        let sd_m = 0.3;
+        let (nodes, weights) = (
+            [-2.856_970, -1.355_626, 0.0, 1.355_626, 2.856_970],
+            [
+                0.011_257_4,
+                0.222_075_9,
+                0.533_333_3,
+                0.222_075_9,
+                0.011_257_4,
+            ],
+        );
+        let mut mean = DVector::zeros(points.len());
+        for k in 0..125_usize {
+            let digits = [k % 5, k / 5 % 5, k / 25];
+            let off = Vector3::from_fn(|axis, _| sd_m * nodes[digits[axis]]);
+            let weight: f64 = digits.iter().map(|digit| weights[*digit]).product();
+            let kernel = near.points.iter().map(|point| {
+                let squared = (point - (at + off)).norm_squared();
+                weight * KERNEL.at(squared)
+            });
+            mean += DVector::from_iterator(points.len(), kernel);
+        }
+        let open = (1.0 - mean.dot(&(&near.inverse * &mean))) * near.misfit;
+        let unsure = Matrix3::identity() * sd_m * sd_m;
+        let foreseen = near.foresee(&at, &unsure).unwrap();
+        assert!(
+            (foreseen.open - open).abs() < 1e-3,
+            "{} {open}",
+            foreseen.open
+        );
+        assert!(foreseen.open > exact.open);
+    }
+
     #[test]
     fn far_from_all_views_nothing_is_expected() {
         let near = neighbourhood(&view(&Point3::origin()), &points());
