@@ -187,6 +187,10 @@ fn a_surprise_is_an_event_and_counted() {
         .declare_subscriber(events_key("default"))
         .wait()
         .unwrap();
+    // What is asked behind it is answered when the service knows of the subscription.
+    let nothing = Codec::Json.encode(&serde_json::json!({}));
+    let key = query_key("default", "predict");
+    raw.ask(&key, Codec::Json.encoding(), nothing).unwrap_err();
     let mut way = along_the_wall();
     let mut last = way.last().unwrap().stamp_ns;
     let taught = last;
