@@ -182,14 +182,13 @@ impl ObjectMemory {
         // Which of them it is should not depend on how far a visit went.
         let felt = { contacts.iter().step_by(step) }.map(|contact| contact.clone().aimed());
         let verdict = recognised(&parts, orientation, felt).verdict();
-        let known = self.get(id)?.clone();
         match verdict {
             Verdict::Object(TOGETHER) => {
-                let model = self.library.get(id)?.clone();
-                self.put(id, KnownObject { revision, ..known }, model, None, revision);
+                self.settle(id, revision);
                 None
             }
             Verdict::Object(_) => {
+                let known = self.get(id)?.clone();
                 let (visits, contacts) = joining.taught;
                 let mut left = KnownObject { revision, ..known };
                 left.visits = left.visits.saturating_sub(visits);

@@ -320,10 +320,7 @@ impl ObjectMemory {
         joining: Option<Joining>,
         revision: u64,
     ) {
-        let mut out = StateWriter::default();
-        model.write(&mut out);
-        joining.write(&mut out);
-        known.digest = out.digest().0;
+        known.digest = digest_of(&model, joining.as_ref());
         let joinings = Arc::make_mut(&mut self.joinings);
         match joining {
             Some(joining) => drop(joinings.insert(id, joining)),
@@ -332,6 +329,18 @@ impl ObjectMemory {
         Arc::make_mut(&mut self.library).put(id, model);
         Arc::make_mut(&mut self.known).insert(id, known);
         self.changed = revision;
+    }
+
+    /// What was joined last to an object is in doubt no more. What may be recognised stays as it is, and its index with it.
+    pub(super) fn settle(&mut self, id: ObjectId, revision: u64) {
+        let Some(model) = self.library.get(id) else {
+            return;
+        };
+        let digest = digest_of(model, None);
+        if let Some(known) = Arc::make_mut(&mut self.known).get_mut(&id) {
+            (known.digest, known.revision) = (digest, revision);
+        }
+        Arc::make_mut(&mut self.joinings).remove(&id);
     }
 
     pub(super) fn remove(&mut self, id: ObjectId, revision: u64) {
@@ -369,6 +378,14 @@ impl ObjectMemory {
             .into_iter()
             .find(|label| self.by_name(label).is_none())
     }
+}
+
+/// Digest of what an object is made of.
+fn digest_of(model: &ObjectModel, joining: Option<&Joining>) -> u128 {
+    let mut out = StateWriter::default();
+    model.write(&mut out);
+    joining.cloned().write(&mut out);
+    out.digest().0
 }
 
 /// What contacts say, and what would tell more.

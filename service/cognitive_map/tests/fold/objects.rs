@@ -344,6 +344,12 @@ fn a_visit_to_what_was_known_before_does_not_undo_what_was_added() {
         let events = visit(&mut map, &mut hand, identify(), &longer, &UP[..8]);
         assert_eq!(recognised(&events), ["fork"], "{events:?}");
     }
+    // A visit to all of it settles what was added.
+    let whole: Vec<usize> = (0..16).collect();
+    let events = visit(&mut map, &mut hand, identify(), &longer, &whole);
+    assert_eq!(recognised(&events), ["fork"], "{events:?}");
+    let restored = CognitiveMap::restore(Settings::default(), map.checkpoint(0)).unwrap();
+    assert_eq!(restored.digest(), map.digest());
     assert_eq!(map.object_places(fork).len(), longer.len());
     assert_eq!(map.object_count(), 3);
 }
