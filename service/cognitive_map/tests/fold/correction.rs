@@ -281,7 +281,7 @@ impl Circling {
 
     /// Is told where it was a round ago, off by some error.
     fn matched(&mut self, map: &mut CognitiveMap, error: &Isometry3<f64>) {
-        let (then, seq) = self.way[self.way.len() - 1 - 126];
+        let (then, seq) = self.way[self.way.len() - 1 - 127];
         let seen = error * self.driver.truth.inv_mul(&then);
         let noise = PoseNoise::new([0.03; 3], [0.02; 3]).unwrap();
         let at = (seen.translation.vector.into(), seen.rotation.coords.into());

@@ -69,12 +69,10 @@ fn off_m(found: &Likeness, frame: &Isometry3<f64>, points: &[Point3<f64>]) -> f6
     points.iter().map(off).fold(0.0, f64::max)
 }
 
-/// Whether the twins are the same points, or points so close to one another that it is open which is which: twins lie within
-/// three deviations of their difference, and each may be off by three deviations of its own (√3 along each axis).
+/// Whether the twins are the same points, or points so close to one another that it is open which is which.
 fn are_right(found: &Likeness, order: &[usize], points: &[Point3<f64>]) -> bool {
-    let most_m = (3.0 * 2.0_f64.sqrt() + 2.0 * 3.0) * SD_M;
     let off = |&(one, other): &(usize, usize)| (points[one] - points[order[other]]).norm();
-    found.twins.iter().all(|twin| off(twin) < most_m)
+    found.twins.iter().all(|twin| off(twin) < 8.0 * SD_M)
 }
 
 proptest! {
