@@ -61,6 +61,10 @@ $(VENV)/installed: $(CLIENT)/pyproject.toml
 	    --editable '$(CLIENT)[dev]' mypy pytest schemathesis
 	touch $@
 
+.PHONY: drills
+drills: release ## attacks and faults that take minutes, as JSON; DRILLS="NAME…" for some of them
+	COGMAP_BIN=$(TARGET)/release/cogmap cargo run --quiet --package cogmap-tests --bin drills -- $(DRILLS)
+
 .PHONY: demo
 demo: release ## the service with a simulated team of robots; ARGS="--robots 8 --duration 30"
 	$(TARGET)/release/cogmap demo $(ARGS)
