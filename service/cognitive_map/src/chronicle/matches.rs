@@ -10,7 +10,7 @@ use super::slots::NONE;
 use super::thinning::composed;
 use super::tie::{Standing, Tie};
 use crate::experience::{Graduation, Marginals, RelaxationSettings, Relaxed};
-use crate::geometry::{PoseCovariance, se3, upper_triangle};
+use crate::geometry::{PoseCovariance, is_somewhere, se3, upper_triangle};
 use crate::sample::Relation;
 
 /// Squared deviation up to which a match agrees with the map or with another match: a true one is farther off once in a
@@ -322,11 +322,13 @@ impl Chronicle {
     fn move_anchors(&mut self, graph: &Graph) {
         let revision = self.revision;
         for number in 0..self.anchors.numbers() {
-            let Some(node) = graph.poses.get(number as usize).copied().flatten() else {
+            let node = graph.poses.get(number as usize).copied().flatten();
+            let pose = node.map(|node| graph.map.pose(node));
+            let Some(pose) = pose.filter(|pose| is_somewhere(&pose.translation.vector)) else {
                 continue;
             };
             if let Some(anchor) = self.anchors.get_mut(number, revision) {
-                anchor.pose = *graph.map.pose(node);
+                anchor.pose = *pose;
                 anchor.is_in_map = true;
             }
         }

@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector4};
 
 use super::chronicle::Chronicle;
 use super::slots::NONE;
+use crate::geometry::is_somewhere;
 use crate::state::{CorruptState, State, StateReader, StateWriter};
 
 /// Moorings that are looked at after a motion while something is to be moved: what a relaxation has to move is
@@ -104,8 +105,10 @@ impl Chronicle {
             let Some(mooring) = self.moorings.get(self.swung) else {
                 continue;
             };
-            if let Some(at) = self.in_map(mooring.anchor) {
-                moved.push((mooring.place, at * mooring.offset.cast()));
+            let at = self.in_map(mooring.anchor);
+            let at = at.map(|at| at * mooring.offset.cast());
+            if let Some(at) = at.filter(|at| is_somewhere(&at.translation.vector)) {
+                moved.push((mooring.place, at));
             }
         }
         moved

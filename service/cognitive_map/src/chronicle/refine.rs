@@ -11,7 +11,7 @@ use crate::experience::{
     ExperienceMap, Freedom, Kernel, Link, LinkId, PointId, PoseId, PoseInformation,
     PositionInformation, Relaxed, Scale, SightingTarget,
 };
-use crate::geometry::PoseCovariance;
+use crate::geometry::{PoseCovariance, is_somewhere, positive};
 use crate::sample::Label;
 
 /// Least deviation of a motion, so that one that states none has an inverse \[m, rad\].
@@ -93,11 +93,18 @@ impl Chronicle {
         let marginals = graph.map.marginals();
         let mut landmarks: Vec<RefinedLandmark> = Vec::new();
         for (number, landmark) in self.landmarks.slots.iter() {
-            if let Some(point) = graph.points[number as usize] {
+            let Some(point) = graph.points[number as usize] else {
+                continue;
+            };
+            let position = graph.map.point(point);
+            if is_somewhere(&position.coords) {
+                let covariance = marginals
+                    .point(point)
+                    .map(|covariance| positive(&covariance));
                 landmarks.push(RefinedLandmark {
                     label: landmark.label.clone(),
-                    position: graph.map.point(point),
-                    covariance: marginals.point(point),
+                    position,
+                    covariance: covariance.filter(|known| known.iter().all(|x| x.is_finite())),
                 });
             }
         }
@@ -146,6 +153,7 @@ impl Chronicle {
                 .get(number)
                 .map_or(0, |previous| previous.until_ns);
         }
+        poses.retain(|refined| is_somewhere(&refined.pose.translation.vector));
         poses.reverse();
         RefinedAgent {
             is_in_map: life.is_in_map,

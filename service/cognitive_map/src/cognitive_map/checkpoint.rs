@@ -45,7 +45,7 @@ use crate::trip::LEG_PAGES_MAX;
 /// version 3 no joint estimate and no chronicle, version 4 no views in it and no objects, version 5 no searches,
 /// version 6 no other names of landmarks, version 7 none of what was joined into objects, version 8 no moorings and no
 /// doubts.
-const VERSION: u16 = 9;
+const VERSION: u16 = 10;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

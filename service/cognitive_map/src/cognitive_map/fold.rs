@@ -127,6 +127,11 @@ impl Fold<'_> {
     fn start_pose(&mut self, start: &StartPose) {
         self.end_trip(TripEnd::StartPose);
         self.estimator.start_pose(self.agent_id.0, start);
+        if !self.estimator.is_in_map(self.agent_id.0) {
+            // One that says that it may be anywhere has said nothing.
+            self.remember_who_was_set_aside();
+            return;
+        }
         self.chronicle.start_pose(&self.moment(), start);
         self.chronicle.end_search(self.agent_id.0);
         let seq = self.agent.next_seq.saturating_sub(1);
@@ -186,6 +191,9 @@ impl Fold<'_> {
     /// anew.
     pub(super) fn follow(&mut self) {
         let number = self.agent_id.0;
+        if !self.estimator.is_in_map(number) && self.agent.placed {
+            self.fall();
+        }
         if self.estimator.is_in_map(number) && !self.agent.placed {
             self.end_trip(TripEnd::StartPose);
             self.stand();
@@ -216,6 +224,14 @@ impl Fold<'_> {
         self.agent.place = None;
         self.agent.entered = None;
         self.agent.still_since = None;
+    }
+
+    /// Takes the agent out of the map, for it was set aside: it begins anew, as one that has just joined.
+    fn fall(&mut self) {
+        self.end_trip(TripEnd::Gap);
+        self.end_episode();
+        self.stand();
+        self.agent.placed = false;
     }
 
     /// Holds the places that the agent needs now, and releases those that it no longer does.

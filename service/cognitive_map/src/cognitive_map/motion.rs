@@ -23,6 +23,7 @@ impl Fold<'_> {
         let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
         let increment = motion.increment();
         let step = self.estimator.motion(agent.0, stamp_ns, motion);
+        self.remember_who_was_set_aside();
         self.chronicle.motion(
             &self.moment(),
             &step.increment,

@@ -82,6 +82,9 @@ impl CognitiveMap {
     /// How well an agent is localised.
     pub fn status(&self, agent: AgentId) -> Option<Status> {
         let position_sd_m = self.covariance(agent)?.position_sd_m();
+        if !self.estimator.is_in_map(agent.0) {
+            return Some(Status::Lost);
+        }
         Some(Status::of(
             self.agent(agent)?,
             position_sd_m,
@@ -230,7 +233,7 @@ impl CognitiveMap {
         Clock::at(self.revision, &self.settings)
     }
 
-    /// Number of landmarks.
+    /// Number of landmarks, those set aside included.
     pub fn landmark_count(&self) -> usize {
         let known = self.landmarks.landmarks().len();
         known
@@ -241,10 +244,20 @@ impl CognitiveMap {
                 .count()
     }
 
-    /// The landmarks, in the order of learning; one with several names once.
+    /// The landmarks, in the order of learning; one with several names once, and those that are set aside not at all.
     pub fn landmarks(&self) -> impl Iterator<Item = (LandmarkId, &Landmark)> {
         let landmarks = (0..).map(LandmarkId).zip(self.landmarks.landmarks().iter());
-        landmarks.filter(|(_, landmark)| self.is_named_so(landmark))
+        landmarks.filter(|(_, landmark)| self.is_told(landmark))
+    }
+
+    /// Whether a landmark goes by its label, and is not one that only an agent has seen which is set aside.
+    fn is_told(&self, landmark: &Landmark) -> bool {
+        self.is_named_so(landmark) && !self.is_aside(landmark)
+    }
+
+    fn is_aside(&self, landmark: &Landmark) -> bool {
+        let only = landmark.only();
+        only.is_some_and(|agent| self.estimator.is_aside(agent))
     }
 
     /// Whether a landmark goes by its label, and not by another name.
@@ -261,7 +274,7 @@ impl CognitiveMap {
         self.landmarks
             .after(label)
             .filter_map(|id| Some((id, self.landmarks.get(id)?)))
-            .filter(|(_, landmark)| self.is_named_so(landmark))
+            .filter(|(_, landmark)| self.is_told(landmark))
     }
 
     /// A landmark.
@@ -275,6 +288,7 @@ impl CognitiveMap {
         let id = self
             .landmarks
             .by_label(self.estimator.name_of(&known).as_str())?;
-        Some((id, self.landmarks.get(id)?))
+        let landmark = self.landmarks.get(id)?;
+        (!self.is_aside(landmark)).then_some((id, landmark))
     }
 }

@@ -22,9 +22,17 @@ impl Fold<'_> {
         }
     }
 
+    /// Remembers who was set aside with the latest call of the estimate.
+    pub(super) fn remember_who_was_set_aside(&mut self) {
+        for agent in self.estimator.take_set_aside() {
+            self.chronicle.set_aside(agent);
+        }
+    }
+
     /// Remembers the sightings of agents that counted with the latest call of the estimate, the landmarks that turned out to be one,
     /// and the frames that it laid into others.
     pub(super) fn remember_what_was_settled(&mut self) {
+        self.remember_who_was_set_aside();
         for settled in self.estimator.take_settled() {
             if settled.accepted {
                 self.chronicle.sighted(
@@ -68,6 +76,7 @@ impl Fold<'_> {
             if let Some(covariance) = correction.covariance {
                 self.estimator
                     .fix(correction.agent, &correction.pose, &covariance);
+                self.remember_who_was_set_aside();
             }
         }
     }

@@ -35,6 +35,7 @@ impl Fold<'_> {
         let taken = self
             .estimator
             .landmark(agent, self.stamp_ns, label, relation);
+        self.remember_who_was_set_aside();
         // It may just have turned out to be another one's.
         let name = self.estimator.name_of(label).clone();
         if taken.accepted {
@@ -47,7 +48,8 @@ impl Fold<'_> {
             && self.agent.placed
             && let Some(landmark) = self.landmarks.by_label(name.as_str())
         {
-            self.landmarks.see(landmark, self.stamp_ns, self.revision);
+            self.landmarks
+                .see(landmark, self.stamp_ns, agent, self.revision);
         }
     }
 
@@ -72,7 +74,8 @@ impl Fold<'_> {
                 self.landmarks.place(landmark, estimate, self.revision);
                 continue;
             }
-            let landmark = Landmark::learn(label.clone(), estimate, self.stamp_ns);
+            let only = self.estimator.only_observer(label);
+            let landmark = Landmark::learn(label.clone(), estimate, self.stamp_ns, only);
             if let Some(landmark) = self.landmarks.learn(landmark, self.revision) {
                 self.events.push(crate::event::Event {
                     agent: self.agent_id,

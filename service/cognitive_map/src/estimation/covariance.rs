@@ -2,7 +2,15 @@
 
 use std::sync::Arc;
 
+use std::ops::Range;
+
 use nalgebra::{SMatrix, SVector};
+
+/// Least variance of a component of a measurement that the estimate expects, as a part of the variances of whose differences it
+/// is made: below that it is rounding. A measurement then says at most so much more than was known.
+const CONDITION: f64 = 1e-8;
+/// By how much variances grow with each update, as a part of what they were: more than what rounding takes away.
+const ROUNDING: f64 = 1e-10;
 
 /// A covariance of any dimension, exactly symmetric, row by row. A clone shares the entries.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,6 +56,16 @@ impl JointCovariance {
     /// All entries, row by row.
     pub(super) fn entries(&self) -> &[f64] {
         &self.entries
+    }
+
+    /// Variance of a component.
+    pub(super) fn variance(&self, component: usize) -> f64 {
+        self.entries[component * self.dim + component]
+    }
+
+    /// All components.
+    pub(super) fn all(&self) -> Range<usize> {
+        0..self.dim
     }
 
     /// A row.
@@ -172,7 +190,16 @@ impl JointCovariance {
                 }
             }
         }
-        let spread = (spread + spread.transpose()) * 0.5;
+        let mut spread = (spread + spread.transpose()) * 0.5;
+        for block in blocks {
+            for column in 0..block.width {
+                let variance = self.variance(block.offset + column);
+                for k in 0..M {
+                    let factor = block.jacobian[(k, column)];
+                    spread[(k, k)] += CONDITION * factor * factor * variance;
+                }
+            }
+        }
         Projection { rows, spread }
     }
 
@@ -180,15 +207,21 @@ impl JointCovariance {
     /// the state, or `None` when S is not positive definite.
     ///
     /// ```text
-    /// S = L Lᵀ      W = P Hᵀ L⁻ᵀ      δ = W L⁻¹ ν      P ← P − W Wᵀ
+    /// S = L Lᵀ      W = P Hᵀ L⁻ᵀ      δ = W L⁻¹ ν      P ← P − W Wᵀ + ε diag P
     /// ```
     ///
-    /// Each entry of W Wᵀ is the same sum as its mirror image, so that P stays exactly symmetric.
+    /// Each entry of W Wᵀ is the same sum as its mirror image, so that P stays exactly symmetric. What rounding can take
+    /// away of it, to first order in the precision of a float and in units of the variances, is less than the ε that is
+    /// added, because S is not smaller than a part of the variances of whose differences it is made: so P stays positive.
+    ///
+    /// Of a measurement that is to correct some components only, the others and what ties them to one another stay as they
+    /// are (Schmidt 1966); P stays positive, too.
     pub(super) fn update<const M: usize>(
         &mut self,
         projection: Projection<M>,
         innovation: &SVector<f64, M>,
         innovation_covariance: &SMatrix<f64, M, M>,
+        corrected: &Range<usize>,
     ) -> Option<Vec<f64>> {
         let lower = innovation_covariance.cholesky()?.unpack();
         let mut rows = projection.rows;
@@ -215,7 +248,8 @@ impl JointCovariance {
         let dim = self.dim;
         let mut correction = vec![0.0; dim];
         for (row, factor) in rows.iter().zip(whitened.iter()) {
-            for (entry, value) in correction.iter_mut().zip(row) {
+            let corrections = correction[corrected.clone()].iter_mut();
+            for (entry, value) in corrections.zip(&row[corrected.clone()]) {
                 *entry += factor * value;
             }
         }
@@ -223,14 +257,22 @@ impl JointCovariance {
             .chunks_exact_mut(dim)
             .enumerate()
         {
+            let variance = target[index];
+            let columns = if corrected.contains(&index) {
+                0..dim
+            } else {
+                corrected.clone()
+            };
             for row in &rows {
                 let factor = row[index];
                 if factor != 0.0 {
-                    for (entry, value) in target.iter_mut().zip(row) {
+                    let entries = target[columns.clone()].iter_mut();
+                    for (entry, value) in entries.zip(&row[columns.clone()]) {
                         *entry -= factor * value;
                     }
                 }
             }
+            target[index] += ROUNDING * variance;
         }
         Some(correction)
     }
@@ -247,6 +289,7 @@ impl JointCovariance {
         let dim = self.dim;
         let own: SMatrix<f64, 3, 3> = self.block(source, source);
         let mut rows: [Vec<f64>; 3] = std::array::from_fn(|k| self.row(source + k).to_vec());
+        let variances: [f64; 3] = std::array::from_fn(|k| own[(k, k)]);
         for (k, row) in rows.iter_mut().enumerate() {
             for (other, lever) in levers.iter().enumerate() {
                 let half = 0.5 * own[(k, other)];
@@ -264,6 +307,9 @@ impl JointCovariance {
                 for ((entry, row), lever) in target.iter_mut().zip(row).zip(lever) {
                     *entry += by_lever * row + by_row * lever;
                 }
+            }
+            for (lever, variance) in levers.iter().zip(variances) {
+                target[index] += ROUNDING * lever[index] * lever[index] * variance;
             }
         }
     }

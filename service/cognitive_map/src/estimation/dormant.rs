@@ -22,6 +22,8 @@ pub(super) struct Dormant {
     pub(super) covariance: Matrix3<f64>,
     /// The sighting of the frame at which it left.
     pub(super) left: u64,
+    /// The one agent that had seen it until then, if there was one only.
+    pub(super) only: Option<u32>,
 }
 
 /// One part.
@@ -66,6 +68,11 @@ impl DormantMarks {
             self.insert(label, mark);
         }
         is_next
+    }
+
+    /// A landmark that sleeps here.
+    pub(super) fn get(&self, label: &Label) -> Option<&Dormant> {
+        self.parts.get(part_of(label))?.get(label)
     }
 
     /// Whether a landmark sleeps here.
@@ -114,6 +121,7 @@ mod tests {
             position: Point3::new(left as f64, 0.0, 0.0),
             covariance: Matrix3::identity(),
             left,
+            only: None,
         }
     }
 

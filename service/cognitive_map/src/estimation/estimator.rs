@@ -5,11 +5,12 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector6};
 
 use super::alias::Aliases;
-use super::frame::{Frame, MEMBERS_MAX};
+use super::aside::DOUBTED;
+use super::frame::{Frame, MEMBERS_MAX, Mark};
 use super::meeting::{Meeting, Pending};
 use super::mover::Mover;
 use super::outcome::{Evidence, Merged, Settled, Step, Taken};
-use super::parameters::Parameters;
+use super::parameters::{ANY_TURN_SD_RAD, Parameters};
 use super::resemblance::Resemblance;
 use super::seat::{Apart, Seat, Traveller};
 use super::sight::{Glance, Verdict};
@@ -52,6 +53,8 @@ pub struct Estimator {
     pub(super) merged: Vec<Merged>,
     /// What it found to be one landmark: the name that was given up, and the one that stays.
     pub(super) same: Vec<(Label, Label)>,
+    /// Whom it set aside.
+    pub(super) set_aside: Vec<u32>,
 }
 
 /// The frame of the map.
@@ -74,6 +77,7 @@ impl Estimator {
             settled: Vec::new(),
             merged: Vec::new(),
             same: Vec::new(),
+            set_aside: Vec::new(),
         }
     }
 
@@ -129,8 +133,21 @@ impl Estimator {
 
     /// An agent was told where it stands in the map.
     pub fn start_pose(&mut self, agent: u32, start: &StartPose) {
-        let covariance = PoseCovariance::from_sd(start.noise().sd());
+        self.begin();
+        let sd = start.noise().sd();
+        // No rotation is off by more than half a turn.
+        let sd = Vector6::from_fn(|k, _| {
+            if k < 3 {
+                sd[k]
+            } else {
+                sd[k].min(ANY_TURN_SD_RAD)
+            }
+        });
+        let covariance = PoseCovariance::from_sd(&sd);
         self.put(agent, start.pose(), covariance.matrix());
+        if self.mover(agent).is_some_and(Mover::is_nowhere) {
+            self.set_aside(agent);
+        }
     }
 
     /// Puts an agent somewhere in the map, by itself.
@@ -138,17 +155,11 @@ impl Estimator {
         let Some((from, traveller)) = self.leave(agent) else {
             return;
         };
-        self.frame_mut(from).population -= 1;
-        if from != MAP && self.frame(from).population == 0 {
-            // Nobody will ever tell where that frame lay.
-            *self.frame_mut(from) = Frame::default();
-            self.forget_meetings(from);
-        }
+        self.depart(from);
         self.frame_mut(MAP).population += 1;
+        let is_aside = self.is_aside(agent);
         let Traveller {
-            mover,
-            mut sensor,
-            refused: _,
+            mover, mut sensor, ..
         } = Arc::unwrap_or_clone(traveller);
         // Numbers of landmarks change.
         sensor.latest.clear();
@@ -156,6 +167,7 @@ impl Estimator {
             mover: mover.placed(*pose, covariance),
             sensor,
             refused: 0,
+            doubt: if is_aside { DOUBTED } else { 0 },
         };
         let seat = self.seat_mut(agent);
         seat.frame = MAP;
@@ -221,6 +233,9 @@ impl Estimator {
         seat.in_odom *= motion.increment();
         seat.in_odom.rotation.renormalize_fast();
         mover.history.note(stamp_ns, &seat.in_odom);
+        if mover.is_nowhere() {
+            self.set_aside(agent);
+        }
         if !self.pending.is_empty() {
             self.settle();
         }
@@ -239,11 +254,15 @@ impl Estimator {
         let Some((number, observer)) = self.admit(agent) else {
             return Taken::nothing();
         };
+        let called = label;
+        let label = &self.aliases.name_of(called).clone();
+        let is_aside = self.is_aside_for(agent, number, label);
         let Some(frame) = self.frames.get_mut(number, 0) else {
             return Taken::nothing();
         };
-        let called = label;
-        let label = &self.aliases.name_of(called).clone();
+        if is_aside {
+            frame.forget(label);
+        }
         let glance = Glance {
             observer,
             back: &Isometry3::identity(),
@@ -255,7 +274,11 @@ impl Estimator {
         let refused = frame.members[observer].traveller.refused;
         self.count(agent, weighed.verdict, refused);
         self.aliases.weigh(called, weighed.verdict, refused);
-        self.merge_with(agent, Some(label));
+        self.sweep(number);
+        self.judge(agent);
+        if self.frame_of(agent) == Some(number) {
+            self.merge_with(agent, Some(label));
+        }
         if self.frame_of(agent) == Some(number) {
             self.look_at_names(number, agent);
         }
@@ -271,6 +294,7 @@ impl Estimator {
         self.settled.clear();
         self.merged.clear();
         self.same.clear();
+        self.set_aside.clear();
     }
 
     /// Lets an agent take part in the joint estimate of its frame, as one that was just seen or saw;
@@ -305,7 +329,7 @@ impl Estimator {
     }
 
     /// Takes an agent out of its frame's joint estimate, without a place of its own for now.
-    fn leave(&mut self, agent: u32) -> Option<(usize, Arc<Traveller>)> {
+    pub(super) fn leave(&mut self, agent: u32) -> Option<(usize, Arc<Traveller>)> {
         let number = self.frame_of(agent)?;
         let traveller = match self.seat_mut(agent).apart.take() {
             Some(apart) => apart.traveller,
@@ -362,14 +386,19 @@ impl Estimator {
         frame.expect("a seat's frame is there")
     }
 
-    /// The body of an agent.
-    pub(super) fn mover(&self, agent: u32) -> Option<&Mover> {
+    /// What is known of an agent itself.
+    pub(super) fn traveller(&self, agent: u32) -> Option<&Traveller> {
         let seat = self.seat(agent)?;
         if let Some(apart) = &seat.apart {
-            return Some(&apart.traveller.mover);
+            return Some(&apart.traveller);
         }
         let frame = self.frame(seat.frame);
-        Some(frame.members[frame.member(agent)?].mover())
+        Some(&frame.members[frame.member(agent)?].traveller)
+    }
+
+    /// The body of an agent.
+    pub(super) fn mover(&self, agent: u32) -> Option<&Mover> {
+        Some(&self.traveller(agent)?.mover)
     }
 
     /// Number of the frame that an agent is in; the map's is 0.
@@ -437,12 +466,15 @@ impl Estimator {
     }
 
     /// The landmarks of the map that are estimated jointly now, by label: position \[m\] and covariance
-    /// \[m²\].
+    /// \[m²\]. Those that only agents have seen which are set aside are left out.
     pub fn landmarks(&self) -> impl Iterator<Item = (&Label, Point3<f64>, Matrix3<f64>)> {
         let frame = self.frame(MAP);
-        frame
-            .marks
-            .iter()
-            .map(|(label, mark)| (label, mark.position, frame.mark_covariance(mark)))
+        let is_aside = |mark: &Mark| {
+            mark.observers
+                .only()
+                .is_some_and(|agent| self.is_aside(agent))
+        };
+        let marks = frame.marks.iter().filter(move |(_, mark)| !is_aside(mark));
+        marks.map(|(label, mark)| (label, mark.position, frame.mark_covariance(mark)))
     }
 }

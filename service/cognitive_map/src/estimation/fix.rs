@@ -8,7 +8,7 @@ use super::covariance::Block;
 use super::estimator::Estimator;
 use super::frame::Frame;
 use super::parameters::Parameters;
-use crate::geometry::{PoseCovariance, se3};
+use crate::geometry::{PoseCovariance, is_somewhere, se3};
 
 /// Steps of the search for the weight.
 const WEIGHT_STEPS: u32 = 16;
@@ -31,6 +31,9 @@ impl Estimator {
         let Some(number) = self.frame_of(agent) else {
             return false;
         };
+        if !is_somewhere(&pose.translation.vector) {
+            return false;
+        }
         let told = Told { pose, covariance };
         if let Some(apart) = &mut self.seat_mut(agent).apart {
             let traveller = Arc::clone(&apart.traveller);
@@ -50,9 +53,11 @@ impl Estimator {
         let Some(frame) = self.frames.get_mut(number, 0) else {
             return false;
         };
-        frame
+        let is_taken = frame
             .member(agent)
-            .is_some_and(|index| frame.fix(index, &told, &self.parameters))
+            .is_some_and(|index| frame.fix(index, &told, &self.parameters));
+        self.sweep(number);
+        is_taken
     }
 }
 
@@ -143,8 +148,9 @@ impl Frame {
         };
         let projection = self.covariance.project(&[block]);
         let s = projection.spread + SMatrix::from_diagonal(&variance);
-        if let Some(correction) = self.covariance.update(projection, &residual, &s) {
-            self.correct(index, &correction);
+        let all = self.covariance.all();
+        if let Some(correction) = self.covariance.update(projection, &residual, &s, &all) {
+            self.correct(index, &correction, parameters);
         }
         true
     }

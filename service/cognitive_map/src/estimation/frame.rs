@@ -1,15 +1,18 @@
 //! One frame: the agents and landmarks whose errors are estimated together.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
-use super::covariance::JointCovariance;
+use super::covariance::{Block, JointCovariance};
 use super::dormant::{Dormant, DormantMarks};
-use super::mover::{BODY_DIM, Mover};
+use super::mover::{BODY_DIM, Mover, make_up_for_rounding};
 use super::observers::Observers;
+use super::parameters::{ANY_TURN_SD_RAD, Parameters};
 use super::seat::Traveller;
+use crate::geometry::{positive, se3};
 use crate::sample::Label;
 
 /// Agents whose errors are estimated jointly; of more, those that saw and were seen longest ago leave.
@@ -64,6 +67,11 @@ pub(super) struct Frame {
 }
 
 impl Member {
+    /// Its components of the joint error.
+    pub(super) fn components(&self) -> Range<usize> {
+        self.offset..self.offset + BODY_DIM
+    }
+
     /// Its body.
     pub(super) fn mover(&self) -> &Mover {
         &self.traveller.mover
@@ -116,7 +124,7 @@ impl Frame {
 
     /// Covariance of a landmark \[m²\].
     pub(super) fn mark_covariance(&self, mark: &Mark) -> Matrix3<f64> {
-        self.covariance.block(mark.offset, mark.offset)
+        positive(&self.covariance.block(mark.offset, mark.offset))
     }
 
     /// Whether all motion was in the plane.
@@ -167,6 +175,7 @@ impl Frame {
                     position: mark.position,
                     covariance: self.mark_covariance(&mark),
                     left: self.sightings,
+                    only: mark.observers.only(),
                 };
                 self.drop_components(mark.offset, MARK_DIM);
                 self.dormant.insert(label, dormant);
@@ -185,6 +194,48 @@ impl Frame {
                 let own = member.traveller.mover.covariance();
                 self.covariance.transform(member.offset, &transition, own);
             }
+        }
+        self.hold_turns();
+    }
+
+    /// Takes into account that no rotation is off by more than half a turn, wherever motion or doubt have made one less certain.
+    ///
+    /// It is a measurement that finds what is expected, so that all that is correlated with the rotation becomes more certain with
+    /// it.
+    fn hold_turns(&mut self) {
+        let most = ANY_TURN_SD_RAD * ANY_TURN_SD_RAD;
+        let turns = |member: &Member| member.offset + 3..member.offset + 6;
+        let turns: Vec<usize> = self.members.iter().flat_map(turns).collect();
+        let mut has_changed = false;
+        for component in turns {
+            let variance = self.covariance.variance(component);
+            if variance > 1.001 * most {
+                let mut jacobian = SMatrix::<f64, 1, 6>::zeros();
+                jacobian[0] = 1.0;
+                let block = Block {
+                    offset: component,
+                    width: 1,
+                    jacobian,
+                };
+                let projection = self.covariance.project(&[block]);
+                let noise = most * variance / (variance - most);
+                let s = projection.spread + SMatrix::<f64, 1, 1>::new(noise);
+                let all = self.covariance.all();
+                self.covariance
+                    .update(projection, &SVector::zeros(), &s, &all);
+                has_changed = true;
+            }
+        }
+        if has_changed {
+            self.tell_members();
+        }
+    }
+
+    /// Tells the members their own parts of the joint covariance.
+    fn tell_members(&mut self) {
+        for member in &mut self.members {
+            let own = self.covariance.block(member.offset, member.offset);
+            *member.traveller_mut().mover.covariance_mut() = own;
         }
     }
 
@@ -212,7 +263,17 @@ impl Frame {
     /// rotation (the right-invariant error of Barrau & Bonnabel 2015), which makes them independent of
     /// the estimate: a correction Δ of a position changes its error by θ × Δ. Without this, corrections
     /// would feign knowledge of the whole map's direction (Huang, Mourikis & Roumeliotis 2010).
-    pub(super) fn correct(&mut self, index: usize, correction: &[f64]) {
+    ///
+    /// Landmarks go along the arcs on which that rotation takes them, as they do in the group of that filter, and not along
+    /// tangents: or else each large correction of a rotation would enlarge the map.
+    ///
+    /// Answers how much of a correction of a position is left along the arc.
+    pub(super) fn correct(
+        &mut self,
+        index: usize,
+        correction: &[f64],
+        parameters: &Parameters,
+    ) -> Matrix3<f64> {
         let observer = &self.members[index];
         let world = observer
             .mover()
@@ -221,6 +282,9 @@ impl Frame {
             .to_rotation_matrix()
             .into_inner();
         let source = observer.offset + 3;
+        let turn = world * Vector3::from_fn(|k, _| correction[source + k]);
+        let along = |axis: Vector3<f64>| se3::exp(&axis, &turn).translation.vector;
+        let arc = Matrix3::from_columns(&[Vector3::x(), Vector3::y(), Vector3::z()].map(along));
         let mut levers: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; correction.len()]);
         let mut lever = |offset: usize, matrix: Matrix3<f64>| {
             for (column, lever) in levers.iter_mut().enumerate() {
@@ -234,7 +298,7 @@ impl Frame {
             let error = SVector::from_fn(|k, _| correction[member.offset + k]);
             let mover = &mut Arc::make_mut(&mut member.traveller).mover;
             let before = mover.pose;
-            mover.correct(&error);
+            mover.correct(&error, parameters);
             let moved = mover.pose.translation.vector - before.translation.vector;
             let to_body = before
                 .rotation
@@ -245,7 +309,7 @@ impl Frame {
             turns.push(mover.pose.rotation.inverse() * before.rotation);
         }
         for mark in Arc::make_mut(&mut self.marks).values_mut() {
-            let moved = Vector3::from_fn(|k, _| correction[mark.offset + k]);
+            let moved = arc * Vector3::from_fn(|k, _| correction[mark.offset + k]);
             mark.position += moved;
             lever(mark.offset, -(moved.cross_matrix() * world));
         }
@@ -257,11 +321,14 @@ impl Frame {
             axes.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
             axes.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
             let own = self.covariance.block(member.offset, member.offset);
-            let own = axes * own * axes.transpose();
+            let mut own = axes * own * axes.transpose();
+            let position = (0..3).map(|k| own[(k, k)]).sum();
+            let turn = (3..6).map(|k| own[(k, k)]).sum();
+            make_up_for_rounding(&mut own, position, turn);
             self.covariance.transform(member.offset, &axes, &own);
-            let own = self.covariance.block(member.offset, member.offset);
-            *member.traveller_mut().mover.covariance_mut() = own;
         }
+        self.tell_members();
+        arc
     }
 }
 

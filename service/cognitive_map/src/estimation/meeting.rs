@@ -7,7 +7,9 @@ use nalgebra::{Isometry3, Point3, Vector6};
 use super::estimator::{Estimator, MAP};
 use super::frame::{Frame, MEMBERS_MAX};
 use super::innovation::seen_at;
+use super::mover::Mover;
 use super::outcome::{Merged, Settled};
+use super::parameters::ANY_TURN_SD_RAD;
 use super::sight::{Glance, Verdict};
 use super::tie::{Pair, Tie, tie};
 use crate::geometry::{PoseCovariance, se3};
@@ -23,8 +25,6 @@ pub(super) const MEETINGS_MAX: usize = 64;
 const MEETING_APART_M: f64 = 0.2;
 /// Frames that are compared with an agent's own after one of its sightings. Of more, others come next.
 const COMPARED_MAX: usize = 16;
-/// Deviation of a turn of which nothing is known \[rad\].
-const ANY_TURN_SD_RAD: f64 = 3.0;
 
 /// A sighting of an agent that has not moved up to it yet.
 #[derive(Clone, Debug)]
@@ -135,6 +135,8 @@ impl Estimator {
                 accepted: weighed.verdict != Verdict::Refused,
                 variance: weighed.variance,
             });
+            self.sweep(number);
+            self.judge(pending.observer);
             return;
         }
         let pose_of = |frame: usize, index: usize| self.frame(frame).members[index].mover().pose;
@@ -181,7 +183,8 @@ impl Estimator {
         for other in others {
             let frame = self.frame(other);
             let knows = |frame: &Frame| label.is_none_or(|label| frame.marks.contains_key(label));
-            if other == own || frame.population == 0 || !knows(frame) {
+            let is_empty = frame.population == 0 && frame.marks.is_empty();
+            if other == own || is_empty || !knows(frame) {
                 continue;
             }
             let (older, newer) = (own.min(other), own.max(other));
@@ -221,6 +224,7 @@ impl Estimator {
         };
         if own == MAP {
             self.put(agent, pose, covariance.matrix());
+            self.seat_mut(agent).is_aside = false;
             return;
         }
         // The error ξ of the body is Ad(T_b) ξ of the frame.
@@ -265,6 +269,12 @@ impl Estimator {
                 apart.was_joint = true;
             }
         }
+        for &agent in &agents {
+            if older == MAP {
+                // What it has seen lies as the map has it.
+                self.seat_mut(agent).is_aside = false;
+            }
+        }
         while self.frame(older).members.len() > MEMBERS_MAX {
             self.dismiss(older);
         }
@@ -273,8 +283,14 @@ impl Estimator {
             frame: newer,
             into: older,
             pose: tie.pose,
-            agents,
+            agents: agents.clone(),
         });
+        self.sweep(older);
+        for agent in agents {
+            if self.mover(agent).is_some_and(Mover::is_nowhere) {
+                self.set_aside(agent);
+            }
+        }
     }
 
     /// Forgets the sightings between a frame and others, and how it resembles them.

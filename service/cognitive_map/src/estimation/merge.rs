@@ -125,6 +125,7 @@ impl Frame {
                 position: tie.pose * mark.position,
                 covariance: symmetric(&(rotation * spread * rotation.transpose())),
                 left: self.sightings,
+                only: mark.only,
             };
             self.dormant.insert(label.clone(), dormant);
         }
@@ -137,6 +138,9 @@ impl Frame {
         index: usize,
         parameters: &Parameters,
     ) {
+        if self.members.is_empty() {
+            return; // of nobody is there a rotation by which errors could be counted
+        }
         let (label, other) = &twins[index];
         if let Some(one) = Arc::make_mut(&mut self.marks).get_mut(label) {
             one.observers.join(&other.observers);
@@ -158,10 +162,11 @@ impl Frame {
             variance[k] += expected * (square / parameters.soft.powi(2) - 1.0).max(0.0);
         }
         let s = projection.spread + Matrix3::from_diagonal(&variance);
-        if let Some(correction) = self.covariance.update(projection, &innovation, &s) {
-            self.correct(0, &correction);
+        let all = self.covariance.all();
+        if let Some(correction) = self.covariance.update(projection, &innovation, &s, &all) {
+            let arc = self.correct(0, &correction, parameters);
             for (_, twin) in twins {
-                twin.position += Vector3::from_fn(|k, _| correction[twin.offset + k]);
+                twin.position += arc * Vector3::from_fn(|k, _| correction[twin.offset + k]);
             }
         }
     }

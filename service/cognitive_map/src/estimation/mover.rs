@@ -9,7 +9,7 @@ use super::history::History;
 use super::outcome::Step;
 use super::parameters::Parameters;
 use super::tie::{Tie, body_by_tie};
-use crate::geometry::{MotionSum, PoseCovariance, se3};
+use crate::geometry::{MotionSum, PoseCovariance, is_somewhere, positive, se3};
 use crate::sample::Motion;
 
 /// Components of a body's error: translation and rotation of the pose (right perturbation), then
@@ -27,6 +27,11 @@ type Tail = SMatrix<f64, POSE, CALIBRATION>;
 const RUN_STEPS_MAX: u32 = 64;
 /// Length of a run after which it is \[m\]: far from where it began, digits are lost.
 const RUN_LENGTH_MAX_M: f64 = 10.0;
+
+/// Deviation of a position from which on it says nothing \[m\]: the largest that settings may call lost.
+pub(super) const POSITION_SD_MAX_M: f64 = 1e6;
+/// Most that rounding takes away of a variance, as a part of those that it is made of.
+const ROUNDING: f64 = 1e-14;
 
 /// A body that moves.
 #[derive(Clone, Debug)]
@@ -123,7 +128,7 @@ impl Mover {
         } else {
             self.moved().0
         };
-        PoseCovariance::from_matrix(&covariance.fixed_view::<6, 6>(0, 0).into_owned())
+        PoseCovariance::from_matrix(&positive(&covariance.fixed_view::<6, 6>(0, 0).into_owned()))
     }
 
     /// Covariance of the body's error, which nothing waits to be added to.
@@ -209,7 +214,12 @@ impl Mover {
         );
         // Out of the plane a planar robot learns nothing, and so forgets nothing.
         let learns = SVector::<f64, CALIBRATION>::from([1.0, 1.0, free.x, free.y, free.z]);
-        let wander = wander.component_mul(&learns);
+        let mut wander = wander.component_mul(&learns);
+        let most = parameters.calibration_variance_max();
+        for k in 0..CALIBRATION {
+            let left = most[k] - self.settled[(POSE + k, POSE + k)] - self.run.wander[k];
+            wander[k] = wander[k].min(left.max(0.0));
+        }
         self.run.wander += wander;
         self.run.steps += 1;
         if self.run.steps >= RUN_STEPS_MAX
@@ -249,7 +259,8 @@ impl Mover {
             + mixed
             + mixed.transpose()
             + spread * run.tail.transpose();
-        let pose = back.times(&back.times(&gathered).transpose());
+        let mut pose = back.times(&back.times(&gathered).transpose());
+        back.make_up_for_rounding(&gathered, &mut pose);
         let cross = back.times(&(cross + spread));
         let mut covariance = self.settled;
         for row in 0..POSE {
@@ -299,15 +310,36 @@ impl Mover {
         transition
     }
 
-    /// Corrects the body by an estimated error.
-    pub(super) fn correct(&mut self, error: &SVector<f64, BODY_DIM>) {
+    /// Corrects the body by an estimated error. Lasting errors of odometry stay within what the settings allow.
+    pub(super) fn correct(&mut self, error: &SVector<f64, BODY_DIM>, parameters: &Parameters) {
         let linear = error.fixed_rows::<3>(0).into_owned();
         let angular = error.fixed_rows::<3>(3).into_owned();
         self.pose *= se3::exp(&linear, &angular);
         self.pose.rotation.renormalize_fast();
-        self.calibration.length += error[6];
-        self.calibration.angle += error[7];
-        self.calibration.bias_rad_s += error.fixed_rows::<3>(8);
+        let most = parameters.calibration_max();
+        let corrected = self.calibration.components() + error.fixed_rows::<CALIBRATION>(POSE);
+        let bounded = corrected.zip_map(&most, |error, most| error.clamp(-most, most));
+        self.calibration = Calibration::of_components(&bounded);
+    }
+
+    /// Whether the body may be anywhere, or is where nothing is: its pose then tells nobody anything.
+    ///
+    /// Cheap, for every motion asks: what the lasting errors of odometry add in the run under way does not count yet.
+    pub(super) fn is_nowhere(&self) -> bool {
+        let settled: f64 = (0..3).map(|k| self.settled[(k, k)]).sum();
+        let variance = settled + self.run.motion.position_variance();
+        // A number that is none fails all comparisons.
+        !(is_somewhere(&self.pose.translation.vector) && variance <= POSITION_SD_MAX_M.powi(2))
+    }
+}
+
+/// Adds to the variances of a pose what rounding may have taken away, as parts of the sums of variances that they were made
+/// of. What is known without error stays so.
+pub(super) fn make_up_for_rounding(covariance: &mut Matrix6<f64>, position: f64, turn: f64) {
+    for k in 0..6 {
+        if covariance.row(k).iter().any(|&entry| entry != 0.0) {
+            covariance[(k, k)] += ROUNDING * if k < 3 { position } else { turn };
+        }
     }
 }
 
@@ -326,6 +358,14 @@ impl Shift {
             .transpose();
         let lever = -(inverse * increment.translation.vector.cross_matrix());
         Self { inverse, lever }
+    }
+
+    /// Adds to the variances of what was moved what rounding may have taken away.
+    fn make_up_for_rounding(&self, from: &Matrix6<f64>, to: &mut Matrix6<f64>) {
+        let turn: f64 = (3..6).map(|k| from[(k, k)]).sum();
+        let lever = self.lever.norm_squared() * turn;
+        let position = lever + (0..3).map(|k| from[(k, k)]).sum::<f64>();
+        make_up_for_rounding(to, position, turn);
     }
 
     fn times<const C: usize>(&self, matrix: &SMatrix<f64, 6, C>) -> SMatrix<f64, 6, C> {

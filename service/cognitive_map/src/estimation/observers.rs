@@ -48,6 +48,14 @@ impl Observers {
         self.agents.binary_search(&agent).is_ok()
     }
 
+    /// The one agent that has seen it, if there is one only.
+    pub(super) fn only(&self) -> Option<u32> {
+        match self.agents[..] {
+            [agent] if !self.are_more => Some(agent),
+            _ => None,
+        }
+    }
+
     /// Whether nobody can have seen both.
     pub(super) fn is_apart_from(&self, others: &Self) -> bool {
         let are_known = !self.are_more && !others.are_more;

@@ -5,6 +5,15 @@ use nalgebra::{SVector, Vector6};
 use crate::sample::Motion;
 use crate::settings::Settings;
 
+/// Deviation of a turn of which nothing is known \[rad\]: no rotation is off by more than half a turn.
+pub(crate) const ANY_TURN_SD_RAD: f64 = 3.0;
+/// Farthest that a lasting error of odometry is believed to be from none, in the deviations that the settings state.
+const LASTING_DEVIATIONS_MAX: f64 = 8.0;
+/// Largest lasting error of lengths and of angles: with more, readings would say next to nothing, or the contrary.
+const LASTING_RATIO_MAX: f64 = 0.9;
+/// Largest deviation of a lasting error, in those that the settings state: it may wander, but not for ever.
+const WANDERED_MAX: f64 = 2.0;
+
 /// Physical parameters of the estimation, the same for every robot and every sensor.
 ///
 /// They are those of a modest wheeled robot with a camera. What a sample states about its own noise
@@ -72,6 +81,24 @@ impl Parameters {
         SVector::from([self.length_error_sd, self.angle_error_sd, bias, bias, bias])
     }
 
+    /// Largest lasting errors that are believed.
+    pub(super) fn calibration_max(&self) -> SVector<f64, 5> {
+        let most = self.calibration_sd() * LASTING_DEVIATIONS_MAX;
+        SVector::from_fn(|k, _| {
+            if k < 2 {
+                most[k].min(LASTING_RATIO_MAX)
+            } else {
+                most[k]
+            }
+        })
+    }
+
+    /// Largest variances of the calibration that its wandering leads to.
+    pub(super) fn calibration_variance_max(&self) -> SVector<f64, 5> {
+        let sd = self.calibration_sd() * WANDERED_MAX;
+        sd.component_mul(&sd)
+    }
+
     /// Variances that a motion adds to those of the calibration.
     pub(super) fn calibration_wander(
         &self,
@@ -96,7 +123,14 @@ impl Parameters {
     /// Motion that lies exactly in the body's x-y plane has no noise out of it.
     pub(crate) fn motion_noise_sd(&self, motion: &Motion) -> Vector6<f64> {
         if let Some(noise) = motion.noise() {
-            return *noise.sd();
+            let sd = noise.sd();
+            return Vector6::from_fn(|k, _| {
+                if k < 3 {
+                    sd[k]
+                } else {
+                    sd[k].min(ANY_TURN_SD_RAD)
+                }
+            });
         }
         let increment = motion.increment();
         let lengths = increment.translation.vector;

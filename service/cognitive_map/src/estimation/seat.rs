@@ -23,6 +23,8 @@ pub(super) struct Traveller {
     pub(super) sensor: Sensor,
     /// Sightings refused one after the other.
     pub(super) refused: u32,
+    /// How much its sightings contradict the estimate lately ([`aside`](super::aside)).
+    pub(super) doubt: u32,
 }
 
 /// An agent, in whatever frame.
@@ -34,6 +36,8 @@ pub(super) struct Seat {
     /// Stamp of its latest motion \[ns\].
     pub(super) stamp_ns: Option<i64>,
     pub(super) evidence: Evidence,
+    /// Whether it was set aside, and its evidence has not fitted since.
+    pub(super) is_aside: bool,
     /// The agent itself, while it does not take part in its frame's joint estimate.
     pub(super) apart: Option<Apart>,
 }
@@ -54,10 +58,12 @@ impl Seat {
             in_odom: Isometry3::identity(),
             stamp_ns: None,
             evidence: Evidence::default(),
+            is_aside: false,
             apart: Some(Apart::new(Arc::new(Traveller {
                 mover,
                 sensor: Sensor::default(),
                 refused: 0,
+                doubt: 0,
             }))),
         }
     }

@@ -16,6 +16,8 @@ const INTERVAL_S_MAX: f64 = 4.0;
 const SCALE_MAX: f64 = 25.0;
 /// Most by which the lasting error of distances exceeds the stated deviation.
 const LASTING_OVER_STATED_MAX: f64 = 3.0;
+/// Least sum of squares that a correlation is the quotient of.
+const SQUARE_MIN: f64 = 1e-12;
 /// Targets whose latest sighting is remembered.
 pub(super) const TARGETS_MAX: usize = 128;
 
@@ -87,7 +89,8 @@ impl Sensor {
 
     /// Correlation of successive errors of distance of one target, from 0 to 1.
     fn correlation(&self) -> f64 {
-        (self.product / self.square).clamp(0.0, 1.0)
+        // Where errors have been exactly zero for ever, nothing is left of what was assumed at first.
+        (self.product / self.square.max(SQUARE_MIN)).clamp(0.0, 1.0)
     }
 
     /// A sighting of a target was expected with these variances from the estimate alone (`spread`) and

@@ -1,5 +1,6 @@
 //! What a sighting does to a frame.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
@@ -10,12 +11,13 @@ use super::frame::{Frame, MARK_DIM, Mark, Member, point_by_pose, symmetric};
 use super::innovation::{PointInnovation, pose_innovation, seen_at};
 use super::observers::Observers;
 use super::parameters::Parameters;
+use super::seat::Traveller;
 use super::sensor::Seen;
 use crate::geometry::se3;
 use crate::sample::{Label, Relation, RelativePose};
 
 /// An agent whose sightings were refused this often in a row is not where it should be.
-const REFUSED_TO_WIDEN: u32 = 8;
+pub(super) const REFUSED_TO_WIDEN: u32 = 8;
 /// By how much its pose then becomes less certain \[m, rad\].
 const WIDENED: (f64, f64) = (1.0, 0.5);
 /// A landmark whose sightings were refused this often in a row, by agents that are where they should
@@ -92,14 +94,20 @@ impl Frame {
             side.block(&(innovation.by_point * point_by_pose(&expected))),
             point_block(mark.offset, &(innovation.by_point * to_body)),
         ];
-        let weighed = self.take_in(glance, &blocks, &innovation, Seen::Mark(mark.number));
+        let seen = Seen::Mark(mark.number);
+        let scope = Scope {
+            corrected: self.corrected_by(glance.observer),
+            counts: true,
+        };
+        let weighed = self.take_in(glance, &blocks, &innovation, seen, &scope);
         let observer_refused = self.members[glance.observer].traveller.refused;
         let sightings = self.sightings;
         let agent = self.members[glance.observer].agent;
+        let is_doubted = self.members[glance.observer].traveller.is_doubted();
         if let Some(mark) = Arc::make_mut(&mut self.marks).get_mut(label) {
             mark.used = sightings;
             if weighed.verdict == Verdict::Refused {
-                mark.refused += 1;
+                mark.refused += u32::from(!is_doubted);
             } else {
                 mark.refused = 0;
                 mark.observers.note(agent);
@@ -123,8 +131,10 @@ impl Frame {
         self.flush();
         let side = Side::new(&self.members[glance.observer], glance.back);
         let other = Side::new(&self.members[target], back);
+        let (corrected, counts) = self.corrected_between(glance.observer, target);
+        let scope = Scope { corrected, counts };
         let weighed = if let Relation::Pose(seen) = glance.relation {
-            self.see_pose(glance, &side, &other, seen)
+            self.see_pose(glance, [&side, &other], seen, &scope)
         } else {
             let expected = side.pose.inv_mul(&other.pose).translation.vector;
             let Some(innovation) = PointInnovation::new(glance.relation, &expected) else {
@@ -141,7 +151,7 @@ impl Frame {
                 other.block(&by_target),
             ];
             let seen = Seen::Agent(self.members[target].agent);
-            self.take_in(glance, &blocks, &innovation, seen)
+            self.take_in(glance, &blocks, &innovation, seen, &scope)
         };
         self.recover(glance.observer);
         weighed
@@ -186,7 +196,7 @@ impl Frame {
         Arc::make_mut(&mut self.marks).insert(label.clone(), mark);
         let verdict = match self.dormant.remove(label) {
             None => Verdict::Learned,
-            Some(dormant) => self.recall(glance.observer, offset, &dormant),
+            Some(dormant) => self.recall(glance, offset, &dormant),
         };
         Weighed { verdict, variance }
     }
@@ -199,7 +209,7 @@ impl Frame {
     /// ```text
     /// R⁻¹ = ½ (Σ_old⁻¹ − Σ_new⁻¹), as far as that is positive
     /// ```
-    fn recall(&mut self, observer: usize, offset: usize, dormant: &Dormant) -> Verdict {
+    fn recall(&mut self, glance: &Glance<'_>, offset: usize, dormant: &Dormant) -> Verdict {
         let accepted = Verdict::Accepted {
             nis: 0.0,
             components: 0,
@@ -234,8 +244,9 @@ impl Frame {
             return Verdict::Refused;
         }
         let s = spread + Matrix3::from_diagonal(&variances);
-        if let Some(correction) = self.covariance.update(projection, &innovation, &s) {
-            self.correct(observer, &correction);
+        let all = self.covariance.all();
+        if let Some(correction) = self.covariance.update(projection, &innovation, &s, &all) {
+            self.correct(glance.observer, &correction, glance.parameters);
         }
         accepted
     }
@@ -247,6 +258,7 @@ impl Frame {
         blocks: &[Block<3>],
         innovation: &PointInnovation,
         seen: Seen,
+        scope: &Scope,
     ) -> Weighed {
         let parameters = glance.parameters;
         let projection = self.covariance.project(blocks);
@@ -264,10 +276,13 @@ impl Frame {
             .iter()
             .all(|square| square.sqrt() <= parameters.gate)
         {
-            member.refused += 1;
+            scope.weigh(member, true, false);
             return weighed;
         }
-        member.refused = 0;
+        let fits = squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.soft);
+        scope.weigh(member, false, fits);
         member
             .sensor
             .note(seen, glance.stamp_ns, innovation, &spread, &variance);
@@ -280,9 +295,11 @@ impl Frame {
             *variance *= (square / parameters.soft.powi(2)).max(1.0);
         }
         let s = projection.spread + Matrix3::from_diagonal(&variance);
-        let update = self.covariance.update(projection, &innovation.residual, &s);
+        let corrected = &scope.corrected;
+        let update =
+            { &mut self.covariance }.update(projection, &innovation.residual, &s, corrected);
         if let Some(correction) = update {
-            self.correct(glance.observer, &correction);
+            self.correct(glance.observer, &correction, parameters);
         }
         let components = if is_flat { 2 } else { 3 };
         weighed.verdict = Verdict::Accepted { nis, components };
@@ -293,9 +310,9 @@ impl Frame {
     fn see_pose(
         &mut self,
         glance: &Glance<'_>,
-        side: &Side,
-        other: &Side,
+        [side, other]: [&Side; 2],
         seen: &RelativePose,
+        scope: &Scope,
     ) -> Weighed {
         let (residual, by_observer, by_target, variance) =
             pose_innovation(seen, &side.pose, &other.pose);
@@ -315,15 +332,19 @@ impl Frame {
             .iter()
             .all(|square| square.sqrt() <= parameters.gate)
         {
-            member.refused += 1;
+            scope.weigh(member, true, false);
             return weighed;
         }
-        member.refused = 0;
+        let fits = squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.soft);
+        scope.weigh(member, false, fits);
         let factors = squares.map(|square| (square / parameters.soft.powi(2)).max(1.0));
         let weighted = variance.component_mul(&factors);
         let s = projection.spread + SMatrix::from_diagonal(&weighted);
-        if let Some(correction) = self.covariance.update(projection, &residual, &s) {
-            self.correct(glance.observer, &correction);
+        let update = { &mut self.covariance }.update(projection, &residual, &s, &scope.corrected);
+        if let Some(correction) = update {
+            self.correct(glance.observer, &correction, parameters);
         }
         weighed.verdict = Verdict::Accepted {
             nis: squares.sum(),
@@ -337,6 +358,23 @@ impl Frame {
         if self.members[observer].traveller.refused >= REFUSED_TO_WIDEN {
             self.members[observer].traveller_mut().refused = 0;
             self.widen(observer, WIDENED.0, WIDENED.1);
+        }
+    }
+}
+
+/// What a sighting may do.
+#[derive(Clone, Debug)]
+struct Scope {
+    /// The components that it corrects.
+    corrected: Range<usize>,
+    /// Whether it speaks for or against its observer.
+    counts: bool,
+}
+
+impl Scope {
+    fn weigh(&self, observer: &mut Traveller, is_refused: bool, fits: bool) {
+        if self.counts {
+            observer.weigh(is_refused, fits);
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
+use super::positive::positive;
+
 /// Covariance of a pose T = T̂ exp(ξ), 6×6, order translation \[m²\], rotation \[rad²\] of ξ.
 ///
 /// ξ perturbs on the right, so its axes are those of the body. The matrix is exactly symmetric.
@@ -91,7 +93,7 @@ impl PoseCovariance {
             let block: Matrix3<f64> = self.0.fixed_view::<3, 3>(row, column).into_owned();
             rotation * block * inverse
         };
-        assemble(&block(0, 0), &block(0, 3), &block(3, 3))
+        positive(&assemble(&block(0, 0), &block(0, 3), &block(3, 3)))
     }
 
     /// Standard deviation of the position \[m\]: the square root of the position block's trace.

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 
 use super::covariance::PoseCovariance;
+use super::positive::positive;
 use super::se3;
 use crate::state::state_of_struct;
 
@@ -53,7 +54,12 @@ impl MotionSum {
     pub(crate) fn covariance(&self) -> PoseCovariance {
         let back = se3::adjoint(&self.motion.inverse());
         let moved = back * self.at_the_beginning() * back.transpose();
-        PoseCovariance::from_matrix(&((moved + moved.transpose()) * 0.5))
+        PoseCovariance::from_matrix(&positive(&((moved + moved.transpose()) * 0.5)))
+    }
+
+    /// Sum of the variances of where it led, about the axes of its beginning \[m²\].
+    pub(crate) fn position_variance(&self) -> f64 {
+        self.position.trace()
     }
 
     /// Covariance of the motion's error about the axes of its beginning.

@@ -57,9 +57,9 @@ impl LandmarkMap {
     }
 
     /// A landmark was seen again.
-    pub(crate) fn see(&mut self, landmark: LandmarkId, stamp_ns: i64, revision: u64) {
+    pub(crate) fn see(&mut self, landmark: LandmarkId, stamp_ns: i64, agent: u32, revision: u64) {
         if let Some(landmark) = self.landmarks.get_mut(landmark.0 as usize, revision) {
-            landmark.see(stamp_ns);
+            landmark.see(stamp_ns, agent);
         }
     }
 
@@ -156,7 +156,7 @@ mod tests {
             position: Point3::origin(),
             covariance: Matrix3::identity(),
         };
-        Landmark::learn(Label::new(label).unwrap(), estimate, 0)
+        Landmark::learn(Label::new(label).unwrap(), estimate, 0, None)
     }
 
     proptest! {

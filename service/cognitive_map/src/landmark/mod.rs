@@ -35,6 +35,8 @@ pub struct Landmark {
     sightings: u64,
     first_stamp_ns: i64,
     last_stamp_ns: i64,
+    /// The one agent that has seen it, by its number; none if there are several.
+    only: Option<u32>,
 }
 
 state_of_struct!(Landmark {
@@ -42,24 +44,32 @@ state_of_struct!(Landmark {
     estimate,
     sightings,
     first_stamp_ns,
-    last_stamp_ns
+    last_stamp_ns,
+    only
 });
 
 impl Landmark {
-    /// A landmark seen for the first time.
-    pub(crate) fn learn(label: Label, estimate: PositionEstimate, stamp_ns: i64) -> Self {
+    /// A landmark seen for the first time, by one agent or by several.
+    pub(crate) fn learn(
+        label: Label,
+        estimate: PositionEstimate,
+        stamp_ns: i64,
+        only: Option<u32>,
+    ) -> Self {
         Self {
             label,
             estimate,
             sightings: 1,
             first_stamp_ns: stamp_ns,
             last_stamp_ns: stamp_ns,
+            only,
         }
     }
 
-    /// The landmark was seen again.
-    pub(crate) fn see(&mut self, stamp_ns: i64) {
+    /// The landmark was seen again, by an agent of this number.
+    pub(crate) fn see(&mut self, stamp_ns: i64, agent: u32) {
         self.sightings += 1;
+        self.only = self.only.filter(|&only| only == agent);
         // The clocks of two agents may differ, so a later sighting may carry an earlier stamp.
         self.last_stamp_ns = self.last_stamp_ns.max(stamp_ns);
     }
@@ -69,6 +79,12 @@ impl Landmark {
         self.sightings = self.sightings.saturating_add(other.sightings);
         self.first_stamp_ns = self.first_stamp_ns.min(other.first_stamp_ns);
         self.last_stamp_ns = self.last_stamp_ns.max(other.last_stamp_ns);
+        self.only = self.only.filter(|_| self.only == other.only);
+    }
+
+    /// The one agent that has seen it, if there is one only.
+    pub(crate) fn only(&self) -> Option<u32> {
+        self.only
     }
 
     /// Label.

@@ -59,12 +59,14 @@ state_of_struct!(Mover {
 state_of_struct!(Traveller {
     mover,
     sensor,
-    refused
+    refused,
+    doubt
 });
 state_of_struct!(Dormant {
     position,
     covariance,
-    left
+    left,
+    only
 });
 
 impl State for History {
@@ -139,6 +141,7 @@ impl State for Seat {
         self.in_odom.write(out);
         self.stamp_ns.write(out);
         self.evidence.write(out);
+        self.is_aside.write(out);
         self.apart.write(out);
     }
 
@@ -148,6 +151,7 @@ impl State for Seat {
             in_odom: State::read(input)?,
             stamp_ns: State::read(input)?,
             evidence: State::read(input)?,
+            is_aside: State::read(input)?,
             apart: State::read(input)?,
         })
     }
@@ -377,6 +381,7 @@ impl State for Estimator {
             settled: Vec::new(),
             merged: Vec::new(),
             same: Vec::new(),
+            set_aside: Vec::new(),
         };
         if estimator.is_sound() {
             Ok(estimator)

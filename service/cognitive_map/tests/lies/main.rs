@@ -1,0 +1,12 @@
+//! Robots that lie: whatever valid samples say, numbers stay finite, covariances positive, honest robots localised.
+
+#![expect(
+    clippy::unwrap_used,
+    reason = "clippy knows test functions, but not what they call"
+)]
+
+mod contradiction; // one robot that contradicts itself
+mod liar; // samples of robots that lie
+#[path = "../seeded/mod.rs"]
+mod seeded;
+mod sound; // what holds of every map
