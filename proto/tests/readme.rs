@@ -113,6 +113,10 @@ fn the_limits_are_those_of_the_code() {
             "WATERMARK_REJECTIONS_MAX",
             format!("| {} |", limits::WATERMARK_REJECTIONS_MAX),
         ),
+        (
+            "SEQUENCE_LEAP_MAX",
+            format!("| {} |", limits::SEQUENCE_LEAP_MAX),
+        ),
     ];
     for (name, value) in rows {
         let row = README

@@ -61,6 +61,7 @@ pub(super) fn each(visit: &mut impl Visit) {
     );
     visit.message("predict_query_increment", &predict_query());
     visit.message("predict_query_velocity", &predict_query_by_velocity());
+    visit.message("watermark_sequence_leap", &watermark_after_a_leap());
     visit.message(
         "watermark_query",
         &WatermarkQuery {
@@ -113,6 +114,19 @@ fn watermark_with_gap() -> Watermark {
         applied: 50,
         gap: Some(SeqRange { from: 50, to: 60 }),
         rejected: rejected.collect(),
+    }
+}
+
+fn watermark_after_a_leap() -> Watermark {
+    Watermark {
+        rejected: vec![Rejection {
+            range: SeqRange {
+                from: 1 << 63,
+                to: (1 << 63) + 1,
+            },
+            reason: SkipReason::SequenceLeap,
+        }],
+        ..watermark()
     }
 }
 

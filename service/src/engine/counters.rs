@@ -171,6 +171,7 @@ impl SpaceCounters {
             SkipReason::InvalidDescriptor => "invalid_descriptor",
             SkipReason::InvalidLabel => "invalid_label",
             SkipReason::InvalidNormal => "invalid_normal",
+            SkipReason::SequenceLeap => "sequence_leap",
         };
         let space = self.space.clone();
         counter!(names::SKIPPED_SAMPLES, "space" => space, "reason" => reason).increment(samples);

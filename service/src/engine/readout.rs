@@ -219,7 +219,8 @@ pub(crate) fn skip_reason(reason: SkipReason) -> wire::SkipReason {
 /// Why samples are skipped, from the journal.
 pub(crate) fn skip_reason_of_wire(reason: wire::SkipReason) -> SkipReason {
     let invalid = match reason {
-        wire::SkipReason::Lost => return SkipReason::Lost,
+        // A leap is refused before the journal, and so never in it.
+        wire::SkipReason::Lost | wire::SkipReason::SequenceLeap => return SkipReason::Lost,
         wire::SkipReason::TimeBackwards => return SkipReason::TimeBackwards,
         wire::SkipReason::NumberOutOfRange => InvalidSample::NumberOutOfRange,
         wire::SkipReason::NonUnitQuaternion => InvalidSample::NonUnitQuaternion,

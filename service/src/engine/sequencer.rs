@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use cogmap_proto::SeqRange;
+use cogmap_proto::limits::SEQUENCE_LEAP_MAX;
 
 /// The order of one agent's samples.
 #[derive(Debug)]
@@ -19,11 +20,29 @@ pub(crate) struct Sequencer<T> {
     waiting: BTreeMap<u64, T>,
     /// What they take in memory.
     waiting_bytes: usize,
-    /// The number after the last sample that was dropped beyond the window, while it is missing.
+    /// The number after the last sample that was dropped for want of room, while it is missing.
     dropped_to: Option<u64>,
+    /// Samples that come from beyond the window.
+    leap: Option<Leap>,
     /// When the present gap was first seen, or last became smaller.
     gap_since: Option<Instant>,
 }
+
+/// Consecutive samples that begin beyond the window: those of a robot that no longer has the ones before, or of somebody who
+/// made a number up. The former keep coming.
+#[derive(Clone, Copy, Debug)]
+struct Leap {
+    from: u64,
+    to: u64,
+    /// How far ahead a sample could be and wait.
+    reach: u64,
+    /// When they were first offered, and last.
+    since: Instant,
+    latest: Instant,
+}
+
+/// Waits for which a leap is remembered that nothing follows: as long as a slow robot may take between two samples.
+const LEAP_WAITS: u32 = 8;
 
 /// Something that waits, and what it takes.
 pub(crate) trait Weight {
@@ -93,6 +112,7 @@ impl<T: Weight> Sequencer<T> {
             waiting: BTreeMap::new(),
             waiting_bytes: 0,
             dropped_to: None,
+            leap: None,
             gap_since: None,
         }
     }
@@ -134,7 +154,8 @@ impl<T: Weight> Sequencer<T> {
     /// The missing samples, if later ones wait for them or were dropped because too many would.
     pub(crate) fn gap(&self) -> Option<SeqRange> {
         let first = self.waiting.first_key_value().map(|(&first, _)| first);
-        let to = first.or(self.dropped_to)?;
+        let leap = self.leap.map(|leap| leap.to);
+        let to = first.or(self.dropped_to).or(leap)?;
         Some(SeqRange {
             from: self.next,
             to,
@@ -144,7 +165,14 @@ impl<T: Weight> Sequencer<T> {
     /// Whether a run of samples from `first` on can be taken whole, as it is: it begins with the next
     /// sample in order and no gap is open.
     pub(crate) fn is_next(&self, first: u64) -> bool {
-        first == self.next && self.waiting.is_empty() && self.dropped_to.is_none()
+        let is_whole = self.waiting.is_empty() && self.dropped_to.is_none() && self.leap.is_none();
+        first == self.next && is_whole
+    }
+
+    /// Whether a run of samples from `first` on leaps farther ahead than any loss explains. It is not to be offered.
+    pub(crate) fn is_out_of_reach(&self, first: u64, count: usize) -> bool {
+        let end = first.checked_add(count as u64);
+        end.is_none_or(|end| end.saturating_sub(self.next) > SEQUENCE_LEAP_MAX)
     }
 
     /// Takes a run for which [`Sequencer::is_next`] holds.
@@ -153,6 +181,8 @@ impl<T: Weight> Sequencer<T> {
     }
 
     /// Offers consecutive samples from `first` on; passes those that are in order now to `accept`.
+    ///
+    /// They must not be [out of reach](Self::is_out_of_reach).
     pub(crate) fn offer(
         &mut self,
         first: u64,
@@ -163,6 +193,7 @@ impl<T: Weight> Sequencer<T> {
     ) -> Offered {
         let mut offered = Offered::default();
         let before = self.next;
+        let is_leap = first.saturating_sub(self.next) >= window.samples as u64;
         for (seq, item) in (first..).zip(items) {
             let bytes = item.bytes();
             if seq < self.next || self.waiting.contains_key(&seq) {
@@ -179,9 +210,15 @@ impl<T: Weight> Sequencer<T> {
                 self.waiting_bytes += bytes;
                 offered.reordered += 1;
             } else {
-                self.dropped_to = self.dropped_to.max(Some(seq + 1));
+                if !is_leap {
+                    self.dropped_to = self.dropped_to.max(Some(seq + 1));
+                }
                 offered.beyond_window += 1;
             }
+        }
+        if is_leap && offered.beyond_window > 0 {
+            let reach = window.samples as u64;
+            self.note_leap(first, first + offered.beyond_window, reach, now);
         }
         self.note_gap(before, now);
         offered
@@ -189,6 +226,10 @@ impl<T: Weight> Sequencer<T> {
 
     /// Gives up a gap that has been waited for long enough: returns the lost range, and passes what
     /// waited for it to `accept`.
+    ///
+    /// One up to samples beyond the window is given up only if these have kept coming, one after the other or again, for half
+    /// of the wait; if they have not, they are forgotten. So a message with a number that somebody made up loses nobody's
+    /// samples.
     pub(crate) fn give_up(
         &mut self,
         timeout: Duration,
@@ -202,6 +243,16 @@ impl<T: Weight> Sequencer<T> {
             .is_none_or(|since| now.saturating_duration_since(since) < timeout)
         {
             return;
+        }
+        if let Some(leap) = self.leap.filter(|leap| leap.to == gap.to) {
+            let lasted = leap.latest.saturating_duration_since(leap.since);
+            if lasted < timeout / 2 {
+                if now.saturating_duration_since(leap.latest) >= timeout * LEAP_WAITS {
+                    self.leap = None;
+                    self.note_gap(self.next, now);
+                }
+                return;
+            }
         }
         lost(gap);
         self.next = gap.to;
@@ -222,9 +273,32 @@ impl<T: Weight> Sequencer<T> {
         }
     }
 
+    /// Samples came from beyond the window.
+    fn note_leap(&mut self, from: u64, to: u64, reach: u64, now: Instant) {
+        let known = self
+            .leap
+            .filter(|leap| (leap.from..=leap.to).contains(&from));
+        self.leap = Some(Leap {
+            from: known.map_or(from, |leap| leap.from),
+            to: known.map_or(to, |leap| leap.to.max(to)),
+            reach,
+            since: known.map_or(now, |leap| leap.since),
+            latest: now,
+        });
+    }
+
     /// Restarts the wait when the gap is new or has moved.
     fn note_gap(&mut self, before: u64, now: Instant) {
         self.dropped_to = self.dropped_to.filter(|&to| to > self.next);
+        if self.next != before
+            && let Some(leap) = self.leap.take()
+        {
+            // The robot goes on: what is ahead of it is missing if it is near, and else was not its own.
+            let is_near = leap.from.saturating_sub(self.next) < leap.reach;
+            if is_near && leap.to > self.next {
+                self.dropped_to = self.dropped_to.max(Some(leap.to));
+            }
+        }
         if self.gap().is_none() {
             self.gap_since = None;
         } else if self.gap_since.is_none() || self.next != before {
@@ -234,169 +308,4 @@ impl<T: Weight> Sequencer<T> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    const WINDOW: Window = Window {
-        samples: 32,
-        bytes: 32 * 8,
-    };
-
-    impl Weight for u64 {
-        fn bytes(&self) -> usize {
-            8
-        }
-    }
-
-    fn offer(
-        sequencer: &mut Sequencer<u64>,
-        first: u64,
-        count: u64,
-        got: &mut Vec<u64>,
-    ) -> Offered {
-        sequencer.offer(
-            first,
-            first..first + count,
-            WINDOW,
-            Instant::now(),
-            |seq, item| {
-                assert_eq!(seq, item, "each sample keeps its number");
-                got.push(item);
-            },
-        )
-    }
-
-    #[test]
-    fn a_gap_is_seen_and_filled() {
-        let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
-        offer(&mut sequencer, 0, 3, &mut got);
-        let offered = offer(&mut sequencer, 5, 2, &mut got);
-        assert_eq!(
-            (got.as_slice(), offered.reordered),
-            ([0, 1, 2].as_slice(), 2)
-        );
-        assert_eq!(sequencer.gap(), Some(SeqRange { from: 3, to: 5 }));
-        offer(&mut sequencer, 3, 2, &mut got);
-        assert_eq!(got, [0, 1, 2, 3, 4, 5, 6]);
-        assert_eq!(sequencer.gap(), None);
-    }
-
-    #[test]
-    fn a_gap_is_given_up_only_after_its_time_without_progress() {
-        let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
-        let start = Instant::now();
-        let timeout = Duration::from_secs(10);
-        let at = |s: u64| start + Duration::from_secs(s);
-        sequencer.offer(2, [2_u64], WINDOW, at(0), |_, item| got.push(item));
-        let mut lost = None;
-        sequencer.give_up(
-            timeout,
-            at(9),
-            |range| lost = Some(range),
-            |_, item| got.push(item),
-        );
-        assert_eq!((lost, got.len()), (None, 0));
-        // One missing sample comes: the wait begins anew.
-        sequencer.offer(0, [0], WINDOW, at(9), |_, item| got.push(item));
-        sequencer.give_up(
-            timeout,
-            at(18),
-            |range| lost = Some(range),
-            |_, item| got.push(item),
-        );
-        assert_eq!(lost, None);
-        sequencer.give_up(
-            timeout,
-            at(19),
-            |range| lost = Some(range),
-            |_, item| got.push(item),
-        );
-        assert_eq!(lost, Some(SeqRange { from: 1, to: 2 }));
-        assert_eq!((got.as_slice(), sequencer.next()), ([0, 2].as_slice(), 3));
-    }
-
-    #[test]
-    fn what_is_beyond_the_window_is_dropped_and_said() {
-        let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
-        let offered = offer(&mut sequencer, 1, 64, &mut got);
-        assert_eq!((offered.reordered, offered.beyond_window), (31, 33));
-        let waiting = sequencer.waiting();
-        assert_eq!((waiting.samples, waiting.bytes), (31, 31 * 8));
-        assert_eq!(sequencer.gap(), Some(SeqRange { from: 0, to: 1 }));
-        // With the missing one, those that waited follow; those that were dropped are missing now.
-        offer(&mut sequencer, 0, 1, &mut got);
-        assert_eq!(sequencer.gap(), Some(SeqRange { from: 32, to: 65 }));
-        offer(&mut sequencer, 32, 33, &mut got);
-        assert_eq!(got, (0..65).collect::<Vec<_>>());
-        assert_eq!((sequencer.gap(), sequencer.waiting()), (None, Window::NONE));
-    }
-
-    #[test]
-    fn what_waits_is_bounded_in_bytes() {
-        let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
-        let window = Window {
-            bytes: 20,
-            ..WINDOW
-        };
-        let offered = sequencer.offer(1, [1, 2, 3], window, Instant::now(), |_, item| {
-            got.push(item);
-        });
-        assert_eq!((offered.reordered, offered.beyond_window), (2, 1));
-    }
-
-    #[test]
-    fn a_gap_wider_than_the_window_is_given_up_too() {
-        let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
-        let timeout = Duration::from_secs(10);
-        let start = Instant::now();
-        let at = |s| start + Duration::from_secs(s);
-        sequencer.offer(1000, [1000_u64], WINDOW, at(0), |_, item| got.push(item));
-        sequencer.offer(1001, [1001], WINDOW, at(5), |_, item| got.push(item));
-        assert_eq!(sequencer.waiting(), Window::NONE);
-        assert_eq!(sequencer.gap(), Some(SeqRange { from: 0, to: 1002 }));
-        let mut lost = None;
-        sequencer.give_up(timeout, at(9), |range| lost = Some(range), |_, _| {});
-        assert_eq!(lost, None);
-        sequencer.give_up(timeout, at(10), |range| lost = Some(range), |_, _| {});
-        assert_eq!(lost, Some(SeqRange { from: 0, to: 1002 }));
-        // From here on the stream is taken again.
-        offer(&mut sequencer, 1002, 3, &mut got);
-        assert_eq!((got, sequencer.gap()), (vec![1002, 1003, 1004], None));
-    }
-
-    #[test]
-    fn a_newer_session_begins_at_zero_and_an_older_one_is_stale() {
-        let mut sequencer: Sequencer<u64> = Sequencer::new(7, 40);
-        assert_eq!(sequencer.order_of(7), SessionOrder::Current);
-        assert_eq!(sequencer.order_of(6), SessionOrder::Stale);
-        assert_eq!(sequencer.order_of(8), SessionOrder::Newer);
-        offer(&mut sequencer, 42, 2, &mut Vec::new());
-        assert_eq!(sequencer.begin(8).samples, 2);
-        assert_eq!(
-            (sequencer.session(), sequencer.next(), sequencer.gap()),
-            (8, 0, None)
-        );
-    }
-
-    proptest! {
-        /// Any order of overlapping runs inside the window gives every sample exactly once, in order.
-        #[test]
-        fn any_arrival_order_gives_one_order(
-            shuffle in Just((0..24_u64).collect::<Vec<_>>()).prop_shuffle(),
-            lengths in prop::collection::vec(1..8_u64, 24),
-        ) {
-            let (mut sequencer, mut got) = (Sequencer::new(1, 0), Vec::new());
-            let mut offered = 0;
-            let mut duplicates = 0;
-            for (&first, &length) in shuffle.iter().zip(&lengths) {
-                let length = length.min(24 - first);
-                offered += length;
-                duplicates += offer(&mut sequencer, first, length, &mut got).duplicates;
-            }
-            prop_assert_eq!(got, (0..24).collect::<Vec<_>>());
-            prop_assert_eq!(offered, 24 + duplicates);
-            prop_assert_eq!(sequencer.gap(), None);
-        }
-    }
-}
+mod tests;

@@ -45,6 +45,8 @@ class SkipReason(str, Enum):
     TIME_BACKWARDS = "time_backwards"
     #: A descriptor has a wrong length or no direction.
     INVALID_DESCRIPTOR = "invalid_descriptor"
+    #: The sample's number is more than 2**32 ahead of the next one in order.
+    SEQUENCE_LEAP = "sequence_leap"
     #: A channel, landmark, agent or marker label is empty, too long or has forbidden characters.
     INVALID_LABEL = "invalid_label"
     #: A surface normal is not a unit vector.

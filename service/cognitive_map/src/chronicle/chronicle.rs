@@ -190,28 +190,8 @@ impl Chronicle {
         }
     }
 
-    /// An agent was set aside: it begins anew in a frame of its own, and what it did and saw in the map no longer counts there.
-    pub fn set_aside(&mut self, agent: u32) {
-        let revision = self.revision;
-        let Some(life) = self.lives.get_mut(agent as usize, revision) else {
-            return;
-        };
-        life.is_in_map = false;
-        life.own_frame = None;
-        life.founds = false;
-        life.is_cut = true;
-        life.pose = Isometry3::identity();
-        let is_fresh = life.is_fresh;
-        self.revisits.cut(agent, revision);
-        self.waiting
-            .retain(|waiting| waiting.observer != agent && waiting.target != agent);
-        if !is_fresh {
-            self.anchor_anew(agent);
-        }
-    }
-
     /// The frame in which an agent was estimated turned out to lie in another one that is not the map's, there. Walks the
-    /// whole chain of the agent.
+    /// whole chain of the agent; anchors from before it was set aside stay in the map.
     pub fn carried(&mut self, agent: u32, frame: &Isometry3<f64>) {
         let revision = self.revision;
         let Some(life) = self.lives.get_mut(agent as usize, revision) else {
@@ -223,7 +203,6 @@ impl Chronicle {
         life.pose = frame * life.pose;
         let mut number = life.newest;
         while let Some(anchor) = self.anchors.get_mut(number, revision) {
-            // Those of an agent that was set aside lie in the map.
             if !anchor.is_in_map {
                 anchor.pose = frame * anchor.pose;
             }

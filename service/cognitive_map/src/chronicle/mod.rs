@@ -8,6 +8,7 @@
 //! to and from them are composed, and what hangs on them goes to a neighbour with the noise of the way there.
 
 mod anchor;
+mod aside;
 mod chain;
 mod checkpoint;
 #[allow(

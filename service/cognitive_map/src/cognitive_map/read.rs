@@ -250,14 +250,14 @@ impl CognitiveMap {
         landmarks.filter(|(_, landmark)| self.is_told(landmark))
     }
 
-    /// Whether a landmark goes by its label, and is not one that only an agent has seen which is set aside.
+    /// Whether a landmark goes by its label, and was not seen only by agents that are set aside.
     fn is_told(&self, landmark: &Landmark) -> bool {
         self.is_named_so(landmark) && !self.is_aside(landmark)
     }
 
     fn is_aside(&self, landmark: &Landmark) -> bool {
-        let only = landmark.only();
-        only.is_some_and(|agent| self.estimator.is_aside(agent))
+        let observers = landmark.observers();
+        observers.are_all(|agent| self.estimator.is_aside(agent))
     }
 
     /// Whether a landmark goes by its label, and not by another name.

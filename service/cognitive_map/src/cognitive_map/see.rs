@@ -74,8 +74,13 @@ impl Fold<'_> {
                 self.landmarks.place(landmark, estimate, self.revision);
                 continue;
             }
-            let only = self.estimator.only_observer(label);
-            let landmark = Landmark::learn(label.clone(), estimate, self.stamp_ns, only);
+            let observers = self.estimator.observers_of(label).cloned();
+            let landmark = Landmark::learn(
+                label.clone(),
+                estimate,
+                self.stamp_ns,
+                observers.unwrap_or_default(),
+            );
             if let Some(landmark) = self.landmarks.learn(landmark, self.revision) {
                 self.events.push(crate::event::Event {
                     agent: self.agent_id,

@@ -17,6 +17,7 @@ use nalgebra::{Isometry3, Matrix6};
 use super::estimator::{Estimator, MAP};
 use super::frame::{Frame, Mark};
 use super::mover::{Mover, POSITION_SD_MAX_M};
+use super::observers::Observers;
 use super::seat::{Apart, Traveller};
 use super::sight::REFUSED_TO_WIDEN;
 use crate::geometry::is_somewhere;
@@ -80,9 +81,9 @@ impl Estimator {
         self.seat(agent).is_some_and(|seat| seat.is_aside)
     }
 
-    /// The one agent that has seen a landmark of the map that is estimated jointly now, if there is one only.
-    pub fn only_observer(&self, label: &Label) -> Option<u32> {
-        self.frame(MAP).marks.get(label)?.observers.only()
+    /// The agents that have seen a landmark of the map that is estimated jointly now.
+    pub(crate) fn observers_of(&self, label: &Label) -> Option<&Observers> {
+        Some(&self.frame(MAP).marks.get(label)?.observers)
     }
 
     /// Takes which agents the latest call set aside. What is not taken is dropped by the next motion or sighting.
@@ -90,14 +91,18 @@ impl Estimator {
         std::mem::take(&mut self.set_aside)
     }
 
-    /// Whether a landmark of a frame was seen only by another agent that is set aside: then it is not there for this one.
+    /// Whether a landmark of a frame was seen only by others that are set aside: then it is not there for this agent.
     pub(super) fn is_aside_for(&self, agent: u32, number: usize, label: &Label) -> bool {
         let frame = self.frame(number);
-        let only = match frame.marks.get(label) {
-            Some(mark) => mark.observers.only(),
-            None => frame.dormant.get(label).and_then(|mark| mark.only),
-        };
-        only.is_some_and(|only| only != agent && self.is_aside(only))
+        let is_other = |other: u32| other != agent && self.is_aside(other);
+        match frame.marks.get(label) {
+            Some(mark) => mark.observers.are_all(is_other),
+            None => frame
+                .dormant
+                .get(label)
+                .and_then(|mark| mark.only)
+                .is_some_and(is_other),
+        }
     }
 
     /// Sets an agent aside if its evidence is absurd, and lets one be again whose evidence fits.

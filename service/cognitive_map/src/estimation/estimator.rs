@@ -466,14 +466,10 @@ impl Estimator {
     }
 
     /// The landmarks of the map that are estimated jointly now, by label: position \[m\] and covariance
-    /// \[m²\]. Those that only agents have seen which are set aside are left out.
+    /// \[m²\]. Those are left out that only agents have seen which are set aside.
     pub fn landmarks(&self) -> impl Iterator<Item = (&Label, Point3<f64>, Matrix3<f64>)> {
         let frame = self.frame(MAP);
-        let is_aside = |mark: &Mark| {
-            mark.observers
-                .only()
-                .is_some_and(|agent| self.is_aside(agent))
-        };
+        let is_aside = |mark: &Mark| mark.observers.are_all(|agent| self.is_aside(agent));
         let marks = frame.marks.iter().filter(move |(_, mark)| !is_aside(mark));
         marks.map(|(label, mark)| (label, mark.position, frame.mark_covariance(mark)))
     }

@@ -275,6 +275,8 @@ impl Estimator {
                 self.seat_mut(agent).is_aside = false;
             }
         }
+        let is_nowhere = |&agent: &u32| self.mover(agent).is_some_and(Mover::is_nowhere);
+        let (lost, agents) = agents.into_iter().partition::<Vec<u32>, _>(is_nowhere);
         while self.frame(older).members.len() > MEMBERS_MAX {
             self.dismiss(older);
         }
@@ -283,14 +285,12 @@ impl Estimator {
             frame: newer,
             into: older,
             pose: tie.pose,
-            agents: agents.clone(),
+            agents,
         });
-        self.sweep(older);
-        for agent in agents {
-            if self.mover(agent).is_some_and(Mover::is_nowhere) {
-                self.set_aside(agent);
-            }
+        for agent in lost {
+            self.set_aside(agent);
         }
+        self.sweep(older);
     }
 
     /// Forgets the sightings between a frame and others, and how it resembles them.

@@ -57,6 +57,7 @@ mod tie;
 
 pub use calibration::{Calibrated, Calibration};
 pub use estimator::Estimator;
+pub(crate) use observers::Observers;
 pub use outcome::{Evidence, Merged, Settled, Step, Taken};
 pub use parameters::Parameters;
 

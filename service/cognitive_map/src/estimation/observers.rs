@@ -7,7 +7,7 @@ pub(super) const OBSERVERS_MAX: usize = 8;
 ///
 /// Two landmarks that one agent has seen and called by different names are two.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Observers {
+pub(crate) struct Observers {
     /// Their numbers, ascending.
     pub(super) agents: Vec<u32>,
     /// Whether there were more, or who they were is forgotten: then it may have been anybody.
@@ -24,7 +24,7 @@ impl Observers {
     }
 
     /// An agent has seen it, too.
-    pub(super) fn note(&mut self, agent: u32) {
+    pub(crate) fn note(&mut self, agent: u32) {
         let Err(at) = self.agents.binary_search(&agent) else {
             return;
         };
@@ -36,7 +36,7 @@ impl Observers {
     }
 
     /// It is also what others have seen.
-    pub(super) fn join(&mut self, others: &Self) {
+    pub(crate) fn join(&mut self, others: &Self) {
         self.are_more |= others.are_more;
         for &agent in &others.agents {
             self.note(agent);
@@ -54,6 +54,12 @@ impl Observers {
             [agent] if !self.are_more => Some(agent),
             _ => None,
         }
+    }
+
+    /// Whether it is known who has seen it, and something holds of all of them.
+    pub(crate) fn are_all(&self, holds: impl Fn(u32) -> bool) -> bool {
+        let are_known = !self.are_more && !self.agents.is_empty();
+        are_known && self.agents.iter().all(|&agent| holds(agent))
     }
 
     /// Whether nobody can have seen both.

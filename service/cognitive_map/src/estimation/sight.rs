@@ -295,9 +295,8 @@ impl Frame {
             *variance *= (square / parameters.soft.powi(2)).max(1.0);
         }
         let s = projection.spread + Matrix3::from_diagonal(&variance);
-        let corrected = &scope.corrected;
-        let update =
-            { &mut self.covariance }.update(projection, &innovation.residual, &s, corrected);
+        let (joint, corrected) = (&mut self.covariance, &scope.corrected);
+        let update = joint.update(projection, &innovation.residual, &s, corrected);
         if let Some(correction) = update {
             self.correct(glance.observer, &correction, parameters);
         }
@@ -342,7 +341,8 @@ impl Frame {
         let factors = squares.map(|square| (square / parameters.soft.powi(2)).max(1.0));
         let weighted = variance.component_mul(&factors);
         let s = projection.spread + SMatrix::from_diagonal(&weighted);
-        let update = { &mut self.covariance }.update(projection, &residual, &s, &scope.corrected);
+        let (joint, corrected) = (&mut self.covariance, &scope.corrected);
+        let update = joint.update(projection, &residual, &s, corrected);
         if let Some(correction) = update {
             self.correct(glance.observer, &correction, parameters);
         }

@@ -147,6 +147,7 @@ impl LandmarkMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimation::Observers;
     use nalgebra::{Matrix3, Point3};
     use proptest::prelude::*;
     use std::collections::BTreeMap;
@@ -156,7 +157,12 @@ mod tests {
             position: Point3::origin(),
             covariance: Matrix3::identity(),
         };
-        Landmark::learn(Label::new(label).unwrap(), estimate, 0, None)
+        Landmark::learn(
+            Label::new(label).unwrap(),
+            estimate,
+            0,
+            Observers::default(),
+        )
     }
 
     proptest! {

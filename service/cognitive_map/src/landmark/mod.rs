@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Point3};
 
 pub(crate) use map::LandmarkMap;
 
+use crate::estimation::Observers;
 use crate::sample::Label;
 use crate::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
@@ -35,8 +36,7 @@ pub struct Landmark {
     sightings: u64,
     first_stamp_ns: i64,
     last_stamp_ns: i64,
-    /// The one agent that has seen it, by its number; none if there are several.
-    only: Option<u32>,
+    observers: Observers,
 }
 
 state_of_struct!(Landmark {
@@ -45,16 +45,16 @@ state_of_struct!(Landmark {
     sightings,
     first_stamp_ns,
     last_stamp_ns,
-    only
+    observers
 });
 
 impl Landmark {
-    /// A landmark seen for the first time, by one agent or by several.
+    /// A landmark seen for the first time.
     pub(crate) fn learn(
         label: Label,
         estimate: PositionEstimate,
         stamp_ns: i64,
-        only: Option<u32>,
+        observers: Observers,
     ) -> Self {
         Self {
             label,
@@ -62,14 +62,14 @@ impl Landmark {
             sightings: 1,
             first_stamp_ns: stamp_ns,
             last_stamp_ns: stamp_ns,
-            only,
+            observers,
         }
     }
 
     /// The landmark was seen again, by an agent of this number.
     pub(crate) fn see(&mut self, stamp_ns: i64, agent: u32) {
         self.sightings += 1;
-        self.only = self.only.filter(|&only| only == agent);
+        self.observers.note(agent);
         // The clocks of two agents may differ, so a later sighting may carry an earlier stamp.
         self.last_stamp_ns = self.last_stamp_ns.max(stamp_ns);
     }
@@ -79,12 +79,12 @@ impl Landmark {
         self.sightings = self.sightings.saturating_add(other.sightings);
         self.first_stamp_ns = self.first_stamp_ns.min(other.first_stamp_ns);
         self.last_stamp_ns = self.last_stamp_ns.max(other.last_stamp_ns);
-        self.only = self.only.filter(|_| self.only == other.only);
+        self.observers.join(&other.observers);
     }
 
-    /// The one agent that has seen it, if there is one only.
-    pub(crate) fn only(&self) -> Option<u32> {
-        self.only
+    /// The agents that have seen it.
+    pub(crate) fn observers(&self) -> &Observers {
+        &self.observers
     }
 
     /// Label.

@@ -1,9 +1,10 @@
 //! Samples of robots that lie: each one valid, together absurd.
 
+use cognitive_map::recognition::Orientation;
 use cognitive_map::{
-    AgentId, CognitiveMap, Descriptor, Event, Label, Level, Motion, PoseNoise, RangeBearing,
-    Record, Relation, RelativePose, RelativePosition, Sample, SampleBody, Sighting, StartPose,
-    Target,
+    AgentId, CognitiveMap, Descriptor, Event, Label, Level, Motion, ObjectMark, PoseNoise,
+    RangeBearing, Record, Relation, RelativePose, RelativePosition, Sample, SampleBody, Sighting,
+    Spacing, StartPose, Target, TouchNoise,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -75,9 +76,14 @@ impl Liar {
         events
     }
 
+    /// A tenth of a second passes.
+    pub(crate) fn wait(&mut self) {
+        self.stamp_ns += 100_000_000;
+    }
+
     /// Says anything.
     pub(crate) fn lie(&mut self, map: &mut CognitiveMap, random: &mut Seeded) -> Vec<Event> {
-        self.stamp_ns += 100_000_000;
+        self.wait();
         if self.temper.is_versatile && random.uniform() < 0.002 {
             self.session += 1;
             self.seq = 0;
@@ -111,6 +117,9 @@ impl Liar {
             let start = StartPose::new(translation_m, rotation, self.noise(random)).unwrap();
             return SampleBody::StartPose(start);
         }
+        if kind < 0.88 {
+            return SampleBody::Object(Self::mark(random));
+        }
         if kind < 0.93 {
             let value = (random.uniform() - 0.5) * 10_f64.powf(300.0 * random.uniform());
             let level = Level::new(label("touch"), value, self.point(random), None).unwrap();
@@ -125,6 +134,21 @@ impl Liar {
             .map(|_| (scale * (random.uniform() - 0.5)) as f32)
             .collect();
         SampleBody::Descriptor(Descriptor::new(label("camera"), &view).unwrap())
+    }
+
+    fn mark(random: &mut Seeded) -> ObjectMark {
+        let orientation = Orientation::Known;
+        let noise = TouchNoise::new(0.002, 0.03, 0.1).unwrap();
+        match index(random, 3) {
+            0 => ObjectMark::Learn {
+                name: Some(label("cup")),
+                spacing: Spacing::default(),
+                orientation,
+                noise,
+            },
+            1 => ObjectMark::Identify { orientation, noise },
+            _ => ObjectMark::End,
+        }
     }
 
     fn motion(&self, random: &mut Seeded) -> Motion {

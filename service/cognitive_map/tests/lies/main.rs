@@ -5,7 +5,8 @@
     reason = "clippy knows test functions, but not what they call"
 )]
 
-mod contradiction; // one robot that contradicts itself
+mod company; // honest robots beside liars
+mod contradiction; // robots that contradict themselves
 mod liar; // samples of robots that lie
 #[path = "../seeded/mod.rs"]
 mod seeded;

@@ -20,7 +20,14 @@ pub(crate) fn check(map: &CognitiveMap) -> Result<(), String> {
             return Err(format!("{id:?}: {status:?} with a deviation of {sd_m} m"));
         }
         finite("odometry", agent.odometry().translation.vector.as_slice())?;
-        finite("travelled", &[agent.travelled_m(), agent.displacement_m(), agent.turning_rad()])?;
+        finite(
+            "travelled",
+            &[
+                agent.travelled_m(),
+                agent.displacement_m(),
+                agent.turning_rad(),
+            ],
+        )?;
         finite("evidence", &[agent.evidence().nis])?;
     }
     for (_, landmark) in map.landmarks() {
@@ -124,12 +131,16 @@ where
     if covariance.diagonal().iter().any(|&x| x < 0.0) {
         return Err(format!("negative variances {:?}", covariance.diagonal()));
     }
-    let scale = covariance.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+    let scale = covariance
+        .diagonal()
+        .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
     let unit = SMatrix::<f64, N, N>::from_fn(|r, c| covariance[(r, c)] * scale[r] * scale[c]);
     finite("correlation", unit.as_slice())?;
     let least = unit.least_eigenvalue();
     if least < -ROUNDING {
-        return Err(format!("eigenvalue {least} of the correlations of {covariance}"));
+        return Err(format!(
+            "eigenvalue {least} of the correlations of {covariance}"
+        ));
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use cogmap_proto::{Codec, Sample, SampleBatch};
+use cogmap_proto::{Codec, Rejection, Sample, SampleBatch, SeqRange, SkipReason};
 use cognitive_map::{AgentId, Label, Record};
 
 use super::{AgentSlot, WAITING_MAX, Writer};
@@ -149,6 +149,11 @@ impl Writer {
 
     /// Puts a batch in order and journals what is. Returns the number of duplicates.
     fn take(&mut self, slot: usize, batch: SampleBatch, raw: Option<&[u8]>, now: Instant) -> u64 {
+        let count = batch.samples.len();
+        if { &self.agents[slot].sequencer }.is_out_of_reach(batch.first_seq, count) {
+            self.refuse_leap(slot, batch.session, batch.first_seq, count);
+            return 0;
+        }
         if self.agents[slot].sequencer.is_next(batch.first_seq)
             && self.take_whole(slot, &batch, raw)
         {
@@ -176,6 +181,22 @@ impl Writer {
         self.agents[slot].remind |= offered != Offered::default();
         self.accept(slot, session, accepted);
         offered.duplicates
+    }
+
+    /// Tells that samples leap too far ahead. The journal hears nothing of it, for nothing has changed.
+    fn refuse_leap(&mut self, slot: usize, session: u64, first: u64, count: usize) {
+        let range = SeqRange {
+            from: first,
+            to: first.saturating_add(count as u64),
+        };
+        let reason = SkipReason::SequenceLeap;
+        self.counters.skipped(count as u64, reason);
+        let slot = &mut self.agents[slot];
+        tracing::warn!(space = %self.shared.name, agent = slot.desk.name(), session,
+            from = range.from, next = slot.sequencer.next(), "samples too far ahead refused");
+        slot.remind = true;
+        let rejection = Rejection { range, reason };
+        slot.desk.marks().rejected(session, rejection);
     }
 
     /// The common case: the batch continues the session and every sample makes sense, so it goes to

@@ -175,6 +175,22 @@ impl State for Member {
     }
 }
 
+impl State for Observers {
+    fn write(&self, out: &mut StateWriter) {
+        write_all(self.agents.len(), &self.agents, out);
+        self.are_more.write(out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        let observers = Self {
+            agents: read_all(input, OBSERVERS_MAX)?,
+            are_more: State::read(input)?,
+        };
+        let are_sorted = observers.agents.is_sorted_by(|one, next| one < next);
+        are_sorted.then_some(observers).ok_or(CorruptState::Invalid)
+    }
+}
+
 impl State for Mark {
     fn write(&self, out: &mut StateWriter) {
         self.number.write(out);
@@ -182,8 +198,7 @@ impl State for Mark {
         write_count(self.offset, out);
         self.used.write(out);
         self.refused.write(out);
-        write_all(self.observers.agents.len(), &self.observers.agents, out);
-        self.observers.are_more.write(out);
+        self.observers.write(out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
@@ -193,10 +208,7 @@ impl State for Mark {
             offset: read_count(input, DIM_MAX)?,
             used: State::read(input)?,
             refused: State::read(input)?,
-            observers: Observers {
-                agents: read_all(input, OBSERVERS_MAX)?,
-                are_more: State::read(input)?,
-            },
+            observers: State::read(input)?,
         })
     }
 }
@@ -277,14 +289,13 @@ impl State for Frame {
         };
         // Everybody has components of his own, and there are no others.
         let bodies = frame.members.iter().map(|member| (member.offset, BODY_DIM));
-        let are_sorted = |mark: &Mark| mark.observers.agents.is_sorted_by(|one, next| one < next);
         let marks = frame.marks.values().map(|mark| (mark.offset, MARK_DIM));
         let mut parts: Vec<(usize, usize)> = bodies.chain(marks).collect();
         parts.sort_unstable();
         let end = parts.iter().try_fold(0, |end, &(offset, width)| {
             (offset == end).then_some(end + width)
         });
-        if end == Some(frame.covariance.dim()) && frame.marks.values().all(are_sorted) {
+        if end == Some(frame.covariance.dim()) {
             Ok(frame)
         } else {
             Err(CorruptState::Invalid)
