@@ -1,4 +1,5 @@
-"""Errors that a caller may want to tell apart. Failures of the network itself stay `OSError`."""
+"""Errors that a caller may want to tell apart. Each is a `CogmapError`, and where the standard library has an
+error for the same thing, that one too."""
 
 from __future__ import annotations
 
@@ -9,8 +10,27 @@ class CogmapError(Exception):
     """Parent of every error of this package."""
 
 
+class InvalidValue(CogmapError, ValueError):
+    """A value that was handed over makes no sense; nothing of the call was taken in.
+
+    `field` names it, for example `translation_m[1]`, and `value` is what was given.
+    """
+
+    def __init__(
+        self, field: str, value: object, expected: str, found: Optional[str] = None
+    ) -> None:
+        shown = _short(repr(value)) if found is None else found
+        super().__init__(f"{field}: {expected}, not {shown}")
+        self.field = field
+        self.value = value
+
+
 class WireError(CogmapError, ValueError):
-    """A message is not what its type says, or a sample cannot be written."""
+    """A message that came is not what its type says."""
+
+
+class Unreachable(CogmapError, ConnectionError):
+    """Nothing answers at an address, or the connection broke."""
 
 
 class Timeout(CogmapError, TimeoutError):
@@ -72,3 +92,8 @@ class ApiError(CogmapError):
         self.detail = detail
         #: Further members of the problem, for example `expected_seq` after a gap in posted samples.
         self.extra: Mapping[str, Any] = dict(extra or {})
+
+
+def _short(shown: str) -> str:
+    """At most some hundred characters: a value may be a whole image descriptor."""
+    return shown if len(shown) <= 120 else f"{shown[:100]}... ({len(shown)} characters)"

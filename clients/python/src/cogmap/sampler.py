@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Iterable, Optional, Union
+from typing import Iterable, Optional, Tuple, Union, cast
 
 from .sample import (
     Descriptor,
@@ -26,7 +26,7 @@ from .sample import (
     TouchNoise,
     Velocity,
 )
-from .vector import IDENTITY, quaternion, single_precision, vec3
+from .vector import IDENTITY, Quaternion, Vec3
 
 
 class Sampler(ABC):
@@ -34,6 +34,9 @@ class Sampler(ABC):
 
     Each returns the sample's sequence number. `stamp_ns` is the time on the sensor's clock; without it,
     the time of the call, though never before an earlier stamp of the session.
+
+    Any iterable of numbers is a vector, a numpy array included; the messages turn it into a tuple of
+    floats. A value that the service would refuse for good raises `InvalidValue`, and no sample is made.
     """
 
     def __init__(self, motion_noise: Optional[MotionNoise]) -> None:
@@ -53,8 +56,8 @@ class Sampler(ABC):
     ) -> int:
         """Motion as a displacement since the previous motion sample, in the body frame at its start."""
         body = Increment(
-            vec3("translation_m", translation_m),
-            quaternion("rotation_xyzw", rotation_xyzw),
+            cast(Vec3, translation_m),
+            cast(Quaternion, rotation_xyzw),
             noise if noise is not None else self._motion_noise,
         )
         return self._send(body, stamp_ns)
@@ -70,8 +73,8 @@ class Sampler(ABC):
     ) -> int:
         """Motion as a body twist held over the `duration_s` that end at the stamp."""
         body = Velocity(
-            vec3("linear_m_s", linear_m_s),
-            vec3("angular_rad_s", angular_rad_s),
+            cast(Vec3, linear_m_s),
+            cast(Vec3, angular_rad_s),
             duration_s,
             noise if noise is not None else self._motion_noise,
         )
@@ -90,8 +93,8 @@ class Sampler(ABC):
         body = Level(
             channel,
             value,
-            vec3("offset_m", offset_m),
-            None if normal is None else vec3("normal", normal),
+            cast(Vec3, offset_m),
+            None if normal is None else cast(Vec3, normal),
         )
         return self._send(body, stamp_ns)
 
@@ -99,7 +102,7 @@ class Sampler(ABC):
         self, channel: str, vector: Iterable[float], *, stamp_ns: Optional[int] = None
     ) -> int:
         """A direction in descriptor space seen on a channel: 8 to 4096 numbers."""
-        return self._send(Descriptor(channel, single_precision("vector", vector)), stamp_ns)
+        return self._send(Descriptor(channel, cast(Tuple[float, ...], vector)), stamp_ns)
 
     def sighting(
         self, target: Union[str, Target], relation: Relation, *, stamp_ns: Optional[int] = None
@@ -119,9 +122,7 @@ class Sampler(ABC):
         noise: Optional[MotionNoise] = None,
     ) -> int:
         """Where the agent stands in `map`, told from outside; exact unless `noise` is given."""
-        body = StartPose(
-            vec3("translation_m", translation_m), quaternion("rotation_xyzw", rotation_xyzw), noise
-        )
+        body = StartPose(cast(Vec3, translation_m), cast(Quaternion, rotation_xyzw), noise)
         return self._send(body, stamp_ns)
 
     def marker(self, label: str, *, ends_trip: bool = False, stamp_ns: Optional[int] = None) -> int:

@@ -18,6 +18,8 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Deque, List, Optional, Tuple
 
+from .scalar import whole, within
+
 
 @dataclass(frozen=True)
 class WindowLimits:
@@ -43,12 +45,11 @@ class WindowLimits:
     gap_interval_s: float = 0.2
 
     def __post_init__(self) -> None:
-        if min(self.capacity_samples, self.capacity_bytes, self.batch_bytes) < 1:
-            raise ValueError("the window needs room for at least one sample")
-        if not 1 <= self.batch_samples <= 4096:
-            raise ValueError("batch_samples: 1 to 4096")
-        if not 0 <= self.batch_delay_s < float("inf"):
-            raise ValueError("batch_delay_s: at least 0")
+        bounds = (1, 1 << 62)
+        whole("window_samples", self.capacity_samples, bounds)
+        whole("window_bytes", self.capacity_bytes, bounds)
+        whole("batch_samples", self.batch_samples, (1, 4096))
+        within("batch_delay_s", self.batch_delay_s, 0.0, 3600.0)
 
 
 @dataclass(frozen=True)
