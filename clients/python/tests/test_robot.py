@@ -448,5 +448,5 @@ def test_no_router_is_a_timeout() -> None:
 
 @pytest.mark.parametrize("space, agent", [("", "ada"), ("lab", "a/b"), ("lab", "*"), ("-x", "ada")])
 def test_names_that_are_no_key_are_refused(space: str, agent: str) -> None:
-    with pytest.raises(ValueError, match="a name is"):
+    with pytest.raises(ValueError, match="expected a name: "):
         cogmap.Robot(space, agent)

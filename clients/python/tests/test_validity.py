@@ -115,7 +115,12 @@ CALLS: Tuple[Tuple[Callable[[Recorder], object], str], ...] = (
         lambda r: r.velocity([1, 0, 0], [0, 0, 0], "soon"),  # type: ignore[arg-type]
         "duration_s: expected a number, not 'soon'",
     ),
-    (lambda r: r.level("", 1), "channel: expected 1 to 128 bytes of UTF-8, not '' of 0 bytes"),
+    (
+        lambda r: r.level("front camera", 1),
+        "channel: expected a name: 1 to 64 of A-Z a-z 0-9 _ . -, the first a letter or digit, "
+        "not 'front camera'",
+    ),
+    (lambda r: r.marker(""), "label: expected 1 to 128 bytes of UTF-8, not '' of 0 bytes"),
     (lambda r: r.level("light", math.inf), "value: expected a finite number, not inf"),
     (lambda r: r.descriptor("view", [1.0] * 7), "vector: expected 8 to 4096 numbers, not 7 of them"),
     (

@@ -17,9 +17,9 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", re.ASCII)
 
 
 def check_name(what: str, name: str) -> str:
-    """`name`, if it may name a space or an agent; `InvalidValue` otherwise."""
+    """`name`, if it may name a space, an agent or a channel; `InvalidValue` otherwise."""
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        expected = "a name is 1 to 64 of A-Z a-z 0-9 _ . - and starts with a letter or digit"
+        expected = "expected a name: 1 to 64 of A-Z a-z 0-9 _ . -, the first a letter or digit"
         raise InvalidValue(what, name, expected)
     return name
 

@@ -17,7 +17,7 @@ UNIT_TOLERANCE = 1e-3
 DESCRIPTOR_LEN_MIN, DESCRIPTOR_LEN_MAX = 8, 4096
 #: Shortest descriptor that has a direction, by its norm.
 DESCRIPTOR_NORM_MIN = 1e-12
-#: Longest label of a landmark, channel, marker or object [bytes of UTF-8].
+#: Longest label of a landmark, marker or object [bytes of UTF-8].
 LABEL_BYTES_MAX = 128
 #: Finest and coarsest spacing of the places of an object [m].
 SPACING_M_MIN, SPACING_M_MAX = 1e-5, 1e3

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar, Optional, Tuple, Union
 
+from .key import check_name
 from .limits import METRES_MAX
 from .sample import Orientation, TouchNoise
-from .scalar import label, number, within
+from .scalar import number, within
 from .vector import Quaternion, Vec3, direction, unit_vector, vec3
 
 
@@ -33,7 +34,7 @@ class ContactLevel:
     value: float
 
     def __post_init__(self) -> None:
-        label("channel", self.channel)
+        check_name("channel", self.channel)
         object.__setattr__(self, "value", number("value", self.value))
 
 
@@ -47,7 +48,7 @@ class ContactDescriptor:
     vector: Tuple[float, ...]
 
     def __post_init__(self) -> None:
-        label("channel", self.channel)
+        check_name("channel", self.channel)
         object.__setattr__(self, "vector", direction("vector", self.vector))
 
 

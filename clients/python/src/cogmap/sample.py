@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Optional, Tuple, Union, get_args
 
 from .errors import InvalidValue
+from .key import check_name
 from .limits import (
     DURATION_S_MAX,
     METRES_MAX,
@@ -106,7 +107,7 @@ class Level:
     normal: Optional[Vec3] = None
 
     def __post_init__(self) -> None:
-        label("channel", self.channel)
+        check_name("channel", self.channel)
         _set(self, "value", number("value", self.value))
         _set(self, "offset_m", vec3("offset_m", self.offset_m))
         if self.normal is not None:
@@ -124,7 +125,7 @@ class Descriptor:
     vector: Tuple[float, ...]
 
     def __post_init__(self) -> None:
-        label("channel", self.channel)
+        check_name("channel", self.channel)
         _set(self, "vector", direction("vector", self.vector))
 
 

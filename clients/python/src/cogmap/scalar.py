@@ -63,7 +63,7 @@ def text(name: str, value: str) -> str:
 
 
 def label(name: str, value: str) -> str:
-    """`value`, if it may name a landmark, a channel, a marker or an object."""
+    """`value`, if it may name a landmark, a marker or an object."""
     size = len(text(name, value).encode())
     if not 1 <= size <= LABEL_BYTES_MAX:
         expected = f"expected 1 to {LABEL_BYTES_MAX} bytes of UTF-8"
