@@ -192,7 +192,7 @@ def test_covariance_matrix_is_symmetric_and_in_row_order() -> None:
     estimate = decode(cogmap.Estimate, (GOLDEN / "estimate_lost.cbor").read_bytes())
     numbered = cogmap.Estimate(**{**vars(estimate), "covariance": tuple(map(float, range(21)))})
     matrix = numbered.covariance_matrix()
-    assert matrix[0] == (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
+    assert tuple(matrix[0]) == (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
     assert (matrix[1][1], matrix[5][5], matrix[5][0]) == (6.0, 20.0, 5.0)
     assert all(matrix[i][j] == matrix[j][i] for i in range(6) for j in range(6))
 

@@ -39,6 +39,7 @@ from .answer import (
 from .client import Client
 from .errors import (
     ApiError,
+    ClockWarning,
     Closed,
     CogmapError,
     InvalidValue,
@@ -151,6 +152,7 @@ __all__ = [
     "ApiError",
     "Bernoulli",
     "Client",
+    "ClockWarning",
     "Closed",
     "CogmapError",
     "Contact",

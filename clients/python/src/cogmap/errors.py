@@ -38,15 +38,19 @@ class Timeout(CogmapError, TimeoutError):
     acknowledgement are still held and sent again."""
 
 
+class ClockWarning(UserWarning):
+    """The stamps of a robot's samples are of two clocks, or say that it is faster than any robot."""
+
+
 class WindowFull(CogmapError):
     """The window of unacknowledged samples stayed full for the whole timeout.
 
     `accepted` samples of the call entered the window; the others did not.
     """
 
-    def __init__(self, accepted: int, capacity_samples: int) -> None:
+    def __init__(self, accepted: int, pending: int, why: str = "") -> None:
         super().__init__(
-            f"no acknowledgement in time, and the window of {capacity_samples} samples is full; "
+            f"the window is full with {pending} samples that were not acknowledged in time{why}; "
             f"{accepted} samples of this call were taken"
         )
         self.accepted = accepted
@@ -56,11 +60,11 @@ class SessionSuperseded(CogmapError):
     """Another run of the agent has taken over its name, or uses this run's session number; what this one
     sends is ignored."""
 
-    def __init__(self, own: int, other: int) -> None:
+    def __init__(self, agent: str, own: int, other: int) -> None:
         super().__init__(
-            f"session {own} was taken over by session {other}"
+            f"session {own} of agent {agent} was taken over by session {other}"
             if other != own
-            else f"session {own} is in use by another run of the agent"
+            else f"session {own} of agent {agent} is in use by another run of the agent"
         )
         self.own = own
         self.other = other
@@ -71,7 +75,7 @@ class Closed(CogmapError):
 
 
 class ApiError(CogmapError):
-    """The HTTP interface refused a request (RFC 9457, `application/problem+json`)."""
+    """The service refused a request, over HTTP or Zenoh (RFC 9457, `application/problem+json`)."""
 
     def __init__(
         self,
@@ -80,8 +84,10 @@ class ApiError(CogmapError):
         title: str,
         detail: str,
         extra: Optional[Mapping[str, Any]] = None,
+        where: str = "",
     ) -> None:
-        super().__init__(f"{status} {title}: {detail}" if detail else f"{status} {title}")
+        told = f"{status} {title}: {detail}" if detail else f"{status} {title}"
+        super().__init__(f"{told} ({where})" if where else told)
         #: HTTP status.
         self.status = status
         #: Kind of the problem, stable, for programs: `/problems/{kind}`.
@@ -90,6 +96,8 @@ class ApiError(CogmapError):
         self.title = title
         #: What was wrong this time.
         self.detail = detail
+        #: What was asked: a method and an address, or a key and an address.
+        self.where = where
         #: Further members of the problem, for example `expected_seq` after a gap in posted samples.
         self.extra: Mapping[str, Any] = dict(extra or {})
 
