@@ -10,7 +10,7 @@ from .errors import Unreachable
 from .key import durable_key, estimate_key, query_key, samples_key
 from .link import reason
 from .query import WatermarkQuery
-from .wire import CBOR, encode
+from .wire import CBOR, JSON, encode
 
 #: How long a query may take [s].
 _QUERY_TIMEOUT_S = 2.0
@@ -111,7 +111,8 @@ class Connection:
         def hear(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 self._hear_watermark(reply.ok)
-            elif reply.err is not None:
+            elif reply.err is not None and str(reply.err.encoding) in (CBOR, JSON):
+                # Zenoh itself says by other errors that no answer came.
                 self._hear_problem(reply.err)
 
         try:

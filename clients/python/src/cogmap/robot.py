@@ -119,10 +119,10 @@ class Robot(Sampler):
 
     def __repr__(self) -> str:
         run = self._run
-        state = "closed" if run.closing else f"{self.pending} pending"
+        state = "closed" if run.closing else f"{self.pending} samples pending"
         return (
-            f"Robot({run.space!r}, {run.agent!r}, connect={run.connection.address!r}, "
-            f"session_id={run.session_id}) with {state}"
+            f"<Robot {run.agent} of {run.space} at {run.connection.address}, "
+            f"session {run.session_id}, {state}>"
         )
 
     @property
