@@ -5,14 +5,13 @@ Positions are in the frame `map`, in metres; rotations are unit quaternions `[x,
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar, Dict, Optional, Tuple, Union
 
 from .array import Floats, symmetric
 from .evidence import Evidence
-from .pose import UncertainPoseReadings
+from .pose import PoseReadings, UncertainPoseReadings, root
 from .settings import SpaceSettings
 from .trajectory import StampedPose
 from .vector import Quaternion, Vec3
@@ -268,7 +267,7 @@ class GridState:
 
 
 @dataclass(frozen=True)
-class Place:
+class Place(PoseReadings):
     """A place cell."""
 
     id: int
@@ -288,6 +287,10 @@ class Place:
     last_stamp_ns: int
     #: The founding and each visit count one when they happen, and half as much after every half-life.
     strength: float
+
+    def __str__(self) -> str:
+        times = "once" if self.visits == 1 else f"{self.visits} times"
+        return f"place {self.id} of {self.founder}: {self._pose_text()}, visited {times}"
 
 
 @dataclass(frozen=True)
@@ -481,7 +484,7 @@ class Landmark:
     @property
     def sd_m(self) -> float:
         """Standard deviation of the position [m]: the root mean square distance of the true one."""
-        return math.sqrt(self.covariance[0] + self.covariance[3] + self.covariance[5])
+        return root(self.covariance[0] + self.covariance[3] + self.covariance[5])
 
     def covariance_matrix(self) -> Floats:
         """The covariance as a symmetric 3 × 3 matrix [m²]: an array where numpy is installed, else nested tuples."""

@@ -57,12 +57,12 @@ class UncertainPoseReadings(PoseReadings):
     def sd_m(self) -> float:
         """Standard deviation of the position [m]: the root mean square distance of the true position, by which
         the service tells the status."""
-        return math.sqrt(sum(self.covariance[at] for at in _VARIANCES[:3]))
+        return root(sum(self.covariance[at] for at in _VARIANCES[:3]))
 
     @property
     def yaw_sd_rad(self) -> float:
         """Standard deviation of the rotation about the z axis of `map` [rad]."""
-        return math.sqrt(self.covariance[_VARIANCES[5]])
+        return root(self.covariance[_VARIANCES[5]])
 
     def covariance_matrix(self) -> Floats:
         """The covariance as a symmetric 6 × 6 matrix: an array where numpy is installed, else nested tuples."""
@@ -70,3 +70,8 @@ class UncertainPoseReadings(PoseReadings):
 
     def _uncertain_pose_text(self) -> str:
         return f"{self._pose_text()}, sd {self.sd_m:.3f} m {self.yaw_sd_rad:.3f} rad"
+
+
+def root(variance: float) -> float:
+    """The standard deviation; rounding may have left a variance a little below zero."""
+    return 0.0 if variance < 0 else math.sqrt(variance)
