@@ -288,9 +288,9 @@ def test_a_full_window_blocks_and_then_raises(service: StandIn) -> None:
         robot.send(cogmap.Sample(0, cogmap.Marker(str(i))) for i in range(9))
     assert raised.value.accepted == 5
     with pytest.raises(cogmap.WindowFull):
-        robot.marker("one more")
+        robot.marker("one more", stamp_ns=0)
     threading.Timer(0.1, service.publish, [cogmap.Watermark(robot.session_id, 3, 3)]).start()
-    assert robot.marker("room again") == 5
+    assert robot.marker("room again", stamp_ns=0) == 5
     with pytest.raises(cogmap.Timeout, match="3 samples"):
         robot.close(timeout_s=0.2)
 
