@@ -14,6 +14,7 @@ from typing import Dict, List
 import pytest
 
 from binary import environment
+from port import Port
 from server import Server
 from wait import LONG_S
 
@@ -141,6 +142,28 @@ def test_programs_end_although_the_service_is_gone(service: Server, how: str) ->
         program.assert_ends()
     if how == "stopped":
         service.resume()
+
+
+def test_an_attempt_to_connect_can_be_interrupted() -> None:
+    port = Port()
+    source = f"""
+    import cogmap
+    print("connecting", flush=True)
+    cogmap.Robot("default", "ada", connect="tcp/127.0.0.1:{port.number}", connect_timeout_s=60)
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(source)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None and process.stdout.readline() == "connecting\n"
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    began = time.monotonic()
+    _, errors = process.communicate(timeout=LONG_S)
+    assert process.returncode == -signal.SIGINT and "KeyboardInterrupt" in errors
+    assert time.monotonic() - began < END_S
 
 
 def test_a_dropped_robot_ends_its_thread_after_it_has_flushed(service: Server) -> None:

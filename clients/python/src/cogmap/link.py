@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import logging
 import re
 import socket
-from typing import Iterable, Union
+import threading
+from typing import Iterable, List, Optional, Union
 
 import zenoh
 
 from .errors import InvalidValue, Timeout
+
+_log = logging.getLogger("cogmap")
 
 #: Where a Zenoh router listens unless told otherwise.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -51,11 +55,27 @@ def open_session(
     config.insert_json5("connect/retry", json.dumps(retry))
     config.insert_json5("listen/endpoints", "[]")
     config.insert_json5("scouting/multicast/enabled", "false")
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError:
+    session = _opened(config)
+    if session is None:
         found = "; ".join(f"{endpoint} {_probe(endpoint)}" for endpoint in endpoints)
-        raise Timeout(f"no Zenoh router answers within {timeout_s:g} s: {found}") from None
+        raise Timeout(f"no Zenoh router answers within {timeout_s:g} s: {found}")
+    return session
+
+
+def _opened(config: zenoh.Config) -> Optional[zenoh.Session]:
+    """A session, if one can be opened; on a thread of its own, so that Ctrl-C does not have to wait for it."""
+    opened: List[zenoh.Session] = []
+
+    def run() -> None:
+        try:
+            opened.append(zenoh.open(config))
+        except zenoh.ZError as error:
+            _log.debug("open a Zenoh session: %s", reason(error))
+
+    thread = threading.Thread(target=run, name="cogmap-open", daemon=True)
+    thread.start()
+    thread.join()
+    return opened[0] if opened else None
 
 
 def reason(error: zenoh.ZError) -> str:

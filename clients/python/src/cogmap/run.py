@@ -169,10 +169,13 @@ class Run:
             if stamp_ns is not None:
                 self.clock.take(seq, stamp_ns)
             due = self.window.ready(now)
-        if due and self._may_send:
-            # A full batch leaves on the caller's thread: a congested network slows the caller down.
-            self._pump()
-        elif starts_batch:
+        if due and self._may_send and self._publishing.acquire(blocking=False):
+            # A full batch leaves on the caller's thread, for the other one might wait long for its turn.
+            try:
+                self._send_due()
+            finally:
+                self._publishing.release()
+        elif due or starts_batch:
             self._wake.set()
         return seq
 
@@ -355,23 +358,24 @@ class Run:
         self._receive()
 
     def _pump(self) -> None:
-        """Sends what is due."""
+        """Sends what is due, after what another thread is sending."""
         with self._publishing:
-            while True:
-                with self.changed:
-                    if self._is_superseded() or not self._may_send:
-                        return
-                    outgoing = self.window.take(time.monotonic())
-                if outgoing is None:
+            self._send_due()
+
+    def _send_due(self) -> None:
+        while True:
+            with self.changed:
+                if self._is_superseded() or not self._may_send:
                     return
-                try:
-                    self.connection.put(
-                        encode_batch(self.session_id, outgoing.first_seq, outgoing.samples)
-                    )
-                except Unreachable as error:
-                    # The samples stay in the window; silence brings them back.
-                    _log.warning("%s", error)
-                    return
+                outgoing = self.window.take(time.monotonic())
+            if outgoing is None:
+                return
+            try:
+                self.connection.put(encode_batch(self.session_id, outgoing.first_seq, outgoing.samples))
+            except Unreachable as error:
+                # The samples stay in the window; silence brings them back.
+                _log.warning("%s", error)
+                return
 
     def _receive(self) -> None:
         # Estimates first, and of the watermarks only those that are here by now: when a flush returns, the estimate
