@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 from typing import Any, Callable, List, Tuple
 
 import pytest
@@ -11,7 +12,7 @@ import cogmap
 from conftest import MakeServer
 from feeder import drive
 from server import Server
-from wait import LONG_S
+from wait import LONG_S, eventually
 
 Ask = Callable[[cogmap.Client], Any]
 
@@ -75,17 +76,52 @@ def test_a_gap_says_which_sample_is_next(service: Server) -> None:
 
 def test_samples_that_make_no_sense_are_refused_one_by_one(service: Server) -> None:
     good = cogmap.Sample(10, cogmap.StartPose((0, 0, 0)))
-    bodies = cogmap.Level("light", float("nan")), cogmap.StartPose((0, 0, 0), (1, 1, 1, 1))
-    bad = [cogmap.Sample(10, body) for body in bodies]
     backwards = cogmap.Sample(9, cogmap.Marker("earlier"))
-    batch = cogmap.SampleBatch(7, 0, (good, *bad, backwards, good))
+    batch = cogmap.SampleBatch(7, 0, (good, backwards, good, backwards, backwards, good))
     mark = service.client().post_samples("default", "ada", batch).watermark
-    assert (mark.durable, mark.applied) == (5, 5)
+    assert (mark.durable, mark.applied) == (6, 6)
+    backwards_of = cogmap.SkipReason.TIME_BACKWARDS
     assert [(one.range.start, one.range.stop, one.reason) for one in mark.rejected] == [
-        (1, 2, cogmap.SkipReason.NUMBER_OUT_OF_RANGE),
-        (2, 3, cogmap.SkipReason.NON_UNIT_QUATERNION),
-        (3, 4, cogmap.SkipReason.TIME_BACKWARDS),
+        (1, 2, backwards_of),
+        (3, 5, backwards_of),
     ]
+
+
+def test_a_robot_of_a_space_that_is_not_there_is_told_at_once(service: Server) -> None:
+    where = f"cogmap/defualt/query/watermark at {service.endpoint}"
+    with pytest.raises(cogmap.ApiError, match=f'"defualt" .{where}.$') as refused:
+        cogmap.Robot("defualt", "ada", connect=service.endpoint)
+    assert refused.value.status == 404
+    with service.robot("ada") as robot:
+        robot.start_pose([0, 0, 0])
+        robot.flush(LONG_S)
+        service.client().delete_space("default")
+        robot.marker("nowhere")
+        with pytest.raises(cogmap.ApiError, match='"default"'):
+            robot.flush(LONG_S)
+        service.client().create_space("default")
+        eventually("the sample in the new space", lambda: robot.pending == 0)
+
+
+def test_refused_samples_are_told_as_one_range(
+    service: Server, caplog: pytest.LogCaptureFixture
+) -> None:
+    heard: List[cogmap.Rejection] = []
+    count = 200
+    with caplog.at_level(logging.WARNING, "cogmap"), service.robot("ada") as robot:
+        robot.on_rejection(heard.append)
+        robot.start_pose([0, 0, 0], stamp_ns=5000)
+        for step in range(count):
+            robot.increment([0.01, 0, 0], stamp_ns=4000 + step)
+        assert robot.estimate(LONG_S, seq=count).seq == count
+        robot.flush(LONG_S)
+        one = cogmap.Rejection(cogmap.SeqRange(1, 1 + count), cogmap.SkipReason.TIME_BACKWARDS)
+        assert robot.rejections == (one,)
+    assert sum(part.range.stop - part.range.start for part in heard) == count
+    told = [record.getMessage() for record in caplog.records]
+    assert len(told) <= 3, "a line for a range, not for a sample"
+    assert told[0].startswith("ada: samples 1 to ")
+    assert told[0].endswith(" refused: time_backwards (stamp 4000 before 5000 [ns])")
 
 
 def test_a_robot_hears_which_of_its_samples_are_refused(service: Server) -> None:
@@ -116,16 +152,17 @@ def test_without_the_token_nothing_is_told_but_health(make_service: MakeServer) 
             with pytest.raises(cogmap.ApiError) as refused:
                 ask(stranger)
             assert (refused.value.status, refused.value.kind) == (401, "/problems/unauthorized")
+            assert ("without a token)" if token is None else "with the given token)") in str(refused.value)
         assert stranger.health() and stranger.ready()
     assert service.client().agent("default", "ada").watermark.durable == 10
 
 
-def test_a_service_that_is_not_there_is_an_error_of_the_system(service: Server) -> None:
+def test_a_service_that_is_not_there_is_told_with_its_address(service: Server) -> None:
     service.terminate()
-    with pytest.raises(OSError) as refused:
+    with pytest.raises(cogmap.Unreachable, match=service.url) as refused:
         service.client().spaces()
-    assert not isinstance(refused.value, cogmap.CogmapError)
-    with pytest.raises(cogmap.Timeout):
+    assert isinstance(refused.value, OSError)
+    with pytest.raises(cogmap.Timeout, match=service.endpoint):
         service.robot("ada", connect_timeout_s=0.2)
     service.start()
     assert [space.name for space in service.client().spaces()] == ["default"]

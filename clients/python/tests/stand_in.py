@@ -16,6 +16,7 @@ from typing import Callable, Dict, List, Optional, Tuple, Type
 import zenoh
 
 from cogmap import Estimate, Rejection, Sample, SampleBatch, SeqRange, Status, Watermark
+from cogmap.problem import Problem
 from cogmap.wire import CBOR, decode, encode
 
 
@@ -49,6 +50,8 @@ class StandIn:
         self.delays_queries = False
         self._held: List[zenoh.Query] = []
         self.queries = 0
+        #: What queries are refused by.
+        self.problem: Optional[Problem] = None
         self._waiting: Dict[int, Sample] = {}
         self._arrived: queue.Queue[Optional[Tuple[str, bytes]]] = queue.Queue()
         config = zenoh.Config()
@@ -70,7 +73,7 @@ class StandIn:
                     (str(message.encoding), message.payload.to_bytes())
                 ),
             ),
-            self._zenoh.declare_queryable("cogmap/lab/query/watermark", self._answer),
+            self._zenoh.declare_queryable("cogmap/*/query/watermark", self._answer),
         ]
 
     def watermark(self) -> Watermark:
@@ -152,5 +155,10 @@ class StandIn:
             return
         with query:
             self.queries += 1
-            if self.answers_queries:
+            if str(query.key_expr) != "cogmap/lab/query/watermark" or self.problem is not None:
+                problem = self.problem or Problem(
+                    "/problems/unknown-space", "unknown space", 404, "no such space"
+                )
+                query.reply_err(encode(problem), encoding=CBOR)
+            elif self.answers_queries:
                 query.reply("cogmap/lab/query/watermark", encode(self.watermark()), encoding=CBOR)

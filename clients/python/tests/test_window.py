@@ -283,3 +283,32 @@ def test_every_sample_arrives_once_and_in_order_through_a_bad_channel(seed: int)
 
     assert service.journal == [b"%d" % seq for seq in range(total)]
     assert window.pending == 0 and window.wake_at() is None
+
+
+def test_a_service_that_is_back_is_asked_and_gets_what_its_watermark_does_not_cover() -> None:
+    window = filled(12)
+    take_all(window, 0.0)
+    window.acknowledge(2, 2, None, 0.0)
+    assert window.rejoin(5.0), "ask"
+    assert take_all(window, 5.0) == [], "and send nothing before the answer"
+    assert window.acknowledge(8, 8, None, 5.05)
+    assert [(batch.first_seq, len(batch.samples)) for batch in take_all(window, 5.05)] == [(8, 4)]
+    assert not window.watch(5.1), "the next silence begins then"
+    assert window.wake_at() == pytest.approx(6.05)
+
+
+def test_a_service_that_is_back_and_does_not_answer_gets_everything_soon() -> None:
+    window = filled(4)
+    take_all(window, 0.0)
+    assert window.rejoin(5.0)
+    assert not window.watch(5.1) and take_all(window, 5.1) == []
+    assert not window.watch(5.2)
+    assert [batch.first_seq for batch in take_all(window, 5.2)] == [0]
+
+
+def test_a_service_that_is_back_is_not_asked_when_everything_is_acknowledged() -> None:
+    window = filled(4)
+    take_all(window, 0.0)
+    window.acknowledge(4, 4, None, 0.0)
+    assert not window.rejoin(5.0)
+    assert take_all(window, 5.0) == []

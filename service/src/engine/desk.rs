@@ -227,13 +227,20 @@ impl Marks {
         (self.applied, self.waiting, self.gap) = (applied, waiting, gap);
     }
 
-    /// Notes a rejection; the oldest makes room.
+    /// Notes a rejection, as one with the latest where it continues that; the oldest makes room.
     pub(crate) fn rejected(&mut self, session: u64, rejection: Rejection) {
         if session != self.session {
             *self = Self {
                 session,
                 ..Self::default()
             };
+        }
+        if let Some(latest) = self.rejected.back_mut()
+            && latest.reason == rejection.reason
+            && latest.range.to == rejection.range.from
+        {
+            latest.range.to = rejection.range.to;
+            return;
         }
         if self.rejected.len() == WATERMARK_REJECTIONS_MAX {
             self.rejected.pop_front();

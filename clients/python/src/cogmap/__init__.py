@@ -39,10 +39,13 @@ from .answer import (
 from .client import Client
 from .errors import (
     ApiError,
+    ClockWarning,
     Closed,
     CogmapError,
+    InvalidValue,
     SessionSuperseded,
     Timeout,
+    Unreachable,
     WindowFull,
     WireError,
 )
@@ -149,6 +152,7 @@ __all__ = [
     "ApiError",
     "Bernoulli",
     "Client",
+    "ClockWarning",
     "Closed",
     "CogmapError",
     "Contact",
@@ -172,6 +176,7 @@ __all__ = [
     "IdentifyQuery",
     "Increment",
     "IngestAnswer",
+    "InvalidValue",
     "KnownObject",
     "Landmark",
     "LandmarkLearned",
@@ -260,6 +265,7 @@ __all__ = [
     "Undecided",
     "UnknownKind",
     "UnknownObject",
+    "Unreachable",
     "Velocity",
     "Watermark",
     "WindowFull",

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar, Dict, Optional, Tuple, Union
 
+from .array import Floats, symmetric
 from .evidence import Evidence
+from .pose import PoseReadings, UncertainPoseReadings, root
 from .settings import SpaceSettings
 from .trajectory import StampedPose
 from .vector import Quaternion, Vec3
@@ -85,7 +87,7 @@ class TripEnd(str, Enum):
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(UncertainPoseReadings):
     """The pose of an agent as known when its sample was applied (the causal estimate)."""
 
     space: str
@@ -113,14 +115,12 @@ class Estimate:
     #: Its confidence, in [0, 1]; 0 without a place.
     confidence: float = 0.0
 
-    def covariance_matrix(self) -> Tuple[Tuple[float, ...], ...]:
-        """The covariance as a full symmetric 6 × 6 matrix."""
-        rows = [[0.0] * 6 for _ in range(6)]
-        entries = iter(self.covariance)
-        for row in range(6):
-            for column in range(row, 6):
-                rows[row][column] = rows[column][row] = next(entries)
-        return tuple(tuple(row) for row in rows)
+    def __str__(self) -> str:
+        place = "" if self.place is None else f", place {self.place} ({self.confidence:.2f})"
+        return (
+            f"{self.agent} {self.status.value} in {self.space}: {self._uncertain_pose_text()}{place}, "
+            f"sample {self.seq}"
+        )
 
 
 @dataclass(frozen=True)
@@ -269,7 +269,7 @@ class GridState:
 
 
 @dataclass(frozen=True)
-class Place:
+class Place(PoseReadings):
     """A place cell."""
 
     id: int
@@ -289,6 +289,10 @@ class Place:
     last_stamp_ns: int
     #: The founding and each visit count one when they happen, and half as much after every half-life.
     strength: float
+
+    def __str__(self) -> str:
+        times = "once" if self.visits == 1 else f"{self.visits} times"
+        return f"place {self.id} of {self.founder}: {self._pose_text()}, visited {times}"
 
 
 @dataclass(frozen=True)
@@ -473,6 +477,24 @@ class Landmark:
     sightings: int
     first_stamp_ns: int
     last_stamp_ns: int
+
+    @property
+    def position(self) -> Vec3:
+        """Position in `map` [m]."""
+        return self.translation_m
+
+    @property
+    def sd_m(self) -> float:
+        """Standard deviation of the position [m]: the root mean square distance of the true one."""
+        return root(self.covariance[0] + self.covariance[3] + self.covariance[5])
+
+    def covariance_matrix(self) -> Floats:
+        """The covariance as a symmetric 3 × 3 matrix [m²]: an array where numpy is installed, else nested tuples."""
+        return symmetric(self.covariance, 3)
+
+    def __str__(self) -> str:
+        x, y, z = self.translation_m
+        return f"{self.id}: x {x:.3f} y {y:.3f} z {z:.3f} m, sd {self.sd_m:.3f} m"
 
 
 @dataclass(frozen=True)

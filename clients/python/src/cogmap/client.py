@@ -27,7 +27,7 @@ from .answer import (
     TripDetail,
     TripPage,
 )
-from .errors import ApiError
+from .errors import ApiError, InvalidValue, WireError
 from .event import Event
 from .localize import Localization, LocalizeQuery
 from .object import (
@@ -45,6 +45,7 @@ from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
 from .settings import SpaceSettings
 from .sse import data_fields
 from .trajectory import StampedPose, Trajectory
+from .unreachable import translated
 from .vector import vec3
 from .wire import CBOR, JSON, decode, encode, to_wire
 
@@ -66,19 +67,21 @@ class Client:
         token: Bearer token, if the service asks for one.
         timeout_s: Longest silence of a connection [s].
 
-    Raises (all methods):
+    Raises (all methods, each with the address in its message):
+        InvalidValue: An argument makes no sense; nothing was asked.
         ApiError: The service refused the request.
         WireError: The answer is not what the interface promises.
-        OSError: The service could not be reached, or fell silent.
+        Unreachable: Nothing answers at the address, or the connection broke.
+        Timeout: The service fell silent.
     """
 
     def __init__(self, url: str, token: Optional[str] = None, timeout_s: float = 10.0) -> None:
-        scheme = urllib.parse.urlsplit(url).scheme
-        if scheme not in ("http", "https"):
-            raise ValueError(f"url {url!r}: expected http:// or https://")
-        self._url = url.rstrip("/")
+        self._url = _checked_url(url)
         self._token = token
         self._timeout_s = timeout_s
+
+    def __repr__(self) -> str:
+        return f"Client({self._url!r}{'' if self._token is None else ', token=...'})"
 
     # Spaces
 
@@ -312,7 +315,7 @@ class Client:
         generator to end it here. A silence longer than `timeout_s`, if given, raises `TimeoutError`.
         """
         request = self._make_request("GET", _path(space, "events"), accept="text/event-stream")
-        with self._open(request, timeout_s) as response:
+        with translated(f"GET {request.full_url}"), self._open(request, timeout_s) as response:
             for data in data_fields(response):
                 yield decode(Event, data.encode(), JSON)
 
@@ -359,11 +362,17 @@ class Client:
     # Requests
 
     def _get(self, kind: Type[T], path: str, query: Optional[_Query] = None) -> T:
-        return decode(kind, self._request("GET", path, query), JSON)
+        return self._decoded(kind, path, self._request("GET", path, query))
 
     def _send(self, kind: Type[T], method: str, path: str, content_type: str, body: bytes) -> T:
         answer = self._request(method, path, body=body, content_type=content_type)
-        return decode(kind, answer, JSON)
+        return self._decoded(kind, path, answer)
+
+    def _decoded(self, kind: Type[T], path: str, answer: bytes) -> T:
+        try:
+            return decode(kind, answer, JSON)
+        except WireError as error:
+            raise WireError(f"{self._url}{path}: {error}") from error
 
     def _request(
         self,
@@ -381,9 +390,10 @@ class Client:
         request = self._make_request(method, path, accept=accept, body=body)
         if content_type is not None:
             request.add_header("Content-Type", content_type)
-        with self._open(request, self._timeout_s) as response:
-            data: bytes = response.read()
-            return data
+        with translated(f"{method} {request.full_url}"):
+            with self._open(request, self._timeout_s) as response:
+                data: bytes = response.read()
+                return data
 
     def _make_request(
         self, method: str, path: str, *, accept: str, body: Optional[bytes] = None
@@ -399,15 +409,31 @@ class Client:
         try:
             return urllib.request.urlopen(request, timeout=timeout_s)
         except urllib.error.HTTPError as error:
+            where = f"{request.get_method()} {request.full_url}"
+            if error.code == 401:
+                where += " without a token" if self._token is None else " with the given token"
             with error:
-                raise _api_error(error.code, error.reason, error.read()) from None
+                raise _api_error(error.code, error.reason, error.read(), where) from None
+
+
+def _checked_url(url: str) -> str:
+    """`url` without a slash at its end, if requests can go there."""
+    expected = "expected an address such as http://127.0.0.1:8080"
+    try:
+        parts = urllib.parse.urlsplit(url)
+        usable = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0
+    except (ValueError, TypeError, AttributeError):
+        usable = False
+    if not usable:
+        raise InvalidValue("url", url, expected)
+    return url.rstrip("/")
 
 
 def _path(*segments: str) -> str:
     return "/v1/spaces" + "".join(f"/{urllib.parse.quote(segment, safe='')}" for segment in segments)
 
 
-def _api_error(status: int, reason: str, body: bytes) -> ApiError:
+def _api_error(status: int, reason: str, body: bytes, where: str) -> ApiError:
     """The error of a refused request; the body may be anything when a proxy wrote it."""
     try:
         problem = json.loads(body)
@@ -417,6 +443,8 @@ def _api_error(status: int, reason: str, body: bytes) -> ApiError:
             str(problem["title"]),
             str(problem.get("detail", "")),
             {name: value for name, value in problem.items() if name not in _PROBLEM},
+            where,
         )
     except (ValueError, KeyError, TypeError, AttributeError):
-        return ApiError(status, "about:blank", reason, body[:200].decode("utf-8", "replace"))
+        text = body[:200].decode("utf-8", "replace")
+        return ApiError(status, "about:blank", reason, text, where=where)

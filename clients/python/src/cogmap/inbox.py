@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-import threading
 from collections import deque
-from typing import Deque, Generic, Optional, Tuple, Type, TypeVar
+from typing import Deque, Generic, Optional, Tuple, Type, TypeVar, Union
 
 import zenoh
 
 from .errors import WireError
+from .wake import Wake
 from .wire import decode
 
 _log = logging.getLogger("cogmap")
@@ -23,20 +23,15 @@ class Inbox(Generic[T]):
     Zenoh's callbacks only append here: they run on the thread that reads the network.
     """
 
-    def __init__(self, kind: Type[T], size: int, wake: threading.Event) -> None:
+    def __init__(self, kind: Type[T], size: int, wake: Wake) -> None:
         self._kind = kind
         self._waiting: Deque[Tuple[str, bytes]] = deque(maxlen=size)
         self._wake = wake
 
-    def hear(self, message: zenoh.Sample) -> None:
-        """Takes in a message of a subscription."""
+    def hear(self, message: Union[zenoh.Sample, zenoh.ReplyError]) -> None:
+        """Takes in a message of a subscription, or an answer to a query."""
         self._waiting.append((str(message.encoding), message.payload.to_bytes()))
         self._wake.set()
-
-    def hear_reply(self, reply: zenoh.Reply) -> None:
-        """Takes in the answer to a query; one that refuses it says nothing here."""
-        if reply.ok is not None:
-            self.hear(reply.ok)
 
     def __len__(self) -> int:
         return len(self._waiting)

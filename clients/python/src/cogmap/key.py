@@ -10,16 +10,17 @@ from __future__ import annotations
 
 import re
 
+from .errors import InvalidValue
+
 #: 1 to 64 characters, one chunk of a key and of a URL path without escaping.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", re.ASCII)
 
 
 def check_name(what: str, name: str) -> str:
-    """`name`, if it may name a space or an agent; `ValueError` otherwise."""
-    if not _NAME.fullmatch(name):
-        raise ValueError(
-            f"{what} {name!r}: a name is 1 to 64 of A-Z a-z 0-9 _ . - and starts with a letter or digit"
-        )
+    """`name`, if it may name a space, an agent or a channel; `InvalidValue` otherwise."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        expected = "expected a name: 1 to 64 of A-Z a-z 0-9 _ . -, the first a letter or digit"
+        raise InvalidValue(what, name, expected)
     return name
 
 

@@ -1,20 +1,34 @@
-"""The Zenoh session of a robot: opened with everything explicit, closed within a bound."""
+"""The Zenoh session of a robot: opened with everything explicit."""
 
 from __future__ import annotations
 
 import json
+import logging
+import re
+import socket
 import threading
-from typing import Any, Callable, Iterable, Union
+from typing import Iterable, List, Optional, Union
 
 import zenoh
 
-from .errors import Timeout
-from .wire import CBOR, encode
+from .errors import InvalidValue, Timeout
+
+_log = logging.getLogger("cogmap")
 
 #: Where a Zenoh router listens unless told otherwise.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-#: How long a query may take [s].
-_QUERY_TIMEOUT_S = 2.0
+#: A protocol and an address.
+_ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/[^/].*")
+#: Protocols whose addresses need a port.
+_WITH_PORT = re.compile(r"(?:tcp|udp|tls|quic|ws)/")
+_PORT = re.compile(r".*:[0-9]{1,5}(?:[?#].*)?")
+#: Where in its sources Zenoh found an error, which is nothing to its callers.
+_SOURCE = re.compile(r"\s+at \S+\.rs:[0-9]+\.?")
+#: How soon a lost connection is tried again, at first and at most [ms]. Zenoh's own 1 s to 4 s would be most of
+#: the time that a restarted service is away.
+_RETRY_MS = (100, 1000)
+#: How long the look at an address that does not answer may take [s].
+_PROBE_S = 0.5
 
 
 def open_session(
@@ -22,61 +36,70 @@ def open_session(
 ) -> zenoh.Session:
     """Opens a Zenoh session in client mode to one of the endpoints, without multicast.
 
-    Several robots of one process may share it. Raises `Timeout` when no endpoint answers in time.
+    Several robots of one process may share it. Raises `InvalidValue` for what is no endpoint, and `Timeout`
+    when none answers in time.
     """
     endpoints = [connect] if isinstance(connect, str) else list(connect)
+    for endpoint in endpoints:
+        _check_endpoint(endpoint)
     config = zenoh.Config()
     config.insert_json5("mode", json.dumps("client"))
-    config.insert_json5("connect/endpoints", json.dumps(endpoints))
+    try:
+        config.insert_json5("connect/endpoints", json.dumps(endpoints))
+    except zenoh.ZError as error:
+        raise InvalidValue("connect", connect, f"expected Zenoh endpoints ({reason(error)})") from None
     config.insert_json5("connect/timeout_ms", json.dumps(max(1, int(1000 * timeout_s))))
     config.insert_json5("connect/exit_on_failure", "true")
+    first_ms, most_ms = _RETRY_MS
+    retry = {"period_init_ms": first_ms, "period_max_ms": most_ms, "period_increase_factor": 2}
+    config.insert_json5("connect/retry", json.dumps(retry))
     config.insert_json5("listen/endpoints", "[]")
     config.insert_json5("scouting/multicast/enabled", "false")
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError as error:
-        raise Timeout(f"no Zenoh router answers at {', '.join(endpoints)}: {error}") from error
+    session = _opened(config)
+    if session is None:
+        found = "; ".join(f"{endpoint} {_probe(endpoint)}" for endpoint in endpoints)
+        raise Timeout(f"no Zenoh router answers within {timeout_s:g} s: {found}")
+    return session
 
 
-def has_subscriber(publisher: zenoh.Publisher) -> bool:
-    """Whether anybody subscribes to what is published here."""
-    status: object = publisher.matching_status
-    # The type stubs of zenoh 1.10 say bool; what comes is an object, and that is always true.
-    return bool(getattr(status, "matching", status))
-
-
-def ask(
-    session: zenoh.Session,
-    key: str,
-    body: Any,
-    hear_reply: Callable[[zenoh.Reply], None],
-    ended: Callable[[], None],
-) -> None:
-    """Asks without waiting: `hear_reply` gets each answer, and `ended` is called when no more come."""
-    session.get(
-        key,
-        zenoh.handlers.Callback(hear_reply, ended),
-        payload=encode(body),
-        encoding=CBOR,
-        timeout=_QUERY_TIMEOUT_S,
-    )
-
-
-def within(timeout_s: float, *actions: Callable[[], object]) -> bool:
-    """Runs teardown steps in order on a thread of their own; says whether they ended in time.
-
-    A step that hangs on a dead network must not hang the robot's program.
-    """
+def _opened(config: zenoh.Config) -> Optional[zenoh.Session]:
+    """A session, if one can be opened; on a thread of its own, so that Ctrl-C does not have to wait for it."""
+    opened: List[zenoh.Session] = []
 
     def run() -> None:
-        for action in actions:
-            try:
-                action()
-            except zenoh.ZError:
-                # The session is gone already, which is what the step was for.
-                continue
+        try:
+            opened.append(zenoh.open(config))
+        except zenoh.ZError as error:
+            _log.debug("open a Zenoh session: %s", reason(error))
 
-    thread = threading.Thread(target=run, name="cogmap-close", daemon=True)
+    thread = threading.Thread(target=run, name="cogmap-open", daemon=True)
     thread.start()
-    thread.join(timeout_s)
-    return not thread.is_alive()
+    thread.join()
+    return opened[0] if opened else None
+
+
+def reason(error: zenoh.ZError) -> str:
+    """What an error of Zenoh says, without where in its sources it was found."""
+    return _SOURCE.sub("", str(error)).strip().rstrip(".")
+
+
+def _check_endpoint(endpoint: str) -> None:
+    example = f"such as {DEFAULT_ENDPOINT}"
+    if not isinstance(endpoint, str) or "://" in endpoint or not _ENDPOINT.fullmatch(endpoint):
+        raise InvalidValue("connect", endpoint, f"expected a Zenoh endpoint {example}")
+    if _WITH_PORT.match(endpoint) and not _PORT.fullmatch(endpoint):
+        raise InvalidValue("connect", endpoint, f"expected an endpoint with a port {example}")
+
+
+def _probe(endpoint: str) -> str:
+    """What is found at an endpoint that does not answer."""
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = re.split(r"[?#]", address)[0].rpartition(":")
+    if protocol not in ("tcp", "tls"):
+        return "does not answer"
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), _PROBE_S).close()
+    except (OSError, ValueError, OverflowError) as error:
+        return f"does not answer ({getattr(error, 'strerror', None) or error})"
+    return "is open but does not speak Zenoh (is it another service, or its HTTP port?)"
+

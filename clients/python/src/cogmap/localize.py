@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Optional, Tuple
 
 from .answer import Status
+from .pose import UncertainPoseReadings
 from .sample import Sample
 from .vector import Quaternion, Vec3
 
@@ -19,7 +20,7 @@ class LocalizeQuery:
 
 
 @dataclass(frozen=True)
-class LocalizedPose:
+class LocalizedPose(UncertainPoseReadings):
     """A pose of the body in the map."""
 
     #: Position [m].
@@ -29,6 +30,9 @@ class LocalizedPose:
     #: Upper triangle, row by row, of the 6 × 6 covariance of (x, y, z, rotation about x, y, z)
     #: along the axes of `map`: 21 numbers [m², m·rad, rad²].
     covariance: Tuple[float, ...]
+
+    def __str__(self) -> str:
+        return self._uncertain_pose_text()
 
 
 @dataclass(frozen=True)

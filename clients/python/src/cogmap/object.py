@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar, Optional, Tuple, Union
 
+from .key import check_name
+from .limits import METRES_MAX
 from .sample import Orientation, TouchNoise
-from .scalar import text
-from .vector import Quaternion, Vec3, single_precision, vec3
+from .scalar import number, within
+from .vector import Quaternion, Vec3, direction, unit_vector, vec3
 
 
 class Reached(Enum):
@@ -32,8 +34,8 @@ class ContactLevel:
     value: float
 
     def __post_init__(self) -> None:
-        text("channel", self.channel)
-        object.__setattr__(self, "value", float(self.value))
+        check_name("channel", self.channel)
+        object.__setattr__(self, "value", number("value", self.value))
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,8 @@ class ContactDescriptor:
     vector: Tuple[float, ...]
 
     def __post_init__(self) -> None:
-        text("channel", self.channel)
-        object.__setattr__(self, "vector", single_precision("vector", self.vector))
+        check_name("channel", self.channel)
+        object.__setattr__(self, "vector", direction("vector", self.vector))
 
 
 @dataclass(frozen=True)
@@ -70,10 +72,11 @@ class Contact:
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_m", vec3("position_m", self.position_m))
         if self.normal is not None:
-            object.__setattr__(self, "normal", vec3("normal", self.normal))
+            object.__setattr__(self, "normal", unit_vector("normal", self.normal))
         object.__setattr__(self, "levels", tuple(self.levels))
         object.__setattr__(self, "descriptors", tuple(self.descriptors))
-        object.__setattr__(self, "drift_sd_m", float(self.drift_sd_m))
+        drift = within("drift_sd_m", self.drift_sd_m, 0.0, METRES_MAX)
+        object.__setattr__(self, "drift_sd_m", drift)
 
 
 @dataclass(frozen=True)

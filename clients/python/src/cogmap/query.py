@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Optional, Tuple, Union
 
 from .sample import Descriptor, Increment, Level, Velocity
+from .scalar import number
 from .vector import Vec3, vec3
 
 #: A percept to recall places by; a level's `offset_m` and `normal` say nothing there.
@@ -50,7 +51,7 @@ class RecallQuery:
             code = tuple(None if phase is None else vec3("code", phase) for phase in self.code)
             object.__setattr__(self, "code", code)
         if self.radius_m is not None:
-            object.__setattr__(self, "radius_m", float(self.radius_m))
+            object.__setattr__(self, "radius_m", number("radius_m", self.radius_m))
 
 
 @dataclass(frozen=True)

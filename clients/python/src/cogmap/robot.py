@@ -3,36 +3,31 @@
 from __future__ import annotations
 
 import logging
-import threading
 import time
+import warnings
+import weakref
 from types import TracebackType
-from typing import Any, Callable, Dict, Iterable, List, Optional, Tuple, Type, Union
+from typing import Callable, Iterable, Optional, Tuple, Type, Union
 
 import zenoh
 
 from .answer import Estimate, Rejection, Watermark
-from .errors import Closed, CogmapError, SessionSuperseded, Timeout, WindowFull
-from .inbox import Inbox
-from .key import check_name, durable_key, estimate_key, query_key, samples_key
-from .link import DEFAULT_ENDPOINT, ask, has_subscriber, open_session, within
-from .query import WatermarkQuery
+from .errors import ClockWarning, CogmapError, InvalidValue, Timeout
+from .key import check_name
+from .link import DEFAULT_ENDPOINT, open_session
+from .run import DROPPED_FLUSH_S, Listeners, Run
 from .sample import MotionNoise, Sample, SampleBody
 from .sampler import Sampler
-from .window import Window, WindowLimits
-from .wire import CBOR, encode_batch, encode_sample
+from .scalar import COUNT_RANGE, whole
+from .window import WindowLimits
 
 _log = logging.getLogger("cogmap")
 
-#: Estimates that wait for the callback; beyond it the oldest are dropped.
-_ESTIMATES_WAITING_MAX = 4096
-#: Watermarks that wait; a later one says all that an earlier one did.
-_WATERMARKS_WAITING_MAX = 256
-#: Rejections remembered, the latest ones.
-_REJECTIONS_MAX = 1024
-#: How often the arrival of the service is looked for [s].
-_MATCH_POLL_S = 0.01
-#: How long the first batch waits for the watermark that the service has of this agent [s].
-_FIRST_ANSWER_S = 0.2
+#: How long `close` waits for the robot's thread to leave Zenoh [s].
+_LEAVE_S = 1.0
+#: How long an error in a `with` block waits for the acknowledgement of what was sent, and for the thread [s].
+_ERROR_FLUSH_S = 1.0
+_ERROR_LEAVE_S = 0.5
 
 
 class Robot(Sampler):
@@ -42,6 +37,9 @@ class Robot(Sampler):
     soon as the sample is in the window; `flush` returns when the service has everything on disk.
     What no watermark covers is held and sent again after a loss, a reconnect or a restart of the
     service. When the window is full a sample method waits, up to `send_timeout_s`.
+
+    A robot that is not closed does not keep its program from ending: what was sent is flushed for at most
+    a second then. One that is dropped flushes in the background.
 
     Args:
         space: Name of the space.
@@ -60,8 +58,10 @@ class Robot(Sampler):
         match_timeout_s: How long samples wait for the service before they are sent anyway [s].
 
     Raises:
-        ValueError: A name is not valid, or both `connect` and `session` are given.
-        Timeout: No router answers.
+        InvalidValue: A name or another argument makes no sense.
+        Timeout: No Zenoh router answers within `connect_timeout_s`.
+        ApiError: The service has no such space.
+        Unreachable: The given Zenoh session is closed.
     """
 
     def __init__(
@@ -82,64 +82,63 @@ class Robot(Sampler):
         match_timeout_s: float = 5.0,
     ) -> None:
         if connect is not None and session is not None:
-            raise ValueError("give either connect or session")
-        self.space = check_name("space", space)
-        self.agent = check_name("agent", agent)
-        self.session_id = time.time_ns() if session_id is None else session_id
-        if not 0 <= self.session_id < 1 << 64:
-            raise ValueError("session_id: an unsigned 64-bit number")
+            raise InvalidValue("connect", connect, "expected either connect or session", "both")
+        check_name("space", space)
+        check_name("agent", agent)
+        number = time.time_ns() if session_id is None else whole("session_id", session_id, COUNT_RANGE)
+        limits = WindowLimits(
+            capacity_samples=window_samples,
+            capacity_bytes=window_bytes,
+            batch_samples=batch_samples,
+            batch_delay_s=batch_delay_s,
+        )
         super().__init__(motion_noise)
         self._send_timeout_s = send_timeout_s
-        self._window = Window(
-            WindowLimits(
-                capacity_samples=window_samples,
-                capacity_bytes=window_bytes,
-                batch_samples=batch_samples,
-                batch_delay_s=batch_delay_s,
-            )
+        if session is None:
+            wanted = DEFAULT_ENDPOINT if connect is None else connect
+            endpoints = [wanted] if isinstance(wanted, str) else list(wanted)
+            link = open_session(endpoints, timeout_s=connect_timeout_s)
+            address = ", ".join(endpoints)
+        else:
+            link, address = session, "the given Zenoh session"
+        self._listeners = Listeners()
+        self._run = Run(
+            space,
+            agent,
+            number,
+            limits,
+            link,
+            owns_session=session is None,
+            address=address,
+            match_timeout_s=match_timeout_s,
+            listeners=self._listeners,
         )
-        # Guards everything below; notified on each change that somebody may wait for.
-        self._changed = threading.Condition()
-        self._last_stamp_ns = 0
-        self._watermark: Optional[Watermark] = None
-        self._superseded_by: Optional[int] = None
-        self._superseded_told = False
-        self._rejections: Dict[Rejection, None] = {}
-        self._estimate: Optional[Estimate] = None
-        self._on_estimate: List[Callable[[Estimate], object]] = []
-        self._on_rejection: List[Callable[[Rejection], object]] = []
-        self._closing = False
-        self._stopped = False
-        # Held while a batch is taken and put, so that batches leave in order.
-        self._publishing = threading.Lock()
-        self._wake = threading.Event()
-        self._estimates_in = Inbox(Estimate, _ESTIMATES_WAITING_MAX, self._wake)
-        self._watermarks_in = Inbox(Watermark, _WATERMARKS_WAITING_MAX, self._wake)
+        self._run.start()
+        # The run at the end of the program is ended elsewhere, within a bound.
+        weakref.finalize(self, self._run.stop, DROPPED_FLUSH_S).atexit = False
 
-        self._own_session = session is None
-        self._zenoh = (
-            open_session(
-                DEFAULT_ENDPOINT if connect is None else connect, timeout_s=connect_timeout_s
-            )
-            if session is None
-            else session
+    def __repr__(self) -> str:
+        run = self._run
+        state = "closed" if run.closing else f"{self.pending} samples pending"
+        return (
+            f"<Robot {run.agent} of {run.space} at {run.connection.address}, "
+            f"session {run.session_id}, {state}>"
         )
-        self._subscribers: List[zenoh.Subscriber[None]] = [
-            self._zenoh.declare_subscriber(estimate_key(space, agent), self._estimates_in.hear),
-            self._zenoh.declare_subscriber(durable_key(space, agent), self._watermarks_in.hear),
-        ]
-        self._publisher = self._zenoh.declare_publisher(
-            samples_key(space, agent),
-            encoding=CBOR,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            express=False,
-        )
-        self._may_send = False
-        self._match_deadline = time.monotonic() + match_timeout_s
-        self._worker = threading.Thread(
-            target=self._work, name=f"cogmap-{space}-{agent}", daemon=True
-        )
-        self._worker.start()
+
+    @property
+    def space(self) -> str:
+        """Name of the space."""
+        return self._run.space
+
+    @property
+    def agent(self) -> str:
+        """Name of the agent."""
+        return self._run.agent
+
+    @property
+    def session_id(self) -> int:
+        """Number of this run."""
+        return self._run.session_id
 
     # Samples beyond the methods of `Sampler`
 
@@ -152,51 +151,23 @@ class Robot(Sampler):
         accepted = 0
         deadline = time.monotonic() + self._send_timeout_s
         for sample in samples:
-            seq = self._append(sample.body, sample.stamp_ns, deadline, accepted)
+            self._warn_of_clocks(sample.body, sample.stamp_ns, stacklevel=3)
+            seq = self._run.append(sample.body, sample.stamp_ns, deadline, accepted)
             first = seq if first is None else first
             accepted += 1
         if first is None:
-            with self._changed:
-                return range(self._window.next_seq, self._window.next_seq)
+            with self._run.changed:
+                return range(self._run.window.next_seq, self._run.window.next_seq)
         return range(first, first + accepted)
 
     def _send(self, body: SampleBody, stamp_ns: Optional[int]) -> int:
-        return self._append(body, stamp_ns, time.monotonic() + self._send_timeout_s, 0)
+        self._warn_of_clocks(body, stamp_ns, stacklevel=4)
+        return self._run.append(body, stamp_ns, time.monotonic() + self._send_timeout_s, 0)
 
-    def _append(
-        self, body: SampleBody, stamp_ns: Optional[int], deadline: float, accepted: int
-    ) -> int:
-        by_clock = stamp_ns is None
-        data = b"" if stamp_ns is None else encode_sample(Sample(stamp_ns, body))
-        with self._changed:
-            while True:
-                self._check_open()
-                if by_clock:
-                    # Stamped under the lock that numbers it, and again after each wait: a sample of
-                    # another thread that gets in between would else have the later stamp and the
-                    # earlier number. The system's clock may be set back; stamps of a session may not.
-                    stamp_ns = max(time.time_ns(), self._last_stamp_ns)
-                    data = encode_sample(Sample(stamp_ns, body))
-                if self._window.has_room(len(data)):
-                    break
-                self._window.hurry()
-                self._wake.set()
-                remaining = deadline - time.monotonic()
-                if remaining <= 0:
-                    raise WindowFull(accepted, self._window.pending)
-                self._changed.wait(remaining)
-            now = time.monotonic()
-            starts_batch = self._window.sent == self._window.next_seq
-            seq = self._window.append(data, now)
-            if stamp_ns is not None:
-                self._last_stamp_ns = max(self._last_stamp_ns, stamp_ns)
-            due = self._window.ready(now)
-        if due and self._may_send:
-            # A full batch leaves on the caller's thread: a congested network slows the caller down.
-            self._pump()
-        elif starts_batch:
-            self._wake.set()
-        return seq
+    def _warn_of_clocks(self, body: SampleBody, stamp_ns: Optional[int], stacklevel: int) -> None:
+        oddity = self._run.clock.oddity(body, stamp_ns, time.time_ns())
+        if oddity is not None:
+            warnings.warn(f"robot {self.agent}: {oddity}", ClockWarning, stacklevel=stacklevel)
 
     # Acknowledgement
 
@@ -205,84 +176,68 @@ class Robot(Sampler):
 
         Raises `Timeout` when it takes longer; the samples stay in the window and are sent again.
         """
-        with self._changed:
-            self._check_open()
-            missing = self._wait_durable(timeout_s)
+        with self._run.changed:
+            self._run.check_open()
+        missing = self._run.wait_durable(timeout_s)
         if missing:
-            raise Timeout(f"{missing} samples are not durable after {timeout_s} s")
-
-    def _wait_durable(self, timeout_s: float) -> int:
-        """Waits, with the condition held; returns the number of samples that are still missing."""
-        if threading.current_thread() is self._worker:
-            raise RuntimeError("a callback cannot wait for acknowledgements: they come after it")
-        target = self._window.next_seq
-        self._window.hurry()
-        self._wake.set()
-        self._changed.wait_for(
-            lambda: self._window.durable >= target or self._superseded_by is not None, timeout_s
-        )
-        self._check_session()
-        return max(0, target - self._window.durable)
+            raise Timeout(
+                f"{missing} samples of agent {self.agent} are not durable after {timeout_s:g} s"
+                f"{self._run.connection.silence()}"
+            )
 
     @property
     def watermark(self) -> Optional[Watermark]:
         """The latest watermark of this session; `None` before the first one."""
-        with self._changed:
-            return self._watermark
+        with self._run.changed:
+            return self._run.watermark
 
     @property
     def pending(self) -> int:
         """Samples without acknowledgement."""
-        with self._changed:
-            return self._window.pending
+        with self._run.changed:
+            return self._run.window.pending
 
     @property
     def rejections(self) -> Tuple[Rejection, ...]:
-        """Ranges of this session's samples that the service refused for good, oldest first."""
-        with self._changed:
-            return tuple(self._rejections)
+        """Ranges of this session's samples that the service refused for good, by number; neighbours that
+        were refused for the same reason are one range."""
+        with self._run.changed:
+            return self._run.rejections.ranges
 
     def on_rejection(self, callback: Callable[[Rejection], object]) -> None:
-        """Calls `callback` once for each refused range, on the robot's own thread."""
-        with self._changed:
-            self._on_rejection.append(callback)
+        """Calls `callback` for refused ranges, on the robot's own thread: once for each sample, together with
+        its neighbours, when no more has been refused for a quarter of a second, or after a second."""
+        self._listeners.rejections.append(callback)
 
     # Estimates
 
-    def estimate(self, timeout_s: float = 10.0) -> Estimate:
-        """The latest estimate of this session; waits for the first one, then raises `Timeout`."""
-        with self._changed:
-            self._check_open()
-            self._changed.wait_for(
-                lambda: self._estimate is not None or self._superseded_by is not None, timeout_s
-            )
-            self._check_session()
-            if self._estimate is None:
-                raise Timeout(f"no estimate within {timeout_s} s")
-            return self._estimate
+    def estimate(self, timeout_s: float = 10.0, *, seq: Optional[int] = None) -> Estimate:
+        """The latest estimate of this session; waits for the first one, then raises `Timeout`.
+
+        Args:
+            timeout_s: Longest wait [s].
+            seq: Waits for an estimate that includes this sample: the number that the sample's method
+                returned. The estimate may include later samples too, as its own `seq` says.
+        """
+        if seq is not None:
+            with self._run.changed:
+                latest = self._run.window.next_seq - 1
+            if latest < 0:
+                raise InvalidValue("seq", seq, "expected a sample that was sent, and there is none")
+            whole("seq", seq, (0, latest))
+        with self._run.changed:
+            self._run.check_open()
+        return self._run.wait_estimate(seq, timeout_s)
 
     def on_estimate(self, callback: Callable[[Estimate], object]) -> None:
         """Calls `callback` with every estimate, on the robot's own thread; it should return soon."""
-        with self._changed:
-            self._on_estimate.append(callback)
+        self._listeners.estimates.append(callback)
 
     # Life
 
     def wait_for_service(self, timeout_s: float = 10.0) -> bool:
         """Waits until the service listens to this robot's samples; says whether it does."""
-        deadline = time.monotonic() + timeout_s
-        while not has_subscriber(self._publisher):
-            if time.monotonic() >= deadline:
-                return False
-            time.sleep(_MATCH_POLL_S)
-        if threading.current_thread() is self._worker:
-            # Only the worker itself ends the wait below.
-            return True
-        with self._changed:
-            # Full batches leave on the caller's thread only from then on.
-            return self._changed.wait_for(
-                lambda: self._may_send or self._stopped, max(0.0, deadline - time.monotonic())
-            )
+        return self._run.wait_heard(timeout_s)
 
     def close(self, timeout_s: float = 5.0) -> None:
         """Flushes for at most `timeout_s`, then closes, also when that fails; a second call does
@@ -291,36 +246,28 @@ class Robot(Sampler):
         Raises `Timeout` when samples are left without acknowledgement: they are lost with this
         process unless they arrived all the same.
         """
-        with self._changed:
-            if self._closing:
+        self._close(timeout_s, _LEAVE_S)
+
+    def _close(self, timeout_s: float, leave_s: float) -> None:
+        run = self._run
+        with run.changed:
+            if run.closing:
                 return
-            self._closing = True
-            self._changed.notify_all()
+            run.closing = True
+            run.changed.notify_all()
         missing = 0
         try:
-            if threading.current_thread() is not self._worker:
-                with self._changed:
-                    if not self._superseded_told:
-                        missing = self._wait_durable(timeout_s)
+            if not run.is_own_thread() and not run.superseded_told:
+                missing = run.wait_durable(timeout_s)
         finally:
-            self._tear_down()
+            run.stop(0.0)
+            if not run.join(leave_s):
+                _log.debug("%s: Zenoh is still closing in the background", self.agent)
         if missing:
-            raise Timeout(f"closed with {missing} samples that are not durable")
-
-    def _tear_down(self) -> None:
-        with self._changed:
-            self._stopped = True
-            self._changed.notify_all()
-        self._wake.set()
-        if threading.current_thread() is not self._worker:
-            # A put may block for 5 s on a dead link; the thread is a daemon, so give up after that.
-            self._worker.join(6.0)
-        steps: List[Callable[[], object]] = [entity.undeclare for entity in self._subscribers]
-        steps.append(self._publisher.undeclare)
-        if self._own_session:
-            steps.append(self._zenoh.close)
-        if not within(5.0, *steps):
-            _log.warning("the Zenoh session of %s did not close in time", self.agent)
+            raise Timeout(
+                f"closed with {missing} samples of agent {self.agent} that are not durable"
+                f"{run.connection.silence()}"
+            )
 
     def __enter__(self) -> Robot:
         return self
@@ -335,160 +282,7 @@ class Robot(Sampler):
             self.close()
             return
         try:
-            self.close(timeout_s=1.0)
+            self._close(_ERROR_FLUSH_S, _ERROR_LEAVE_S)
         except CogmapError as second:
             # The first error is the one that the caller has to see.
             _log.warning("closing after an error: %s", second)
-
-    def _check_open(self) -> None:
-        if self._closing:
-            raise Closed(f"robot {self.agent} is closed")
-        self._check_session()
-
-    def _check_session(self) -> None:
-        if self._superseded_by is not None:
-            self._superseded_told = True
-            raise SessionSuperseded(self.session_id, self._superseded_by)
-
-    # The robot's own thread
-
-    def _work(self) -> None:
-        while True:
-            self._wake.wait(self._idle_s())
-            self._wake.clear()
-            if self._stopped:
-                return
-            self._receive()
-            if not self._may_send:
-                if not self._finds_service():
-                    continue
-                self._ask_first()
-            self._pump()
-            with self._changed:
-                ask = self._superseded_by is None and self._window.watch(time.monotonic())
-            if ask:
-                _log.debug("no progress of %s: asking for the watermark", self.agent)
-                self._ask_watermark(threading.Event())
-            self._pump()
-
-    def _idle_s(self) -> Optional[float]:
-        with self._changed:
-            if self._superseded_by is not None:
-                return None
-            if not self._may_send:
-                return _MATCH_POLL_S
-            at = self._window.wake_at()
-        return None if at is None else max(0.0, at - time.monotonic())
-
-    def _finds_service(self) -> bool:
-        """A put before the subscriber is known is dropped on the way: so wait for it, but not for
-        ever, since what is dropped is sent again."""
-        try:
-            found = has_subscriber(self._publisher)
-        except zenoh.ZError:
-            found = False
-        return found or time.monotonic() >= self._match_deadline
-
-    def _ask_first(self) -> None:
-        """Asks for the watermark before anything is sent, and waits for the answer, though not for
-        long: a robot may start before its service. If the service has samples of this session already,
-        another run uses its number, and after the first put nobody could tell whose they are."""
-        answered = threading.Event()
-        self._ask_watermark(answered)
-        answered.wait(_FIRST_ANSWER_S)
-        self._receive()
-        with self._changed:
-            self._may_send = True
-            self._changed.notify_all()
-
-    def _pump(self) -> None:
-        """Sends what is due."""
-        with self._publishing:
-            while True:
-                with self._changed:
-                    if self._superseded_by is not None or self._stopped:
-                        return
-                    outgoing = self._window.take(time.monotonic())
-                if outgoing is None:
-                    return
-                try:
-                    self._publisher.put(
-                        encode_batch(self.session_id, outgoing.first_seq, outgoing.samples)
-                    )
-                except zenoh.ZError as error:
-                    # The samples stay in the window; silence brings them back.
-                    _log.warning("put of %s: %s", self.agent, error)
-                    return
-
-    def _ask_watermark(self, ended: threading.Event) -> None:
-        """Asks for the watermark; `ended` is set when no further answer comes."""
-        try:
-            key, hear = query_key(self.space, "watermark"), self._watermarks_in.hear_reply
-            ask(self._zenoh, key, WatermarkQuery(self.agent), hear, ended.set)
-        except zenoh.ZError as error:
-            _log.warning("watermark query of %s: %s", self.agent, error)
-
-    def _receive(self) -> None:
-        # Estimates first, and of the watermarks only those that are here by now: when a flush returns, the estimate
-        # published before is in place. What comes meanwhile wakes this thread again.
-        watermarks = len(self._watermarks_in)
-        with self._changed:
-            callbacks = list(self._on_estimate)
-        while self._estimates_in:
-            if len(self._estimates_in) > 1 and not callbacks:
-                # Nobody asked for each one, and only the latest is kept: spare the decoding.
-                self._estimates_in.drop()
-                continue
-            estimate = self._estimates_in.take()
-            if estimate is not None and estimate.session == self.session_id:
-                with self._changed:
-                    self._estimate = estimate
-                    self._changed.notify_all()
-                _call(callbacks, estimate)
-        for _ in range(min(watermarks, len(self._watermarks_in))):
-            watermark = self._watermarks_in.take()
-            if watermark is not None:
-                self._take_watermark(watermark)
-
-    def _take_watermark(self, watermark: Watermark) -> None:
-        if watermark.session < self.session_id:
-            # An earlier run of this agent; ours has not arrived yet.
-            return
-        with self._changed:
-            # The service cannot have applied what this run never sent: that is of another run with our
-            # number. `applied` moves before `durable`, so it tells first.
-            foreign = max(watermark.applied, watermark.durable) > self._window.sent
-            if watermark.session > self.session_id or foreign:
-                self._superseded_by = max(watermark.session, self._superseded_by or 0)
-                self._changed.notify_all()
-            if self._superseded_by is not None:
-                # Two runs may share the number, so nobody knows which of them this is about.
-                return
-            gap = None if watermark.gap is None else (watermark.gap.start, watermark.gap.stop)
-            self._window.acknowledge(watermark.durable, watermark.applied, gap, time.monotonic())
-            if self._watermark is None or watermark.durable >= self._watermark.durable:
-                self._watermark = watermark
-            fresh = [entry for entry in watermark.rejected if entry not in self._rejections]
-            for entry in fresh:
-                self._rejections[entry] = None
-            while len(self._rejections) > _REJECTIONS_MAX:
-                del self._rejections[next(iter(self._rejections))]
-            callbacks = list(self._on_rejection)
-            self._changed.notify_all()
-        for entry in fresh:
-            _log.warning(
-                "%s: samples %d to %d refused: %s",
-                self.agent,
-                entry.range.start,
-                entry.range.stop - 1,
-                entry.reason.value,
-            )
-            _call(callbacks, entry)
-
-
-def _call(callbacks: List[Callable[[Any], object]], argument: Any) -> None:
-    for callback in callbacks:
-        try:
-            callback(argument)
-        except Exception:  # An error of the user's callback must not end the robot's thread.
-            _log.exception("callback %r", callback)

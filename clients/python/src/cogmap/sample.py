@@ -9,8 +9,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Optional, Tuple, Union, get_args
 
-from .scalar import COUNT_RANGE, STAMP_RANGE, one_of, text, whole
-from .vector import IDENTITY, Quaternion, Vec3, quaternion, single_precision, vec3
+from .errors import InvalidValue
+from .key import check_name
+from .limits import (
+    DURATION_S_MAX,
+    METRES_MAX,
+    RADIANS_PER_SECOND_MAX,
+    ROTATIONS_MAX,
+    SPACING_M_MAX,
+    SPACING_M_MIN,
+    TOUCH_SD_MAX,
+)
+from .scalar import COUNT_RANGE, STAMP_RANGE, label, number, one_of, whole, within
+from .vector import (
+    IDENTITY,
+    Quaternion,
+    Vec3,
+    deviations,
+    direction,
+    quaternion,
+    unit_vector,
+    vec3,
+)
 
 
 def _set(instance: object, name: str, value: object) -> None:
@@ -28,8 +48,8 @@ class MotionNoise:
     rotation_sd_rad: Vec3
 
     def __post_init__(self) -> None:
-        _set(self, "translation_sd_m", vec3("translation_sd_m", self.translation_sd_m))
-        _set(self, "rotation_sd_rad", vec3("rotation_sd_rad", self.rotation_sd_rad))
+        _set(self, "translation_sd_m", deviations("translation_sd_m", self.translation_sd_m))
+        _set(self, "rotation_sd_rad", deviations("rotation_sd_rad", self.rotation_sd_rad))
 
 
 @dataclass(frozen=True)
@@ -66,8 +86,9 @@ class Velocity:
 
     def __post_init__(self) -> None:
         _set(self, "linear_m_s", vec3("linear_m_s", self.linear_m_s))
-        _set(self, "angular_rad_s", vec3("angular_rad_s", self.angular_rad_s))
-        _set(self, "duration_s", float(self.duration_s))
+        angular = vec3("angular_rad_s", self.angular_rad_s, RADIANS_PER_SECOND_MAX)
+        _set(self, "angular_rad_s", angular)
+        _set(self, "duration_s", within("duration_s", self.duration_s, 0.0, DURATION_S_MAX))
         _check_noise(self.noise)
 
 
@@ -86,11 +107,11 @@ class Level:
     normal: Optional[Vec3] = None
 
     def __post_init__(self) -> None:
-        text("channel", self.channel)
-        _set(self, "value", float(self.value))
+        check_name("channel", self.channel)
+        _set(self, "value", number("value", self.value))
         _set(self, "offset_m", vec3("offset_m", self.offset_m))
         if self.normal is not None:
-            _set(self, "normal", vec3("normal", self.normal))
+            _set(self, "normal", unit_vector("normal", self.normal))
 
 
 @dataclass(frozen=True)
@@ -104,8 +125,8 @@ class Descriptor:
     vector: Tuple[float, ...]
 
     def __post_init__(self) -> None:
-        text("channel", self.channel)
-        _set(self, "vector", single_precision("vector", self.vector))
+        check_name("channel", self.channel)
+        _set(self, "vector", direction("vector", self.vector))
 
 
 @dataclass(frozen=True)
@@ -117,7 +138,7 @@ class LandmarkTarget:
     label: str
 
     def __post_init__(self) -> None:
-        text("label", self.label)
+        label("label", self.label)
 
 
 @dataclass(frozen=True)
@@ -129,7 +150,7 @@ class AgentTarget:
     name: str
 
     def __post_init__(self) -> None:
-        text("name", self.name)
+        label("name", self.name)
 
 
 @dataclass(frozen=True)
@@ -159,7 +180,7 @@ class Position:
 
     def __post_init__(self) -> None:
         _set(self, "translation_m", vec3("translation_m", self.translation_m))
-        _set(self, "sd_m", vec3("sd_m", self.sd_m))
+        _set(self, "sd_m", deviations("sd_m", self.sd_m))
 
 
 @dataclass(frozen=True)
@@ -188,7 +209,8 @@ class RangeBearing:
 
     def __post_init__(self) -> None:
         for name in self.WIRE_ORDER:
-            _set(self, name, float(getattr(self, name)))
+            low = -METRES_MAX if name in ("azimuth_rad", "elevation_rad") else 0.0
+            _set(self, name, within(name, getattr(self, name), low, METRES_MAX))
 
 
 @dataclass(frozen=True)
@@ -256,7 +278,7 @@ class Marker:
     ends_trip: bool = False
 
     def __post_init__(self) -> None:
-        text("label", self.label)
+        label("label", self.label)
         _set(self, "ends_trip", bool(self.ends_trip))
 
 
@@ -283,7 +305,13 @@ class FiniteTurns:
     rotations_xyzw: Tuple[Quaternion, ...]
 
     def __post_init__(self) -> None:
-        turns = tuple(quaternion("rotations_xyzw", turn) for turn in self.rotations_xyzw)
+        turns = tuple(
+            quaternion(f"rotations_xyzw[{index}]", turn)
+            for index, turn in enumerate(self.rotations_xyzw)
+        )
+        if not 1 <= len(turns) <= ROTATIONS_MAX:
+            expected = f"expected 1 to {ROTATIONS_MAX} rotations"
+            raise InvalidValue("rotations_xyzw", turns, expected, f"{len(turns)} of them")
         _set(self, "rotations_xyzw", turns)
 
 
@@ -311,7 +339,7 @@ class TouchNoise:
 
     def __post_init__(self) -> None:
         for name in ("position_sd_m", "normal_sd_rad", "level_sd"):
-            _set(self, name, float(getattr(self, name)))
+            _set(self, name, within(name, getattr(self, name), 0.0, TOUCH_SD_MAX))
 
 
 @dataclass(frozen=True)
@@ -330,9 +358,11 @@ class LearnObject:
     noise: TouchNoise = TouchNoise()
 
     def __post_init__(self) -> None:
-        if self.name is not None:
-            text("name", self.name)
-        _set(self, "spacing_m", float(self.spacing_m))
+        if self.name is not None and label("name", self.name) == "identify":
+            raise InvalidValue("name", self.name, "expected a name that is not reserved")
+        _set(self, "spacing_m", within("spacing_m", self.spacing_m, SPACING_M_MIN, SPACING_M_MAX))
+        one_of("orientation", self.orientation, get_args(Orientation))
+        one_of("noise", self.noise, (TouchNoise,))
 
 
 @dataclass(frozen=True)
@@ -344,6 +374,10 @@ class IdentifyObject:
     orientation: Orientation = NoTurn()
     #: How exactly is felt.
     noise: TouchNoise = TouchNoise()
+
+    def __post_init__(self) -> None:
+        one_of("orientation", self.orientation, get_args(Orientation))
+        one_of("noise", self.noise, (TouchNoise,))
 
 
 @dataclass(frozen=True)

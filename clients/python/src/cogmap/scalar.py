@@ -1,15 +1,17 @@
-"""Whole numbers and texts as they cross the wire.
+"""Numbers and texts as they cross the wire.
 
-They are checked when a message is made: one sample that the service cannot decode would make it refuse
-the whole batch, again and again.
+They are checked when a message is made: the caller's own line is in the traceback then. A sample that the
+service could not even decode would besides make it refuse the whole batch, again and again.
 """
 
 from __future__ import annotations
 
 import operator
+import unicodedata
 from typing import Tuple
 
-from .errors import WireError
+from .errors import InvalidValue
+from .limits import LABEL_BYTES_MAX
 
 STAMP_RANGE = (-(1 << 63), (1 << 63) - 1)
 COUNT_RANGE = (0, (1 << 64) - 1)
@@ -20,20 +22,54 @@ def whole(name: str, value: int, bounds: Tuple[int, int]) -> int:
     try:
         number = operator.index(value)
     except TypeError as error:
-        raise WireError(f"{name}: expected an integer, not {value!r}") from error
+        raise InvalidValue(name, value, "expected an integer") from error
     if not bounds[0] <= number <= bounds[1]:
-        raise WireError(f"{name}: {number} is beyond 64 bits")
+        raise InvalidValue(name, value, f"expected {bounds[0]} to {bounds[1]}")
     return number
+
+
+def number(name: str, value: float) -> float:
+    """`value` as a finite float."""
+    return within(name, value, -_LARGEST, _LARGEST)
+
+
+_LARGEST = 1.7976931348623157e308
+
+
+def within(name: str, value: float, low: float, high: float) -> float:
+    """`value` as a finite float from `low` to `high`."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidValue(name, value, "expected a number") from error
+    # NaN fails both comparisons.
+    if low <= result <= high:
+        return result
+    finite = -_LARGEST <= result <= _LARGEST
+    raise InvalidValue(
+        name, value, f"expected {low:g} to {high:g}" if finite else "expected a finite number"
+    )
 
 
 def text(name: str, value: str) -> str:
     """`value`, if it is a text that UTF-8 can carry."""
     if not isinstance(value, str):
-        raise WireError(f"{name}: expected a text, not {value!r}")
+        raise InvalidValue(name, value, "expected a text")
     try:
         value.encode()
     except UnicodeEncodeError as error:
-        raise WireError(f"{name}: {error}") from error
+        raise InvalidValue(name, value, "expected a text that UTF-8 can carry") from error
+    return value
+
+
+def label(name: str, value: str) -> str:
+    """`value`, if it may name a landmark, a marker or an object."""
+    size = len(text(name, value).encode())
+    if not 1 <= size <= LABEL_BYTES_MAX:
+        expected = f"expected 1 to {LABEL_BYTES_MAX} bytes of UTF-8"
+        raise InvalidValue(name, value, expected, f"{value!r} of {size} bytes")
+    if any(unicodedata.category(character) == "Cc" for character in value):
+        raise InvalidValue(name, value, "expected a text without control characters")
     return value
 
 
@@ -41,4 +77,4 @@ def one_of(name: str, value: object, kinds: Tuple[type, ...]) -> None:
     """Raises unless `value` is one of `kinds`."""
     if not isinstance(value, kinds):
         expected = ", ".join(kind.__name__ for kind in kinds)
-        raise WireError(f"{name}: expected {expected}, not {value!r}")
+        raise InvalidValue(name, value, f"expected {expected}")

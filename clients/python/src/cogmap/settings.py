@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Union
 
+from .scalar import within
+
 
 @dataclass(frozen=True)
 class Novelty:
@@ -22,7 +24,7 @@ class Bernoulli:
     probability: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "probability", float(self.probability))
+        object.__setattr__(self, "probability", within("probability", self.probability, 0.0, 1.0))
 
 
 Recruitment = Union[Novelty, Bernoulli]

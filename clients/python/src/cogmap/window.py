@@ -10,6 +10,8 @@ that every loss and delay can be tested without a network. The rules:
 * When samples are outstanding and the watermark has not moved for `silence_s`, the watermark is asked
   for; if it does not move within `grace_s` either, everything from the watermark on is sent again. The
   wait doubles from time to time, up to `silence_max_s`, until the watermark moves.
+* When the service is back after it was gone, the watermark is asked for at once, and what it does not cover
+  is sent again as soon as it comes, or after `grace_s`.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from typing import Deque, List, Optional, Tuple
+
+from .scalar import whole, within
 
 
 @dataclass(frozen=True)
@@ -43,12 +47,11 @@ class WindowLimits:
     gap_interval_s: float = 0.2
 
     def __post_init__(self) -> None:
-        if min(self.capacity_samples, self.capacity_bytes, self.batch_bytes) < 1:
-            raise ValueError("the window needs room for at least one sample")
-        if not 1 <= self.batch_samples <= 4096:
-            raise ValueError("batch_samples: 1 to 4096")
-        if not 0 <= self.batch_delay_s < float("inf"):
-            raise ValueError("batch_delay_s: at least 0")
+        bounds = (1, 1 << 62)
+        whole("window_samples", self.capacity_samples, bounds)
+        whole("window_bytes", self.capacity_bytes, bounds)
+        whole("batch_samples", self.batch_samples, (1, 4096))
+        within("batch_delay_s", self.batch_delay_s, 0.0, 3600.0)
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,7 @@ class Window:
         self._quiet_since = 0.0
         self._silence_s = limits.silence_s
         self._asked_at: Optional[float] = None
+        self._rejoining = False
 
     @property
     def durable(self) -> int:
@@ -214,7 +218,12 @@ class Window:
             self._asked_at = None
         restarted = applied < self._applied
         self._applied = applied
-        if restarted and now >= self._restart_at + self._limits.gap_interval_s:
+        if self._rejoining:
+            self._rejoining = False
+            self._asked_at = None
+            self._quiet_since = now
+            self.resend()
+        elif restarted and now >= self._restart_at + self._limits.gap_interval_s:
             self._restart_at = now
             self.resend()
         if gap is None:
@@ -246,6 +255,17 @@ class Window:
         if self._durable < self._sent:
             self._repeat = [(self._durable, self._sent)]
 
+    def rejoin(self, now: float) -> bool:
+        """The service is there again. True: ask for the watermark now."""
+        self._silence_s = self._limits.silence_s
+        if self._durable == self._sent:
+            return False
+        # What was put since it went may be lost, and so may be what was on its way.
+        self._rejoining = True
+        self._repeat = []
+        self._asked_at = now
+        return True
+
     def watch(self, now: float) -> bool:
         """Looks for silence. True: ask for the watermark now. When asking has not helped, everything
         outstanding is scheduled."""
@@ -256,6 +276,7 @@ class Window:
         if self._asked_at is not None:
             if now >= self._asked_at + self._limits.grace_s:
                 self._asked_at = None
+                self._rejoining = False
                 self._silence_s = min(2 * self._silence_s, self._limits.silence_max_s)
                 self.resend()
             return False

@@ -20,7 +20,7 @@ from typing import Any, Dict, List, Optional, Tuple, Type, TypeVar, Union, get_t
 
 import cbor2
 
-from .errors import WireError
+from .errors import InvalidValue, WireError
 from .event import UnknownKind
 from .sample import Sample
 
@@ -136,7 +136,14 @@ def _read_fields(cls: Any, value: Any, at: str) -> Any:
             arguments[field.name] = None
         elif field.required:
             raise WireError(f"{at}: field {field.wire_name!r} is missing")
-    return cls(**arguments)
+    return _make(cls, arguments, at)
+
+
+def _make(cls: Any, arguments: Dict[str, Any], at: str) -> Any:
+    try:
+        return cls(**arguments)
+    except InvalidValue as error:
+        raise WireError(f"{at}: {error}") from error
 
 
 def _read_variant(options: Tuple[Any, ...], value: Any, at: str) -> Any:
@@ -146,7 +153,8 @@ def _read_variant(options: Tuple[Any, ...], value: Any, at: str) -> Any:
     for option in options:
         if getattr(option, "TAG", None) == tag:
             if getattr(option, "NEWTYPE", False):
-                return option(_read(_fields(option)[0].type, content, f"{at}.{tag}"))
+                held = _read(_fields(option)[0].type, content, f"{at}.{tag}")
+                return _make(option, {_fields(option)[0].name: held}, at)
             return _read_fields(option, content, f"{at}.{tag}")
     if UnknownKind in options:
         return UnknownKind(name=tag, fields=content if isinstance(content, dict) else {})
@@ -173,9 +181,10 @@ def encode_sample(sample: Sample) -> bytes:
     try:
         data = encode(sample)
     except (TypeError, ValueError, OverflowError) as error:
-        raise WireError(f"sample cannot be written: {error}") from error
+        raise InvalidValue("sample", sample, f"expected one that can be written ({error})") from error
     if len(data) + _BATCH_HEAD_BYTES > MESSAGE_BYTES_MAX:
-        raise WireError(f"a sample of {len(data)} bytes does not fit a message")
+        expected = f"expected at most {MESSAGE_BYTES_MAX - _BATCH_HEAD_BYTES} bytes"
+        raise InvalidValue("sample", sample, expected, f"{len(data)}")
     return data
 
 

@@ -1,0 +1,481 @@
+"""One run of an agent: its samples on their way out, what comes back, and the thread that does both.
+
+A `Robot` owns its run, and not the other way round: the thread knows the robot's callbacks by a weak reference
+only. So a robot that a program drops is finalised, and its run ends after what was sent is flushed. At the end of
+the program all runs are ended in the same way, within a bound.
+"""
+
+from __future__ import annotations
+
+import atexit
+import logging
+import threading
+import time
+import weakref
+from typing import Any, Callable, List, Optional, Set, Tuple
+
+import zenoh
+
+from .answer import Estimate, Rejection, Watermark
+from .clock import SessionClock
+from .connection import Connection
+from .errors import Closed, SessionSuperseded, Timeout, Unreachable, WindowFull
+from .inbox import Inbox
+from .problem import Problem
+from .rejection import Rejections, sentences
+from .sample import Sample, SampleBody
+from .wake import Wake
+from .window import Window, WindowLimits
+from .wire import encode_batch, encode_sample
+
+_log = logging.getLogger("cogmap")
+
+#: Estimates that wait for the callback; beyond it the oldest are dropped.
+_ESTIMATES_WAITING_MAX = 4096
+#: Watermarks and refusals that wait; a later one says all that an earlier one did.
+_ANSWERS_WAITING_MAX = 256
+#: How often the arrival of the service is looked for [s].
+_MATCH_POLL_S = 0.01
+#: How long a robot waits at its start for the watermark that the service has of it, and again before the first
+#: batch if none came [s].
+_FIRST_ANSWER_S = 0.5
+_SECOND_ANSWER_S = 0.2
+#: How long a dropped robot's samples are flushed in the background [s].
+DROPPED_FLUSH_S = 10.0
+#: How long the samples of all robots are flushed at the end of the program [s], and how long they may take to
+#: leave Zenoh afterwards.
+_EXIT_FLUSH_S = 1.0
+_EXIT_CLOSE_S = 0.5
+
+
+class Listeners:
+    """The callbacks of a robot. The robot alone keeps them: a callback often keeps its robot."""
+
+    def __init__(self) -> None:
+        self.estimates: List[Callable[[Estimate], object]] = []
+        self.rejections: List[Callable[[Rejection], object]] = []
+
+
+class Run:
+    """One run of an agent, with a thread of its own from `start` on.
+
+    Args:
+        owns_session: Whether the Zenoh session is closed with the run.
+        address: Where the Zenoh session leads, for messages.
+        match_timeout_s: How long samples wait for the service before they are sent anyway [s].
+    """
+
+    def __init__(
+        self,
+        space: str,
+        agent: str,
+        session_id: int,
+        limits: WindowLimits,
+        zenoh_session: zenoh.Session,
+        *,
+        owns_session: bool,
+        address: str,
+        match_timeout_s: float,
+        listeners: Listeners,
+    ) -> None:
+        self.space = space
+        self.agent = agent
+        self.session_id = session_id
+        # Guards everything below; notified on each change that somebody may wait for.
+        self.changed = threading.Condition()
+        self.window = Window(limits)
+        self.clock = SessionClock()
+        self.rejections = Rejections()
+        self.watermark: Optional[Watermark] = None
+        self.estimate: Optional[Estimate] = None
+        self.closing = False
+        self.superseded_told = False
+        self._superseded_by: Optional[int] = None
+        self._problem: Optional[Problem] = None
+        self._listeners = weakref.ref(listeners)
+        # When the thread ends at the latest, once it has been asked to.
+        self._stop_at: Optional[float] = None
+        self._is_known = False
+        # Whether the service was away since the last put, and whether it has come back.
+        self._was_away = False
+        self._is_back = False
+        self._may_send = False
+        self._match_deadline = time.monotonic() + match_timeout_s
+        # Held while a batch is taken and put, so that batches leave in order.
+        self._publishing = threading.Lock()
+        self._wake = Wake()
+        self._estimates_in = Inbox(Estimate, _ESTIMATES_WAITING_MAX, self._wake)
+        self._watermarks_in = Inbox(Watermark, _ANSWERS_WAITING_MAX, self._wake)
+        self._problems_in = Inbox(Problem, _ANSWERS_WAITING_MAX, self._wake)
+        self.connection = Connection(
+            zenoh_session,
+            owns_session,
+            address,
+            space,
+            agent,
+            hear_estimate=self._estimates_in.hear,
+            hear_watermark=self._watermarks_in.hear,
+            hear_problem=self._problems_in.hear,
+            hear_matching=self._hear_matching,
+        )
+        self._thread = threading.Thread(
+            target=self._work, name=f"cogmap-{space}-{agent}", daemon=True
+        )
+
+    def start(self) -> None:
+        """Asks the service for the agent's watermark, and starts the thread.
+
+        If the service has samples of this session already, another run uses its number, and after the first
+        put nobody could tell whose they are. Without an answer the thread asks again: a robot may start
+        before its service.
+
+        Raises `ApiError` when the service knows no such space; the run is closed then.
+        """
+        self._ask_and_wait(_FIRST_ANSWER_S)
+        if self._problem is not None:
+            self.connection.close()
+            raise self._problem.error(self.connection.where_asked)
+        _RUNNING.add(self)
+        self._thread.start()
+
+    # For the robot
+
+    def append(
+        self, body: SampleBody, stamp_ns: Optional[int], deadline: float, accepted: int
+    ) -> int:
+        """Takes a sample into the window and returns its number; waits for room until the deadline."""
+        by_clock = stamp_ns is None
+        data = b"" if stamp_ns is None else encode_sample(Sample(stamp_ns, body))
+        with self.changed:
+            while True:
+                self.check_open()
+                if by_clock:
+                    # Stamped under the lock that numbers it, and again after each wait: a sample of
+                    # another thread that gets in between would else have the later stamp and the
+                    # earlier number.
+                    stamp_ns = self.clock.stamp(time.time_ns())
+                    data = encode_sample(Sample(stamp_ns, body))
+                if self.window.has_room(len(data)):
+                    break
+                self.window.hurry()
+                self._wake.set()
+                remaining = deadline - time.monotonic()
+                if remaining <= 0:
+                    raise WindowFull(accepted, self.window.pending, self.connection.silence())
+                self.changed.wait(remaining)
+            now = time.monotonic()
+            starts_batch = self.window.sent == self.window.next_seq
+            seq = self.window.append(data, now)
+            if stamp_ns is not None:
+                self.clock.take(seq, stamp_ns)
+            due = self.window.ready(now)
+        if due and self._may_send and self._publishing.acquire(blocking=False):
+            # A full batch leaves on the caller's thread, for the other one might wait long for its turn.
+            try:
+                self._send_due()
+            finally:
+                self._publishing.release()
+        elif due or starts_batch:
+            self._wake.set()
+        return seq
+
+    def wait_durable(self, timeout_s: float) -> int:
+        """Waits until the watermark covers all samples; returns how many are missing after the time."""
+        if self.is_own_thread():
+            raise RuntimeError("a callback cannot wait for acknowledgements: they come after it")
+        with self.changed:
+            target = self.window.next_seq
+            self.window.hurry()
+            self._wake.set()
+            self.changed.wait_for(
+                lambda: self.window.durable >= target or self._is_refused(), timeout_s
+            )
+            if self.window.durable < target:
+                self.check_usable()
+            return max(0, target - self.window.durable)
+
+    def wait_estimate(self, seq: Optional[int], timeout_s: float) -> Estimate:
+        """Waits for an estimate, or for one that includes a sample."""
+        if self.is_own_thread() and seq is not None:
+            raise RuntimeError("a callback cannot wait for an estimate: it comes after it")
+        with self.changed:
+            self.window.hurry()
+            self._wake.set()
+            self.changed.wait_for(lambda: self._has_estimate(seq) or self._is_refused(), timeout_s)
+            if self.estimate is not None and self._has_estimate(seq):
+                return self.estimate
+            self.check_usable()
+            what = "no estimate" if seq is None else f"no estimate of sample {seq}"
+            silence = self.connection.silence()
+            refused = None if seq is None else self.rejections.reason_of(seq)
+            why = f": the sample was refused ({refused.value})" if refused is not None else silence
+            raise Timeout(f"{what} of agent {self.agent} within {timeout_s:g} s{why}")
+
+    def _has_estimate(self, seq: Optional[int]) -> bool:
+        return self.estimate is not None and (seq is None or self.estimate.seq >= seq)
+
+    def wait_heard(self, timeout_s: float) -> bool:
+        """Waits until the service listens to this run's samples; says whether it does."""
+        deadline = time.monotonic() + timeout_s
+        while not self.connection.is_heard():
+            if time.monotonic() >= deadline:
+                return False
+            time.sleep(_MATCH_POLL_S)
+        if self.is_own_thread():
+            # Only the thread itself ends the wait below.
+            return True
+        with self.changed:
+            # Full batches leave on the caller's thread only from then on.
+            return self.changed.wait_for(
+                lambda: self._may_send or self._stop_at is not None,
+                max(0.0, deadline - time.monotonic()),
+            )
+
+    def check_open(self) -> None:
+        """Raises if no sample can be taken in."""
+        if self.closing:
+            raise Closed(f"robot {self.agent} of space {self.space} is closed")
+        self.check_usable()
+
+    def check_usable(self) -> None:
+        """Raises if nothing that is sent would be taken."""
+        if self._superseded_by is not None:
+            self.superseded_told = True
+            raise SessionSuperseded(self.agent, self.session_id, self._superseded_by)
+        if self._problem is not None:
+            raise self._problem.error(self.connection.where_asked)
+
+    def _is_refused(self) -> bool:
+        return self._superseded_by is not None or self._problem is not None
+
+    # The end
+
+    def stop(self, flush_s: float) -> None:
+        """Lets the thread end as soon as everything is acknowledged, at the latest after `flush_s`. It waits for
+        nothing and takes no lock: a garbage collection may call it anywhere."""
+        at = time.monotonic() + flush_s
+        self._stop_at = at if self._stop_at is None else min(at, self._stop_at)
+        self._wake.set()
+
+    def join(self, timeout_s: float) -> bool:
+        """Waits for the end of the thread; says whether it came."""
+        if not self.is_own_thread():
+            self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def is_own_thread(self) -> bool:
+        """Whether the caller is the run's own thread, as in a callback."""
+        return threading.current_thread() is self._thread
+
+    def _is_over(self) -> bool:
+        if self._stop_at is None:
+            return False
+        with self.changed:
+            done = self.window.pending == 0 or self._is_refused()
+        return done or time.monotonic() >= self._stop_at
+
+    # The thread
+
+    def _work(self) -> None:
+        try:
+            while not self._is_over():
+                self._wake.wait(self._idle_s())
+                self._turn()
+        finally:
+            self._receive()
+            self._tell_rejections(at_once=True)
+            if self.window.pending and not self.closing:
+                missing, silence = self.window.pending, self.connection.silence()
+                _log.warning("%s: %d samples are lost, not acknowledged%s", self.agent, missing, silence)
+            with self.changed:
+                self.closing = True
+                self.changed.notify_all()
+            self.connection.close()
+            _RUNNING.discard(self)
+
+    def _turn(self) -> None:
+        self._receive()
+        self._tell_rejections()
+        if not self._may_send:
+            # A put before the subscriber is known is dropped on the way: so wait for it, but not for
+            # ever, since what is dropped is sent again.
+            is_heard = self.connection.is_heard()
+            if not is_heard and time.monotonic() < self._match_deadline:
+                return
+            self._was_away = not is_heard
+            if not self._is_known:
+                self._ask_and_wait(_SECOND_ANSWER_S)
+            with self.changed:
+                self._may_send = True
+                self.changed.notify_all()
+        self._pump()
+        with self.changed:
+            now = time.monotonic()
+            if self._stop_at is not None:
+                self.window.hurry()
+            ask = not self._is_superseded() and self.window.watch(now)
+            if self._is_back:
+                self._is_back = False
+                ask = self.window.rejoin(now) or self._problem is not None or ask
+        if ask:
+            _log.debug("no progress of %s: asking for the watermark", self.agent)
+            self._ask(lambda: None)
+        self._pump()
+
+    def _idle_s(self) -> Optional[float]:
+        with self.changed:
+            if self._is_superseded():
+                at = None
+            elif not self._may_send:
+                return _MATCH_POLL_S
+            else:
+                at = self.window.wake_at()
+            times = [one for one in (at, self.rejections.tell_at(), self._stop_at) if one is not None]
+        return max(0.0, min(times) - time.monotonic()) if times else None
+
+    def _is_superseded(self) -> bool:
+        return self._superseded_by is not None
+
+    def _hear_matching(self, is_matching: bool) -> None:
+        if not is_matching:
+            self._was_away = True
+        elif self._was_away:
+            self._was_away = False
+            self._is_back = self._may_send
+        self._wake.set()
+
+    def _ask(self, ended: Callable[[], None]) -> None:
+        try:
+            self.connection.ask_watermark(ended)
+        except Unreachable as error:
+            _log.warning("%s", error)
+            ended()
+
+    def _ask_and_wait(self, timeout_s: float) -> None:
+        answered = threading.Event()
+        self._ask(answered.set)
+        answered.wait(timeout_s)
+        self._receive()
+
+    def _pump(self) -> None:
+        """Sends what is due, after what another thread is sending."""
+        with self._publishing:
+            self._send_due()
+
+    def _send_due(self) -> None:
+        while True:
+            with self.changed:
+                if self._is_superseded() or not self._may_send:
+                    return
+                outgoing = self.window.take(time.monotonic())
+            if outgoing is None:
+                return
+            try:
+                self.connection.put(encode_batch(self.session_id, outgoing.first_seq, outgoing.samples))
+            except Unreachable as error:
+                # The samples stay in the window; silence brings them back.
+                _log.warning("%s", error)
+                return
+
+    def _receive(self) -> None:
+        # Estimates first, and of the watermarks only those that are here by now: when a flush returns, the estimate
+        # published before is in place. What comes meanwhile wakes this thread again.
+        watermarks = len(self._watermarks_in)
+        listeners = self._listeners()
+        callbacks = [] if listeners is None else list(listeners.estimates)
+        del listeners
+        while self._estimates_in:
+            if len(self._estimates_in) > 1 and not callbacks:
+                # Nobody asked for each one, and only the latest is kept: spare the decoding.
+                self._estimates_in.drop()
+                continue
+            estimate = self._estimates_in.take()
+            if estimate is not None and estimate.session == self.session_id:
+                with self.changed:
+                    self.estimate = estimate
+                    self.changed.notify_all()
+                _call(callbacks, estimate)
+        del callbacks
+        for _ in range(watermarks):
+            watermark = self._watermarks_in.take()
+            if watermark is not None:
+                self._take_watermark(watermark)
+        while self._problems_in:
+            problem = self._problems_in.take()
+            if problem is not None:
+                self._take_problem(problem)
+
+    def _take_watermark(self, watermark: Watermark) -> None:
+        with self.changed:
+            self._is_known = True
+            self._problem = None
+            if watermark.session < self.session_id:
+                # An earlier run of this agent; ours has not arrived yet.
+                return
+            # The service cannot have applied what this run never sent: that is of another run with our
+            # number. `applied` moves before `durable`, so it tells first.
+            foreign = max(watermark.applied, watermark.durable) > self.window.sent
+            if watermark.session > self.session_id or foreign:
+                self._superseded_by = max(watermark.session, self._superseded_by or 0)
+                self.changed.notify_all()
+            if self._superseded_by is not None:
+                # Two runs may share the number, so nobody knows which of them this is about.
+                return
+            now = time.monotonic()
+            gap = None if watermark.gap is None else (watermark.gap.start, watermark.gap.stop)
+            self.window.acknowledge(watermark.durable, watermark.applied, gap, now)
+            if self.watermark is None or watermark.durable >= self.watermark.durable:
+                self.watermark = watermark
+            self.rejections.take(watermark.rejected, now)
+            self.changed.notify_all()
+
+    def _take_problem(self, problem: Problem) -> None:
+        if not problem.says_unknown_agent and not problem.blames_the_request:
+            # It has too much to do, or is about to end: asking again later may help.
+            _log.debug("%s: %s", self.connection.where_asked, problem.detail)
+            return
+        with self.changed:
+            self._is_known = True
+            self._problem = None if problem.says_unknown_agent else problem
+            self.changed.notify_all()
+
+    def _tell_rejections(self, at_once: bool = False) -> None:
+        with self.changed:
+            told = self.rejections.tell(time.monotonic(), at_once)
+            stamps = self.clock.backwards if told else {}
+        if not told:
+            return
+        for sentence in sentences(told, stamps):
+            _log.warning("%s: %s", self.agent, sentence)
+        listeners = self._listeners()
+        callbacks: List[Callable[[Rejection], object]] = (
+            [] if listeners is None else list(listeners.rejections)
+        )
+        del listeners
+        for rejection in told:
+            _call(callbacks, rejection)
+
+
+def _call(callbacks: List[Callable[[Any], object]], argument: Any) -> None:
+    for callback in callbacks:
+        try:
+            callback(argument)
+        except Exception:  # An error of the user's callback must not end the robot's thread.
+            _log.exception("callback %r", callback)
+
+
+#: The runs whose threads have not ended.
+_RUNNING: Set[Run] = set()
+
+
+def _end_all() -> None:
+    """Ends all runs at the end of the program, after what was sent is flushed if the service is there."""
+    runs: Tuple[Run, ...] = tuple(_RUNNING)
+    for run in runs:
+        run.stop(_EXIT_FLUSH_S)
+    end = time.monotonic() + _EXIT_FLUSH_S + _EXIT_CLOSE_S
+    for run in runs:
+        run.join(max(0.0, end - time.monotonic()))
+
+
+atexit.register(_end_all)
