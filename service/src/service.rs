@@ -95,10 +95,10 @@ impl Service {
             None => None,
         };
         let outlet: Arc<dyn Outlet> = match &session {
-            Some(session) => Arc::new(ZenohOutlet::new(
-                session.clone(),
-                config.zenoh.encoding.codec(),
-            )),
+            Some(session) => {
+                let codec = config.zenoh.encoding.codec();
+                Arc::new(ZenohOutlet::declare(session.clone(), codec).await?)
+            }
             None => Arc::new(Silent),
         };
         let engine = Engine::open(store, config.engine.settings(), outlet).map_err(of_store)?;

@@ -83,14 +83,10 @@ impl Writer {
     }
 
     fn publish_events(&mut self) {
-        for event in self.events.drain(..) {
-            self.counters.event(&self.map, &event);
-            if let Some(event) = readout::event(&self.shared.name, &self.map, &event) {
-                self.shared.outlet.event(&event);
-                // No one listening is no fault.
-                let _ = self.shared.events.send(Arc::new(event));
-            }
+        for event in &self.told {
+            self.shared.outlet.event(event);
         }
+        self.shared.events.extend(self.told.drain(..));
     }
 
     fn remind(&self, slot: &AgentSlot) {

@@ -8,6 +8,7 @@ mod problems;
 mod resources;
 mod running;
 mod trajectories;
+mod uniform;
 
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
