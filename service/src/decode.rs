@@ -58,6 +58,7 @@ pub fn journaled_sample(sample: &wire::Sample) -> Result<Sample, InvalidSample> 
             ends_trip: marker.ends_trip,
         }),
         wire::SampleBody::Object(mark) => SampleBody::Object(object_mark(mark)?),
+        wire::SampleBody::SessionEnd {} => SampleBody::SessionEnd,
     };
     Ok(Sample {
         stamp_ns: sample.stamp_ns,

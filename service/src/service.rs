@@ -121,7 +121,7 @@ impl Service {
             Some(session) => Some(Intake::start(session, &engine).await?),
             None => None,
         };
-        let upkeep = tokio::spawn(metrics::upkeep(prometheus.clone()));
+        let upkeep = tokio::spawn(metrics::upkeep(prometheus.clone(), directory.clone()));
         let (stop_http, stopped) = oneshot::channel();
         let http = tokio::spawn(http::run(
             listener,

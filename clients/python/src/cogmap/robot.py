@@ -16,7 +16,7 @@ from .inbox import Inbox
 from .key import check_name, durable_key, estimate_key, query_key, samples_key
 from .link import DEFAULT_ENDPOINT, ask, has_subscriber, open_session, within
 from .query import WatermarkQuery
-from .sample import MotionNoise, Sample, SampleBody
+from .sample import MotionNoise, Sample, SampleBody, SessionEnd
 from .sampler import Sampler
 from .window import Window, WindowLimits
 from .wire import CBOR, encode_batch, encode_sample
@@ -58,6 +58,8 @@ class Robot(Sampler):
         send_timeout_s: How long a sample method waits for room before `WindowFull` [s].
         connect_timeout_s: How long to wait for the router [s].
         match_timeout_s: How long samples wait for the service before they are sent anyway [s].
+        ends_session: Whether `close` ends the session, and the trip under way, by a last sample. Without
+            it they end when the agent's next session begins.
 
     Raises:
         ValueError: A name is not valid, or both `connect` and `session` are given.
@@ -80,6 +82,7 @@ class Robot(Sampler):
         send_timeout_s: float = 10.0,
         connect_timeout_s: float = 10.0,
         match_timeout_s: float = 5.0,
+        ends_session: bool = True,
     ) -> None:
         if connect is not None and session is not None:
             raise ValueError("give either connect or session")
@@ -90,6 +93,7 @@ class Robot(Sampler):
             raise ValueError("session_id: an unsigned 64-bit number")
         super().__init__(motion_noise)
         self._send_timeout_s = send_timeout_s
+        self._ends_session = ends_session
         self._window = Window(
             WindowLimits(
                 capacity_samples=window_samples,
@@ -285,8 +289,8 @@ class Robot(Sampler):
             )
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """Flushes for at most `timeout_s`, then closes, also when that fails; a second call does
-        nothing.
+        """Ends the session and the trip under way, flushes for at most `timeout_s`, then closes, also
+        when that fails; a second call does nothing.
 
         Raises `Timeout` when samples are left without acknowledgement: they are lost with this
         process unless they arrived all the same.
@@ -294,6 +298,7 @@ class Robot(Sampler):
         with self._changed:
             if self._closing:
                 return
+            self._end_session()
             self._closing = True
             self._changed.notify_all()
         missing = 0
@@ -306,6 +311,15 @@ class Robot(Sampler):
             self._tear_down()
         if missing:
             raise Timeout(f"closed with {missing} samples that are not durable")
+
+    def _end_session(self) -> None:
+        """Appends the last sample, with the condition held: at the stamp of the one before, because the
+        robot's clock may be another than this machine's. A full window is left as it is."""
+        if not self._ends_session or self._superseded_by is not None or not self._window.next_seq:
+            return
+        data = encode_sample(Sample(self._last_stamp_ns, SessionEnd()))
+        if self._window.has_room(len(data)):
+            self._window.append(data, time.monotonic())
 
     def _tear_down(self) -> None:
         with self._changed:

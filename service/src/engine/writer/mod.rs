@@ -154,7 +154,7 @@ impl Writer {
             self.round(&mut inbox, now);
             if now >= next_look {
                 self.give_up_gaps(now);
-                self.counters.sizes(&self.map, waiting);
+                self.measure(waiting);
                 next_look = now + PATIENCE;
             }
             self.shared.serve_snapshots(&self.map);
