@@ -6,10 +6,10 @@
 
 use std::fmt;
 
-use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 
 use crate::codec::DecodeError;
-use crate::limits::{BATCH_SAMPLES_MAX, LOCALIZE_SAMPLES_MAX};
+use crate::limits::BATCH_SAMPLES_MAX;
 use crate::sample::{Sample, SampleBatch};
 
 /// A [`SampleBatch`] on its way in. The fields are the same, in the same order.
@@ -37,19 +37,16 @@ impl BoundedBatch {
     }
 }
 
-/// The samples of a question where they were taken.
+/// The samples of a question where they were taken: one more than there may be stands for all that are
+/// too many, for whoever answers to refuse.
 pub(crate) fn localize_samples<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Vec<Sample>, D::Error> {
-    let BoundedSamples { kept, count } = BoundedSamples::deserialize(deserializer)?;
-    if count > LOCALIZE_SAMPLES_MAX {
-        let detail = format!("{count} samples, the limit is {LOCALIZE_SAMPLES_MAX}");
-        return Err(D::Error::custom(detail));
-    }
+    let BoundedSamples { kept, .. } = BoundedSamples::deserialize(deserializer)?;
     Ok(kept)
 }
 
-/// The first [`BATCH_SAMPLES_MAX`] samples, and how many there were.
+/// The first samples, one more than there may be at most, and how many there were.
 struct BoundedSamples {
     kept: Vec<Sample>,
     count: usize,
@@ -75,7 +72,7 @@ impl<'de> Visitor<'de> for BoundedVisitor {
         let mut kept = Vec::with_capacity(expected);
         let mut count = 0;
         while let Some(sample) = seq.next_element()? {
-            if count < BATCH_SAMPLES_MAX {
+            if count <= BATCH_SAMPLES_MAX {
                 kept.push(sample);
             }
             count += 1;

@@ -7,12 +7,16 @@
 //! left over and enum variants that are not a text or a map of one entry.
 
 use std::fmt;
+use std::marker::PhantomData;
 
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{
     Deserialize, DeserializeOwned, DeserializeSeed, Deserializer, EnumAccess, Error, IgnoredAny,
     IntoDeserializer, MapAccess, SeqAccess, Visitor,
 };
+use serde_path_to_error::Path;
+
+use crate::field;
 
 /// Deepest nesting: messages stay below ten, so this leaves room for fields that nobody knows, and
 /// stays far from the end of a thread's stack.
@@ -30,6 +34,22 @@ pub(crate) fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String>
         Ok(message)
     } else {
         Err(format!("{} bytes after the message", rest.len()))
+    }
+}
+
+/// The field for which the bytes are no such message, if it is for one.
+pub(crate) fn refused_field<T: DeserializeOwned>(bytes: &[u8]) -> Option<Path> {
+    let found = ciborium::de::from_reader_with_recursion_limit(bytes, NESTING_MAX);
+    found.ok().and_then(|Refused::<T>(path, _)| path)
+}
+
+/// The field for which a message cannot be read, in place of the message.
+struct Refused<T>(Option<Path>, PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Refused<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let path = field::refused::<T, _>(Strict(deserializer));
+        Ok(Self(path, PhantomData))
     }
 }
 

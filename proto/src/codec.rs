@@ -1,10 +1,14 @@
 //! The three codecs, chosen by the Zenoh `Encoding` or the HTTP `Content-Type`.
 
+use std::fmt::Display;
+
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_path_to_error::Path;
 
 use crate::bounded::BoundedBatch;
 use crate::cbor;
+use crate::field;
 use crate::limits::{BATCH_SAMPLES_MAX, MESSAGE_BYTES_MAX};
 use crate::sample::SampleBatch;
 
@@ -155,10 +159,12 @@ impl Codec {
                     Err(malformed(format!("{} bytes after the message", rest.len())))
                 }
             }
-            Self::Cbor => cbor::from_slice(bytes).map_err(malformed),
-            Self::Json => {
-                serde_json::from_slice(bytes).map_err(|error| malformed(error.to_string()))
-            }
+            Self::Cbor => cbor::from_slice(bytes)
+                .map_err(|error| malformed(located(cbor::refused_field::<T>(bytes), &error))),
+            Self::Json => serde_json::from_slice(bytes).map_err(|error| {
+                let mut json = serde_json::Deserializer::from_slice(bytes);
+                malformed(located(field::refused::<T, _>(&mut json), &error))
+            }),
         }
     }
 
@@ -170,6 +176,11 @@ impl Codec {
     pub fn decode_batch(self, bytes: &[u8]) -> Result<SampleBatch, DecodeError> {
         self.decode::<BoundedBatch>(bytes)?.into_batch()
     }
+}
+
+/// What is wrong, at the field where it is.
+fn located(path: Option<Path>, error: &impl Display) -> String {
+    path.map_or_else(|| error.to_string(), |path| field::at_field(&path, error))
 }
 
 impl SampleBatch {

@@ -1,8 +1,106 @@
 //! Events: what happened in a space, for whoever follows it.
 
+use std::fmt;
+use std::num::ParseIntError;
+use std::str::FromStr;
+
 use serde::{Deserialize, Serialize};
 
 use crate::watermark::SkipReason;
+
+/// Which event of its space one is. Made of the record that brought it about, so it is the same live,
+/// after a restart and in a replay, and later events have larger ids. As a text
+/// `{map_revision}-{index}`, such as `4711-0`.
+///
+/// It stands beside the event: as `id` of a server-sent event and of a page, over Zenoh as the
+/// attachment.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[serde(try_from = "String", into = "String")]
+pub struct EventId {
+    /// Number of records that the map includes with the one that brought the event about.
+    pub revision: u64,
+    /// Number of that record's events before this one.
+    pub index: u32,
+}
+
+/// Why a text is not an [`EventId`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("an event's id is a map revision and an index, such as 4711-0, not {0:?}")]
+pub struct EventIdError(String);
+
+impl fmt::Display for EventId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}", self.revision, self.index)
+    }
+}
+
+impl FromStr for EventId {
+    type Err = EventIdError;
+
+    fn from_str(text: &str) -> Result<Self, EventIdError> {
+        let refused = |_: ParseIntError| EventIdError(text.to_owned());
+        // A sign is no digit, though Rust reads it.
+        let digits = |c: char| c.is_ascii_digit() || c == '-';
+        let parts = text.split_once('-').filter(|_| text.chars().all(digits));
+        let (revision, index) = parts.ok_or_else(|| EventIdError(text.to_owned()))?;
+        Ok(Self {
+            revision: revision.parse().map_err(refused)?,
+            index: index.parse().map_err(refused)?,
+        })
+    }
+}
+
+impl TryFrom<String> for EventId {
+    type Error = EventIdError;
+
+    fn try_from(text: String) -> Result<Self, EventIdError> {
+        text.parse()
+    }
+}
+
+impl From<EventId> for String {
+    fn from(id: EventId) -> Self {
+        id.to_string()
+    }
+}
+
+/// An event with its id.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct EventRecord {
+    /// Its id.
+    #[cfg_attr(feature = "schema", schema(value_type = String, pattern = "^[0-9]+-[0-9]+$"))]
+    pub id: EventId,
+    /// What happened.
+    pub event: Event,
+}
+
+/// Events that somebody who follows them will not get: there were more than are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct MissedEvents {
+    /// How many. Null where nobody counted: they are older than the start of the service, or the id
+    /// asked for is of another past of the space.
+    pub events: Option<u64>,
+    /// Id of the oldest event that is kept; null where none is.
+    #[cfg_attr(feature = "schema", schema(value_type = Option<String>))]
+    pub next: Option<EventId>,
+}
+
+/// One page of the latest events.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct EventPage {
+    /// The events, oldest first.
+    pub events: Vec<EventRecord>,
+    /// What happened after `after` and is not kept any more; absent where nothing did.
+    pub missed: Option<MissedEvents>,
+    /// Pass as `after` for the events that come after these; absent where there are none yet.
+    #[cfg_attr(feature = "schema", schema(value_type = Option<String>))]
+    pub next: Option<EventId>,
+}
 
 /// One event, published on `cogmap/{space}/events` and as a server-sent event.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -12,7 +110,7 @@ pub struct Event {
     pub space: String,
     /// Agent that caused it.
     pub agent: String,
-    /// Number of records that the map includes.
+    /// Number of records that the map includes with the one that brought it about.
     pub map_revision: u64,
     /// Stamp of the sample that caused it \[ns\].
     pub stamp_ns: i64,

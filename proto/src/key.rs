@@ -5,6 +5,7 @@
 //! cogmap/{space}/{agent}/estimate    out  Estimate
 //! cogmap/{space}/{agent}/durable     out  Watermark
 //! cogmap/{space}/events              out  Event
+//! …/estimate, durable, events + /@json   out  the same as JSON, while somebody listens
 //! cogmap/{space}/query/{verb}        queryables, bodies as in HTTP
 //! ```
 
@@ -33,6 +34,12 @@ pub fn durable_key(space: &str, agent: &str) -> String {
 /// Where a space's events are published.
 pub fn events_key(space: &str) -> String {
     format!("{ROOT}/{space}/events")
+}
+
+/// Where the same is published as JSON, whatever the service's own encoding, while somebody listens
+/// there. Wildcards do not match the last chunk, so who listens to `cogmap/**` gets nothing twice.
+pub fn json_key(key: &str) -> String {
+    format!("{key}/@json")
 }
 
 /// Where a space answers a query.

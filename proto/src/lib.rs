@@ -18,6 +18,7 @@ mod cbor;
 mod codec;
 mod estimate;
 mod event;
+mod field;
 mod key;
 pub mod limits;
 mod localize;
@@ -37,8 +38,14 @@ pub use answer::{
 };
 pub use codec::{CBOR, Codec, DecodeError, JSON, POSTCARD_V1};
 pub use estimate::{Estimate, Status};
-pub use event::{Event, EventKind, PerceptKind, TripEnd};
-pub use key::{AgentKey, KeyError, durable_key, estimate_key, events_key, query_key, samples_key};
+pub use event::{
+    Event, EventId, EventIdError, EventKind, EventPage, EventRecord, MissedEvents, PerceptKind,
+    TripEnd,
+};
+pub use field::at_field;
+pub use key::{
+    AgentKey, KeyError, durable_key, estimate_key, events_key, json_key, query_key, samples_key,
+};
 pub use localize::{Localization, LocalizationHypothesis, LocalizeQuery, LocalizedPose};
 pub use name::{Name, NameError};
 pub use object::{

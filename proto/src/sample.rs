@@ -51,6 +51,9 @@ pub enum SampleBody {
     Marker(Marker),
     /// An episode with an object begins or ends.
     Object(ObjectMark),
+    /// The session ends, and the trip under way with it: a robot's last word. Samples that come after it
+    /// all the same go on as before.
+    SessionEnd {},
 }
 
 /// The body's displacement since the previous motion sample, in the body frame at its start.

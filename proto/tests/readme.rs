@@ -38,11 +38,12 @@ fn the_examples_are_messages() {
             SampleBody::StartPose(_) => "start_pose",
             SampleBody::Marker(_) => "marker",
             SampleBody::Object(_) => "object",
+            SampleBody::SessionEnd {} => "session_end",
         })
         .collect();
     assert_eq!(
         kinds.len(),
-        8,
+        9,
         "every kind of sample has an example: {kinds:?}"
     );
     let estimate: Estimate = Codec::Json.decode(estimate.as_bytes()).unwrap();

@@ -10,11 +10,30 @@ use cognitive_map::{
     StartPose, Target, Touch, TouchLevel, TouchNoise,
 };
 
-/// Reads one sample.
+/// Reads one sample that has just come.
 ///
 /// # Errors
 /// Says why the sample makes no sense.
 pub fn sample(sample: &wire::Sample) -> Result<Sample, InvalidSample> {
+    match &sample.body {
+        wire::SampleBody::Level(level) => check_name(&level.channel)?,
+        wire::SampleBody::Descriptor(descriptor) => check_name(&descriptor.channel)?,
+        wire::SampleBody::Sighting(sighting) => {
+            if let wire::Target::Agent(name) = &sighting.target {
+                check_name(name)?;
+            }
+        }
+        _ => {}
+    }
+    journaled_sample(sample)
+}
+
+/// Reads one sample of the journal: as [`sample`], but for names, which older versions took in more
+/// forms.
+///
+/// # Errors
+/// Says why the sample makes no sense.
+pub fn journaled_sample(sample: &wire::Sample) -> Result<Sample, InvalidSample> {
     let body = match &sample.body {
         wire::SampleBody::Increment(body) => SampleBody::Motion(increment(body)?),
         wire::SampleBody::Velocity(body) => SampleBody::Motion(velocity(body)?),
@@ -39,6 +58,7 @@ pub fn sample(sample: &wire::Sample) -> Result<Sample, InvalidSample> {
             ends_trip: marker.ends_trip,
         }),
         wire::SampleBody::Object(mark) => SampleBody::Object(object_mark(mark)?),
+        wire::SampleBody::SessionEnd {} => SampleBody::SessionEnd,
     };
     Ok(Sample {
         stamp_ns: sample.stamp_ns,
@@ -55,6 +75,26 @@ pub fn motion(motion: &wire::MotionBody) -> Result<Motion, InvalidSample> {
         wire::MotionBody::Increment(body) => increment(body),
         wire::MotionBody::Velocity(body) => velocity(body),
     }
+}
+
+/// Checks the name of a channel or an agent.
+fn check_name(name: &str) -> Result<(), InvalidSample> {
+    wire::Name::check(name).map_err(|_| InvalidSample::InvalidLabel)
+}
+
+/// Checks the names of channels of contacts that have just come.
+///
+/// # Errors
+/// Says which contact names none, by its place in the list.
+pub fn check_channels(contacts: &[wire::Contact]) -> Result<(), (usize, InvalidSample)> {
+    for (at, contact) in contacts.iter().enumerate() {
+        let levels = contact.levels.iter().map(|level| &level.channel);
+        let descriptors = contact.descriptors.iter().map(|seen| &seen.channel);
+        for channel in levels.chain(descriptors) {
+            check_name(channel).map_err(|error| (at, error))?;
+        }
+    }
+    Ok(())
 }
 
 /// Reads a percept that is a cue.

@@ -1,9 +1,13 @@
 //! Metrics: their names, their descriptions, and the recorder behind `/metrics`.
 
+mod process;
+
+use std::path::PathBuf;
 use std::time::Duration;
 
 use metrics::{Unit, describe_counter, describe_gauge, describe_histogram};
 use metrics_exporter_prometheus::{BuildError, Matcher, PrometheusBuilder, PrometheusHandle};
+use tokio::time::MissedTickBehavior;
 
 /// Messages received; label `codec` (`postcard`, `cbor`, `json`).
 pub const RECEIVED_MESSAGES: &str = "cogmap_received_messages_total";
@@ -61,8 +65,23 @@ pub const HTTP_REQUESTS: &str = "cogmap_http_requests_total";
 pub const HTTP_REQUEST_SECONDS: &str = "cogmap_http_request_seconds";
 /// Event streams open now.
 pub const HTTP_STREAMS: &str = "cogmap_http_streams";
+/// Agents of a space by how they are localised; labels `space`, `status` (`localized`, `uncertain`,
+/// `lost`, or `new` before the first sample).
+pub const AGENTS_BY_STATUS: &str = "cogmap_agents_by_status";
+/// Samples of one agent that are applied and not yet durable, the most of all agents; label `space`.
+pub const NOT_DURABLE_MAX: &str = "cogmap_not_durable_samples_max";
+/// Samples of one agent that wait for earlier ones, the most of all agents; label `space`.
+pub const WAITING_MAX: &str = "cogmap_waiting_samples_max";
+/// What the store takes on its disk \[bytes\]; label `part` (a directory in it, or `top`).
+pub const STORE_BYTES: &str = "cogmap_store_bytes";
+/// Memory of the process that is in use \[bytes\], under the name that Prometheus has for it.
+pub const PROCESS_MEMORY: &str = "process_resident_memory_bytes";
+/// Open file descriptors of the process, under the name that Prometheus has for it.
+pub const PROCESS_FDS: &str = "process_open_fds";
+/// Most file descriptors that the process may open, under the name that Prometheus has for it.
+pub const PROCESS_FDS_MAX: &str = "process_max_fds";
 
-/// How often histograms are tended.
+/// How often histograms are tended and the store is measured.
 const UPKEEP_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Bounds of the histograms of times \[s\]: from a motion step to a stalled disk.
@@ -89,13 +108,23 @@ pub fn install() -> Result<PrometheusHandle, BuildError> {
 }
 
 /// Moves what histograms have recorded into their buckets from time to time. A scrape does that too;
-/// where nobody scrapes, the records would pile up.
-pub async fn upkeep(handle: PrometheusHandle) {
+/// where nobody scrapes, the records would pile up. Measures the store's `directory`, too.
+pub async fn upkeep(handle: PrometheusHandle, directory: PathBuf) {
     let mut ticks = tokio::time::interval(UPKEEP_INTERVAL);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         ticks.tick().await;
         handle.run_upkeep();
+        let directory = directory.clone();
+        // A panic there is in the log, and the next look may do better.
+        let _ = tokio::task::spawn_blocking(move || process::record_store(&directory)).await;
     }
+}
+
+/// The metrics in Prometheus's text format, with what the process takes now.
+pub fn render(handle: &PrometheusHandle) -> String {
+    process::record();
+    handle.render()
 }
 
 /// Sum of a counter over all its labels.
@@ -197,11 +226,102 @@ fn describe() {
         "Time to the head of an answer"
     );
     describe_gauge!(HTTP_STREAMS, Unit::Count, "Event streams open now");
+    describe_gauge!(
+        AGENTS_BY_STATUS,
+        Unit::Count,
+        "Agents of a space, by how they are localised"
+    );
+    describe_gauge!(
+        NOT_DURABLE_MAX,
+        Unit::Count,
+        "Largest number of samples of one agent applied and not yet durable"
+    );
+    describe_gauge!(
+        WAITING_MAX,
+        Unit::Count,
+        "Largest number of samples of one agent that wait for earlier ones"
+    );
+    describe_gauge!(
+        STORE_BYTES,
+        Unit::Bytes,
+        "Disk that the store takes, by directory"
+    );
+    describe_gauge!(
+        PROCESS_MEMORY,
+        Unit::Bytes,
+        "Resident memory of the process"
+    );
+    describe_gauge!(PROCESS_FDS, Unit::Count, "Open file descriptors");
+    describe_gauge!(
+        PROCESS_FDS_MAX,
+        Unit::Count,
+        "Most file descriptors that may be open"
+    );
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The metrics that this file names: constant and name.
+    fn named() -> Vec<(&'static str, &'static str)> {
+        let lines = include_str!("metrics.rs").lines();
+        let constants = lines.filter_map(|line| line.strip_prefix("pub const "));
+        constants
+            .filter_map(|line| line.split_once(": &str = \""))
+            .filter_map(|(constant, name)| Some((constant, name.strip_suffix("\";")?)))
+            .collect()
+    }
+
+    #[test]
+    fn every_metric_is_described_here_and_on_the_page_of_metrics() {
+        let (source, page) = (
+            include_str!("metrics.rs"),
+            include_str!("../../docs/metrics.md"),
+        );
+        let named = named();
+        assert!(named.len() > 30, "{named:?}");
+        for (constant, name) in &named {
+            let described = ["counter", "gauge", "histogram"].iter().any(|kind| {
+                let one_line = format!("describe_{kind}!({constant},");
+                let lines = format!("describe_{kind}!(\n        {constant},");
+                source.contains(&one_line) || source.contains(&lines)
+            });
+            assert!(described, "{constant} has no help");
+            assert!(
+                page.contains(&format!("| `{name}` |")),
+                "{name} is not there"
+            );
+        }
+        let rows = page.lines().filter_map(|line| line.strip_prefix("| `"));
+        for name in rows.filter_map(|row| row.split('`').next()) {
+            let known = named.iter().any(|(_, known)| *known == name);
+            assert!(known, "the page knows {name}, the code does not");
+        }
+    }
+
+    #[test]
+    fn a_scrape_says_what_the_process_takes() {
+        let recorder = builder().expect("buckets are not empty").build_recorder();
+        let handle = recorder.handle();
+        let text = metrics::with_local_recorder(&recorder, || {
+            process::record_store(std::path::Path::new(env!("CARGO_MANIFEST_DIR")));
+            render(&handle)
+        });
+        let value = |name: &str| -> f64 {
+            let line = text
+                .lines()
+                .find(|line| line.starts_with(&format!("{name} ")));
+            let line = line.unwrap_or_else(|| panic!("{name} is not in:\n{text}"));
+            line.rsplit(' ')
+                .next()
+                .and_then(|v| v.parse().ok())
+                .expect("a number")
+        };
+        assert!((1e6..1e12).contains(&value(PROCESS_MEMORY)));
+        assert!((3.0..value(PROCESS_FDS_MAX)).contains(&value(PROCESS_FDS)));
+        assert!(value("cogmap_store_bytes{part=\"src\"}") > 1e5);
+    }
 
     #[test]
     fn what_is_counted_appears_with_its_description_and_buckets() {

@@ -95,10 +95,10 @@ impl Service {
             None => None,
         };
         let outlet: Arc<dyn Outlet> = match &session {
-            Some(session) => Arc::new(ZenohOutlet::new(
-                session.clone(),
-                config.zenoh.encoding.codec(),
-            )),
+            Some(session) => {
+                let codec = config.zenoh.encoding.codec();
+                Arc::new(ZenohOutlet::declare(session.clone(), codec).await?)
+            }
             None => Arc::new(Silent),
         };
         let engine = Engine::open(store, config.engine.settings(), outlet).map_err(of_store)?;
@@ -121,7 +121,7 @@ impl Service {
             Some(session) => Some(Intake::start(session, &engine).await?),
             None => None,
         };
-        let upkeep = tokio::spawn(metrics::upkeep(prometheus.clone()));
+        let upkeep = tokio::spawn(metrics::upkeep(prometheus.clone(), directory.clone()));
         let (stop_http, stopped) = oneshot::channel();
         let http = tokio::spawn(http::run(
             listener,

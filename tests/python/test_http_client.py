@@ -127,7 +127,7 @@ def test_samples_of_nobody_are_localised(client: cogmap.Client) -> None:
     with pytest.raises(cogmap.ApiError) as raised:
         client.localize("default", [cogmap.Sample(0, cogmap.StartPose((0, 0, 0)))])
     assert (raised.value.status, raised.value.kind) == (422, "/problems/invalid-query")
-    assert raised.value.detail.startswith("sample 0: ")
+    assert raised.value.detail.startswith("samples[0]: ")
 
 
 def test_trips_and_landmarks(client: cogmap.Client) -> None:

@@ -68,7 +68,8 @@ def publish(directory: Path, server: Server) -> None:
     streams = {robot: mrclam.stream(robot, recordings, *span) for robot in recordings}
     link = cogmap.open_session(server.endpoint)
     options: Dict[str, Any] = {"session": link, "session_id": 1, "batch_samples": 1}
-    options.update(window_samples=1024, send_timeout_s=LONG_S)
+    # A replay ends no sessions.
+    options.update(window_samples=1024, send_timeout_s=LONG_S, ends_session=False)
     robots = {n: cogmap.Robot("default", f"robot{n}", **options) for n in recordings}
     for robot in robots.values():
         assert robot.wait_for_service()

@@ -39,7 +39,7 @@ REFUSED: Tuple[Tuple[Ask, int, str], ...] = (
     (lambda c: c.space("../spaces"), 400, "invalid-path"),
     (lambda c: c.place("default", -1), 400, "invalid-path"),
     (lambda c: list(c.places("default", limt=3)), 400, "invalid-parameter"),
-    (lambda c: list(c.trips("default", limit=0)), 400, "invalid-parameter"),
+    (lambda c: list(c.trips("default", limit=0)), 422, "invalid-query"),
     (lambda c: c.export("default", "gpx"), 400, "invalid-parameter"),
     (lambda c: c.create_space("lab", grid_moduls=5), 400, "malformed-body"),
     (lambda c: c.create_space("lab", grid_modules=0), 422, "invalid-settings"),

@@ -203,6 +203,8 @@ impl Server {
             agent,
             RobotSettings {
                 session: Some(session),
+                // The tests count what they send.
+                ends_session: false,
                 ..RobotSettings::default()
             },
         )

@@ -206,6 +206,8 @@ def main(arguments: Optional[List[str]] = None) -> None:
             batch_samples=1,
             window_samples=args.window,
             send_timeout_s=60.0,
+            # The recording ends, and its robots drive on.
+            ends_session=False,
         )
         for number in chosen
     }

@@ -24,6 +24,8 @@ def service() -> Iterator[StandIn]:
 
 
 def ada(service: StandIn, **settings: object) -> cogmap.Robot:
+    # The tests count what they send.
+    settings.setdefault("ends_session", False)
     return cogmap.Robot("lab", "ada", connect=service.endpoint, **settings)  # type: ignore[arg-type]
 
 
@@ -410,19 +412,33 @@ def test_robots_share_a_session_and_leave_it_open(service: StandIn) -> None:
     assert not link.is_closed()
     with cogmap.Robot("lab", "ada", session=link) as robot:
         robot.marker("y")
-    assert [sample.body for sample in service.journal] == [cogmap.Marker("y")]
+    bodies = [sample.body for sample in service.journal]
+    assert bodies == [cogmap.Marker("y"), cogmap.SessionEnd()]
     link.close()  # type: ignore[no-untyped-call]
 
 
 def test_a_single_sample_batch_leaves_with_the_call(service: StandIn) -> None:
     link = cogmap.open_session(service.endpoint)
-    with cogmap.Robot("lab", "ada", session=link, batch_samples=1, batch_delay_s=60.0) as robot:
+    at_once = {"batch_samples": 1, "batch_delay_s": 60.0, "ends_session": False}
+    with cogmap.Robot("lab", "ada", session=link, **at_once) as robot:  # type: ignore[arg-type]
         assert robot.wait_for_service()
         for value in range(5):
             robot.level("n", value)
         assert eventually(lambda: len(service.batches) == 5)
     link.close()  # type: ignore[no-untyped-call]
     assert [len(batch.samples) for batch in service.batches] == [1] * 5
+
+
+def test_closing_ends_the_session_with_a_last_sample_at_the_last_stamp(service: StandIn) -> None:
+    with ada(service, ends_session=True):
+        pass
+    assert service.journal == [], "one that has sent nothing has no session to end"
+    with ada(service, ends_session=True) as robot:
+        robot.marker("x", stamp_ns=7)
+    assert service.journal == [
+        cogmap.Sample(7, cogmap.Marker("x")),
+        cogmap.Sample(7, cogmap.SessionEnd()),
+    ]
 
 
 def test_a_closed_robot_says_so(service: StandIn) -> None:

@@ -50,7 +50,10 @@ pub(crate) fn encode<'a>(
 /// [`MESSAGE_BYTES_MAX`] whole, and would do so at every repetition.
 pub(crate) fn bytes_max(sample: &Sample, codec: Codec) -> usize {
     let (texts, vector) = match &sample.body {
-        SampleBody::Increment(_) | SampleBody::Velocity(_) | SampleBody::StartPose(_) => (0, 0),
+        SampleBody::Increment(_)
+        | SampleBody::Velocity(_)
+        | SampleBody::StartPose(_)
+        | SampleBody::SessionEnd {} => (0, 0),
         SampleBody::Level(level) => (level.channel.len(), 0),
         SampleBody::Descriptor(descriptor) => (descriptor.channel.len(), descriptor.vector.len()),
         SampleBody::Sighting(sighting) => match (&sighting.target, &sighting.relation) {

@@ -42,6 +42,7 @@ pub struct Robot {
     session: u64,
     codec: Codec,
     send_timeout: Duration,
+    ends_session: bool,
     sender: Option<JoinHandle<()>>,
     // Held for their effect: dropping them undeclares.
     _watermarks: Subscriber<()>,
@@ -114,6 +115,7 @@ impl Robot {
             session,
             codec: settings.codec,
             send_timeout: settings.send_timeout,
+            ends_session: settings.ends_session,
             sender: Some(sender),
             _watermarks: watermarks,
             _estimates: estimates,
@@ -353,12 +355,35 @@ impl Robot {
         self.shared.lock().counters
     }
 
-    /// Flushes, then ends the robot whether or not that worked.
+    /// Ends the session, and the trip under way with it, flushes, then ends the robot whether or not
+    /// that worked. The session's end is a sample, the last one; a robot that has sent nothing and one
+    /// whose settings say so send none.
     ///
     /// # Errors
     /// As [`Robot::flush`]; what was not durable by then may be lost.
     pub fn close(self, timeout: Duration) -> Result<(), ClientError> {
-        self.flush(timeout)
+        let deadline = Instant::now() + timeout;
+        if self.ends_session {
+            self.end_session(timeout)?;
+        }
+        self.flush(deadline.saturating_duration_since(Instant::now()))
+    }
+
+    fn end_session(&self, timeout: Duration) -> Result<(), ClientError> {
+        let body = SampleBody::SessionEnd {};
+        let mut sample = Sample { stamp_ns: 0, body };
+        let bytes = self.check(&sample)?;
+        if !self.shared.lock().window.has_room(bytes) {
+            self.flush(timeout)?;
+        }
+        let mut state = self.shared.lock();
+        self.check_session(&state)?;
+        if state.window.next() > 0 {
+            // The robot's own clock may be another than this machine's.
+            sample.stamp_ns = state.last_stamp_ns;
+            self.push(&mut state, sample, bytes);
+        }
+        Ok(())
     }
 }
 

@@ -34,6 +34,9 @@ pub struct RobotSettings {
     pub match_timeout: Duration,
     /// Codec of samples and queries.
     pub codec: Codec,
+    /// Whether closing the robot ends the session, and the trip under way, by a last sample. Without
+    /// it they end when the agent's next session begins.
+    pub ends_session: bool,
 }
 
 impl Default for RobotSettings {
@@ -48,6 +51,7 @@ impl Default for RobotSettings {
             connect_timeout: Duration::from_secs(10),
             match_timeout: Duration::from_secs(3),
             codec: Codec::Postcard,
+            ends_session: true,
         }
     }
 }

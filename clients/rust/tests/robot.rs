@@ -202,7 +202,11 @@ fn a_second_run_with_the_same_session_number_sends_nothing_and_is_told() {
     let connect = || {
         Robot::builder("demo", "ada")
             .zenoh_session(shared.clone())
-            .session(5)
+            .settings(RobotSettings {
+                session: Some(5),
+                ends_session: false,
+                ..RobotSettings::default()
+            })
             .connect()
             .unwrap()
     };
@@ -397,4 +401,22 @@ fn names_and_settings_are_checked_before_connecting() {
             .settings(settings);
         assert!(matches!(built.connect(), Err(ClientError::Settings(_))));
     }
+}
+
+#[test]
+fn closing_ends_the_session_with_a_last_sample_at_the_last_stamp() {
+    let endpoint = free_endpoint();
+    let service = Service::start(&endpoint, "demo", "ada", Faults::default());
+    let connect = || Robot::connect(&endpoint, "demo", "ada").unwrap();
+    // One that has sent nothing has no session to end.
+    connect().close(LONG).unwrap();
+    assert_eq!(service.journal(), []);
+    let robot = connect();
+    robot.send_batch(levels(3)).unwrap();
+    robot.close(LONG).unwrap();
+    let journal = service.journal();
+    let last = journal.last().unwrap();
+    assert_eq!(journal[..3], levels(3));
+    assert_eq!((journal.len(), &last.body), (4, &SampleBody::SessionEnd {}));
+    assert_eq!(last.stamp_ns, journal[2].stamp_ns);
 }

@@ -92,6 +92,7 @@ fn bodies(floats: &Floats) -> impl Strategy<Value = SampleBody> + use<> {
         ),
         (any::<String>(), any::<bool>())
             .prop_map(|(label, ends_trip)| SampleBody::Marker(Marker { label, ends_trip })),
+        Just(SampleBody::SessionEnd {}),
         option::of(any::<String>()).prop_map(|name| {
             SampleBody::Object(ObjectMark::Learn {
                 name,

@@ -24,6 +24,7 @@ pub(super) fn each(visit: &mut impl Visit) {
     visit.batch("batch_start_pose", &batch(start_poses()));
     visit.batch("batch_marker", &batch(markers()));
     visit.batch("batch_object", &batch(object_marks()));
+    visit.batch("batch_session_end", &batch(vec![SampleBody::SessionEnd {}]));
     visit.batch("batch_extremes", &extremes());
 }
 

@@ -44,6 +44,8 @@ pub enum SampleBody {
     Marker(Marker),
     /// An episode with an object begins or ends.
     Object(ObjectMark),
+    /// The session ends here, and the trip under way with it.
+    SessionEnd,
 }
 
 /// Why a sample is refused.
@@ -496,7 +498,7 @@ fn deviations(sd: [f64; 3]) -> Result<Vector3<f64>, InvalidSample> {
 
 /// A pose from a translation \[m\] and a unit quaternion `[x, y, z, w]`.
 fn pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<Isometry3<f64>, InvalidSample> {
-    let translation = bounded(translation_m, METRES_MAX)?;
+    let translation = Translation3::from(bounded(translation_m, METRES_MAX)?);
     let [x, y, z, w] = rotation_xyzw;
     let quaternion = Quaternion::new(w, x, y, z);
     let norm = quaternion.norm();
@@ -507,8 +509,5 @@ fn pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<Isometry3<f6
         return Err(InvalidSample::NonUnitQuaternion);
     }
     let rotation = UnitQuaternion::new_normalize(quaternion);
-    Ok(Isometry3::from_parts(
-        Translation3::from(translation),
-        rotation,
-    ))
+    Ok(Isometry3::from_parts(translation, rotation))
 }

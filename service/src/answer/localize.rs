@@ -17,16 +17,16 @@ pub enum InvalidSequence {
     #[error("samples must be 1 to {LOCALIZE_SAMPLES_MAX}, not {0}")]
     Count(usize),
     /// A sample makes no sense.
-    #[error("sample {0}: {1}")]
+    #[error("samples[{0}]: {1}")]
     Sample(usize, InvalidSample),
     /// A stamp is earlier than the one before.
-    #[error("sample {0}: the stamp runs backwards")]
+    #[error("samples[{0}]: the stamp runs backwards")]
     TimeBackwards(usize),
     /// A sample tells where the robot is, which is what was asked.
-    #[error("sample {0}: a start pose has no place where a pose is asked for")]
+    #[error("samples[{0}]: a start pose has no place where a pose is asked for")]
     StartPose(usize),
     /// A sample begins or ends an episode with an object, of which nothing would be learned.
-    #[error("sample {0}: an episode with an object has no place where a pose is asked for")]
+    #[error("samples[{0}]: an episode with an object has no place where a pose is asked for")]
     Object(usize),
 }
 

@@ -1,25 +1,29 @@
 //! From the map to the messages that answer questions about it, and from questions to cues.
 
+mod channel;
 mod grid;
 mod landmark;
 mod localize;
 mod object;
 mod place;
 mod predict;
+mod problem;
 mod recall;
 mod space;
 mod trip;
 
+pub use channel::InvalidChannel;
 pub use grid::grid_state;
 pub use landmark::landmark;
 pub use localize::{InvalidSequence, localization, samples_to_localize};
 pub use object::{
-    InvalidContacts, agent_object, identification, lesson, object_detail, object_summary,
-    touches_to_identify,
+    InvalidContacts, agent_object, identification, journaled_lesson, lesson, object_detail,
+    object_summary, touches_to_identify,
 };
 pub use place::place;
 pub use predict::{InvalidPrediction, predict};
-pub use recall::{InvalidQuery, cue, recall};
+pub use problem::{Expected, Kind, Problem};
+pub use recall::{InvalidQuery, cue, recall, unknown_agent};
 pub use space::space_info;
 pub use trip::{leg, trip, trip_detail};
 

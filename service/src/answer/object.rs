@@ -20,7 +20,7 @@ pub enum InvalidContacts {
     #[error("contacts must be 1 to {0}, not {1}")]
     Count(usize, usize),
     /// A contact makes no sense.
-    #[error("contact {0}: {1}")]
+    #[error("contacts[{0}]: {1}")]
     Contact(usize, InvalidSample),
     /// The noise, the spacing or the orientation makes no sense.
     #[error("{0}: {1}")]
@@ -30,11 +30,21 @@ pub enum InvalidContacts {
     Name(InvalidSample),
 }
 
-/// A lesson as the map takes it.
+/// A lesson that has just come, as the map takes it.
 ///
 /// # Errors
 /// Says which rule it breaks.
 pub fn lesson(lesson: &wire::ObjectLesson) -> Result<Lesson, InvalidContacts> {
+    check_channels(&lesson.contacts)?;
+    journaled_lesson(lesson)
+}
+
+/// A lesson of the journal: as [`lesson`], but for names of channels, which older versions took in more
+/// forms.
+///
+/// # Errors
+/// Says which rule it breaks.
+pub fn journaled_lesson(lesson: &wire::ObjectLesson) -> Result<Lesson, InvalidContacts> {
     check_count(lesson.contacts.len(), LESSON_CONTACTS_MAX)?;
     let spacing = decode::spacing(lesson.spacing_m);
     let spacing = spacing.map_err(|error| InvalidContacts::Field("spacing_m", error))?;
@@ -53,6 +63,7 @@ pub fn touches_to_identify(
     query: &wire::IdentifyQuery,
 ) -> Result<(Orientation, Vec<Touch>), InvalidContacts> {
     check_count(query.contacts.len(), IDENTIFY_CONTACTS_MAX)?;
+    check_channels(&query.contacts)?;
     let orientation = decode::orientation(&query.orientation);
     let orientation = orientation.map_err(|error| InvalidContacts::Field("orientation", error))?;
     let noise = decode::touch_noise(&query.noise);
@@ -207,6 +218,11 @@ fn object_pose(object: String, pose: &PoseEstimate) -> wire::ObjectPose {
             })
             .collect(),
     }
+}
+
+fn check_channels(contacts: &[wire::Contact]) -> Result<(), InvalidContacts> {
+    let checked = decode::check_channels(contacts);
+    checked.map_err(|(at, error)| InvalidContacts::Contact(at, error))
 }
 
 fn check_count(count: usize, most: usize) -> Result<(), InvalidContacts> {

@@ -7,26 +7,27 @@ use cognitive_map::{AgentId, CognitiveMap, Expected, InvalidSample, Label, Predi
 use nalgebra::Vector3;
 
 use super::FRAME;
+use super::channel::{InvalidChannel, check_channel};
 use crate::decode;
 
 /// Why nothing can be predicted.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InvalidPrediction {
     /// The motion makes no sense.
     #[error("motion: {0}")]
     Motion(InvalidSample),
     /// A coordinate of `offset_m` is not a number or is too large.
-    #[error("offset_m must hold finite numbers of at most {METRES_MAX} m")]
-    Offset,
-    /// The channel's name is none.
+    #[error("offset_m must hold finite numbers of at most {METRES_MAX} m, not {0:?}")]
+    Offset([f64; 3]),
+    /// The channel cannot be asked for.
     #[error("channel: {0}")]
-    Channel(InvalidSample),
+    Channel(#[from] InvalidChannel),
     /// There is no agent in the query.
     #[error("agent must name an agent")]
     NoAgent,
     /// The agent in the body is not that of the path.
-    #[error("agent is another one than in the path")]
-    OtherAgent,
+    #[error("agent is {0:?}, which is another one than in the path")]
+    OtherAgent(String),
     /// Nobody knows where the agent is.
     #[error("the agent is lost: it is not known where it stands in the map")]
     NotPlaced,
@@ -45,11 +46,16 @@ pub fn predict(
     let motion = decode::motion(&query.motion).map_err(InvalidPrediction::Motion)?;
     // A comparison with NaN is false.
     if !query.offset_m.iter().all(|metre| metre.abs() <= METRES_MAX) {
-        return Err(InvalidPrediction::Offset);
+        return Err(InvalidPrediction::Offset(query.offset_m));
     }
     let offset_m = Vector3::from(query.offset_m);
-    let channel = query.channel.as_deref().map(Label::new).transpose();
-    let channel = channel.map_err(InvalidPrediction::Channel)?;
+    if let Some(channel) = &query.channel {
+        check_channel(map, channel)?;
+    }
+    let channel = query
+        .channel
+        .as_deref()
+        .and_then(|name| Label::new(name).ok());
     let prediction = map
         .predict(agent, &motion, &offset_m, channel.as_ref())
         .ok_or(InvalidPrediction::NotPlaced)?;

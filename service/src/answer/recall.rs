@@ -7,6 +7,7 @@ use cognitive_map::grid::{InvalidCode, PartialCode, Phase};
 use cognitive_map::{AgentId, CognitiveMap, InvalidSample, RecallCue};
 use nalgebra::{Point3, Vector3};
 
+use super::channel::{InvalidChannel, check_cue};
 use super::{FRAME, place};
 use crate::decode;
 
@@ -14,45 +15,50 @@ use crate::decode;
 const LIMIT_DEFAULT: u32 = 10;
 
 /// Why a query cannot be answered.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InvalidQuery {
     /// A coordinate of `position_m` is not a number or is too large.
-    #[error("position_m must hold finite numbers of at most {METRES_MAX} m")]
-    Position,
+    #[error("position_m must hold finite numbers of at most {METRES_MAX} m, not {0:?}")]
+    Position([f64; 3]),
     /// `radius_m` is negative, not a number or too large.
-    #[error("radius_m must be 0 to {METRES_MAX} m")]
-    Radius,
+    #[error("radius_m must be 0 to {METRES_MAX} m, not {0}")]
+    Radius(f64),
     /// There is a radius but no centre.
     #[error("radius_m needs position_m, its centre")]
     RadiusWithoutPosition,
     /// A phase is outside \[0, 1).
-    #[error("phases in code must be at least 0 and less than 1")]
-    Phase,
+    #[error("phases in code must be at least 0 and less than 1; code[{0}] is {1:?}")]
+    Phase(usize, [f64; 3]),
     /// The code is not one of this space.
     #[error("code: {0}")]
     Code(#[from] InvalidCode),
     /// The agent's name is none.
     #[error("agent: {0}")]
     Agent(#[from] NameError),
+    /// There is no such agent.
+    #[error("the space has no agent {0:?}")]
+    UnknownAgent(String),
     /// The percept makes no sense.
     #[error("percept: {0}")]
     Percept(InvalidSample),
+    /// The percept's channel cannot be asked for.
+    #[error("percept: {0}")]
+    Channel(#[from] InvalidChannel),
     /// The limit is out of range.
-    #[error("limit must be 1 to {PAGE_ITEMS_MAX}")]
-    Limit,
+    #[error("limit must be 1 to {PAGE_ITEMS_MAX}, not {0}")]
+    Limit(usize),
 }
 
-/// The cue of a query; nothing if the query can have no answer, because nobody has the name of the
-/// agent that it asks for.
+/// The cue of a query.
 ///
 /// # Errors
-/// Says which rule the query breaks.
-pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<Option<RecallCue>, InvalidQuery> {
+/// Says which rule the query breaks, or that an agent or channel in it is unknown.
+pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<RecallCue, InvalidQuery> {
     let position = query.position_m.map(position).transpose()?;
     if let Some(radius_m) = query.radius_m {
         // A comparison with NaN is false.
         if !(0.0..=METRES_MAX).contains(&radius_m) {
-            return Err(InvalidQuery::Radius);
+            return Err(InvalidQuery::Radius(radius_m));
         }
         if position.is_none() {
             return Err(InvalidQuery::RadiusWithoutPosition);
@@ -65,19 +71,16 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<Option<RecallCue>,
         .transpose()?;
     let percept = query.percept.as_ref().map(decode::percept).transpose();
     let percept = percept.map_err(InvalidQuery::Percept)?;
+    if let Some(percept) = &percept {
+        check_cue(map, percept)?;
+    }
     let limit = query.limit.unwrap_or(LIMIT_DEFAULT) as usize;
     if !(1..=PAGE_ITEMS_MAX).contains(&limit) {
-        return Err(InvalidQuery::Limit);
+        return Err(InvalidQuery::Limit(limit));
     }
-    let mut founder = None;
-    if let Some(name) = &query.agent {
-        Name::check(name)?;
-        founder = agent_by_name(map, name);
-        if founder.is_none() {
-            return Ok(None);
-        }
-    }
-    Ok(Some(RecallCue {
+    let founder = query.agent.as_deref().map(|name| agent(map, name));
+    let founder = founder.transpose()?;
+    Ok(RecallCue {
         position,
         code,
         percept,
@@ -86,23 +89,22 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<Option<RecallCue>,
         since_ns: query.since_ns,
         until_ns: query.until_ns,
         limit,
-    }))
+    })
 }
 
 /// The places of a space that answer a query.
 ///
 /// # Errors
-/// Says which rule the query breaks.
+/// As [`cue`].
 pub fn recall(
     space: &str,
     map: &CognitiveMap,
     query: &RecallQuery,
 ) -> Result<wire::RecallAnswer, InvalidQuery> {
     let cue = cue(map, query)?;
-    let recalled = cue.as_ref().map(|cue| map.recall(cue)).unwrap_or_default();
-    let rivals = cue
-        .zip(recalled.first())
-        .and_then(|(cue, best)| map.rivals(&cue, best))
+    let recalled = map.recall(&cue);
+    let rivals = { recalled.first() }
+        .and_then(|best| map.rivals(&cue, best))
         .map(|rivals| wire::Rivals {
             count: rivals.count as u64,
             place: rivals.place.0.into(),
@@ -131,13 +133,15 @@ fn position(metres: [f64; 3]) -> Result<Point3<f64>, InvalidQuery> {
     let legal = metres.iter().all(|metre| metre.abs() <= METRES_MAX);
     legal
         .then(|| Point3::from(metres))
-        .ok_or(InvalidQuery::Position)
+        .ok_or(InvalidQuery::Position(metres))
 }
 
 fn code(map: &CognitiveMap, phases: &[Option<[f64; 3]>]) -> Result<PartialCode, InvalidQuery> {
     let legal = |turns: &[f64; 3]| turns.iter().all(|turn| (0.0..1.0).contains(turn));
-    if !phases.iter().flatten().all(legal) {
-        return Err(InvalidQuery::Phase);
+    for (module, turns) in phases.iter().enumerate() {
+        if let Some(turns) = turns.filter(|turns| !legal(turns)) {
+            return Err(InvalidQuery::Phase(module, turns));
+        }
     }
     let phase = |turns: &[f64; 3]| Phase::wrap(Vector3::from(*turns));
     let phases = phases.iter().map(|turns| turns.as_ref().map(phase));
@@ -145,9 +149,16 @@ fn code(map: &CognitiveMap, phases: &[Option<[f64; 3]>]) -> Result<PartialCode, 
 }
 
 /// An agent by its name. Spaces have at most some thousand agents, so a scan will do.
-fn agent_by_name(map: &CognitiveMap, name: &str) -> Option<AgentId> {
+fn agent(map: &CognitiveMap, name: &str) -> Result<AgentId, InvalidQuery> {
     let mut agents = map.agents();
-    agents
-        .find(|(_, agent)| agent.name().as_str() == name)
-        .map(|(id, _)| id)
+    let found = agents.find(|(_, agent)| agent.name().as_str() == name);
+    found.map(|(id, _)| id).ok_or_else(|| unknown_agent(name))
+}
+
+/// Why there is no agent of this name: there is none, or nobody can be called so.
+pub fn unknown_agent(name: &str) -> InvalidQuery {
+    match Name::check(name) {
+        Ok(()) => InvalidQuery::UnknownAgent(name.to_owned()),
+        Err(error) => InvalidQuery::Agent(error),
+    }
 }

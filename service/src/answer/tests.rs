@@ -194,17 +194,60 @@ fn recall_by_a_place_s_own_code_finds_the_place() {
 }
 
 #[test]
-fn a_stranger_has_founded_nothing() {
+fn a_stranger_is_unknown() {
     let query = RecallQuery {
         agent: Some("nobody".to_owned()),
         ..RecallQuery::default()
     };
+    let refused = recall("lab", &map(), &query).expect_err("nobody is called so");
+    assert_eq!(refused, InvalidQuery::UnknownAgent("nobody".to_owned()));
+}
+
+#[test]
+fn a_channel_that_nobody_has_felt_is_unknown() {
+    let map = map();
+    let asked = |percept| {
+        let query = RecallQuery {
+            percept: Some(percept),
+            ..RecallQuery::default()
+        };
+        recall("lab", &map, &query).expect_err("no such channel")
+    };
+    let refused = asked(level_cue("smell", 1.0));
+    assert!(matches!(
+        refused,
+        InvalidQuery::Channel(InvalidChannel::Unknown { .. })
+    ));
+    let detail = refused.to_string();
     assert!(
-        recall("lab", &map(), &query)
-            .expect("a legal query")
-            .places
-            .is_empty()
+        detail.contains("\"smell\"") && detail.contains("touch, camera"),
+        "{detail}"
     );
+    // A level is asked for where descriptors are felt.
+    let refused = asked(level_cue("camera", 1.0));
+    assert!(matches!(
+        refused,
+        InvalidQuery::Channel(InvalidChannel::OtherKind { .. })
+    ));
+    assert!(
+        refused.to_string().contains("descriptors of 16 numbers"),
+        "{refused}"
+    );
+    // A name that no channel can have.
+    let refused = asked(level_cue("my nose", 1.0));
+    assert!(matches!(
+        refused,
+        InvalidQuery::Channel(InvalidChannel::Name(..))
+    ));
+    let query = PredictQuery {
+        channel: Some("smell".to_owned()),
+        ..question(0.0)
+    };
+    let refused = predict("lab", &map, AgentId(0), &query).expect_err("no such channel");
+    assert!(matches!(
+        refused,
+        InvalidPrediction::Channel(InvalidChannel::Unknown { .. })
+    ));
 }
 
 #[test]
@@ -415,7 +458,8 @@ fn predictions_that_make_no_sense_are_refused() {
     );
     let mut query = question(0.0);
     query.offset_m[1] = f64::NAN;
-    assert_eq!(refused(&map, 0, &query), InvalidPrediction::Offset);
+    let offset = refused(&map, 0, &query);
+    assert!(matches!(offset, InvalidPrediction::Offset(_)), "{offset}");
     query = question(0.0);
     query.channel = Some(String::new());
     let unnamed = refused(&map, 0, &query);

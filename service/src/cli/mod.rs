@@ -3,8 +3,10 @@
 mod bench;
 mod check_config;
 mod demo;
+mod duration;
 mod eval;
 mod export;
+mod help;
 mod output;
 mod replay;
 mod serve;
@@ -12,7 +14,7 @@ mod serve;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use cogmap_experiments::eval::InvalidProtocol;
 use cogmap_experiments::eval::object::InvalidObjectProtocol;
 use cogmap_experiments::touch::InvalidTouchProtocol;
@@ -92,7 +94,9 @@ impl ConfigArgs {
 
 /// Runs the command that the arguments name. 0: done, 1: failed, 2: wrong usage.
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let arguments = help::plain(Cli::command()).get_matches();
+    let cli = Cli::from_arg_matches(&arguments).unwrap_or_else(|error| error.exit());
+    let result = match cli.command {
         Command::Serve(args) => serve::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::CheckConfig(args) => check_config::run(&args),

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use cognitive_map::CognitiveMap;
 
+use super::events::EventRing;
 use super::health::Health;
 use super::trajectory::Recorder;
 use crate::store::{Checkpoint, SpaceNumber, Store};
@@ -40,8 +41,26 @@ pub(crate) struct Job {
     space: SpaceNumber,
     next_block: u64,
     map: CognitiveMap,
-    recorders: Vec<Recorder>,
+    beside: Beside,
     progress: Arc<Progress>,
+}
+
+/// What a checkpoint holds beside the map.
+#[derive(Clone, Debug)]
+pub(crate) struct Beside {
+    /// One for each agent, in the agents' order.
+    pub(crate) recorders: Vec<Recorder>,
+    /// The latest events.
+    pub(crate) events: EventRing,
+}
+
+impl Beside {
+    /// Its bytes: the recorders as older versions read them, and the events behind them.
+    fn write(&self) -> Vec<u8> {
+        let mut bytes = Recorder::write_all(&self.recorders);
+        bytes.extend(self.events.write());
+        bytes
+    }
 }
 
 /// Starts the thread that writes checkpoints. It ends when all senders are gone.
@@ -69,7 +88,7 @@ fn write(store: &dyn Store, health: &Health, job: &Job) {
     let checkpoint = Checkpoint {
         next_block: job.next_block,
         pages: job.map.checkpoint(since).collect(),
-        recorders: Recorder::write_all(&job.recorders),
+        recorders: job.beside.write(),
     };
     match store.write_checkpoint(job.space, &checkpoint) {
         Ok(()) => job
@@ -112,13 +131,13 @@ impl Checkpointer {
         &mut self,
         next_block: u64,
         map: &CognitiveMap,
-        recorders: impl FnOnce() -> Vec<Recorder>,
+        beside: impl FnOnce() -> Beside,
     ) {
         let due = next_block > self.last_block && self.last.elapsed() >= self.interval;
         if due && !self.progress.writing.swap(true, Ordering::AcqRel) {
             (self.last, self.last_block) = (Instant::now(), next_block);
             // The thread outlives the writers; were it gone, the journal would still be whole.
-            let _ = self.jobs.send(self.job(next_block, map, recorders()));
+            let _ = self.jobs.send(self.job(next_block, map, beside()));
         }
     }
 
@@ -127,7 +146,7 @@ impl Checkpointer {
         &mut self,
         next_block: u64,
         map: &CognitiveMap,
-        recorders: impl FnOnce() -> Vec<Recorder>,
+        beside: impl FnOnce() -> Beside,
     ) {
         while self.progress.writing.load(Ordering::Acquire) {
             std::thread::sleep(Duration::from_millis(1));
@@ -138,18 +157,18 @@ impl Checkpointer {
             write(
                 &*self.store,
                 &self.health,
-                &self.job(next_block, map, recorders()),
+                &self.job(next_block, map, beside()),
             );
         }
     }
 
-    fn job(&self, next_block: u64, map: &CognitiveMap, recorders: Vec<Recorder>) -> Job {
+    fn job(&self, next_block: u64, map: &CognitiveMap, beside: Beside) -> Job {
         let progress = Arc::clone(&self.progress);
         Job {
             space: self.space,
             next_block,
             map: map.clone(),
-            recorders,
+            beside,
             progress,
         }
     }

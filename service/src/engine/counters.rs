@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use cogmap_proto::{Codec, DecodeError, SkipReason};
+use cogmap_proto::{Codec, DecodeError, SkipReason, Status};
 use cognitive_map::{ChannelKind, CognitiveMap, Event, EventKind};
 use metrics::{Counter, Gauge, Histogram, counter, gauge, histogram};
 
@@ -126,6 +126,9 @@ pub(crate) struct SpaceCounters {
     places: Gauge,
     trips: Gauge,
     landmarks: Gauge,
+    by_status: [Gauge; 4],
+    not_durable_max: Gauge,
+    waiting_max: Gauge,
     forgotten_places: Counter,
     forgotten_trips: Counter,
 }
@@ -151,6 +154,11 @@ impl SpaceCounters {
             places: gauge!(names::PLACES, "space" => label()),
             trips: gauge!(names::TRIPS, "space" => label()),
             landmarks: gauge!(names::LANDMARKS, "space" => label()),
+            by_status: ["localized", "uncertain", "lost", "new"].map(
+                |status| gauge!(names::AGENTS_BY_STATUS, "space" => label(), "status" => status),
+            ),
+            not_durable_max: gauge!(names::NOT_DURABLE_MAX, "space" => label()),
+            waiting_max: gauge!(names::WAITING_MAX, "space" => label()),
             forgotten_places: counter!(names::FORGOTTEN_PLACES, "space" => label()),
             forgotten_trips: counter!(names::FORGOTTEN_TRIPS, "space" => label()),
         }
@@ -196,9 +204,12 @@ impl SpaceCounters {
             &self.places,
             &self.trips,
             &self.landmarks,
+            &self.not_durable_max,
+            &self.waiting_max,
         ] {
             gauge.set(0.0);
         }
+        self.by_status.iter().for_each(|gauge| gauge.set(0.0));
     }
 
     /// Counts a round that applied samples.
@@ -241,6 +252,39 @@ impl SpaceCounters {
         self.places.set(map.place_count() as f64);
         self.trips.set(map.trip_count() as f64);
         self.landmarks.set(map.landmark_count() as f64);
+    }
+
+    /// Records how the agents stand.
+    pub(crate) fn standing(&self, standing: &Standing) {
+        for (gauge, count) in self.by_status.iter().zip(standing.by_status) {
+            gauge.set(f64::from(count));
+        }
+        self.not_durable_max.set(standing.not_durable_max as f64);
+        self.waiting_max.set(standing.waiting_max as f64);
+    }
+}
+
+/// How agents stand, one after the other.
+#[derive(Debug, Default)]
+pub(crate) struct Standing {
+    by_status: [u32; 4],
+    not_durable_max: u64,
+    waiting_max: u64,
+}
+
+impl Standing {
+    /// Notes an agent: how it is localised, none before its first sample, and how many of its samples
+    /// are not durable and wait.
+    pub(crate) fn note(&mut self, status: Option<Status>, not_durable: u64, waiting: u64) {
+        let index = match status {
+            Some(Status::Localized) => 0,
+            Some(Status::Uncertain) => 1,
+            Some(Status::Lost) => 2,
+            None => 3,
+        };
+        self.by_status[index] += 1;
+        self.not_durable_max = self.not_durable_max.max(not_durable);
+        self.waiting_max = self.waiting_max.max(waiting);
     }
 }
 

@@ -9,6 +9,7 @@ use cogmap_proto::{AgentDetail, Estimate, Evidence, Rejection, SeqRange, Stamped
 use cognitive_map::AgentId;
 use serde::Serialize;
 
+use super::counters::Standing;
 use super::trajectory::Recorder;
 
 /// What is known of an agent outside its space's writer. Readers never hold the writer up: the
@@ -103,6 +104,15 @@ impl AgentDesk {
             .load()
             .as_ref()
             .map(|readout| readout.estimate.clone())
+    }
+
+    /// Notes how it is localised and how far its samples are behind.
+    pub(crate) fn stand(&self, standing: &mut Standing) {
+        let readout = self.readout.load();
+        let status = readout.as_ref().map(|readout| readout.estimate.status);
+        let marks = self.marks();
+        let not_durable = marks.applied.saturating_sub(marks.durable);
+        standing.note(status, not_durable, marks.waiting);
     }
 
     /// How far its samples have come.

@@ -78,7 +78,7 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
             let agent = AgentId(*agent);
             let session = batch.session;
             for (seq, wire) in (batch.first_seq..).zip(&batch.samples) {
-                take(match decode::sample(wire) {
+                take(match decode::journaled_sample(wire) {
                     Ok(sample) => Record::Sample {
                         agent,
                         session,
@@ -119,7 +119,7 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
             lesson,
         } => {
             // Only lessons that passed are journaled.
-            if let (Ok(name), Ok(lesson)) = (Label::new(name), answer::lesson(lesson)) {
+            if let (Ok(name), Ok(lesson)) = (Label::new(name), answer::journaled_lesson(lesson)) {
                 take(Record::TeachObject {
                     number: *number,
                     name,

@@ -77,7 +77,10 @@ pub enum IngestError {
 impl Weight for Sample {
     fn bytes(&self) -> usize {
         let beside = match &self.body {
-            SampleBody::Increment(_) | SampleBody::Velocity(_) | SampleBody::StartPose(_) => 0,
+            SampleBody::Increment(_)
+            | SampleBody::Velocity(_)
+            | SampleBody::StartPose(_)
+            | SampleBody::SessionEnd {} => 0,
             SampleBody::Level(level) => level.channel.len(),
             SampleBody::Descriptor(descriptor) => {
                 descriptor.channel.len() + size_of_val(descriptor.vector.as_slice())

@@ -14,6 +14,7 @@ mod checkpointer;
 mod committer;
 mod counters;
 mod desk;
+mod events;
 mod fold;
 mod health;
 mod message;
@@ -43,6 +44,7 @@ use cognitive_map::InvalidSettings;
 
 pub use block::{CorruptBlock, Entry, entries};
 pub use desk::AgentDesk;
+pub use events::{EVENTS_KEPT, EventFollower, Followed};
 pub use fold::{core_settings, records_of, trajectory_interval_ns};
 pub use message::IngestError;
 pub use outlet::{Outlet, Silent};

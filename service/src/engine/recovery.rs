@@ -3,6 +3,7 @@
 use cognitive_map::{CognitiveMap, Settings};
 
 use super::block::{self, CorruptBlock};
+use super::events::EventRing;
 use super::fold::records_of;
 use super::trajectory::{self, Chunk, Recorder};
 use crate::store::{ChunkKey, SpaceNumber, Store, StoreError};
@@ -13,6 +14,8 @@ pub(crate) struct Recovered {
     pub(crate) map: CognitiveMap,
     /// One for each agent, in the agents' order.
     pub(crate) recorders: Vec<Recorder>,
+    /// The latest events.
+    pub(crate) events: EventRing,
     /// Number of the next journal block.
     pub(crate) next_block: u64,
     /// Revision of the map that the store's checkpoint holds.
@@ -32,12 +35,12 @@ pub(crate) enum RecoveryError {
     Closing,
 }
 
-/// Loads a space, unless `closing` says that nobody wants it any more.
+/// Loads a space of a name, unless `closing` says that nobody wants it any more.
 pub(crate) fn recover(
     store: &dyn Store,
     space: SpaceNumber,
     settings: &Settings,
-    interval_ns: i64,
+    (name, interval_ns): (&str, i64),
     closing: impl Fn() -> bool,
 ) -> Result<Recovered, RecoveryError> {
     let mut recovered = match load_checkpoint(store, space, settings)? {
@@ -45,6 +48,7 @@ pub(crate) fn recover(
         None => Recovered {
             map: CognitiveMap::new(settings.clone()),
             recorders: Vec::new(),
+            events: EventRing::since(0),
             next_block: 0,
             checkpoint_revision: 0,
         },
@@ -66,6 +70,7 @@ pub(crate) fn recover(
         for entry in &entries {
             records_of(entry, |record| {
                 recovered.map.apply(&record, &mut events);
+                recovered.events.note(name, &recovered.map, &events);
                 events.clear();
                 let (map, recorders) = (&recovered.map, &mut recovered.recorders);
                 chunks.extend(trajectory::note_all(recorders, map, &record, interval_ns));
@@ -92,20 +97,22 @@ fn load_checkpoint(
     let Some(checkpoint) = store.checkpoint(space)? else {
         return Ok(None);
     };
-    let recorders = Recorder::read_all(&checkpoint.recorders);
+    let beside = Recorder::read_all(&checkpoint.recorders);
     match (
         CognitiveMap::restore(settings.clone(), checkpoint.pages),
-        recorders,
+        beside,
     ) {
-        (Ok(map), Ok(recorders)) => Ok(Some(Recovered {
+        (Ok(map), Ok((recorders, events))) => Ok(Some(Recovered {
             checkpoint_revision: map.revision(),
+            // Older versions wrote none.
+            events: EventRing::read(events).unwrap_or_else(|| EventRing::since(map.revision())),
             map,
             recorders,
             next_block: checkpoint.next_block,
         })),
-        (map, recorders) => {
+        (map, beside) => {
             let map = map.err().map(|error| error.to_string());
-            let recorders = recorders.err().map(|error| error.to_string());
+            let recorders = beside.err().map(|error| error.to_string());
             tracing::warn!(
                 ?map,
                 ?recorders,

@@ -90,7 +90,7 @@ impl Space {
             made
         };
         let relaxed = tokio::task::spawn_blocking(relax).await;
-        relaxed.map_err(|_| interrupted())
+        relaxed.map_err(|_| Unavailable::Interrupted)
     }
 
     /// The relaxed map of now, or for a later page that of the first one.
@@ -114,10 +114,6 @@ impl Space {
             relaxed
         };
         let relaxed = tokio::task::spawn_blocking(relax).await;
-        relaxed.map_err(|_| interrupted())
+        relaxed.map_err(|_| Unavailable::Interrupted)
     }
-}
-
-fn interrupted() -> Unavailable {
-    Unavailable::Failed("the relaxation of the map was interrupted".to_owned())
 }

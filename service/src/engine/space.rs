@@ -8,14 +8,15 @@ use std::time::Duration;
 
 use arc_swap::ArcSwapOption;
 use cogmap_proto::{
-    Codec, Event, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings, Trajectory,
+    Codec, EventId, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings, Trajectory,
 };
 use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
-use tokio::sync::{broadcast, oneshot};
+use tokio::sync::oneshot;
 
 use super::checkpointer::{Checkpointer, Job};
 use super::committer::Commit;
 use super::desk::AgentDesk;
+use super::events::{EventFollower, EventLog};
 use super::health::Health;
 use super::message::{Call, IngestError, ObjectRequest, Request};
 use super::outlet::Outlet;
@@ -27,9 +28,6 @@ use super::settings::EngineSettings;
 use super::trajectory;
 use super::writer::Writer;
 use crate::store::{SpaceNumber, Store, StoreError};
-
-/// Events that a slow listener may be behind before it misses some.
-const EVENTS_BEHIND_MAX: usize = 1024;
 
 /// A space: its readers' and senders' side.
 #[derive(Debug)]
@@ -52,7 +50,8 @@ pub(crate) struct Shared {
     pub(crate) store: Arc<dyn Store>,
     pub(crate) outlet: Arc<dyn Outlet>,
     pub(crate) health: Arc<Health>,
-    pub(crate) events: broadcast::Sender<Arc<Event>>,
+    /// What happened of late.
+    pub(crate) events: EventLog,
     /// Revision of the map at the end of the latest round.
     pub(crate) revision: AtomicU64,
     /// Set once: the writer takes what is queued and ends.
@@ -79,7 +78,13 @@ pub enum Unavailable {
     /// It is still loading.
     #[error("the space is recovering")]
     Recovering,
-    /// It could not be loaded, or is closing.
+    /// It is closing.
+    #[error("the space is closing")]
+    Closing,
+    /// The work on it ended with a panic.
+    #[error("the work was interrupted")]
+    Interrupted,
+    /// It could not be loaded, or is not written any more.
     #[error("{0}")]
     Failed(String),
 }
@@ -130,7 +135,7 @@ impl Space {
             store: Arc::clone(&around.store),
             outlet: Arc::clone(&around.outlet),
             health: Arc::clone(&around.health),
-            events: broadcast::channel(EVENTS_BEHIND_MAX).0,
+            events: EventLog::new(),
             revision: AtomicU64::new(0),
             closing: AtomicBool::new(false),
             loaded: OnceLock::new(),
@@ -207,7 +212,7 @@ impl Space {
         self.queue.call();
         granted.await.map_err(|_| {
             let detail = self.failure();
-            Unavailable::Failed(detail.unwrap_or_else(|| "the space is closing".to_owned()))
+            detail.map_or(Unavailable::Closing, Unavailable::Failed)
         })
     }
 
@@ -228,9 +233,14 @@ impl Space {
             .collect()
     }
 
-    /// Events from now on.
-    pub fn events(&self) -> broadcast::Receiver<Arc<Event>> {
-        self.shared.events.subscribe()
+    /// Follows the events after `after`, or those from now on.
+    ///
+    /// # Errors
+    /// The space is still loading, or could not be loaded.
+    pub fn follow(&self, after: Option<EventId>) -> Result<EventFollower, Unavailable> {
+        self.available()?;
+        let revision = self.shared.revision.load(Ordering::Acquire);
+        Ok(self.shared.events.follow(after, revision))
     }
 
     /// Queues samples as they came over Zenoh.
@@ -298,7 +308,8 @@ impl Space {
         match self.available() {
             Ok(()) => {}
             Err(Unavailable::Recovering) => return Err(IngestError::Recovering),
-            Err(Unavailable::Failed(detail)) => return Err(IngestError::Store(detail)),
+            Err(Unavailable::Closing) => return Err(IngestError::Closed),
+            Err(error) => return Err(IngestError::Store(error.to_string())),
         }
         self.queue.request(call).map_err(|error| match error {
             NotQueued::Full => IngestError::Busy,
@@ -395,7 +406,8 @@ fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: 
         ..
     } = around;
     let closing = || shared.closing.load(Ordering::Acquire);
-    match recovery::recover(&*store, shared.number, core, shared.interval_ns, closing) {
+    let told = (&*shared.name, shared.interval_ns);
+    match recovery::recover(&*store, shared.number, core, told, closing) {
         Ok(recovered) => {
             let progress = (recovered.checkpoint_revision, recovered.next_block);
             let interval = settings.checkpoint_interval;
@@ -406,6 +418,7 @@ fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: 
             shared
                 .revision
                 .store(recovered.map.revision(), Ordering::Release);
+            shared.events.begin(recovered.events.clone());
             let writer = Writer::new(Arc::clone(shared), commits, checkpointer, recovered);
             let _present = Presence(shared);
             let _ = shared.loaded.set(Ok(()));

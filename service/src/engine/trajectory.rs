@@ -119,11 +119,11 @@ impl Recorder {
         postcard::to_stdvec(&plain).expect("plain data encodes")
     }
 
-    /// Reads what [`Recorder::write_all`] wrote.
-    pub(crate) fn read_all(bytes: &[u8]) -> Result<Vec<Self>, CorruptChunk> {
-        let plain: Vec<(u64, Option<i64>, Vec<u8>)> =
-            postcard::from_bytes(bytes).map_err(|_| CorruptChunk)?;
-        plain
+    /// Reads what [`Recorder::write_all`] wrote, and gives the bytes after it.
+    pub(crate) fn read_all(bytes: &[u8]) -> Result<(Vec<Self>, &[u8]), CorruptChunk> {
+        let (plain, rest): (Vec<(u64, Option<i64>, Vec<u8>)>, _) =
+            postcard::take_from_bytes(bytes).map_err(|_| CorruptChunk)?;
+        let recorders: Result<_, _> = plain
             .into_iter()
             .map(|(session, latest_ns, rows)| {
                 Ok(Self {
@@ -132,7 +132,8 @@ impl Recorder {
                     latest_ns,
                 })
             })
-            .collect()
+            .collect();
+        Ok((recorders?, rest))
     }
 }
 

@@ -30,7 +30,8 @@ pub(crate) struct AgentsQuery {
     params(SpaceParam, AgentsQuery),
     responses(
         (status = 200, description = "The agents, by name", body = AgentPage),
-        (status = 404, description = "There is no such space")))]
+        (status = 404, description = "There is no such space"),
+        (status = 422, description = "A parameter breaks a rule")))]
 pub(crate) async fn list(
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<AgentsQuery>,

@@ -15,7 +15,7 @@ use futures_util::stream;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::extract::{Query, SpaceOfPath, SpaceParam};
+use super::extract::{Query, SpaceOfPath, SpaceParam, named};
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::trajectory::{TUM, tum};
@@ -80,12 +80,17 @@ pub(crate) struct MapExport {
         (status = 200, description = "The map", content(
             (MapExport = "application/json"), (String = "text/plain"))),
         (status = 404, description = "There is no such space or agent"),
-        (status = 422, description = "A trajectory was asked for, but no agent named")))]
+        (status = 422, description = "A trajectory was asked for and no agent named, or the other way round")))]
 pub(crate) async fn get(
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<ExportQuery>,
 ) -> Result<Response<Body>, Problem> {
-    let (mut response, file) = match query.format.unwrap_or_default() {
+    let format = query.format.unwrap_or_default();
+    if format != ExportFormat::Tum && (query.agent.is_some() || query.session.is_some()) {
+        let detail = "`agent` and `session` are for format=tum only";
+        return Err(Problem::new(Kind::InvalidQuery, detail));
+    }
+    let (mut response, file) = match format {
         ExportFormat::Json => (map(&space).await?, format!("{}.json", space.name())),
         ExportFormat::G2o => (graph(&space).await?, format!("{}.g2o", space.name())),
         ExportFormat::Ply => (cloud(&space).await?, format!("{}.ply", space.name())),
@@ -94,6 +99,7 @@ pub(crate) async fn get(
             let agent = query
                 .agent
                 .ok_or_else(|| Problem::new(Kind::InvalidQuery, detail))?;
+            named(&space, &agent)?;
             let file = format!("{}-{agent}.tum", space.name());
             (trajectory(space, agent, query.session).await?, file)
         }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use axum::body::{Body, Bytes};
 use axum::extract::{FromRequest, FromRequestParts, Path, Request};
-use axum::http::StatusCode;
-use axum::http::header::{CONTENT_TYPE, HeaderValue};
+use axum::http::header::{CONTENT_TYPE, ORIGIN};
 use axum::http::request::Parts;
+use axum::http::{HeaderMap, StatusCode};
 use cogmap_proto::limits::MESSAGE_BYTES_MAX;
 use cogmap_proto::{Codec, Name};
 use http_body_util::Limited;
@@ -16,7 +16,13 @@ use serde::{Deserialize, Serialize};
 use super::json;
 use super::problem::{Kind, Problem};
 use super::state::Service;
+use crate::answer;
 use crate::engine::{AgentDesk, Space};
+
+/// What curl calls a body that it was not told the type of.
+const CURL_DEFAULT: &str = "application/x-www-form-urlencoded";
+/// By this header browsers say which site a request comes from; other programs do not send it.
+const SEC_FETCH_SITE: &str = "sec-fetch-site";
 
 /// The space that the path names.
 #[derive(Debug)]
@@ -126,6 +132,12 @@ pub(crate) fn space(service: &Service, text: &str) -> Result<Arc<Space>, Problem
     found.map_or_else(|| Err(Problem::unknown_space(name(text)?.as_str())), Ok)
 }
 
+/// The agent that a parameter names.
+pub(crate) fn named(space: &Space, name: &str) -> Result<Arc<AgentDesk>, Problem> {
+    let found = space.agent(name);
+    found.ok_or_else(|| answer::unknown_agent(name).into())
+}
+
 /// The parameters of a path.
 pub(crate) async fn path<T>(parts: &mut Parts, service: &Service) -> Result<T, Problem>
 where
@@ -196,7 +208,7 @@ impl<T: DeserializeOwned + Serialize> FromRequest<Service> for Json<T> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, service: &Service) -> Result<Self, Problem> {
-        must_be_json(request.headers().get(CONTENT_TYPE))?;
+        must_be_json(request.headers())?;
         let bytes = whole_body(request, service).await?;
         json::message(&bytes).map(Self)
     }
@@ -206,7 +218,7 @@ impl FromRequest<Service> for Encoded {
     type Rejection = Problem;
 
     async fn from_request(request: Request, service: &Service) -> Result<Self, Problem> {
-        let codec = codec(request.headers().get(CONTENT_TYPE))?;
+        let codec = codec(request.headers())?;
         Ok(Self {
             codec,
             bytes: whole_body(request, service).await?,
@@ -214,18 +226,30 @@ impl FromRequest<Service> for Encoded {
     }
 }
 
-/// The codec that a `Content-Type` names.
-fn codec(media_type: Option<&HeaderValue>) -> Result<Codec, Problem> {
-    let media_type = media_type
-        .and_then(|value| value.to_str().ok())
-        .unwrap_or_default();
-    Codec::of_encoding(media_type)
-        .map_err(|error| Problem::new(Kind::UnsupportedMediaType, error.to_string()))
+/// The codec of a body: that which its `Content-Type` names.
+///
+/// A program that names none, or lets curl name its default, means JSON. A page in a browser has to
+/// name it: only then does the browser ask first whether a page of another origin may send it.
+fn codec(headers: &HeaderMap) -> Result<Codec, Problem> {
+    let media_type = headers.get(CONTENT_TYPE).map_or("", |value| {
+        // What is not a text is not one of ours either.
+        value.to_str().unwrap_or("?")
+    });
+    let essence = media_type.split(';').next().unwrap_or_default().trim();
+    let unnamed = essence.is_empty() || essence.eq_ignore_ascii_case(CURL_DEFAULT);
+    let from_page = headers.contains_key(ORIGIN) || headers.contains_key(SEC_FETCH_SITE);
+    if unnamed && !from_page {
+        return Ok(Codec::Json);
+    }
+    Codec::of_encoding(media_type).map_err(|error| {
+        let detail = format!("Content-Type: {error}; JSON is {}", Codec::Json.encoding());
+        Problem::new(Kind::UnsupportedMediaType, detail)
+    })
 }
 
 /// Refuses a `Content-Type` that is not JSON.
-pub(crate) fn must_be_json(media_type: Option<&HeaderValue>) -> Result<(), Problem> {
-    match codec(media_type)? {
+pub(crate) fn must_be_json(headers: &HeaderMap) -> Result<(), Problem> {
+    match codec(headers)? {
         Codec::Json => Ok(()),
         Codec::Cbor | Codec::Postcard => {
             let detail = format!("a body here is {}", Codec::Json.encoding());

@@ -51,6 +51,6 @@ pub(crate) async fn readyz(
 #[utoipa::path(get, path = "/metrics", tag = "service", operation_id = "get_metrics",
     responses((status = 200, description = "The metrics", body = String, content_type = "text/plain")))]
 pub(crate) async fn metrics(State(service): State<Service>, _: NoQuery) -> Response<Body> {
-    let text = service.prometheus.render();
+    let text = crate::metrics::render(&service.prometheus);
     reply::with_type("text/plain; version=0.0.4; charset=utf-8", Body::from(text))
 }

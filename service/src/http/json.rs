@@ -13,37 +13,46 @@ use super::problem::{Kind, Problem};
 /// Largest number up to which every integer has a float of its own.
 const FLOAT_INTEGER_MAX: f64 = 9_007_199_254_740_992.0;
 
-/// A JSON text as a message.
+/// A JSON text as a message. What cannot be read is refused by the name of its field.
 pub(crate) fn message<T: DeserializeOwned + Serialize>(bytes: &[u8]) -> Result<T, Problem> {
     let malformed = |detail: String| Problem::new(Kind::MalformedBody, detail);
     let mut given: Value =
         serde_json::from_slice(bytes).map_err(|error| malformed(error.to_string()))?;
     make_whole_numbers_integers(&mut given);
-    let message = T::deserialize(&given).map_err(|error| malformed(error.to_string()))?;
+    let message: T = serde_path_to_error::deserialize(&given)
+        .map_err(|error| malformed(cogmap_proto::at_field(error.path(), error.inner())))?;
     let written = serde_json::to_value(&message).map_err(|error| malformed(error.to_string()))?;
-    if has_array_for_object(&given, &written) {
-        return Err(malformed(
-            "there is an array where an object should be".to_owned(),
-        ));
+    if let Some(mut path) = array_for_object(&given, &written) {
+        path.reverse();
+        let field = if path.is_empty() {
+            "the body".to_owned()
+        } else {
+            path.join(".")
+        };
+        return Err(malformed(format!(
+            "{field}: an array where an object should be"
+        )));
     }
     Ok(message)
 }
 
-/// Whether an array stands in `given` for an object: serde takes one for the fields in their order,
-/// and an empty one for no fields at all, which nobody means.
-fn has_array_for_object(given: &Value, written: &Value) -> bool {
+/// Where an array stands in `given` for an object, innermost part first: serde takes one for the fields
+/// in their order, and an empty one for no fields at all, which nobody means.
+fn array_for_object(given: &Value, written: &Value) -> Option<Vec<String>> {
+    let within = |part: String, given, written| {
+        let mut path = array_for_object(given, written)?;
+        path.push(part);
+        Some(path)
+    };
     match (given, written) {
-        (Value::Array(_), Value::Object(_)) => true,
-        (Value::Array(given), Value::Array(written)) => given
+        (Value::Array(_), Value::Object(_)) => Some(Vec::new()),
+        (Value::Array(given), Value::Array(written)) => (0..)
+            .zip(given.iter().zip(written))
+            .find_map(|(at, (given, written))| within(at.to_string(), given, written)),
+        (Value::Object(given), Value::Object(written)) => given
             .iter()
-            .zip(written)
-            .any(|(given, written)| has_array_for_object(given, written)),
-        (Value::Object(given), Value::Object(written)) => given.iter().any(|(key, given)| {
-            written
-                .get(key)
-                .is_some_and(|written| has_array_for_object(given, written))
-        }),
-        _ => false,
+            .find_map(|(key, given)| within(key.clone(), given, written.get(key)?)),
+        _ => None,
     }
 }
 

@@ -35,7 +35,8 @@ pub(crate) struct LandmarksQuery {
     operation_id = "list_landmarks", params(SpaceParam, LandmarksQuery),
     responses(
         (status = 200, description = "The landmarks, by label", body = LandmarkPage),
-        (status = 404, description = "There is no such space")))]
+        (status = 404, description = "There is no such space"),
+        (status = 422, description = "A parameter breaks a rule")))]
 pub(crate) async fn list(
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<LandmarksQuery>,

@@ -5,11 +5,14 @@
 
 mod agents;
 mod docs;
+mod elsewhere;
 mod events;
+mod examples;
 mod export;
 mod extract;
 mod guard;
 mod health;
+mod index;
 mod json;
 mod landmarks;
 mod listener;
@@ -64,6 +67,7 @@ struct Description;
 
 fn described() -> OpenApiRouter<Service> {
     OpenApiRouter::with_openapi(Description::openapi())
+        .routes(routes!(index::get))
         .routes(routes!(spaces::list))
         .routes(routes!(spaces::get, spaces::put, spaces::delete))
         .routes(routes!(agents::list))
@@ -110,29 +114,16 @@ pub fn router(
     stopping: watch::Receiver<bool>,
 ) -> Router {
     let (described, paths) = described().split_for_parts();
-    let guard = Guard::new(settings, paths.paths.paths.into_keys());
+    let paths: Vec<String> = paths.paths.paths.into_keys().collect();
+    let guard = Guard::new(settings, paths.iter().cloned());
     described
         .merge(docs::routes(&openapi(settings.token.is_some())))
-        .fallback(unknown_route)
-        .method_not_allowed_fallback(method_not_allowed)
+        .fallback(elsewhere::unknown_path)
+        .method_not_allowed_fallback(elsewhere::other_method)
         .layer(guard)
         .with_state(Service::new(Shared::new(
-            engine, prometheus, settings, stopping,
+            engine, prometheus, settings, stopping, paths,
         )))
-}
-
-async fn unknown_route() -> Problem {
-    Problem::new(
-        Kind::UnknownRoute,
-        "there is nothing under this path; /docs lists what there is",
-    )
-}
-
-async fn method_not_allowed() -> Problem {
-    Problem::new(
-        Kind::MethodNotAllowed,
-        "the header Allow lists the methods of this path",
-    )
 }
 
 /// Serves until `shutdown` comes, then finishes what is under way, within a bounded time.

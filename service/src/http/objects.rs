@@ -57,7 +57,8 @@ pub(crate) struct ObjectsQuery {
     operation_id = "list_objects", params(SpaceParam, ObjectsQuery),
     responses(
         (status = 200, description = "The objects, by name", body = ObjectPage),
-        (status = 404, description = "There is no such space")))]
+        (status = 404, description = "There is no such space"),
+        (status = 422, description = "A parameter breaks a rule")))]
 pub(crate) async fn list(
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<ObjectsQuery>,

@@ -7,7 +7,8 @@ use cogmap_proto::limits::{
 };
 use serde_json::{Map, Value, json};
 
-use super::problem::PROBLEM_JSON;
+use super::examples;
+use super::problem::{Kind, PROBLEM_JSON};
 
 /// Statuses that every route may answer with, whoever handles it.
 const EVERYWHERE: [(&str, &str); 6] = [
@@ -69,6 +70,10 @@ pub(crate) fn complete(mut openapi: Value, token: bool) -> Value {
     bound_integers(&mut openapi);
     measure_arrays(&mut openapi);
     close_variants(&mut openapi["components"]["schemas"]);
+    let kinds: Vec<_> = { Kind::ALL.iter() }
+        .map(|kind| format!("/problems/{}", kind.name()))
+        .collect();
+    openapi["components"]["schemas"]["Problem"]["properties"]["type"]["enum"] = json!(kinds);
     let creation = &mut openapi["paths"]["/v1/spaces/{space}"]["put"]["requestBody"];
     creation["required"] = json!(false);
     constrain(&mut openapi["components"]["schemas"]);
@@ -77,6 +82,11 @@ pub(crate) fn complete(mut openapi: Value, token: bool) -> Value {
 
 fn complete_operation(operation: &mut Value) {
     let with_body = operation.get("requestBody").is_some();
+    let example = operation["operationId"].as_str().and_then(examples::of);
+    let json = "/requestBody/content/application~1json";
+    if let (Some(example), Some(body)) = (example, operation.pointer_mut(json)) {
+        body["example"] = example;
+    }
     let responses = &mut operation["responses"];
     for (status, description) in EVERYWHERE {
         add(responses, status, description);

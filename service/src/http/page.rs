@@ -2,7 +2,8 @@
 
 use cogmap_proto::limits::{PAGE_ITEMS_DEFAULT, PAGE_ITEMS_MAX};
 
-use super::problem::{Kind, Problem};
+use super::problem::Problem;
+use crate::answer::InvalidQuery;
 
 /// Number of items that a query asks for.
 pub(crate) fn limit(asked: Option<u32>) -> Result<usize, Problem> {
@@ -10,8 +11,7 @@ pub(crate) fn limit(asked: Option<u32>) -> Result<usize, Problem> {
     if (1..=PAGE_ITEMS_MAX).contains(&limit) {
         Ok(limit)
     } else {
-        let detail = format!("limit is {limit}, but must be 1 to {PAGE_ITEMS_MAX}");
-        Err(Problem::new(Kind::InvalidParameter, detail))
+        Err(InvalidQuery::Limit(limit).into())
     }
 }
 

@@ -42,7 +42,8 @@ pub(crate) struct PlacesQuery {
     params(SpaceParam, PlacesQuery),
     responses(
         (status = 200, description = "The places, by number", body = PlacePage),
-        (status = 404, description = "There is no such space")))]
+        (status = 404, description = "There is no such space"),
+        (status = 422, description = "A parameter breaks a rule")))]
 pub(crate) async fn list(
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<PlacesQuery>,

@@ -15,7 +15,7 @@ use crate::answer::{self, InvalidPrediction};
     responses(
         (status = 200, description = "Where the motion leads and what is expected there; no percepts \
             where no place answers", body = PredictAnswer),
-        (status = 404, description = "There is no such space or agent"),
+        (status = 404, description = "There is no such space, agent or channel"),
         (status = 409, description = "It is not known where the agent stands in the map"),
         (status = 422, description = "The query makes no sense")))]
 pub(crate) async fn post(
@@ -23,12 +23,8 @@ pub(crate) async fn post(
     _: NoQuery,
     Json(query): Json<PredictQuery>,
 ) -> Result<Response<Body>, Problem> {
-    if query
-        .agent
-        .as_deref()
-        .is_some_and(|name| name != desk.name())
-    {
-        return Err(InvalidPrediction::OtherAgent.into());
+    if let Some(other) = query.agent.as_ref().filter(|name| *name != desk.name()) {
+        return Err(InvalidPrediction::OtherAgent(other.clone()).into());
     }
     let map = space.snapshot().await?;
     let answer = answer::predict(space.name(), &map, desk.id(), &query)?;

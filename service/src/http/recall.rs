@@ -14,7 +14,7 @@ use crate::answer;
     params(SpaceParam), request_body = RecallQuery,
     responses(
         (status = 200, description = "The places, best first", body = RecallAnswer),
-        (status = 404, description = "There is no such space"),
+        (status = 404, description = "There is no such space, agent or channel"),
         (status = 422, description = "The query makes no sense in this space")))]
 pub(crate) async fn post(
     SpaceOfPath(space): SpaceOfPath,

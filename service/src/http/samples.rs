@@ -2,11 +2,11 @@
 
 use axum::body::Body;
 use axum::http::Response;
-use cogmap_proto::{Codec, DecodeError, IngestAnswer, SampleBatch};
+use cogmap_proto::{Codec, IngestAnswer, SampleBatch};
 
 use super::extract::{AgentName, AgentParams, Encoded, NoQuery};
 use super::json;
-use super::problem::{Kind, Problem, SequenceProblem};
+use super::problem::{Problem, SequenceProblem};
 use super::reply;
 
 /// Send samples.
@@ -27,6 +27,7 @@ use super::reply;
         (status = 409, description = "Earlier samples are missing, a newer session has taken the \
             agent over, or the space has its full number of agents",
             body = SequenceProblem, content_type = "application/problem+json"),
+        (status = 422, description = "The batch is empty, too large, or breaks another rule as a whole"),
         (status = 507, description = "The store is full")))]
 pub(crate) async fn post(
     AgentName(space, agent): AgentName,
@@ -37,13 +38,6 @@ pub(crate) async fn post(
         Codec::Json => json::batch(&body.bytes),
         Codec::Cbor | Codec::Postcard => body.codec.decode_batch(&body.bytes),
     };
-    let batch = batch.map_err(|error| {
-        let kind = match error {
-            DecodeError::TooLong(_) => Kind::BodyTooLong,
-            _ => Kind::MalformedBody,
-        };
-        Problem::new(kind, error.to_string())
-    })?;
-    let answer: IngestAnswer = space.ingest(&agent, batch).await?;
+    let answer: IngestAnswer = space.ingest(&agent, batch?).await?;
     Ok(reply::json(&answer))
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::{FromRequest, Request, State};
-use axum::http::header::{CONTENT_TYPE, LOCATION};
+use axum::http::header::LOCATION;
 use axum::http::{HeaderValue, Response, StatusCode};
 use cogmap_proto::{Name, SpaceInfo, SpaceList, SpaceSettings};
 
@@ -110,7 +110,7 @@ pub(crate) async fn info(space: &Arc<Space>) -> Result<SpaceInfo, Problem> {
             Kind::Recovering,
             format!("the space {:?} is loading", space.name()),
         ),
-        Unavailable::Failed(_) => error.into(),
+        error => error.into(),
     })?;
     Ok(answer::space_info(space.name(), space.settings(), &map))
 }
@@ -125,12 +125,12 @@ impl FromRequest<Service> for NewSpace {
         let (mut parts, body) = request.into_parts();
         let params: SpaceParam = super::extract::path(&mut parts, service).await?;
         let name = name(&params.space)?;
-        let media_type = parts.headers.get(CONTENT_TYPE).cloned();
+        let headers = parts.headers.clone();
         let bytes = whole_body(Request::from_parts(parts, body), service).await?;
         if bytes.is_empty() {
             return Ok(Self(name, SpaceSettings::default()));
         }
-        must_be_json(media_type.as_ref())?;
+        must_be_json(&headers)?;
         let settings = json::message(&bytes)?;
         Ok(Self(name, settings))
     }

@@ -19,6 +19,8 @@ pub(crate) struct Shared {
     pub(crate) streams: Arc<Semaphore>,
     /// Turns true when the service stops; event streams end then.
     pub(crate) stopping: watch::Receiver<bool>,
+    /// The paths that there are, as the description has them.
+    pub(crate) paths: Vec<String>,
 }
 
 impl Shared {
@@ -27,6 +29,7 @@ impl Shared {
         prometheus: PrometheusHandle,
         settings: &HttpSettings,
         stopping: watch::Receiver<bool>,
+        paths: Vec<String>,
     ) -> Self {
         let streams = Arc::new(Semaphore::new(settings.streams_max));
         Self {
@@ -34,6 +37,7 @@ impl Shared {
             prometheus,
             streams,
             stopping,
+            paths,
         }
     }
 }

@@ -6,7 +6,7 @@ use cogmap_proto::{TripDetail, TripPage};
 use cognitive_map::TripId;
 use serde::Deserialize;
 
-use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam};
+use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam, named};
 use super::page;
 use super::places::{MemoryOfPath, forgotten, unknown};
 use super::problem::Problem;
@@ -34,24 +34,22 @@ pub(crate) struct TripsQuery {
     params(SpaceParam, TripsQuery),
     responses(
         (status = 200, description = "The trips, by number", body = TripPage),
-        (status = 404, description = "There is no such space")))]
+        (status = 404, description = "There is no such space or agent"),
+        (status = 422, description = "A parameter breaks a rule")))]
 pub(crate) async fn list(
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<TripsQuery>,
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
     let map = space.snapshot().await?;
-    // Nobody has the number of an agent that is not there.
-    let agent = query
-        .agent
-        .as_deref()
-        .map(|name| space.agent(name).map(|desk| desk.id()));
+    let agent = query.agent.as_deref().map(|name| named(&space, name));
+    let agent = agent.transpose()?.map(|desk| desk.id());
     let first = page::first(query.after);
     let listed = first
         .into_iter()
         .flat_map(|first| map.trips_from(TripId(first)));
     let wanted = listed.filter(|(_, trip)| {
-        agent.is_none_or(|agent| agent == Some(trip.agent()))
+        agent.is_none_or(|agent| agent == trip.agent())
             && query
                 .since_ns
                 .is_none_or(|since| trip.end_stamp_ns() >= since)

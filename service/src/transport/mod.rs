@@ -1,6 +1,7 @@
 //! The transport: Zenoh in and out. Nothing else in the service knows Zenoh.
 
 mod intake;
+mod latest;
 mod outlet;
 mod queries;
 mod session;

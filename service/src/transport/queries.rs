@@ -3,19 +3,19 @@
 use std::sync::Arc;
 
 use cogmap_proto::{
-    Codec, IdentifyQuery, LocalizeQuery, PredictQuery, Problem, RecallQuery, Verb, WatermarkQuery,
+    Codec, IdentifyQuery, LocalizeQuery, Name, PredictQuery, RecallQuery, Verb, WatermarkQuery,
     query_key,
 };
-use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use zenoh::Session;
 use zenoh::query::{Query, Queryable};
 
+use super::latest;
 use super::session::TransportError;
-use crate::answer::{self, InvalidPrediction};
-use crate::engine::{Engine, QuestionError};
+use crate::answer::{self, InvalidPrediction, Kind, Problem};
+use crate::engine::{AgentDesk, Engine, Space};
 
 /// Most queries under way; further ones are told to come back.
 const QUERIES_MAX: usize = 64;
@@ -47,41 +47,47 @@ pub(crate) async fn declare(
             .await?;
         queryables.push(queryable);
     }
+    queryables.extend(latest::declare(session, engine, &room).await?);
     Ok(queryables)
 }
 
 async fn reply(engine: &Engine, verb: Verb, query: Query, permit: Option<OwnedSemaphorePermit>) {
-    let codec = query.encoding().map_or(Ok(Codec::Json), |encoding| {
-        Codec::of_encoding(&encoding.to_string())
-    });
-    let (codec, result) = match codec {
-        Ok(codec) if permit.is_none() => (
-            codec,
-            Err(problem("busy", 503, "too much is under way".to_owned())),
-        ),
-        Ok(codec) => (codec, answer(engine, verb, &query, codec).await),
-        Err(error) => (
-            Codec::Json,
-            Err(problem("unsupported-encoding", 415, error.to_string())),
-        ),
+    let (codec, answered) = match (codec_of(&query), permit) {
+        (Err(problem), _) => (Codec::Json, Err(problem)),
+        (Ok(codec), None) => (codec, Err(busy())),
+        (Ok(codec), Some(_permit)) => (codec, answer(engine, verb, &query, codec).await),
     };
-    let sent = match result {
-        Ok(bytes) => {
-            query
-                .reply(query.key_expr(), bytes)
-                .encoding(codec.encoding())
-                .await
-        }
-        Err(problem) => {
-            query
-                .reply_err(codec.encode(&problem))
-                .encoding(codec.encoding())
-                .await
-        }
+    let bytes = match answered {
+        Ok(bytes) => bytes,
+        Err(problem) => return refuse(&query, codec, &problem).await,
     };
-    if let Err(error) = sent {
+    let sent = query.reply(query.key_expr(), bytes);
+    if let Err(error) = sent.encoding(codec.encoding()).await {
         tracing::debug!(%error, "answer a query");
     }
+}
+
+/// Answers with a problem.
+pub(super) async fn refuse(query: &Query, codec: Codec, problem: &Problem) {
+    let sent = query.reply_err(codec.encode(&problem.to_wire()));
+    if let Err(error) = sent.encoding(codec.encoding()).await {
+        tracing::debug!(%error, "refuse a query");
+    }
+}
+
+/// The codec of a question, and so of its answer. A question without an encoding means JSON.
+pub(super) fn codec_of(query: &Query) -> Result<Codec, Problem> {
+    let encoding = query.encoding().map(ToString::to_string);
+    // An encoding that was not given comes as Zenoh's default.
+    match encoding.as_deref() {
+        None | Some("" | "zenoh/bytes") => Ok(Codec::Json),
+        Some(encoding) => Ok(Codec::of_encoding(encoding)?),
+    }
+}
+
+/// As many questions as may be are under way.
+pub(super) fn busy() -> Problem {
+    Problem::new(Kind::Busy, "too much is under way")
 }
 
 async fn answer(
@@ -90,74 +96,59 @@ async fn answer(
     query: &Query,
     codec: Codec,
 ) -> Result<Vec<u8>, Problem> {
-    let name = query
-        .key_expr()
-        .as_str()
-        .split('/')
-        .nth(1)
-        .unwrap_or_default();
-    let space = engine
-        .space(name)
-        .ok_or_else(|| problem("unknown-space", 404, format!("no space {name:?}")))?;
+    let key = query.key_expr().as_str();
+    let space = space(engine, key.split('/').nth(1).unwrap_or_default())?;
     match verb {
         Verb::Recall => {
             let body: RecallQuery = body(query, codec)?;
-            let map = space
-                .snapshot()
-                .await
-                .map_err(|error| problem("unavailable", 503, error.to_string()))?;
+            let map = space.snapshot().await?;
             // It may look at every place: not on a thread that others wait for.
             let recall = move || answer::recall(space.name(), &map, &body);
-            let recalled = tokio::task::spawn_blocking(recall)
-                .await
-                .map_err(|error| problem("internal", 500, error.to_string()))?
-                .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
-            Ok(encoded(codec, &recalled))
+            let recalled = tokio::task::spawn_blocking(recall).await;
+            let recalled = recalled.map_err(|_| Problem::interrupted())??;
+            Ok(codec.encode(&recalled))
         }
         Verb::Watermark => {
             let body: WatermarkQuery = body(query, codec)?;
-            let agent = &body.agent;
-            let desk = space
-                .agent(agent)
-                .ok_or_else(|| problem("unknown-agent", 404, format!("no agent {agent:?}")))?;
-            Ok(encoded(codec, &desk.watermark()))
+            Ok(codec.encode(&agent(&space, &body.agent)?.watermark()))
         }
         Verb::Predict => {
             let body: PredictQuery = body(query, codec)?;
-            let agent = body
-                .agent
-                .as_deref()
-                .ok_or_else(|| unpredictable(&InvalidPrediction::NoAgent))?;
-            let desk = space
-                .agent(agent)
-                .ok_or_else(|| problem("unknown-agent", 404, format!("no agent {agent:?}")))?;
-            let map = space
-                .snapshot()
-                .await
-                .map_err(|error| problem("unavailable", 503, error.to_string()))?;
-            let predicted = answer::predict(space.name(), &map, desk.id(), &body);
-            let predicted = predicted.map_err(|error| unpredictable(&error))?;
-            Ok(encoded(codec, &predicted))
+            let name = body.agent.as_deref().ok_or(InvalidPrediction::NoAgent)?;
+            let desk = agent(&space, name)?;
+            let map = space.snapshot().await?;
+            let predicted = answer::predict(space.name(), &map, desk.id(), &body)?;
+            Ok(codec.encode(&predicted))
         }
         Verb::Identify => {
             let body: IdentifyQuery = body(query, codec)?;
-            let (orientation, touches) = answer::touches_to_identify(&body)
-                .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
-            let identified = space.identify(orientation, touches).await;
-            let (map, identified) = identified.map_err(|error| unanswered(&error))?;
+            let (orientation, touches) = answer::touches_to_identify(&body)?;
+            let (map, identified) = space.identify(orientation, touches).await?;
             let answer = answer::identification(space.name(), &map, &identified);
-            Ok(encoded(codec, &answer))
+            Ok(codec.encode(&answer))
         }
         Verb::Localize => {
             let body: LocalizeQuery = body(query, codec)?;
-            let samples = answer::samples_to_localize(&body)
-                .map_err(|error| problem("invalid-query", 422, error.to_string()))?;
-            let found = space.localize(samples).await;
-            let (map, found) = found.map_err(|error| unanswered(&error))?;
+            let samples = answer::samples_to_localize(&body)?;
+            let (map, found) = space.localize(samples).await?;
             let answer = answer::localization(space.name(), &map, &found);
-            Ok(encoded(codec, &answer))
+            Ok(codec.encode(&answer))
         }
     }
+}
+
+/// The space that a key names.
+pub(super) fn space(engine: &Engine, name: &str) -> Result<Arc<Space>, Problem> {
+    engine.space(name).ok_or_else(|| match Name::check(name) {
+        Ok(()) => Problem::unknown_space(name),
+        Err(error) => Problem::new(Kind::InvalidPath, format!("{name:?}: {error}")),
+    })
+}
+
+/// The agent that a question names.
+pub(super) fn agent(space: &Space, name: &str) -> Result<Arc<AgentDesk>, Problem> {
+    let found = space.agent(name);
+    found.ok_or_else(|| answer::unknown_agent(name).into())
 }
 
 fn body<T: DeserializeOwned>(query: &Query, codec: Codec) -> Result<T, Problem> {
@@ -165,38 +156,5 @@ fn body<T: DeserializeOwned>(query: &Query, codec: Codec) -> Result<T, Problem> 
         .payload()
         .map(|payload| payload.to_bytes())
         .unwrap_or_default();
-    codec
-        .decode(&payload)
-        .map_err(|error| problem("malformed-body", 400, error.to_string()))
-}
-
-fn encoded<T: Serialize>(codec: Codec, message: &T) -> Vec<u8> {
-    codec.encode(message)
-}
-
-fn unpredictable(error: &InvalidPrediction) -> Problem {
-    match error {
-        InvalidPrediction::NotPlaced => problem("not-placed", 409, error.to_string()),
-        _ => problem("invalid-query", 422, error.to_string()),
-    }
-}
-
-fn unanswered(error: &QuestionError) -> Problem {
-    let (kind, status) = match error {
-        QuestionError::Busy => ("busy", 503),
-        QuestionError::Overdue(_) => ("timeout", 504),
-        QuestionError::Interrupted => ("internal", 500),
-        QuestionError::Unavailable(_) => ("unavailable", 503),
-    };
-    problem(kind, status, error.to_string())
-}
-
-fn problem(kind: &str, status: u16, detail: String) -> Problem {
-    let title = kind.replace('-', " ");
-    Problem {
-        kind: format!("/problems/{kind}"),
-        title,
-        status,
-        detail,
-    }
+    Ok(codec.decode(&payload)?)
 }

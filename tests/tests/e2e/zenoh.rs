@@ -192,6 +192,7 @@ fn a_client_that_starts_before_the_service_waits_for_it() {
         let settings = RobotSettings {
             session: Some(SESSION),
             connect_timeout: LONG,
+            ends_session: false,
             ..RobotSettings::default()
         };
         let robot = Robot::builder("default", AGENT).endpoint(&endpoint);

@@ -56,6 +56,8 @@ class Robot(Sampler):
         send_timeout_s: How long a sample method waits for room before `WindowFull` [s].
         connect_timeout_s: How long to wait for the router [s].
         match_timeout_s: How long samples wait for the service before they are sent anyway [s].
+        ends_session: Whether `close` ends the session, and the trip under way, by a last sample. Without
+            it they end when the agent's next session begins.
 
     Raises:
         InvalidValue: A name or another argument makes no sense.
@@ -80,6 +82,7 @@ class Robot(Sampler):
         send_timeout_s: float = 10.0,
         connect_timeout_s: float = 10.0,
         match_timeout_s: float = 5.0,
+        ends_session: bool = True,
     ) -> None:
         if connect is not None and session is not None:
             raise InvalidValue("connect", connect, "expected either connect or session", "both")
@@ -94,6 +97,7 @@ class Robot(Sampler):
         )
         super().__init__(motion_noise)
         self._send_timeout_s = send_timeout_s
+        self._ends_session = ends_session
         if session is None:
             wanted = DEFAULT_ENDPOINT if connect is None else connect
             endpoints = [wanted] if isinstance(wanted, str) else list(wanted)
@@ -240,8 +244,8 @@ class Robot(Sampler):
         return self._run.wait_heard(timeout_s)
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """Flushes for at most `timeout_s`, then closes, also when that fails; a second call does
-        nothing.
+        """Ends the session and the trip under way, flushes for at most `timeout_s`, then closes, also
+        when that fails; a second call does nothing.
 
         Raises `Timeout` when samples are left without acknowledgement: they are lost with this
         process unless they arrived all the same.
@@ -253,6 +257,8 @@ class Robot(Sampler):
         with run.changed:
             if run.closing:
                 return
+            if self._ends_session:
+                run.end_session()
             run.closing = True
             run.changed.notify_all()
         missing = 0

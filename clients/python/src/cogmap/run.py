@@ -23,7 +23,7 @@ from .errors import Closed, SessionSuperseded, Timeout, Unreachable, WindowFull
 from .inbox import Inbox
 from .problem import Problem
 from .rejection import Rejections, sentences
-from .sample import Sample, SampleBody
+from .sample import Sample, SampleBody, SessionEnd
 from .wake import Wake
 from .window import Window, WindowLimits
 from .wire import encode_batch, encode_sample
@@ -178,6 +178,15 @@ class Run:
         elif due or starts_batch:
             self._wake.set()
         return seq
+
+    def end_session(self) -> None:
+        """Appends the session's last sample, with the condition held: at the stamp of the one before, because
+        the robot's clock may be another than this machine's. A full window is left as it is."""
+        if self._is_refused() or not self.window.next_seq:
+            return
+        data = encode_sample(Sample(self.clock.latest_ns, SessionEnd()))
+        if self.window.has_room(len(data)):
+            self.window.append(data, time.monotonic())
 
     def wait_durable(self, timeout_s: float) -> int:
         """Waits until the watermark covers all samples; returns how many are missing after the time."""

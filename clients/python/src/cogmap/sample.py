@@ -399,7 +399,24 @@ class ObjectMark:
         one_of("mark", self.mark, (LearnObject, IdentifyObject, EndObject))
 
 
-SampleBody = Union[Increment, Velocity, Level, Descriptor, Sighting, StartPose, Marker, ObjectMark]
+@dataclass(frozen=True)
+class SessionEnd:
+    """The session ends, and the trip under way with it: a robot's last word."""
+
+    TAG: ClassVar[str] = "session_end"
+
+
+SampleBody = Union[
+    Increment,
+    Velocity,
+    Level,
+    Descriptor,
+    Sighting,
+    StartPose,
+    Marker,
+    ObjectMark,
+    SessionEnd,
+]
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,10 @@ impl Fold<'_> {
             SampleBody::StartPose(start) => self.start_pose(start),
             SampleBody::Marker(marker) => self.marker(marker),
             SampleBody::Object(mark) => self.object_mark(mark),
+            SampleBody::SessionEnd => {
+                self.end_trip(TripEnd::SessionEnd);
+                self.end_episode();
+            }
         }
         self.rest();
     }

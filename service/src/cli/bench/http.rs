@@ -16,6 +16,7 @@ use tokio::net::{TcpListener, TcpStream};
 
 use super::ingest::{Bench, durable_of, rate};
 use super::quantile::quantile;
+use crate::cli::duration::seconds;
 use crate::cli::output;
 use crate::engine::Space;
 
@@ -24,8 +25,8 @@ pub(in crate::cli) struct HttpArgs {
     /// Connections that ask at the same time.
     #[arg(long, default_value_t = 16)]
     connections: usize,
-    /// Length of each measurement \[s\].
-    #[arg(long, default_value_t = 4.0)]
+    /// Length of each measurement, such as 5s; a number alone is in seconds.
+    #[arg(long, default_value = "4s", value_name = "DURATION", value_parser = seconds)]
     seconds: f64,
     /// Messages a second that come in meanwhile, each of ten samples.
     #[arg(long, default_value_t = 1000.0)]

@@ -12,6 +12,7 @@ use serde::Serialize;
 use zenoh::Session;
 
 use super::load::raw_key;
+use crate::cli::duration::seconds;
 use crate::cli::output;
 use crate::config::Config;
 use crate::engine::{AgentDesk, Space};
@@ -26,8 +27,8 @@ pub(in crate::cli) struct IngestArgs {
     /// Samples of a message.
     #[arg(long, value_delimiter = ',', default_values_t = [1, 8, 64])]
     samples_per_message: Vec<usize>,
-    /// Length of each measurement \[s\].
-    #[arg(long, default_value_t = 5.0)]
+    /// Length of each measurement, such as 5s; a number alone is in seconds.
+    #[arg(long, default_value = "5s", value_name = "DURATION", value_parser = seconds)]
     seconds: f64,
     /// Directory for the store; a temporary one, removed at the end, when absent.
     #[arg(long, value_name = "DIR")]

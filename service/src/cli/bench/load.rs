@@ -72,6 +72,8 @@ fn robot(args: &LoadArgs) -> anyhow::Result<()> {
         session: Some(1),
         batch_samples: args.samples_per_message,
         batch_delay: Duration::from_secs(1),
+        // What arrives is counted against what was published.
+        ends_session: false,
         send_timeout: TIMEOUT,
         ..RobotSettings::default()
     };

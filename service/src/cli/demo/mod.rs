@@ -17,6 +17,7 @@ use self::progress::Progress;
 use self::summary::Summary;
 use self::team::DemoTeam;
 use super::bench::free_port;
+use super::duration::seconds;
 use super::{output, serve};
 use crate::config::Config;
 use crate::metrics;
@@ -28,8 +29,8 @@ const ZENOH_PORT: u16 = 7447;
 
 #[derive(Debug, Args)]
 pub(super) struct DemoArgs {
-    /// How long the robots drive \[s\].
-    #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
+    /// How long the robots drive, such as 20s or 1m30s; a number alone is in seconds.
+    #[arg(long, default_value = "60s", value_name = "DURATION", value_parser = seconds)]
     duration: f64,
     /// Number of robots.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
@@ -63,10 +64,6 @@ pub(super) struct DemoArgs {
 }
 
 pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
-    anyhow::ensure!(
-        args.duration > 0.0 && args.duration < 1e6,
-        "--duration is a positive number of seconds"
-    );
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()?;

@@ -15,13 +15,15 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
+use cogmap_proto::EventRecord;
 use cognitive_map::{CognitiveMap, Event, Record};
 
 use super::block::BlockWriter;
-use super::checkpointer::Checkpointer;
+use super::checkpointer::{Beside, Checkpointer};
 use super::committer::{Answer, Commit};
 use super::counters::SpaceCounters;
 use super::desk::AgentDesk;
+use super::events::published;
 use super::message::{Call, ObjectReply};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
@@ -65,7 +67,10 @@ pub(crate) struct Writer {
     records: Vec<Record>,
     answers: Vec<Answer>,
     objects: Vec<ObjectReply>,
+    /// What the record under way brings about.
     events: Vec<Event>,
+    /// What the round has brought about that is published.
+    told: Vec<Arc<EventRecord>>,
     /// Samples that it has applied.
     applied: u64,
 }
@@ -115,6 +120,7 @@ impl Writer {
             answers: Vec::new(),
             objects: Vec::new(),
             events: Vec::new(),
+            told: Vec::new(),
             applied: 0,
         };
         let mut recorders = recorders.into_iter();
@@ -148,27 +154,20 @@ impl Writer {
             self.round(&mut inbox, now);
             if now >= next_look {
                 self.give_up_gaps(now);
-                self.counters.sizes(&self.map, waiting);
+                self.measure(waiting);
                 next_look = now + PATIENCE;
             }
             self.shared.serve_snapshots(&self.map);
-            self.checkpointer.offer(self.next_block, &self.map, || {
-                self.agents
-                    .iter()
-                    .map(|slot| slot.desk.recorder().clone())
-                    .collect()
-            });
+            let (shared, agents) = (&self.shared, &self.agents);
+            let beside = || beside(shared, agents);
+            self.checkpointer.offer(self.next_block, &self.map, beside);
             if closing && waiting == 0 {
                 break;
             }
         }
         self.counters.gone();
-        self.checkpointer.finish(self.next_block, &self.map, || {
-            self.agents
-                .iter()
-                .map(|slot| slot.desk.recorder().clone())
-                .collect()
-        });
+        let beside = || beside(&self.shared, &self.agents);
+        self.checkpointer.finish(self.next_block, &self.map, beside);
     }
 
     fn round(&mut self, inbox: &mut Inbox, now: Instant) {
@@ -218,6 +217,12 @@ impl Writer {
     fn apply(&mut self) {
         for record in &self.records {
             self.map.apply(record, &mut self.events);
+            for event in &self.events {
+                self.counters.event(&self.map, event);
+            }
+            self.told
+                .extend(published(&self.shared.name, &self.map, &self.events));
+            self.events.clear();
             self.applied += u64::from(matches!(record, Record::Sample { .. }));
             let (Record::Sample { agent, .. }
             | Record::Skip { agent, .. }
@@ -246,5 +251,15 @@ impl Writer {
                 }
             }
         }
+    }
+}
+
+/// What a checkpoint holds beside the map.
+fn beside(shared: &Shared, agents: &[AgentSlot]) -> Beside {
+    Beside {
+        recorders: { agents.iter() }
+            .map(|slot| slot.desk.recorder().clone())
+            .collect(),
+        events: shared.events.ring(),
     }
 }

@@ -5,12 +5,23 @@ use std::sync::atomic::Ordering;
 
 use super::{AgentSlot, Writer};
 use crate::engine::committer::{Commit, Mark};
+use crate::engine::counters::Standing;
 use crate::engine::readout;
 
 impl Writer {
+    /// Records the sizes of the space, and how its agents stand.
+    pub(super) fn measure(&self, queued: usize) {
+        self.counters.sizes(&self.map, queued);
+        let mut standing = Standing::default();
+        for slot in &self.agents {
+            slot.desk.stand(&mut standing);
+        }
+        self.counters.standing(&standing);
+    }
+
     /// After a start: tells everyone where each agent stands.
     pub(super) fn greet(&self) {
-        self.counters.sizes(&self.map, 0);
+        self.measure(0);
         for slot in &self.agents {
             let id = slot.desk.id();
             if let Some(readout) = readout::readout(&self.shared.name, &self.map, id) {
@@ -83,14 +94,10 @@ impl Writer {
     }
 
     fn publish_events(&mut self) {
-        for event in self.events.drain(..) {
-            self.counters.event(&self.map, &event);
-            if let Some(event) = readout::event(&self.shared.name, &self.map, &event) {
-                self.shared.outlet.event(&event);
-                // No one listening is no fault.
-                let _ = self.shared.events.send(Arc::new(event));
-            }
+        for event in &self.told {
+            self.shared.outlet.event(event);
         }
+        self.shared.events.extend(self.told.drain(..));
     }
 
     fn remind(&self, slot: &AgentSlot) {

@@ -219,8 +219,9 @@ async fn trips_and_landmarks_are_remembered() {
         trip["legs"].as_array().map(|legs| legs.len() as u64),
         trip["trip"]["leg_count"].as_u64()
     );
-    let none = rig.get("/v1/spaces/lab/trips?agent=nobody").await.good();
-    assert_eq!(none["trips"], serde_json::json!([]));
+    rig.get("/v1/spaces/lab/trips?agent=nobody")
+        .await
+        .problem(404, "unknown-agent");
     assert_eq!(
         rig.get("/v1/spaces/lab/trips?agent=rover").await.good(),
         trips

@@ -64,6 +64,7 @@ async fn read_until(stream: &mut TcpStream, text: &str) -> String {
 #[tokio::test]
 async fn events_stream_in_and_end_with_the_service() {
     let rig = rig();
+    rig.samples("other", &steps(1, 0, 1)).await.good();
     let running = run_on(&rig, settings()).await;
     let mut all = connect(&running, "/v1/spaces/lab/events").await;
     let mut other = connect(&running, "/v1/spaces/lab/events?agent=other").await;
@@ -71,7 +72,7 @@ async fn events_stream_in_and_end_with_the_service() {
     assert!(head.contains("content-type: text/event-stream"), "{head}");
     read_until(&mut other, "\r\n\r\n").await;
     rig.samples("rover", &steps(1, 0, 2)).await.good();
-    rig.samples("other", &steps(1, 0, 2)).await.good();
+    rig.samples("other", &steps(2, 0, 2)).await.good();
     let events = read_until(&mut all, "\"agent\":\"other\"").await;
     assert!(
         events.contains("\"agent\":\"rover\"") && events.contains("agent_enrolled"),

@@ -1,0 +1,127 @@
+//! What was published last, for whoever asks: `get` on the keys of estimates and watermarks.
+
+use std::sync::Arc;
+
+use cogmap_proto::{Codec, durable_key, estimate_key};
+use tokio::runtime::Handle;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use zenoh::Session;
+use zenoh::key_expr::KeyExpr;
+use zenoh::query::{Query, Queryable};
+
+use super::queries::{agent, busy, codec_of, refuse, space};
+use super::session::TransportError;
+use crate::answer::{Kind, Problem};
+use crate::engine::{AgentDesk, Engine};
+
+/// What is published of each agent.
+#[derive(Clone, Copy, Debug)]
+enum Latest {
+    Estimate,
+    Watermark,
+}
+
+impl Latest {
+    fn key(self, space: &str, agent: &str) -> String {
+        match self {
+            Self::Estimate => estimate_key(space, agent),
+            Self::Watermark => durable_key(space, agent),
+        }
+    }
+
+    /// What there is of an agent; no estimate before its first sample.
+    fn encoded(self, desk: &AgentDesk, codec: Codec) -> Option<Vec<u8>> {
+        match self {
+            Self::Estimate => desk.estimate().map(|estimate| codec.encode(&estimate)),
+            Self::Watermark => Some(codec.encode(&desk.watermark())),
+        }
+    }
+}
+
+/// Answers for every agent of every space.
+pub(super) async fn declare(
+    session: &Session,
+    engine: &Engine,
+    room: &Arc<Semaphore>,
+) -> Result<Vec<Queryable<()>>, TransportError> {
+    let mut queryables = Vec::new();
+    for latest in [Latest::Estimate, Latest::Watermark] {
+        let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(room));
+        let queryable = session
+            .declare_queryable(latest.key("*", "*"))
+            .complete(true)
+            // The callback runs on a receiving thread: the answer is made elsewhere.
+            .callback(move |query| {
+                let engine = engine.clone();
+                let permit = Arc::clone(&room).try_acquire_owned().ok();
+                runtime.spawn(async move { reply(&engine, latest, query, permit).await });
+            })
+            .await?;
+        queryables.push(queryable);
+    }
+    Ok(queryables)
+}
+
+async fn reply(
+    engine: &Engine,
+    latest: Latest,
+    query: Query,
+    permit: Option<OwnedSemaphorePermit>,
+) {
+    let (codec, answered) = match (codec_of(&query), permit) {
+        (Err(problem), _) => (Codec::Json, Err(problem)),
+        (Ok(codec), None) => (codec, Err(busy())),
+        (Ok(codec), Some(_permit)) if query.key_expr().is_wild() => {
+            (codec, reply_all(engine, latest, &query, codec).await)
+        }
+        (Ok(codec), Some(_permit)) => (codec, reply_one(engine, latest, &query, codec).await),
+    };
+    if let Err(problem) = answered {
+        refuse(&query, codec, &problem).await;
+    }
+}
+
+/// Answers for the one agent that the key names.
+async fn reply_one(
+    engine: &Engine,
+    latest: Latest,
+    query: &Query,
+    codec: Codec,
+) -> Result<(), Problem> {
+    let mut names = query.key_expr().as_str().split('/').skip(1);
+    let mut name = || names.next().unwrap_or_default();
+    let space = space(engine, name())?;
+    let desk = agent(&space, name())?;
+    let bytes = latest.encoded(&desk, codec).ok_or_else(|| {
+        let detail = format!("the agent {:?} has no sample yet", desk.name());
+        Problem::new(Kind::UnknownAgent, detail)
+    })?;
+    send(query, query.key_expr().as_str(), codec, bytes).await;
+    Ok(())
+}
+
+/// Answers for all agents whose keys the query matches.
+async fn reply_all(
+    engine: &Engine,
+    latest: Latest,
+    query: &Query,
+    codec: Codec,
+) -> Result<(), Problem> {
+    for space in engine.spaces() {
+        for desk in space.agents_after(None, usize::MAX) {
+            let key = latest.key(space.name(), desk.name());
+            let asked = KeyExpr::try_from(&*key).is_ok_and(|key| query.key_expr().intersects(&key));
+            if asked && let Some(bytes) = latest.encoded(&desk, codec) {
+                send(query, &key, codec, bytes).await;
+            }
+        }
+    }
+    Ok(())
+}
+
+async fn send(query: &Query, key: &str, codec: Codec, bytes: Vec<u8>) {
+    let sent = query.reply(key, bytes).encoding(codec.encoding()).await;
+    if let Err(error) = sent {
+        tracing::debug!(%error, "answer a query");
+    }
+}
