@@ -301,7 +301,7 @@ impl Space {
             Err(Unavailable::Failed(detail)) => return Err(IngestError::Store(detail)),
         }
         self.queue.request(call).map_err(|error| match error {
-            NotQueued::Full => IngestError::Busy,
+            NotQueued::Full | NotQueued::LaneFull => IngestError::Busy,
             NotQueued::Closed => IngestError::Closed,
         })
     }

@@ -1,9 +1,10 @@
 //! Trips.
 
 use axum::body::Body;
+use axum::extract::State;
 use axum::http::Response;
 use cogmap_proto::{TripDetail, TripPage};
-use cognitive_map::TripId;
+use cognitive_map::{AgentId, CognitiveMap, TripId};
 use serde::Deserialize;
 
 use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam};
@@ -11,6 +12,7 @@ use super::page;
 use super::places::{MemoryOfPath, forgotten, unknown};
 use super::problem::Problem;
 use super::reply;
+use super::state::Service;
 use crate::answer;
 
 /// Which trips.
@@ -36,6 +38,7 @@ pub(crate) struct TripsQuery {
         (status = 200, description = "The trips, by number", body = TripPage),
         (status = 404, description = "There is no such space")))]
 pub(crate) async fn list(
+    State(service): State<Service>,
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<TripsQuery>,
 ) -> Result<Response<Body>, Problem> {
@@ -46,6 +49,17 @@ pub(crate) async fn list(
         .agent
         .as_deref()
         .map(|name| space.agent(name).map(|desk| desk.id()));
+    // A filter may look at every trip.
+    let listed = service.long.make(move || trips(&map, &query, agent, limit));
+    listed.await
+}
+
+fn trips(
+    map: &CognitiveMap,
+    query: &TripsQuery,
+    agent: Option<Option<AgentId>>,
+    limit: usize,
+) -> Response<Body> {
     let first = page::first(query.after);
     let listed = first
         .into_iter()
@@ -59,9 +73,9 @@ pub(crate) async fn list(
     let (trips, next) = page::cut(wanted, limit, |(id, _)| u64::from(id.0));
     let trips = trips
         .into_iter()
-        .map(|(id, trip)| answer::trip(&map, id, trip))
+        .map(|(id, trip)| answer::trip(map, id, trip))
         .collect();
-    Ok(reply::json(&TripPage { trips, next }))
+    reply::json(&TripPage { trips, next })
 }
 
 /// A trip with its legs.

@@ -1,5 +1,6 @@
 //! The transport: Zenoh in and out. Nothing else in the service knows Zenoh.
 
+mod board;
 mod intake;
 mod outlet;
 mod queries;

@@ -10,8 +10,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use zenoh::Session;
 use zenoh::query::{Query, Queryable};
+use zenoh::{Session, Wait};
 
 use super::session::TransportError;
 use crate::answer::{self, InvalidPrediction};
@@ -65,18 +65,28 @@ async fn reply(engine: &Engine, verb: Verb, query: Query, permit: Option<OwnedSe
             Err(problem("unsupported-encoding", 415, error.to_string())),
         ),
     };
-    let sent = match result {
+    // Zenoh waits where the link to whoever asked is congested, also to say that the answer is
+    // complete, which it does when the query is dropped: not on a thread that others wait for.
+    let sending = tokio::task::spawn_blocking(move || {
+        send(&query, codec, result);
+        drop((query, permit));
+    });
+    if sending.await.is_err() {
+        tracing::error!("answering a query ended with a panic");
+    }
+}
+
+/// Sends an answer, which may wait.
+fn send(query: &Query, codec: Codec, answer: Result<Vec<u8>, Problem>) {
+    let encoding = codec.encoding();
+    let sent = match answer {
         Ok(bytes) => {
-            query
-                .reply(query.key_expr(), bytes)
-                .encoding(codec.encoding())
-                .await
+            let reply = query.reply(query.key_expr(), bytes);
+            reply.encoding(encoding).wait()
         }
         Err(problem) => {
-            query
-                .reply_err(codec.encode(&problem))
-                .encoding(codec.encoding())
-                .await
+            let reply = query.reply_err(codec.encode(&problem));
+            reply.encoding(encoding).wait()
         }
     };
     if let Err(error) = sent {

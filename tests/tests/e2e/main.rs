@@ -10,6 +10,7 @@
 mod bad_input; // what no client would send
 mod crash; // kill -9, and what recovery makes of it
 mod full_disk; // a disk that takes no more
+mod nobody_waits; // connections that say next to nothing
 mod pause; // a process that stands still
 mod readers; // readers and senders at once
 

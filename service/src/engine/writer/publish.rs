@@ -44,8 +44,8 @@ impl Writer {
             let (session, next) = (agent.session(), agent.next_seq());
             if applied {
                 if let Some(readout) = readout::readout(space, &self.map, slot.desk.id()) {
-                    let readout = slot.desk.publish(readout);
-                    self.shared.outlet.estimate(&readout.estimate);
+                    slot.desk.publish(readout);
+                    self.shared.outlet.estimate(space, &slot.desk);
                 }
                 commit.marks.push(Mark {
                     desk: Arc::clone(&slot.desk),
@@ -65,9 +65,7 @@ impl Writer {
                 .marks()
                 .applied(session, next, waiting, sequencer.gap());
             if remind {
-                self.shared
-                    .outlet
-                    .watermark(space, slot.desk.name(), &slot.desk.watermark());
+                self.shared.outlet.watermark(space, &slot.desk);
             }
         }
         self.counters
@@ -86,17 +84,15 @@ impl Writer {
         for event in self.events.drain(..) {
             self.counters.event(&self.map, &event);
             if let Some(event) = readout::event(&self.shared.name, &self.map, &event) {
+                let event = Arc::new(event);
                 self.shared.outlet.event(&event);
                 // No one listening is no fault.
-                let _ = self.shared.events.send(Arc::new(event));
+                let _ = self.shared.events.send(event);
             }
         }
     }
 
     fn remind(&self, slot: &AgentSlot) {
-        let watermark = slot.desk.watermark();
-        self.shared
-            .outlet
-            .watermark(&self.shared.name, slot.desk.name(), &watermark);
+        self.shared.outlet.watermark(&self.shared.name, &slot.desk);
     }
 }

@@ -10,6 +10,15 @@
 
 #![allow(clippy::print_stdout)] // The report is what it is for.
 
+mod descriptors;
+mod flood;
+mod half_open;
+mod long_answers;
+mod quantile;
+mod stopped_subscribers;
+mod subscriber;
+mod watermarks;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
@@ -19,10 +28,21 @@ use serde_json::{Value, json};
 type Drill = fn() -> Value;
 
 /// All drills, in the order in which they run.
-const DRILLS: &[(&str, Drill)] = &[];
+const DRILLS: &[(&str, Drill)] = &[
+    ("stopped-subscribers", stopped_subscribers::run),
+    ("flood", flood::run),
+    ("half-open", half_open::run),
+    ("descriptors", descriptors::run),
+    ("long-answers", long_answers::run),
+];
 
 fn main() -> ExitCode {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
+    if let [first, arguments @ ..] = &wanted[..]
+        && first == subscriber::ARGUMENT
+    {
+        subscriber::run(arguments);
+    }
     for name in &wanted {
         if !DRILLS.iter().any(|(drill, _)| drill == name) {
             let names: Vec<_> = DRILLS.iter().map(|(drill, _)| *drill).collect();
@@ -40,7 +60,10 @@ fn main() -> ExitCode {
         failed |= outcome.is_err();
         let passed = outcome.is_ok();
         let figures = outcome.unwrap_or(Value::Null);
-        println!("{}", json!({"drill": name, "passed": passed, "figures": figures}));
+        println!(
+            "{}",
+            json!({"drill": name, "passed": passed, "figures": figures})
+        );
     }
     ExitCode::from(u8::from(failed))
 }
