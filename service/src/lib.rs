@@ -8,6 +8,7 @@ pub mod answer;
 pub mod cli;
 pub mod config;
 pub mod decode;
+mod descriptors;
 pub mod engine;
 pub mod http;
 pub mod metrics;

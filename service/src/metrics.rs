@@ -13,7 +13,7 @@ use tokio::time::MissedTickBehavior;
 pub const RECEIVED_MESSAGES: &str = "cogmap_received_messages_total";
 /// Bytes of messages received; label `codec`.
 pub const RECEIVED_BYTES: &str = "cogmap_received_bytes_total";
-/// Messages dropped whole; label `reason` (`queue_full`, `unknown_space`, `bad_key`,
+/// Messages dropped whole; label `reason` (`queue_full`, `agent_queue_full`, `unknown_space`, `bad_key`,
 /// `too_many_agents`, `stale_session` and others).
 pub const DROPPED_MESSAGES: &str = "cogmap_dropped_messages_total";
 /// Messages that could not be read; label `kind`.
@@ -59,6 +59,8 @@ pub const ROUND_SAMPLES: &str = "cogmap_round_samples";
 pub const QUEUE_MESSAGES: &str = "cogmap_queue_messages";
 /// Estimates published; label `space`.
 pub const PUBLISHED_ESTIMATES: &str = "cogmap_published_estimates_total";
+/// Events that were not published over Zenoh because too many waited.
+pub const UNPUBLISHED_EVENTS: &str = "cogmap_unpublished_events_total";
 /// HTTP requests answered; labels `route` (the pattern, not the path), `status`.
 pub const HTTP_REQUESTS: &str = "cogmap_http_requests_total";
 /// Time from a request's head to its answer's head \[s\]; label `route`.
@@ -215,6 +217,11 @@ fn describe() {
         "Messages that wait for a space's writer"
     );
     describe_counter!(PUBLISHED_ESTIMATES, Unit::Count, "Estimates published");
+    describe_counter!(
+        UNPUBLISHED_EVENTS,
+        Unit::Count,
+        "Events not published over Zenoh: too many waited"
+    );
     describe_counter!(
         HTTP_REQUESTS,
         Unit::Count,

@@ -11,14 +11,17 @@ use tokio::task::JoinHandle;
 use zenoh::Session;
 
 use crate::config::{Config, ConfigError};
+use crate::descriptors::{self, Shares};
 use crate::engine::{Engine, Outlet, Silent, SpaceError};
-use crate::http;
+use crate::http::{self, HttpSettings};
 use crate::metrics;
 use crate::store::{FjallStore, StoreError};
 use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohOutlet};
 
 /// Longest wait for the Zenoh session to close.
 const SESSION_CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
+/// Most connections that are not yet a session of Zenoh.
+const ZENOH_HANDSHAKES_MAX: usize = 128;
 
 /// A running service.
 #[derive(Debug)]
@@ -26,6 +29,7 @@ pub struct Service {
     engine: Engine,
     address: SocketAddr,
     session: Option<Session>,
+    outlet: Option<Arc<ZenohOutlet>>,
     intake: Option<Intake>,
     stop_http: oneshot::Sender<()>,
     http: JoinHandle<std::io::Result<()>>,
@@ -74,6 +78,24 @@ impl Service {
     /// # Errors
     /// See [`StartError`].
     pub async fn start(config: &Config, prometheus: PrometheusHandle) -> Result<Self, StartError> {
+        let limit = descriptors::raise_limit();
+        let shares = descriptors::share_out(limit, wanted(config));
+        let http_settings = fitting(config.http.settings(), shares.http);
+        if shares.sessions < config.zenoh.sessions_max {
+            let (key, wanted, most) = (
+                "zenoh.sessions_max",
+                config.zenoh.sessions_max,
+                shares.sessions,
+            );
+            tracing::warn!(key, wanted, most, "lowered: too few open files are allowed");
+        }
+        tracing::info!(
+            limit,
+            http_connections = http_settings.connections_max,
+            zenoh_sessions = shares.sessions,
+            zenoh_handshakes = shares.handshakes,
+            "open files"
+        );
         let directory = &config.store.directory;
         let of_store = |source| StartError::Store {
             directory: directory.display().to_string(),
@@ -90,15 +112,20 @@ impl Service {
         }
         let address = listener.local_addr().map_err(of_http)?;
 
-        let session = match transport_settings(config) {
+        let session = match transport_settings(config, shares) {
             Some(settings) => Some(transport::open(&settings).await?),
             None => None,
         };
-        let outlet: Arc<dyn Outlet> = match &session {
+        let zenoh_outlet = match &session {
             Some(session) => {
                 let codec = config.zenoh.encoding.codec();
-                Arc::new(ZenohOutlet::declare(session.clone(), codec).await?)
+                let outlet = ZenohOutlet::declare(session.clone(), codec).await?;
+                Some(Arc::new(outlet))
             }
+            None => None,
+        };
+        let outlet: Arc<dyn Outlet> = match &zenoh_outlet {
+            Some(outlet) => Arc::clone(outlet) as Arc<dyn Outlet>,
             None => Arc::new(Silent),
         };
         let engine = Engine::open(store, config.engine.settings(), outlet).map_err(of_store)?;
@@ -126,7 +153,7 @@ impl Service {
         let http = tokio::spawn(http::run(
             listener,
             engine.clone(),
-            config.http.settings(),
+            http_settings,
             prometheus,
             async {
                 // A dropped sender means the same as a sent stop.
@@ -137,6 +164,7 @@ impl Service {
             engine,
             address,
             session,
+            outlet: zenoh_outlet,
             intake,
             stop_http,
             http,
@@ -169,11 +197,14 @@ impl Service {
             Err(error) => tracing::error!(%error, "the http task ended with a panic"),
         }
         self.upkeep.abort();
-        let engine = self.engine;
-        if tokio::task::spawn_blocking(move || engine.shutdown())
-            .await
-            .is_err()
-        {
+        let (engine, outlet) = (self.engine, self.outlet);
+        let end = move || {
+            engine.shutdown();
+            if let Some(outlet) = outlet {
+                outlet.close();
+            }
+        };
+        if tokio::task::spawn_blocking(end).await.is_err() {
             tracing::error!("the engine's shutdown ended with a panic");
         }
         if let Some(session) = self.session
@@ -186,12 +217,59 @@ impl Service {
     }
 }
 
-fn transport_settings(config: &Config) -> Option<TransportSettings> {
+/// How many descriptors connections may use, by the settings.
+fn wanted(config: &Config) -> Shares {
+    Shares {
+        http: config.http.connections_max,
+        sessions: config.zenoh.sessions_max,
+        handshakes: ZENOH_HANDSHAKES_MAX,
+    }
+}
+
+/// The settings of HTTP with so many connections: bounds that do not fit are lowered.
+fn fitting(mut settings: HttpSettings, connections: usize) -> HttpSettings {
+    if connections < settings.connections_max {
+        // Some always wait for requests, and make room for others.
+        let bounds = [
+            (
+                "http.connections_max",
+                &mut settings.connections_max,
+                connections,
+            ),
+            (
+                "http.requests_max",
+                &mut settings.requests_max,
+                connections / 2,
+            ),
+            (
+                "http.streams_max",
+                &mut settings.streams_max,
+                connections / 4,
+            ),
+        ];
+        for (key, bound, most) in bounds {
+            if *bound > most {
+                tracing::warn!(
+                    key,
+                    wanted = *bound,
+                    most,
+                    "lowered: too few open files are allowed"
+                );
+                *bound = most;
+            }
+        }
+    }
+    settings
+}
+
+fn transport_settings(config: &Config, shares: Shares) -> Option<TransportSettings> {
     let zenoh = &config.zenoh;
     zenoh.enabled.then(|| TransportSettings {
         mode: zenoh.mode.as_str().to_owned(),
         listen: zenoh.listen.clone(),
         connect: zenoh.connect.clone(),
         config_file: zenoh.config_file.clone(),
+        sessions_max: shares.sessions,
+        handshakes_max: shares.handshakes,
     })
 }

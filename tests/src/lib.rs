@@ -11,6 +11,7 @@ mod port;
 mod raw;
 mod scrape;
 mod server;
+mod slow;
 mod wait;
 
 pub use binary::{Finished, binary, run};
@@ -20,4 +21,5 @@ pub use port::Port;
 pub use raw::RawPublisher;
 pub use scrape::Metrics;
 pub use server::Server;
+pub use slow::{Slow, raise_open_files};
 pub use wait::{LONG, eventually, seed};

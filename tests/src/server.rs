@@ -177,6 +177,11 @@ impl Server {
         format!("http://127.0.0.1:{}", self.http.number())
     }
 
+    /// Address and port of its HTTP interface.
+    pub fn address(&self) -> String {
+        format!("127.0.0.1:{}", self.http.number())
+    }
+
     /// Its Zenoh endpoint.
     pub fn endpoint(&self) -> String {
         format!("tcp/127.0.0.1:{}", self.zenoh.number())

@@ -29,9 +29,12 @@ pub struct HttpConfig {
     pub requests_max: usize,
     /// Most open event streams; further ones are told to come back.
     pub streams_max: usize,
-    /// Most connections; further ones wait in the system's queue.
+    /// Most connections; for a further one, the one that has waited longest without a request under
+    /// way is closed.
     pub connections_max: usize,
-    /// A connection on which nothing passes for one to two times as long is closed \[s\].
+    /// Longest time for the head of a request, from its first byte or the connection's begin \[s\].
+    pub head_timeout_s: f64,
+    /// A connection on which nothing passes for as long is closed \[s\].
     pub idle_timeout_s: f64,
     /// Longest wait for open requests when the service stops \[s\].
     pub shutdown_timeout_s: f64,
@@ -47,6 +50,7 @@ impl Default for HttpConfig {
             requests_max: 1024,
             streams_max: 256,
             connections_max: 4096,
+            head_timeout_s: 10.0,
             idle_timeout_s: 60.0,
             shutdown_timeout_s: 5.0,
         }
@@ -67,6 +71,7 @@ impl HttpConfig {
             requests_max: self.requests_max,
             streams_max: self.streams_max,
             connections_max: self.connections_max,
+            head_timeout: Duration::from_secs_f64(self.head_timeout_s),
             idle_timeout: Duration::from_secs_f64(self.idle_timeout_s),
             shutdown_timeout: Duration::from_secs_f64(self.shutdown_timeout_s),
         }
@@ -108,6 +113,7 @@ impl HttpConfig {
         }
         let times = [
             ("http.request_timeout_s", self.request_timeout_s),
+            ("http.head_timeout_s", self.head_timeout_s),
             ("http.idle_timeout_s", self.idle_timeout_s),
             ("http.shutdown_timeout_s", self.shutdown_timeout_s),
         ];

@@ -23,6 +23,8 @@ pub struct ZenohConfig {
     /// Zenoh's own configuration (JSON5), which the keys above are put over.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub config_file: Option<PathBuf>,
+    /// Most sessions of others: robots, and whoever listens or asks.
+    pub sessions_max: usize,
     /// Codec of what the service publishes.
     pub encoding: ZenohEncoding,
 }
@@ -59,6 +61,7 @@ impl Default for ZenohConfig {
             listen: vec!["tcp/127.0.0.1:7447".to_owned()],
             connect: Vec::new(),
             config_file: None,
+            sessions_max: 1000,
             encoding: ZenohEncoding::Cbor,
         }
     }
@@ -80,6 +83,9 @@ impl ZenohConfig {
                 check(known, key, &format_args!("{endpoint:?}"), rule)?;
             }
         }
+        let sessions = self.sessions_max;
+        let in_range = (1..=1_000_000).contains(&sessions);
+        check(in_range, "zenoh.sessions_max", &sessions, "1 to 1000000")?;
         let alone =
             self.mode == ZenohMode::Client && self.connect.is_empty() && self.config_file.is_none();
         check(

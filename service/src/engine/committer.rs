@@ -108,7 +108,7 @@ fn acknowledge(commit: Commit, outlet: &dyn Outlet, counters: &CommitCounters) {
         mark.desk.marks().durable(mark.session, mark.next);
     }
     for mark in &commit.marks {
-        outlet.watermark(&commit.space, mark.desk.name(), &mark.desk.watermark());
+        outlet.watermark(&commit.space, &mark.desk);
     }
     for Answer {
         reply,

@@ -38,6 +38,7 @@ pub(crate) enum Drop {
     BadKey,
     UnknownSpace,
     QueueFull,
+    AgentQueueFull,
     SpaceClosed,
     TooManyAgents,
     StaleSession,
@@ -45,10 +46,11 @@ pub(crate) enum Drop {
 }
 
 impl Drop {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::BadKey,
         Self::UnknownSpace,
         Self::QueueFull,
+        Self::AgentQueueFull,
         Self::SpaceClosed,
         Self::TooManyAgents,
         Self::StaleSession,
@@ -60,6 +62,7 @@ impl Drop {
             Self::BadKey => "bad_key",
             Self::UnknownSpace => "unknown_space",
             Self::QueueFull => "queue_full",
+            Self::AgentQueueFull => "agent_queue_full",
             Self::SpaceClosed => "space_closed",
             Self::TooManyAgents => "too_many_agents",
             Self::StaleSession => "stale_session",

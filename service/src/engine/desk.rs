@@ -10,6 +10,7 @@ use cognitive_map::AgentId;
 use serde::Serialize;
 
 use super::counters::Standing;
+use super::due::{Due, Messages};
 use super::trajectory::Recorder;
 
 /// What is known of an agent outside its space's writer. Readers never hold the writer up: the
@@ -21,6 +22,7 @@ pub struct AgentDesk {
     readout: ArcSwapOption<Readout>,
     marks: Mutex<Marks>,
     recorder: Mutex<Recorder>,
+    due: Due,
 }
 
 /// An agent after a group of its samples.
@@ -85,6 +87,7 @@ impl AgentDesk {
             readout: ArcSwapOption::empty(),
             marks: Mutex::new(marks),
             recorder: Mutex::new(recorder),
+            due: Due::default(),
         }
     }
 
@@ -113,6 +116,22 @@ impl AgentDesk {
         let marks = self.marks();
         let not_durable = marks.applied.saturating_sub(marks.durable);
         standing.note(status, not_durable, marks.waiting);
+    }
+
+    /// Passes its latest estimate to `read`, if there is one.
+    pub(crate) fn read_estimate<T>(&self, read: impl FnOnce(&Estimate) -> T) -> Option<T> {
+        let readout = self.readout.load();
+        readout.as_ref().map(|readout| read(&readout.estimate))
+    }
+
+    /// Makes messages due to be published. Says whether none was before.
+    pub(crate) fn make_due(&self, messages: Messages) -> bool {
+        self.due.add(messages)
+    }
+
+    /// Takes those of `messages` that are due.
+    pub(crate) fn take_due(&self, messages: Messages) -> Messages {
+        self.due.take(messages)
     }
 
     /// How far its samples have come.
@@ -179,10 +198,9 @@ impl AgentDesk {
         }
     }
 
-    pub(crate) fn publish(&self, readout: Readout) -> Arc<Readout> {
-        let readout = Arc::new(readout);
-        self.readout.store(Some(Arc::clone(&readout)));
-        readout
+    /// Puts a new readout on the desk.
+    pub(crate) fn publish(&self, readout: Readout) {
+        self.readout.store(Some(Arc::new(readout)));
     }
 
     // A panic while one of these locks is held cannot leave half a change behind.
@@ -193,6 +211,12 @@ impl AgentDesk {
     pub(crate) fn recorder(&self) -> MutexGuard<'_, Recorder> {
         self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// A desk of an agent that has done nothing.
+#[cfg(test)]
+pub(crate) fn desk_of(name: &str) -> AgentDesk {
+    AgentDesk::new(AgentId(0), name, 0, 0, Recorder::default())
 }
 
 /// What became of an agent's sightings; of none before its first sample.

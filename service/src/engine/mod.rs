@@ -14,6 +14,7 @@ mod checkpointer;
 mod committer;
 mod counters;
 mod desk;
+mod due;
 mod events;
 mod fold;
 mod health;
@@ -44,6 +45,9 @@ use cognitive_map::InvalidSettings;
 
 pub use block::{CorruptBlock, Entry, entries};
 pub use desk::AgentDesk;
+#[cfg(test)]
+pub(crate) use desk::desk_of;
+pub(crate) use due::Messages;
 pub use events::{EVENTS_KEPT, EventFollower, Followed};
 pub use fold::{core_settings, records_of, trajectory_interval_ns};
 pub use message::IngestError;
@@ -51,7 +55,7 @@ pub use outlet::{Outlet, Silent};
 pub use question::QuestionError;
 pub use readout::evidence;
 pub(crate) use readout::{status, trip_end};
-pub use refinement::refined_trajectories;
+pub use refinement::{SharedText, refined_trajectories};
 pub use settings::EngineSettings;
 pub use space::{Space, TrajectoryError, Unavailable};
 pub(crate) use trajectory::stamped;
@@ -280,6 +284,7 @@ impl Engine {
         match space.offer(agent, codec, payload) {
             Ok(()) => {}
             Err(NotQueued::Full) => intake.dropped(Drop::QueueFull),
+            Err(NotQueued::LaneFull) => intake.dropped(Drop::AgentQueueFull),
             Err(NotQueued::Closed) => intake.dropped(Drop::SpaceClosed),
         }
     }

@@ -1,16 +1,22 @@
 //! Where the engine publishes; the transport implements it.
 
-use cogmap_proto::{Estimate, EventRecord, Watermark};
+use std::sync::Arc;
 
-/// Takes what is published. Calls come from the writers' and the committer's threads and must not
-/// block: an outlet that cannot keep up drops.
+use cogmap_proto::EventRecord;
+
+use super::desk::AgentDesk;
+
+/// Is told what there is to publish. Calls come from the writers' and the committer's threads and
+/// must not block, so an outlet publishes on a thread of its own: estimates and watermarks as they
+/// are on the agent's desk by then, which supersede all before them; of events as many as it holds.
 pub trait Outlet: std::fmt::Debug + Send + Sync + 'static {
-    /// The estimate of an agent moved.
-    fn estimate(&self, estimate: &Estimate);
-    /// The watermark of an agent moved, or a client should look at it again.
-    fn watermark(&self, space: &str, agent: &str, watermark: &Watermark);
+    /// The estimate on an agent's desk is a new one.
+    fn estimate(&self, space: &Arc<str>, agent: &Arc<AgentDesk>);
+    /// The watermark on an agent's desk moved, or its client should look at it again. Whoever hears
+    /// it has been sent the estimate of the samples that it covers before.
+    fn watermark(&self, space: &Arc<str>, agent: &Arc<AgentDesk>);
     /// Something happened in a space.
-    fn event(&self, event: &EventRecord);
+    fn event(&self, event: &Arc<EventRecord>);
 }
 
 /// An outlet into nowhere, for services without Zenoh.
@@ -18,7 +24,7 @@ pub trait Outlet: std::fmt::Debug + Send + Sync + 'static {
 pub struct Silent;
 
 impl Outlet for Silent {
-    fn estimate(&self, _: &Estimate) {}
-    fn watermark(&self, _: &str, _: &str, _: &Watermark) {}
-    fn event(&self, _: &EventRecord) {}
+    fn estimate(&self, _: &Arc<str>, _: &Arc<AgentDesk>) {}
+    fn watermark(&self, _: &Arc<str>, _: &Arc<AgentDesk>) {}
+    fn event(&self, _: &Arc<EventRecord>) {}
 }

@@ -16,9 +16,15 @@ const AT_ONCE_MAX: usize = 4;
 /// Longest time until an answer: less than the ten seconds after which Zenoh and the Python client stop waiting for one.
 const TIME_MAX: Duration = Duration::from_secs(8);
 
+/// Most relaxations for those who ask for the past at once, of all spaces.
+const RELAXATIONS_MAX: usize = 2;
+
 /// Room for those that are under way. Clones share it.
 #[derive(Clone, Debug)]
-pub(crate) struct QuestionRoom(Arc<Semaphore>);
+pub(crate) struct QuestionRoom {
+    questions: Arc<Semaphore>,
+    relaxations: Arc<Semaphore>,
+}
 
 /// Why a question was not answered.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -39,15 +45,24 @@ pub enum QuestionError {
 
 impl Default for QuestionRoom {
     fn default() -> Self {
-        Self(Arc::new(Semaphore::new(AT_ONCE_MAX)))
+        Self {
+            questions: Arc::new(Semaphore::new(AT_ONCE_MAX)),
+            relaxations: Arc::new(Semaphore::new(RELAXATIONS_MAX)),
+        }
     }
 }
 
 impl QuestionRoom {
     /// Room for one more, if there is any.
     pub(crate) fn enter(&self) -> Result<OwnedSemaphorePermit, QuestionError> {
-        let permit = Arc::clone(&self.0).try_acquire_owned();
+        let permit = Arc::clone(&self.questions).try_acquire_owned();
         permit.map_err(|_| QuestionError::Busy)
+    }
+
+    /// Waits until a map may be relaxed.
+    pub(super) async fn relaxation(&self) -> OwnedSemaphorePermit {
+        let turn = Arc::clone(&self.relaxations).acquire_owned().await;
+        turn.expect("nobody closes the semaphore")
     }
 }
 

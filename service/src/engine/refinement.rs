@@ -1,7 +1,7 @@
 //! Refined trajectories: where agents were, given all that has been remembered since.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 use cogmap_proto::{StampedPose, Trajectory};
@@ -14,14 +14,36 @@ use super::trajectory::stamped;
 /// How long the later pages of a trajectory are those of the relaxation that its first page came from.
 const PAGES_LAST: Duration = Duration::from_secs(60);
 
-/// A space's latest relaxation, and the place where those queue who want another one.
+/// A space's latest relaxations, and the places where those queue who want another one.
 #[derive(Debug, Default)]
-pub(super) struct Refinements(Arc<Mutex<Option<Arc<Refinement>>>>);
+pub(super) struct Refinements {
+    trajectories: Arc<Mutex<Option<Arc<Refinement>>>>,
+    graph: Arc<Mutex<Option<Graph>>>,
+}
+
+/// A relaxed map as a text. Who holds it keeps it; the space does not.
+#[derive(Debug)]
+struct Graph {
+    taken: Instant,
+    text: Weak<String>,
+}
+
+/// A text that others hold too.
+#[derive(Clone, Debug)]
+pub struct SharedText(Arc<String>);
+
+impl AsRef<[u8]> for SharedText {
+    fn as_ref(&self) -> &[u8] {
+        self.0.as_bytes()
+    }
+}
 
 /// The trajectories of a relaxed map.
 #[derive(Debug)]
 struct Refinement {
     revision: u64,
+    /// Before the map was taken that it is of.
+    taken: Instant,
     made: Instant,
     agents: BTreeMap<String, Vec<StampedPose>>,
 }
@@ -74,43 +96,68 @@ impl Space {
         })
     }
 
-    /// What `of` makes of the map by relaxing it. Waits for its turn: the map is relaxed for one at a time.
+    /// What `write` makes of the map by relaxing it. The map is relaxed for one at a time, and all who
+    /// have come by then get the same text.
     ///
     /// # Errors
     /// The space cannot be read.
-    pub(crate) async fn relaxed<T: Send + 'static>(
+    pub(crate) async fn graph(
         &self,
-        of: impl FnOnce(&CognitiveMap) -> T + Send + 'static,
-    ) -> Result<T, Unavailable> {
-        let turn = Arc::clone(&self.refinements().0).lock_owned().await;
+        write: impl FnOnce(&CognitiveMap) -> String + Send + 'static,
+    ) -> Result<SharedText, Unavailable> {
+        let asked = Instant::now();
+        let mut latest = Arc::clone(&self.refinements().graph).lock_owned().await;
+        if let Some(latest) = &*latest
+            && latest.taken >= asked
+            && let Some(text) = latest.text.upgrade()
+        {
+            return Ok(SharedText(text));
+        }
+        let turn = self.question_room().relaxation().await;
+        let taken = Instant::now();
         let map = self.snapshot().await?;
         let relax = move || {
-            let made = of(&map);
+            let text = Arc::new(write(&map));
+            let weak = Arc::downgrade(&text);
+            *latest = Some(Graph { taken, text: weak });
             drop(turn);
-            made
+            // Those who wait find it as long as this one lives.
+            SharedText(text)
         };
         let relaxed = tokio::task::spawn_blocking(relax).await;
         relaxed.map_err(|_| Unavailable::Interrupted)
     }
 
-    /// The relaxed map of now, or for a later page that of the first one.
+    /// The relaxed map of now, or for a later page that of the first one. One that was made of the map
+    /// after the question came is of now.
     async fn refinement(&self, is_later_page: bool) -> Result<Arc<Refinement>, Unavailable> {
-        let mut latest = Arc::clone(&self.refinements().0).lock_owned().await;
-        let map = self.snapshot().await?;
+        let asked = Instant::now();
+        let mut latest = Arc::clone(&self.refinements().trajectories)
+            .lock_owned()
+            .await;
         if let Some(latest) = &*latest
-            && (latest.revision == map.revision()
-                || (is_later_page && latest.made.elapsed() < PAGES_LAST))
+            && (latest.taken >= asked || (is_later_page && latest.made.elapsed() < PAGES_LAST))
         {
             return Ok(Arc::clone(latest));
         }
+        let taken = Instant::now();
+        let map = self.snapshot().await?;
+        if let Some(latest) = &*latest
+            && latest.revision == map.revision()
+        {
+            return Ok(Arc::clone(latest));
+        }
+        let turn = self.question_room().relaxation().await;
         // The turn goes with the work: who stops waiting for it does not let a second one begin beside it.
         let relax = move || {
             let relaxed = Arc::new(Refinement {
                 revision: map.revision(),
-                made: Instant::now(),
+                taken,
                 agents: refined_trajectories(&map),
+                made: Instant::now(),
             });
             *latest = Some(Arc::clone(&relaxed));
+            drop(turn);
             relaxed
         };
         let relaxed = tokio::task::spawn_blocking(relax).await;

@@ -312,7 +312,7 @@ impl Space {
             Err(error) => return Err(IngestError::Store(error.to_string())),
         }
         self.queue.request(call).map_err(|error| match error {
-            NotQueued::Full => IngestError::Busy,
+            NotQueued::Full | NotQueued::LaneFull => IngestError::Busy,
             NotQueued::Closed => IngestError::Closed,
         })
     }

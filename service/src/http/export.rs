@@ -1,10 +1,11 @@
 //! Export of a space's map.
 
-use std::convert::Infallible;
 use std::fmt::Write;
+use std::io;
 use std::sync::Arc;
 
 use axum::body::{Body, Bytes};
+use axum::extract::State;
 use axum::http::Response;
 use axum::http::header::{CONTENT_DISPOSITION, HeaderValue};
 use cogmap_experiments::g2o::write_g2o;
@@ -16,11 +17,13 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::extract::{Query, SpaceOfPath, SpaceParam, named};
+use super::long::LongAnswers;
 use super::problem::{Kind, Problem};
 use super::reply;
+use super::state::Service;
 use super::trajectory::{TUM, tum};
 use crate::answer;
-use crate::engine::{Space, TrajectoryError};
+use crate::engine::Space;
 
 /// Items that are written at once: an answer of any length takes the memory of this many.
 const CHUNK_ITEMS: usize = 256;
@@ -73,7 +76,7 @@ pub(crate) struct MapExport {
 /// Export the map of a space.
 ///
 /// The map is as it was when the request came, whatever happens while it is sent. For a graph the whole map is
-/// relaxed, which may take seconds, and for one request at a time.
+/// relaxed, which may take seconds; all who ask meanwhile get the same one after it.
 #[utoipa::path(get, path = "/v1/spaces/{space}/export", tag = "spaces", operation_id = "export_space",
     params(SpaceParam, ExportQuery),
     responses(
@@ -82,6 +85,7 @@ pub(crate) struct MapExport {
         (status = 404, description = "There is no such space or agent"),
         (status = 422, description = "A trajectory was asked for and no agent named, or the other way round")))]
 pub(crate) async fn get(
+    State(service): State<Service>,
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<ExportQuery>,
 ) -> Result<Response<Body>, Problem> {
@@ -90,10 +94,11 @@ pub(crate) async fn get(
         let detail = "`agent` and `session` are for format=tum only";
         return Err(Problem::new(Kind::InvalidQuery, detail));
     }
+    let long = &service.long;
     let (mut response, file) = match format {
-        ExportFormat::Json => (map(&space).await?, format!("{}.json", space.name())),
+        ExportFormat::Json => (map(long, &space).await?, format!("{}.json", space.name())),
         ExportFormat::G2o => (graph(&space).await?, format!("{}.g2o", space.name())),
-        ExportFormat::Ply => (cloud(&space).await?, format!("{}.ply", space.name())),
+        ExportFormat::Ply => (cloud(long, &space).await?, format!("{}.ply", space.name())),
         ExportFormat::Tum => {
             let detail = "format=tum needs agent";
             let agent = query
@@ -101,7 +106,7 @@ pub(crate) async fn get(
                 .ok_or_else(|| Problem::new(Kind::InvalidQuery, detail))?;
             named(&space, &agent)?;
             let file = format!("{}-{agent}.tum", space.name());
-            (trajectory(space, agent, query.session).await?, file)
+            (trajectory(long, space, agent, query.session).await?, file)
         }
     };
     if let Ok(disposition) = HeaderValue::try_from(format!("attachment; filename=\"{file}\"")) {
@@ -115,10 +120,16 @@ pub(crate) async fn get(
 /// A list of an export that can be written from any of its items on: their numbers, and them as JSON.
 type Section = fn(&CognitiveMap, &[AgentSummary], u32) -> Vec<(u32, String)>;
 
-async fn map(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
+async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, Problem> {
+    let room = long.enter()?;
     let map = space.snapshot().await?;
-    let info = answer::space_info(space.name(), space.settings(), &map);
-    let head = format!("{{\"space\":{}", text(&info));
+    let head = {
+        let (space, map) = (Arc::clone(space), Arc::clone(&map));
+        std::iter::once_with(move || {
+            let info = answer::space_info(space.name(), space.settings(), &map);
+            format!("{{\"space\":{}", text(&info))
+        })
+    };
     let sections: [(&str, Section); 4] = [
         ("agents", |_, agents, first| {
             let agents = (0..).zip(agents.iter()).skip(first as usize);
@@ -169,19 +180,18 @@ async fn map(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
         let open = std::iter::once(format!(",\"{name}\":["));
         open.chain(items).chain(std::iter::once("]".to_owned()))
     });
-    let texts = std::iter::once(head)
-        .chain(lists)
-        .chain(std::iter::once("}".to_owned()));
-    Ok(reply::with_type("application/json", streamed(texts)))
+    let texts = head.chain(lists).chain(std::iter::once("}".to_owned()));
+    Ok(reply::with_type("application/json", long.body(room, texts)))
 }
 
 /// The graph, in the memory of its whole text: that of the relaxation is larger.
 async fn graph(space: &Space) -> Result<Response<Body>, Problem> {
-    let graph = space.relaxed(|map| write_g2o(&map.experience_map()));
-    Ok(reply::with_type(TUM, Body::from(graph.await?)))
+    let graph = space.graph(|map| write_g2o(&map.experience_map())).await?;
+    Ok(reply::with_type(TUM, Body::from(Bytes::from_owner(graph))))
 }
 
-async fn cloud(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
+async fn cloud(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, Problem> {
+    let room = long.enter()?;
     let map = space.snapshot().await?;
     let head = format!(
         "ply\nformat ascii 1.0\ncomment places of the cogmap space {}\nelement vertex {}\n\
@@ -201,24 +211,26 @@ async fn cloud(space: &Arc<Space>) -> Result<Response<Body>, Problem> {
         }
         (!lines.is_empty()).then_some(lines)
     });
-    Ok(reply::with_type(
-        TUM,
-        streamed(std::iter::once(head).chain(lines)),
-    ))
+    let texts = std::iter::once(head).chain(lines);
+    Ok(reply::with_type(TUM, long.body(room, texts)))
 }
 
 async fn trajectory(
+    long: &LongAnswers,
     space: Arc<Space>,
     agent: String,
     session: Option<u64>,
 ) -> Result<Response<Body>, Problem> {
+    let room = long.enter()?;
     // The first page comes before the answer's head, so that its errors can still be told.
     let first = space
         .trajectory(&agent, session, None, None, PAGE_ITEMS_MAX)
         .await?;
     let session = first.session;
+    let long = long.clone();
     let pages = stream::try_unfold(Some(first), move |page| {
-        let (space, agent) = (Arc::clone(&space), agent.clone());
+        let _ = &room; // as long as there are pages
+        let (long, space, agent) = (long.clone(), Arc::clone(&space), agent.clone());
         async move {
             let Some(page) = page else { return Ok(None) };
             let next = match page.next_from_ns {
@@ -226,10 +238,13 @@ async fn trajectory(
                 from => Some(
                     space
                         .trajectory(&agent, Some(session), from, None, PAGE_ITEMS_MAX)
-                        .await?,
+                        .await
+                        .map_err(io::Error::other)?,
                 ),
             };
-            Ok::<_, TrajectoryError>(Some((Bytes::from(tum(&page.poses)), next)))
+            let text = long.make(move || tum(&page.poses)).await;
+            let text = text.map_err(|_| io::ErrorKind::Interrupted)?;
+            Ok::<_, io::Error>(Some((Bytes::from(text), next)))
         }
     });
     Ok(reply::with_type(TUM, Body::from_stream(pages)))
@@ -237,10 +252,4 @@ async fn trajectory(
 
 fn text<T: Serialize>(message: &T) -> String {
     serde_json::to_string(message).expect("plain data encodes")
-}
-
-fn streamed(texts: impl Iterator<Item = String> + Send + 'static) -> Body {
-    Body::from_stream(stream::iter(
-        texts.map(|text| Ok::<_, Infallible>(Bytes::from(text))),
-    ))
 }

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use axum::body::Body;
 use axum::extract::{MatchedPath, Request};
-use axum::http::header::AUTHORIZATION;
+use axum::http::header::{AUTHORIZATION, CONTENT_TYPE};
 use axum::http::{Response, StatusCode};
 use axum::response::IntoResponse;
 use futures_util::FutureExt;
@@ -20,6 +20,7 @@ use subtle::ConstantTimeEq;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tower::{Layer, Service};
 
+use super::held::holding;
 use super::problem::{Kind, Problem};
 use super::settings::HttpSettings;
 use crate::config::Token;
@@ -30,6 +31,8 @@ const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
 /// Paths of pages, which hold nothing of any space: a browser has to load them before it can be given
 /// a token.
 const PAGES: [&str; 3] = ["/", "/openapi.json", "/docs"];
+/// Media type of event streams.
+const EVENT_STREAM: &str = "text/event-stream";
 /// Label of requests that no route matches.
 const UNMATCHED: &str = "unmatched";
 /// Statuses that have counters of their own.
@@ -198,7 +201,7 @@ where
         let admitted = admitted.map(|permit| (permit, self.inner.call(request)));
         Box::pin(async move {
             let response = match admitted {
-                Ok((_permit, answer)) => guard.answer(answer).await,
+                Ok((permit, answer)) => with_permit(guard.answer(answer).await, permit),
                 Err(refusal) => refusal.into_response(),
             };
             let seconds = start.elapsed().as_secs_f64();
@@ -211,6 +214,18 @@ where
             }
             Ok(response)
         })
+    }
+}
+
+/// The answer, which counts as under way until it has been sent. An event stream, which never ends, has
+/// a bound of its own.
+fn with_permit(response: Response<Body>, permit: Option<OwnedSemaphorePermit>) -> Response<Body> {
+    let streams = response.headers().get(CONTENT_TYPE);
+    match permit {
+        Some(permit) if streams.is_none_or(|kind| kind != EVENT_STREAM) => {
+            response.map(|body| holding(body, permit))
+        }
+        _ => response,
     }
 }
 

@@ -50,7 +50,16 @@ pub(crate) async fn readyz(
 /// Metrics in Prometheus's text format.
 #[utoipa::path(get, path = "/metrics", tag = "service", operation_id = "get_metrics",
     responses((status = 200, description = "The metrics", body = String, content_type = "text/plain")))]
-pub(crate) async fn metrics(State(service): State<Service>, _: NoQuery) -> Response<Body> {
-    let text = crate::metrics::render(&service.prometheus);
-    reply::with_type("text/plain; version=0.0.4; charset=utf-8", Body::from(text))
+pub(crate) async fn metrics(
+    State(service): State<Service>,
+    _: NoQuery,
+) -> Result<Response<Body>, Problem> {
+    // Of many spaces it is a long text; whoever watches does not wait for a turn.
+    let prometheus = service.prometheus.clone();
+    let text = tokio::task::spawn_blocking(move || crate::metrics::render(&prometheus)).await;
+    let body = Body::from(text.map_err(|_| Problem::interrupted())?);
+    Ok(reply::with_type(
+        "text/plain; version=0.0.4; charset=utf-8",
+        body,
+    ))
 }

@@ -1,4 +1,4 @@
-//! A listener that keeps to a number of connections.
+//! A listener that keeps to a number of connections, and the connections.
 
 use std::io;
 use std::net::SocketAddr;
@@ -13,11 +13,17 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{Instant, Sleep};
 
-/// Accepts a connection only while fewer than its bound are open; others wait in the system's queue.
+use super::seat::{Seat, Seats};
+use super::settings::HttpSettings;
+
+/// Accepts connections. Where as many are open as may be, the one that has waited longest without a
+/// request under way makes room; where there is none such, others wait in the system's queue.
 #[derive(Debug)]
 pub(crate) struct BoundedListener {
     listener: TcpListener,
-    connections: Arc<Semaphore>,
+    room: Arc<Semaphore>,
+    seats: Arc<Seats>,
+    head_timeout: Duration,
     idle_timeout: Duration,
 }
 
@@ -25,40 +31,38 @@ pub(crate) struct BoundedListener {
 #[derive(Debug)]
 pub(crate) struct Connection {
     stream: TcpStream,
-    /// Whether bytes have passed since the watch was last looked at.
-    used: bool,
+    seat: Arc<Seat>,
+    /// When bytes have passed last.
+    used: Instant,
+    /// Since when the head of a request is awaited: from its first byte on, or the connection's begin.
+    head_since: Option<Instant>,
+    /// Requests that had begun when this was looked at last.
+    requests: u64,
     watch: Pin<Box<Sleep>>,
+    head_timeout: Duration,
     idle_timeout: Duration,
     _permit: OwnedSemaphorePermit,
 }
 
 impl BoundedListener {
-    pub(crate) fn new(
-        listener: TcpListener,
-        connections_max: usize,
-        idle_timeout: Duration,
-    ) -> Self {
+    pub(crate) fn new(listener: TcpListener, settings: &HttpSettings) -> Self {
         Self {
             listener,
-            connections: Arc::new(Semaphore::new(connections_max)),
-            idle_timeout,
+            room: Arc::new(Semaphore::new(settings.connections_max)),
+            seats: Arc::default(),
+            head_timeout: settings.head_timeout,
+            idle_timeout: settings.idle_timeout,
         }
     }
-}
 
-impl Connection {
-    /// Ends a wait for bytes on a connection where nothing has passed, either way, from one look at
-    /// the watch to the next. Without it, whoever opens connections and says nothing keeps all others
-    /// out.
-    fn poll_idle(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        while self.watch.as_mut().poll(context).is_ready() {
-            if !std::mem::take(&mut self.used) {
-                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
-            }
-            let next = Instant::now() + self.idle_timeout;
-            self.watch.as_mut().reset(next);
+    /// Room for one more connection.
+    async fn make_room(&self) -> OwnedSemaphorePermit {
+        if let Ok(permit) = Arc::clone(&self.room).try_acquire_owned() {
+            return permit;
         }
-        Poll::Pending
+        self.seats.send_away();
+        let permit = Arc::clone(&self.room).acquire_owned().await;
+        permit.expect("nobody closes the semaphore")
     }
 }
 
@@ -67,18 +71,22 @@ impl Listener for BoundedListener {
     type Addr = SocketAddr;
 
     async fn accept(&mut self) -> (Connection, SocketAddr) {
-        let permit = Arc::clone(&self.connections).acquire_owned().await;
-        let permit = permit.expect("nobody closes the semaphore");
-        // axum's own listener retries after errors.
+        // axum's own listener retries after errors, and pauses after those of the system.
         let (stream, address) = Listener::accept(&mut self.listener).await;
+        let permit = self.make_room().await;
         // Answers are short and written whole: waiting for more to send would only delay them.
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "set TCP_NODELAY");
         }
+        let now = Instant::now();
         let connection = Connection {
             stream,
-            used: false,
-            watch: Box::pin(tokio::time::sleep(self.idle_timeout)),
+            seat: self.seats.seat(),
+            used: now,
+            head_since: Some(now),
+            requests: 0,
+            watch: Box::pin(tokio::time::sleep(self.head_timeout.min(self.idle_timeout))),
+            head_timeout: self.head_timeout,
             idle_timeout: self.idle_timeout,
             _permit: permit,
         };
@@ -90,6 +98,59 @@ impl Listener for BoundedListener {
     }
 }
 
+impl Connection {
+    /// Where the connection's requests are noted.
+    pub(crate) fn seat(&self) -> &Arc<Seat> {
+        &self.seat
+    }
+
+    /// Ends a wait for the other side: when the connection has been sent away, a head has not come in
+    /// its time, or nothing has passed either way in its time. Without it, whoever opens connections
+    /// and says nothing, or hardly anything, keeps all others out.
+    fn poll_patience(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        if self.seat.is_sent_away(context) {
+            return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
+        }
+        self.look_at_requests();
+        let idle = self.used + self.idle_timeout;
+        let head = self.head_since.map(|since| since + self.head_timeout);
+        let due = head.map_or(idle, |head| head.min(idle));
+        if due < self.watch.deadline() {
+            self.watch.as_mut().reset(due);
+        }
+        while self.watch.as_mut().poll(context).is_ready() {
+            if Instant::now() >= due {
+                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+            }
+            self.watch.as_mut().reset(due);
+        }
+        Poll::Pending
+    }
+
+    fn note_read(&mut self) {
+        self.used = Instant::now();
+        self.look_at_requests();
+        if self.head_since.is_none() && !self.seat.has_request() {
+            self.head_since = Some(self.used);
+        }
+    }
+
+    /// Where a request has begun since, its head has come.
+    fn look_at_requests(&mut self) {
+        let requests = self.seat.requests();
+        if requests != self.requests {
+            self.requests = requests;
+            self.head_since = None;
+        }
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.seat.leave();
+    }
+}
+
 impl AsyncRead for Connection {
     fn poll_read(
         mut self: Pin<&mut Self>,
@@ -98,10 +159,10 @@ impl AsyncRead for Connection {
     ) -> Poll<io::Result<()>> {
         match Pin::new(&mut self.stream).poll_read(context, buffer) {
             Poll::Ready(read) => {
-                self.used = true;
+                self.note_read();
                 Poll::Ready(read)
             }
-            Poll::Pending => self.poll_idle(context),
+            Poll::Pending => self.poll_patience(context),
         }
     }
 }
@@ -112,9 +173,13 @@ impl AsyncWrite for Connection {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
-        let written = Pin::new(&mut self.stream).poll_write(context, bytes);
-        self.used |= written.is_ready();
-        written
+        match Pin::new(&mut self.stream).poll_write(context, bytes) {
+            Poll::Ready(written) => {
+                self.used = Instant::now();
+                Poll::Ready(written)
+            }
+            Poll::Pending => self.poll_patience(context).map_ok(|()| 0),
+        }
     }
 
     fn poll_write_vectored(
@@ -122,9 +187,13 @@ impl AsyncWrite for Connection {
         context: &mut Context<'_>,
         slices: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
-        let written = Pin::new(&mut self.stream).poll_write_vectored(context, slices);
-        self.used |= written.is_ready();
-        written
+        match Pin::new(&mut self.stream).poll_write_vectored(context, slices) {
+            Poll::Ready(written) => {
+                self.used = Instant::now();
+                Poll::Ready(written)
+            }
+            Poll::Pending => self.poll_patience(context).map_ok(|()| 0),
+        }
     }
 
     fn is_write_vectored(&self) -> bool {

@@ -1,12 +1,14 @@
 //! Where samples were taken.
 
 use axum::body::Body;
+use axum::extract::State;
 use axum::http::Response;
 use cogmap_proto::{Localization, LocalizeQuery};
 
 use super::extract::{Json, NoQuery, SpaceOfPath, SpaceParam};
 use super::problem::Problem;
 use super::reply;
+use super::state::Service;
 use crate::answer;
 
 /// Find out where a sequence of samples was taken, by what the map knows: its motions, what it saw and the landmarks in it.
@@ -20,12 +22,19 @@ use crate::answer;
         (status = 404, description = "There is no such space"),
         (status = 422, description = "The samples make no sense, or not here")))]
 pub(crate) async fn post(
+    State(service): State<Service>,
     SpaceOfPath(space): SpaceOfPath,
     _: NoQuery,
     Json(query): Json<LocalizeQuery>,
 ) -> Result<Response<Body>, Problem> {
-    let samples = answer::samples_to_localize(&query)?;
+    let samples = service
+        .long
+        .make(move || answer::samples_to_localize(&query));
+    let samples = samples.await??;
     let (map, found) = space.localize(samples).await?;
-    let answer: Localization = answer::localization(space.name(), &map, &found);
-    Ok(reply::json(&answer))
+    let answered = service.long.make(move || {
+        let answer: Localization = answer::localization(space.name(), &map, &found);
+        reply::json(&answer)
+    });
+    answered.await
 }

@@ -12,11 +12,13 @@ mod export;
 mod extract;
 mod guard;
 mod health;
+mod held;
 mod index;
 mod json;
 mod landmarks;
 mod listener;
 mod localize;
+mod long;
 mod objects;
 mod openapi;
 mod page;
@@ -26,6 +28,7 @@ mod problem;
 mod recall;
 mod reply;
 mod samples;
+mod seat;
 mod settings;
 mod spaces;
 mod state;
@@ -49,6 +52,7 @@ pub use settings::HttpSettings;
 use crate::engine::Engine;
 use guard::Guard;
 use listener::BoundedListener;
+use seat::Noting;
 use state::{Service, Shared};
 
 /// What the description says of the whole.
@@ -143,8 +147,8 @@ pub async fn run(
         shutdown.await;
         stop.send_replace(true);
     };
-    let listener = BoundedListener::new(listener, settings.connections_max, settings.idle_timeout);
-    let served = axum::serve(listener, router)
+    let listener = BoundedListener::new(listener, &settings);
+    let served = axum::serve(listener, Noting(router))
         .with_graceful_shutdown(signal)
         .into_future();
     let mut stopping = stopping;

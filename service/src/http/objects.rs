@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::body::Body;
-use axum::extract::FromRequestParts;
+use axum::extract::{FromRequestParts, State};
 use axum::http::request::Parts;
 use axum::http::{Response, StatusCode};
 use cogmap_proto::{
@@ -60,12 +60,20 @@ pub(crate) struct ObjectsQuery {
         (status = 404, description = "There is no such space"),
         (status = 422, description = "A parameter breaks a rule")))]
 pub(crate) async fn list(
+    State(service): State<Service>,
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<ObjectsQuery>,
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
     let map = space.snapshot().await?;
-    let after = query.after.as_deref().unwrap_or_default();
+    let listed = service
+        .long
+        .make(move || summaries(&map, query.after.as_deref(), limit));
+    listed.await
+}
+
+fn summaries(map: &CognitiveMap, after: Option<&str>, limit: usize) -> Response<Body> {
+    let after = after.unwrap_or_default();
     let mut objects: Vec<_> = map
         .objects()
         .filter(|(_, known, _)| known.name().as_str() > after)
@@ -75,7 +83,7 @@ pub(crate) async fn list(
         .iter()
         .map(|(_, known, model)| answer::object_summary(known, model));
     let (objects, next) = page::cut(summaries, limit, |summary| summary.name.clone());
-    Ok(reply::json(&ObjectPage { objects, next }))
+    reply::json(&ObjectPage { objects, next })
 }
 
 /// An object, with its places.

@@ -1,11 +1,11 @@
 //! Places.
 
 use axum::body::Body;
-use axum::extract::FromRequestParts;
+use axum::extract::{FromRequestParts, State};
 use axum::http::Response;
 use axum::http::request::Parts;
 use cogmap_proto::{Place, PlacePage};
-use cognitive_map::PlaceId;
+use cognitive_map::{CognitiveMap, PlaceId};
 use serde::{Deserialize, Deserializer};
 
 use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam, path, space};
@@ -45,11 +45,18 @@ pub(crate) struct PlacesQuery {
         (status = 404, description = "There is no such space"),
         (status = 422, description = "A parameter breaks a rule")))]
 pub(crate) async fn list(
+    State(service): State<Service>,
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<PlacesQuery>,
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
     let map = space.snapshot().await?;
+    // A filter may look at every place.
+    let listed = service.long.make(move || places(&map, &query, limit));
+    listed.await
+}
+
+fn places(map: &CognitiveMap, query: &PlacesQuery, limit: usize) -> Response<Body> {
     let first = page::first(query.after);
     let listed = first
         .into_iter()
@@ -66,15 +73,15 @@ pub(crate) async fn list(
                 .is_none_or(|since| place.last_stamp_ns() >= since)
     });
     let (places, next) = page::cut(wanted, limit, |(id, _)| u64::from(id.0));
-    Ok(reply::json(&PlacePage {
+    reply::json(&PlacePage {
         frame: answer::FRAME.to_owned(),
         map_revision: map.revision(),
         places: places
             .into_iter()
-            .map(|(id, place)| answer::place(&map, id, place))
+            .map(|(id, place)| answer::place(map, id, place))
             .collect(),
         next,
-    }))
+    })
 }
 
 /// A place.

@@ -1,12 +1,14 @@
 //! Recall of places.
 
 use axum::body::Body;
+use axum::extract::State;
 use axum::http::Response;
 use cogmap_proto::{RecallAnswer, RecallQuery};
 
 use super::extract::{Json, NoQuery, SpaceOfPath, SpaceParam};
 use super::problem::Problem;
 use super::reply;
+use super::state::Service;
 use crate::answer;
 
 /// Recall places by position, grid code and percept, alone or together; filtered by agent and time.
@@ -17,14 +19,15 @@ use crate::answer;
         (status = 404, description = "There is no such space, agent or channel"),
         (status = 422, description = "The query makes no sense in this space")))]
 pub(crate) async fn post(
+    State(service): State<Service>,
     SpaceOfPath(space): SpaceOfPath,
     _: NoQuery,
     Json(query): Json<RecallQuery>,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
     // A cue by code or percept is compared with every place: work for a thread that may be busy.
-    let answered = tokio::task::spawn_blocking(move || {
+    let answered = service.long.make(move || {
         answer::recall(space.name(), &map, &query).map(|answer| reply::json(&answer))
     });
-    Ok(answered.await.map_err(|_| Problem::interrupted())??)
+    Ok(answered.await??)
 }

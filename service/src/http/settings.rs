@@ -15,10 +15,12 @@ pub struct HttpSettings {
     pub requests_max: usize,
     /// Most open event streams.
     pub streams_max: usize,
-    /// Most connections.
+    /// Most connections; for a further one, the one that has waited longest without a request under
+    /// way is closed.
     pub connections_max: usize,
-    /// A connection on which nothing passes for twice this time is closed, and none sooner than after
-    /// this time.
+    /// Longest time for the head of a request.
+    pub head_timeout: Duration,
+    /// A connection on which nothing passes for this time is closed.
     pub idle_timeout: Duration,
     /// Longest wait for open requests when the service stops.
     pub shutdown_timeout: Duration,

@@ -31,7 +31,7 @@ pub(crate) async fn list(
 ) -> Result<Response<Body>, Problem> {
     let mut spaces = Vec::new();
     for space in service.engine.spaces() {
-        if let Ok(info) = info(&space).await {
+        if let Ok(info) = info(&service, &space).await {
             spaces.push(info);
         }
     }
@@ -45,10 +45,11 @@ pub(crate) async fn list(
         (status = 200, description = "The space", body = SpaceInfo),
         (status = 404, description = "There is no such space")))]
 pub(crate) async fn get(
+    State(service): State<Service>,
     SpaceOfPath(space): SpaceOfPath,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
-    Ok(reply::json(&info(&space).await?))
+    Ok(reply::json(&info(&service, &space).await?))
 }
 
 /// Create a space.
@@ -73,12 +74,12 @@ pub(crate) async fn put(
     let created = tokio::task::spawn_blocking(move || engine.create_space(&name, &settings));
     let (space, created) = created.await.map_err(|_| Problem::interrupted())??;
     if !created {
-        return Ok(reply::json(&info(&space).await?));
+        return Ok(reply::json(&info(&service, &space).await?));
     }
     while space.recovering() {
         tokio::time::sleep(SET_UP_POLL).await;
     }
-    let mut response = reply::json(&info(&space).await?);
+    let mut response = reply::json(&info(&service, &space).await?);
     *response.status_mut() = StatusCode::CREATED;
     if let Ok(location) = HeaderValue::try_from(format!("/v1/spaces/{}", space.name())) {
         response.headers_mut().insert(LOCATION, location);
@@ -104,7 +105,7 @@ pub(crate) async fn delete(
 }
 
 /// What is known of a space.
-pub(crate) async fn info(space: &Arc<Space>) -> Result<SpaceInfo, Problem> {
+async fn info(service: &Service, space: &Arc<Space>) -> Result<SpaceInfo, Problem> {
     let map = space.snapshot().await.map_err(|error| match error {
         Unavailable::Recovering => Problem::new(
             Kind::Recovering,
@@ -112,7 +113,10 @@ pub(crate) async fn info(space: &Arc<Space>) -> Result<SpaceInfo, Problem> {
         ),
         error => error.into(),
     })?;
-    Ok(answer::space_info(space.name(), space.settings(), &map))
+    // The digest looks at everything that changed.
+    let space = Arc::clone(space);
+    let info = move || answer::space_info(space.name(), space.settings(), &map);
+    service.long.make(info).await
 }
 
 /// The name in the path and the settings in the body.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use metrics_exporter_prometheus::PrometheusHandle;
 use tokio::sync::{Semaphore, watch};
 
+use super::long::LongAnswers;
 use super::settings::HttpSettings;
 use crate::engine::Engine;
 
@@ -17,6 +18,8 @@ pub(crate) struct Shared {
     pub(crate) prometheus: PrometheusHandle,
     /// One permit for each event stream.
     pub(crate) streams: Arc<Semaphore>,
+    /// Room for answers that take long.
+    pub(crate) long: LongAnswers,
     /// Turns true when the service stops; event streams end then.
     pub(crate) stopping: watch::Receiver<bool>,
     /// The paths that there are, as the description has them.
@@ -36,6 +39,7 @@ impl Shared {
             engine,
             prometheus,
             streams,
+            long: LongAnswers::default(),
             stopping,
             paths,
         }

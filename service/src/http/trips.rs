@@ -1,9 +1,10 @@
 //! Trips.
 
 use axum::body::Body;
+use axum::extract::State;
 use axum::http::Response;
 use cogmap_proto::{TripDetail, TripPage};
-use cognitive_map::TripId;
+use cognitive_map::{AgentId, CognitiveMap, TripId};
 use serde::Deserialize;
 
 use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam, named};
@@ -11,6 +12,7 @@ use super::page;
 use super::places::{MemoryOfPath, forgotten, unknown};
 use super::problem::Problem;
 use super::reply;
+use super::state::Service;
 use crate::answer;
 
 /// Which trips.
@@ -37,6 +39,7 @@ pub(crate) struct TripsQuery {
         (status = 404, description = "There is no such space or agent"),
         (status = 422, description = "A parameter breaks a rule")))]
 pub(crate) async fn list(
+    State(service): State<Service>,
     SpaceOfPath(space): SpaceOfPath,
     Query(query): Query<TripsQuery>,
 ) -> Result<Response<Body>, Problem> {
@@ -44,6 +47,17 @@ pub(crate) async fn list(
     let map = space.snapshot().await?;
     let agent = query.agent.as_deref().map(|name| named(&space, name));
     let agent = agent.transpose()?.map(|desk| desk.id());
+    // A filter may look at every trip.
+    let listed = service.long.make(move || trips(&map, &query, agent, limit));
+    listed.await
+}
+
+fn trips(
+    map: &CognitiveMap,
+    query: &TripsQuery,
+    agent: Option<AgentId>,
+    limit: usize,
+) -> Response<Body> {
     let first = page::first(query.after);
     let listed = first
         .into_iter()
@@ -57,9 +71,9 @@ pub(crate) async fn list(
     let (trips, next) = page::cut(wanted, limit, |(id, _)| u64::from(id.0));
     let trips = trips
         .into_iter()
-        .map(|(id, trip)| answer::trip(&map, id, trip))
+        .map(|(id, trip)| answer::trip(map, id, trip))
         .collect();
-    Ok(reply::json(&TripPage { trips, next }))
+    reply::json(&TripPage { trips, next })
 }
 
 /// A trip with its legs.

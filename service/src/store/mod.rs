@@ -8,6 +8,11 @@ mod fjall;
 
 use cognitive_map::CheckpointPage;
 
+/// Most files of tables that the store keeps open to read.
+const CACHED_FILES_MAX: usize = 256;
+/// Most files that it has open, those of journals and of merges among them.
+pub const OPEN_FILES_MAX: usize = CACHED_FILES_MAX + 128;
+
 pub use error::StoreError;
 pub use fjall::{FORMAT_VERSION, FjallStore};
 

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use cogmap_proto::{Codec, durable_key, estimate_key};
 use tokio::runtime::Handle;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::Semaphore;
 use zenoh::Session;
 use zenoh::key_expr::KeyExpr;
 use zenoh::query::{Query, Queryable};
 
-use super::queries::{agent, busy, codec_of, refuse, space};
+use super::queries::{agent, busy, codec_of, refuse, send, space};
 use super::session::TransportError;
 use crate::answer::{Kind, Problem};
 use crate::engine::{AgentDesk, Engine};
@@ -50,11 +50,15 @@ pub(super) async fn declare(
         let queryable = session
             .declare_queryable(latest.key("*", "*"))
             .complete(true)
-            // The callback runs on a receiving thread: the answer is made elsewhere.
+            // The callback runs on a receiving thread: the answer is made elsewhere, on a thread that may
+            // wait for a congested link.
             .callback(move |query| {
                 let engine = engine.clone();
                 let permit = Arc::clone(&room).try_acquire_owned().ok();
-                runtime.spawn(async move { reply(&engine, latest, query, permit).await });
+                runtime.spawn_blocking(move || {
+                    reply(&engine, latest, &query, permit.is_some());
+                    drop((query, permit));
+                });
             })
             .await?;
         queryables.push(queryable);
@@ -62,32 +66,23 @@ pub(super) async fn declare(
     Ok(queryables)
 }
 
-async fn reply(
-    engine: &Engine,
-    latest: Latest,
-    query: Query,
-    permit: Option<OwnedSemaphorePermit>,
-) {
-    let (codec, answered) = match (codec_of(&query), permit) {
-        (Err(problem), _) => (Codec::Json, Err(problem)),
-        (Ok(codec), None) => (codec, Err(busy())),
-        (Ok(codec), Some(_permit)) if query.key_expr().is_wild() => {
-            (codec, reply_all(engine, latest, &query, codec).await)
+fn reply(engine: &Engine, latest: Latest, query: &Query, has_room: bool) {
+    let (codec, answered) = match codec_of(query) {
+        Err(problem) => (Codec::Json, Err(problem)),
+        Ok(codec) if !has_room => (codec, Err(busy())),
+        Ok(codec) if query.key_expr().is_wild() => {
+            reply_all(engine, latest, query, codec);
+            (codec, Ok(()))
         }
-        (Ok(codec), Some(_permit)) => (codec, reply_one(engine, latest, &query, codec).await),
+        Ok(codec) => (codec, reply_one(engine, latest, query, codec)),
     };
     if let Err(problem) = answered {
-        refuse(&query, codec, &problem).await;
+        refuse(query, codec, &problem);
     }
 }
 
 /// Answers for the one agent that the key names.
-async fn reply_one(
-    engine: &Engine,
-    latest: Latest,
-    query: &Query,
-    codec: Codec,
-) -> Result<(), Problem> {
+fn reply_one(engine: &Engine, latest: Latest, query: &Query, codec: Codec) -> Result<(), Problem> {
     let mut names = query.key_expr().as_str().split('/').skip(1);
     let mut name = || names.next().unwrap_or_default();
     let space = space(engine, name())?;
@@ -96,32 +91,19 @@ async fn reply_one(
         let detail = format!("the agent {:?} has no sample yet", desk.name());
         Problem::new(Kind::UnknownAgent, detail)
     })?;
-    send(query, query.key_expr().as_str(), codec, bytes).await;
+    send(query, query.key_expr().as_str(), codec, bytes);
     Ok(())
 }
 
 /// Answers for all agents whose keys the query matches.
-async fn reply_all(
-    engine: &Engine,
-    latest: Latest,
-    query: &Query,
-    codec: Codec,
-) -> Result<(), Problem> {
+fn reply_all(engine: &Engine, latest: Latest, query: &Query, codec: Codec) {
     for space in engine.spaces() {
         for desk in space.agents_after(None, usize::MAX) {
             let key = latest.key(space.name(), desk.name());
             let asked = KeyExpr::try_from(&*key).is_ok_and(|key| query.key_expr().intersects(&key));
             if asked && let Some(bytes) = latest.encoded(&desk, codec) {
-                send(query, &key, codec, bytes).await;
+                send(query, &key, codec, bytes);
             }
         }
-    }
-    Ok(())
-}
-
-async fn send(query: &Query, key: &str, codec: Codec, bytes: Vec<u8>) {
-    let sent = query.reply(key, bytes).encoding(codec.encoding()).await;
-    if let Err(error) = sent {
-        tracing::debug!(%error, "answer a query");
     }
 }

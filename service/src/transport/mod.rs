@@ -1,8 +1,10 @@
 //! The transport: Zenoh in and out. Nothing else in the service knows Zenoh.
 
+mod board;
 mod intake;
 mod latest;
 mod outlet;
+mod publisher;
 mod queries;
 mod session;
 

@@ -1,58 +1,22 @@
-//! Estimates, watermarks and events out.
+//! What the engine tells, to the thread that publishes it.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{Builder, JoinHandle};
 
-use cogmap_proto::{
-    Codec, Estimate, EventRecord, Watermark, durable_key, estimate_key, events_key, json_key,
-};
-use serde::Serialize;
-use zenoh::pubsub::Publisher;
-use zenoh::qos::CongestionControl;
-use zenoh::{Session, Wait};
+use cogmap_proto::{Codec, EventRecord};
+use zenoh::Session;
 
+use super::board::Board;
+use super::publisher::Publisher;
 use super::session::TransportError;
-use crate::engine::Outlet;
+use crate::engine::{AgentDesk, Messages, Outlet};
 
-/// Publishes over Zenoh. What a congested link cannot take is dropped: the next estimate supersedes
-/// it, and a client that misses a watermark asks for it.
+/// Publishes over Zenoh, on a thread of its own. What a congested link cannot take is dropped: the
+/// next estimate supersedes it, and a client that misses a watermark asks for it.
 #[derive(Debug)]
 pub struct ZenohOutlet {
-    session: Session,
-    codec: Codec,
-    estimates: JsonListeners,
-    watermarks: JsonListeners,
-    events: JsonListeners,
-}
-
-/// Whether anybody listens to the JSON form of a kind of message. Nothing is encoded or put while
-/// nobody does.
-#[derive(Debug)]
-struct JsonListeners {
-    listening: Arc<AtomicBool>,
-    /// Held for its effect: Zenoh tells it who listens.
-    _publisher: Publisher<'static>,
-}
-
-impl JsonListeners {
-    async fn watch(session: &Session, key: &str) -> Result<Self, TransportError> {
-        let publisher = session.declare_publisher(json_key(key)).await?;
-        let listening = Arc::new(AtomicBool::new(false));
-        let heard = Arc::clone(&listening);
-        publisher
-            .matching_listener()
-            .callback(move |status| heard.store(status.matching(), Ordering::Relaxed))
-            .background()
-            .await?;
-        Ok(Self {
-            listening,
-            _publisher: publisher,
-        })
-    }
-
-    fn is_heard(&self) -> bool {
-        self.listening.load(Ordering::Relaxed)
-    }
+    board: Arc<Board>,
+    thread: Mutex<Option<JoinHandle<()>>>,
 }
 
 impl ZenohOutlet {
@@ -60,58 +24,52 @@ impl ZenohOutlet {
     ///
     /// # Errors
     /// The declarations fail.
+    ///
+    /// # Panics
+    /// The system cannot start a thread.
     pub async fn declare(session: Session, codec: Codec) -> Result<Self, TransportError> {
+        let publisher = Publisher::declare(session, codec).await?;
+        let board = Arc::new(Board::default());
+        let thread = {
+            let board = Arc::clone(&board);
+            Builder::new()
+                .name("publisher".into())
+                .spawn(move || publisher.run(&board))
+                .expect("the system can start a thread")
+        };
         Ok(Self {
-            estimates: JsonListeners::watch(&session, &estimate_key("*", "*")).await?,
-            watermarks: JsonListeners::watch(&session, &durable_key("*", "*")).await?,
-            events: JsonListeners::watch(&session, &events_key("*")).await?,
-            session,
-            codec,
+            board,
+            thread: Mutex::new(Some(thread)),
         })
     }
 
-    /// Publishes a message under its key, and as JSON beside it if that is heard.
-    fn put<T: Serialize>(
-        &self,
-        key: &str,
-        message: &T,
-        json: &JsonListeners,
-        attachment: Option<&str>,
-    ) {
-        self.put_as(self.codec, key, message, attachment);
-        if json.is_heard() {
-            self.put_as(Codec::Json, &json_key(key), message, attachment);
-        }
-    }
-
-    fn put_as<T: Serialize>(&self, codec: Codec, key: &str, message: &T, attachment: Option<&str>) {
-        let put = self
-            .session
-            .put(key, codec.encode(message))
-            .encoding(codec.encoding())
-            .attachment(attachment)
-            .congestion_control(CongestionControl::Drop)
-            .wait();
-        if let Err(error) = put {
-            tracing::debug!(%error, "publish");
+    /// Publishes what is due and ends; what comes later is not published.
+    pub fn close(&self) {
+        self.board.close();
+        let mut thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
+        let thread = thread.take();
+        if thread.is_some_and(|thread| thread.join().is_err()) {
+            tracing::error!("the publisher ended with a panic");
         }
     }
 }
 
+impl Drop for ZenohOutlet {
+    fn drop(&mut self) {
+        self.board.close();
+    }
+}
+
 impl Outlet for ZenohOutlet {
-    fn estimate(&self, estimate: &Estimate) {
-        let key = estimate_key(&estimate.space, &estimate.agent);
-        self.put(&key, estimate, &self.estimates, None);
+    fn estimate(&self, space: &Arc<str>, agent: &Arc<AgentDesk>) {
+        self.board.agent(space, agent, Messages::ESTIMATE);
     }
 
-    fn watermark(&self, space: &str, agent: &str, watermark: &Watermark) {
-        let key = durable_key(space, agent);
-        self.put(&key, watermark, &self.watermarks, None);
+    fn watermark(&self, space: &Arc<str>, agent: &Arc<AgentDesk>) {
+        self.board.agent(space, agent, Messages::WATERMARK);
     }
 
-    fn event(&self, event: &EventRecord) {
-        let key = events_key(&event.event.space);
-        let id = event.id.to_string();
-        self.put(&key, &event.event, &self.events, Some(&id));
+    fn event(&self, event: &Arc<EventRecord>) {
+        self.board.event(event);
     }
 }

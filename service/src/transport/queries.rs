@@ -9,8 +9,8 @@ use cogmap_proto::{
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use zenoh::Session;
 use zenoh::query::{Query, Queryable};
+use zenoh::{Session, Wait};
 
 use super::latest;
 use super::session::TransportError;
@@ -52,25 +52,37 @@ pub(crate) async fn declare(
 }
 
 async fn reply(engine: &Engine, verb: Verb, query: Query, permit: Option<OwnedSemaphorePermit>) {
-    let (codec, answered) = match (codec_of(&query), permit) {
+    let (codec, answered) = match (codec_of(&query), &permit) {
         (Err(problem), _) => (Codec::Json, Err(problem)),
         (Ok(codec), None) => (codec, Err(busy())),
-        (Ok(codec), Some(_permit)) => (codec, answer(engine, verb, &query, codec).await),
+        (Ok(codec), Some(_)) => (codec, answer(engine, verb, &query, codec).await),
     };
-    let bytes = match answered {
-        Ok(bytes) => bytes,
-        Err(problem) => return refuse(&query, codec, &problem).await,
-    };
-    let sent = query.reply(query.key_expr(), bytes);
-    if let Err(error) = sent.encoding(codec.encoding()).await {
+    // Zenoh waits where the link to whoever asked is congested, also to say that the answer is
+    // complete, which it does when the query is dropped: not on a thread that others wait for.
+    let sending = tokio::task::spawn_blocking(move || {
+        match answered {
+            Ok(bytes) => send(&query, query.key_expr().as_str(), codec, bytes),
+            Err(problem) => refuse(&query, codec, &problem),
+        }
+        drop((query, permit));
+    });
+    if sending.await.is_err() {
+        tracing::error!("answering a query ended with a panic");
+    }
+}
+
+/// Sends an answer under a key, which may wait.
+pub(super) fn send(query: &Query, key: &str, codec: Codec, bytes: Vec<u8>) {
+    let sent = query.reply(key, bytes).encoding(codec.encoding()).wait();
+    if let Err(error) = sent {
         tracing::debug!(%error, "answer a query");
     }
 }
 
-/// Answers with a problem.
-pub(super) async fn refuse(query: &Query, codec: Codec, problem: &Problem) {
+/// Answers with a problem, which may wait.
+pub(super) fn refuse(query: &Query, codec: Codec, problem: &Problem) {
     let sent = query.reply_err(codec.encode(&problem.to_wire()));
-    if let Err(error) = sent.encoding(codec.encoding()).await {
+    if let Err(error) = sent.encoding(codec.encoding()).wait() {
         tracing::debug!(%error, "refuse a query");
     }
 }

@@ -11,6 +11,7 @@ mod bad_input; // what no client would send
 mod crash; // kill -9, and what recovery makes of it
 mod full_disk; // a disk that takes no more
 mod leaps; // sequence numbers that somebody made up
+mod nobody_waits; // connections that say next to nothing
 mod pause; // a process that stands still
 mod readers; // readers and senders at once
 

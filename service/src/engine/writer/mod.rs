@@ -6,6 +6,7 @@
 
 mod journal;
 mod objects;
+mod pace;
 mod publish;
 mod receive;
 
@@ -31,11 +32,10 @@ use super::sequencer::{Sequencer, Window};
 use super::space::Shared;
 use super::trajectory;
 use crate::store::ChunkKey;
+use pace::Pace;
 
-/// Most messages of a round, and the number of records that ends it: they bound how old an estimate
-/// can be when it leaves, and how long a reader waits for a snapshot.
+/// Most messages of a round: of those, too, that bring no records.
 const ROUND_MESSAGES_MAX: usize = 2048;
-const ROUND_RECORDS_MAX: usize = 16_384;
 /// How long a writer waits for a message before it looks after gaps and wishes.
 const PATIENCE: Duration = Duration::from_millis(100);
 /// Most samples of all agents that wait for earlier ones, and the most memory that they take
@@ -61,6 +61,7 @@ pub(crate) struct Writer {
     next_lesson: u64,
     /// How many samples of all agents wait for earlier ones, and what they take.
     waiting: Window,
+    pace: Pace,
 
     /// The round under way; emptied and used again.
     block: BlockWriter,
@@ -115,6 +116,7 @@ impl Writer {
             interval_ns,
             next_lesson,
             waiting: Window::NONE,
+            pace: Pace::new(),
             block: BlockWriter::new(),
             records: Vec::new(),
             answers: Vec::new(),
@@ -182,11 +184,13 @@ impl Writer {
                 Some(Message::Call(Call::Object(request))) => self.receive_object(request),
                 None => break,
             }
-            if self.records.len() >= ROUND_RECORDS_MAX {
+            if self.pace.is_over(self.records.len(), now.elapsed()) {
                 break;
             }
         }
+        let records = self.records.len();
         self.finish_round();
+        self.pace.note(records, now.elapsed());
     }
 
     /// Journals and applies what the round has accepted, then publishes.

@@ -55,8 +55,8 @@ impl Writer {
             let (session, next) = (agent.session(), agent.next_seq());
             if applied {
                 if let Some(readout) = readout::readout(space, &self.map, slot.desk.id()) {
-                    let readout = slot.desk.publish(readout);
-                    self.shared.outlet.estimate(&readout.estimate);
+                    slot.desk.publish(readout);
+                    self.shared.outlet.estimate(space, &slot.desk);
                 }
                 commit.marks.push(Mark {
                     desk: Arc::clone(&slot.desk),
@@ -76,9 +76,7 @@ impl Writer {
                 .marks()
                 .applied(session, next, waiting, sequencer.gap());
             if remind {
-                self.shared
-                    .outlet
-                    .watermark(space, slot.desk.name(), &slot.desk.watermark());
+                self.shared.outlet.watermark(space, &slot.desk);
             }
         }
         self.counters
@@ -101,9 +99,6 @@ impl Writer {
     }
 
     fn remind(&self, slot: &AgentSlot) {
-        let watermark = slot.desk.watermark();
-        self.shared
-            .outlet
-            .watermark(&self.shared.name, slot.desk.name(), &watermark);
+        self.shared.outlet.watermark(&self.shared.name, &slot.desk);
     }
 }

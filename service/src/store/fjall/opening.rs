@@ -11,7 +11,7 @@ use fjall::{
     CompressionType, Database, Keyspace, KeyspaceCreateOptions, KvSeparationOptions, PersistMode,
 };
 
-use super::super::StoreError;
+use super::super::{CACHED_FILES_MAX, StoreError};
 use super::{FORMAT_VERSION, FjallStore, fault, keys};
 
 /// File by which the engine recognises its directory; the last one that it creates.
@@ -35,6 +35,7 @@ pub(super) fn open(directory: &Path) -> Result<FjallStore, StoreError> {
     // compare. And it is slow: 37 MB/s of 4 KiB blocks where 70 are offered.
     let database = Database::builder(directory)
         .journal_compression(CompressionType::None)
+        .max_cached_files(Some(CACHED_FILES_MAX))
         .open()
         .map_err(on_open)?;
 

@@ -10,7 +10,15 @@
 
 #![allow(clippy::print_stdout)] // The report is what it is for.
 
+mod descriptors;
+mod flood;
+mod half_open;
 mod liars; // valid samples, absurd together
+mod long_answers;
+mod quantile;
+mod stopped_subscribers;
+mod subscriber;
+mod watermarks;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -21,10 +29,22 @@ use serde_json::{Value, json};
 type Drill = fn() -> Value;
 
 /// All drills, in the order in which they run.
-const DRILLS: &[(&str, Drill)] = &[("liars", liars::liars)];
+const DRILLS: &[(&str, Drill)] = &[
+    ("liars", liars::liars),
+    ("stopped-subscribers", stopped_subscribers::run),
+    ("flood", flood::run),
+    ("half-open", half_open::run),
+    ("descriptors", descriptors::run),
+    ("long-answers", long_answers::run),
+];
 
 fn main() -> ExitCode {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
+    if let [first, arguments @ ..] = &wanted[..]
+        && first == subscriber::ARGUMENT
+    {
+        subscriber::run(arguments);
+    }
     for name in &wanted {
         if !DRILLS.iter().any(|(drill, _)| drill == name) {
             let names: Vec<_> = DRILLS.iter().map(|(drill, _)| *drill).collect();

@@ -1,9 +1,12 @@
 //! The bounded queue of a space's writer.
 //!
-//! Encoded messages are copied one behind the other into one buffer, which the writer takes whole:
-//! no allocation for a message, and a lock that is held for one copy. Requests, which someone waits
-//! for, are rare and stand beside it.
+//! A lane for each agent: whoever sends more than the writer can take fills his own and waits in it.
+//! A message costs a copy at each end and no allocation, and the lock is held for these copies only.
 
+mod frames;
+mod lanes;
+
+use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -11,9 +14,11 @@ use cogmap_proto::{Codec, Contact, ContactLevel, Sample};
 
 use super::message::{Call, ObjectRequest, Request};
 use super::sequencer::Weight;
+use frames::Frames;
+use lanes::{HEAD_BYTES, Lanes};
 
-/// A buffer that has grown beyond this is given back when little of it is used.
-const KEPT_BYTES: usize = 1 << 20;
+/// Bytes that the writer takes at once: little enough that whoever comes next is not far behind.
+const TAKEN_BYTES: usize = 32 << 10;
 
 /// Sending end, bounded in messages and in bytes.
 #[derive(Clone, Debug)]
@@ -31,6 +36,8 @@ pub(crate) struct Inbox {
 pub(crate) enum NotQueued {
     /// The queue is full.
     Full,
+    /// The agent's messages take up all the room that it may have beside others.
+    LaneFull,
     /// The writer is gone.
     Closed,
 }
@@ -46,8 +53,7 @@ struct Channel {
 /// What is between the two ends.
 #[derive(Debug, Default)]
 struct Waiting {
-    frames: Frames,
-    calls: Vec<Call>,
+    lanes: Lanes,
     /// What the bounds hold for: that which the writer has taken and not yet handled is part of it.
     load: Load,
     /// The writer is to look up although no message comes.
@@ -65,24 +71,8 @@ struct Load {
 #[derive(Debug, Default)]
 struct Taken {
     frames: Frames,
-    calls: std::vec::IntoIter<Call>,
+    calls: VecDeque<Call>,
     handled: Load,
-}
-
-/// Encoded messages, one behind the other.
-#[derive(Debug, Default)]
-struct Frames {
-    heads: Vec<Head>,
-    bytes: Vec<u8>,
-    /// How many heads and bytes have been read.
-    read: Load,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Head {
-    codec: Codec,
-    agent_len: usize,
-    payload_len: usize,
 }
 
 /// A message as the writer takes it.
@@ -119,16 +109,21 @@ pub(crate) fn queue(messages_max: usize, bytes_max: usize) -> (Queue, Inbox) {
 impl Queue {
     /// Queues a message as it came, or gives up at once.
     pub(crate) fn push(&self, agent: &str, codec: Codec, payload: &[u8]) -> Result<(), NotQueued> {
-        let mut waiting = self.0.room_for(agent.len() + payload.len())?;
-        waiting.frames.push(agent, codec, payload);
+        let (mut waiting, lane) = self.0.room_for(agent, agent.len() + payload.len())?;
+        waiting.lanes.push(lane, agent, codec, payload);
         self.0.ring(waiting);
         Ok(())
     }
 
     /// Queues a request, or gives up at once.
     pub(crate) fn request(&self, call: Call) -> Result<(), NotQueued> {
-        let mut waiting = self.0.room_for(size_of_call(&call))?;
-        waiting.calls.push(call);
+        let bytes = size_of_call(&call);
+        let agent = match &call {
+            Call::Samples(request) => &*request.agent,
+            Call::Object(_) => "",
+        };
+        let (mut waiting, lane) = self.0.room_for(agent, bytes)?;
+        waiting.lanes.push_call(lane, call, bytes);
         self.0.ring(waiting);
         Ok(())
     }
@@ -146,33 +141,33 @@ impl Inbox {
     /// Returns the number of messages that wait.
     pub(crate) fn wait(&mut self, patience: Duration) -> usize {
         let mut waiting = self.channel.lock();
-        let handled = std::mem::take(&mut self.taken.handled);
-        waiting.load.messages -= handled.messages;
-        waiting.load.bytes -= handled.bytes;
+        waiting.settle(&mut self.taken.handled);
         if !self.taken.is_empty() {
             return waiting.load.messages;
         }
-        if waiting.is_empty() {
+        if waiting.lanes.is_empty() {
             waiting.writer_sleeps = true;
             waiting = self
                 .channel
                 .bell
                 .wait_timeout_while(waiting, patience, |waiting| {
-                    waiting.is_empty() && !waiting.call
+                    waiting.lanes.is_empty() && !waiting.call
                 })
                 .unwrap_or_else(PoisonError::into_inner)
                 .0;
             waiting.writer_sleeps = false;
         }
         waiting.call = false;
-        self.taken.frames.clear();
-        std::mem::swap(&mut self.taken.frames, &mut waiting.frames);
-        self.taken.calls = std::mem::take(&mut waiting.calls).into_iter();
         waiting.load.messages
     }
 
-    /// The next message that [`Self::wait`] has taken.
+    /// The next message, each agent's in the order in which they came.
     pub(crate) fn next(&mut self) -> Option<Message<'_>> {
+        if self.taken.is_empty() {
+            let mut waiting = self.channel.lock();
+            waiting.settle(&mut self.taken.handled);
+            self.taken.refill(&mut waiting.lanes);
+        }
         self.taken.next()
     }
 }
@@ -194,18 +189,27 @@ impl Channel {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn room_for(&self, bytes: usize) -> Result<MutexGuard<'_, Waiting>, NotQueued> {
+    /// The queue with room for a message of so many bytes made in it, and the lane of its agent.
+    fn room_for(
+        &self,
+        agent: &str,
+        bytes: usize,
+    ) -> Result<(MutexGuard<'_, Waiting>, usize), NotQueued> {
         let mut waiting = self.lock();
         if waiting.closed {
             return Err(NotQueued::Closed);
         }
-        let mut load = waiting.load;
-        load.add(bytes);
-        if load.messages > self.messages_max || load.bytes > self.bytes_max {
+        let bytes = bytes + HEAD_BYTES;
+        let free = Load {
+            messages: self.messages_max.saturating_sub(waiting.load.messages),
+            bytes: self.bytes_max.saturating_sub(waiting.load.bytes),
+        };
+        if free.messages == 0 || bytes > free.bytes {
             return Err(NotQueued::Full);
         }
-        waiting.load = load;
-        Ok(waiting)
+        let lane = waiting.lanes.lane_for(agent, bytes, free)?;
+        waiting.load.add(bytes);
+        Ok((waiting, lane))
     }
 
     /// Wakes the writer if it sleeps, once.
@@ -224,65 +228,45 @@ impl Load {
         self.messages += 1;
         self.bytes += bytes;
     }
+
+    /// Takes a message off.
+    fn remove(&mut self, bytes: usize) {
+        self.messages -= 1;
+        self.bytes -= bytes;
+    }
 }
 
 impl Waiting {
-    fn is_empty(&self) -> bool {
-        self.frames.heads.is_empty() && self.calls.is_empty()
+    /// Frees the room of what has been handled.
+    fn settle(&mut self, handled: &mut Load) {
+        let handled = std::mem::take(handled);
+        self.load.messages -= handled.messages;
+        self.load.bytes -= handled.bytes;
     }
 }
 
 impl Taken {
     fn is_empty(&self) -> bool {
-        self.frames.read.messages == self.frames.heads.len() && self.calls.len() == 0
+        self.frames.is_empty() && self.calls.is_empty()
+    }
+
+    fn refill(&mut self, lanes: &mut Lanes) {
+        self.frames.clear();
+        lanes.take(&mut self.frames, &mut self.calls, TAKEN_BYTES);
     }
 
     fn next(&mut self) -> Option<Message<'_>> {
-        if let Some(call) = self.calls.next() {
-            self.handled.add(size_of_call(&call));
+        if let Some(call) = self.calls.pop_front() {
+            self.handled.add(HEAD_BYTES + size_of_call(&call));
             return Some(Message::Call(call));
         }
         let (agent, codec, payload) = self.frames.next()?;
-        self.handled.add(agent.len() + payload.len());
+        self.handled.add(HEAD_BYTES + agent.len() + payload.len());
         Some(Message::Encoded {
             agent,
             codec,
             payload,
         })
-    }
-}
-
-impl Frames {
-    fn push(&mut self, agent: &str, codec: Codec, payload: &[u8]) {
-        self.bytes.extend_from_slice(agent.as_bytes());
-        self.bytes.extend_from_slice(payload);
-        self.heads.push(Head {
-            codec,
-            agent_len: agent.len(),
-            payload_len: payload.len(),
-        });
-    }
-
-    fn next(&mut self) -> Option<(&str, Codec, &[u8])> {
-        let Head {
-            codec,
-            agent_len,
-            payload_len,
-        } = *self.heads.get(self.read.messages)?;
-        let start = self.read.bytes;
-        self.read.add(agent_len + payload_len);
-        let (agent, payload) = self.bytes[start..self.read.bytes].split_at(agent_len);
-        let agent = str::from_utf8(agent).expect("a name was pushed as a str");
-        Some((agent, codec, payload))
-    }
-
-    fn clear(&mut self) {
-        if self.bytes.capacity() > KEPT_BYTES && self.bytes.len() < self.bytes.capacity() / 4 {
-            *self = Self::default();
-        }
-        self.heads.clear();
-        self.bytes.clear();
-        self.read = Load::default();
     }
 }
 
@@ -323,30 +307,57 @@ fn size_of_request(request: &Request) -> usize {
 mod tests {
     use super::*;
 
-    fn push(queue: &Queue, bytes: usize) -> Result<(), NotQueued> {
-        queue.push("a", Codec::Postcard, &vec![0; bytes - 1])
+    /// Sends as many bytes as a message then counts.
+    fn push(queue: &Queue, agent: &str, bytes: usize) -> Result<(), NotQueued> {
+        let payload = vec![0; bytes - HEAD_BYTES - agent.len()];
+        queue.push(agent, Codec::Postcard, &payload)
     }
 
     #[test]
     fn both_bounds_hold_and_room_comes_back_when_a_message_is_handled() {
-        let (queue, mut inbox) = queue(2, 100);
-        assert_eq!(push(&queue, 101), Err(NotQueued::Full));
-        assert_eq!(push(&queue, 60), Ok(()));
-        assert_eq!(push(&queue, 60), Err(NotQueued::Full));
-        assert_eq!(push(&queue, 40), Ok(()));
-        assert_eq!(push(&queue, 1), Err(NotQueued::Full));
-        assert_eq!(inbox.wait(Duration::ZERO), 2);
-        assert_eq!(push(&queue, 1), Err(NotQueued::Full));
+        let (queue, mut inbox) = queue(4, 1000);
+        assert_eq!(push(&queue, "a", 1001), Err(NotQueued::Full));
+        assert_eq!(push(&queue, "a", 600), Ok(()));
+        assert_eq!(push(&queue, "b", 600), Err(NotQueued::Full));
+        assert_eq!(push(&queue, "b", 100), Ok(()));
+        assert_eq!(push(&queue, "c", 100), Ok(()));
+        assert_eq!(push(&queue, "d", 100), Ok(()));
+        assert_eq!(push(&queue, "e", 100), Err(NotQueued::Full));
+        assert_eq!(inbox.wait(Duration::ZERO), 4);
         assert!(inbox.next().is_some());
-        assert_eq!(inbox.wait(Duration::ZERO), 1);
-        assert_eq!(push(&queue, 60), Ok(()));
+        assert_eq!(push(&queue, "e", 100), Err(NotQueued::Full));
+        assert_eq!(inbox.wait(Duration::ZERO), 3);
+        assert_eq!(push(&queue, "e", 600), Ok(()));
         drop(inbox);
-        assert_eq!(push(&queue, 1), Err(NotQueued::Closed));
+        assert_eq!(push(&queue, "e", 100), Err(NotQueued::Closed));
     }
 
     #[test]
-    fn messages_come_out_as_they_went_in() {
-        let (queue, mut inbox) = queue(100, 1000);
+    fn one_agent_alone_cannot_fill_the_queue() {
+        let (queue, mut inbox) = queue(1_000_000, 1_000_000);
+        let fill = |agent: &str| (0..).find(|_| push(&queue, agent, 1000).is_err()).unwrap();
+        let first = fill("first");
+        assert_eq!(
+            (first, push(&queue, "first", 1000)),
+            (500, Err(NotQueued::LaneFull))
+        );
+        // Those who come later share what is left, and there is always some.
+        assert_eq!(fill("second"), 250);
+        assert_eq!(fill("third"), 125);
+        assert_eq!(push(&queue, "honest", 1000), Ok(()));
+        // Nothing is lost of what was taken.
+        inbox.wait(Duration::ZERO);
+        let mut received = 0;
+        while inbox.next().is_some() {
+            received += 1;
+        }
+        assert_eq!(received, 500 + 250 + 125 + 1);
+        assert_eq!(inbox.wait(Duration::ZERO), 0);
+    }
+
+    #[test]
+    fn messages_of_an_agent_come_out_as_they_went_in() {
+        let (queue, mut inbox) = queue(100, 100_000);
         let sent = [
             ("ada", Codec::Cbor, vec![1, 2, 3]),
             ("bob", Codec::Postcard, Vec::new()),
@@ -365,7 +376,8 @@ mod tests {
         {
             received.push((agent.to_owned(), codec, payload.to_vec()));
         }
-        let sent = sent.map(|(agent, codec, payload)| (agent.to_owned(), codec, payload));
+        let mut sent = sent.map(|(agent, codec, payload)| (agent.to_owned(), codec, payload));
+        sent.swap(1, 2); // a turn of an agent's lane
         assert_eq!(received, sent);
         assert_eq!(inbox.wait(Duration::ZERO), 0);
     }
