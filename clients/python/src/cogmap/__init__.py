@@ -14,8 +14,6 @@ from .answer import (
     GridModuleState,
     GridState,
     IngestAnswer,
-    Landmark,
-    LandmarkPage,
     Leg,
     Place,
     PlacePage,
@@ -76,6 +74,7 @@ from .event import (
     TripStarted,
     UnknownKind,
 )
+from .landmark import Landmark, LandmarkPage
 from .link import DEFAULT_ENDPOINT, open_session
 from .localize import Localization, LocalizationHypothesis, LocalizedPose, LocalizeQuery
 from .object import (

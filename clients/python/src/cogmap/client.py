@@ -15,8 +15,6 @@ from .answer import (
     AgentSummary,
     GridState,
     IngestAnswer,
-    Landmark,
-    LandmarkPage,
     Place,
     PlacePage,
     PredictAnswer,
@@ -29,6 +27,7 @@ from .answer import (
 )
 from .errors import ApiError, InvalidValue, WireError
 from .event import Event
+from .landmark import Landmark, LandmarkPage
 from .localize import Localization, LocalizeQuery
 from .object import (
     AgentObject,

@@ -1,6 +1,7 @@
 """Bounds of what a sample may say, the same as the service's.
 
-`proto/validity.json` holds samples at and beyond them, which the tests of this package and of the service read.
+`proto/validity.json` holds samples at and beyond them, which the tests of this package and of the
+service read.
 """
 
 from __future__ import annotations

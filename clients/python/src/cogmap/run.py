@@ -1,8 +1,9 @@
-"""One run of an agent: its samples on their way out, what comes back, and the thread that does both.
+"""One run of an agent: its samples on their way out, what comes back, and the thread that does
+both.
 
-A `Robot` owns its run, and not the other way round: the thread knows the robot's callbacks by a weak reference
-only. So a robot that a program drops is finalised, and its run ends after what was sent is flushed. At the end of
-the program all runs are ended in the same way, within a bound.
+A `Robot` owns its run, and not the other way round: the thread knows the robot's callbacks by a
+weak reference only. So a robot that a program drops is finalised, and its run ends after what was
+sent is flushed. At the end of the program all runs are ended in the same way, within a bound.
 """
 
 from __future__ import annotations
@@ -36,14 +37,14 @@ _ESTIMATES_WAITING_MAX = 4096
 _ANSWERS_WAITING_MAX = 256
 #: How often the arrival of the service is looked for [s].
 _MATCH_POLL_S = 0.01
-#: How long a robot waits at its start for the watermark that the service has of it, and again before the first
-#: batch if none came [s].
+#: How long a robot waits at its start for the watermark that the service has of it, and again
+#: before the first batch if none came [s].
 _FIRST_ANSWER_S = 0.5
 _SECOND_ANSWER_S = 0.2
 #: How long a dropped robot's samples are flushed in the background [s].
 DROPPED_FLUSH_S = 10.0
-#: How long the samples of all robots are flushed at the end of the program [s], and how long they may take to
-#: leave Zenoh afterwards.
+#: How long the samples of all robots are flushed at the end of the program [s], and how long they
+#: may take to leave Zenoh afterwards.
 _EXIT_FLUSH_S = 1.0
 _EXIT_CLOSE_S = 0.5
 
@@ -125,9 +126,9 @@ class Run:
     def start(self) -> None:
         """Asks the service for the agent's watermark, and starts the thread.
 
-        If the service has samples of this session already, another run uses its number, and after the first
-        put nobody could tell whose they are. Without an answer the thread asks again: a robot may start
-        before its service.
+        If the service has samples of this session already, another run uses its number, and after
+        the first put nobody could tell whose they are. Without an answer the thread asks again: a
+        robot may start before its service.
 
         Raises `ApiError` when the service knows no such space; the run is closed then.
         """
@@ -143,7 +144,8 @@ class Run:
     def append(
         self, body: SampleBody, stamp_ns: Optional[int], deadline: float, accepted: int
     ) -> int:
-        """Takes a sample into the window and returns its number; waits for room until the deadline."""
+        """Takes a sample into the window and returns its number; waits for room until the
+        deadline."""
         by_clock = stamp_ns is None
         data = b"" if stamp_ns is None else encode_sample(Sample(stamp_ns, body))
         with self.changed:
@@ -170,7 +172,8 @@ class Run:
                 self.clock.take(seq, stamp_ns)
             due = self.window.ready(now)
         if due and self._may_send and self._publishing.acquire(blocking=False):
-            # A full batch leaves on the caller's thread, for the other one might wait long for its turn.
+            # A full batch leaves on the caller's thread, for the other one might wait long for its
+            # turn.
             try:
                 self._send_due()
             finally:
@@ -180,7 +183,8 @@ class Run:
         return seq
 
     def wait_durable(self, timeout_s: float) -> int:
-        """Waits until the watermark covers all samples; returns how many are missing after the time."""
+        """Waits until the watermark covers all samples; returns how many are missing after the
+        time."""
         if self.is_own_thread():
             raise RuntimeError("a callback cannot wait for acknowledgements: they come after it")
         with self.changed:
@@ -251,8 +255,8 @@ class Run:
     # The end
 
     def stop(self, flush_s: float) -> None:
-        """Lets the thread end as soon as everything is acknowledged, at the latest after `flush_s`. It waits for
-        nothing and takes no lock: a garbage collection may call it anywhere."""
+        """Lets the thread end as soon as everything is acknowledged, at the latest after `flush_s`.
+        It waits for nothing and takes no lock: a garbage collection may call it anywhere."""
         at = time.monotonic() + flush_s
         self._stop_at = at if self._stop_at is None else min(at, self._stop_at)
         self._wake.set()
@@ -286,7 +290,9 @@ class Run:
             self._tell_rejections(at_once=True)
             if self.window.pending and not self.closing:
                 missing, silence = self.window.pending, self.connection.silence()
-                _log.warning("%s: %d samples are lost, not acknowledged%s", self.agent, missing, silence)
+                _log.warning(
+                    "%s: %d samples are lost, not acknowledged%s", self.agent, missing, silence
+                )
             with self.changed:
                 self.closing = True
                 self.changed.notify_all()
@@ -297,8 +303,8 @@ class Run:
         self._receive()
         self._tell_rejections()
         if not self._may_send:
-            # A put before the subscriber is known is dropped on the way: so wait for it, but not for
-            # ever, since what is dropped is sent again.
+            # A put before the subscriber is known is dropped on the way: so wait for it, but not
+            # for ever, since what is dropped is sent again.
             is_heard = self.connection.is_heard()
             if not is_heard and time.monotonic() < self._match_deadline:
                 return
@@ -330,7 +336,9 @@ class Run:
                 return _MATCH_POLL_S
             else:
                 at = self.window.wake_at()
-            times = [one for one in (at, self.rejections.tell_at(), self._stop_at) if one is not None]
+            times = [
+                one for one in (at, self.rejections.tell_at(), self._stop_at) if one is not None
+            ]
         return max(0.0, min(times) - time.monotonic()) if times else None
 
     def _is_superseded(self) -> bool:
@@ -371,15 +379,18 @@ class Run:
             if outgoing is None:
                 return
             try:
-                self.connection.put(encode_batch(self.session_id, outgoing.first_seq, outgoing.samples))
+                self.connection.put(
+                    encode_batch(self.session_id, outgoing.first_seq, outgoing.samples)
+                )
             except Unreachable as error:
                 # The samples stay in the window; silence brings them back.
                 _log.warning("%s", error)
                 return
 
     def _receive(self) -> None:
-        # Estimates first, and of the watermarks only those that are here by now: when a flush returns, the estimate
-        # published before is in place. What comes meanwhile wakes this thread again.
+        # Estimates first, and of the watermarks only those that are here by now: when a flush
+        # returns, the estimate published before is in place. What comes meanwhile wakes this thread
+        # again.
         watermarks = len(self._watermarks_in)
         listeners = self._listeners()
         callbacks = [] if listeners is None else list(listeners.estimates)
@@ -412,8 +423,8 @@ class Run:
             if watermark.session < self.session_id:
                 # An earlier run of this agent; ours has not arrived yet.
                 return
-            # The service cannot have applied what this run never sent: that is of another run with our
-            # number. `applied` moves before `durable`, so it tells first.
+            # The service cannot have applied what this run never sent: that is of another run with
+            # our number. `applied` moves before `durable`, so it tells first.
             foreign = max(watermark.applied, watermark.durable) > self.window.sent
             if watermark.session > self.session_id or foreign:
                 self._superseded_by = max(watermark.session, self._superseded_by or 0)
@@ -469,7 +480,8 @@ _RUNNING: Set[Run] = set()
 
 
 def _end_all() -> None:
-    """Ends all runs at the end of the program, after what was sent is flushed if the service is there."""
+    """Ends all runs at the end of the program, after what was sent is flushed if the service is
+    there."""
     runs: Tuple[Run, ...] = tuple(_RUNNING)
     for run in runs:
         run.stop(_EXIT_FLUSH_S)

@@ -1,7 +1,8 @@
 """Numbers and texts as they cross the wire.
 
-They are checked when a message is made: the caller's own line is in the traceback then. A sample that the
-service could not even decode would besides make it refuse the whole batch, again and again.
+They are checked when a message is made: the caller's own line is in the traceback then. A sample
+that the service could not even decode would besides make it refuse the whole batch, again and
+again.
 """
 
 from __future__ import annotations

@@ -181,7 +181,8 @@ def encode_sample(sample: Sample) -> bytes:
     try:
         data = encode(sample)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidValue("sample", sample, f"expected one that can be written ({error})") from error
+        expected = f"expected one that can be written ({error})"
+        raise InvalidValue("sample", sample, expected) from error
     if len(data) + _BATCH_HEAD_BYTES > MESSAGE_BYTES_MAX:
         expected = f"expected at most {MESSAGE_BYTES_MAX - _BATCH_HEAD_BYTES} bytes"
         raise InvalidValue("sample", sample, expected, f"{len(data)}")
