@@ -342,7 +342,7 @@ def test_a_callback_that_would_wait_for_itself_is_told(service: StandIn) -> None
     def flush(_: cogmap.Estimate) -> None:
         try:
             robot.flush()
-        except RuntimeError as error:
+        except cogmap.CalledFromCallback as error:
             caught.append(error)
 
     with ada(service) as robot:

@@ -152,3 +152,19 @@ def test_a_closed_session_is_told_with_the_key() -> None:
             cogmap.Unreachable, match="^cogmap/lab/ada/samples at .*: session closed$"
         ):
             cogmap.Robot("lab", "ada", session=link)
+
+
+def test_a_session_that_is_closed_under_a_robot_is_told_at_once() -> None:
+    with StandIn() as service:
+        link = cogmap.open_session(service.endpoint)
+        robot = cogmap.Robot("lab", "ada", session=link)
+        robot.marker("x")
+        robot.flush()
+        link.close()  # type: ignore[no-untyped-call]
+        with pytest.raises(cogmap.Unreachable, match="^cogmap/lab/.*: session closed$"):
+            robot.marker("y")
+            robot.flush(30.0)
+        with pytest.raises(cogmap.Unreachable):
+            robot.marker("z")
+        with pytest.raises(cogmap.Unreachable):
+            robot.close()

@@ -165,3 +165,19 @@ def test_settings_of_a_robot_are_checked_by_name() -> None:
         (name,) = settings
         with pytest.raises(cogmap.InvalidValue, match=f"^{name}: "):
             cogmap.Robot("lab", "ada", connect="tcp/127.0.0.1:1", **settings)
+
+
+def test_lists_have_their_bounds() -> None:
+    sample, contact = cogmap.Sample(0, cogmap.Marker("x")), cogmap.Contact((0, 0, 0))
+    client = cogmap.Client("http://127.0.0.1:1")
+    for most, make in (
+        (4096, lambda count: cogmap.SampleBatch(1, 0, (sample,) * count)),
+        (4096, lambda count: cogmap.LocalizeQuery((sample,) * count)),
+        (4096, lambda count: client.teach_object("lab", "cup", [contact] * count)),
+        (256, lambda count: client.identify("lab", [contact] * count)),
+    ):
+        for count in (0, most + 1):
+            with pytest.raises(
+                cogmap.InvalidValue, match=f"expected 1 to {most} of them, not {count}"
+            ):
+                make(count)

@@ -37,6 +37,7 @@ from .answer import (
 from .client import Client
 from .errors import (
     ApiError,
+    CalledFromCallback,
     ClockWarning,
     Closed,
     CogmapError,
@@ -150,6 +151,7 @@ __all__ = [
     "AnyTurn",
     "ApiError",
     "Bernoulli",
+    "CalledFromCallback",
     "Client",
     "ClockWarning",
     "Closed",

@@ -71,6 +71,10 @@ class SessionSuperseded(CogmapError):
         self.other = other
 
 
+class CalledFromCallback(CogmapError, RuntimeError):
+    """A callback would wait for what its own thread has to bring."""
+
+
 class Closed(CogmapError):
     """The robot has been closed."""
 

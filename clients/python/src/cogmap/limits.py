@@ -26,3 +26,7 @@ SPACING_M_MIN, SPACING_M_MAX = 1e-5, 1e3
 TOUCH_SD_MAX = 1e6
 #: Most rotations by which the frame of an episode may be turned against an object's.
 ROTATIONS_MAX = 1000
+#: Most samples of a batch, and of a question where they were taken.
+BATCH_SAMPLES_MAX = 4096
+#: Most contacts of a lesson about an object, and of a question which object it is.
+LESSON_CONTACTS_MAX, IDENTIFY_CONTACTS_MAX = 4096, 256

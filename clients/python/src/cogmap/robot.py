@@ -15,7 +15,8 @@ from .answer import Estimate, Rejection, Watermark
 from .errors import ClockWarning, CogmapError, InvalidValue, Timeout
 from .key import check_name
 from .link import DEFAULT_ENDPOINT, open_session
-from .run import DROPPED_FLUSH_S, Listeners, Run
+from .listeners import Listeners
+from .run import DROPPED_FLUSH_S, Run
 from .sample import MotionNoise, Sample, SampleBody
 from .sampler import Sampler
 from .scalar import COUNT_RANGE, whole

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import operator
 import unicodedata
-from typing import Tuple
+from typing import Tuple, TypeVar
 
 from .errors import InvalidValue
 from .limits import LABEL_BYTES_MAX
+
+_T = TypeVar("_T")
 
 STAMP_RANGE = (-(1 << 63), (1 << 63) - 1)
 COUNT_RANGE = (0, (1 << 64) - 1)
@@ -72,6 +74,13 @@ def label(name: str, value: str) -> str:
     if any(unicodedata.category(character) == "Cc" for character in value):
         raise InvalidValue(name, value, "expected a text without control characters")
     return value
+
+
+def counted(name: str, items: Tuple[_T, ...], most: int) -> Tuple[_T, ...]:
+    """`items`, if there is one at least, and not more than `most`."""
+    if not 1 <= len(items) <= most:
+        raise InvalidValue(name, items, f"expected 1 to {most} of them", str(len(items)))
+    return items
 
 
 def one_of(name: str, value: object, kinds: Tuple[type, ...]) -> None:

@@ -31,8 +31,6 @@ JSON = "application/json"
 MESSAGE_BYTES_MAX = 1 << 20
 #: Room that a batch's own fields need in a message [bytes].
 _BATCH_HEAD_BYTES = 64
-#: Most samples in one batch.
-BATCH_SAMPLES_MAX = 4096
 
 #: Types that are plain data already.
 _PLAIN = frozenset((float, int, str, bool))
