@@ -1,4 +1,5 @@
-"""The Python programs of the documents run as they stand, one after the other, as if pasted by a newcomer."""
+"""The Python programs of the documents run as they stand, one after the other, as if pasted by a
+newcomer."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ _PRINTS = re.compile(r"^ *print\(.*\)  # (.*)$", re.MULTILINE)
 
 
 def programs(document: str) -> List[Tuple[str, List[str]]]:
-    """The Python programs of a document, each with what it prints by the text behind it and by its comments."""
+    """The Python programs of a document, each with what it prints by the text behind it and by its
+    comments."""
     found = []
     for part in (ROOT / document).read_text().split("```python\n")[1:]:
         program, behind = part.split("```", 1)
@@ -31,9 +33,7 @@ def programs(document: str) -> List[Tuple[str, List[str]]]:
     return found
 
 
-@pytest.mark.parametrize(
-    "document, count", [("README.md", 3), ("clients/python/README.md", 7)]
-)
+@pytest.mark.parametrize("document, count", [("README.md", 3), ("clients/python/README.md", 7)])
 def test_the_programs_of_a_document_do_what_they_say(
     service: Server, document: str, count: int, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,4 +1,5 @@
-"""A program that uses a robot ends by itself, soon, with its own exit code, and what it sent is on disk."""
+"""A program that uses a robot ends by itself, soon, with its own exit code, and what it sent is on
+disk."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from port import Port
 from server import Server
 from wait import LONG_S
 
-#: Longest time from a program's last line to its end [s]. It is two seconds at most where nothing else runs.
+#: Longest time from a program's last line to its end [s]. It is two seconds at most where nothing
+#: else runs.
 END_S = 5.0
 SAMPLES = 500
 
@@ -223,7 +225,10 @@ def test_robots_of_one_program_are_flushed_at_its_end_together(service: Server) 
             robot.increment([0.001, 0, 0])
     """
     subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(source)], env=environment(), timeout=LONG_S, check=True
+        [sys.executable, "-c", textwrap.dedent(source)],
+        env=environment(),
+        timeout=LONG_S,
+        check=True,
     )
     marks: List[int] = [
         service.client().agent("default", f"ada-{n}").watermark.durable for n in range(10)

@@ -11,7 +11,6 @@ from typing import List, Tuple
 import pytest
 
 import cogmap
-from conftest import MakeServer
 from server import Server
 from wait import LONG_S, eventually
 

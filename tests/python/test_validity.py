@@ -1,4 +1,5 @@
-"""The service refuses and accepts the samples that the clients do: those of `proto/validity.json`."""
+"""The service refuses and accepts the samples that the clients do: those of
+`proto/validity.json`."""
 
 from __future__ import annotations
 

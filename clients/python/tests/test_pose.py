@@ -87,7 +87,8 @@ def test_a_variance_that_rounding_left_below_zero_is_none() -> None:
 
 def way() -> cogmap.Trajectory:
     poses = tuple(
-        cogmap.StampedPose(10 * step, (float(step), 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for step in range(3)
+        cogmap.StampedPose(10 * step, (float(step), 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        for step in range(3)
     )
     return cogmap.Trajectory("ada", 1, "map", "causal", poses)
 

@@ -70,7 +70,9 @@ def test_a_service_that_is_not_there_is_told_with_key_and_address() -> None:
         robot = ada(service, match_timeout_s=0.1, window_samples=1, send_timeout_s=0.2)
         robot.marker("x")
         told = f": no service listens to cogmap/lab/ada/samples at {service.endpoint}"
-        with pytest.raises(cogmap.Timeout, match=f"^1 samples of agent ada are not durable .*{told}$"):
+        with pytest.raises(
+            cogmap.Timeout, match=f"^1 samples of agent ada are not durable .*{told}$"
+        ):
             robot.flush(0.3)
         with pytest.raises(cogmap.Timeout, match=f"^no estimate of agent ada .*{told}$"):
             robot.estimate(0.1)
@@ -149,7 +151,9 @@ def test_an_estimate_that_does_not_come_says_which(service: StandIn) -> None:
             with pytest.raises(cogmap.InvalidValue, match="there is none"):
                 robot.estimate(seq=0)
             robot.marker("x")
-            with pytest.raises(cogmap.Timeout, match="^no estimate of sample 0 of agent ada within"):
+            with pytest.raises(
+                cogmap.Timeout, match="^no estimate of sample 0 of agent ada within"
+            ):
                 robot.estimate(0.1, seq=0)
             robot.close(0.1)
 

@@ -62,7 +62,9 @@ def test_the_example_program_runs(service: StandIn) -> None:
     command += ["--connect", service.endpoint]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("ada localized in lab: x 1.000 y 2.000 z 0.000 m, yaw 0.000 rad, ")
+    assert done.stdout.startswith(
+        "ada localized in lab: x 1.000 y 2.000 z 0.000 m, yaw 0.000 rad, "
+    )
     assert done.stdout.count("\n") == 1
 
 
@@ -342,7 +344,7 @@ def test_a_callback_that_would_wait_for_itself_is_told(service: StandIn) -> None
     def flush(_: cogmap.Estimate) -> None:
         try:
             robot.flush()
-        except RuntimeError as error:
+        except cogmap.CalledFromCallback as error:
             caught.append(error)
 
     with ada(service) as robot:

@@ -1,4 +1,5 @@
-"""What fails on the way to the service is told as an error of this package, with the address in it."""
+"""What fails on the way to the service is told as an error of this package, with the address in
+it."""
 
 from __future__ import annotations
 
@@ -106,14 +107,17 @@ def test_an_answer_of_another_kind_is_told_with_the_address(serve: Callable[[Spe
         cogmap.Client(f"http://127.0.0.1:{port}").spaces()
 
 
-@pytest.mark.parametrize("url", ["127.0.0.1:8080", "tcp/127.0.0.1:7447", "http://", "http://h:port", ""])
+@pytest.mark.parametrize(
+    "url", ["127.0.0.1:8080", "tcp/127.0.0.1:7447", "http://", "http://h:port", ""]
+)
 def test_an_address_that_is_none_is_refused(url: str) -> None:
     with pytest.raises(cogmap.InvalidValue, match="^url: expected an address such as http://"):
         cogmap.Client(url)
 
 
 @pytest.mark.parametrize(
-    "endpoint", ["127.0.0.1:7447", "http://127.0.0.1:7447", "tcp/127.0.0.1", "tcp//", "", "localhost"]
+    "endpoint",
+    ["127.0.0.1:7447", "http://127.0.0.1:7447", "tcp/127.0.0.1", "tcp//", "", "localhost"],
 )
 def test_an_endpoint_that_is_none_is_refused_at_once(endpoint: str) -> None:
     with pytest.raises(cogmap.InvalidValue, match="^connect: expected .* such as tcp/") as raised:
@@ -144,5 +148,23 @@ def test_a_closed_session_is_told_with_the_key() -> None:
     with StandIn() as service:
         link = cogmap.open_session(service.endpoint)
         link.close()  # type: ignore[no-untyped-call]
-        with pytest.raises(cogmap.Unreachable, match="^cogmap/lab/ada/samples at .*: session closed$"):
+        with pytest.raises(
+            cogmap.Unreachable, match="^cogmap/lab/ada/samples at .*: session closed$"
+        ):
             cogmap.Robot("lab", "ada", session=link)
+
+
+def test_a_session_that_is_closed_under_a_robot_is_told_at_once() -> None:
+    with StandIn() as service:
+        link = cogmap.open_session(service.endpoint)
+        robot = cogmap.Robot("lab", "ada", session=link)
+        robot.marker("x")
+        robot.flush()
+        link.close()  # type: ignore[no-untyped-call]
+        with pytest.raises(cogmap.Unreachable, match="^cogmap/lab/.*: session closed$"):
+            robot.marker("y")
+            robot.flush(30.0)
+        with pytest.raises(cogmap.Unreachable):
+            robot.marker("z")
+        with pytest.raises(cogmap.Unreachable):
+            robot.close()

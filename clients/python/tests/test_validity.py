@@ -1,4 +1,5 @@
-"""What the service would refuse is refused when it is handed over, by field and value, and nothing else is."""
+"""What the service would refuse is refused when it is handed over, by field and value, and nothing
+else is."""
 
 from __future__ import annotations
 
@@ -122,7 +123,10 @@ CALLS: Tuple[Tuple[Callable[[Recorder], object], str], ...] = (
     ),
     (lambda r: r.marker(""), "label: expected 1 to 128 bytes of UTF-8, not '' of 0 bytes"),
     (lambda r: r.level("light", math.inf), "value: expected a finite number, not inf"),
-    (lambda r: r.descriptor("view", [1.0] * 7), "vector: expected 8 to 4096 numbers, not 7 of them"),
+    (
+        lambda r: r.descriptor("view", [1.0] * 7),
+        "vector: expected 8 to 4096 numbers, not 7 of them",
+    ),
     (
         lambda r: r.descriptor("view", [math.nan] * 4096),
         "vector: expected finite numbers that have a direction, not a vector of norm nan",
@@ -131,7 +135,10 @@ CALLS: Tuple[Tuple[Callable[[Recorder], object], str], ...] = (
         lambda r: r.sighting("door", cogmap.Position((1, 0, 0), (0.1, 0.1, -0.1))),
         "sd_m[2]: expected 0 to 1e+08, not -0.1",
     ),
-    (lambda r: r.learn_object("identify"), "name: expected a name that is not reserved, not 'identify'"),
+    (
+        lambda r: r.learn_object("identify"),
+        "name: expected a name that is not reserved, not 'identify'",
+    ),
 )
 
 
@@ -158,3 +165,19 @@ def test_settings_of_a_robot_are_checked_by_name() -> None:
         (name,) = settings
         with pytest.raises(cogmap.InvalidValue, match=f"^{name}: "):
             cogmap.Robot("lab", "ada", connect="tcp/127.0.0.1:1", **settings)
+
+
+def test_lists_have_their_bounds() -> None:
+    sample, contact = cogmap.Sample(0, cogmap.Marker("x")), cogmap.Contact((0, 0, 0))
+    client = cogmap.Client("http://127.0.0.1:1")
+    for most, make in (
+        (4096, lambda count: cogmap.SampleBatch(1, 0, (sample,) * count)),
+        (4096, lambda count: cogmap.LocalizeQuery((sample,) * count)),
+        (4096, lambda count: client.teach_object("lab", "cup", [contact] * count)),
+        (256, lambda count: client.identify("lab", [contact] * count)),
+    ):
+        for count in (0, most + 1):
+            with pytest.raises(
+                cogmap.InvalidValue, match=f"expected 1 to {most} of them, not {count}"
+            ):
+                make(count)

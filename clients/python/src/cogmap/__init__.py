@@ -14,8 +14,6 @@ from .answer import (
     GridModuleState,
     GridState,
     IngestAnswer,
-    Landmark,
-    LandmarkPage,
     Leg,
     Place,
     PlacePage,
@@ -39,6 +37,7 @@ from .answer import (
 from .client import Client
 from .errors import (
     ApiError,
+    CalledFromCallback,
     ClockWarning,
     Closed,
     CogmapError,
@@ -76,6 +75,7 @@ from .event import (
     TripStarted,
     UnknownKind,
 )
+from .landmark import Landmark, LandmarkPage
 from .link import DEFAULT_ENDPOINT, open_session
 from .localize import Localization, LocalizationHypothesis, LocalizedPose, LocalizeQuery
 from .object import (
@@ -152,6 +152,7 @@ __all__ = [
     "AnyTurn",
     "ApiError",
     "Bernoulli",
+    "CalledFromCallback",
     "Client",
     "ClockWarning",
     "Closed",

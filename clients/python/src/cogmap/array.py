@@ -16,7 +16,8 @@ else:
 
 
 def _numpy() -> Any:
-    """The package numpy, if it is installed; imported late, for it takes longer than all of this package."""
+    """The package numpy, if it is installed; imported late, for it takes longer than all of this
+    package."""
     try:
         return importlib.import_module("numpy")
     except ImportError:

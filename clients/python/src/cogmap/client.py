@@ -15,8 +15,6 @@ from .answer import (
     AgentSummary,
     GridState,
     IngestAnswer,
-    Landmark,
-    LandmarkPage,
     Place,
     PlacePage,
     PredictAnswer,
@@ -29,6 +27,7 @@ from .answer import (
 )
 from .errors import ApiError, InvalidValue, WireError
 from .event import Event
+from .landmark import Landmark, LandmarkPage
 from .localize import Localization, LocalizeQuery
 from .object import (
     AgentObject,
@@ -283,7 +282,7 @@ class Client:
     ) -> ObjectSummary:
         """Teaches an object at once, by contacts in its own frame, in place of what was known of it; returns
         when that is on the service's disk."""
-        lesson = ObjectLesson(float(spacing_m), noise, tuple(contacts))
+        lesson = ObjectLesson(spacing_m, noise, tuple(contacts))
         path = _path(space, "objects", name)
         return self._send(ObjectSummary, "PUT", path, JSON, json.dumps(to_wire(lesson)).encode())
 

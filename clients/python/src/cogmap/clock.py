@@ -10,7 +10,8 @@ from .scalar import STAMP_RANGE
 
 #: Farthest that stamps of the caller may be from the system's clock when both are used [s].
 _CLOCKS_APART_S = 1.0
-#: Stamped by the system's clock, velocities may last this much longer than they took to be sent [s] …
+#: Stamped by the system's clock, velocities may last this much longer than they took to be sent [s]
+#: …
 _BURST_S = 2.0
 #: … and this many times as long.
 _BURST_RATIO = 1.5
@@ -25,8 +26,8 @@ _ADVICE = "give every sample a stamp_ns of one clock, or none"
 
 
 class SessionClock:
-    """Gives stamps to samples that have none, and notices stamps that cannot be meant. Pure logic: the
-    system's clock comes in as an argument [ns]."""
+    """Gives stamps to samples that have none, and notices stamps that cannot be meant. Pure logic:
+    the system's clock comes in as an argument [ns]."""
 
     def __init__(self) -> None:
         self.latest_ns = STAMP_RANGE[0]
@@ -41,8 +42,8 @@ class SessionClock:
         self._was_backwards = False
 
     def stamp(self, now_ns: int) -> int:
-        """The stamp of a sample that has none. The system's clock may be set back; the stamps of a session
-        may not."""
+        """The stamp of a sample that has none. The system's clock may be set back; the stamps of a
+        session may not."""
         return max(now_ns, self.latest_ns)
 
     def take(self, seq: int, stamp_ns: int) -> None:
@@ -72,8 +73,8 @@ class SessionClock:
             if abs(self._own_apart_s) > _CLOCKS_APART_S:
                 self._told_mixed = True
                 return (
-                    "samples with a stamp_ns and samples without one are mixed, and the given stamps are "
-                    f"{self._own_apart_s:+.3g} s from the system's clock: {_ADVICE}"
+                    "samples with a stamp_ns and samples without one are mixed, and the given stamps "
+                    f"are {self._own_apart_s:+.3g} s from the system's clock: {_ADVICE}"
                 )
         if stamp_ns is None and not self._told_fast:
             return self._haste(body, now_ns)
@@ -97,6 +98,6 @@ class SessionClock:
             return None
         self._told_fast = True
         return (
-            f"{what} without stamp_ns was sent within {took_s:.3g} s, faster than real time: the samples "
-            f"get the time of the call as their stamps; {_ADVICE.replace(', or none', '')}"
+            f"{what} without stamp_ns was sent within {took_s:.3g} s, faster than real time: the "
+            f"samples get the time of the call as their stamps; {_ADVICE.replace(', or none', '')}"
         )

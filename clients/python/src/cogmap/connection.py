@@ -21,8 +21,9 @@ _Hear = Callable[[Any], None]
 class Connection:
     """The publisher, the subscribers and the questions of one agent.
 
-    Callbacks run on the threads that read the network, so they may only put things into queues. Zenoh's
-    default, a Python thread for each callback that is no daemon, would keep the program from ending.
+    Callbacks run on the threads that read the network, so they may only put things into queues.
+    Zenoh's default, a Python thread for each callback that is no daemon, would keep the program
+    from ending.
 
     Args:
         session: The Zenoh session.
@@ -103,7 +104,8 @@ class Connection:
             raise Unreachable(f"{self._samples_key} at {self.address}: {reason(error)}") from None
 
     def ask_watermark(self, ended: Callable[[], None]) -> None:
-        """Asks for the agent's watermark without waiting; `ended` is called when no more answers come.
+        """Asks for the agent's watermark without waiting; `ended` is called when no more answers
+        come.
 
         Raises `Unreachable` when the session is closed.
         """
@@ -127,7 +129,8 @@ class Connection:
             raise Unreachable(f"{self.where_asked}: {reason(error)}") from None
 
     def close(self) -> None:
-        """Undeclares everything, and closes the session if it is the connection's own. It may hang on a dead
+        """Undeclares everything, and closes the session if it is the connection's own. It may hang
+        on a dead
         network: the caller gives it a thread that nobody has to wait for."""
         steps = list(self._undeclare)
         if self._owns_session:

@@ -1,5 +1,5 @@
-"""Errors that a caller may want to tell apart. Each is a `CogmapError`, and where the standard library has an
-error for the same thing, that one too."""
+"""Errors that a caller may want to tell apart. Each is a `CogmapError`, and where the standard
+library has an error for the same thing, that one too."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ class Timeout(CogmapError, TimeoutError):
 
 
 class ClockWarning(UserWarning):
-    """The stamps of a robot's samples are of two clocks, or say that it is faster than any robot."""
+    """The stamps of a robot's samples are of two clocks, or say that it is faster than any
+    robot."""
 
 
 class WindowFull(CogmapError):
@@ -68,6 +69,10 @@ class SessionSuperseded(CogmapError):
         )
         self.own = own
         self.other = other
+
+
+class CalledFromCallback(CogmapError, RuntimeError):
+    """A callback would wait for what its own thread has to bring."""
 
 
 class Closed(CogmapError):

@@ -1,6 +1,7 @@
 """Bounds of what a sample may say, the same as the service's.
 
-`proto/validity.json` holds samples at and beyond them, which the tests of this package and of the service read.
+`proto/validity.json` holds samples at and beyond them, which the tests of this package and of the
+service read.
 """
 
 from __future__ import annotations
@@ -25,3 +26,7 @@ SPACING_M_MIN, SPACING_M_MAX = 1e-5, 1e3
 TOUCH_SD_MAX = 1e6
 #: Most rotations by which the frame of an episode may be turned against an object's.
 ROTATIONS_MAX = 1000
+#: Most samples of a batch, and of a question where they were taken.
+BATCH_SAMPLES_MAX = 4096
+#: Most contacts of a lesson about an object, and of a question which object it is.
+LESSON_CONTACTS_MAX, IDENTIFY_CONTACTS_MAX = 4096, 256

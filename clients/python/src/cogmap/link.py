@@ -24,8 +24,8 @@ _WITH_PORT = re.compile(r"(?:tcp|udp|tls|quic|ws)/")
 _PORT = re.compile(r".*:[0-9]{1,5}(?:[?#].*)?")
 #: Where in its sources Zenoh found an error, which is nothing to its callers.
 _SOURCE = re.compile(r"\s+at \S+\.rs:[0-9]+\.?")
-#: How soon a lost connection is tried again, at first and at most [ms]. Zenoh's own 1 s to 4 s would be most of
-#: the time that a restarted service is away.
+#: How soon a lost connection is tried again, at first and at most [ms]. Zenoh's own 1 s to 4 s
+#: would be most of the time that a restarted service is away.
 _RETRY_MS = (100, 1000)
 #: How long the look at an address that does not answer may take [s].
 _PROBE_S = 0.5
@@ -36,8 +36,8 @@ def open_session(
 ) -> zenoh.Session:
     """Opens a Zenoh session in client mode to one of the endpoints, without multicast.
 
-    Several robots of one process may share it. Raises `InvalidValue` for what is no endpoint, and `Timeout`
-    when none answers in time.
+    Several robots of one process may share it. Raises `InvalidValue` for what is no endpoint, and
+    `Timeout` when none answers in time.
     """
     endpoints = [connect] if isinstance(connect, str) else list(connect)
     for endpoint in endpoints:
@@ -47,7 +47,9 @@ def open_session(
     try:
         config.insert_json5("connect/endpoints", json.dumps(endpoints))
     except zenoh.ZError as error:
-        raise InvalidValue("connect", connect, f"expected Zenoh endpoints ({reason(error)})") from None
+        raise InvalidValue(
+            "connect", connect, f"expected Zenoh endpoints ({reason(error)})"
+        ) from None
     config.insert_json5("connect/timeout_ms", json.dumps(max(1, int(1000 * timeout_s))))
     config.insert_json5("connect/exit_on_failure", "true")
     first_ms, most_ms = _RETRY_MS
@@ -63,7 +65,8 @@ def open_session(
 
 
 def _opened(config: zenoh.Config) -> Optional[zenoh.Session]:
-    """A session, if one can be opened; on a thread of its own, so that Ctrl-C does not have to wait for it."""
+    """A session, if one can be opened; on a thread of its own, so that Ctrl-C does not have to wait
+    for it."""
     opened: List[zenoh.Session] = []
 
     def run() -> None:
@@ -102,4 +105,3 @@ def _probe(endpoint: str) -> str:
     except (OSError, ValueError, OverflowError) as error:
         return f"does not answer ({getattr(error, 'strerror', None) or error})"
     return "is open but does not speak Zenoh (is it another service, or its HTTP port?)"
-

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from typing import Optional, Tuple
 
 from .answer import Status
+from .limits import BATCH_SAMPLES_MAX
 from .pose import UncertainPoseReadings
 from .sample import Sample
+from .scalar import counted
 from .vector import Quaternion, Vec3
 
 
@@ -17,6 +19,9 @@ class LocalizeQuery:
 
     #: The samples of one robot, in order; 1 to 4096, without start poses and episodes with objects.
     samples: Tuple[Sample, ...]
+
+    def __post_init__(self) -> None:
+        counted("samples", self.samples, BATCH_SAMPLES_MAX)
 
 
 @dataclass(frozen=True)

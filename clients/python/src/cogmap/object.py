@@ -7,9 +7,15 @@ from enum import Enum
 from typing import ClassVar, Optional, Tuple, Union
 
 from .key import check_name
-from .limits import METRES_MAX
+from .limits import (
+    IDENTIFY_CONTACTS_MAX,
+    LESSON_CONTACTS_MAX,
+    METRES_MAX,
+    SPACING_M_MAX,
+    SPACING_M_MIN,
+)
 from .sample import Orientation, TouchNoise
-from .scalar import number, within
+from .scalar import counted, number, within
 from .vector import Quaternion, Vec3, direction, unit_vector, vec3
 
 
@@ -90,6 +96,11 @@ class ObjectLesson:
     #: The contacts, in the object's own frame; 1 to 4096.
     contacts: Tuple[Contact, ...]
 
+    def __post_init__(self) -> None:
+        spacing = within("spacing_m", self.spacing_m, SPACING_M_MIN, SPACING_M_MAX)
+        object.__setattr__(self, "spacing_m", spacing)
+        counted("contacts", self.contacts, LESSON_CONTACTS_MAX)
+
 
 @dataclass(frozen=True)
 class IdentifyQuery:
@@ -101,6 +112,9 @@ class IdentifyQuery:
     noise: TouchNoise
     #: The contacts, in the order in which they were felt, in a frame of their own; 1 to 256.
     contacts: Tuple[Contact, ...]
+
+    def __post_init__(self) -> None:
+        counted("contacts", self.contacts, IDENTIFY_CONTACTS_MAX)
 
 
 @dataclass(frozen=True)

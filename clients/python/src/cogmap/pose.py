@@ -25,13 +25,14 @@ class PoseReadings:
 
     @property
     def yaw_rad(self) -> float:
-        """Heading in the x-y plane of `map`, left positive, in (-π, π] [rad]: the yaw of REP 103."""
+        """Heading in the x-y plane of `map`, left positive, in (-π, π] [rad]: the yaw of REP
+        103."""
         x, y, z, w = self.rotation_xyzw
         return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
     def transform(self) -> Floats:
-        """The 4 × 4 homogeneous transform from the body frame into `map` [m]: an array where numpy is installed,
-        else nested tuples."""
+        """The 4 × 4 homogeneous transform from the body frame into `map` [m]: an array where numpy
+        is installed, else nested tuples."""
         x, y, z, w = self.rotation_xyzw
         px, py, pz = self.translation_m
         rows = (
@@ -48,15 +49,15 @@ class PoseReadings:
 
 
 class UncertainPoseReadings(PoseReadings):
-    """The same of a pose with a `covariance`: the upper triangle, row by row, of the 6 × 6 covariance of (x, y, z,
-    rotation about x, y, z) along the axes of `map` [m², m·rad, rad²]."""
+    """The same of a pose with a `covariance`: the upper triangle, row by row, of the 6 × 6
+    covariance of (x, y, z, rotation about x, y, z) along the axes of `map` [m², m·rad, rad²]."""
 
     covariance: Tuple[float, ...]
 
     @property
     def sd_m(self) -> float:
-        """Standard deviation of the position [m]: the root mean square distance of the true position, by which
-        the service tells the status."""
+        """Standard deviation of the position [m]: the root mean square distance of the true
+        position, by which the service tells the status."""
         return root(sum(self.covariance[at] for at in _VARIANCES[:3]))
 
     @property
@@ -65,7 +66,8 @@ class UncertainPoseReadings(PoseReadings):
         return root(self.covariance[_VARIANCES[5]])
 
     def covariance_matrix(self) -> Floats:
-        """The covariance as a symmetric 6 × 6 matrix: an array where numpy is installed, else nested tuples."""
+        """The covariance as a symmetric 6 × 6 matrix: an array where numpy is installed, else
+        nested tuples."""
         return symmetric(self.covariance, 6)
 
     def _uncertain_pose_text(self) -> str:

@@ -20,8 +20,8 @@ _GATHER_MAX_S = 60.0
 class Rejections:
     """The refused ranges of a session.
 
-    Watermarks name the latest few again and again, the last of them growing. Each sample is told once here,
-    together with its neighbours. Pure logic: times come in as arguments.
+    Watermarks name the latest few again and again, the last of them growing. Each sample is told
+    once here, together with its neighbours. Pure logic: times come in as arguments.
     """
 
     def __init__(self) -> None:
@@ -92,7 +92,8 @@ class Rejections:
 
 
 def sentences(told: Sequence[Rejection], stamps: Dict[int, str]) -> List[str]:
-    """One sentence for each reason. `stamps` says of some samples how their stamps run backwards."""
+    """One sentence for each reason. `stamps` says of some samples how their stamps run
+    backwards."""
     by_reason: Dict[SkipReason, List[SeqRange]] = {}
     for rejection in told:
         by_reason.setdefault(rejection.reason, []).append(rejection.range)
@@ -106,7 +107,9 @@ def sentences(told: Sequence[Rejection], stamps: Dict[int, str]) -> List[str]:
             which = f"samples {first} to {last}"
         else:
             which = f"{count} samples from {first} to {last}"
-        why = next((stamps[seq] for one in ranges for seq in stamps if one.start <= seq < one.stop), "")
+        why = next(
+            (stamps[seq] for one in ranges for seq in stamps if one.start <= seq < one.stop), ""
+        )
         detail = f" ({why})" if why and reason is SkipReason.TIME_BACKWARDS else ""
         lines.append(f"{which} refused: {reason.value}{detail}")
     return lines

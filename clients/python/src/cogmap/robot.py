@@ -15,7 +15,8 @@ from .answer import Estimate, Rejection, Watermark
 from .errors import ClockWarning, CogmapError, InvalidValue, Timeout
 from .key import check_name
 from .link import DEFAULT_ENDPOINT, open_session
-from .run import DROPPED_FLUSH_S, Listeners, Run
+from .listeners import Listeners
+from .run import DROPPED_FLUSH_S, Run
 from .sample import MotionNoise, Sample, SampleBody
 from .sampler import Sampler
 from .scalar import COUNT_RANGE, whole
@@ -25,7 +26,8 @@ _log = logging.getLogger("cogmap")
 
 #: How long `close` waits for the robot's thread to leave Zenoh [s].
 _LEAVE_S = 1.0
-#: How long an error in a `with` block waits for the acknowledgement of what was sent, and for the thread [s].
+#: How long an error in a `with` block waits for the acknowledgement of what was sent, and for the
+#: thread [s].
 _ERROR_FLUSH_S = 1.0
 _ERROR_LEAVE_S = 0.5
 
@@ -38,8 +40,8 @@ class Robot(Sampler):
     What no watermark covers is held and sent again after a loss, a reconnect or a restart of the
     service. When the window is full a sample method waits, up to `send_timeout_s`.
 
-    A robot that is not closed does not keep its program from ending: what was sent is flushed for at most
-    a second then. One that is dropped flushes in the background.
+    A robot that is not closed does not keep its program from ending: what was sent is flushed for
+    at most a second then. One that is dropped flushes in the background.
 
     Args:
         space: Name of the space.
@@ -88,7 +90,9 @@ class Robot(Sampler):
             raise InvalidValue("connect", connect, "expected either connect or session", "both")
         check_name("space", space)
         check_name("agent", agent)
-        number = time.time_ns() if session_id is None else whole("session_id", session_id, COUNT_RANGE)
+        number = (
+            time.time_ns() if session_id is None else whole("session_id", session_id, COUNT_RANGE)
+        )
         limits = WindowLimits(
             capacity_samples=window_samples,
             capacity_bytes=window_bytes,
@@ -203,14 +207,15 @@ class Robot(Sampler):
 
     @property
     def rejections(self) -> Tuple[Rejection, ...]:
-        """Ranges of this session's samples that the service refused for good, by number; neighbours that
-        were refused for the same reason are one range."""
+        """Ranges of this session's samples that the service refused for good, by number; neighbours
+        that were refused for the same reason are one range."""
         with self._run.changed:
             return self._run.rejections.ranges
 
     def on_rejection(self, callback: Callable[[Rejection], object]) -> None:
-        """Calls `callback` for refused ranges, on the robot's own thread: once for each sample, together with
-        its neighbours, when no more has been refused for a quarter of a second, or after a second."""
+        """Calls `callback` for refused ranges, on the robot's own thread: once for each sample,
+        together with its neighbours, when no more has been refused for a quarter of a second, or
+        after a second."""
         self._listeners.rejections.append(callback)
 
     # Estimates
@@ -220,8 +225,8 @@ class Robot(Sampler):
 
         Args:
             timeout_s: Longest wait [s].
-            seq: Waits for an estimate that includes this sample: the number that the sample's method
-                returned. The estimate may include later samples too, as its own `seq` says.
+            seq: Waits for an estimate that includes this sample: the number that the sample's
+                method returned. The estimate may include later samples too, as its own `seq` says.
         """
         if seq is not None:
             with self._run.changed:

@@ -1,26 +1,34 @@
-"""One run of an agent: its samples on their way out, what comes back, and the thread that does both.
+"""One run of an agent: its samples on their way out, what comes back, and the thread that does
+both.
 
-A `Robot` owns its run, and not the other way round: the thread knows the robot's callbacks by a weak reference
-only. So a robot that a program drops is finalised, and its run ends after what was sent is flushed. At the end of
-the program all runs are ended in the same way, within a bound.
+A `Robot` owns its run, and not the other way round: the thread knows the robot's callbacks by a
+weak reference only. So a robot that a program drops is finalised, and its run ends after what was
+sent is flushed. At the end of the program all runs are ended in the same way, within a bound.
 """
 
 from __future__ import annotations
 
-import atexit
 import logging
 import threading
 import time
-import weakref
-from typing import Any, Callable, List, Optional, Set, Tuple
+from typing import Callable, Optional
 
 import zenoh
 
-from .answer import Estimate, Rejection, Watermark
+from .answer import Estimate, Watermark
 from .clock import SessionClock
 from .connection import Connection
-from .errors import Closed, SessionSuperseded, Timeout, Unreachable, WindowFull
+from .ending import begins, has_ended
+from .errors import (
+    CalledFromCallback,
+    Closed,
+    SessionSuperseded,
+    Timeout,
+    Unreachable,
+    WindowFull,
+)
 from .inbox import Inbox
+from .listeners import Listeners, WeakListeners
 from .problem import Problem
 from .rejection import Rejections, sentences
 from .sample import Sample, SampleBody, SessionEnd
@@ -36,24 +44,12 @@ _ESTIMATES_WAITING_MAX = 4096
 _ANSWERS_WAITING_MAX = 256
 #: How often the arrival of the service is looked for [s].
 _MATCH_POLL_S = 0.01
-#: How long a robot waits at its start for the watermark that the service has of it, and again before the first
-#: batch if none came [s].
+#: How long a robot waits at its start for the watermark that the service has of it, and again
+#: before the first batch if none came [s].
 _FIRST_ANSWER_S = 0.5
 _SECOND_ANSWER_S = 0.2
 #: How long a dropped robot's samples are flushed in the background [s].
 DROPPED_FLUSH_S = 10.0
-#: How long the samples of all robots are flushed at the end of the program [s], and how long they may take to
-#: leave Zenoh afterwards.
-_EXIT_FLUSH_S = 1.0
-_EXIT_CLOSE_S = 0.5
-
-
-class Listeners:
-    """The callbacks of a robot. The robot alone keeps them: a callback often keeps its robot."""
-
-    def __init__(self) -> None:
-        self.estimates: List[Callable[[Estimate], object]] = []
-        self.rejections: List[Callable[[Rejection], object]] = []
 
 
 class Run:
@@ -92,7 +88,9 @@ class Run:
         self.superseded_told = False
         self._superseded_by: Optional[int] = None
         self._problem: Optional[Problem] = None
-        self._listeners = weakref.ref(listeners)
+        # What Zenoh says of its session once that is closed.
+        self._broken: Optional[str] = None
+        self._listeners = WeakListeners(listeners)
         # When the thread ends at the latest, once it has been asked to.
         self._stop_at: Optional[float] = None
         self._is_known = False
@@ -125,9 +123,9 @@ class Run:
     def start(self) -> None:
         """Asks the service for the agent's watermark, and starts the thread.
 
-        If the service has samples of this session already, another run uses its number, and after the first
-        put nobody could tell whose they are. Without an answer the thread asks again: a robot may start
-        before its service.
+        If the service has samples of this session already, another run uses its number, and after
+        the first put nobody could tell whose they are. Without an answer the thread asks again: a
+        robot may start before its service.
 
         Raises `ApiError` when the service knows no such space; the run is closed then.
         """
@@ -135,7 +133,7 @@ class Run:
         if self._problem is not None:
             self.connection.close()
             raise self._problem.error(self.connection.where_asked)
-        _RUNNING.add(self)
+        begins(self)
         self._thread.start()
 
     # For the robot
@@ -143,7 +141,8 @@ class Run:
     def append(
         self, body: SampleBody, stamp_ns: Optional[int], deadline: float, accepted: int
     ) -> int:
-        """Takes a sample into the window and returns its number; waits for room until the deadline."""
+        """Takes a sample into the window and returns its number; waits for room until the
+        deadline."""
         by_clock = stamp_ns is None
         data = b"" if stamp_ns is None else encode_sample(Sample(stamp_ns, body))
         with self.changed:
@@ -170,7 +169,8 @@ class Run:
                 self.clock.take(seq, stamp_ns)
             due = self.window.ready(now)
         if due and self._may_send and self._publishing.acquire(blocking=False):
-            # A full batch leaves on the caller's thread, for the other one might wait long for its turn.
+            # A full batch leaves on the caller's thread, for the other one might wait long for its
+            # turn.
             try:
                 self._send_due()
             finally:
@@ -189,9 +189,10 @@ class Run:
             self.window.append(data, time.monotonic())
 
     def wait_durable(self, timeout_s: float) -> int:
-        """Waits until the watermark covers all samples; returns how many are missing after the time."""
+        """Waits until the watermark covers all samples; returns how many are missing after the
+        time."""
         if self.is_own_thread():
-            raise RuntimeError("a callback cannot wait for acknowledgements: they come after it")
+            raise CalledFromCallback("a callback cannot wait for watermarks: they come after it")
         with self.changed:
             target = self.window.next_seq
             self.window.hurry()
@@ -206,7 +207,7 @@ class Run:
     def wait_estimate(self, seq: Optional[int], timeout_s: float) -> Estimate:
         """Waits for an estimate, or for one that includes a sample."""
         if self.is_own_thread() and seq is not None:
-            raise RuntimeError("a callback cannot wait for an estimate: it comes after it")
+            raise CalledFromCallback("a callback cannot wait for an estimate: it comes after it")
         with self.changed:
             self.window.hurry()
             self._wake.set()
@@ -251,17 +252,19 @@ class Run:
         if self._superseded_by is not None:
             self.superseded_told = True
             raise SessionSuperseded(self.agent, self.session_id, self._superseded_by)
+        if self._broken is not None:
+            raise Unreachable(self._broken)
         if self._problem is not None:
             raise self._problem.error(self.connection.where_asked)
 
     def _is_refused(self) -> bool:
-        return self._superseded_by is not None or self._problem is not None
+        return self._is_useless() or self._problem is not None
 
     # The end
 
     def stop(self, flush_s: float) -> None:
-        """Lets the thread end as soon as everything is acknowledged, at the latest after `flush_s`. It waits for
-        nothing and takes no lock: a garbage collection may call it anywhere."""
+        """Lets the thread end as soon as everything is acknowledged, at the latest after `flush_s`.
+        It waits for nothing and takes no lock: a garbage collection may call it anywhere."""
         at = time.monotonic() + flush_s
         self._stop_at = at if self._stop_at is None else min(at, self._stop_at)
         self._wake.set()
@@ -295,19 +298,21 @@ class Run:
             self._tell_rejections(at_once=True)
             if self.window.pending and not self.closing:
                 missing, silence = self.window.pending, self.connection.silence()
-                _log.warning("%s: %d samples are lost, not acknowledged%s", self.agent, missing, silence)
+                _log.warning(
+                    "%s: %d samples are lost, not acknowledged%s", self.agent, missing, silence
+                )
             with self.changed:
                 self.closing = True
                 self.changed.notify_all()
             self.connection.close()
-            _RUNNING.discard(self)
+            has_ended(self)
 
     def _turn(self) -> None:
         self._receive()
         self._tell_rejections()
         if not self._may_send:
-            # A put before the subscriber is known is dropped on the way: so wait for it, but not for
-            # ever, since what is dropped is sent again.
+            # A put before the subscriber is known is dropped on the way: so wait for it, but not
+            # for ever, since what is dropped is sent again.
             is_heard = self.connection.is_heard()
             if not is_heard and time.monotonic() < self._match_deadline:
                 return
@@ -322,7 +327,7 @@ class Run:
             now = time.monotonic()
             if self._stop_at is not None:
                 self.window.hurry()
-            ask = not self._is_superseded() and self.window.watch(now)
+            ask = not self._is_useless() and self.window.watch(now)
             if self._is_back:
                 self._is_back = False
                 ask = self.window.rejoin(now) or self._problem is not None or ask
@@ -333,17 +338,25 @@ class Run:
 
     def _idle_s(self) -> Optional[float]:
         with self.changed:
-            if self._is_superseded():
+            if self._is_useless():
                 at = None
             elif not self._may_send:
                 return _MATCH_POLL_S
             else:
                 at = self.window.wake_at()
-            times = [one for one in (at, self.rejections.tell_at(), self._stop_at) if one is not None]
+            times = [
+                one for one in (at, self.rejections.tell_at(), self._stop_at) if one is not None
+            ]
         return max(0.0, min(times) - time.monotonic()) if times else None
 
-    def _is_superseded(self) -> bool:
-        return self._superseded_by is not None
+    def _is_useless(self) -> bool:
+        """Whether nothing will ever be acknowledged again."""
+        return self._superseded_by is not None or self._broken is not None
+
+    def _break(self, error: Unreachable) -> None:
+        with self.changed:
+            self._broken = str(error)
+            self.changed.notify_all()
 
     def _hear_matching(self, is_matching: bool) -> None:
         if not is_matching:
@@ -357,7 +370,7 @@ class Run:
         try:
             self.connection.ask_watermark(ended)
         except Unreachable as error:
-            _log.warning("%s", error)
+            self._break(error)
             ended()
 
     def _ask_and_wait(self, timeout_s: float) -> None:
@@ -374,27 +387,27 @@ class Run:
     def _send_due(self) -> None:
         while True:
             with self.changed:
-                if self._is_superseded() or not self._may_send:
+                if self._is_useless() or not self._may_send:
                     return
                 outgoing = self.window.take(time.monotonic())
             if outgoing is None:
                 return
             try:
-                self.connection.put(encode_batch(self.session_id, outgoing.first_seq, outgoing.samples))
+                self.connection.put(
+                    encode_batch(self.session_id, outgoing.first_seq, outgoing.samples)
+                )
             except Unreachable as error:
-                # The samples stay in the window; silence brings them back.
-                _log.warning("%s", error)
+                self._break(error)
                 return
 
     def _receive(self) -> None:
-        # Estimates first, and of the watermarks only those that are here by now: when a flush returns, the estimate
-        # published before is in place. What comes meanwhile wakes this thread again.
+        # Estimates first, and of the watermarks only those that are here by now: when a flush
+        # returns, the estimate published before is in place. What comes meanwhile wakes this thread
+        # again.
         watermarks = len(self._watermarks_in)
-        listeners = self._listeners()
-        callbacks = [] if listeners is None else list(listeners.estimates)
-        del listeners
+        wanted = self._listeners.want_estimates()
         while self._estimates_in:
-            if len(self._estimates_in) > 1 and not callbacks:
+            if len(self._estimates_in) > 1 and not wanted:
                 # Nobody asked for each one, and only the latest is kept: spare the decoding.
                 self._estimates_in.drop()
                 continue
@@ -403,8 +416,7 @@ class Run:
                 with self.changed:
                     self.estimate = estimate
                     self.changed.notify_all()
-                _call(callbacks, estimate)
-        del callbacks
+                self._listeners.hear_estimate(estimate)
         for _ in range(watermarks):
             watermark = self._watermarks_in.take()
             if watermark is not None:
@@ -421,8 +433,8 @@ class Run:
             if watermark.session < self.session_id:
                 # An earlier run of this agent; ours has not arrived yet.
                 return
-            # The service cannot have applied what this run never sent: that is of another run with our
-            # number. `applied` moves before `durable`, so it tells first.
+            # The service cannot have applied what this run never sent: that is of another run with
+            # our number. `applied` moves before `durable`, so it tells first.
             foreign = max(watermark.applied, watermark.durable) > self.window.sent
             if watermark.session > self.session_id or foreign:
                 self._superseded_by = max(watermark.session, self._superseded_by or 0)
@@ -456,35 +468,5 @@ class Run:
             return
         for sentence in sentences(told, stamps):
             _log.warning("%s: %s", self.agent, sentence)
-        listeners = self._listeners()
-        callbacks: List[Callable[[Rejection], object]] = (
-            [] if listeners is None else list(listeners.rejections)
-        )
-        del listeners
         for rejection in told:
-            _call(callbacks, rejection)
-
-
-def _call(callbacks: List[Callable[[Any], object]], argument: Any) -> None:
-    for callback in callbacks:
-        try:
-            callback(argument)
-        except Exception:  # An error of the user's callback must not end the robot's thread.
-            _log.exception("callback %r", callback)
-
-
-#: The runs whose threads have not ended.
-_RUNNING: Set[Run] = set()
-
-
-def _end_all() -> None:
-    """Ends all runs at the end of the program, after what was sent is flushed if the service is there."""
-    runs: Tuple[Run, ...] = tuple(_RUNNING)
-    for run in runs:
-        run.stop(_EXIT_FLUSH_S)
-    end = time.monotonic() + _EXIT_FLUSH_S + _EXIT_CLOSE_S
-    for run in runs:
-        run.join(max(0.0, end - time.monotonic()))
-
-
-atexit.register(_end_all)
+            self._listeners.hear_rejection(rejection)

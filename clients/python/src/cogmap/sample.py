@@ -12,6 +12,7 @@ from typing import ClassVar, Optional, Tuple, Union, get_args
 from .errors import InvalidValue
 from .key import check_name
 from .limits import (
+    BATCH_SAMPLES_MAX,
     DURATION_S_MAX,
     METRES_MAX,
     RADIANS_PER_SECOND_MAX,
@@ -20,7 +21,7 @@ from .limits import (
     SPACING_M_MIN,
     TOUCH_SD_MAX,
 )
-from .scalar import COUNT_RANGE, STAMP_RANGE, label, number, one_of, whole, within
+from .scalar import COUNT_RANGE, STAMP_RANGE, counted, label, number, one_of, whole, within
 from .vector import (
     IDENTITY,
     Quaternion,
@@ -447,7 +448,7 @@ class SampleBatch:
     def __post_init__(self) -> None:
         _set(self, "session", whole("session", self.session, COUNT_RANGE))
         _set(self, "first_seq", whole("first_seq", self.first_seq, COUNT_RANGE))
-        _set(self, "samples", tuple(self.samples))
+        _set(self, "samples", counted("samples", tuple(self.samples), BATCH_SAMPLES_MAX))
 
 
 def _check_noise(noise: Optional[MotionNoise]) -> None:

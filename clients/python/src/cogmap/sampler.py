@@ -35,8 +35,9 @@ class Sampler(ABC):
     Each returns the sample's sequence number. `stamp_ns` is the time on the sensor's clock; without it,
     the time of the call, though never before an earlier stamp of the session.
 
-    Any iterable of numbers is a vector, a numpy array included; the messages turn it into a tuple of
-    floats. A value that the service would refuse for good raises `InvalidValue`, and no sample is made.
+    Any iterable of numbers is a vector, a numpy array included; the messages turn it into a tuple
+    of floats. A value that the service would refuse for good raises `InvalidValue`, and no sample
+    is made.
     """
 
     def __init__(self, motion_noise: Optional[MotionNoise]) -> None:
@@ -60,7 +61,8 @@ class Sampler(ABC):
             translation_m: Displacement [m] in the body frame at its start: x forward, y left, z up.
             rotation_xyzw: Rotation, unit quaternion `[x, y, z, w]`.
             stamp_ns: When the displacement ended, on the sensor's clock [ns].
-            noise: Its standard deviations; the robot's `motion_noise`, or else the space's, when absent.
+            noise: Its standard deviations; the robot's `motion_noise`, or else the space's, when
+                absent.
         """
         body = Increment(
             cast(Vec3, translation_m),
@@ -85,8 +87,8 @@ class Sampler(ABC):
             angular_rad_s: Angular velocity about the body axes [rad/s]; z is positive to the left.
             duration_s: How long the twist was held, 0 to 3600 [s].
             stamp_ns: When it ended, on the sensor's clock [ns].
-            noise: Standard deviations of the resulting increment; the robot's `motion_noise`, or else the
-                space's, when absent.
+            noise: Standard deviations of the resulting increment; the robot's `motion_noise`, or
+                else the space's, when absent.
         """
         body = Velocity(
             cast(Vec3, linear_m_s),
@@ -108,7 +110,8 @@ class Sampler(ABC):
         """A scalar felt on a channel.
 
         Args:
-            channel: Name of the channel: 1 to 64 of `A-Z a-z 0-9 _ . -`, the first a letter or a digit.
+            channel: Name of the channel: 1 to 64 of `A-Z a-z 0-9 _ . -`, the first a letter or a
+                digit.
             value: The value, in the channel's own unit.
             offset_m: Where the sensor sits in the body frame [m].
             normal: Outward normal of the touched surface in the body frame, a unit vector.
@@ -140,10 +143,10 @@ class Sampler(ABC):
         """A target seen from the body.
 
         Args:
-            target: A landmark by its label, an `AgentTarget` by its name, or an `OwnSampleTarget`: where this
-                agent was at an earlier sample, a loop closure found outside.
-            relation: Where it was seen in the body frame, and how exactly: a `Position` [m], a `RangeBearing`
-                [m, rad] or a `RelativePose`.
+            target: A landmark by its label, an `AgentTarget` by its name, or an `OwnSampleTarget`:
+                where this agent was at an earlier sample, a loop closure found outside.
+            relation: Where it was seen in the body frame, and how exactly: a `Position` [m], a
+                `RangeBearing` [m, rad] or a `RelativePose`.
             stamp_ns: When it was seen, on the sensor's clock [ns].
         """
         if isinstance(target, str):

@@ -1,17 +1,20 @@
 """Numbers and texts as they cross the wire.
 
-They are checked when a message is made: the caller's own line is in the traceback then. A sample that the
-service could not even decode would besides make it refuse the whole batch, again and again.
+They are checked when a message is made: the caller's own line is in the traceback then. A sample
+that the service could not even decode would besides make it refuse the whole batch, again and
+again.
 """
 
 from __future__ import annotations
 
 import operator
 import unicodedata
-from typing import Tuple
+from typing import Tuple, TypeVar
 
 from .errors import InvalidValue
 from .limits import LABEL_BYTES_MAX
+
+_T = TypeVar("_T")
 
 STAMP_RANGE = (-(1 << 63), (1 << 63) - 1)
 COUNT_RANGE = (0, (1 << 64) - 1)
@@ -71,6 +74,13 @@ def label(name: str, value: str) -> str:
     if any(unicodedata.category(character) == "Cc" for character in value):
         raise InvalidValue(name, value, "expected a text without control characters")
     return value
+
+
+def counted(name: str, items: Tuple[_T, ...], most: int) -> Tuple[_T, ...]:
+    """`items`, if there is one at least, and not more than `most`."""
+    if not 1 <= len(items) <= most:
+        raise InvalidValue(name, items, f"expected 1 to {most} of them", str(len(items)))
+    return items
 
 
 def one_of(name: str, value: object, kinds: Tuple[type, ...]) -> None:

@@ -54,7 +54,8 @@ class Trajectory:
         return f"{self.kind} trajectory of {self.agent}: {len(self)} poses in {self.frame}"
 
     def stamps_ns(self) -> Integers:
-        """Times on the sensor's clock [ns], of shape (n,): an array where numpy is installed, else a tuple."""
+        """Times on the sensor's clock [ns], of shape (n,): an array where numpy is installed, else
+        a tuple."""
         return integers([pose.stamp_ns for pose in self.poses])
 
     def positions_m(self) -> Floats:
@@ -62,6 +63,6 @@ class Trajectory:
         return floats([pose.translation_m for pose in self.poses], len(self), 3)
 
     def rotations_xyzw(self) -> Floats:
-        """Orientations, unit quaternions `[x, y, z, w]`, of shape (n, 4): an array where numpy is installed, else
-        nested tuples."""
+        """Orientations, unit quaternions `[x, y, z, w]`, of shape (n, 4): an array where numpy is
+        installed, else nested tuples."""
         return floats([pose.rotation_xyzw for pose in self.poses], len(self), 4)

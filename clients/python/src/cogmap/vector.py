@@ -69,7 +69,9 @@ def quaternion(name: str, values: Iterable[float]) -> Quaternion:
 def _of_unit_norm(name: str, numbers: Tuple[float, ...], what: str) -> Tuple[float, ...]:
     norm = math.hypot(*numbers)
     if not abs(norm - 1.0) <= UNIT_TOLERANCE:
-        raise InvalidValue(name, numbers, f"expected a {what}", f"{numbers}, whose norm is {norm:.6g}")
+        raise InvalidValue(
+            name, numbers, f"expected a {what}", f"{numbers}, whose norm is {norm:.6g}"
+        )
     return numbers
 
 

@@ -10,7 +10,8 @@ that every loss and delay can be tested without a network. The rules:
 * When samples are outstanding and the watermark has not moved for `silence_s`, the watermark is asked
   for; if it does not move within `grace_s` either, everything from the watermark on is sent again. The
   wait doubles from time to time, up to `silence_max_s`, until the watermark moves.
-* When the service is back after it was gone, the watermark is asked for at once, and what it does not cover
+* When the service is back after it was gone, the watermark is asked for at once, and what it does
+not cover
   is sent again as soon as it comes, or after `grace_s`.
 """
 

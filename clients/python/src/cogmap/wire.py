@@ -31,8 +31,6 @@ JSON = "application/json"
 MESSAGE_BYTES_MAX = 1 << 20
 #: Room that a batch's own fields need in a message [bytes].
 _BATCH_HEAD_BYTES = 64
-#: Most samples in one batch.
-BATCH_SAMPLES_MAX = 4096
 
 #: Types that are plain data already.
 _PLAIN = frozenset((float, int, str, bool))
@@ -181,7 +179,8 @@ def encode_sample(sample: Sample) -> bytes:
     try:
         data = encode(sample)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidValue("sample", sample, f"expected one that can be written ({error})") from error
+        expected = f"expected one that can be written ({error})"
+        raise InvalidValue("sample", sample, expected) from error
     if len(data) + _BATCH_HEAD_BYTES > MESSAGE_BYTES_MAX:
         expected = f"expected at most {MESSAGE_BYTES_MAX - _BATCH_HEAD_BYTES} bytes"
         raise InvalidValue("sample", sample, expected, f"{len(data)}")
