@@ -29,8 +29,7 @@ impl<'a> Laid<'a> {
     pub(super) fn unrivalled(&self, pairs: &[(usize, usize)]) -> Vec<(usize, usize)> {
         let is_free_older = |at: usize| pairs.iter().all(|pair| pair.0 != at);
         let is_free_newer = |at: usize| pairs.iter().all(|pair| pair.1 != at);
-        let is_sure =
-            |pair: &&(usize, usize)| self.is_sure(**pair, &is_free_older, &is_free_newer);
+        let is_sure = |pair: &&(usize, usize)| self.is_sure(**pair, &is_free_older, &is_free_newer);
         pairs.iter().filter(is_sure).copied().collect()
     }
 
