@@ -51,7 +51,9 @@ test-python: $(VENV)/installed ## types and tests of the Python client, then the
 	cargo build $(ALL)
 	cd $(CLIENT) && $(VENV)/bin/mypy --strict
 	cd tests/python && $(VENV)/bin/mypy --strict .
+	cd tests/scorecard && $(VENV)/bin/mypy --strict .
 	cd $(CLIENT) && $(VENV)/bin/pytest
+	$(VENV)/bin/pytest tests/scorecard
 	$(VENV)/bin/pytest tests/python
 
 # A venv is made anew when what it has to hold changes.
@@ -80,6 +82,10 @@ bench: release ## the benchmarks, each beside its yardstick; ARGS="--json"
 	$(TARGET)/release/cogmap bench descriptors $(ARGS)
 	$(TARGET)/release/cogmap bench ingest $(ARGS)
 	$(TARGET)/release/cogmap bench http $(ARGS)
+
+.PHONY: scorecard
+scorecard: release ## figures of README and docs beside the committed card, half an hour; DATA=DIR with the data sets, ARGS="--quick", "--update"
+	$(PYTHON) tests/scorecard/scorecard.py --binary $(TARGET)/release/cogmap $(if $(DATA),--data '$(DATA)') $(ARGS)
 
 # Peers are large packages, so they have a venv of their own and no part in the gate.
 .PHONY: peers

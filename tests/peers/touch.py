@@ -97,7 +97,8 @@ def _noise(text: str) -> "tuple[float, float]":
 
 
 def _cogmap(args: argparse.Namespace, noise_mm: float, noise_level: float, out: Path) -> None:
-    command = [args.binary, "replay", "touch", args.directory, "--out", out, "--json"]
+    # Both know that touches are drawn from the whole object.
+    command = [args.binary, "replay", "touch", args.directory, "--told", "--out", out, "--json"]
     command += ["--noise-mm", str(noise_mm), "--noise-level", str(noise_level)]
     command += ["--trials", str(args.trials), "--max-touches", str(max(_AFTER))]
     command += ["--seed", str(args.seed)]

@@ -66,6 +66,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     level_sd: number(3, 0.5)?,
                 },
                 rotate: Rotate::None,
+                is_reach_told: false,
                 trials: count(number(4, 20.0)?),
                 touches_max: 12,
                 sure: 0.998,

@@ -1,4 +1,4 @@
-//! Recognition of point clouds: `points DIR [--contacts independent|walk|policy] [--learned N]
+//! Recognition of point clouds: `points DIR [--contacts independent|walk|policy] [--told yes|no] [--learned N]
 //! [--noise-mm X] [--noise-deg X] [--trials N] [--leave-out N] [--looks K,K,…] [--seed N]`; one JSON
 //! object on stdout.
 
@@ -24,6 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     _ => return Err("independent, walk or policy".into()),
                 }
             }
+            "--told" => settings.is_reach_told = value == "yes",
             "--learned" => settings.learned = value.parse()?,
             "--noise-mm" => settings.noise_m = value.parse::<f64>()? / 1e3,
             "--noise-deg" => settings.noise_rad = value.parse::<f64>()?.to_radians(),

@@ -54,11 +54,12 @@ fn views_are_measured_and_what_makes_no_sense_is_refused() {
 fn objects_are_told_apart_and_figures_are_written() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().to_str().unwrap();
-    let small = ["eval", "env3", "--objects", "2", "--trials", "8"];
+    let small = ["eval", "env3", "--objects", "2", "--trials", "100"];
     let report = run(&[&small[..], &["--json", "--out", out]].concat()).json();
     let number = |name: &str| report[name].as_f64().unwrap();
-    assert!(number("accuracy") > 0.6, "{report}");
-    assert!(number("steps_mean") < 30.0, "{report}");
+    // 99.5 % is claimed, after 6 touches. Of 100 more than 4 are wrong once in 5000 times.
+    assert!(number("accuracy") >= 0.96, "{report}");
+    assert!(number("steps_mean") < 9.0, "{report}");
     assert!(number("touch_us_p50") <= number("touch_us_p99"), "{report}");
     for name in ["unknown_rate", "false_known_rate", "steps_sd"] {
         assert!(report[name].is_number(), "{name} in {report}");
@@ -74,14 +75,21 @@ fn objects_are_told_apart_and_figures_are_written() {
 
 #[test]
 fn robots_that_wake_up_are_found_on_any_number_of_threads() {
-    let small = ["--trials", "2", "--trials-per-building", "1"];
-    let small = [&["eval", "waking"][..], &small, &["--explorer-steps", "60"]].concat();
+    let small = ["--trials", "4", "--trials-per-building", "2"];
+    let small = [
+        &["eval", "waking"][..],
+        &small,
+        &["--explorer-steps", "1000"],
+    ]
+    .concat();
     let report = |threads| run(&[&small[..], &["--json", "--threads", threads]].concat()).json();
     let alone = report("1");
     assert_eq!(alone, report("2"));
-    assert_eq!(alone["protocol"]["trials"], 2, "{alone}");
-    let share = alone["relocalised"].as_f64().unwrap();
-    assert!((0.0..=1.0).contains(&share), "{alone}");
+    assert_eq!(alone["protocol"]["trials"], 4, "{alone}");
+    // A way of 100 m leaves gaps: all are found, not all of them within 0.2 m.
+    assert_eq!(alone["uncertain"], 0, "{alone}");
+    let error_m = alone["error_m"]["p50"].as_f64().unwrap();
+    assert!(error_m < 0.2, "{alone}");
     // Nobody is put where it is not.
     assert_eq!(alone["false_claims"], 0, "{alone}");
     let table = run(&small);

@@ -205,6 +205,41 @@ fn four_false_matches_for_each_true_one_do_not_bend_a_recording() {
     assert_ne!(other["digest"], doubtful["digest"]);
 }
 
+/// The memory of a service gets the same recording as samples, with the default settings of a space.
+#[test]
+fn a_recording_goes_through_the_memory_as_samples() {
+    let home = TempDir::new().unwrap();
+    write_tuc(home.path());
+    let replay = |more: &[&str]| {
+        let args = ["replay", "tuc", text(home.path()), "--samples", "--json"];
+        run(&[&args[..], more].concat()).json()
+    };
+    let clean = replay(&[]);
+    // A start pose, 600 motions and 81 matches.
+    assert_eq!(
+        (&clean["samples"], &clean["matches"]),
+        (&682.into(), &81.into())
+    );
+    let error = "/refined_aligned_ate_rmse_m";
+    assert!(number(&clean, error) < 0.3, "{clean}");
+    assert!(
+        number(&clean, "/causal_aligned_ate_rmse_m") < 1.0,
+        "{clean}"
+    );
+    let doubtful = replay(&["--add-false", "0.8", "--seed", "7"]);
+    assert!(
+        number(&doubtful, error) < number(&clean, error) + 0.15,
+        "{doubtful}"
+    );
+    assert_eq!(replay(&[])["digest"], clean["digest"]);
+    let refused = run(&[
+        &["replay", "tuc", "--samples", "--no-causal"][..],
+        &[text(home.path())],
+    ]
+    .concat());
+    assert_eq!(refused.code(), 2, "{refused:?}");
+}
+
 #[test]
 fn trees_correct_a_car() {
     let home = TempDir::new().unwrap();

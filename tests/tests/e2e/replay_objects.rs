@@ -42,6 +42,8 @@ fn touched_objects_are_recognised_and_their_touches_written() {
     for name in ["steps_mean", "wrong_rate", "unknown_rate", "accuracy"] {
         assert!(report[name].is_number(), "{name} in {report}");
     }
+    let told = run(&[&arguments[..], &["--told"]].concat()).json();
+    assert!(told["top1_after"]["6"].as_f64().unwrap() > 0.9, "{told}");
     let trials = fs::read_to_string(out.join("trials.csv")).unwrap();
     assert_eq!(trials.lines().count(), 1 + 3 * 4 * 6);
     let refused = run(&[&arguments[..], &["--noise-mm", "-2"]].concat());

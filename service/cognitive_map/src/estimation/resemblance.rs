@@ -4,7 +4,9 @@ use std::cmp::Reverse;
 
 use nalgebra::Isometry3;
 
-use super::constellation::{GATE, Likeness, SOUGHT_MAX, Star, apart_m, likeness, mean_variance};
+use super::constellation::{
+    GATE, Likeness, SOUGHT_MAX, SURE_MARGIN, Star, apart_m, likeness, mean_variance,
+};
 use super::estimator::{Estimator, MAP};
 use super::frame::{Frame, Mark};
 use super::tie::{Pair, tie};
@@ -18,8 +20,6 @@ const LOOK_EVERY: u64 = 31;
 const LOOKS_MIN: u32 = 3;
 /// Rounds of looking whether pairs of twins fit better crosswise.
 const CROSSED_ROUNDS: usize = 3;
-/// Difference of squared distances over the variance from which it is sure which of two landmarks is meant: 400 to 1.
-const SURE_MARGIN: f64 = 12.0;
 /// Landmarks of the older frame among which others are sought, in the plane and in space, where it takes three to a motion.
 const KNOWN_MAX: (usize, usize) = (64, 32);
 /// Most pairs of frames of which it is remembered what was found.

@@ -71,4 +71,4 @@ pub use episode::Recognition;
 pub use library::{ObjectId, ObjectLibrary};
 pub use model::{LevelMemory, ModelPlace, ModelSettings, ObjectModel};
 pub use orientation::Orientation;
-pub use posterior::{PoseEstimate, Posterior, Verdict};
+pub use posterior::{PoseEstimate, Posterior, SURE, Verdict};

@@ -6,7 +6,7 @@ use super::library::ObjectId;
 use crate::geometry::PoseCovariance;
 
 /// Least probability at which an answer is given: one in two hundred such answers may be wrong.
-const SURE: f64 = 0.995;
+pub const SURE: f64 = 0.995;
 
 /// Answer of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -472,7 +472,11 @@ fn numbers_of_any_size_stop_nothing() {
                 let sum = posterior.objects.iter().map(|object| object.1).sum::<f64>();
                 let all = sum + posterior.unknown;
                 assert!((all - 1.0).abs() < 1e-6, "{all} of world {world}");
-                let _ = recognition.next_touch(&library);
+                if let Some(next) = recognition.next_touch(&library) {
+                    let point = next.point_m.coords;
+                    assert!(next.gain_nats > 0.0, "{next:?} of world {world}");
+                    assert!(point.norm() < 1e7, "{next:?} of world {world}");
+                }
             }
         }
     }

@@ -7,10 +7,6 @@ use crate::world::OdometryNoise;
 
 /// The paper's probability of a new place at a step (Sections 4.1, 4.2 and 5.1 C).
 pub const PAPER_P_NEW: f64 = 0.05;
-/// Most places that the map of an experiment holds: some hundred times as many as the paper's. Its
-/// memory "levels off"; what levels ours is the budget, as a walk of the paper's length discovers new
-/// places to its end.
-pub const PLACES_MAX: u32 = 2048;
 /// Most steps of a walk: three years at 10 Hz; stamps stay far from their limit.
 const STEPS_MAX: u64 = 1_000_000_000;
 
@@ -131,7 +127,6 @@ impl Protocol {
                 recruitment: Recruitment::Bernoulli {
                     probability: PAPER_P_NEW,
                 },
-                places_max: PLACES_MAX,
                 ..SettingsValues::default()
             },
             percept: Percept::None,

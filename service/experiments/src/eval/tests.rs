@@ -338,11 +338,20 @@ fn figures_are_whole_and_name_the_paper() {
 #[test]
 fn views_of_places_seen_before_refine_the_walk_and_its_graph_can_be_read() {
     let mut protocol = protocol_with_views();
-    protocol.steps = 600;
-    let experiment = Experiment::run(&protocol, 1, 11, NonZeroUsize::MIN, &|_| {}).unwrap();
+    protocol.steps = 2000;
+    let experiment = Experiment::run(&protocol, 2, 11, NonZeroUsize::MIN, &|_| {}).unwrap();
     let report = Report::of(&experiment);
-    assert!(report.mean("closures").unwrap() >= 0.0);
-    assert!(report.mean("refined_ate_rmse_m").unwrap() > 0.0);
+    let mean = |measure: &str| report.mean(measure).unwrap();
+    // Ways hardly meet in three dimensions; what is found of them halves the drift.
+    assert!(mean("closures") >= 10.0, "{report:?}");
+    let [drift_m, causal_m, refined_m] = [
+        "dead_reckoning_ate_rmse_m",
+        "causal_ate_rmse_m",
+        "refined_ate_rmse_m",
+    ]
+    .map(mean);
+    assert!(causal_m < 0.75 * drift_m, "{report:?}");
+    assert!(refined_m < 0.6 * drift_m, "{report:?}");
     let path = experiment.path().unwrap();
     let text = crate::g2o::write_g2o(&path.experience);
     let graph = crate::g2o::PoseGraph::read(&text).unwrap();

@@ -1,7 +1,7 @@
 //! The format, and a graph whose optimum another solver has found.
 
 use cognitive_map::experience::InvalidInformation;
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 
 use super::{G2oError, LineReason, PoseGraph, Reference, ReferenceError};
@@ -219,7 +219,27 @@ fn a_reference_is_read_by_id() {
 
 proptest! {
     #[test]
-    fn any_text_is_answered(text in "(EDGE_SE2|VERTEX_SE2|EDGE_SE3:QUAT|EDGE_SE2_XY|FIX|[-+0-9.e# \n]{0,9}){0,20}") {
-        let _ = PoseGraph::read(&text);
+    fn what_is_read_of_any_text_hangs_together(
+        lines in prop::collection::vec("(EDGE_SE2|VERTEX_SE2|FIX|EDGE_SE2_XY|EDGE_SE3:QUAT)( [0-3]| 1e9| -0.5){1,12}", 0..4),
+        noise in "[-+0-9.eE_FIXDGS# ]{0,9}",
+    ) {
+        let text = lines.join("\n") + &noise;
+        if let Ok(graph) = PoseGraph::read(&text) {
+            for edge in graph.edges() {
+                prop_assert!(graph.poses().contains_key(&edge.from) && graph.poses().contains_key(&edge.to));
+            }
+            let finite = |pose: &Isometry3<f64>| pose.translation.vector.iter().all(|x| x.is_finite());
+            prop_assert!(graph.poses().values().all(finite));
+        }
+    }
+
+    #[test]
+    fn any_text_is_answered_and_nothing_is_made_up(
+        text in "(EDGE_SE2|VERTEX_SE2|EDGE_SE3:QUAT|EDGE_SE2_XY|FIX|[-+0-9.e# \n]{0,9}){0,20}",
+    ) {
+        if let Ok(graph) = PoseGraph::read(&text) {
+            let n_words = text.split_whitespace().count();
+            prop_assert!(graph.poses().len() + graph.edges().len() <= n_words);
+        }
     }
 }

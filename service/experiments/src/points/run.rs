@@ -31,6 +31,8 @@ const OFFSET_M: f64 = 1.0;
 pub struct PointsSettings {
     /// How contacts of a trial come about.
     pub exploration: Exploration,
+    /// Whether contacts say how they were come by. If not they count as found, as an agent's do; who asks over HTTP may say it.
+    pub is_reach_told: bool,
     /// Contacts by which each object is learned.
     pub learned: usize,
     /// Standard deviation of a contact's position, per axis \[m\].
@@ -51,6 +53,7 @@ impl Default for PointsSettings {
     fn default() -> Self {
         Self {
             exploration: Exploration::Independent,
+            is_reach_told: false,
             learned: 1000,
             noise_m: 0.002,
             noise_rad: 2.0 * PI / 180.0,
@@ -223,10 +226,12 @@ impl Scene<'_> {
                 _ => probe.anywhere(&mut rng),
             };
             let mut contact = felt(cloud, at, &episode_from_object, self.settings, &mut rng);
-            if next.is_some() {
-                contact = contact.aimed();
-            } else if self.settings.exploration != Exploration::Walk {
-                contact = contact.drawn();
+            if self.settings.is_reach_told {
+                contact = match (&next, self.settings.exploration) {
+                    (Some(_), _) => contact.aimed(),
+                    (None, Exploration::Walk) => contact,
+                    (None, _) => contact.drawn(),
+                };
             }
             let before = (self.clock)();
             recognition.touch(library, contact);

@@ -23,6 +23,9 @@ pub struct TouchProtocol {
     pub noise: TouchNoise,
     /// Which turns the objects may have made since they were learned.
     pub rotate: Rotate,
+    /// Whether touches say that they were drawn from the whole object. If not they count as found, as an agent's do; who asks over HTTP
+    /// may say it.
+    pub is_reach_told: bool,
     /// Explorations of each object.
     pub trials: u32,
     /// Most touches of an exploration.
@@ -162,7 +165,15 @@ fn explore(
     let trace = Trace::follow(
         library,
         &protocol.rotate.orientation(),
-        touches.map(|touch| contact(touch, position_sd_m, level_sd)),
+        touches.map(|touch| {
+            let contact = contact(touch, position_sd_m, level_sd);
+            // In random order, from anywhere to anywhere.
+            if protocol.is_reach_told {
+                contact.drawn()
+            } else {
+                contact
+            }
+        }),
         Some(object_id(number)),
         Ending {
             sure: protocol.sure,
@@ -178,8 +189,5 @@ fn explore(
 }
 
 fn contact(touch: &Touch, position_sd_m: f64, level_sd: f64) -> Contact {
-    // In random order, from anywhere to anywhere.
-    Contact::at(touch.position_m, position_sd_m)
-        .with_level(CHANNEL, touch.level, level_sd)
-        .drawn()
+    Contact::at(touch.position_m, position_sd_m).with_level(CHANNEL, touch.level, level_sd)
 }

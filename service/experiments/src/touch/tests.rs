@@ -132,6 +132,7 @@ fn protocol(position_sd_m: f64, rotate: Rotate) -> TouchProtocol {
             level_sd: 0.2,
         },
         rotate,
+        is_reach_told: false,
         trials: 5,
         touches_max: 8,
         sure: 0.99,

@@ -153,7 +153,7 @@ impl Tuc {
     }
 
     /// The step that ended next to a moment; of two equally near ones the earlier.
-    pub(super) fn step_at(&self, stamp_ns: i64) -> usize {
+    pub fn step_at(&self, stamp_ns: i64) -> usize {
         let after = self.steps.partition_point(|step| step.stamp_ns < stamp_ns);
         let candidates = after.saturating_sub(1)..(after + 1).min(self.steps.len());
         let nearest = candidates.min_by_key(|&step| self.steps[step].stamp_ns.abs_diff(stamp_ns));

@@ -22,9 +22,11 @@ fn few(trials: u32) -> WakingProtocol {
 #[test]
 fn robots_find_out_where_they_woke_up() {
     let report = run(&few(4));
-    assert!(report.relocalised >= 0.5, "{report:?}");
+    // 98.5 % are claimed, after 1 m and 0.06 m off, where the explorer went farther. Of 4 two are missed once in 700 times.
+    assert!(report.relocalised >= 0.75, "{report:?}");
     assert_eq!(report.false_claims, 0);
-    assert!(report.travel_m.p50.unwrap() < 3.0);
+    assert!(report.travel_m.p50.unwrap() < 2.0, "{report:?}");
+    assert!(report.error_m.p50.unwrap() < 0.12, "{report:?}");
 }
 
 #[test]

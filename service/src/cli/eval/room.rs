@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use cogmap_experiments::eval::{
-    Environment, Experiment, PAPER_P_NEW, PLACES_MAX, Percept, Protocol, Report, SightingSettings,
-    Table, ViewSettings, Walk, figures,
+    Environment, Experiment, PAPER_P_NEW, Percept, Protocol, Report, SightingSettings, Table,
+    ViewSettings, Walk, figures,
 };
 use cogmap_experiments::g2o::write_g2o;
 use cogmap_experiments::metrics::StampedPose;
@@ -67,9 +67,9 @@ pub(in crate::cli) struct RoomArgs {
     /// Distance at which a place's confidence is one half [m]; the default of a space when absent.
     #[arg(long, value_name = "M")]
     field_radius_m: Option<f64>,
-    /// Most places in memory; for one more the weakest is forgotten.
-    #[arg(long, default_value_t = PLACES_MAX, value_name = "N")]
-    places_max: u32,
+    /// Most places in memory, for one more the weakest is forgotten; the default of a space when absent.
+    #[arg(long, value_name = "N")]
+    places_max: Option<u32>,
     /// Steps of 0.1 m in each run; the paper's number when absent.
     #[arg(long)]
     steps: Option<u64>,
@@ -167,7 +167,7 @@ fn protocol(environment: Environment, args: &RoomArgs) -> Protocol {
             grid_modules: args.grid_modules.unwrap_or(default.grid_modules),
             grid_spacing_m: args.grid_spacing_m.unwrap_or(default.grid_spacing_m),
             grid_ratio: args.grid_ratio.unwrap_or(default.grid_ratio),
-            places_max: args.places_max,
+            places_max: args.places_max.unwrap_or(default.places_max),
             field_radius_m: args.field_radius_m.unwrap_or(default.field_radius_m),
             ..default
         },

@@ -12,6 +12,7 @@ mod recorded;
 mod recorded_report;
 mod touch;
 mod tuc;
+mod tuc_samples;
 mod victoria;
 
 use clap::Subcommand;

@@ -19,6 +19,10 @@ pub(in crate::cli) struct PointsArgs {
     /// How contacts come about.
     #[arg(long, value_enum, default_value = "independent")]
     contacts: Contacts,
+    /// Contacts say whether they were drawn from the whole surface or asked for, as those of a question over HTTP may; otherwise
+    /// they count as found, as those of an agent do.
+    #[arg(long)]
+    told: bool,
     /// Contacts by which each object is learned.
     #[arg(long, default_value_t = 1000, value_name = "N")]
     learned: usize,
@@ -64,6 +68,7 @@ pub(super) fn run(args: &PointsArgs) -> anyhow::Result<()> {
             Contacts::Walk => Exploration::Walk,
             Contacts::Policy => Exploration::Policy,
         },
+        is_reach_told: args.told,
         learned: args.learned,
         noise_m: args.noise_mm * M_PER_MM,
         noise_rad: args.noise_deg.to_radians(),

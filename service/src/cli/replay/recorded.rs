@@ -29,7 +29,7 @@ pub(super) struct RecordedArgs {
     plot: bool,
     /// Print one JSON object.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// What is known of where the robot was.

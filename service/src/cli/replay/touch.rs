@@ -10,6 +10,8 @@ use cogmap_experiments::touch::{
     TouchExperiment, TouchNoise, TouchProtocol, TouchReport, TouchSet,
 };
 
+use cognitive_map::recognition::SURE;
+
 use crate::cli::eval::{Progress, Turns};
 use crate::cli::output;
 
@@ -35,8 +37,12 @@ pub(in crate::cli) struct TouchArgs {
     /// Which turns the objects may have made since they were learned.
     #[arg(long, value_enum, default_value = "none")]
     rotate: Turns,
+    /// Touches say that they were drawn from the whole object, as those of a question over HTTP may; otherwise they count as found, as
+    /// those of an agent do.
+    #[arg(long)]
+    told: bool,
     /// An answer is given as soon as its probability is this high.
-    #[arg(long, default_value_t = 0.99, value_name = "P")]
+    #[arg(long, default_value_t = SURE, value_name = "P")]
     sure: f64,
     /// Seed of the order of touches, of noise and of where the object is.
     #[arg(long, default_value_t = 1)]
@@ -60,6 +66,7 @@ pub(super) fn run(args: &TouchArgs) -> anyhow::Result<()> {
             level_sd: args.noise_level,
         },
         rotate: args.rotate.into(),
+        is_reach_told: args.told,
         trials: args.trials,
         touches_max: args.max_touches,
         sure: args.sure,

@@ -7,6 +7,7 @@ use cogmap_experiments::metrics::Alignment;
 use cogmap_experiments::tuc::Tuc;
 
 use super::recorded::{self, Case, RecordedArgs, Truth};
+use super::tuc_samples;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct TucArgs {
@@ -18,6 +19,10 @@ pub(in crate::cli) struct TucArgs {
     /// Seed of the false matches.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Send odometry and matches as samples through the memory that a service keeps, with the default settings of a space, instead
+    /// of straight into the solver.
+    #[arg(long, conflicts_with_all = ["no_causal", "out", "plot"])]
+    samples: bool,
     #[command(flatten)]
     recorded: RecordedArgs,
 }
@@ -30,6 +35,9 @@ pub(super) fn run(args: &TucArgs) -> anyhow::Result<()> {
     }
     let n_true = matches.iter().filter(|found| set.is_true(found)).count();
     let n = matches.len();
+    if args.samples {
+        return tuc_samples::run(&set, &matches, args.recorded.json);
+    }
     let case = Case {
         title: "Odometry and place matches".to_owned(),
         recording: &set.recording(&matches),

@@ -4,7 +4,7 @@
 //! hypotheses   rigid motions that lay two landmarks of one frame (three in space) over two of the other which are as
 //!              far from one another, within the deviations of both distances
 //! twins        landmarks that a motion lays within their deviations of one another, one to one; the motion is fitted to
-//!              them and the twins are sought again
+//!              those in which no other landmark may be meant, and they are sought again
 //! chance       H · m · P(at least k − 2 of m − 2 are so near by chance), the least over k; in space k − 3 of m − 3
 //! ```
 //!
@@ -15,6 +15,7 @@
 //! such hypotheses). Landmarks in a regular order are no matter of chance: so no other motion may explain nearly as much.
 //! A mirrored constellation is another one, and nothing is believed that it would explain better.
 
+mod ambiguity;
 mod candidates;
 mod chance;
 mod groups;
@@ -24,6 +25,7 @@ mod sky;
 use nalgebra::{Isometry3, Point3};
 
 use crate::geometry::align;
+use ambiguity::Laid;
 use candidates::candidates;
 use chance::{Tried, log10_by_chance};
 use groups::{groups, n_different, n_hypotheses, one_by_group};
@@ -37,6 +39,8 @@ pub(super) use sky::Sky;
 pub(super) const SOUGHT_MAX: usize = 24;
 /// Deviations within which two landmarks, or two distances, may be the same.
 pub(super) const GATE: f64 = 3.0;
+/// Difference of squared distances over the variance from which it is sure which of two landmarks is meant: 400 to 1.
+pub(super) const SURE_MARGIN: f64 = 12.0;
 /// Fewest twins between planar frames, and between frames in space.
 const TWINS_MIN: (usize, usize) = (5, 6);
 /// Log₁₀ of the expected number of motions that are as good by chance, for one to be believed.
@@ -68,8 +72,8 @@ pub(super) struct Star {
 pub(super) struct Likeness {
     /// Pose of the newer frame in the older one.
     pub(super) pose: Isometry3<f64>,
-    /// Numbers of the landmarks that lie over one another, in the older and in the newer frame. Of landmarks close together it is
-    /// open which is which.
+    /// Numbers of the landmarks that lie over one another, in the older and in the newer frame. Of two pairs close together it is
+    /// open which is which; a pair in which a landmark of no pair may be meant is left out.
     pub(super) twins: Vec<(usize, usize)>,
     /// Log₁₀ of the expected number of motions as good as this one by chance.
     pub(super) log10_chance: f64,
@@ -109,9 +113,11 @@ pub(super) fn likeness(older: &[Star], newer: &[Star], is_planar: bool) -> Optio
     if rival.is_some_and(|rival| rival.log10_chance < best.log10_chance - MIRRORED_MAX) {
         return None;
     }
-    for twin in &mut best.twins {
-        *twin = (older_at[twin.0], newer_at[twin.1]);
-    }
+    let twins = Laid::new(&best.pose, &older, &newer).unrivalled(&best.twins);
+    best.twins = twins
+        .iter()
+        .map(|&(one, other)| (older_at[one], newer_at[other]))
+        .collect();
     Some(best)
 }
 
@@ -198,7 +204,8 @@ pub(super) fn apart_m(one: &Isometry3<f64>, other: &Isometry3<f64>, stars: &[Sta
     stars.iter().map(apart).fold(0.0, f64::max)
 }
 
-/// Fits a motion to its twins and seeks them again, until nothing changes.
+/// Fits a motion to its twins and seeks them again, until nothing changes. Twins in which another landmark may be meant are left out
+/// of the fit as long as the others alone are enough for a motion to be believed.
 fn settle(
     mut pose: Isometry3<f64>,
     sky: &Sky<'_>,
@@ -206,6 +213,7 @@ fn settle(
     newer: &[Star],
     is_planar: bool,
 ) -> Option<(Isometry3<f64>, Vec<Twin>)> {
+    let twins_min = if is_planar { TWINS_MIN.0 } else { TWINS_MIN.1 };
     let mut twins = Vec::new();
     for round in 0..ROUNDS {
         // At first the motion is only that of two or three landmarks.
@@ -216,11 +224,21 @@ fn settle(
         };
         sky.pairs(&pose, newer, &|_| spread, &mut twins);
         one_to_one(&mut twins);
-        let pairs: Vec<_> = twins
+        let all: Vec<_> = twins.iter().map(|twin| (twin.older, twin.newer)).collect();
+        let unambiguous = Laid::new(&pose, older, newer).unambiguous(&all);
+        let fitted = if unambiguous.len() >= twins_min {
+            unambiguous
+        } else {
+            all
+        };
+        let pairs: Vec<_> = fitted
             .iter()
-            .map(|twin| (older[twin.older].position, newer[twin.newer].position))
+            .map(|&(one, other)| (older[one].position, newer[other].position))
             .collect();
-        let weights: Vec<f64> = twins.iter().map(|twin| 1.0 / twin.variance).collect();
+        let weights: Vec<f64> = fitted
+            .iter()
+            .map(|&(one, other)| 1.0 / (older[one].variance + newer[other].variance))
+            .collect();
         pose = align(&pairs, &weights, is_planar)?;
     }
     sky.pairs(&pose, newer, &|_| 0.0, &mut twins);

@@ -30,9 +30,18 @@ fn exact_and_partly_erased_codes_recall_the_right_place() {
         assert!(row.right >= 1.0 && row.right_worst >= 1.0, "{row:?}");
         assert!(row.beyond_half_m <= 0.0);
     }
-    for row in &report.rows {
-        assert!(row.right_worst <= row.right && row.right <= 1.0);
-        assert!(row.right + row.beyond_half_m <= 1.0 && row.rivals >= 0.0);
+    assert!(report.row("whole").unwrap().rivals <= 0.0);
+    // Noise of 5 % is claimed to leave 99.9 % right, and 97 % with two modules erased.
+    for (condition, least) in [
+        ("jittered", 1.0),
+        ("noisy", 0.95),
+        ("noisy, two erased", 0.9),
+    ] {
+        let row = report.row(condition).unwrap();
+        assert!(
+            row.right >= least && row.right_worst <= row.right,
+            "{row:?}"
+        );
     }
     let queries: u64 = report.rows.iter().map(|row| row.queries).sum();
     assert_eq!(recalled.into_inner(), queries);

@@ -1,5 +1,7 @@
 //! What is done with how many objects.
 
+use cognitive_map::recognition::SURE;
+
 use crate::eval::object::Rotate;
 use crate::objects::ExplorationNoise;
 
@@ -21,7 +23,7 @@ pub struct ObjectProtocol {
     pub trials: u32,
     /// Most touches of an exploration.
     pub touches_max: usize,
-    /// An answer is given as soon as its probability is this high.
+    /// An answer is given as soon as its probability is this high; [`SURE`] is the service's.
     pub sure: f64,
     /// Most touches of each object while learning.
     pub learning_touches: usize,
@@ -68,7 +70,7 @@ impl ObjectProtocol {
             normals: Normals::Untold,
             trials: 1000,
             touches_max: 200,
-            sure: 0.9995,
+            sure: SURE,
             learning_touches: 10_000,
             seed: 1,
         }
