@@ -25,6 +25,7 @@ mod mooring;
 mod names;
 mod refine;
 mod relocalisation;
+mod removal;
 mod revisit;
 mod revisited;
 mod settings;

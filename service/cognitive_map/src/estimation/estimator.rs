@@ -190,8 +190,7 @@ impl Estimator {
                 frame.covariance.set_diagonal(member.offset, own);
             }
         }
-        self.pending
-            .retain(|pending| pending.observer != agent && pending.target != agent);
+        self.forget_pending(agent);
     }
 
     /// An agent moved.
@@ -305,7 +304,7 @@ impl Estimator {
     }
 
     /// Takes an agent out of its frame's joint estimate, without a place of its own for now.
-    fn leave(&mut self, agent: u32) -> Option<(usize, Arc<Traveller>)> {
+    pub(super) fn leave(&mut self, agent: u32) -> Option<(usize, Arc<Traveller>)> {
         let number = self.frame_of(agent)?;
         let traveller = match self.seat_mut(agent).apart.take() {
             Some(apart) => apart.traveller,
