@@ -38,7 +38,10 @@ pub use answer::{
 pub use codec::{CBOR, Codec, DecodeError, JSON, POSTCARD_V1};
 pub use estimate::{Estimate, Status};
 pub use event::{Event, EventKind, PerceptKind, TripEnd};
-pub use key::{AgentKey, KeyError, durable_key, estimate_key, events_key, query_key, samples_key};
+pub use key::{
+    AgentKey, KeyError, SESSION_PARAMETER, durable_key, estimate_key, events_key, query_key,
+    samples_key,
+};
 pub use localize::{Localization, LocalizationHypothesis, LocalizeQuery, LocalizedPose};
 pub use name::{Name, NameError};
 pub use object::{

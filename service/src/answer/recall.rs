@@ -144,10 +144,11 @@ fn code(map: &CognitiveMap, phases: &[Option<[f64; 3]>]) -> Result<PartialCode, 
     Ok(PartialCode::new(map.modules(), phases.collect())?)
 }
 
-/// An agent by its name. Spaces have at most some thousand agents, so a scan will do.
+/// An agent by its name; where there is none now, the latest one that was removed. Spaces have at most some
+/// thousand agents, so a scan will do.
 fn agent_by_name(map: &CognitiveMap, name: &str) -> Option<AgentId> {
-    let mut agents = map.agents();
-    agents
-        .find(|(_, agent)| agent.name().as_str() == name)
+    map.agents_ever()
+        .filter(|(_, agent)| agent.name().as_str() == name)
+        .max_by_key(|(id, agent)| (agent.is_enrolled(), *id))
         .map(|(id, _)| id)
 }

@@ -41,17 +41,19 @@ pub(crate) enum Drop {
     SpaceClosed,
     TooManyAgents,
     StaleSession,
+    SessionInFuture,
     StoreFailed,
 }
 
 impl Drop {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::BadKey,
         Self::UnknownSpace,
         Self::QueueFull,
         Self::SpaceClosed,
         Self::TooManyAgents,
         Self::StaleSession,
+        Self::SessionInFuture,
         Self::StoreFailed,
     ];
 
@@ -63,6 +65,7 @@ impl Drop {
             Self::SpaceClosed => "space_closed",
             Self::TooManyAgents => "too_many_agents",
             Self::StaleSession => "stale_session",
+            Self::SessionInFuture => "session_in_future",
             Self::StoreFailed => "store_failed",
         }
     }
@@ -126,6 +129,7 @@ pub(crate) struct SpaceCounters {
     places: Gauge,
     trips: Gauge,
     landmarks: Gauge,
+    made_room: Counter,
     forgotten_places: Counter,
     forgotten_trips: Counter,
 }
@@ -151,6 +155,7 @@ impl SpaceCounters {
             places: gauge!(names::PLACES, "space" => label()),
             trips: gauge!(names::TRIPS, "space" => label()),
             landmarks: gauge!(names::LANDMARKS, "space" => label()),
+            made_room: counter!(names::AGENTS_MADE_ROOM, "space" => label()),
             forgotten_places: counter!(names::FORGOTTEN_PLACES, "space" => label()),
             forgotten_trips: counter!(names::FORGOTTEN_TRIPS, "space" => label()),
         }
@@ -185,6 +190,11 @@ impl SpaceCounters {
     /// Counts samples that waited for earlier ones when their session was taken over.
     pub(crate) fn abandoned(&self, samples: usize) {
         self.abandoned.increment(samples as u64);
+    }
+
+    /// Counts an agent that was removed so that another one could enrol.
+    pub(crate) fn made_room(&self) {
+        self.made_room.increment(1);
     }
 
     /// Forgets the sizes of a space that is gone.

@@ -24,6 +24,7 @@ mod readout;
 mod recovery;
 mod refinement;
 mod sequencer;
+mod session_bound;
 mod settings;
 mod space;
 mod surprise;

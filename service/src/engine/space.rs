@@ -10,21 +10,22 @@ use arc_swap::ArcSwapOption;
 use cogmap_proto::{
     Codec, Event, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings, Trajectory,
 };
-use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
+use cognitive_map::{AgentId, CognitiveMap, Label, Lesson, Settings};
 use tokio::sync::{broadcast, oneshot};
 
 use super::checkpointer::{Checkpointer, Job};
 use super::committer::Commit;
 use super::desk::AgentDesk;
 use super::health::Health;
-use super::message::{Call, IngestError, ObjectRequest, Request};
+use super::message::{Call, IngestError, ObjectRequest, RemovalRequest, Request};
 use super::outlet::Outlet;
 use super::question::QuestionRoom;
 use super::queue::{Inbox, NotQueued, Queue, queue};
 use super::recovery;
 use super::refinement::Refinements;
+use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
-use super::trajectory;
+use super::trajectory::{self, Part, Window};
 use super::writer::Writer;
 use crate::store::{SpaceNumber, Store, StoreError};
 
@@ -47,6 +48,7 @@ pub(crate) struct Shared {
     pub(crate) number: SpaceNumber,
     pub(crate) interval_ns: i64,
     pub(crate) agents_max: usize,
+    pub(crate) sessions: SessionBound,
     pub(crate) reorder_window: usize,
     pub(crate) gap_timeout: Duration,
     pub(crate) store: Arc<dyn Store>,
@@ -60,6 +62,8 @@ pub(crate) struct Shared {
     /// Set once the map is loaded, or could not be.
     loaded: OnceLock<Result<(), String>>,
     agents: RwLock<BTreeMap<String, Arc<AgentDesk>>>,
+    /// Removed agents that were in the map, by name, the latest last.
+    former: RwLock<BTreeMap<String, Vec<AgentId>>>,
     snapshot: ArcSwapOption<CognitiveMap>,
     /// Those who wait for a snapshot; none once the writer is gone.
     wishes: Mutex<Option<Vec<Wish>>>,
@@ -90,6 +94,11 @@ pub enum TrajectoryError {
     /// There is no such agent.
     #[error("unknown agent")]
     UnknownAgent,
+    /// It has been removed.
+    #[error(
+        "the agent has been removed; causal trajectories of its sessions can be read by their number"
+    )]
+    RemovedAgent,
     /// The store cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -125,6 +134,7 @@ impl Space {
             number,
             interval_ns,
             agents_max: around.settings.agents_max,
+            sessions: SessionBound::new(around.settings.session_ahead_max),
             reorder_window: around.settings.reorder_window,
             gap_timeout: around.settings.gap_timeout,
             store: Arc::clone(&around.store),
@@ -135,6 +145,7 @@ impl Space {
             closing: AtomicBool::new(false),
             loaded: OnceLock::new(),
             agents: RwLock::default(),
+            former: RwLock::default(),
             snapshot: ArcSwapOption::empty(),
             wishes: Mutex::new(Some(Vec::new())),
             refinements: Refinements::default(),
@@ -216,6 +227,23 @@ impl Space {
         self.shared.agents().get(name).cloned()
     }
 
+    /// Whether an agent of that name was removed that had been in the map, and none has come since.
+    pub fn has_removed(&self, name: &str) -> bool {
+        self.agent(name).is_none() && !self.shared.former(name).is_empty()
+    }
+
+    /// Whether a session of an agent may begin now, or has begun.
+    ///
+    /// # Errors
+    /// It lies too far in the future.
+    pub fn check_session(&self, agent: &str, session: u64) -> Result<(), IngestError> {
+        let current = self.agent(agent).map(|desk| desk.watermark().session);
+        match current {
+            Some(current) if session <= current => Ok(()),
+            _ => self.shared.sessions.check(session),
+        }
+    }
+
     /// Up to `limit` agents in the order of their names, those after `after`.
     pub fn agents_after(&self, after: Option<&str>, limit: usize) -> Vec<Arc<AgentDesk>> {
         use std::ops::Bound::{Excluded, Unbounded};
@@ -293,6 +321,19 @@ impl Space {
         answer.await.unwrap_or(Err(IngestError::Closed))
     }
 
+    /// Removes an agent and answers when that is durable. What it did in the map stays, and its name is free.
+    ///
+    /// # Errors
+    /// See [`IngestError`].
+    pub async fn remove_agent(&self, agent: &Name) -> Result<(), IngestError> {
+        let (reply, answer) = oneshot::channel();
+        self.call(Call::Removal(RemovalRequest {
+            agent: agent.as_str().into(),
+            reply,
+        }))?;
+        answer.await.unwrap_or(Err(IngestError::Closed))
+    }
+
     /// Queues what someone waits for.
     fn call(&self, call: Call) -> Result<(), IngestError> {
         match self.available() {
@@ -307,7 +348,7 @@ impl Space {
     }
 
     /// Up to `limit` poses of an agent's causal trajectory with `from_ns <= stamp < to_ns`; of its
-    /// current session when none is named.
+    /// current session when none is named. A session may be one of a removed agent of that name.
     ///
     /// # Errors
     /// There is no such agent, or the store cannot be read.
@@ -319,21 +360,41 @@ impl Space {
         to_ns: Option<i64>,
         limit: usize,
     ) -> Result<Trajectory, TrajectoryError> {
-        let desk = self.agent(agent).ok_or(TrajectoryError::UnknownAgent)?;
-        let shared = Arc::clone(&self.shared);
+        let desk = self.agent(agent);
+        let present = desk.as_deref().map(Part::of_desk);
+        let former = self.shared.former(agent);
+        let session = match (&present, session) {
+            (Some(present), session) => session.unwrap_or(present.session),
+            (None, Some(session)) if !former.is_empty() => session,
+            (None, _) => return Err(self.no_agent(agent)),
+        };
+        // The latest agent of that name that had such a session.
+        let former = former.into_iter().rev();
+        let parts: Vec<Part> = { present.into_iter() }
+            .chain(former.map(Part::of_former))
+            .collect();
+        let (shared, name) = (Arc::clone(&self.shared), agent.to_owned());
         let read = move || {
-            trajectory::read(
-                &*shared.store,
-                shared.number,
-                &desk,
+            let window = Window {
                 session,
-                (from_ns, to_ns),
+                from_ns,
+                to_ns,
                 limit,
-            )
+            };
+            trajectory::read(&*shared.store, shared.number, &name, &parts, &window)
         };
         tokio::task::spawn_blocking(read)
             .await
             .map_err(|_| TrajectoryError::Store(StoreError::Io("reading was interrupted".into())))?
+    }
+
+    /// Why there is no agent of a name.
+    pub(super) fn no_agent(&self, name: &str) -> TrajectoryError {
+        if self.has_removed(name) {
+            TrajectoryError::RemovedAgent
+        } else {
+            TrajectoryError::UnknownAgent
+        }
     }
 
     /// The map relaxed for those who asked for the past.
@@ -425,6 +486,24 @@ impl Shared {
     pub(crate) fn seat(&self, desk: Arc<AgentDesk>) {
         let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);
         agents.insert(desk.name().to_owned(), desk);
+    }
+
+    /// Lists an agent no longer.
+    pub(crate) fn unseat(&self, name: &str) {
+        let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);
+        agents.remove(name);
+    }
+
+    /// Notes a removed agent that was in the map.
+    pub(crate) fn note_former(&self, name: &str, id: AgentId) {
+        let mut former = self.former.write().unwrap_or_else(PoisonError::into_inner);
+        former.entry(name.to_owned()).or_default().push(id);
+    }
+
+    /// The removed agents of a name that were in the map, the latest last.
+    fn former(&self, name: &str) -> Vec<AgentId> {
+        let former = self.former.read().unwrap_or_else(PoisonError::into_inner);
+        former.get(name).cloned().unwrap_or_default()
     }
 
     /// Gives the map to all who wish for it: one copy for all, and copying is cheap.

@@ -163,7 +163,7 @@ impl FromRequestParts<Service> for AgentOfPath {
         let space = space(service, &params.space)?;
         match space.agent(&params.agent) {
             Some(desk) => Ok(Self(space, desk)),
-            None => Err(Problem::unknown_agent(name(&params.agent)?.as_str())),
+            None => Err(Problem::no_agent(&space, name(&params.agent)?.as_str())),
         }
     }
 }

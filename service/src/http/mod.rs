@@ -10,6 +10,7 @@ mod export;
 mod extract;
 mod guard;
 mod health;
+mod hosts;
 mod json;
 mod landmarks;
 mod listener;
@@ -40,6 +41,7 @@ use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+pub use hosts::HostRule;
 pub use problem::{Kind, Problem};
 pub use settings::HttpSettings;
 
@@ -67,7 +69,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(spaces::list))
         .routes(routes!(spaces::get, spaces::put, spaces::delete))
         .routes(routes!(agents::list))
-        .routes(routes!(agents::get))
+        .routes(routes!(agents::get, agents::delete))
         .routes(routes!(agents::grid))
         .routes(routes!(trajectory::get))
         .routes(routes!(samples::post))

@@ -8,7 +8,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::answer::{InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence};
-use crate::engine::{IngestError, QuestionError, SpaceError, TrajectoryError, Unavailable};
+use crate::engine::{IngestError, QuestionError, Space, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
 
 /// Media type of problems.
@@ -28,12 +28,18 @@ pub enum Kind {
     MalformedBody,
     /// The token is missing or wrong.
     Unauthorized,
+    /// The request is for a host that the service is not known as.
+    UnknownHost,
+    /// A page of another host wants to change something.
+    ForeignOrigin,
     /// There is nothing under this path.
     UnknownRoute,
     /// There is no such space.
     UnknownSpace,
     /// There is no such agent.
     UnknownAgent,
+    /// The agent has been removed.
+    RemovedAgent,
     /// There is no such place, trip or landmark.
     UnknownMemory,
     /// The place or trip has been forgotten.
@@ -44,6 +50,8 @@ pub enum Kind {
     SequenceGap,
     /// A newer session has taken the agent over.
     StaleSession,
+    /// The session's number lies in the future.
+    SessionInFuture,
     /// The space exists with other settings.
     OtherSettings,
     /// The space has its full number of agents.
@@ -114,14 +122,18 @@ impl Kind {
             Self::InvalidParameter => ("invalid-parameter", S::BAD_REQUEST),
             Self::MalformedBody => ("malformed-body", S::BAD_REQUEST),
             Self::Unauthorized => ("unauthorized", S::UNAUTHORIZED),
+            Self::UnknownHost => ("unknown-host", S::MISDIRECTED_REQUEST),
+            Self::ForeignOrigin => ("foreign-origin", S::FORBIDDEN),
             Self::UnknownRoute => ("unknown-route", S::NOT_FOUND),
             Self::UnknownSpace => ("unknown-space", S::NOT_FOUND),
             Self::UnknownAgent => ("unknown-agent", S::NOT_FOUND),
+            Self::RemovedAgent => ("removed-agent", S::GONE),
             Self::UnknownMemory => ("unknown-memory", S::NOT_FOUND),
             Self::ForgottenMemory => ("forgotten-memory", S::GONE),
             Self::MethodNotAllowed => ("method-not-allowed", S::METHOD_NOT_ALLOWED),
             Self::SequenceGap => ("sequence-gap", S::CONFLICT),
             Self::StaleSession => ("stale-session", S::CONFLICT),
+            Self::SessionInFuture => ("session-in-future", S::UNPROCESSABLE_ENTITY),
             Self::OtherSettings => ("other-settings", S::CONFLICT),
             Self::TooManyAgents => ("too-many-agents", S::CONFLICT),
             Self::TooManySpaces => ("too-many-spaces", S::CONFLICT),
@@ -163,6 +175,16 @@ impl Problem {
             Kind::UnknownAgent,
             format!("the space has no agent {name:?}"),
         )
+    }
+
+    /// There is no agent of that name; there may have been one.
+    pub(crate) fn no_agent(space: &Space, name: &str) -> Self {
+        if space.has_removed(name) {
+            let detail = format!("the agent {name:?} has been removed");
+            Self::new(Kind::RemovedAgent, detail)
+        } else {
+            Self::unknown_agent(name)
+        }
     }
 
     /// Work in another thread ended with a panic.
@@ -276,6 +298,7 @@ impl From<TrajectoryError> for Problem {
     fn from(error: TrajectoryError) -> Self {
         match error {
             TrajectoryError::UnknownAgent => Self::new(Kind::UnknownAgent, error.to_string()),
+            TrajectoryError::RemovedAgent => Self::new(Kind::RemovedAgent, error.to_string()),
             TrajectoryError::Store(error) => error.into(),
             TrajectoryError::Unavailable(error) => error.into(),
         }
@@ -308,6 +331,8 @@ impl From<IngestError> for Problem {
             IngestError::StaleSession { current } => {
                 Self::new(Kind::StaleSession, detail).expecting(current, None)
             }
+            IngestError::SessionInFuture { .. } => Self::new(Kind::SessionInFuture, detail),
+            IngestError::UnknownAgent(_) => Self::new(Kind::UnknownAgent, detail),
             IngestError::TooManyAgents => Self::new(Kind::TooManyAgents, detail),
             IngestError::DiskFull(_) => Self::new(Kind::StoreFull, detail),
             IngestError::Store(_) => Self::new(Kind::StoreFailed, detail),

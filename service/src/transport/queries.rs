@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use cogmap_proto::{
-    Codec, IdentifyQuery, LocalizeQuery, PredictQuery, Problem, RecallQuery, Verb, WatermarkQuery,
-    query_key,
+    Codec, IdentifyQuery, LocalizeQuery, PredictQuery, Problem, RecallQuery, SESSION_PARAMETER,
+    Verb, WatermarkQuery, query_key,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -15,7 +15,7 @@ use zenoh::query::{Query, Queryable};
 
 use super::session::TransportError;
 use crate::answer::{self, InvalidPrediction};
-use crate::engine::{Engine, QuestionError};
+use crate::engine::{Engine, IngestError, QuestionError};
 
 /// Most queries under way; further ones are told to come back.
 const QUERIES_MAX: usize = 64;
@@ -117,6 +117,11 @@ async fn answer(
         Verb::Watermark => {
             let body: WatermarkQuery = body(query, codec)?;
             let agent = &body.agent;
+            if let Some(session) = session(query)? {
+                let refused =
+                    |error: IngestError| problem("session-in-future", 422, error.to_string());
+                space.check_session(agent, session).map_err(refused)?;
+            }
             let desk = space
                 .agent(agent)
                 .ok_or_else(|| problem("unknown-agent", 404, format!("no agent {agent:?}")))?;
@@ -158,6 +163,18 @@ async fn answer(
             Ok(encoded(codec, &answer))
         }
     }
+}
+
+/// The session that a robot asks as, if it says so: the service tells whether it may begin.
+fn session(query: &Query) -> Result<Option<u64>, Problem> {
+    let Some(session) = query.parameters().get(SESSION_PARAMETER) else {
+        return Ok(None);
+    };
+    let session = session.parse().map(Some);
+    session.map_err(|_| {
+        let detail = format!("{SESSION_PARAMETER} is an unsigned 64-bit number");
+        problem("invalid-parameter", 400, detail)
+    })
 }
 
 fn body<T: DeserializeOwned>(query: &Query, codec: Codec) -> Result<T, Problem> {

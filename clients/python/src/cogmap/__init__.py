@@ -49,6 +49,7 @@ from .errors import (
 from .evidence import Evidence
 from .event import (
     AgentEnrolled,
+    AgentRemoved,
     AgentPlaced,
     Event,
     EventKind,
@@ -140,6 +141,7 @@ __all__ = [
     "DEFAULT_ENDPOINT",
     "AgentDetail",
     "AgentEnrolled",
+    "AgentRemoved",
     "AgentObject",
     "AgentPage",
     "AgentPlaced",

@@ -120,6 +120,14 @@ class Client:
         """Where an agent is, how sure that is, and how far its samples have come."""
         return self._get(AgentDetail, _path(space, "agents", agent))
 
+    def delete_agent(self, space: str, agent: str) -> None:
+        """Removes an agent; returns when that is on the service's disk.
+
+        Its name is free, and what it did in the map stays: places, trips, landmarks and the causal
+        trajectories of its sessions. A robot that goes on sending under the name comes back as a new agent.
+        """
+        self._request("DELETE", _path(space, "agents", agent))
+
     def grid(self, space: str, agent: str) -> GridState:
         """Grid-cell state of an agent."""
         return self._get(GridState, _path(space, "agents", agent, "grid"))

@@ -5,6 +5,7 @@ mod guarding;
 mod localize;
 mod objects;
 mod problems;
+mod removal;
 mod resources;
 mod running;
 mod trajectories;
