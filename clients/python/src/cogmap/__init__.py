@@ -37,6 +37,7 @@ from .answer import (
     Watermark,
 )
 from .client import Client
+from .credentials import Credentials
 from .errors import (
     ApiError,
     Closed,
@@ -49,8 +50,8 @@ from .errors import (
 from .evidence import Evidence
 from .event import (
     AgentEnrolled,
-    AgentRemoved,
     AgentPlaced,
+    AgentRemoved,
     Event,
     EventKind,
     LandmarkLearned,
@@ -141,10 +142,10 @@ __all__ = [
     "DEFAULT_ENDPOINT",
     "AgentDetail",
     "AgentEnrolled",
-    "AgentRemoved",
     "AgentObject",
     "AgentPage",
     "AgentPlaced",
+    "AgentRemoved",
     "AgentSummary",
     "AgentTarget",
     "AnyTurn",
@@ -156,6 +157,7 @@ __all__ = [
     "Contact",
     "ContactDescriptor",
     "ContactLevel",
+    "Credentials",
     "CubeTurns",
     "Descriptor",
     "EndObject",

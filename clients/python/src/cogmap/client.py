@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import ssl
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -65,6 +66,8 @@ class Client:
         url: Address of the service, for example `http://127.0.0.1:8080`.
         token: Bearer token, if the service asks for one.
         timeout_s: Longest silence of a connection [s].
+        ca_file: File (PEM) with the authority that has signed the certificate of an `https://` service; the
+            system's authorities when absent.
 
     Raises (all methods):
         ApiError: The service refused the request.
@@ -72,13 +75,20 @@ class Client:
         OSError: The service could not be reached, or fell silent.
     """
 
-    def __init__(self, url: str, token: Optional[str] = None, timeout_s: float = 10.0) -> None:
+    def __init__(
+        self,
+        url: str,
+        token: Optional[str] = None,
+        timeout_s: float = 10.0,
+        ca_file: Optional[str] = None,
+    ) -> None:
         scheme = urllib.parse.urlsplit(url).scheme
         if scheme not in ("http", "https"):
             raise ValueError(f"url {url!r}: expected http:// or https://")
         self._url = url.rstrip("/")
         self._token = token
         self._timeout_s = timeout_s
+        self._tls = None if ca_file is None else ssl.create_default_context(cafile=ca_file)
 
     # Spaces
 
@@ -405,7 +415,7 @@ class Client:
 
     def _open(self, request: urllib.request.Request, timeout_s: Optional[float]) -> Any:
         try:
-            return urllib.request.urlopen(request, timeout=timeout_s)
+            return urllib.request.urlopen(request, timeout=timeout_s, context=self._tls)
         except urllib.error.HTTPError as error:
             with error:
                 raise _api_error(error.code, error.reason, error.read()) from None

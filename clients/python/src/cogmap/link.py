@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import threading
-from typing import Any, Callable, Iterable, Union
+from typing import Any, Callable, Iterable, Optional, Union
 
 import zenoh
 
-from .errors import Timeout
+from .credentials import Credentials
+from .errors import CogmapError, Timeout
 from .wire import CBOR, encode
 
 #: Where a Zenoh router listens unless told otherwise.
@@ -18,14 +19,21 @@ _QUERY_TIMEOUT_S = 2.0
 
 
 def open_session(
-    connect: Union[str, Iterable[str]] = DEFAULT_ENDPOINT, *, timeout_s: float = 10.0
+    connect: Union[str, Iterable[str]] = DEFAULT_ENDPOINT,
+    *,
+    credentials: Optional[Credentials] = None,
+    timeout_s: float = 10.0,
 ) -> zenoh.Session:
     """Opens a Zenoh session in client mode to one of the endpoints, without multicast.
 
-    Several robots of one process may share it. Raises `Timeout` when no endpoint answers in time.
+    Several robots of one process may share it. Raises `Timeout` when no endpoint answers in time, or none
+    accepts the credentials, and `CogmapError` when the credentials' files cannot be used.
     """
     endpoints = [connect] if isinstance(connect, str) else list(connect)
-    config = zenoh.Config()
+    try:
+        config = (credentials or Credentials()).config()
+    except zenoh.ZError as error:
+        raise CogmapError(f"credentials: {error}") from error
     config.insert_json5("mode", json.dumps("client"))
     config.insert_json5("connect/endpoints", json.dumps(endpoints))
     config.insert_json5("connect/timeout_ms", json.dumps(max(1, int(1000 * timeout_s))))
@@ -35,7 +43,8 @@ def open_session(
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        raise Timeout(f"no Zenoh router answers at {', '.join(endpoints)}: {error}") from error
+        at = ", ".join(endpoints)
+        raise Timeout(f"no Zenoh router at {at} let this robot in: {error}") from error
 
 
 def has_subscriber(publisher: zenoh.Publisher) -> bool:

@@ -11,6 +11,7 @@ from typing import Any, Callable, Dict, Iterable, List, Optional, Tuple, Type, U
 import zenoh
 
 from .answer import Estimate, Rejection, Watermark
+from .credentials import Credentials
 from .errors import Closed, CogmapError, SessionSuperseded, Timeout, WindowFull
 from .inbox import Inbox
 from .key import check_name, durable_key, estimate_key, query_key, samples_key
@@ -48,6 +49,7 @@ class Robot(Sampler):
         agent: Name of the agent.
         connect: Zenoh endpoint, or several of them to try; `tcp/127.0.0.1:7447` when absent.
         session: An open Zenoh session to use instead; it is left open by `close`.
+        credentials: User, password and certificates for the router; none when absent.
         session_id: Number of this run; it must be larger than those of earlier runs. The time of the
             start [ns] when absent.
         batch_samples: Most samples of one message, 1 to 4096.
@@ -60,8 +62,8 @@ class Robot(Sampler):
         match_timeout_s: How long samples wait for the service before they are sent anyway [s].
 
     Raises:
-        ValueError: A name is not valid, or both `connect` and `session` are given.
-        Timeout: No router answers.
+        ValueError: A name is not valid, or `connect` or `credentials` are given with `session`.
+        Timeout: No router answers, or none accepts the credentials.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class Robot(Sampler):
         *,
         connect: Union[None, str, Iterable[str]] = None,
         session: Optional[zenoh.Session] = None,
+        credentials: Optional[Credentials] = None,
         session_id: Optional[int] = None,
         batch_samples: int = 64,
         batch_delay_s: float = 0.02,
@@ -83,6 +86,8 @@ class Robot(Sampler):
     ) -> None:
         if connect is not None and session is not None:
             raise ValueError("give either connect or session")
+        if credentials is not None and session is not None:
+            raise ValueError("give either credentials or session")
         self.space = check_name("space", space)
         self.agent = check_name("agent", agent)
         self.session_id = time.time_ns() if session_id is None else session_id
@@ -119,7 +124,9 @@ class Robot(Sampler):
         self._own_session = session is None
         self._zenoh = (
             open_session(
-                DEFAULT_ENDPOINT if connect is None else connect, timeout_s=connect_timeout_s
+                DEFAULT_ENDPOINT if connect is None else connect,
+                credentials=credentials,
+                timeout_s=connect_timeout_s,
             )
             if session is None
             else session
@@ -424,6 +431,8 @@ class Robot(Sampler):
         """Asks for the watermark; `ended` is set when no further answer comes."""
         try:
             key, hear = query_key(self.space, "watermark"), self._watermarks_in.hear_reply
+            # With the session, the service says when it would not let this run begin.
+            key = f"{key}?session={self.session_id}"
             ask(self._zenoh, key, WatermarkQuery(self.agent), hear, ended.set)
         except zenoh.ZError as error:
             _log.warning("watermark query of %s: %s", self.agent, error)

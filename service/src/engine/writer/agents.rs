@@ -95,7 +95,7 @@ impl Writer {
                 && let Some(slot) = self.idlest_without_trace(now)
             {
                 let (space, agent) = (&self.shared.name, self.agents[slot].desk.name());
-                tracing::info!(%space, agent, "removed to make room: it was never in the map");
+                tracing::debug!(%space, agent, "removed to make room: it was never in the map");
                 self.remove(slot);
                 self.counters.made_room();
                 // The map as it is says that the number will be vacant.
