@@ -23,6 +23,7 @@ mod queue;
 mod readout;
 mod recovery;
 mod refinement;
+mod removal;
 mod sequencer;
 mod session_bound;
 mod settings;

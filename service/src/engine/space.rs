@@ -7,9 +7,7 @@ use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 use arc_swap::ArcSwapOption;
-use cogmap_proto::{
-    Codec, Event, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings, Trajectory,
-};
+use cogmap_proto::{Codec, Event, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings};
 use cognitive_map::{AgentId, CognitiveMap, Label, Lesson, Settings};
 use tokio::sync::{broadcast, oneshot};
 
@@ -17,7 +15,7 @@ use super::checkpointer::{Checkpointer, Job};
 use super::committer::Commit;
 use super::desk::AgentDesk;
 use super::health::Health;
-use super::message::{Call, IngestError, ObjectRequest, RemovalRequest, Request};
+use super::message::{Call, IngestError, ObjectRequest, Request};
 use super::outlet::Outlet;
 use super::question::QuestionRoom;
 use super::queue::{Inbox, NotQueued, Queue, queue};
@@ -25,7 +23,6 @@ use super::recovery;
 use super::refinement::Refinements;
 use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
-use super::trajectory::{self, Part, Window};
 use super::writer::Writer;
 use crate::store::{SpaceNumber, Store, StoreError};
 
@@ -227,23 +224,6 @@ impl Space {
         self.shared.agents().get(name).cloned()
     }
 
-    /// Whether an agent of that name was removed that had been in the map, and none has come since.
-    pub fn has_removed(&self, name: &str) -> bool {
-        self.agent(name).is_none() && !self.shared.former(name).is_empty()
-    }
-
-    /// Whether a session of an agent may begin now, or has begun.
-    ///
-    /// # Errors
-    /// It lies too far in the future.
-    pub fn check_session(&self, agent: &str, session: u64) -> Result<(), IngestError> {
-        let current = self.agent(agent).map(|desk| desk.watermark().session);
-        match current {
-            Some(current) if session <= current => Ok(()),
-            _ => self.shared.sessions.check(session),
-        }
-    }
-
     /// Up to `limit` agents in the order of their names, those after `after`.
     pub fn agents_after(&self, after: Option<&str>, limit: usize) -> Vec<Arc<AgentDesk>> {
         use std::ops::Bound::{Excluded, Unbounded};
@@ -321,21 +301,13 @@ impl Space {
         answer.await.unwrap_or(Err(IngestError::Closed))
     }
 
-    /// Removes an agent and answers when that is durable. What it did in the map stays, and its name is free.
-    ///
-    /// # Errors
-    /// See [`IngestError`].
-    pub async fn remove_agent(&self, agent: &Name) -> Result<(), IngestError> {
-        let (reply, answer) = oneshot::channel();
-        self.call(Call::Removal(RemovalRequest {
-            agent: agent.as_str().into(),
-            reply,
-        }))?;
-        answer.await.unwrap_or(Err(IngestError::Closed))
+    /// What it shares with its writer.
+    pub(super) fn shared(&self) -> &Arc<Shared> {
+        &self.shared
     }
 
     /// Queues what someone waits for.
-    fn call(&self, call: Call) -> Result<(), IngestError> {
+    pub(super) fn call(&self, call: Call) -> Result<(), IngestError> {
         match self.available() {
             Ok(()) => {}
             Err(Unavailable::Recovering) => return Err(IngestError::Recovering),
@@ -345,56 +317,6 @@ impl Space {
             NotQueued::Full => IngestError::Busy,
             NotQueued::Closed => IngestError::Closed,
         })
-    }
-
-    /// Up to `limit` poses of an agent's causal trajectory with `from_ns <= stamp < to_ns`; of its
-    /// current session when none is named. A session may be one of a removed agent of that name.
-    ///
-    /// # Errors
-    /// There is no such agent, or the store cannot be read.
-    pub async fn trajectory(
-        &self,
-        agent: &str,
-        session: Option<u64>,
-        from_ns: Option<i64>,
-        to_ns: Option<i64>,
-        limit: usize,
-    ) -> Result<Trajectory, TrajectoryError> {
-        let desk = self.agent(agent);
-        let present = desk.as_deref().map(Part::of_desk);
-        let former = self.shared.former(agent);
-        let session = match (&present, session) {
-            (Some(present), session) => session.unwrap_or(present.session),
-            (None, Some(session)) if !former.is_empty() => session,
-            (None, _) => return Err(self.no_agent(agent)),
-        };
-        // The latest agent of that name that had such a session.
-        let former = former.into_iter().rev();
-        let parts: Vec<Part> = { present.into_iter() }
-            .chain(former.map(Part::of_former))
-            .collect();
-        let (shared, name) = (Arc::clone(&self.shared), agent.to_owned());
-        let read = move || {
-            let window = Window {
-                session,
-                from_ns,
-                to_ns,
-                limit,
-            };
-            trajectory::read(&*shared.store, shared.number, &name, &parts, &window)
-        };
-        tokio::task::spawn_blocking(read)
-            .await
-            .map_err(|_| TrajectoryError::Store(StoreError::Io("reading was interrupted".into())))?
-    }
-
-    /// Why there is no agent of a name.
-    pub(super) fn no_agent(&self, name: &str) -> TrajectoryError {
-        if self.has_removed(name) {
-            TrajectoryError::RemovedAgent
-        } else {
-            TrajectoryError::UnknownAgent
-        }
     }
 
     /// The map relaxed for those who asked for the past.
@@ -495,13 +417,13 @@ impl Shared {
     }
 
     /// Notes a removed agent that was in the map.
-    pub(crate) fn note_former(&self, name: &str, id: AgentId) {
+    pub(super) fn note_former(&self, name: &str, id: AgentId) {
         let mut former = self.former.write().unwrap_or_else(PoisonError::into_inner);
         former.entry(name.to_owned()).or_default().push(id);
     }
 
     /// The removed agents of a name that were in the map, the latest last.
-    fn former(&self, name: &str) -> Vec<AgentId> {
+    pub(super) fn former(&self, name: &str) -> Vec<AgentId> {
         let former = self.former.read().unwrap_or_else(PoisonError::into_inner);
         former.get(name).cloned().unwrap_or_default()
     }

@@ -5,11 +5,13 @@
 //! row    = stamp_ns:i64  x y z qx qy qz qw : f64        little endian, 64 bytes
 //! ```
 
+use std::sync::Arc;
+
 use cogmap_proto::{StampedPose, Trajectory};
 use cognitive_map::{Agent, AgentId, CognitiveMap, Record, SampleBody};
 
 use super::desk::AgentDesk;
-use super::space::TrajectoryError;
+use super::space::{Space, TrajectoryError};
 use crate::store::{SpaceNumber, Store, StoreError};
 
 /// Rows of a full chunk.
@@ -199,6 +201,58 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Vec<StampedPose>, CorruptChunk> {
             rotation_xyzw: [4, 5, 6, 7].map(|at| f64::from_le_bytes(eight(row, at))),
         })
         .collect())
+}
+
+impl Space {
+    /// Up to `limit` poses of an agent's causal trajectory with `from_ns <= stamp < to_ns`; of its
+    /// current session when none is named. A session may be one of a removed agent of that name.
+    ///
+    /// # Errors
+    /// There is no such agent, or the store cannot be read.
+    pub async fn trajectory(
+        &self,
+        agent: &str,
+        session: Option<u64>,
+        from_ns: Option<i64>,
+        to_ns: Option<i64>,
+        limit: usize,
+    ) -> Result<Trajectory, TrajectoryError> {
+        let desk = self.agent(agent);
+        let present = desk.as_deref().map(Part::of_desk);
+        let former = self.shared().former(agent);
+        let session = match (&present, session) {
+            (Some(present), session) => session.unwrap_or(present.session),
+            (None, Some(session)) if !former.is_empty() => session,
+            (None, _) => return Err(self.no_agent(agent)),
+        };
+        // The latest agent of that name that had such a session.
+        let former = former.into_iter().rev();
+        let parts: Vec<Part> = { present.into_iter() }
+            .chain(former.map(Part::of_former))
+            .collect();
+        let (shared, name) = (Arc::clone(self.shared()), agent.to_owned());
+        let work = move || {
+            let window = Window {
+                session,
+                from_ns,
+                to_ns,
+                limit,
+            };
+            read(&*shared.store, shared.number, &name, &parts, &window)
+        };
+        tokio::task::spawn_blocking(work)
+            .await
+            .map_err(|_| TrajectoryError::Store(StoreError::Io("reading was interrupted".into())))?
+    }
+
+    /// Why there is no agent of a name.
+    pub(super) fn no_agent(&self, name: &str) -> TrajectoryError {
+        if self.has_removed(name) {
+            TrajectoryError::RemovedAgent
+        } else {
+            TrajectoryError::UnknownAgent
+        }
+    }
 }
 
 /// Where an agent's rows are: in the store, and the latest of them at its desk.

@@ -80,6 +80,7 @@ pub(crate) struct MapExport {
         (status = 200, description = "The map", content(
             (MapExport = "application/json"), (String = "text/plain"))),
         (status = 404, description = "There is no such space or agent"),
+        (status = 410, description = "The agent has been removed: name one of its sessions"),
         (status = 422, description = "A trajectory was asked for, but no agent named")))]
 pub(crate) async fn get(
     SpaceOfPath(space): SpaceOfPath,

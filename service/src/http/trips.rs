@@ -41,17 +41,18 @@ pub(crate) async fn list(
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
     let map = space.snapshot().await?;
-    // Nobody has the number of an agent that is not there.
-    let agent = query
-        .agent
-        .as_deref()
-        .map(|name| space.agent(name).map(|desk| desk.id()));
+    // By name, so that the trips of a removed agent are found, too.
+    let is_called = |id, name: &str| {
+        let agent = map.agent(id);
+        agent.is_some_and(|agent| agent.name().as_str() == name)
+    };
     let first = page::first(query.after);
     let listed = first
         .into_iter()
         .flat_map(|first| map.trips_from(TripId(first)));
     let wanted = listed.filter(|(_, trip)| {
-        agent.is_none_or(|agent| agent == Some(trip.agent()))
+        let agent = query.agent.as_deref();
+        agent.is_none_or(|name| is_called(trip.agent(), name))
             && query
                 .since_ns
                 .is_none_or(|since| trip.end_stamp_ns() >= since)

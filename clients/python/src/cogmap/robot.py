@@ -84,10 +84,8 @@ class Robot(Sampler):
         connect_timeout_s: float = 10.0,
         match_timeout_s: float = 5.0,
     ) -> None:
-        if connect is not None and session is not None:
-            raise ValueError("give either connect or session")
-        if credentials is not None and session is not None:
-            raise ValueError("give either credentials or session")
+        if session is not None and (connect is not None or credentials is not None):
+            raise ValueError("give either connect and credentials, or session")
         self.space = check_name("space", space)
         self.agent = check_name("agent", agent)
         self.session_id = time.time_ns() if session_id is None else session_id
@@ -430,10 +428,9 @@ class Robot(Sampler):
     def _ask_watermark(self, ended: threading.Event) -> None:
         """Asks for the watermark; `ended` is set when no further answer comes."""
         try:
-            key, hear = query_key(self.space, "watermark"), self._watermarks_in.hear_reply
             # With the session, the service says when it would not let this run begin.
-            key = f"{key}?session={self.session_id}"
-            ask(self._zenoh, key, WatermarkQuery(self.agent), hear, ended.set)
+            key = f"{query_key(self.space, 'watermark')}?session={self.session_id}"
+            ask(self._zenoh, key, WatermarkQuery(self.agent), self._watermarks_in.hear_reply, ended.set)
         except zenoh.ZError as error:
             _log.warning("watermark query of %s: %s", self.agent, error)
 

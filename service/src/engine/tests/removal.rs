@@ -182,6 +182,7 @@ fn agents_that_were_never_in_the_map_make_room_and_others_do_not() {
     assert_eq!(ingest(&engine, "fifth", 1, &drive[1..3]), full);
     let before = digest(&engine);
     engine.shutdown();
+    drop(engine);
     drop_checkpoint(directory.path());
     engine = open(directory.path(), settings);
     assert_eq!(digest(&engine), before);

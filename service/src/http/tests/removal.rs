@@ -48,6 +48,11 @@ async fn a_removed_agent_is_told_from_an_unknown_one_and_its_name_is_free() {
             .as_array()
             .is_some_and(|places| !places.is_empty())
     );
+    let trips = rig.get("/v1/spaces/lab/trips?agent=rover").await.good();
+    assert_eq!(trips["trips"][0]["agent"], "rover");
+    let tum = "/v1/spaces/lab/export?format=tum&agent=rover";
+    rig.get(tum).await.problem(410, "removed-agent");
+    assert_eq!(rig.get(&format!("{tum}&session=7")).await.status, 200);
     rig.get(&format!("{path}/trajectory"))
         .await
         .problem(410, "removed-agent");
