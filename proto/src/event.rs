@@ -254,6 +254,9 @@ pub enum EventKind {
         /// Name of the other one.
         part: String,
     },
+    /// The agent was removed, by whoever runs the service or to make room. What it did in the map stays; a
+    /// message under its name enrols another agent.
+    AgentRemoved {},
 }
 
 /// What kind of percept a channel carries.

@@ -44,7 +44,8 @@ pub use event::{
 };
 pub use field::at_field;
 pub use key::{
-    AgentKey, KeyError, durable_key, estimate_key, events_key, json_key, query_key, samples_key,
+    AgentKey, KeyError, SESSION_PARAMETER, durable_key, estimate_key, events_key, json_key,
+    query_key, samples_key,
 };
 pub use localize::{Localization, LocalizationHypothesis, LocalizeQuery, LocalizedPose};
 pub use name::{Name, NameError};

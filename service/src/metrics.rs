@@ -14,7 +14,7 @@ pub const RECEIVED_MESSAGES: &str = "cogmap_received_messages_total";
 /// Bytes of messages received; label `codec`.
 pub const RECEIVED_BYTES: &str = "cogmap_received_bytes_total";
 /// Messages dropped whole; label `reason` (`queue_full`, `agent_queue_full`, `unknown_space`, `bad_key`,
-/// `too_many_agents`, `stale_session` and others).
+/// `too_many_agents`, `stale_session`, `session_in_future` and others).
 pub const DROPPED_MESSAGES: &str = "cogmap_dropped_messages_total";
 /// Messages that could not be read; label `kind`.
 pub const DECODE_ERRORS: &str = "cogmap_decode_errors_total";
@@ -38,6 +38,8 @@ pub const JOURNAL_BYTES: &str = "cogmap_journal_bytes_total";
 pub const COMMIT_SECONDS: &str = "cogmap_commit_seconds";
 /// Agents of a space; label `space`.
 pub const AGENTS: &str = "cogmap_agents";
+/// Agents removed so that others could enrol; label `space`.
+pub const AGENTS_MADE_ROOM: &str = "cogmap_agents_made_room_total";
 /// Places of a space; label `space`.
 pub const PLACES: &str = "cogmap_places";
 /// Trips of a space; label `space`.
@@ -187,6 +189,11 @@ fn describe() {
     describe_counter!(JOURNAL_BYTES, Unit::Bytes, "Bytes appended to journals");
     describe_histogram!(COMMIT_SECONDS, Unit::Seconds, "Time of a sync of the store");
     describe_gauge!(AGENTS, Unit::Count, "Agents of a space");
+    describe_counter!(
+        AGENTS_MADE_ROOM,
+        Unit::Count,
+        "Agents removed so that others could enrol"
+    );
     describe_gauge!(PLACES, Unit::Count, "Places of a space");
     describe_gauge!(TRIPS, Unit::Count, "Trips of a space");
     describe_counter!(

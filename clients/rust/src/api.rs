@@ -150,6 +150,16 @@ impl Api {
         self.get(&agent_path(space, agent, "")?)
     }
 
+    /// Removes an agent; returns when that is durable. Its name is free, and what it did in the map stays: places,
+    /// trips, landmarks and the causal trajectories of its sessions. A robot that goes on sending under the name
+    /// comes back as a new agent.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn delete_agent(&self, space: &str, agent: &str) -> Result<(), ApiError> {
+        done(self.run(Method::DELETE, &agent_path(space, agent, "")?, None)?)
+    }
+
     /// The grid-cell state of an agent.
     ///
     /// # Errors

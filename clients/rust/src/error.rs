@@ -17,7 +17,7 @@ pub enum ClientError {
     #[error("settings: {0}")]
     Settings(&'static str),
     /// No router answered in time.
-    #[error("no Zenoh router at {endpoints:?} within {timeout:?}")]
+    #[error("no Zenoh router at {endpoints:?} let this robot in within {timeout:?}: {source}")]
     Connect {
         /// Where it was sought.
         endpoints: Vec<String>,
@@ -60,15 +60,36 @@ pub enum ClientError {
         /// The session that took over; this robot's own number when another run uses it too.
         by: u64,
     },
+    /// The service does not let this run begin; none of its samples is taken.
+    #[error("{detail}")]
+    SessionRefused {
+        /// What the service says.
+        detail: String,
+    },
+    /// The Zenoh settings of the credentials cannot be used.
+    #[error("Zenoh settings of the credentials: {0}")]
+    Credentials(#[source] zenoh::Error),
     /// Not everything became durable in time. Nothing is lost: sending goes on.
-    #[error("{pending} samples are not durable yet")]
+    #[error("{pending} samples are not durable yet{}", silence(*is_heard))]
     FlushTimeout {
         /// Samples that no watermark covers.
         pending: u64,
+        /// Whether the service has acknowledged anything of this run.
+        is_heard: bool,
     },
     /// No estimate that includes all samples came in time. Sending goes on.
     #[error("no estimate that includes all samples came in time")]
     EstimateTimeout,
+}
+
+/// What may be wrong when the service says nothing at all: Zenoh tells nobody what its access rules drop.
+fn silence(is_heard: bool) -> &'static str {
+    if is_heard {
+        ""
+    } else {
+        ", and the service has not acknowledged any: it may not be running, it may have no such space, or the \
+         access rules of Zenoh may not let this user publish under the agent's name or hear of it"
+    }
 }
 
 fn superseded(session: u64, by: u64) -> String {

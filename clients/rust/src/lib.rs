@@ -22,6 +22,7 @@
 
 mod api;
 mod batch;
+mod credentials;
 mod error;
 mod link;
 mod robot;
@@ -33,8 +34,9 @@ mod window;
 
 pub use api::{Api, ApiError};
 pub use cogmap_proto as proto;
+pub use credentials::Credentials;
 pub use error::ClientError;
-pub use link::open_session;
+pub use link::{open_session, open_session_as};
 pub use robot::Robot;
 pub use sampling::TripMark;
 pub use settings::{RobotBuilder, RobotSettings};

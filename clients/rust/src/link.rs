@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use zenoh::{Config, Session, Wait};
 
+use crate::credentials::Credentials;
 use crate::error::ClientError;
 
 /// Longest time for one attempt at one endpoint: Zenoh's own default.
@@ -22,11 +23,24 @@ pub fn open_session<S: AsRef<str>>(
     endpoints: &[S],
     timeout: Duration,
 ) -> Result<Session, ClientError> {
+    open_session_as(endpoints, &Credentials::default(), timeout)
+}
+
+/// As [`open_session`], showing credentials.
+///
+/// # Errors
+/// As [`open_session`]; or the credentials cannot be used, or the router does not accept them.
+pub fn open_session_as<S: AsRef<str>>(
+    endpoints: &[S],
+    credentials: &Credentials,
+    timeout: Duration,
+) -> Result<Session, ClientError> {
     let endpoints: Vec<String> = endpoints.iter().map(|e| e.as_ref().to_owned()).collect();
     if endpoints.is_empty() {
         return Err(ClientError::Settings("there is no endpoint to connect to"));
     }
-    let config = client_config(&endpoints, timeout)
+    let config = credentials.config().map_err(ClientError::Credentials)?;
+    let config = client_config(config, &endpoints, timeout)
         .map_err(|_| ClientError::Settings("an endpoint is like tcp/127.0.0.1:7447"))?;
     let deadline = Instant::now() + timeout;
     loop {
@@ -46,8 +60,11 @@ pub fn open_session<S: AsRef<str>>(
     }
 }
 
-fn client_config(endpoints: &[String], timeout: Duration) -> zenoh::Result<Config> {
-    let mut config = Config::default();
+fn client_config(
+    mut config: Config,
+    endpoints: &[String],
+    timeout: Duration,
+) -> zenoh::Result<Config> {
     let endpoints = serde_json::to_string(endpoints)?;
     // An address that swallows packets must not hold one attempt beyond the whole time.
     let open_timeout_ms = timeout.min(OPEN_TIMEOUT_MAX).as_millis().max(1).to_string();

@@ -254,6 +254,11 @@ impl Robot {
     }
 
     fn check_session(&self, state: &State) -> Result<(), ClientError> {
+        if let Some(detail) = &state.refused {
+            return Err(ClientError::SessionRefused {
+                detail: detail.clone(),
+            });
+        }
         state.superseded_by.map_or(Ok(()), |by| {
             Err(ClientError::SessionSuperseded {
                 session: self.session,
@@ -282,6 +287,7 @@ impl Robot {
             if left.is_zero() {
                 return Err(ClientError::FlushTimeout {
                     pending: state.window.pending(),
+                    is_heard: state.watermark.is_some(),
                 });
             }
             state = Shared::wait(&self.shared.caller_bell, state, left);

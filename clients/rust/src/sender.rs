@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use cogmap_proto::{Codec, Verb, WatermarkQuery, query_key};
+use cogmap_proto::{Codec, SESSION_PARAMETER, Verb, WatermarkQuery, query_key};
 use zenoh::pubsub::Publisher;
 use zenoh::{Session, Wait};
 
@@ -106,7 +106,7 @@ impl Sender {
                 return Step::End;
             }
             let now = self.shared.now();
-            let over = state.superseded_by.is_some();
+            let over = state.superseded_by.is_some() || state.refused.is_some();
             if !over {
                 if state.window.poll(now) {
                     state.counters.queries += 1;
@@ -155,17 +155,19 @@ impl Sender {
         let query = WatermarkQuery {
             agent: self.agent.clone(),
         };
+        let key = query_key(&self.space, Verb::Watermark.as_str());
         let (told, answered) = channel();
         let shared = Arc::clone(&self.shared);
         let asked = self
             .zenoh
-            .get(query_key(&self.space, Verb::Watermark.as_str()))
+            .get(format!("{key}?{SESSION_PARAMETER}={}", self.session))
             .payload(self.codec.encode(&query))
             .encoding(self.codec.encoding())
             .timeout(QUERY_TIMEOUT)
             .callback(move |reply| {
-                if let Ok(sample) = reply.result() {
-                    shared.hear_watermark(sample);
+                match reply.result() {
+                    Ok(sample) => shared.hear_watermark(sample),
+                    Err(refusal) => shared.hear_refusal(refusal),
                 }
                 // Nobody may wait for it.
                 let _ = told.send(());

@@ -6,6 +6,7 @@ use cogmap_proto::limits::BATCH_SAMPLES_MAX;
 use cogmap_proto::{Codec, Name};
 use zenoh::Session;
 
+use crate::credentials::Credentials;
 use crate::error::ClientError;
 use crate::link;
 use crate::robot::Robot;
@@ -88,6 +89,7 @@ pub struct RobotBuilder {
     agent: String,
     endpoints: Vec<String>,
     shared: Option<Session>,
+    credentials: Credentials,
     settings: RobotSettings,
 }
 
@@ -98,6 +100,7 @@ impl RobotBuilder {
             agent: agent.to_owned(),
             endpoints: Vec::new(),
             shared: None,
+            credentials: Credentials::default(),
             settings: RobotSettings::default(),
         }
     }
@@ -110,10 +113,15 @@ impl RobotBuilder {
     }
 
     /// Uses a Zenoh session that is open already, and leaves it open; endpoints are then ignored.
-    /// Many robots of one process share a session this way, and authentication or TLS are
-    /// configured on it.
+    /// Many robots of one process share a session this way.
     pub fn zenoh_session(mut self, session: Session) -> Self {
         self.shared = Some(session);
+        self
+    }
+
+    /// Shows credentials to the router, and checks who it is; they are ignored with a session that is open already.
+    pub fn credentials(mut self, credentials: Credentials) -> Self {
+        self.credentials = credentials;
         self
     }
 
@@ -140,7 +148,10 @@ impl RobotBuilder {
         self.settings.check()?;
         let session = match self.shared {
             Some(session) => session,
-            None => link::open_session(&self.endpoints, self.settings.connect_timeout)?,
+            None => {
+                let timeout = self.settings.connect_timeout;
+                link::open_session_as(&self.endpoints, &self.credentials, timeout)?
+            }
         };
         Robot::start(session, self.space, self.agent, &self.settings)
     }

@@ -7,13 +7,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use cogmap_proto::{Codec, Estimate, Rejection, Watermark};
+use cogmap_proto::{Codec, Estimate, Problem, Rejection, Watermark};
 use serde::de::DeserializeOwned;
+use zenoh::query::ReplyError;
 
 use crate::window::{Heard, Window};
 
 /// Rejections remembered: the latest ones.
 const REJECTIONS_MAX: usize = 256;
+
+/// Kind of the problem that a session lies in the future.
+const SESSION_IN_FUTURE: &str = "/problems/session-in-future";
 
 /// What a robot has sent and heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,6 +48,8 @@ pub(crate) struct State {
     pub(crate) window: Window,
     pub(crate) session: u64,
     pub(crate) superseded_by: Option<u64>,
+    /// Why the service does not let this run begin.
+    pub(crate) refused: Option<String>,
     pub(crate) watermark: Option<Watermark>,
     pub(crate) estimate: Option<Estimate>,
     pub(crate) on_estimate: Option<EstimateCallback>,
@@ -81,6 +87,7 @@ impl Shared {
                 window,
                 session,
                 superseded_by: None,
+                refused: None,
                 watermark: None,
                 estimate: None,
                 on_estimate: None,
@@ -157,6 +164,23 @@ impl Shared {
         drop(state);
         self.sender_bell.notify_one();
         self.caller_bell.notify_all();
+    }
+
+    /// Takes in the refusal of a query for the watermark. Of those that the service may come to think
+    /// otherwise of nothing is kept: it may not know the agent yet, or be loading.
+    pub(crate) fn hear_refusal(&self, refusal: &ReplyError) {
+        let problem = Codec::of_encoding(&refusal.encoding().to_string())
+            .and_then(|codec| codec.decode::<Problem>(&refusal.payload().to_bytes()));
+        let Ok(problem) = problem else {
+            self.lock().counters.undecodable += 1;
+            return;
+        };
+        if problem.kind == SESSION_IN_FUTURE {
+            self.lock().refused = Some(problem.detail);
+            self.set_over();
+            self.sender_bell.notify_one();
+            self.caller_bell.notify_all();
+        }
     }
 
     /// Takes in an estimate of a Zenoh subscription.

@@ -122,7 +122,7 @@ fn samples_sent_before_the_service_is_up_are_not_lost() {
     let flushed = robot.flush(Duration::from_millis(100));
     assert!(matches!(
         flushed,
-        Err(ClientError::FlushTimeout { pending: 100 })
+        Err(ClientError::FlushTimeout { pending: 100, .. })
     ));
     let service = Service::on(router, "demo", "ada", Faults::default());
     robot.flush(LONG).unwrap();

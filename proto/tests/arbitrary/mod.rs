@@ -225,6 +225,7 @@ pub(crate) fn events(floats: &Floats) -> impl Strategy<Value = Event> + use<> {
     let kind =
         prop_oneof![
             Just(EventKind::AgentEnrolled {}),
+            Just(EventKind::AgentRemoved {}),
             number().prop_map(|session| EventKind::SessionStarted { session }),
             (number(), three()).prop_map(|(place, translation_m)| EventKind::PlaceRecruited {
                 place,

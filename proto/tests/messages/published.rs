@@ -179,11 +179,12 @@ fn object_events() -> [(&'static str, EventKind); 7] {
     ]
 }
 
-fn event_kinds() -> [(&'static str, EventKind); 14] {
+fn event_kinds() -> [(&'static str, EventKind); 15] {
     let session = 1_800_000_000_000_000_000;
     let landmark = "porte 3, étage α".to_owned();
     [
         ("agent_enrolled", EventKind::AgentEnrolled {}),
+        ("agent_removed", EventKind::AgentRemoved {}),
         ("session_started", EventKind::SessionStarted { session }),
         (
             "place_recruited",

@@ -169,4 +169,9 @@ pub enum EventKind {
         /// least; for a descriptor one minus the cosine, 0 to 2.
         surprise: f64,
     },
+    /// The agent was removed: by that name the space knows nobody any more.
+    AgentRemoved {
+        /// Its name.
+        name: Label,
+    },
 }

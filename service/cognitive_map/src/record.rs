@@ -3,14 +3,15 @@
 use crate::object::Lesson;
 use crate::sample::{InvalidSample, Label, Sample};
 
-/// An agent of a space, counted from 0 in the order of enrolment.
+/// An agent of a space, counted from 0 in the order of enrolment. The number of a removed agent that was
+/// never in the map goes to a later one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AgentId(pub u32);
 
 /// One entry of the journal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Record {
-    /// A new agent; its identifier is the number of agents before it.
+    /// A new agent. Its identifier is the number of those given out before, or one that is vacant.
     Enrol {
         /// Its identifier.
         agent: AgentId,
@@ -56,6 +57,11 @@ pub enum Record {
         number: u64,
         /// Its name.
         name: Label,
+    },
+    /// An agent is removed: its name is free, and what it did in the map stays.
+    Remove {
+        /// The agent.
+        agent: AgentId,
     },
 }
 

@@ -148,11 +148,14 @@ fn code(map: &CognitiveMap, phases: &[Option<[f64; 3]>]) -> Result<PartialCode, 
     Ok(PartialCode::new(map.modules(), phases.collect())?)
 }
 
-/// An agent by its name. Spaces have at most some thousand agents, so a scan will do.
+/// An agent by its name; where there is none now, the latest one that was removed. Spaces have at most some
+/// thousand agents, so a scan will do.
 fn agent(map: &CognitiveMap, name: &str) -> Result<AgentId, InvalidQuery> {
-    let mut agents = map.agents();
-    let found = agents.find(|(_, agent)| agent.name().as_str() == name);
-    found.map(|(id, _)| id).ok_or_else(|| unknown_agent(name))
+    map.agents_ever()
+        .filter(|(_, agent)| agent.name().as_str() == name)
+        .max_by_key(|(id, agent)| (agent.is_enrolled(), *id))
+        .map(|(id, _)| id)
+        .ok_or_else(|| unknown_agent(name))
 }
 
 /// Why there is no agent of this name: there is none, or nobody can be called so.

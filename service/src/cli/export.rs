@@ -88,12 +88,17 @@ fn trajectory(source: &Source, agent: &str) -> anyhow::Result<()> {
             records_of(&entry, |record| {
                 map.apply(&record, &mut events);
                 events.clear();
-                if let Record::Enrol { agent: id, name } = &record
-                    && name.as_str() == agent
-                {
-                    known = Some(*id);
+                if let Record::Enrol { agent: id, name } = &record {
+                    let is_asked_for = name.as_str() == agent;
+                    // Another agent may take over the name, or the number of one that left nothing.
+                    if is_asked_for || known == Some(*id) {
+                        known = is_asked_for.then_some(*id);
+                        recorder = Recorder::default();
+                        rows.clear();
+                    }
                 }
-                let Record::Sample { agent: id, .. } = &record else {
+                let (Record::Sample { agent: id, .. } | Record::Remove { agent: id }) = &record
+                else {
                     return;
                 };
                 if known != Some(*id) {
@@ -103,7 +108,8 @@ fn trajectory(source: &Source, agent: &str) -> anyhow::Result<()> {
                 let before = recorder.session();
                 let full = recorder.note(&record, of_map, interval_ns);
                 // A session that has moved replaces the one before.
-                if recorder.session() != before {
+                let is_sample = matches!(record, Record::Sample { .. });
+                if is_sample && recorder.session() != before {
                     rows.clear();
                 } else if let Some(chunk) = full {
                     rows.extend(chunk.rows);

@@ -18,6 +18,8 @@ pub struct EngineConfig {
     pub queue_bytes: usize,
     /// Most agents of a space.
     pub agents_max: usize,
+    /// How far ahead of the service's clock the number of a session may be that begins \[s\].
+    pub session_ahead_max_s: f64,
     /// Most spaces.
     pub spaces_max: usize,
     /// Most samples of one agent that wait for earlier ones.
@@ -37,6 +39,7 @@ impl Default for EngineConfig {
             queue_messages: settings.queue_messages,
             queue_bytes: settings.queue_bytes,
             agents_max: settings.agents_max,
+            session_ahead_max_s: settings.session_ahead_max.as_secs_f64(),
             spaces_max: settings.spaces_max,
             reorder_window_samples: settings.reorder_window,
             gap_timeout_s: settings.gap_timeout.as_secs_f64(),
@@ -53,6 +56,7 @@ impl EngineConfig {
             queue_messages: self.queue_messages,
             queue_bytes: self.queue_bytes,
             agents_max: self.agents_max,
+            session_ahead_max: Duration::from_secs_f64(self.session_ahead_max_s),
             spaces_max: self.spaces_max,
             reorder_window: self.reorder_window_samples,
             gap_timeout: Duration::from_secs_f64(self.gap_timeout_s),
@@ -79,6 +83,13 @@ impl EngineConfig {
         let bytes = self.queue_bytes;
         let rule = "at least 2097152, two of the longest messages";
         check(bytes >= 2 << 20, "engine.queue_bytes", &bytes, rule)?;
+        let ahead = self.session_ahead_max_s;
+        check(
+            (1.0..=1e9).contains(&ahead),
+            "engine.session_ahead_max_s",
+            &ahead,
+            "1 to 1e9 seconds",
+        )?;
         let times = [
             ("engine.gap_timeout_s", self.gap_timeout_s),
             ("engine.commit_interval_s", self.commit_interval_s),

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::rule::{INTERVAL_S, check, is_interval_s};
 use super::{ConfigError, Token};
-use crate::http::HttpSettings;
+use crate::http::{HostRule, HttpSettings};
 
 /// Settings of the HTTP interface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,6 +23,8 @@ pub struct HttpConfig {
     /// File whose first line is the token, instead of `token`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub token_file: Option<PathBuf>,
+    /// Names of hosts by which the service is asked, beside its addresses and `localhost`; `*` stands for any.
+    pub hosts: Vec<String>,
     /// Longest time from a request's head to the head of its answer \[s\].
     pub request_timeout_s: f64,
     /// Most requests under way; further ones are told to come back.
@@ -46,6 +48,7 @@ impl Default for HttpConfig {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
             token: None,
             token_file: None,
+            hosts: Vec::new(),
             request_timeout_s: 30.0,
             requests_max: 1024,
             streams_max: 256,
@@ -67,6 +70,7 @@ impl HttpConfig {
     pub fn settings(&self) -> HttpSettings {
         HttpSettings {
             token: self.token.clone(),
+            hosts: HostRule::new(&self.hosts, self.token.is_some()),
             request_timeout: Duration::from_secs_f64(self.request_timeout_s),
             requests_max: self.requests_max,
             streams_max: self.streams_max,
@@ -97,6 +101,14 @@ impl HttpConfig {
         if let Some(token) = &self.token {
             let rule = "visible ASCII without spaces, at least one character";
             check(token.is_presentable(), "http.token", &"(hidden)", rule)?;
+        }
+        for name in &self.hosts {
+            let is_name = |name: &str| {
+                let legal = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_');
+                !name.is_empty() && name.chars().all(legal)
+            };
+            let rule = "names of hosts, without scheme and port, or \"*\"";
+            check(name == "*" || is_name(name), "http.hosts", name, rule)?;
         }
         let bounds = [
             ("http.requests_max", self.requests_max),

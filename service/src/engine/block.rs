@@ -7,6 +7,7 @@
 //!        | 2 agent:varint session:varint from:varint to:varint reason:varint
 //!        | 3 number:varint name:string lesson              a lesson about an object
 //!        | 4 number:varint name:string                     an object to forget
+//!        | 5 agent:varint                                  an agent that is removed
 //! ```
 //!
 //! All of it is postcard of [`Entry`], so a batch that came as postcard and is accepted whole goes to
@@ -25,7 +26,7 @@ const VERSION: u8 = 1;
 pub enum Entry<'a> {
     /// A new agent.
     Enrol {
-        /// Its number, counted from 0.
+        /// Its number: the next one, counted from 0, or one that is vacant.
         agent: u32,
         /// Its name.
         name: Cow<'a, str>,
@@ -65,6 +66,11 @@ pub enum Entry<'a> {
         number: u64,
         /// Name of the object.
         name: Cow<'a, str>,
+    },
+    /// An agent is removed: its name is free.
+    Remove {
+        /// Its number.
+        agent: u32,
     },
 }
 
@@ -234,6 +240,15 @@ mod tests {
             reason: SkipReason::Lost,
         };
         assert_eq!(read[2], lost);
+    }
+
+    /// Entries that version 1 gained later have the tags after the first ones.
+    #[test]
+    fn a_removal_is_two_bytes_behind_what_was_there() {
+        let mut writer = BlockWriter::new();
+        writer.push(&Entry::Remove { agent: 2 });
+        assert_eq!(writer.bytes(), [1, 5, 2]);
+        assert_eq!(entries(&[1, 5, 2]).unwrap(), [Entry::Remove { agent: 2 }]);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use cogmap_proto::IngestAnswer;
 use super::counters::CommitCounters;
 use super::desk::AgentDesk;
 use super::health::Health;
-use super::message::{IngestError, ObjectReply, Reply};
+use super::message::{ChangeReply, IngestError, Reply};
 use super::outlet::Outlet;
 use crate::store::Store;
 
@@ -24,8 +24,8 @@ pub(crate) struct Commit {
     pub(crate) samples: u64,
     pub(crate) marks: Vec<Mark>,
     pub(crate) answers: Vec<Answer>,
-    /// Those who wait for a change of objects.
-    pub(crate) objects: Vec<ObjectReply>,
+    /// Those who wait for a change of objects or agents.
+    pub(crate) changes: Vec<ChangeReply>,
 }
 
 /// Samples of an agent's session below `next` are in the store.
@@ -122,7 +122,7 @@ fn acknowledge(commit: Commit, outlet: &dyn Outlet, counters: &CommitCounters) {
             duplicates,
         }));
     }
-    for reply in commit.objects {
+    for reply in commit.changes {
         let _ = reply.send(Ok(()));
     }
 }
@@ -132,7 +132,7 @@ fn refuse(commit: Commit, health: &Health) {
         let refusal = health.refusal().unwrap_or(IngestError::Closed);
         let _ = answer.reply.send(Err(refusal));
     }
-    for reply in commit.objects {
+    for reply in commit.changes {
         let _ = reply.send(Err(health.refusal().unwrap_or(IngestError::Closed)));
     }
 }

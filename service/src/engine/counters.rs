@@ -42,6 +42,7 @@ pub(crate) enum Drop {
     SpaceClosed,
     TooManyAgents,
     StaleSession,
+    SessionInFuture,
     StoreFailed,
 }
 
@@ -54,6 +55,7 @@ impl Drop {
         Self::SpaceClosed,
         Self::TooManyAgents,
         Self::StaleSession,
+        Self::SessionInFuture,
         Self::StoreFailed,
     ];
 
@@ -66,6 +68,7 @@ impl Drop {
             Self::SpaceClosed => "space_closed",
             Self::TooManyAgents => "too_many_agents",
             Self::StaleSession => "stale_session",
+            Self::SessionInFuture => "session_in_future",
             Self::StoreFailed => "store_failed",
         }
     }
@@ -132,6 +135,7 @@ pub(crate) struct SpaceCounters {
     by_status: [Gauge; 4],
     not_durable_max: Gauge,
     waiting_max: Gauge,
+    made_room: Counter,
     forgotten_places: Counter,
     forgotten_trips: Counter,
 }
@@ -162,6 +166,7 @@ impl SpaceCounters {
             ),
             not_durable_max: gauge!(names::NOT_DURABLE_MAX, "space" => label()),
             waiting_max: gauge!(names::WAITING_MAX, "space" => label()),
+            made_room: counter!(names::AGENTS_MADE_ROOM, "space" => label()),
             forgotten_places: counter!(names::FORGOTTEN_PLACES, "space" => label()),
             forgotten_trips: counter!(names::FORGOTTEN_TRIPS, "space" => label()),
         }
@@ -197,6 +202,11 @@ impl SpaceCounters {
     /// Counts samples that waited for earlier ones when their session was taken over.
     pub(crate) fn abandoned(&self, samples: usize) {
         self.abandoned.increment(samples as u64);
+    }
+
+    /// Counts an agent that was removed so that another one could enrol.
+    pub(crate) fn made_room(&self) {
+        self.made_room.increment(1);
     }
 
     /// Forgets the sizes of a space that is gone.

@@ -127,6 +127,9 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
                 });
             }
         }
+        Entry::Remove { agent } => take(Record::Remove {
+            agent: AgentId(*agent),
+        }),
         Entry::Forget { number, name } => {
             if let Ok(name) = Label::new(name) {
                 take(Record::ForgetObject {

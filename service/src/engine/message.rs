@@ -20,17 +20,25 @@ pub(crate) struct ObjectRequest {
     pub(crate) name: Label,
     /// The lesson as it came and as the map takes it; none to forget the object.
     pub(crate) lesson: Option<(ObjectLesson, Lesson)>,
-    pub(crate) reply: ObjectReply,
+    pub(crate) reply: ChangeReply,
 }
 
-/// Whoever waits for a change of objects to be durable.
-pub(crate) type ObjectReply = oneshot::Sender<Result<(), IngestError>>;
+/// An agent that is to be removed, for whose removal someone waits.
+#[derive(Debug)]
+pub(crate) struct RemovalRequest {
+    pub(crate) agent: Box<str>,
+    pub(crate) reply: ChangeReply,
+}
+
+/// Whoever waits for a change that is no sample to be durable.
+pub(crate) type ChangeReply = oneshot::Sender<Result<(), IngestError>>;
 
 /// What someone waits for.
 #[derive(Debug)]
 pub(crate) enum Call {
     Samples(Request),
     Object(ObjectRequest),
+    Removal(RemovalRequest),
 }
 
 /// Whoever waits for samples to be durable.
@@ -60,6 +68,20 @@ pub enum IngestError {
         /// The newer session.
         current: u64,
     },
+    /// The session has a number that lies too far in the future.
+    #[error(
+        "session {session} lies in the future: a session is the Unix time of its start [ns], and the \
+         service begins none above {latest} now"
+    )]
+    SessionInFuture {
+        /// The session.
+        session: u64,
+        /// The largest one that may begin now.
+        latest: u64,
+    },
+    /// There is no such agent.
+    #[error("the space has no agent {0:?}")]
+    UnknownAgent(String),
     /// The space has as many agents as it may.
     #[error("the space has its full number of agents")]
     TooManyAgents,

@@ -73,6 +73,7 @@ pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wi
     let kind = match &event.kind {
         EventKind::CellEntered { .. } => return None,
         EventKind::AgentEnrolled => wire::EventKind::AgentEnrolled {},
+        EventKind::AgentRemoved { .. } => wire::EventKind::AgentRemoved {},
         EventKind::SessionStarted { session } => {
             wire::EventKind::SessionStarted { session: *session }
         }
@@ -144,9 +145,14 @@ pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wi
             }
         }
     };
+    // The number of a removed agent may be another one's by now.
+    let agent = match &event.kind {
+        EventKind::AgentRemoved { name } => name,
+        _ => map.agent(event.agent)?.name(),
+    };
     Some(wire::Event {
         space: space.to_owned(),
-        agent: map.agent(event.agent)?.name().as_str().to_owned(),
+        agent: agent.as_str().to_owned(),
         map_revision: map.revision(),
         stamp_ns: event.stamp_ns,
         kind,

@@ -83,7 +83,7 @@ pub(crate) fn recover(
     }
     recovered
         .recorders
-        .resize_with(recovered.map.agent_count(), Recorder::default);
+        .resize_with(recovered.map.agent_numbers(), Recorder::default);
     Ok(recovered)
 }
 

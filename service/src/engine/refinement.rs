@@ -48,16 +48,20 @@ struct Refinement {
     agents: BTreeMap<String, Vec<StampedPose>>,
 }
 
-/// The refined trajectory of each agent of a map, by name; empty where it is not placed. Takes up to seconds.
+/// The refined trajectory of each agent of a map that has not been removed, by name; empty where it is not placed. Takes up to seconds.
 pub fn refined_trajectories(map: &CognitiveMap) -> BTreeMap<String, Vec<StampedPose>> {
     let mut refined = map.refined().agents.into_iter();
     let of_agent = |(_, agent): (AgentId, &Agent)| {
+        // Those of removed agents are among them.
         let poses = refined.next().filter(|refined| refined.is_in_map);
         let poses = poses.map(|refined| refined.poses).unwrap_or_default();
         let rows = poses.iter().map(|row| stamped(row.stamp_ns, &row.pose));
-        (agent.name().as_str().to_owned(), rows.collect())
+        let name = agent
+            .is_enrolled()
+            .then(|| agent.name().as_str().to_owned())?;
+        Some((name, rows.collect()))
     };
-    map.agents().map(of_agent).collect()
+    map.agents_ever().filter_map(of_agent).collect()
 }
 
 impl Space {
@@ -76,7 +80,7 @@ impl Space {
         to_ns: Option<i64>,
         limit: usize,
     ) -> Result<Trajectory, TrajectoryError> {
-        let desk = self.agent(agent).ok_or(TrajectoryError::UnknownAgent)?;
+        let desk = self.agent(agent).ok_or_else(|| self.no_agent(agent))?;
         let refinement = self.refinement(from_ns.is_some()).await?;
         let rows = refinement.agents.get(agent).map_or(&[][..], Vec::as_slice);
         let start = from_ns.map_or(0, |from| rows.partition_point(|row| row.stamp_ns < from));

@@ -11,6 +11,8 @@ pub struct EngineSettings {
     pub queue_bytes: usize,
     /// Most agents of a space; samples of further names are dropped and counted.
     pub agents_max: usize,
+    /// How far ahead of the service's clock the number of a session may be that begins.
+    pub session_ahead_max: Duration,
     /// Most spaces of the service.
     pub spaces_max: usize,
     /// Most samples of one agent that wait for earlier ones; further ones are dropped and counted,
@@ -30,6 +32,7 @@ impl Default for EngineSettings {
             queue_messages: 131_072,
             queue_bytes: 64 << 20,
             agents_max: 1024,
+            session_ahead_max: Duration::from_secs(86_400),
             spaces_max: 256,
             reorder_window: 8192,
             gap_timeout: Duration::from_secs(10),

@@ -7,10 +7,8 @@ use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 use arc_swap::ArcSwapOption;
-use cogmap_proto::{
-    Codec, EventId, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings, Trajectory,
-};
-use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
+use cogmap_proto::{Codec, EventId, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings};
+use cognitive_map::{AgentId, CognitiveMap, Label, Lesson, Settings};
 use tokio::sync::oneshot;
 
 use super::checkpointer::{Checkpointer, Job};
@@ -24,8 +22,8 @@ use super::question::QuestionRoom;
 use super::queue::{Inbox, NotQueued, Queue, queue};
 use super::recovery;
 use super::refinement::Refinements;
+use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
-use super::trajectory;
 use super::writer::Writer;
 use crate::store::{SpaceNumber, Store, StoreError};
 
@@ -45,6 +43,7 @@ pub(crate) struct Shared {
     pub(crate) number: SpaceNumber,
     pub(crate) interval_ns: i64,
     pub(crate) agents_max: usize,
+    pub(crate) sessions: SessionBound,
     pub(crate) reorder_window: usize,
     pub(crate) gap_timeout: Duration,
     pub(crate) store: Arc<dyn Store>,
@@ -59,6 +58,8 @@ pub(crate) struct Shared {
     /// Set once the map is loaded, or could not be.
     loaded: OnceLock<Result<(), String>>,
     agents: RwLock<BTreeMap<String, Arc<AgentDesk>>>,
+    /// Removed agents that were in the map, by name, the latest last.
+    former: RwLock<BTreeMap<String, Vec<AgentId>>>,
     snapshot: ArcSwapOption<CognitiveMap>,
     /// Those who wait for a snapshot; none once the writer is gone.
     wishes: Mutex<Option<Vec<Wish>>>,
@@ -95,6 +96,11 @@ pub enum TrajectoryError {
     /// There is no such agent.
     #[error("unknown agent")]
     UnknownAgent,
+    /// It has been removed.
+    #[error(
+        "the agent has been removed; causal trajectories of its sessions can be read by their number"
+    )]
+    RemovedAgent,
     /// The store cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -130,6 +136,7 @@ impl Space {
             number,
             interval_ns,
             agents_max: around.settings.agents_max,
+            sessions: SessionBound::new(around.settings.session_ahead_max),
             reorder_window: around.settings.reorder_window,
             gap_timeout: around.settings.gap_timeout,
             store: Arc::clone(&around.store),
@@ -140,6 +147,7 @@ impl Space {
             closing: AtomicBool::new(false),
             loaded: OnceLock::new(),
             agents: RwLock::default(),
+            former: RwLock::default(),
             snapshot: ArcSwapOption::empty(),
             wishes: Mutex::new(Some(Vec::new())),
             refinements: Refinements::default(),
@@ -303,8 +311,13 @@ impl Space {
         answer.await.unwrap_or(Err(IngestError::Closed))
     }
 
+    /// What it shares with its writer.
+    pub(super) fn shared(&self) -> &Arc<Shared> {
+        &self.shared
+    }
+
     /// Queues what someone waits for.
-    fn call(&self, call: Call) -> Result<(), IngestError> {
+    pub(super) fn call(&self, call: Call) -> Result<(), IngestError> {
         match self.available() {
             Ok(()) => {}
             Err(Unavailable::Recovering) => return Err(IngestError::Recovering),
@@ -315,36 +328,6 @@ impl Space {
             NotQueued::Full | NotQueued::LaneFull => IngestError::Busy,
             NotQueued::Closed => IngestError::Closed,
         })
-    }
-
-    /// Up to `limit` poses of an agent's causal trajectory with `from_ns <= stamp < to_ns`; of its
-    /// current session when none is named.
-    ///
-    /// # Errors
-    /// There is no such agent, or the store cannot be read.
-    pub async fn trajectory(
-        &self,
-        agent: &str,
-        session: Option<u64>,
-        from_ns: Option<i64>,
-        to_ns: Option<i64>,
-        limit: usize,
-    ) -> Result<Trajectory, TrajectoryError> {
-        let desk = self.agent(agent).ok_or(TrajectoryError::UnknownAgent)?;
-        let shared = Arc::clone(&self.shared);
-        let read = move || {
-            trajectory::read(
-                &*shared.store,
-                shared.number,
-                &desk,
-                session,
-                (from_ns, to_ns),
-                limit,
-            )
-        };
-        tokio::task::spawn_blocking(read)
-            .await
-            .map_err(|_| TrajectoryError::Store(StoreError::Io("reading was interrupted".into())))?
     }
 
     /// The map relaxed for those who asked for the past.
@@ -438,6 +421,24 @@ impl Shared {
     pub(crate) fn seat(&self, desk: Arc<AgentDesk>) {
         let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);
         agents.insert(desk.name().to_owned(), desk);
+    }
+
+    /// Lists an agent no longer.
+    pub(crate) fn unseat(&self, name: &str) {
+        let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);
+        agents.remove(name);
+    }
+
+    /// Notes a removed agent that was in the map.
+    pub(super) fn note_former(&self, name: &str, id: AgentId) {
+        let mut former = self.former.write().unwrap_or_else(PoisonError::into_inner);
+        former.entry(name.to_owned()).or_default().push(id);
+    }
+
+    /// The removed agents of a name that were in the map, the latest last.
+    pub(super) fn former(&self, name: &str) -> Vec<AgentId> {
+        let former = self.former.read().unwrap_or_else(PoisonError::into_inner);
+        former.get(name).cloned().unwrap_or_default()
     }
 
     /// Gives the map to all who wish for it: one copy for all, and copying is cheap.

@@ -16,6 +16,8 @@ use super::{
 };
 use crate::store::FjallStore;
 
+mod removal;
+
 const SPACE: &str = "lab";
 const AGENT: &str = "ada";
 const SESSION: u64 = 3;

@@ -5,11 +5,13 @@
 //! row    = stamp_ns:i64  x y z qx qy qz qw : f64        little endian, 64 bytes
 //! ```
 
+use std::sync::Arc;
+
 use cogmap_proto::{StampedPose, Trajectory};
-use cognitive_map::{Agent, CognitiveMap, Record, SampleBody};
+use cognitive_map::{Agent, AgentId, CognitiveMap, Record, SampleBody};
 
 use super::desk::AgentDesk;
-use super::space::TrajectoryError;
+use super::space::{Space, TrajectoryError};
 use crate::store::{SpaceNumber, Store, StoreError};
 
 /// Rows of a full chunk.
@@ -47,13 +49,18 @@ impl Recorder {
     /// Notes the pose of `agent` after a record has been applied to it, if the record moved or corrected
     /// it and the latest row is at least `interval_ns` old. A start pose or a sighting at the stamp of the
     /// latest row replaces that row. An agent that is not placed has no pose in the map, and no rows.
-    /// Returns a chunk when one is complete.
+    /// Returns a chunk when one is complete, and what is left when the agent is removed.
     pub fn note(&mut self, record: &Record, agent: &Agent, interval_ns: i64) -> Option<Chunk> {
-        let Record::Sample {
-            session, sample, ..
-        } = record
-        else {
-            return None;
+        let (session, sample) = match record {
+            Record::Sample {
+                session, sample, ..
+            } => (session, sample),
+            Record::Remove { .. } => {
+                let rest = self.take();
+                *self = Self::default();
+                return rest;
+            }
+            _ => return None,
         };
         let jumped = match sample.body {
             SampleBody::Motion(_) => false,
@@ -144,7 +151,7 @@ pub(crate) fn note_all(
     record: &Record,
     interval_ns: i64,
 ) -> Option<(u32, Chunk)> {
-    let Record::Sample { agent, .. } = record else {
+    let (Record::Sample { agent, .. } | Record::Remove { agent }) = record else {
         return None;
     };
     let index = agent.0 as usize;
@@ -197,56 +204,175 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Vec<StampedPose>, CorruptChunk> {
         .collect())
 }
 
-/// Rows of an agent's session with `from_ns <= stamp < to_ns`, at most `limit` of them.
+impl Space {
+    /// Up to `limit` poses of an agent's causal trajectory with `from_ns <= stamp < to_ns`; of its
+    /// current session when none is named. A session may be one of a removed agent of that name.
+    ///
+    /// # Errors
+    /// There is no such agent, or the store cannot be read.
+    pub async fn trajectory(
+        &self,
+        agent: &str,
+        session: Option<u64>,
+        from_ns: Option<i64>,
+        to_ns: Option<i64>,
+        limit: usize,
+    ) -> Result<Trajectory, TrajectoryError> {
+        let desk = self.agent(agent);
+        let present = desk.as_deref().map(Part::of_desk);
+        let former = self.shared().former(agent);
+        let session = match (&present, session) {
+            (Some(present), session) => session.unwrap_or(present.session),
+            (None, Some(session)) if !former.is_empty() => session,
+            (None, _) => return Err(self.no_agent(agent)),
+        };
+        // The latest agent of that name that had such a session.
+        let former = former.into_iter().rev();
+        let parts: Vec<Part> = { present.into_iter() }
+            .chain(former.map(Part::of_former))
+            .collect();
+        let (shared, name) = (Arc::clone(self.shared()), agent.to_owned());
+        let work = move || {
+            let window = Window {
+                session,
+                from_ns,
+                to_ns,
+                limit,
+            };
+            read(&*shared.store, shared.number, &name, &parts, &window)
+        };
+        tokio::task::spawn_blocking(work)
+            .await
+            .map_err(|_| TrajectoryError::Store(StoreError::Io("reading was interrupted".into())))?
+    }
+
+    /// Why there is no agent of a name.
+    pub(super) fn no_agent(&self, name: &str) -> TrajectoryError {
+        if self.has_removed(name) {
+            TrajectoryError::RemovedAgent
+        } else {
+            TrajectoryError::UnknownAgent
+        }
+    }
+}
+
+/// Where an agent's rows are: in the store, and the latest of them at its desk.
+#[derive(Debug)]
+pub(crate) struct Part {
+    agent: u32,
+    /// Session of the rows at the desk.
+    pub(crate) session: u64,
+    fresh: Vec<StampedPose>,
+}
+
+/// Which rows are asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Window {
+    pub(crate) session: u64,
+    pub(crate) from_ns: Option<i64>,
+    pub(crate) to_ns: Option<i64>,
+    pub(crate) limit: usize,
+}
+
+impl Part {
+    /// Of an agent of the space. The rows at the desk are to be taken first and those in the store
+    /// afterwards: a chunk that moves from one to the other in between is then found twice and never missed.
+    pub(crate) fn of_desk(desk: &AgentDesk) -> Self {
+        let recorder = desk.recorder();
+        Self {
+            agent: desk.id().0,
+            session: recorder.session(),
+            fresh: recorder.rows().to_vec(),
+        }
+    }
+
+    /// Of a removed agent: all its rows are in the store.
+    pub(crate) fn of_former(agent: AgentId) -> Self {
+        Self {
+            agent: agent.0,
+            session: 0,
+            fresh: Vec::new(),
+        }
+    }
+
+    /// Whether it has rows of a session.
+    fn had(&self, session: u64, store: &dyn Store, space: SpaceNumber) -> Result<bool, StoreError> {
+        if self.session == session && !self.fresh.is_empty() {
+            return Ok(true);
+        }
+        Ok(!store
+            .chunks(space, self.agent, session, i64::MIN, 1)?
+            .is_empty())
+    }
+}
+
+/// Rows of a session with `from_ns <= stamp < to_ns`, at most `limit` of them: of the first of the parts that
+/// had such a session.
 pub(crate) fn read(
     store: &dyn Store,
     space: SpaceNumber,
-    desk: &AgentDesk,
-    session: Option<u64>,
-    (from_ns, to_ns): (Option<i64>, Option<i64>),
-    limit: usize,
+    name: &str,
+    parts: &[Part],
+    window: &Window,
 ) -> Result<Trajectory, TrajectoryError> {
-    // The rows at the desk first, the store afterwards: a chunk that moves from one to the other in
-    // between is then found twice and never missed.
-    let (current, fresh) = {
-        let recorder = desk.recorder();
-        (recorder.session(), recorder.rows().to_vec())
-    };
-    let session = session.unwrap_or(current);
-    let from_ns = from_ns.unwrap_or(i64::MIN);
-    let to_ns = to_ns.unwrap_or(i64::MAX);
-    let mut poses: Vec<StampedPose> = Vec::new();
-    let mut next_from_ns = from_ns;
-    'chunks: loop {
-        let agent = desk.id().0;
-        let chunks = store.chunks(space, agent, session, next_from_ns, CHUNKS_AT_ONCE)?;
-        let last = chunks.len() < CHUNKS_AT_ONCE;
-        for (_, bytes) in chunks {
-            let rows = decode(&bytes).map_err(|error| StoreError::Corrupt(error.to_string()))?;
-            poses.extend(rows.into_iter().filter(|row| row.stamp_ns >= next_from_ns));
-            let Some(latest) = poses.last() else { continue };
-            if poses.len() > limit || latest.stamp_ns >= to_ns {
-                break 'chunks;
-            }
-            next_from_ns = latest.stamp_ns.saturating_add(1);
-        }
-        if last {
-            if session == current {
-                poses.extend(fresh.into_iter().filter(|row| row.stamp_ns >= next_from_ns));
-            }
+    let mut poses = Vec::new();
+    for (at, part) in parts.iter().enumerate() {
+        let is_last = at + 1 == parts.len();
+        if is_last || part.had(window.session, store, space)? {
+            poses = rows(store, space, part, window)?;
             break;
         }
     }
-    poses.retain(|row| row.stamp_ns < to_ns);
-    let next_from_ns = poses.get(limit).map(|row| row.stamp_ns);
-    poses.truncate(limit);
+    let next_from_ns = poses.get(window.limit).map(|row| row.stamp_ns);
+    poses.truncate(window.limit);
     Ok(Trajectory {
-        agent: desk.name().to_owned(),
-        session,
+        agent: name.to_owned(),
+        session: window.session,
         frame: "map".to_owned(),
         kind: "causal".to_owned(),
         map_revision: None,
         poses,
         next_from_ns,
     })
+}
+
+/// The rows of one part, and one beyond the limit if there is.
+fn rows(
+    store: &dyn Store,
+    space: SpaceNumber,
+    part: &Part,
+    window: &Window,
+) -> Result<Vec<StampedPose>, TrajectoryError> {
+    let from_ns = window.from_ns.unwrap_or(i64::MIN);
+    let to_ns = window.to_ns.unwrap_or(i64::MAX);
+    let mut poses: Vec<StampedPose> = Vec::new();
+    let mut next_from_ns = from_ns;
+    'chunks: loop {
+        let chunks = store.chunks(
+            space,
+            part.agent,
+            window.session,
+            next_from_ns,
+            CHUNKS_AT_ONCE,
+        )?;
+        let last = chunks.len() < CHUNKS_AT_ONCE;
+        for (_, bytes) in chunks {
+            let rows = decode(&bytes).map_err(|error| StoreError::Corrupt(error.to_string()))?;
+            poses.extend(rows.into_iter().filter(|row| row.stamp_ns >= next_from_ns));
+            let Some(latest) = poses.last() else { continue };
+            if poses.len() > window.limit || latest.stamp_ns >= to_ns {
+                break 'chunks;
+            }
+            next_from_ns = latest.stamp_ns.saturating_add(1);
+        }
+        if last {
+            if window.session == part.session {
+                let fresh = part.fresh.iter();
+                poses.extend(fresh.filter(|row| row.stamp_ns >= next_from_ns));
+            }
+            break;
+        }
+    }
+    poses.retain(|row| row.stamp_ns < to_ns);
+    Ok(poses)
 }

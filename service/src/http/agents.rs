@@ -2,16 +2,19 @@
 
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::Response;
+use axum::http::{Response, StatusCode};
 use cogmap_proto::{AgentDetail, AgentPage, AgentSummary, GridState};
 use serde::Deserialize;
 
-use super::extract::{AgentOfPath, AgentParams, NoQuery, Query, SpaceOfPath, SpaceParam};
+use super::extract::{
+    AgentName, AgentOfPath, AgentParams, NoQuery, Query, SpaceOfPath, SpaceParam,
+};
 use super::page;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
 use crate::answer;
+use crate::engine::IngestError;
 
 /// Which page of the agents.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -58,6 +61,31 @@ pub(crate) async fn list(
         (status = 404, description = "There is no such space or agent")))]
 pub(crate) async fn get(AgentOfPath(_, desk): AgentOfPath, _: NoQuery) -> Response<Body> {
     reply::with_type("application/json", Body::from(desk.detail_json()))
+}
+
+/// Remove an agent.
+///
+/// Its name is free: the next samples under it enrol another agent, whose sessions begin from nothing. What
+/// the agent did in the map stays: places, trips, landmarks, and the causal trajectories of its sessions,
+/// which can still be read by their number. Of one that was never in the map nothing stays.
+///
+/// A robot that goes on sending comes back as a new agent, whose earlier samples are missing: they count as
+/// lost after the usual wait, or a new run begins from 0.
+#[utoipa::path(delete, path = "/v1/spaces/{space}/agents/{agent}", tag = "agents",
+    operation_id = "remove_agent", params(AgentParams),
+    responses(
+        (status = 204, description = "The agent is removed, and that is on disk"),
+        (status = 404, description = "There is no such space or agent"),
+        (status = 507, description = "The store is full")))]
+pub(crate) async fn delete(
+    AgentName(space, agent): AgentName,
+    _: NoQuery,
+) -> Result<StatusCode, Problem> {
+    match space.remove_agent(&agent).await {
+        Ok(()) => Ok(StatusCode::NO_CONTENT),
+        Err(IngestError::UnknownAgent(name)) => Err(Problem::no_agent(&space, &name)),
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// The grid-cell state of an agent.

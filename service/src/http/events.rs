@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::OwnedSemaphorePermit;
 use utoipa::ToSchema;
 
-use super::extract::{Query, SpaceOfPath, SpaceParam, named};
+use super::extract::{Query, SpaceOfPath, SpaceParam, known};
 use super::page;
 use super::problem::{Kind, Problem};
 use super::reply;
@@ -107,7 +107,7 @@ pub(crate) async fn get(
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
     if let Some(name) = &query.agent {
-        named(&space, name)?;
+        known(&space, name)?;
     }
     let after = last_event_id(&headers)?.or(query.after);
     let accepted = || match headers.get(ACCEPT).and_then(|accept| accept.to_str().ok()) {

@@ -16,7 +16,7 @@ use futures_util::stream;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::extract::{Query, SpaceOfPath, SpaceParam, named};
+use super::extract::{Query, SpaceOfPath, SpaceParam, known};
 use super::long::LongAnswers;
 use super::problem::{Kind, Problem};
 use super::reply;
@@ -83,6 +83,7 @@ pub(crate) struct MapExport {
         (status = 200, description = "The map", content(
             (MapExport = "application/json"), (String = "text/plain"))),
         (status = 404, description = "There is no such space or agent"),
+        (status = 410, description = "The agent has been removed: name one of its sessions"),
         (status = 422, description = "A trajectory was asked for and no agent named, or the other way round")))]
 pub(crate) async fn get(
     State(service): State<Service>,
@@ -104,7 +105,7 @@ pub(crate) async fn get(
             let agent = query
                 .agent
                 .ok_or_else(|| Problem::new(Kind::InvalidQuery, detail))?;
-            named(&space, &agent)?;
+            known(&space, &agent)?;
             let file = format!("{}-{agent}.tum", space.name());
             (trajectory(long, space, agent, query.session).await?, file)
         }

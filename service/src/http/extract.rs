@@ -132,10 +132,13 @@ pub(crate) fn space(service: &Service, text: &str) -> Result<Arc<Space>, Problem
     found.map_or_else(|| Err(Problem::unknown_space(name(text)?.as_str())), Ok)
 }
 
-/// The agent that a parameter names.
-pub(crate) fn named(space: &Space, name: &str) -> Result<Arc<AgentDesk>, Problem> {
-    let found = space.agent(name);
-    found.ok_or_else(|| answer::unknown_agent(name).into())
+/// Checks that a parameter names an agent, or one that has been removed.
+pub(crate) fn known(space: &Space, name: &str) -> Result<(), Problem> {
+    if space.agent(name).is_some() || space.has_removed(name) {
+        Ok(())
+    } else {
+        Err(Problem::no_agent(space, name))
+    }
 }
 
 /// The parameters of a path.
@@ -175,7 +178,7 @@ impl FromRequestParts<Service> for AgentOfPath {
         let space = space(service, &params.space)?;
         match space.agent(&params.agent) {
             Some(desk) => Ok(Self(space, desk)),
-            None => Err(Problem::unknown_agent(name(&params.agent)?.as_str())),
+            None => Err(Problem::no_agent(&space, name(&params.agent)?.as_str())),
         }
     }
 }

@@ -21,6 +21,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tower::{Layer, Service};
 
 use super::held::holding;
+use super::hosts::HostRule;
 use super::problem::{Kind, Problem};
 use super::settings::HttpSettings;
 use crate::config::Token;
@@ -36,8 +37,9 @@ const EVENT_STREAM: &str = "text/event-stream";
 /// Label of requests that no route matches.
 const UNMATCHED: &str = "unmatched";
 /// Statuses that have counters of their own.
-const STATUSES: [u16; 17] = [
-    200, 201, 204, 303, 400, 401, 404, 405, 409, 413, 415, 422, 500, 503, 504, 507, 0,
+const STATUSES: [u16; 20] = [
+    200, 201, 204, 303, 400, 401, 403, 404, 405, 409, 410, 413, 415, 421, 422, 500, 503, 504, 507,
+    0,
 ];
 
 /// What stands before every handler.
@@ -53,6 +55,7 @@ pub(crate) struct Guarded<S> {
 
 struct Inner {
     token: Option<Token>,
+    hosts: HostRule,
     timeout: Duration,
     requests: Arc<Semaphore>,
     routes: BTreeMap<String, RouteMeters>,
@@ -70,6 +73,7 @@ impl Guard {
     pub(crate) fn new(settings: &HttpSettings, routes: impl Iterator<Item = String>) -> Self {
         Self(Arc::new(Inner {
             token: settings.token.clone(),
+            hosts: settings.hosts.clone(),
             timeout: settings.request_timeout,
             requests: Arc::new(Semaphore::new(settings.requests_max)),
             routes: routes
@@ -84,6 +88,7 @@ impl Guard {
         if OPEN_PATHS.contains(&request.uri().path()) {
             return Ok(None);
         }
+        self.0.hosts.check(request)?;
         if !self.knows(request) && !is_page(request) {
             let detail = "the header Authorization must be: Bearer, a space, the token";
             return Err(Problem::new(Kind::Unauthorized, detail));

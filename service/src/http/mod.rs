@@ -13,6 +13,7 @@ mod extract;
 mod guard;
 mod health;
 mod held;
+mod hosts;
 mod index;
 mod json;
 mod landmarks;
@@ -46,6 +47,7 @@ use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+pub use hosts::HostRule;
 pub use problem::{Kind, Problem};
 pub use settings::HttpSettings;
 
@@ -75,7 +77,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(spaces::list))
         .routes(routes!(spaces::get, spaces::put, spaces::delete))
         .routes(routes!(agents::list))
-        .routes(routes!(agents::get))
+        .routes(routes!(agents::get, agents::delete))
         .routes(routes!(agents::grid))
         .routes(routes!(trajectory::get))
         .routes(routes!(samples::post))

@@ -11,9 +11,13 @@ use super::examples;
 use super::problem::{Kind, PROBLEM_JSON};
 
 /// Statuses that every route may answer with, whoever handles it.
-const EVERYWHERE: [(&str, &str); 6] = [
+const EVERYWHERE: [(&str, &str); 7] = [
     ("400", "The request is malformed"),
     ("401", "The token is missing or wrong"),
+    (
+        "421",
+        "The request is for a host that the service is not known as: see http.hosts",
+    ),
     ("405", "The path does not take this method"),
     ("500", "A fault of the service, or the store has failed"),
     (
@@ -27,6 +31,11 @@ const WITH_BODY: [(&str, &str); 2] = [
     ("413", "The body is too long"),
     ("415", "The body's Content-Type is not one of these"),
 ];
+
+/// Statuses of routes that name an agent.
+const OF_AGENT: [(&str, &str); 1] = [("410", "The agent has been removed")];
+/// Statuses of routes that may change something.
+const CHANGING: [(&str, &str); 1] = [("403", "The request comes from a page of another host")];
 
 /// Lengths of arrays, by the names of the fields that hold them.
 const LENGTHS: [(&str, usize); 21] = [
@@ -56,7 +65,13 @@ const LENGTHS: [(&str, usize); 21] = [
 /// Completes a description. With `token`, it says that a bearer token is asked for.
 pub(crate) fn complete(mut openapi: Value, token: bool) -> Value {
     for (path, item) in entries(&mut openapi["paths"]) {
-        for (_, operation) in entries(item) {
+        for (method, operation) in entries(item) {
+            if path.contains("{agent}") {
+                add_all(operation, &OF_AGENT);
+            }
+            if method != "get" {
+                add_all(operation, &CHANGING);
+            }
             complete_operation(operation);
             if token && !matches!(path.as_str(), "/healthz" | "/readyz") {
                 operation["security"] = json!([{ "token": [] }]);
@@ -87,16 +102,11 @@ fn complete_operation(operation: &mut Value) {
     if let (Some(example), Some(body)) = (example, operation.pointer_mut(json)) {
         body["example"] = example;
     }
-    let responses = &mut operation["responses"];
-    for (status, description) in EVERYWHERE {
-        add(responses, status, description);
-    }
+    add_all(operation, &EVERYWHERE);
     if with_body {
-        for (status, description) in WITH_BODY {
-            add(responses, status, description);
-        }
+        add_all(operation, &WITH_BODY);
     }
-    for (status, response) in entries(responses) {
+    for (status, response) in entries(&mut operation["responses"]) {
         if status.as_str() >= "400" && response.get("content").is_none() {
             let schema = json!({ "$ref": "#/components/schemas/Problem" });
             response["content"] = json!({ PROBLEM_JSON: { "schema": schema } });
@@ -104,9 +114,13 @@ fn complete_operation(operation: &mut Value) {
     }
 }
 
-fn add(responses: &mut Value, status: &str, description: &str) {
-    if responses.get(status).is_none() {
-        responses[status] = json!({ "description": description });
+/// Adds statuses that the operation does not describe itself.
+fn add_all(operation: &mut Value, statuses: &[(&str, &str)]) {
+    let responses = &mut operation["responses"];
+    for (status, description) in statuses {
+        if responses.get(status).is_none() {
+            responses[status] = json!({ "description": description });
+        }
     }
 }
 

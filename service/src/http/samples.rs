@@ -27,7 +27,8 @@ use super::reply;
         (status = 409, description = "Earlier samples are missing, a newer session has taken the \
             agent over, or the space has its full number of agents",
             body = SequenceProblem, content_type = "application/problem+json"),
-        (status = 422, description = "The batch is empty, too large, or breaks another rule as a whole"),
+        (status = 422, description = "The batch is empty, too large, or breaks another rule as a whole; or the \
+            session lies in the future: its number is the Unix time of its start in nanoseconds"),
         (status = 507, description = "The store is full")))]
 pub(crate) async fn post(
     AgentName(space, agent): AgentName,

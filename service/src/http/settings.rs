@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::hosts::HostRule;
 use crate::config::Token;
 
 /// Settings of the HTTP interface. The settings file explains them.
@@ -9,6 +10,8 @@ use crate::config::Token;
 pub struct HttpSettings {
     /// Bearer token that requests must carry; absent, none is asked for.
     pub token: Option<Token>,
+    /// Which hosts the service answers as.
+    pub hosts: HostRule,
     /// Longest time from a request's head to the head of its answer.
     pub request_timeout: Duration,
     /// Most requests under way.

@@ -7,7 +7,7 @@ use cogmap_proto::{StampedPose, Trajectory};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::extract::{AgentOfPath, AgentParams, Query};
+use super::extract::{AgentName, AgentParams, Query};
 use super::page;
 use super::problem::{Kind, Problem};
 use super::reply;
@@ -72,13 +72,13 @@ pub(crate) struct TrajectoryQuery {
         (status = 404, description = "There is no such space or agent"),
         (status = 422, description = "A session was named for a refined trajectory")))]
 pub(crate) async fn get(
-    AgentOfPath(space, desk): AgentOfPath,
+    AgentName(space, agent): AgentName,
     Query(query): Query<TrajectoryQuery>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
-    let (name, from_ns, to_ns) = (desk.name(), query.from_ns, query.to_ns);
+    let (name, from_ns, to_ns) = (agent.as_str(), query.from_ns, query.to_ns);
     let read = match query.kind.unwrap_or_default() {
         TrajectoryKind::Causal => {
             space

@@ -4,10 +4,10 @@ use axum::body::Body;
 use axum::extract::State;
 use axum::http::Response;
 use cogmap_proto::{TripDetail, TripPage};
-use cognitive_map::{AgentId, CognitiveMap, TripId};
+use cognitive_map::{CognitiveMap, TripId};
 use serde::Deserialize;
 
-use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam, named};
+use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam, known};
 use super::page;
 use super::places::{MemoryOfPath, forgotten, unknown};
 use super::problem::Problem;
@@ -45,25 +45,27 @@ pub(crate) async fn list(
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
     let map = space.snapshot().await?;
-    let agent = query.agent.as_deref().map(|name| named(&space, name));
-    let agent = agent.transpose()?.map(|desk| desk.id());
+    if let Some(name) = query.agent.as_deref() {
+        known(&space, name)?;
+    }
     // A filter may look at every trip.
-    let listed = service.long.make(move || trips(&map, &query, agent, limit));
+    let listed = service.long.make(move || trips(&map, &query, limit));
     listed.await
 }
 
-fn trips(
-    map: &CognitiveMap,
-    query: &TripsQuery,
-    agent: Option<AgentId>,
-    limit: usize,
-) -> Response<Body> {
+fn trips(map: &CognitiveMap, query: &TripsQuery, limit: usize) -> Response<Body> {
+    // By name, so that the trips of a removed agent are found, too.
+    let is_called = |id, name: &str| {
+        let agent = map.agent(id);
+        agent.is_some_and(|agent| agent.name().as_str() == name)
+    };
     let first = page::first(query.after);
     let listed = first
         .into_iter()
         .flat_map(|first| map.trips_from(TripId(first)));
     let wanted = listed.filter(|(_, trip)| {
-        agent.is_none_or(|agent| agent == trip.agent())
+        let agent = query.agent.as_deref();
+        agent.is_none_or(|name| is_called(trip.agent(), name))
             && query
                 .since_ns
                 .is_none_or(|since| trip.end_stamp_ns() >= since)

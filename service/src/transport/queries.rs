@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use cogmap_proto::{
-    Codec, IdentifyQuery, LocalizeQuery, Name, PredictQuery, RecallQuery, Verb, WatermarkQuery,
-    query_key,
+    Codec, IdentifyQuery, LocalizeQuery, Name, PredictQuery, RecallQuery, SESSION_PARAMETER, Verb,
+    WatermarkQuery, query_key,
 };
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
@@ -122,6 +122,9 @@ async fn answer(
         }
         Verb::Watermark => {
             let body: WatermarkQuery = body(query, codec)?;
+            if let Some(session) = session(query)? {
+                space.check_session(&body.agent, session)?;
+            }
             Ok(codec.encode(&agent(&space, &body.agent)?.watermark()))
         }
         Verb::Predict => {
@@ -160,7 +163,19 @@ pub(super) fn space(engine: &Engine, name: &str) -> Result<Arc<Space>, Problem> 
 /// The agent that a question names.
 pub(super) fn agent(space: &Space, name: &str) -> Result<Arc<AgentDesk>, Problem> {
     let found = space.agent(name);
-    found.ok_or_else(|| answer::unknown_agent(name).into())
+    found.ok_or_else(|| Problem::no_agent(space, name))
+}
+
+/// The session that a robot asks as, if it says so: the service tells whether it may begin.
+fn session(query: &Query) -> Result<Option<u64>, Problem> {
+    let Some(session) = query.parameters().get(SESSION_PARAMETER) else {
+        return Ok(None);
+    };
+    let session = session.parse().map(Some);
+    session.map_err(|_| {
+        let detail = format!("{SESSION_PARAMETER} is an unsigned 64-bit number");
+        Problem::new(Kind::InvalidParameter, detail)
+    })
 }
 
 fn body<T: DeserializeOwned>(query: &Query, codec: Codec) -> Result<T, Problem> {

@@ -11,9 +11,11 @@ mod bad_input; // what no client would send
 mod crash; // kill -9, and what recovery makes of it
 mod full_disk; // a disk that takes no more
 mod leaps; // sequence numbers that somebody made up
+mod names; // names that others claim, and agents that are removed
 mod nobody_waits; // connections that say next to nothing
 mod pause; // a process that stands still
 mod readers; // readers and senders at once
+mod secure; // the example of docs/security.md: who may say and hear what
 
 // What the service does for the outside.
 mod cli; // the commands

@@ -35,6 +35,7 @@ from .answer import (
     Watermark,
 )
 from .client import Client
+from .credentials import Credentials
 from .errors import (
     ApiError,
     CalledFromCallback,
@@ -52,6 +53,7 @@ from .evidence import Evidence
 from .event import (
     AgentEnrolled,
     AgentPlaced,
+    AgentRemoved,
     Event,
     EventKind,
     LandmarkLearned,
@@ -147,6 +149,7 @@ __all__ = [
     "AgentObject",
     "AgentPage",
     "AgentPlaced",
+    "AgentRemoved",
     "AgentSummary",
     "AgentTarget",
     "AnyTurn",
@@ -160,6 +163,7 @@ __all__ = [
     "Contact",
     "ContactDescriptor",
     "ContactLevel",
+    "Credentials",
     "CubeTurns",
     "Descriptor",
     "EndObject",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import ssl
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -65,6 +66,8 @@ class Client:
         url: Address of the service, for example `http://127.0.0.1:8080`.
         token: Bearer token, if the service asks for one.
         timeout_s: Longest silence of a connection [s].
+        ca_file: File (PEM) with the authority that has signed the certificate of an `https://` service; the
+            system's authorities when absent.
 
     Raises (all methods, each with the address in its message):
         InvalidValue: An argument makes no sense; nothing was asked.
@@ -74,10 +77,17 @@ class Client:
         Timeout: The service fell silent.
     """
 
-    def __init__(self, url: str, token: Optional[str] = None, timeout_s: float = 10.0) -> None:
+    def __init__(
+        self,
+        url: str,
+        token: Optional[str] = None,
+        timeout_s: float = 10.0,
+        ca_file: Optional[str] = None,
+    ) -> None:
         self._url = _checked_url(url)
         self._token = token
         self._timeout_s = timeout_s
+        self._tls = None if ca_file is None else ssl.create_default_context(cafile=ca_file)
 
     def __repr__(self) -> str:
         return f"Client({self._url!r}{'' if self._token is None else ', token=...'})"
@@ -121,6 +131,14 @@ class Client:
     def agent(self, space: str, agent: str) -> AgentDetail:
         """Where an agent is, how sure that is, and how far its samples have come."""
         return self._get(AgentDetail, _path(space, "agents", agent))
+
+    def delete_agent(self, space: str, agent: str) -> None:
+        """Removes an agent; returns when that is on the service's disk.
+
+        Its name is free, and what it did in the map stays: places, trips, landmarks and the causal
+        trajectories of its sessions. A robot that goes on sending under the name comes back as a new agent.
+        """
+        self._request("DELETE", _path(space, "agents", agent))
 
     def grid(self, space: str, agent: str) -> GridState:
         """Grid-cell state of an agent."""
@@ -406,7 +424,7 @@ class Client:
 
     def _open(self, request: urllib.request.Request, timeout_s: Optional[float]) -> Any:
         try:
-            return urllib.request.urlopen(request, timeout=timeout_s)
+            return urllib.request.urlopen(request, timeout=timeout_s, context=self._tls)
         except urllib.error.HTTPError as error:
             where = f"{request.get_method()} {request.full_url}"
             if error.code == 401:

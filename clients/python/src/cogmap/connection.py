@@ -29,6 +29,7 @@ class Connection:
         session: The Zenoh session.
         owns_session: Whether `close` closes the session too.
         address: Where the session leads, for messages.
+        run_number: Number of the run, with which the service is asked whether it may begin.
     """
 
     def __init__(
@@ -38,6 +39,7 @@ class Connection:
         address: str,
         space: str,
         agent: str,
+        run_number: int,
         *,
         hear_estimate: _Hear,
         hear_watermark: _Hear,
@@ -49,6 +51,7 @@ class Connection:
         self._owns_session = owns_session
         self._agent = agent
         self._query_key = query_key(space, "watermark")
+        self._selector = f"{self._query_key}?session={run_number}"
         self._samples_key = samples_key(space, agent)
         self._hear_watermark = hear_watermark
         self._hear_problem = hear_problem
@@ -119,7 +122,7 @@ class Connection:
 
         try:
             self._session.get(
-                self._query_key,
+                self._selector,
                 zenoh.handlers.Callback(hear, ended, indirect=False),
                 payload=encode(WatermarkQuery(self._agent)),
                 encoding=CBOR,

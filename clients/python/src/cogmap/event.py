@@ -18,6 +18,14 @@ class AgentEnrolled:
 
 
 @dataclass(frozen=True)
+class AgentRemoved:
+    """The agent was removed, by whoever runs the service or to make room. What it did in the map stays; a
+    message under its name enrols another agent."""
+
+    TAG: ClassVar[str] = "agent_removed"
+
+
+@dataclass(frozen=True)
 class SessionStarted:
     """The agent began a session."""
 
@@ -235,6 +243,7 @@ class UnknownKind:
 
 EventKind = Union[
     AgentEnrolled,
+    AgentRemoved,
     SessionStarted,
     PlaceRecruited,
     PlaceEntered,

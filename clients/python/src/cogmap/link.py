@@ -11,7 +11,8 @@ from typing import Iterable, List, Optional, Union
 
 import zenoh
 
-from .errors import InvalidValue, Timeout
+from .credentials import Credentials
+from .errors import CogmapError, InvalidValue, Timeout
 
 _log = logging.getLogger("cogmap")
 
@@ -32,17 +33,24 @@ _PROBE_S = 0.5
 
 
 def open_session(
-    connect: Union[str, Iterable[str]] = DEFAULT_ENDPOINT, *, timeout_s: float = 10.0
+    connect: Union[str, Iterable[str]] = DEFAULT_ENDPOINT,
+    *,
+    credentials: Optional[Credentials] = None,
+    timeout_s: float = 10.0,
 ) -> zenoh.Session:
     """Opens a Zenoh session in client mode to one of the endpoints, without multicast.
 
-    Several robots of one process may share it. Raises `InvalidValue` for what is no endpoint, and
-    `Timeout` when none answers in time.
+    Several robots of one process may share it. Raises `InvalidValue` for what is no endpoint, `Timeout`
+    when none answers in time or accepts the credentials, and `CogmapError` when the credentials' files
+    cannot be used.
     """
     endpoints = [connect] if isinstance(connect, str) else list(connect)
     for endpoint in endpoints:
         _check_endpoint(endpoint)
-    config = zenoh.Config()
+    try:
+        config = (credentials or Credentials()).config()
+    except zenoh.ZError as error:
+        raise CogmapError(f"credentials: {reason(error)}") from None
     config.insert_json5("mode", json.dumps("client"))
     try:
         config.insert_json5("connect/endpoints", json.dumps(endpoints))
@@ -60,7 +68,7 @@ def open_session(
     session = _opened(config)
     if session is None:
         found = "; ".join(f"{endpoint} {_probe(endpoint)}" for endpoint in endpoints)
-        raise Timeout(f"no Zenoh router answers within {timeout_s:g} s: {found}")
+        raise Timeout(f"no Zenoh router let this robot in within {timeout_s:g} s: {found}")
     return session
 
 

@@ -12,6 +12,7 @@ from typing import Callable, Iterable, Optional, Tuple, Type, Union
 import zenoh
 
 from .answer import Estimate, Rejection, Watermark
+from .credentials import Credentials
 from .errors import ClockWarning, CogmapError, InvalidValue, Timeout
 from .key import check_name
 from .link import DEFAULT_ENDPOINT, open_session
@@ -48,6 +49,7 @@ class Robot(Sampler):
         agent: Name of the agent.
         connect: Zenoh endpoint, or several of them to try; `tcp/127.0.0.1:7447` when absent.
         session: An open Zenoh session to use instead; it is left open by `close`.
+        credentials: User, password and certificates for the router; none when absent.
         session_id: Number of this run; it must be larger than those of earlier runs. The time of the
             start [ns] when absent.
         batch_samples: Most samples of one message, 1 to 4096.
@@ -62,8 +64,9 @@ class Robot(Sampler):
             it they end when the agent's next session begins.
 
     Raises:
-        InvalidValue: A name or another argument makes no sense.
-        Timeout: No Zenoh router answers within `connect_timeout_s`.
+        InvalidValue: A name or another argument makes no sense, or `connect` or `credentials` are
+            given with `session`.
+        Timeout: No Zenoh router answers within `connect_timeout_s`, or none accepts the credentials.
         ApiError: The service has no such space.
         Unreachable: The given Zenoh session is closed.
     """
@@ -75,6 +78,7 @@ class Robot(Sampler):
         *,
         connect: Union[None, str, Iterable[str]] = None,
         session: Optional[zenoh.Session] = None,
+        credentials: Optional[Credentials] = None,
         session_id: Optional[int] = None,
         batch_samples: int = 64,
         batch_delay_s: float = 0.02,
@@ -86,8 +90,11 @@ class Robot(Sampler):
         match_timeout_s: float = 5.0,
         ends_session: bool = True,
     ) -> None:
-        if connect is not None and session is not None:
+        if session is not None and connect is not None:
             raise InvalidValue("connect", connect, "expected either connect or session", "both")
+        if session is not None and credentials is not None:
+            expected = "expected none with a session, which has its own"
+            raise InvalidValue("credentials", credentials, expected)
         check_name("space", space)
         check_name("agent", agent)
         number = (
@@ -105,7 +112,9 @@ class Robot(Sampler):
         if session is None:
             wanted = DEFAULT_ENDPOINT if connect is None else connect
             endpoints = [wanted] if isinstance(wanted, str) else list(wanted)
-            link = open_session(endpoints, timeout_s=connect_timeout_s)
+            link = open_session(
+                endpoints, credentials=credentials, timeout_s=connect_timeout_s
+            )
             address = ", ".join(endpoints)
         else:
             link, address = session, "the given Zenoh session"

@@ -111,6 +111,7 @@ class Run:
             address,
             space,
             agent,
+            session_id,
             hear_estimate=self._estimates_in.hear,
             hear_watermark=self._watermarks_in.hear,
             hear_problem=self._problems_in.hear,

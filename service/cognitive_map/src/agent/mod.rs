@@ -1,11 +1,13 @@
 //! Agents: who samples the space, and where each of them is.
 
 mod body;
+mod membership;
 mod status;
 
 use nalgebra::{Isometry3, Point3};
 
 pub(crate) use body::Body;
+pub(crate) use membership::Membership;
 pub use status::Status;
 
 use crate::estimation::Evidence;
@@ -25,6 +27,7 @@ use crate::trip::{LegUnderWay, Recorder, TripId};
 #[derive(Clone, Debug)]
 pub struct Agent {
     pub(crate) name: Label,
+    pub(crate) membership: Membership,
     /// `None` before the first session.
     pub(crate) session: Option<u64>,
     pub(crate) next_seq: u64,
@@ -51,6 +54,7 @@ pub struct Agent {
 
 state_of_struct!(Agent {
     name,
+    membership,
     session,
     next_seq,
     stamp_ns,
@@ -73,6 +77,7 @@ impl Agent {
     pub(crate) fn new(name: Label, modules: &GridModules) -> Self {
         Self {
             name,
+            membership: Membership::Enrolled,
             session: None,
             next_seq: 0,
             stamp_ns: None,
@@ -93,8 +98,10 @@ impl Agent {
 
     /// Whether the sample numbers up to and without `to` of a session hold news.
     pub(crate) fn awaits(&self, session: u64, to: u64) -> bool {
-        self.session
-            .is_none_or(|own| session > own || (session == own && to > self.next_seq))
+        self.is_enrolled()
+            && self
+                .session
+                .is_none_or(|own| session > own || (session == own && to > self.next_seq))
     }
 
     /// The places that must not be forgotten: the one that answers here, and the one that the leg
@@ -107,7 +114,12 @@ impl Agent {
         ]
     }
 
-    /// Name.
+    /// Whether it belongs to the space: it has not been removed.
+    pub fn is_enrolled(&self) -> bool {
+        self.membership == Membership::Enrolled
+    }
+
+    /// Name; of one that has been removed the name that it had.
     pub fn name(&self) -> &Label {
         &self.name
     }

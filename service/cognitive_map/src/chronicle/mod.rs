@@ -26,6 +26,7 @@ mod mooring;
 mod names;
 mod refine;
 mod relocalisation;
+mod removal;
 mod revisit;
 mod revisited;
 mod settings;

@@ -44,7 +44,7 @@ use crate::trip::LEG_PAGES_MAX;
 /// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps,
 /// version 3 no joint estimate and no chronicle, version 4 no views in it and no objects, version 5 no searches,
 /// version 6 no other names of landmarks, version 7 none of what was joined into objects, version 8 no moorings and no
-/// doubts.
+/// doubts, version 9 nobody removed or set aside.
 const VERSION: u16 = 10;
 
 const HEADER: u8 = 0;

@@ -1,6 +1,7 @@
 //! The cognitive map of a space: everything that is derived from its journal.
 
 mod checkpoint;
+mod enrolment;
 mod feel;
 mod fold;
 mod forget;
@@ -23,7 +24,7 @@ pub use predict::{Predicted, Prediction};
 use crate::agent::Agent;
 use crate::chronicle::{Chronicle, ChronicleSettings};
 use crate::estimation::{Estimator, Parameters};
-use crate::event::{Event, EventKind};
+use crate::event::Event;
 use crate::grid::GridModules;
 use crate::landmark::LandmarkMap;
 use crate::object::ObjectMemory;
@@ -91,31 +92,15 @@ impl CognitiveMap {
     /// Applies the next record of the journal, and appends to `events` what it brought about.
     ///
     /// Every record is legal. One that says nothing new has no effect at all: the enrolment of an
-    /// agent that is there (or is not next in line), a lesson that is not next in line, a sample of an unknown agent, of an earlier
-    /// session, or with a sequence number that has been applied or skipped. A sample whose number is
+    /// agent that is there (or is neither next in line nor vacant), the removal of one that is not, a lesson that is not next in
+    /// line, a sample of an unknown or removed agent, of an earlier session, or with a sequence number that has been applied or
+    /// skipped. A sample whose number is
     /// ahead first skips the missing ones as [`SkipReason::Lost`]. Work and memory per sample are
     /// bounded, whatever the size of the map.
     pub fn apply(&mut self, record: &Record, events: &mut Vec<Event>) {
         match record {
-            Record::Enrol { agent, name } => {
-                if agent.0 as usize == self.agents.len() {
-                    self.revision += 1;
-                    self.agents
-                        .push(Agent::new(name.clone(), &self.modules), self.revision);
-                    Arc::make_mut(&mut self.names)
-                        .entry(name.clone())
-                        .or_insert(*agent);
-                    Arc::make_mut(&mut self.estimator).enrol();
-                    let chronicle = Arc::make_mut(&mut self.chronicle);
-                    chronicle.set_revision(self.revision);
-                    chronicle.enrol();
-                    events.push(Event {
-                        agent: *agent,
-                        stamp_ns: 0,
-                        kind: EventKind::AgentEnrolled,
-                    });
-                }
-            }
+            Record::Enrol { agent, name } => self.enrol(*agent, name, events),
+            Record::Remove { agent } => self.remove(*agent, events),
             Record::Sample {
                 agent,
                 session,
@@ -182,10 +167,16 @@ impl CognitiveMap {
         to: u64,
         events: &'a mut Vec<Event>,
     ) -> Option<Fold<'a>> {
-        let index = agent_id.0 as usize;
-        if !self.agents.get(index)?.awaits(session, to) {
+        if !self.agents.get(agent_id.0 as usize)?.awaits(session, to) {
             return None;
         }
+        self.open(agent_id, events)
+    }
+
+    /// Opens the map for a record of an agent that has an effect.
+    fn open<'a>(&'a mut self, agent_id: AgentId, events: &'a mut Vec<Event>) -> Option<Fold<'a>> {
+        let index = agent_id.0 as usize;
+        self.agents.get(index)?;
         self.revision += 1;
         let agent = self.agents.get_mut(index, self.revision)?;
         let chronicle = Arc::make_mut(&mut self.chronicle);

@@ -59,17 +59,27 @@ impl CognitiveMap {
         self.names.get(name).copied()
     }
 
-    /// Number of agents.
+    /// Number of agents, without those that have been removed.
     pub fn agent_count(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Number of identifiers of agents that have been given out, those of removed ones included.
+    pub fn agent_numbers(&self) -> usize {
         self.agents.len()
     }
 
-    /// The agents, in the order of enrolment.
+    /// The agents by number, without those that have been removed.
     pub fn agents(&self) -> impl Iterator<Item = (AgentId, &Agent)> {
+        self.agents_ever().filter(|(_, agent)| agent.is_enrolled())
+    }
+
+    /// The agents by number, removed ones included.
+    pub fn agents_ever(&self) -> impl Iterator<Item = (AgentId, &Agent)> {
         (0..).map(AgentId).zip(self.agents.iter())
     }
 
-    /// An agent.
+    /// An agent, also one that has been removed.
     pub fn agent(&self, agent: AgentId) -> Option<&Agent> {
         self.agents.get(agent.0 as usize)
     }

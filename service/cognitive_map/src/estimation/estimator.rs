@@ -202,8 +202,7 @@ impl Estimator {
                 frame.covariance.set_diagonal(member.offset, own);
             }
         }
-        self.pending
-            .retain(|pending| pending.observer != agent && pending.target != agent);
+        self.forget_pending(agent);
     }
 
     /// An agent moved.

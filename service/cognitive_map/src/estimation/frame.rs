@@ -183,6 +183,13 @@ impl Frame {
         }
     }
 
+    /// Forgets that an agent saw landmarks, whose number will be another one's: it may have been anybody.
+    pub(super) fn forget_observer(&mut self, agent: u32) {
+        for mark in Arc::make_mut(&mut self.marks).values_mut() {
+            mark.observers.forget(agent);
+        }
+    }
+
     /// Brings all cross terms up to date.
     ///
     /// Between sightings a moving body keeps only its own covariance and its transition; what ties it to

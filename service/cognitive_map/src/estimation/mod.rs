@@ -46,6 +46,7 @@ mod mover;
 mod observers;
 mod outcome;
 mod parameters;
+mod removal;
 mod resemblance;
 mod seat;
 mod sensor;

@@ -43,6 +43,14 @@ impl Observers {
         }
     }
 
+    /// An agent's number stands for another one from now on: who it was is forgotten.
+    pub(super) fn forget(&mut self, agent: u32) {
+        if let Ok(at) = self.agents.binary_search(&agent) {
+            self.agents.remove(at);
+            self.are_more = true;
+        }
+    }
+
     /// Whether an agent is known to have seen it.
     pub(super) fn contains(&self, agent: u32) -> bool {
         self.agents.binary_search(&agent).is_ok()

@@ -18,4 +18,5 @@ mod objects; // what is taught and known again
 mod percepts; // what places learn of percepts, and what they predict
 mod places; // recruitment, revisits
 mod recall; // recall against an exhaustive scan
+mod removal; // agents that go, and who comes after them
 mod trips; // legs, and every way a trip ends

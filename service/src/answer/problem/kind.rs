@@ -11,6 +11,8 @@ pub enum Kind {
     MalformedBody,
     /// The token is missing or wrong.
     Unauthorized,
+    /// A page of another host wants to change something.
+    ForeignOrigin,
     /// There is nothing under this path.
     UnknownRoute,
     /// There is no such space.
@@ -19,6 +21,8 @@ pub enum Kind {
     UnknownAgent,
     /// No place remembers anything of the channel.
     UnknownChannel,
+    /// The agent has been removed.
+    RemovedAgent,
     /// There is no such place, trip, landmark or object.
     UnknownMemory,
     /// The place or trip has been forgotten.
@@ -41,6 +45,10 @@ pub enum Kind {
     BodyTooLong,
     /// The codec that the message names is not one that is read here.
     UnsupportedMediaType,
+    /// The request is for a host that the service is not known as.
+    UnknownHost,
+    /// The session's number lies in the future.
+    SessionInFuture,
     /// Settings that break a rule.
     InvalidSettings,
     /// A question or a batch that can be read, and breaks a rule.
@@ -65,11 +73,12 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, by status.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 33] = [
         Self::InvalidPath,
         Self::InvalidParameter,
         Self::MalformedBody,
         Self::Unauthorized,
+        Self::ForeignOrigin,
         Self::UnknownRoute,
         Self::UnknownSpace,
         Self::UnknownAgent,
@@ -82,9 +91,12 @@ impl Kind {
         Self::TooManyAgents,
         Self::TooManySpaces,
         Self::NotPlaced,
+        Self::RemovedAgent,
         Self::ForgottenMemory,
         Self::BodyTooLong,
         Self::UnsupportedMediaType,
+        Self::UnknownHost,
+        Self::SessionInFuture,
         Self::InvalidSettings,
         Self::InvalidQuery,
         Self::Internal,
@@ -104,6 +116,7 @@ impl Kind {
             Self::InvalidParameter => ("invalid-parameter", 400, "Invalid query parameter"),
             Self::MalformedBody => ("malformed-body", 400, "Malformed body"),
             Self::Unauthorized => ("unauthorized", 401, "Missing or wrong token"),
+            Self::ForeignOrigin => ("foreign-origin", 403, "A page of another host"),
             Self::UnknownRoute => ("unknown-route", 404, "Unknown path"),
             Self::UnknownSpace => ("unknown-space", 404, "Unknown space"),
             Self::UnknownAgent => ("unknown-agent", 404, "Unknown agent"),
@@ -116,9 +129,12 @@ impl Kind {
             Self::TooManyAgents => ("too-many-agents", 409, "Too many agents"),
             Self::TooManySpaces => ("too-many-spaces", 409, "Too many spaces"),
             Self::NotPlaced => ("not-placed", 409, "The agent is lost"),
+            Self::RemovedAgent => ("removed-agent", 410, "Removed agent"),
             Self::ForgottenMemory => ("forgotten-memory", 410, "Forgotten memory"),
             Self::BodyTooLong => ("body-too-long", 413, "Body too long"),
             Self::UnsupportedMediaType => ("unsupported-media-type", 415, "Unsupported encoding"),
+            Self::UnknownHost => ("unknown-host", 421, "Unknown host"),
+            Self::SessionInFuture => ("session-in-future", 422, "The session lies in the future"),
             Self::InvalidSettings => ("invalid-settings", 422, "Invalid settings"),
             Self::InvalidQuery => ("invalid-query", 422, "The request breaks a rule"),
             Self::Internal => ("internal", 500, "Fault of the service"),

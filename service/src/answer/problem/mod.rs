@@ -6,8 +6,10 @@ mod kind;
 use cogmap_proto::DecodeError;
 pub use kind::Kind;
 
-use super::{InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence};
-use crate::engine::{IngestError, QuestionError, SpaceError, TrajectoryError, Unavailable};
+use super::{
+    InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence, unknown_agent,
+};
+use crate::engine::{IngestError, QuestionError, Space, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
 
 /// A problem, as an answer.
@@ -48,6 +50,16 @@ impl Problem {
             Kind::UnknownAgent,
             format!("the space has no agent {name:?}"),
         )
+    }
+
+    /// There is no agent of that name; there may have been one.
+    pub(crate) fn no_agent(space: &Space, name: &str) -> Self {
+        if space.has_removed(name) {
+            let detail = format!("the agent {name:?} has been removed");
+            Self::new(Kind::RemovedAgent, detail)
+        } else {
+            unknown_agent(name).into()
+        }
     }
 
     /// Work in another thread ended with a panic.
@@ -174,6 +186,7 @@ impl From<TrajectoryError> for Problem {
     fn from(error: TrajectoryError) -> Self {
         match error {
             TrajectoryError::UnknownAgent => Self::new(Kind::UnknownAgent, error.to_string()),
+            TrajectoryError::RemovedAgent => Self::new(Kind::RemovedAgent, error.to_string()),
             TrajectoryError::Store(error) => error.into(),
             TrajectoryError::Unavailable(error) => error.into(),
         }
@@ -206,6 +219,8 @@ impl From<IngestError> for Problem {
             IngestError::StaleSession { current } => {
                 Self::new(Kind::StaleSession, detail).expecting(current, None)
             }
+            IngestError::SessionInFuture { .. } => Self::new(Kind::SessionInFuture, detail),
+            IngestError::UnknownAgent(_) => Self::new(Kind::UnknownAgent, detail),
             IngestError::TooManyAgents => Self::new(Kind::TooManyAgents, detail),
             IngestError::DiskFull(_) => Self::new(Kind::StoreFull, detail),
             IngestError::Store(_) => Self::new(Kind::StoreFailed, detail),

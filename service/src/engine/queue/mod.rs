@@ -278,6 +278,7 @@ fn size_of_call(call: &Call) -> usize {
             // Twice: as it came, and as the map takes it.
             name.as_str().len() + 2 * contacts.map(size_of_contact).sum::<usize>()
         }
+        Call::Removal(request) => request.agent.len(),
     }
 }
 

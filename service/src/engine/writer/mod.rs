@@ -4,13 +4,14 @@
 //! round's block to the journal, and only then applies it. Estimates leave at the end of the round;
 //! the committer makes the block durable beside the next one.
 
+mod agents;
 mod journal;
 mod objects;
 mod pace;
 mod publish;
 mod receive;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Sender;
@@ -19,13 +20,15 @@ use std::time::{Duration, Instant};
 use cogmap_proto::EventRecord;
 use cognitive_map::{CognitiveMap, Event, Record};
 
+use agents::note_removal;
+
 use super::block::BlockWriter;
 use super::checkpointer::{Beside, Checkpointer};
 use super::committer::{Answer, Commit};
 use super::counters::SpaceCounters;
 use super::desk::AgentDesk;
 use super::events::published;
-use super::message::{Call, ObjectReply};
+use super::message::{Call, ChangeReply};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
 use super::sequencer::{Sequencer, Window};
@@ -53,8 +56,13 @@ pub(crate) struct Writer {
     counters: SpaceCounters,
 
     map: CognitiveMap,
+    /// By number, those that have been removed among them.
     agents: Vec<AgentSlot>,
     by_name: BTreeMap<Box<str>, usize>,
+    /// Numbers of removed agents that go to those who come next.
+    vacant: BTreeSet<usize>,
+    /// Until when nobody makes room for another agent.
+    full_until: Option<Instant>,
     next_block: u64,
     interval_ns: i64,
     /// Number of the next lesson about an object, or wish to forget one.
@@ -67,7 +75,7 @@ pub(crate) struct Writer {
     block: BlockWriter,
     records: Vec<Record>,
     answers: Vec<Answer>,
-    objects: Vec<ObjectReply>,
+    changes: Vec<ChangeReply>,
     /// What the record under way brings about.
     events: Vec<Event>,
     /// What the round has brought about that is published.
@@ -82,6 +90,10 @@ struct AgentSlot {
     sequencer: Sequencer<cogmap_proto::Sample>,
     /// Stamp of the latest accepted sample of the session.
     latest_ns: i64,
+    /// When a message of it came last.
+    heard: Instant,
+    /// Whether it has been removed.
+    removed: bool,
     /// Whether this round changed the agent in the map.
     applied: bool,
     /// Whether its watermark is to be sent although nothing new becomes durable.
@@ -112,6 +124,8 @@ impl Writer {
             map,
             agents: Vec::new(),
             by_name: BTreeMap::new(),
+            vacant: BTreeSet::new(),
+            full_until: None,
             next_block,
             interval_ns,
             next_lesson,
@@ -120,26 +134,12 @@ impl Writer {
             block: BlockWriter::new(),
             records: Vec::new(),
             answers: Vec::new(),
-            objects: Vec::new(),
+            changes: Vec::new(),
             events: Vec::new(),
             told: Vec::new(),
             applied: 0,
         };
-        let mut recorders = recorders.into_iter();
-        let known: Vec<_> = writer
-            .map
-            .agents()
-            .map(|(id, agent)| {
-                let recorder = recorders.next().unwrap_or_default();
-                let name = agent.name().as_str();
-                let desk = AgentDesk::new(id, name, agent.session(), agent.next_seq(), recorder);
-                let sequencer = Sequencer::new(agent.session(), agent.next_seq());
-                (desk, sequencer, agent.stamp_ns().unwrap_or(i64::MIN))
-            })
-            .collect();
-        for (desk, sequencer, latest_ns) in known {
-            writer.seat(desk, sequencer, latest_ns);
-        }
+        writer.seat_all(recorders);
         writer
     }
 
@@ -182,6 +182,7 @@ impl Writer {
                 }) => self.receive(agent, codec, payload, now),
                 Some(Message::Call(Call::Samples(request))) => self.receive_request(request, now),
                 Some(Message::Call(Call::Object(request))) => self.receive_object(request),
+                Some(Message::Call(Call::Removal(request))) => self.receive_removal(request),
                 None => break,
             }
             if self.pace.is_over(self.records.len(), now.elapsed()) {
@@ -230,10 +231,19 @@ impl Writer {
             self.applied += u64::from(matches!(record, Record::Sample { .. }));
             let (Record::Sample { agent, .. }
             | Record::Skip { agent, .. }
-            | Record::Enrol { agent, .. }) = record
+            | Record::Enrol { agent, .. }
+            | Record::Remove { agent }) = record
             else {
                 continue; // of no agent
             };
+            if matches!(record, Record::Remove { .. }) {
+                note_removal(
+                    &self.shared,
+                    &self.map,
+                    &mut self.vacant,
+                    &self.agents[agent.0 as usize],
+                );
+            }
             let slot = &mut self.agents[agent.0 as usize];
             slot.applied = true;
             let Some(agent_in_map) = self.map.agent(*agent) else {

@@ -43,6 +43,6 @@ impl Writer {
             Record::ForgetObject { number, name }
         };
         self.records.push(record);
-        self.objects.push(reply);
+        self.changes.push(reply);
     }
 }

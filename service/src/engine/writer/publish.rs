@@ -22,7 +22,7 @@ impl Writer {
     /// After a start: tells everyone where each agent stands.
     pub(super) fn greet(&self) {
         self.measure(0);
-        for slot in &self.agents {
+        for slot in self.agents.iter().filter(|slot| !slot.removed) {
             let id = slot.desk.id();
             if let Some(readout) = readout::readout(&self.shared.name, &self.map, id) {
                 slot.desk.publish(readout);
@@ -39,7 +39,7 @@ impl Writer {
             samples: std::mem::take(&mut self.applied),
             marks: Vec::new(),
             answers: std::mem::take(&mut self.answers),
-            objects: std::mem::take(&mut self.objects),
+            changes: std::mem::take(&mut self.changes),
         };
         for slot in &mut self.agents {
             if !slot.applied && !slot.remind {
@@ -49,6 +49,9 @@ impl Writer {
                 std::mem::take(&mut slot.applied),
                 std::mem::take(&mut slot.remind),
             );
+            if slot.removed {
+                continue;
+            }
             let Some(agent) = self.map.agent(slot.desk.id()) else {
                 continue;
             };
@@ -85,7 +88,7 @@ impl Writer {
             .revision
             .store(self.map.revision(), Ordering::Release);
         self.publish_events();
-        if !commit.marks.is_empty() || !commit.answers.is_empty() || !commit.objects.is_empty() {
+        if !commit.marks.is_empty() || !commit.answers.is_empty() || !commit.changes.is_empty() {
             // The committer outlives the writers; without it nothing could be acknowledged anyway.
             let _ = self.commits.send(commit);
         }

@@ -3,18 +3,16 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use cogmap_proto::{Codec, Rejection, Sample, SampleBatch, SeqRange, SkipReason};
-use cognitive_map::{AgentId, Label, Record};
+use cogmap_proto::{Codec, Rejection, SampleBatch, SeqRange, SkipReason};
+use cognitive_map::Record;
 
-use super::{AgentSlot, WAITING_MAX, Writer};
+use super::{WAITING_MAX, Writer};
 use crate::decode;
 use crate::engine::block::Entry;
 use crate::engine::committer::Answer;
 use crate::engine::counters::{self, Drop};
-use crate::engine::desk::AgentDesk;
 use crate::engine::message::{IngestError, Request};
-use crate::engine::sequencer::{Offered, Sequencer, SessionOrder, Window};
-use crate::engine::trajectory;
+use crate::engine::sequencer::{Offered, SessionOrder, Window};
 
 impl Writer {
     /// Takes a message of Zenoh.
@@ -24,7 +22,7 @@ impl Writer {
                 let raw = (codec == Codec::Postcard).then_some(payload);
                 // Nobody waits for an answer; a refusal is counted.
                 let _ = self
-                    .slot_for(agent, &batch)
+                    .slot_for(agent, &batch, now)
                     .map(|slot| self.take(slot, batch, raw, now));
             }
             Err(error) => {
@@ -42,7 +40,7 @@ impl Writer {
             batch,
             reply,
         } = request;
-        match self.slot_for_request(&agent, &batch) {
+        match self.slot_for_request(&agent, &batch, now) {
             Ok(slot) => {
                 let duplicates = self.take(slot, batch, None, now);
                 self.answers.push(Answer {
@@ -58,7 +56,12 @@ impl Writer {
         }
     }
 
-    fn slot_for_request(&mut self, agent: &str, batch: &SampleBatch) -> Result<usize, IngestError> {
+    fn slot_for_request(
+        &mut self,
+        agent: &str,
+        batch: &SampleBatch,
+        now: Instant,
+    ) -> Result<usize, IngestError> {
         let gap = |session, expected| Err(IngestError::Gap { session, expected });
         // A session that begins with a gap must not end the one before it.
         let begins = self.by_name.get(agent).is_none_or(|&slot| {
@@ -67,7 +70,7 @@ impl Writer {
         if begins && batch.first_seq > 0 {
             return gap(batch.session, 0);
         }
-        let slot = self.slot_for(agent, batch)?;
+        let slot = self.slot_for(agent, batch, now)?;
         let expected = self.agents[slot].sequencer.next();
         if batch.first_seq > expected {
             return gap(batch.session, expected);
@@ -76,15 +79,30 @@ impl Writer {
     }
 
     /// The slot that takes a batch, its session begun where it is a new one.
-    fn slot_for(&mut self, agent: &str, batch: &SampleBatch) -> Result<usize, IngestError> {
+    fn slot_for(
+        &mut self,
+        agent: &str,
+        batch: &SampleBatch,
+        now: Instant,
+    ) -> Result<usize, IngestError> {
         if let Some(refusal) = self.shared.health.refusal() {
             self.counters.dropped(Drop::StoreFailed);
             return Err(refusal);
         }
-        let Some(slot) = self.slot_of(agent) else {
+        let known = self.by_name.get(agent).copied();
+        let current = known.map(|slot| self.agents[slot].sequencer.session());
+        // Before anything is journaled, so that no replay depends on the clock.
+        if current.is_none_or(|current| batch.session > current)
+            && let Err(refusal) = self.shared.sessions.check(batch.session)
+        {
+            self.counters.dropped(Drop::SessionInFuture);
+            return Err(refusal);
+        }
+        let Some(slot) = known.or_else(|| self.enrol(agent, now)) else {
             self.counters.dropped(Drop::TooManyAgents);
             return Err(IngestError::TooManyAgents);
         };
+        self.agents[slot].heard = now;
         let sequencer = &mut self.agents[slot].sequencer;
         match sequencer.order_of(batch.session) {
             SessionOrder::Current => {}
@@ -102,49 +120,6 @@ impl Writer {
             }
         }
         Ok(slot)
-    }
-
-    /// The slot of an agent; a new one unless there are too many.
-    fn slot_of(&mut self, name: &str) -> Option<usize> {
-        if let Some(&slot) = self.by_name.get(name) {
-            return Some(slot);
-        }
-        if self.agents.len() >= self.shared.agents_max {
-            return None;
-        }
-        let label = Label::new(name).ok()?;
-        let id = AgentId(u32::try_from(self.agents.len()).ok()?);
-        self.block.push(&Entry::Enrol {
-            agent: id.0,
-            name: name.into(),
-        });
-        self.records.push(Record::Enrol {
-            agent: id,
-            name: label,
-        });
-        let desk = AgentDesk::new(id, name, 0, 0, trajectory::Recorder::default());
-        Some(self.seat(desk, Sequencer::new(0, 0), i64::MIN))
-    }
-
-    pub(super) fn seat(
-        &mut self,
-        desk: AgentDesk,
-        sequencer: Sequencer<Sample>,
-        latest_ns: i64,
-    ) -> usize {
-        let slot = self.agents.len();
-        let desk = Arc::new(desk);
-        self.by_name.insert(desk.name().into(), slot);
-        self.shared.seat(Arc::clone(&desk));
-        let slot_of_agent = AgentSlot {
-            desk,
-            sequencer,
-            latest_ns,
-            applied: false,
-            remind: false,
-        };
-        self.agents.push(slot_of_agent);
-        slot
     }
 
     /// Puts a batch in order and journals what is. Returns the number of duplicates.

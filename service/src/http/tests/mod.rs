@@ -6,6 +6,7 @@ mod guarding;
 mod localize;
 mod objects;
 mod problems;
+mod removal;
 mod resources;
 mod running;
 mod trajectories;

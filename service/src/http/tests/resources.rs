@@ -415,7 +415,7 @@ async fn the_description_lists_every_route_with_every_status() {
         for (method, operation) in item.as_object().expect("operations") {
             operations.push(format!("{} {path}", method.to_uppercase()));
             let responses = operation["responses"].as_object().expect("responses");
-            for status in ["400", "401", "405", "500", "503", "504"] {
+            for status in ["400", "401", "405", "421", "500", "503", "504"] {
                 let content = &responses[status]["content"];
                 assert!(
                     content["application/problem+json"].is_object(),
@@ -427,6 +427,7 @@ async fn the_description_lists_every_route_with_every_status() {
     operations.sort();
     let expected = [
         "DELETE /v1/spaces/{space}",
+        "DELETE /v1/spaces/{space}/agents/{agent}",
         "DELETE /v1/spaces/{space}/objects/{name}",
         "GET /healthz",
         "GET /metrics",

@@ -40,7 +40,7 @@ async fn connect(running: &Running, path: &str) -> TcpStream {
     let mut stream = TcpStream::connect(running.address)
         .await
         .expect("it listens");
-    let request = format!("GET {path} HTTP/1.1\r\nhost: test\r\n\r\n");
+    let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n");
     stream.write_all(request.as_bytes()).await.expect("sent");
     stream
 }
@@ -107,7 +107,7 @@ async fn a_client_that_stalls_does_not_hold_up_the_end() {
     let mut stream = TcpStream::connect(running.address)
         .await
         .expect("it listens");
-    let head = "POST /v1/spaces/lab/recall HTTP/1.1\r\nhost: test\r\n\
+    let head = "POST /v1/spaces/lab/recall HTTP/1.1\r\nhost: localhost\r\n\
         content-type: application/json\r\ncontent-length: 100\r\n\r\n{";
     stream.write_all(head.as_bytes()).await.expect("sent");
     let mut probe = connect(&running, "/healthz").await;
@@ -182,7 +182,7 @@ async fn more_connections_than_the_bound_wait() {
     let second = tokio::task::spawn_blocking(move || {
         use std::io::Write;
         let mut stream = std::net::TcpStream::connect(address).expect("the system takes it");
-        let request = "GET /healthz HTTP/1.1\r\nhost: test\r\nconnection: close\r\n\r\n";
+        let request = "GET /healthz HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n";
         stream.write_all(request.as_bytes()).expect("sent");
         let mut answer = String::new();
         stream.read_to_string(&mut answer).expect("a text");
