@@ -7,7 +7,8 @@ use cogmap_proto::DecodeError;
 pub use kind::Kind;
 
 use super::{
-    InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence, unknown_agent,
+    InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence,
+    unknown_agent,
 };
 use crate::engine::{IngestError, QuestionError, Space, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
