@@ -11,6 +11,7 @@ use cogmap_proto::{
     Codec, Event, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings, Trajectory,
 };
 use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
+use metrics::gauge;
 use tokio::sync::{broadcast, oneshot};
 
 use super::checkpointer::{Checkpointer, Job};
@@ -21,12 +22,13 @@ use super::message::{Call, IngestError, ObjectRequest, Request};
 use super::outlet::Outlet;
 use super::question::QuestionRoom;
 use super::queue::{Inbox, NotQueued, Queue, queue};
-use super::recovery;
+use super::recovery::{self, Loading, RecoveryError};
 use super::refinement::Refinements;
 use super::settings::EngineSettings;
 use super::trajectory;
 use super::writer::Writer;
-use crate::store::{SpaceNumber, Store, StoreError};
+use crate::metrics::SPACE_STOPPED;
+use crate::store::{DerivedError, SpaceNumber, Store};
 
 /// Events that a slow listener may be behind before it misses some.
 const EVENTS_BEHIND_MAX: usize = 1024;
@@ -58,7 +60,7 @@ pub(crate) struct Shared {
     /// Set once: the writer takes what is queued and ends.
     pub(crate) closing: AtomicBool,
     /// Set once the map is loaded, or could not be.
-    loaded: OnceLock<Result<(), String>>,
+    loaded: OnceLock<Result<(), Unavailable>>,
     agents: RwLock<BTreeMap<String, Arc<AgentDesk>>>,
     snapshot: ArcSwapOption<CognitiveMap>,
     /// Those who wait for a snapshot; none once the writer is gone.
@@ -79,7 +81,10 @@ pub enum Unavailable {
     /// It is still loading.
     #[error("the space is recovering")]
     Recovering,
-    /// It could not be loaded, or is closing.
+    /// It could not be loaded: its journal is damaged.
+    #[error("{0}")]
+    Stopped(String),
+    /// Its writer has failed, or it is closing.
     #[error("{0}")]
     Failed(String),
 }
@@ -90,9 +95,12 @@ pub enum TrajectoryError {
     /// There is no such agent.
     #[error("unknown agent")]
     UnknownAgent,
-    /// The store cannot be read.
+    /// The stored part cannot be read.
     #[error(transparent)]
-    Store(#[from] StoreError),
+    Derived(#[from] DerivedError),
+    /// The reading was interrupted.
+    #[error("the reading was interrupted")]
+    Interrupted,
     /// The map cannot be read.
     #[error(transparent)]
     Unavailable(#[from] Unavailable),
@@ -120,27 +128,7 @@ impl Space {
         around: &Surroundings,
     ) -> Self {
         let (queue, inbox) = queue(around.settings.queue_messages, around.settings.queue_bytes);
-        let shared = Arc::new(Shared {
-            name: name.into(),
-            number,
-            interval_ns,
-            agents_max: around.settings.agents_max,
-            reorder_window: around.settings.reorder_window,
-            gap_timeout: around.settings.gap_timeout,
-            store: Arc::clone(&around.store),
-            outlet: Arc::clone(&around.outlet),
-            health: Arc::clone(&around.health),
-            events: broadcast::channel(EVENTS_BEHIND_MAX).0,
-            revision: AtomicU64::new(0),
-            closing: AtomicBool::new(false),
-            loaded: OnceLock::new(),
-            agents: RwLock::default(),
-            snapshot: ArcSwapOption::empty(),
-            wishes: Mutex::new(Some(Vec::new())),
-            refinements: Refinements::default(),
-            questions: around.questions.clone(),
-            broken: AtomicBool::new(false),
-        });
+        let shared = Shared::new(number, name, interval_ns, around);
         let thread = {
             let (shared, around) = (Arc::clone(&shared), around.clone());
             Builder::new()
@@ -153,6 +141,24 @@ impl Space {
             settings,
             queue,
             thread: Mutex::new(Some(thread)),
+        }
+    }
+
+    /// A space that cannot be started, because its record is damaged. It can be deleted.
+    pub(crate) fn stopped(
+        number: SpaceNumber,
+        name: &str,
+        reason: String,
+        around: &Surroundings,
+    ) -> Self {
+        let (queue, _) = queue(around.settings.queue_messages, around.settings.queue_bytes);
+        let shared = Shared::new(number, name, 0, around);
+        shared.stop(reason);
+        Self {
+            shared,
+            settings: SpaceSettings::default(),
+            queue,
+            thread: Mutex::new(None),
         }
     }
 
@@ -176,15 +182,18 @@ impl Space {
         self.shared.loaded.get().is_none()
     }
 
-    /// Why the map could not be loaded or is not written any more, if so.
-    pub fn failure(&self) -> Option<String> {
-        if self.shared.broken.load(Ordering::Acquire) {
-            return Some("the space's writer has failed; the log says more".to_owned());
+    /// Why the map could not be loaded, if so: what is damaged, and what is lost.
+    pub fn stop_reason(&self) -> Option<&str> {
+        match self.shared.loaded.get() {
+            Some(Err(Unavailable::Stopped(reason))) => Some(reason),
+            _ => None,
         }
-        self.shared
-            .loaded
-            .get()
-            .and_then(|loaded| loaded.clone().err())
+    }
+
+    /// Why the map is not written any more, if so.
+    pub fn failure(&self) -> Option<String> {
+        let failed = self.shared.broken.load(Ordering::Acquire);
+        failed.then(|| "the space's writer has failed; the log says more".to_owned())
     }
 
     /// The map as it was at the end of a round that ended after the call, or is unchanged since.
@@ -298,6 +307,7 @@ impl Space {
         match self.available() {
             Ok(()) => {}
             Err(Unavailable::Recovering) => return Err(IngestError::Recovering),
+            Err(Unavailable::Stopped(reason)) => return Err(IngestError::Stopped(reason)),
             Err(Unavailable::Failed(detail)) => return Err(IngestError::Store(detail)),
         }
         self.queue.request(call).map_err(|error| match error {
@@ -310,7 +320,7 @@ impl Space {
     /// current session when none is named.
     ///
     /// # Errors
-    /// There is no such agent, or the store cannot be read.
+    /// There is no such agent, or the stored part cannot be read.
     pub async fn trajectory(
         &self,
         agent: &str,
@@ -333,7 +343,7 @@ impl Space {
         };
         tokio::task::spawn_blocking(read)
             .await
-            .map_err(|_| TrajectoryError::Store(StoreError::Io("reading was interrupted".into())))?
+            .map_err(|_| TrajectoryError::Interrupted)?
     }
 
     /// The map relaxed for those who asked for the past.
@@ -363,11 +373,11 @@ impl Space {
     }
 
     fn available(&self) -> Result<(), Unavailable> {
-        match self.failure() {
-            Some(detail) => Err(Unavailable::Failed(detail)),
-            None if self.recovering() => Err(Unavailable::Recovering),
-            None => Ok(()),
+        if let Some(detail) = self.failure() {
+            return Err(Unavailable::Failed(detail));
         }
+        let loaded = self.shared.loaded.get();
+        loaded.cloned().unwrap_or(Err(Unavailable::Recovering))
     }
 }
 
@@ -395,7 +405,15 @@ fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: 
         ..
     } = around;
     let closing = || shared.closing.load(Ordering::Acquire);
-    match recovery::recover(&*store, shared.number, core, shared.interval_ns, closing) {
+    let loading = Loading {
+        store: &*store,
+        health: &health,
+        name: &shared.name,
+        space: shared.number,
+        settings: core,
+        interval_ns: shared.interval_ns,
+    };
+    match recovery::recover(&loading, closing) {
         Ok(recovered) => {
             let progress = (recovered.checkpoint_revision, recovered.next_block);
             let interval = settings.checkpoint_interval;
@@ -411,16 +429,46 @@ fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: 
             let _ = shared.loaded.set(Ok(()));
             writer.run(inbox);
         }
-        Err(error) => {
-            if !closing() {
-                tracing::error!(space = %shared.name, %error, "load space");
-            }
-            let _ = shared.loaded.set(Err(error.to_string()));
+        Err(RecoveryError::Closing) => {
+            let closing = "the space is closing".to_owned();
+            let _ = shared.loaded.set(Err(Unavailable::Failed(closing)));
         }
+        Err(error) => shared.stop(error.to_string()),
     }
 }
 
 impl Shared {
+    fn new(number: SpaceNumber, name: &str, interval_ns: i64, around: &Surroundings) -> Arc<Self> {
+        Arc::new(Self {
+            name: name.into(),
+            number,
+            interval_ns,
+            agents_max: around.settings.agents_max,
+            reorder_window: around.settings.reorder_window,
+            gap_timeout: around.settings.gap_timeout,
+            store: Arc::clone(&around.store),
+            outlet: Arc::clone(&around.outlet),
+            health: Arc::clone(&around.health),
+            events: broadcast::channel(EVENTS_BEHIND_MAX).0,
+            revision: AtomicU64::new(0),
+            closing: AtomicBool::new(false),
+            loaded: OnceLock::new(),
+            agents: RwLock::default(),
+            snapshot: ArcSwapOption::empty(),
+            wishes: Mutex::new(Some(Vec::new())),
+            refinements: Refinements::default(),
+            questions: around.questions.clone(),
+            broken: AtomicBool::new(false),
+        })
+    }
+
+    /// Stops the space for good, before it has begun: only an operator can help.
+    fn stop(&self, reason: String) {
+        tracing::error!(space = %self.name, reason, "the space is stopped");
+        gauge!(SPACE_STOPPED, "space" => self.name.to_string()).set(1.0);
+        let _ = self.loaded.set(Err(Unavailable::Stopped(reason)));
+    }
+
     /// Lists a new agent.
     pub(crate) fn seat(&self, desk: Arc<AgentDesk>) {
         let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);

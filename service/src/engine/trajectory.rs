@@ -10,7 +10,7 @@ use cognitive_map::{Agent, CognitiveMap, Record, SampleBody};
 
 use super::desk::AgentDesk;
 use super::space::TrajectoryError;
-use crate::store::{SpaceNumber, Store, StoreError};
+use crate::store::{DerivedError, SpaceNumber, Store};
 
 /// Rows of a full chunk.
 const CHUNK_ROWS: usize = 256;
@@ -221,7 +221,7 @@ pub(crate) fn read(
         let chunks = store.chunks(space, agent, session, next_from_ns, CHUNKS_AT_ONCE)?;
         let last = chunks.len() < CHUNKS_AT_ONCE;
         for (_, bytes) in chunks {
-            let rows = decode(&bytes).map_err(|error| StoreError::Corrupt(error.to_string()))?;
+            let rows = decode(&bytes).map_err(|error| DerivedError(error.to_string()))?;
             poses.extend(rows.into_iter().filter(|row| row.stamp_ns >= next_from_ns));
             let Some(latest) = poses.last() else { continue };
             if poses.len() > limit || latest.stamp_ns >= to_ns {

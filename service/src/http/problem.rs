@@ -68,6 +68,8 @@ pub enum Kind {
     Busy,
     /// The space is still loading; come back.
     Recovering,
+    /// The space's journal is damaged; an operator must look after it.
+    SpaceStopped,
     /// The service or the space is closing.
     Closing,
     /// The service cannot do its work until it is looked after.
@@ -134,6 +136,7 @@ impl Kind {
             Self::StoreFailed => ("store-failed", S::INTERNAL_SERVER_ERROR),
             Self::Busy => ("busy", S::SERVICE_UNAVAILABLE),
             Self::Recovering => ("recovering", S::SERVICE_UNAVAILABLE),
+            Self::SpaceStopped => ("space-stopped", S::SERVICE_UNAVAILABLE),
             Self::Closing => ("closing", S::SERVICE_UNAVAILABLE),
             Self::NotReady => ("not-ready", S::SERVICE_UNAVAILABLE),
             Self::Timeout => ("timeout", S::GATEWAY_TIMEOUT),
@@ -163,6 +166,11 @@ impl Problem {
             Kind::UnknownAgent,
             format!("the space has no agent {name:?}"),
         )
+    }
+
+    /// The space is stopped.
+    pub fn space_stopped(reason: &str) -> Self {
+        Self::new(Kind::SpaceStopped, reason)
     }
 
     /// Work in another thread ended with a panic.
@@ -201,7 +209,8 @@ impl IntoResponse for Problem {
         *response.status_mut() = status;
         let headers = response.headers_mut();
         headers.insert(CONTENT_TYPE, HeaderValue::from_static(PROBLEM_JSON));
-        if status == StatusCode::SERVICE_UNAVAILABLE {
+        // Waiting does not help a space that is stopped.
+        if status == StatusCode::SERVICE_UNAVAILABLE && self.kind != Kind::SpaceStopped {
             headers.insert(RETRY_AFTER, HeaderValue::from_static(RETRY_AFTER_S));
         }
         if status == StatusCode::UNAUTHORIZED {
@@ -215,6 +224,7 @@ impl From<Unavailable> for Problem {
     fn from(error: Unavailable) -> Self {
         let kind = match &error {
             Unavailable::Recovering => Kind::Recovering,
+            Unavailable::Stopped(_) => Kind::SpaceStopped,
             Unavailable::Failed(_) => Kind::StoreFailed,
         };
         Self::new(kind, error.to_string())
@@ -276,7 +286,11 @@ impl From<TrajectoryError> for Problem {
     fn from(error: TrajectoryError) -> Self {
         match error {
             TrajectoryError::UnknownAgent => Self::new(Kind::UnknownAgent, error.to_string()),
-            TrajectoryError::Store(error) => error.into(),
+            TrajectoryError::Derived(error) => {
+                tracing::error!(%error, "read a trajectory");
+                Self::new(Kind::StoreFailed, error.to_string())
+            }
+            TrajectoryError::Interrupted => Self::interrupted(),
             TrajectoryError::Unavailable(error) => error.into(),
         }
     }
@@ -311,6 +325,7 @@ impl From<IngestError> for Problem {
             IngestError::TooManyAgents => Self::new(Kind::TooManyAgents, detail),
             IngestError::DiskFull(_) => Self::new(Kind::StoreFull, detail),
             IngestError::Store(_) => Self::new(Kind::StoreFailed, detail),
+            IngestError::Stopped(_) => Self::new(Kind::SpaceStopped, detail),
             IngestError::Closed => Self::new(Kind::Closing, detail),
         }
     }

@@ -99,6 +99,9 @@ async fn answer(
     let space = engine
         .space(name)
         .ok_or_else(|| problem("unknown-space", 404, format!("no space {name:?}")))?;
+    if let Some(reason) = space.stop_reason() {
+        return Err(problem("space-stopped", 503, reason.to_owned()));
+    }
     match verb {
         Verb::Recall => {
             let body: RecallQuery = body(query, codec)?;

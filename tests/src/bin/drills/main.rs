@@ -40,7 +40,10 @@ fn main() -> ExitCode {
         failed |= outcome.is_err();
         let passed = outcome.is_ok();
         let figures = outcome.unwrap_or(Value::Null);
-        println!("{}", json!({"drill": name, "passed": passed, "figures": figures}));
+        println!(
+            "{}",
+            json!({"drill": name, "passed": passed, "figures": figures})
+        );
     }
     ExitCode::from(u8::from(failed))
 }
