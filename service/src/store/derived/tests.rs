@@ -46,13 +46,13 @@ fn a_checkpoint_is_the_merge_of_its_writes() {
     let (space, other) = (SpaceNumber(3), SpaceNumber(4));
     assert!(store.checkpoint(space).unwrap().is_none());
     let first = vec![page(0, 0, b"a0"), page(0, 256, b"a256"), page(1, 0, b"b0")];
-    let write = |space, state| store.write_checkpoint(space, &state).unwrap();
-    write(space, checkpoint(10, b"r1", first));
+    let write = |store: &FjallDerived, space, state| store.write_checkpoint(space, &state).unwrap();
+    write(&store, space, checkpoint(10, b"r1", first));
     // A page of no bytes is none: it removes what was stored.
     let second = vec![page(0, 256, b"A256"), page(1, 0, b""), page(2, 7, b"")];
-    write(space, checkpoint(20, b"r2", second));
-    write(other, checkpoint(5, b"", vec![page(0, 0, b"z")]));
-    write(space, checkpoint(u64::MAX, b"", Vec::new()));
+    write(&store, space, checkpoint(20, b"r2", second));
+    write(&store, other, checkpoint(5, b"", vec![page(0, 0, b"z")]));
+    write(&store, space, checkpoint(u64::MAX, b"", Vec::new()));
     drop(store);
 
     let store = open(directory.path());
@@ -67,7 +67,7 @@ fn a_checkpoint_is_the_merge_of_its_writes() {
     store.forget(space).unwrap();
     assert!(store.checkpoint(space).unwrap().is_none());
     assert!(store.checkpoint(other).unwrap().is_some());
-    write(space, checkpoint(1, b"", vec![page(0, 1, b"new")]));
+    write(&store, space, checkpoint(1, b"", vec![page(0, 1, b"new")]));
     let read = store.checkpoint(space).unwrap().unwrap();
     assert_eq!(contents(&read), [(0, 1, &b"new"[..])]);
 }

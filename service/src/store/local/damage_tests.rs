@@ -11,7 +11,9 @@ use crate::store::{Flaw, backup, restore};
 fn store_of_two(path: &Path) -> [SpaceNumber; 2] {
     let store = LocalStore::open(path).unwrap();
     let spaces = ["damaged", "sound"].map(|name| store.create_space(name, b"{}").unwrap());
-    spaces.map(|space| fill(&store, space, 40));
+    for space in spaces {
+        fill(&store, space, 40);
+    }
     spaces
 }
 

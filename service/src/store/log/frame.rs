@@ -164,5 +164,7 @@ mod tests {
         assert!(header.fits(payload) && !header.fits(b"abd") && !header.fits(b"ab"));
     }
 
-    const RELEASED: [u8; 16] = [0; 16];
+    const RELEASED: [u8; 16] = [
+        138, 120, 203, 56, 87, 155, 4, 55, 194, 63, 199, 73, 55, 190, 76, 151,
+    ];
 }
