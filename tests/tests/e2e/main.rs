@@ -12,6 +12,7 @@ mod crash; // kill -9, and what recovery makes of it
 mod full_disk; // a disk that takes no more
 mod pause; // a process that stands still
 mod readers; // readers and senders at once
+mod store; // damage on the disk, repair and backups
 
 // What the service does for the outside.
 mod cli; // the commands

@@ -9,6 +9,9 @@
 //!   its name if the checkpoint knows it, else under a placeholder.
 //! - Lessons about objects are numbered anew, for the numbers count those before.
 
+#[cfg(test)]
+mod tests;
+
 use std::borrow::Cow;
 use std::path::PathBuf;
 
