@@ -36,6 +36,17 @@ pub const DURABLE_SAMPLES: &str = "cogmap_durable_samples_total";
 pub const JOURNAL_BYTES: &str = "cogmap_journal_bytes_total";
 /// Time that a sync of the store takes \[s\].
 pub const COMMIT_SECONDS: &str = "cogmap_commit_seconds";
+/// Spaces that are stopped because their journal is damaged; label `space`: 1, or 0 once repaired.
+pub const SPACE_STOPPED: &str = "cogmap_space_stopped";
+/// Blocks cut off the ends of journals, which a crash had caught before they were acknowledged; label
+/// `space`.
+pub const TORN_TAILS: &str = "cogmap_journal_torn_tails_total";
+/// Journals of which it was not known how far they were acknowledged; label `space`.
+pub const LOST_MARKS: &str = "cogmap_journal_lost_marks_total";
+/// Times that checkpoints and trajectories were dropped, to be made again from the journals.
+pub const DERIVED_REBUILDS: &str = "cogmap_derived_rebuilds_total";
+/// Checkpoints and chunks of trajectories that could not be read or written.
+pub const DERIVED_FAILURES: &str = "cogmap_derived_failures_total";
 /// Agents of a space; label `space`.
 pub const AGENTS: &str = "cogmap_agents";
 /// Agents removed so that others could enrol; label `space`.
@@ -188,6 +199,31 @@ fn describe() {
     describe_counter!(DURABLE_SAMPLES, Unit::Count, "Samples made durable");
     describe_counter!(JOURNAL_BYTES, Unit::Bytes, "Bytes appended to journals");
     describe_histogram!(COMMIT_SECONDS, Unit::Seconds, "Time of a sync of the store");
+    describe_gauge!(
+        SPACE_STOPPED,
+        Unit::Count,
+        "Whether a space is stopped because it is damaged"
+    );
+    describe_counter!(
+        TORN_TAILS,
+        Unit::Count,
+        "Ends of journals cut off that were never acknowledged"
+    );
+    describe_counter!(
+        LOST_MARKS,
+        Unit::Count,
+        "Journals of which it was not known how far they were acknowledged"
+    );
+    describe_counter!(
+        DERIVED_REBUILDS,
+        Unit::Count,
+        "Times that derived state was dropped"
+    );
+    describe_counter!(
+        DERIVED_FAILURES,
+        Unit::Count,
+        "Derived state that could not be read or written"
+    );
     describe_gauge!(AGENTS, Unit::Count, "Agents of a space");
     describe_counter!(
         AGENTS_MADE_ROOM,

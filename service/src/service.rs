@@ -1,6 +1,7 @@
 //! The composition root: the whole service from its settings.
 
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,10 +13,10 @@ use zenoh::Session;
 
 use crate::config::{Config, ConfigError};
 use crate::descriptors::{self, Shares};
-use crate::engine::{Engine, Outlet, Silent, SpaceError};
+use crate::engine::{self, Engine, Outlet, Silent, SpaceError, core_settings};
 use crate::http::{self, HttpSettings};
 use crate::metrics;
-use crate::store::{FjallStore, StoreError};
+use crate::store::{self, LocalStore, StoreError};
 use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohOutlet};
 
 /// Longest wait for the Zenoh session to close.
@@ -72,12 +73,20 @@ pub enum StartError {
 }
 
 impl Service {
-    /// Opens the store, the Zenoh session and the HTTP listener, and begins to serve. Spaces may
-    /// still be loading when it returns.
+    /// Opens the HTTP listener, the Zenoh session and the store, and begins to serve. Spaces may still
+    /// be loading when it returns. A start that fails leaves no store behind that was not there.
     ///
     /// # Errors
     /// See [`StartError`].
     pub async fn start(config: &Config, prometheus: PrometheusHandle) -> Result<Self, StartError> {
+        // What may fail comes in the order of what it leaves behind: settings nothing, a port or a
+        // session nothing that outlives the process, the store files.
+        for (name, settings) in &config.spaces {
+            core_settings(settings).map_err(|source| StartError::Space {
+                name: name.to_string(),
+                source: source.into(),
+            })?;
+        }
         let limit = descriptors::raise_limit();
         let shares = descriptors::share_out(limit, wanted(config));
         let http_settings = fitting(config.http.settings(), shares.http);
@@ -96,14 +105,6 @@ impl Service {
             zenoh_handshakes = shares.handshakes,
             "open files"
         );
-        let directory = &config.store.directory;
-        let of_store = |source| StartError::Store {
-            directory: directory.display().to_string(),
-            source,
-        };
-        let store = Arc::new(FjallStore::open(directory).map_err(of_store)?);
-
-        // The port first: whoever finds it taken should not have disturbed anyone else by then.
         let address = config.http.listen;
         let of_http = |source| StartError::Http { address, source };
         let listener = TcpListener::bind(address).await.map_err(of_http)?;
@@ -128,6 +129,12 @@ impl Service {
             Some(outlet) => Arc::clone(outlet) as Arc<dyn Outlet>,
             None => Arc::new(Silent),
         };
+        let directory = &config.store.directory;
+        let of_store = |source| StartError::Store {
+            directory: directory.display().to_string(),
+            source,
+        };
+        let store = Arc::new(open_store(directory).map_err(of_store)?);
         let engine = Engine::open(store, config.engine.settings(), outlet).map_err(of_store)?;
         for (name, settings) in &config.spaces {
             if let Some(space) = engine.space(name.as_str()) {
@@ -215,6 +222,15 @@ impl Service {
             tracing::warn!("the zenoh session did not close in time");
         }
     }
+}
+
+/// Opens the store in `directory`, made anew in the present format where it has an older one.
+///
+/// # Errors
+/// See [`LocalStore::open`] and [`store::migrate`].
+pub fn open_store(directory: &Path) -> Result<LocalStore, StoreError> {
+    store::migrate(directory, engine::samples_in)?;
+    LocalStore::open(directory)
 }
 
 /// How many descriptors connections may use, by the settings.

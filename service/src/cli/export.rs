@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 
 use super::output;
 use crate::engine::{Recorder, core_settings, entries, records_of, trajectory_interval_ns};
-use crate::store::{FjallStore, SpaceNumber, Store};
+use crate::store::{Journal, LocalJournal, SpaceNumber};
 use cogmap_experiments::metrics::StampedPose;
 use cogmap_experiments::tum::write_tum;
 use cogmap_proto::SpaceSettings;
@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum ExportCommand {
-    /// The journal of a space, one JSON object for each entry.
+    /// The journal of a space, one JSON object for each entry; up to the damage where there is one.
     Journal(Source),
     /// The causal trajectory of an agent's latest session, as TUM lines `t x y z qx qy qz qw`.
     Trajectory {
@@ -46,21 +46,18 @@ pub(super) fn run(command: &ExportCommand) -> anyhow::Result<()> {
     }
 }
 
-fn open(source: &Source) -> anyhow::Result<(FjallStore, SpaceNumber, SpaceSettings)> {
+fn open(source: &Source) -> anyhow::Result<(LocalJournal, SpaceNumber, SpaceSettings)> {
     let directory = &source.data_dir;
     anyhow::ensure!(
         directory.is_dir(),
         "there is no store at {}",
         directory.display()
     );
-    let store = FjallStore::open(directory)
+    let store = LocalJournal::open(directory)
         .with_context(|| format!("open the store {}", directory.display()))?;
-    let space = store
-        .spaces()?
-        .into_iter()
-        .find(|space| space.name == source.space)
-        .with_context(|| format!("the store has no space {:?}", source.space))?;
-    let settings = serde_json::from_slice(&space.settings).context("read the space's settings")?;
+    let space = store.space(&source.space)?;
+    let settings = space.settings.context("the space's settings are lost")?;
+    let settings = serde_json::from_slice(&settings).context("read the space's settings")?;
     Ok((store, space.number, settings))
 }
 

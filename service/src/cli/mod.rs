@@ -10,6 +10,7 @@ mod help;
 mod output;
 mod replay;
 mod serve;
+mod store;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -41,6 +42,13 @@ enum Command {
     /// Write what a store holds: the journal as JSON lines, a trajectory as TUM.
     #[command(subcommand)]
     Export(export::ExportCommand),
+    /// Verify or repair a store.
+    #[command(subcommand)]
+    Store(store::StoreCommand),
+    /// Copy a store, also while the service runs on it; all that was acknowledged before is in the copy.
+    Backup(store::BackupArgs),
+    /// Make a store from a backup, into a directory that is empty or absent.
+    Restore(store::BackupArgs),
     /// Send a recorded data set through the map and measure the error.
     #[command(subcommand)]
     Replay(replay::ReplayCommand),
@@ -101,6 +109,9 @@ pub fn main() -> ExitCode {
         Command::Demo(args) => demo::run(&args),
         Command::CheckConfig(args) => check_config::run(&args),
         Command::Export(command) => export::run(&command),
+        Command::Store(command) => store::run(&command),
+        Command::Backup(args) => store::backup(&args),
+        Command::Restore(args) => store::restore(&args),
         Command::Replay(command) => replay::run(&command),
         Command::Eval(command) => eval::run(&command),
         Command::Bench(command) => bench::run(&command),

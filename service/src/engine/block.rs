@@ -155,6 +155,16 @@ pub fn entries(block: &[u8]) -> Result<Vec<Entry<'static>>, CorruptBlock> {
     Ok(entries)
 }
 
+/// Number of samples in a block; none in one that cannot be read.
+pub fn samples_in(block: &[u8]) -> u64 {
+    let entries = entries(block).unwrap_or_default();
+    let samples = entries.iter().map(|entry| match entry {
+        Entry::Samples { batch, .. } => batch.samples.len() as u64,
+        _ => 0,
+    });
+    samples.sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -81,7 +81,7 @@ fn run(store: &dyn Store, health: &Health, jobs: &Receiver<Job>) {
 }
 
 fn write(store: &dyn Store, health: &Health, job: &Job) {
-    if health.failed().is_some() {
+    if health.failed().is_some() || !health.keeps_derived() {
         return;
     }
     let since = job.progress.revision.load(Ordering::Acquire);
@@ -95,7 +95,7 @@ fn write(store: &dyn Store, health: &Health, job: &Job) {
             .progress
             .revision
             .store(job.map.revision(), Ordering::Release),
-        Err(error) => health.fail(&error),
+        Err(error) => health.derived_fail(&error),
     }
 }
 

@@ -1,15 +1,20 @@
 //! Whether the store still takes writes.
 
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use metrics::counter;
 
 use super::message::IngestError;
-use crate::store::StoreError;
+use crate::metrics::DERIVED_FAILURES;
+use crate::store::{DerivedError, StoreError};
 
 /// The first failure of the store, if there was one. After it nothing is written until the service
 /// starts anew and recovers: what the disk holds is then the truth.
 #[derive(Debug, Default)]
 pub(crate) struct Health {
     failure: OnceLock<Failure>,
+    derived_failed: AtomicBool,
 }
 
 #[derive(Debug)]
@@ -29,6 +34,20 @@ impl Health {
         if self.failure.set(failure).is_ok() {
             tracing::error!(%error, "write to the store; no more samples are taken");
         }
+    }
+
+    /// Notes that derived state could not be read or written. Samples are taken all the same, for the
+    /// journal holds them.
+    pub(crate) fn derived_fail(&self, error: &DerivedError) {
+        counter!(DERIVED_FAILURES).increment(1);
+        if !self.derived_failed.swap(true, Ordering::AcqRel) {
+            tracing::warn!(%error, "samples are taken on, without checkpoints");
+        }
+    }
+
+    /// Whether derived state is read and written.
+    pub(crate) fn keeps_derived(&self) -> bool {
+        !self.derived_failed.load(Ordering::Acquire)
     }
 
     /// What went wrong, if anything did.

@@ -91,6 +91,9 @@ pub enum IngestError {
     /// The store failed otherwise.
     #[error("{0}")]
     Store(String),
+    /// The space is stopped, because its journal is damaged.
+    #[error("{0}")]
+    Stopped(String),
     /// The space is closing.
     #[error("the space is closing")]
     Closed,

@@ -26,6 +26,7 @@ mod readout;
 mod recovery;
 mod refinement;
 mod removal;
+mod repair;
 mod sequencer;
 mod session_bound;
 mod settings;
@@ -45,7 +46,7 @@ use arc_swap::ArcSwap;
 use cogmap_proto::{Codec, DecodeError, Name, SpaceSettings};
 use cognitive_map::InvalidSettings;
 
-pub use block::{CorruptBlock, Entry, entries};
+pub use block::{CorruptBlock, Entry, entries, samples_in};
 pub use desk::AgentDesk;
 #[cfg(test)]
 pub(crate) use desk::desk_of;
@@ -58,12 +59,13 @@ pub use question::QuestionError;
 pub use readout::evidence;
 pub(crate) use readout::{status, trip_end};
 pub use refinement::{SharedText, refined_trajectories};
+pub use repair::{AgentLoss, LostBlocks, MissingSamples, RepairReport, repair};
 pub use settings::EngineSettings;
 pub use space::{Space, TrajectoryError, Unavailable};
 pub(crate) use trajectory::stamped;
 pub use trajectory::{Chunk, Recorder};
 
-use crate::store::{Store, StoreError};
+use crate::store::{Store, StoreError, StoredSpace};
 use counters::{Drop, IntakeCounters};
 use health::Health;
 use question::QuestionRoom;
@@ -96,6 +98,11 @@ struct Control {
 pub enum Readiness {
     /// It can.
     Ready,
+    /// It can, but for these spaces, which are stopped because they are damaged.
+    ReadyBut {
+        /// Their names, each with the reason.
+        stopped: Vec<(String, String)>,
+    },
     /// These spaces are still loading.
     Recovering {
         /// Their names.
@@ -131,6 +138,24 @@ pub enum SpaceError {
     Closed,
 }
 
+/// The settings that a space was created with, for the wire and for the core.
+fn stored_settings(
+    stored: &StoredSpace,
+) -> Result<(SpaceSettings, (cognitive_map::Settings, i64)), String> {
+    let (name, number) = (&stored.name, stored.number.0);
+    let bytes = stored.settings.as_ref().ok_or_else(|| {
+        format!(
+            "name and settings of space number {number} are lost: both copies of its record are damaged; \
+             restore it from a backup, or delete it as {name:?}"
+        )
+    })?;
+    let wrong = |detail: &dyn std::fmt::Display| format!("settings of space {name:?}: {detail}");
+    let settings: SpaceSettings = serde_json::from_slice(bytes).map_err(|error| wrong(&error))?;
+    let core = core_settings(&settings).map_err(|error| wrong(&error))?;
+    let interval_ns = trajectory_interval_ns(&settings);
+    Ok((settings, (core, interval_ns)))
+}
+
 impl Engine {
     /// Starts the spaces that the store holds. Returns at once; they load in their own threads.
     ///
@@ -162,14 +187,11 @@ impl Engine {
         };
         let mut spaces = BTreeMap::new();
         for stored in stored {
-            let corrupt = |detail: String| {
-                StoreError::Corrupt(format!("settings of space {}: {detail}", stored.name))
+            let (number, name) = (stored.number, &stored.name);
+            let space = match stored_settings(&stored) {
+                Ok((settings, core)) => Space::start(number, name, settings, core, &around),
+                Err(reason) => Space::stopped(number, name, reason, &around),
             };
-            let settings: SpaceSettings = serde_json::from_slice(&stored.settings)
-                .map_err(|error| corrupt(error.to_string()))?;
-            let core = core_settings(&settings).map_err(|error| corrupt(error.to_string()))?;
-            let core = (core, trajectory_interval_ns(&settings));
-            let space = Space::start(stored.number, &stored.name, settings, core, &around);
             spaces.insert(stored.name, Arc::new(space));
         }
         let control = Control {
@@ -199,10 +221,20 @@ impl Engine {
             .filter(|space| space.recovering())
             .map(|space| space.name().to_owned())
             .collect();
-        if recovering.is_empty() {
-            Readiness::Ready
-        } else {
-            Readiness::Recovering { spaces: recovering }
+        if !recovering.is_empty() {
+            return Readiness::Recovering { spaces: recovering };
+        }
+        let reason = |space: &Arc<Space>| {
+            let reason = space.stop_reason()?;
+            Some((space.name().to_owned(), reason.to_owned()))
+        };
+        let stopped: Vec<_> = spaces.values().filter_map(reason).collect();
+        match &*stopped {
+            [] => Readiness::Ready,
+            [(_, reason), ..] if stopped.len() == spaces.len() => Readiness::Failed {
+                detail: format!("all spaces are stopped; {reason}"),
+            },
+            _ => Readiness::ReadyBut { stopped },
         }
     }
 

@@ -1,12 +1,15 @@
 //! Recovery: the checkpoint, and the journal's tail folded on top of it.
 
 use cognitive_map::{CognitiveMap, Settings};
+use metrics::counter;
 
 use super::block::{self, CorruptBlock};
 use super::events::EventRing;
 use super::fold::records_of;
+use super::health::Health;
 use super::trajectory::{self, Chunk, Recorder};
-use crate::store::{ChunkKey, SpaceNumber, Store, StoreError};
+use crate::metrics::{LOST_MARKS, TORN_TAILS};
+use crate::store::{ChunkKey, OpenJournal, SpaceNumber, Store, StoreError};
 
 /// A space as it was when the service ended, however it ended.
 #[derive(Debug)]
@@ -35,15 +38,32 @@ pub(crate) enum RecoveryError {
     Closing,
 }
 
-/// Loads a space of a name, unless `closing` says that nobody wants it any more.
+/// A space to load.
+pub(crate) struct Loading<'a> {
+    pub(crate) store: &'a dyn Store,
+    pub(crate) health: &'a Health,
+    pub(crate) name: &'a str,
+    pub(crate) space: SpaceNumber,
+    pub(crate) settings: &'a Settings,
+    pub(crate) interval_ns: i64,
+}
+
+/// Loads a space, unless `closing` says that nobody wants it any more.
 pub(crate) fn recover(
-    store: &dyn Store,
-    space: SpaceNumber,
-    settings: &Settings,
-    (name, interval_ns): (&str, i64),
+    loading: &Loading<'_>,
     closing: impl Fn() -> bool,
 ) -> Result<Recovered, RecoveryError> {
-    let mut recovered = match load_checkpoint(store, space, settings)? {
+    let Loading {
+        store,
+        health,
+        name,
+        space,
+        settings,
+        interval_ns,
+    } = *loading;
+    let journal = store.open_journal(space)?;
+    report(name, &journal);
+    let mut recovered = match load_checkpoint(loading, journal.extent.blocks) {
         Some(recovered) => recovered,
         None => Recovered {
             map: CognitiveMap::new(settings.clone()),
@@ -77,7 +97,7 @@ pub(crate) fn recover(
             });
         }
         for (agent, chunk) in chunks {
-            put(store, space, agent, &chunk)?;
+            put(store, health, space, agent, &chunk);
         }
         recovered.next_block = number + 1;
     }
@@ -87,50 +107,84 @@ pub(crate) fn recover(
     Ok(recovered)
 }
 
-/// The checkpoint, if there is one that this build understands. One that it does not is dropped:
-/// the journal holds all that it held.
-fn load_checkpoint(
-    store: &dyn Store,
-    space: SpaceNumber,
-    settings: &Settings,
-) -> Result<Option<Recovered>, RecoveryError> {
-    let Some(checkpoint) = store.checkpoint(space)? else {
-        return Ok(None);
+/// Says what was found at the end of a journal.
+fn report(space: &str, journal: &OpenJournal) {
+    if let Some(cut) = &journal.cut {
+        counter!(TORN_TAILS, "space" => space.to_owned()).increment(1);
+        tracing::warn!(space, block = cut.block, file = cut.file, offset = cut.offset, flaw = %cut.flaw,
+            "what was never acknowledged has been cut off the end of the journal");
+    }
+    if journal.mark_lost {
+        counter!(LOST_MARKS, "space" => space.to_owned()).increment(1);
+        tracing::warn!(
+            space,
+            blocks = journal.extent.blocks,
+            samples = journal.extent.samples,
+            "it is not known how far the space was acknowledged: blocks may be missing at its end"
+        );
+    }
+}
+
+/// The checkpoint, if there is one that this build understands and whose blocks the journal has. Any
+/// other one is dropped, together with the trajectories: the journal holds all that they held.
+fn load_checkpoint(loading: &Loading<'_>, blocks: u64) -> Option<Recovered> {
+    let Loading {
+        store,
+        health,
+        name,
+        space,
+        settings,
+        ..
+    } = *loading;
+    let loaded = match store.checkpoint(space) {
+        Ok(None) => return None,
+        Ok(Some(checkpoint)) if checkpoint.next_block > blocks => {
+            Err("it holds blocks that the journal has not".to_owned())
+        }
+        Ok(Some(checkpoint)) => {
+            let map = CognitiveMap::restore(settings.clone(), checkpoint.pages);
+            let beside = Recorder::read_all(&checkpoint.recorders);
+            match (map, beside) {
+                (Ok(map), Ok((recorders, events))) => Ok(Recovered {
+                    checkpoint_revision: map.revision(),
+                    // Older versions wrote none.
+                    events: EventRing::read(events)
+                        .unwrap_or_else(|| EventRing::since(map.revision())),
+                    map,
+                    recorders,
+                    next_block: checkpoint.next_block,
+                }),
+                (Err(error), _) => Err(error.to_string()),
+                (_, Err(error)) => Err(error.to_string()),
+            }
+        }
+        Err(error) => Err(error.to_string()),
     };
-    let beside = Recorder::read_all(&checkpoint.recorders);
-    match (
-        CognitiveMap::restore(settings.clone(), checkpoint.pages),
-        beside,
-    ) {
-        (Ok(map), Ok((recorders, events))) => Ok(Some(Recovered {
-            checkpoint_revision: map.revision(),
-            // Older versions wrote none.
-            events: EventRing::read(events).unwrap_or_else(|| EventRing::since(map.revision())),
-            map,
-            recorders,
-            next_block: checkpoint.next_block,
-        })),
-        (map, beside) => {
-            let map = map.err().map(|error| error.to_string());
-            let recorders = beside.err().map(|error| error.to_string());
+    match loaded {
+        Ok(recovered) => Some(recovered),
+        Err(reason) => {
             tracing::warn!(
-                ?map,
-                ?recorders,
-                "checkpoint not usable; replaying the whole journal"
+                space = name,
+                reason,
+                "checkpoint not usable; the whole journal is replayed"
             );
-            store.drop_checkpoint(space)?;
-            Ok(None)
+            if let Err(error) = store.forget(space) {
+                health.derived_fail(&error);
+            }
+            None
         }
     }
 }
 
 /// Puts a chunk again: the same rows under the same key as before the end.
-fn put(store: &dyn Store, space: SpaceNumber, agent: u32, chunk: &Chunk) -> Result<(), StoreError> {
+fn put(store: &dyn Store, health: &Health, space: SpaceNumber, agent: u32, chunk: &Chunk) {
     let first_stamp_ns = chunk.rows[0].stamp_ns;
     let key = ChunkKey {
         agent,
         session: chunk.session,
         first_stamp_ns,
     };
-    store.put_chunk(space, key, &trajectory::encode(&chunk.rows))
+    if let Err(error) = store.put_chunk(space, key, &trajectory::encode(&chunk.rows)) {
+        health.derived_fail(&error);
+    }
 }

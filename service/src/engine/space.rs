@@ -9,6 +9,7 @@ use std::time::Duration;
 use arc_swap::ArcSwapOption;
 use cogmap_proto::{Codec, EventId, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings};
 use cognitive_map::{AgentId, CognitiveMap, Label, Lesson, Settings};
+use metrics::gauge;
 use tokio::sync::oneshot;
 
 use super::checkpointer::{Checkpointer, Job};
@@ -20,12 +21,13 @@ use super::message::{Call, IngestError, ObjectRequest, Request};
 use super::outlet::Outlet;
 use super::question::QuestionRoom;
 use super::queue::{Inbox, NotQueued, Queue, queue};
-use super::recovery;
+use super::recovery::{self, Loading, RecoveryError};
 use super::refinement::Refinements;
 use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
 use super::writer::Writer;
-use crate::store::{SpaceNumber, Store, StoreError};
+use crate::metrics::SPACE_STOPPED;
+use crate::store::{DerivedError, SpaceNumber, Store};
 
 /// A space: its readers' and senders' side.
 #[derive(Debug)]
@@ -56,7 +58,7 @@ pub(crate) struct Shared {
     /// Set once: the writer takes what is queued and ends.
     pub(crate) closing: AtomicBool,
     /// Set once the map is loaded, or could not be.
-    loaded: OnceLock<Result<(), String>>,
+    loaded: OnceLock<Result<(), Unavailable>>,
     agents: RwLock<BTreeMap<String, Arc<AgentDesk>>>,
     /// Removed agents that were in the map, by name, the latest last.
     former: RwLock<BTreeMap<String, Vec<AgentId>>>,
@@ -85,7 +87,10 @@ pub enum Unavailable {
     /// The work on it ended with a panic.
     #[error("the work was interrupted")]
     Interrupted,
-    /// It could not be loaded, or is not written any more.
+    /// It could not be loaded: its journal is damaged.
+    #[error("{0}")]
+    Stopped(String),
+    /// Its writer has failed.
     #[error("{0}")]
     Failed(String),
 }
@@ -101,9 +106,12 @@ pub enum TrajectoryError {
         "the agent has been removed; causal trajectories of its sessions can be read by their number"
     )]
     RemovedAgent,
-    /// The store cannot be read.
+    /// The stored part cannot be read.
     #[error(transparent)]
-    Store(#[from] StoreError),
+    Derived(#[from] DerivedError),
+    /// The reading was interrupted.
+    #[error("the reading was interrupted")]
+    Interrupted,
     /// The map cannot be read.
     #[error(transparent)]
     Unavailable(#[from] Unavailable),
@@ -131,29 +139,7 @@ impl Space {
         around: &Surroundings,
     ) -> Self {
         let (queue, inbox) = queue(around.settings.queue_messages, around.settings.queue_bytes);
-        let shared = Arc::new(Shared {
-            name: name.into(),
-            number,
-            interval_ns,
-            agents_max: around.settings.agents_max,
-            sessions: SessionBound::new(around.settings.session_ahead_max),
-            reorder_window: around.settings.reorder_window,
-            gap_timeout: around.settings.gap_timeout,
-            store: Arc::clone(&around.store),
-            outlet: Arc::clone(&around.outlet),
-            health: Arc::clone(&around.health),
-            events: EventLog::new(),
-            revision: AtomicU64::new(0),
-            closing: AtomicBool::new(false),
-            loaded: OnceLock::new(),
-            agents: RwLock::default(),
-            former: RwLock::default(),
-            snapshot: ArcSwapOption::empty(),
-            wishes: Mutex::new(Some(Vec::new())),
-            refinements: Refinements::default(),
-            questions: around.questions.clone(),
-            broken: AtomicBool::new(false),
-        });
+        let shared = Shared::new(number, name, interval_ns, around);
         let thread = {
             let (shared, around) = (Arc::clone(&shared), around.clone());
             Builder::new()
@@ -166,6 +152,24 @@ impl Space {
             settings,
             queue,
             thread: Mutex::new(Some(thread)),
+        }
+    }
+
+    /// A space that cannot be started, because its record is damaged. It can be deleted.
+    pub(crate) fn stopped(
+        number: SpaceNumber,
+        name: &str,
+        reason: String,
+        around: &Surroundings,
+    ) -> Self {
+        let (queue, _) = queue(around.settings.queue_messages, around.settings.queue_bytes);
+        let shared = Shared::new(number, name, 0, around);
+        shared.stop(reason);
+        Self {
+            shared,
+            settings: SpaceSettings::default(),
+            queue,
+            thread: Mutex::new(None),
         }
     }
 
@@ -189,15 +193,18 @@ impl Space {
         self.shared.loaded.get().is_none()
     }
 
-    /// Why the map could not be loaded or is not written any more, if so.
-    pub fn failure(&self) -> Option<String> {
-        if self.shared.broken.load(Ordering::Acquire) {
-            return Some("the space's writer has failed; the log says more".to_owned());
+    /// Why the map could not be loaded, if so: what is damaged, and what is lost.
+    pub fn stop_reason(&self) -> Option<&str> {
+        match self.shared.loaded.get() {
+            Some(Err(Unavailable::Stopped(reason))) => Some(reason),
+            _ => None,
         }
-        self.shared
-            .loaded
-            .get()
-            .and_then(|loaded| loaded.clone().err())
+    }
+
+    /// Why the map is not written any more, if so.
+    pub fn failure(&self) -> Option<String> {
+        let failed = self.shared.broken.load(Ordering::Acquire);
+        failed.then(|| "the space's writer has failed; the log says more".to_owned())
     }
 
     /// The map as it was at the end of a round that ended after the call, or is unchanged since.
@@ -322,6 +329,7 @@ impl Space {
             Ok(()) => {}
             Err(Unavailable::Recovering) => return Err(IngestError::Recovering),
             Err(Unavailable::Closing) => return Err(IngestError::Closed),
+            Err(Unavailable::Stopped(reason)) => return Err(IngestError::Stopped(reason)),
             Err(error) => return Err(IngestError::Store(error.to_string())),
         }
         self.queue.request(call).map_err(|error| match error {
@@ -357,11 +365,11 @@ impl Space {
     }
 
     fn available(&self) -> Result<(), Unavailable> {
-        match self.failure() {
-            Some(detail) => Err(Unavailable::Failed(detail)),
-            None if self.recovering() => Err(Unavailable::Recovering),
-            None => Ok(()),
+        if let Some(detail) = self.failure() {
+            return Err(Unavailable::Failed(detail));
         }
+        let loaded = self.shared.loaded.get();
+        loaded.cloned().unwrap_or(Err(Unavailable::Recovering))
     }
 }
 
@@ -389,8 +397,15 @@ fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: 
         ..
     } = around;
     let closing = || shared.closing.load(Ordering::Acquire);
-    let told = (&*shared.name, shared.interval_ns);
-    match recovery::recover(&*store, shared.number, core, told, closing) {
+    let loading = Loading {
+        store: &*store,
+        health: &health,
+        name: &shared.name,
+        space: shared.number,
+        settings: core,
+        interval_ns: shared.interval_ns,
+    };
+    match recovery::recover(&loading, closing) {
         Ok(recovered) => {
             let progress = (recovered.checkpoint_revision, recovered.next_block);
             let interval = settings.checkpoint_interval;
@@ -407,16 +422,48 @@ fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: 
             let _ = shared.loaded.set(Ok(()));
             writer.run(inbox);
         }
-        Err(error) => {
-            if !closing() {
-                tracing::error!(space = %shared.name, %error, "load space");
-            }
-            let _ = shared.loaded.set(Err(error.to_string()));
+        Err(RecoveryError::Closing) => {
+            let closing = "the space is closing".to_owned();
+            let _ = shared.loaded.set(Err(Unavailable::Failed(closing)));
         }
+        Err(error) => shared.stop(error.to_string()),
     }
 }
 
 impl Shared {
+    fn new(number: SpaceNumber, name: &str, interval_ns: i64, around: &Surroundings) -> Arc<Self> {
+        Arc::new(Self {
+            name: name.into(),
+            number,
+            interval_ns,
+            agents_max: around.settings.agents_max,
+            sessions: SessionBound::new(around.settings.session_ahead_max),
+            reorder_window: around.settings.reorder_window,
+            gap_timeout: around.settings.gap_timeout,
+            store: Arc::clone(&around.store),
+            outlet: Arc::clone(&around.outlet),
+            health: Arc::clone(&around.health),
+            events: EventLog::new(),
+            revision: AtomicU64::new(0),
+            closing: AtomicBool::new(false),
+            loaded: OnceLock::new(),
+            agents: RwLock::default(),
+            former: RwLock::default(),
+            snapshot: ArcSwapOption::empty(),
+            wishes: Mutex::new(Some(Vec::new())),
+            refinements: Refinements::default(),
+            questions: around.questions.clone(),
+            broken: AtomicBool::new(false),
+        })
+    }
+
+    /// Stops the space for good, before it has begun: only an operator can help.
+    fn stop(&self, reason: String) {
+        tracing::error!(space = %self.name, reason, "the space is stopped");
+        gauge!(SPACE_STOPPED, "space" => self.name.to_string()).set(1.0);
+        let _ = self.loaded.set(Err(Unavailable::Stopped(reason)));
+    }
+
     /// Lists a new agent.
     pub(crate) fn seat(&self, desk: Arc<AgentDesk>) {
         let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);

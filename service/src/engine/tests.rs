@@ -14,7 +14,7 @@ use proptest::prelude::*;
 use super::{
     Engine, EngineSettings, Entry, QuestionError, Readiness, Silent, core_settings, records_of,
 };
-use crate::store::FjallStore;
+use crate::store::{Derived, Journal, LocalStore};
 
 mod removal;
 
@@ -75,7 +75,7 @@ fn drive() -> Vec<Sample> {
 }
 
 fn open(directory: &Path, settings: EngineSettings) -> Engine {
-    let store = Arc::new(FjallStore::open(directory).expect("the store opens"));
+    let store = Arc::new(LocalStore::open(directory).expect("the store opens"));
     let engine = Engine::open(store, settings, Arc::new(Silent)).expect("the engine opens");
     let name = SPACE.parse().expect("a name");
     engine
@@ -353,9 +353,9 @@ fn lessons_outlive_the_engine_with_and_without_a_checkpoint() {
         engine.shutdown();
     }
     // From the journal alone.
-    let store = FjallStore::open(directory.path()).expect("the store opens");
-    let number = crate::store::Store::spaces(&store).expect("spaces")[0].number;
-    crate::store::Store::drop_checkpoint(&store, number).expect("dropped");
+    let store = LocalStore::open(directory.path()).expect("the store opens");
+    let number = store.spaces().expect("spaces")[0].number;
+    store.forget(number).expect("dropped");
     drop(store);
     let engine = open(directory.path(), EngineSettings::default());
     let space = engine.space(SPACE).expect("the space is there");

@@ -12,7 +12,7 @@ use cognitive_map::{Agent, AgentId, CognitiveMap, Record, SampleBody};
 
 use super::desk::AgentDesk;
 use super::space::{Space, TrajectoryError};
-use crate::store::{SpaceNumber, Store, StoreError};
+use crate::store::{DerivedError, SpaceNumber, Store};
 
 /// Rows of a full chunk.
 const CHUNK_ROWS: usize = 256;
@@ -243,7 +243,7 @@ impl Space {
         };
         tokio::task::spawn_blocking(work)
             .await
-            .map_err(|_| TrajectoryError::Store(StoreError::Io("reading was interrupted".into())))?
+            .map_err(|_| TrajectoryError::Interrupted)?
     }
 
     /// Why there is no agent of a name.
@@ -296,7 +296,12 @@ impl Part {
     }
 
     /// Whether it has rows of a session.
-    fn had(&self, session: u64, store: &dyn Store, space: SpaceNumber) -> Result<bool, StoreError> {
+    fn had(
+        &self,
+        session: u64,
+        store: &dyn Store,
+        space: SpaceNumber,
+    ) -> Result<bool, DerivedError> {
         if self.session == session && !self.fresh.is_empty() {
             return Ok(true);
         }
@@ -357,7 +362,7 @@ fn rows(
         )?;
         let last = chunks.len() < CHUNKS_AT_ONCE;
         for (_, bytes) in chunks {
-            let rows = decode(&bytes).map_err(|error| StoreError::Corrupt(error.to_string()))?;
+            let rows = decode(&bytes).map_err(|error| DerivedError(error.to_string()))?;
             poses.extend(rows.into_iter().filter(|row| row.stamp_ns >= next_from_ns));
             let Some(latest) = poses.last() else { continue };
             if poses.len() > window.limit || latest.stamp_ns >= to_ns {

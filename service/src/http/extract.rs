@@ -32,6 +32,10 @@ pub(crate) struct SpaceOfPath(pub(crate) Arc<Space>);
 #[derive(Debug)]
 pub(crate) struct AgentName(pub(crate) Arc<Space>, pub(crate) Name);
 
+/// The space that the path names, also one that is stopped.
+#[derive(Debug)]
+pub(crate) struct AnySpaceOfPath(pub(crate) Arc<Space>);
+
 /// The space and the agent that the path names.
 #[derive(Debug)]
 pub(crate) struct AgentOfPath(pub(crate) Arc<Space>, pub(crate) Arc<AgentDesk>);
@@ -127,6 +131,15 @@ pub(crate) fn name(text: &str) -> Result<Name, Problem> {
 
 /// The space of a name in a path.
 pub(crate) fn space(service: &Service, text: &str) -> Result<Arc<Space>, Problem> {
+    let space = any_space(service, text)?;
+    match space.stop_reason() {
+        Some(reason) => Err(Problem::space_stopped(reason)),
+        None => Ok(space),
+    }
+}
+
+/// The space of a name in a path, stopped or not.
+fn any_space(service: &Service, text: &str) -> Result<Arc<Space>, Problem> {
     let found = service.engine.space(text);
     // Only what was not found needs the name's rules: what exists has a valid one.
     found.map_or_else(|| Err(Problem::unknown_space(name(text)?.as_str())), Ok)
@@ -157,6 +170,15 @@ impl FromRequestParts<Service> for SpaceOfPath {
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: SpaceParam = path(parts, service).await?;
         space(service, &params.space).map(Self)
+    }
+}
+
+impl FromRequestParts<Service> for AnySpaceOfPath {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
+        let params: SpaceParam = path(parts, service).await?;
+        any_space(service, &params.space).map(Self)
     }
 }
 

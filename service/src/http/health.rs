@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use super::extract::NoQuery;
 use super::problem::{Kind, Problem};
 use super::reply;
+use super::spaces::StoppedSpace;
 use super::state::Service;
 use crate::engine::Readiness;
 
@@ -28,23 +29,45 @@ pub(crate) async fn healthz(_: NoQuery) -> Response<Body> {
     reply::json(&OK)
 }
 
-/// The service can do its work: every space is loaded, and the store takes writes.
+/// Whether the service can do its work, and what it does it without.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct ReadyHealth {
+    /// `ok`.
+    status: &'static str,
+    /// Spaces that are stopped because their journal is damaged.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    stopped: Vec<StoppedSpace>,
+}
+
+/// The service can do its work: the store takes writes, and every space is loaded, but for those that
+/// are stopped because their journal is damaged.
 #[utoipa::path(get, path = "/readyz", tag = "service", operation_id = "get_readiness",
     responses(
-        (status = 200, description = "It can", body = Health),
-        (status = 503, description = "Spaces are still loading, or the store has failed")))]
+        (status = 200, description = "It can", body = ReadyHealth),
+        (status = 503, description = "Spaces are still loading, all are stopped, or the store has failed")))]
 pub(crate) async fn readyz(
     State(service): State<Service>,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     match service.engine.readiness() {
-        Readiness::Ready => Ok(reply::json(&OK)),
+        Readiness::Ready => Ok(ready(Vec::new())),
+        Readiness::ReadyBut { stopped } => Ok(ready(stopped)),
         Readiness::Recovering { spaces } => {
             let detail = format!("spaces still loading: {}", spaces.join(", "));
             Err(Problem::new(Kind::Recovering, detail))
         }
         Readiness::Failed { detail } => Err(Problem::new(Kind::NotReady, detail)),
     }
+}
+
+fn ready(stopped: Vec<(String, String)>) -> Response<Body> {
+    let stopped = stopped.into_iter();
+    reply::json(&ReadyHealth {
+        status: "ok",
+        stopped: stopped
+            .map(|(name, reason)| StoppedSpace { name, reason })
+            .collect(),
+    })
 }
 
 /// Metrics in Prometheus's text format.

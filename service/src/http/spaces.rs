@@ -7,9 +7,13 @@ use axum::body::Body;
 use axum::extract::{FromRequest, Request, State};
 use axum::http::header::LOCATION;
 use axum::http::{HeaderValue, Response, StatusCode};
-use cogmap_proto::{Name, SpaceInfo, SpaceList, SpaceSettings};
+use cogmap_proto::{Name, SpaceInfo, SpaceSettings};
+use serde::Serialize;
+use utoipa::ToSchema;
 
-use super::extract::{NoQuery, SpaceOfPath, SpaceParam, must_be_json, name, whole_body};
+use super::extract::{
+    AnySpaceOfPath, NoQuery, SpaceOfPath, SpaceParam, must_be_json, name, whole_body,
+};
 use super::json;
 use super::problem::{Kind, Problem};
 use super::reply;
@@ -20,22 +24,45 @@ use crate::engine::{Space, Unavailable};
 /// How often to look whether a new space has been set up.
 const SET_UP_POLL: Duration = Duration::from_millis(1);
 
+/// The spaces of the service.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct ListedSpaces {
+    /// The spaces, by name.
+    spaces: Vec<SpaceInfo>,
+    /// Spaces that are stopped because their journal is damaged, by name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    stopped: Vec<StoppedSpace>,
+}
+
+/// A space that is stopped because its journal is damaged.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct StoppedSpace {
+    /// Name.
+    pub(crate) name: String,
+    /// What is damaged, what is lost, and which command helps.
+    pub(crate) reason: String,
+}
+
 /// The spaces.
 ///
-/// Those that are still loading, or cannot be read, are not among them; `/readyz` names them.
+/// Those that are still loading are not among them; `/readyz` names them. Those that are stopped because
+/// their journal is damaged are listed apart, each with the reason.
 #[utoipa::path(get, path = "/v1/spaces", tag = "spaces", operation_id = "list_spaces",
-    responses((status = 200, description = "All spaces, by name", body = SpaceList)))]
+    responses((status = 200, description = "All spaces, by name", body = ListedSpaces)))]
 pub(crate) async fn list(
     State(service): State<Service>,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
-    let mut spaces = Vec::new();
+    let (mut spaces, mut stopped) = (Vec::new(), Vec::new());
     for space in service.engine.spaces() {
-        if let Ok(info) = info(&service, &space).await {
+        if let Some(reason) = space.stop_reason() {
+            let (name, reason) = (space.name().to_owned(), reason.to_owned());
+            stopped.push(StoppedSpace { name, reason });
+        } else if let Ok(info) = info(&service, &space).await {
             spaces.push(info);
         }
     }
-    Ok(reply::json(&SpaceList { spaces }))
+    Ok(reply::json(&ListedSpaces { spaces, stopped }))
 }
 
 /// A space.
@@ -95,7 +122,7 @@ pub(crate) async fn put(
         (status = 404, description = "There is no such space")))]
 pub(crate) async fn delete(
     State(service): State<Service>,
-    SpaceOfPath(space): SpaceOfPath,
+    AnySpaceOfPath(space): AnySpaceOfPath,
     _: NoQuery,
 ) -> Result<StatusCode, Problem> {
     // The space's writer finishes what it has before the store forgets it.

@@ -1,5 +1,7 @@
 //! Errors of the store, one variant for each way in which the caller would act differently.
 
+use super::log::{Damage, Extent, Flaw, Survey};
+
 /// Why the store could not do it.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
@@ -14,6 +16,11 @@ pub enum StoreError {
         /// Newest format that this build reads.
         supported: u32,
     },
+    /// The directory was written by an older version.
+    #[error(
+        "the store has format 1: start the service on it once, and it is made anew as format 2"
+    )]
+    OlderFormat,
     /// The disk is full.
     #[error("no space left on the store's disk: free some and restart")]
     DiskFull,
@@ -23,6 +30,9 @@ pub enum StoreError {
     /// An earlier write failed; writes are refused until the service is restarted.
     #[error("the store refuses writes since an earlier failure; restart the service")]
     Broken,
+    /// The journal of a space is damaged, or a part of it is missing.
+    #[error(transparent)]
+    Damaged(Box<DamagedJournal>),
     /// The bytes on disk are not what they should be.
     #[error("corrupt store: {0}")]
     Corrupt(String),
@@ -30,3 +40,74 @@ pub enum StoreError {
     #[error("store: {0}")]
     Io(String),
 }
+
+/// A journal of which something that was acknowledged cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DamagedJournal {
+    /// Name of the space.
+    pub space: String,
+    /// The first damage.
+    pub first: Damage,
+    /// Acknowledged blocks that cannot be read, and the samples in them.
+    pub lost: Extent,
+    /// How far the journal was acknowledged.
+    pub acknowledged: Extent,
+}
+
+impl DamagedJournal {
+    /// The damage that a survey has found, if any.
+    pub(super) fn of(space: &str, survey: &Survey) -> Option<Self> {
+        Some(Self {
+            space: space.to_owned(),
+            first: survey.damage.first()?.clone(),
+            lost: survey.lost,
+            acknowledged: survey.acknowledged,
+        })
+    }
+}
+
+impl std::fmt::Display for DamagedJournal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            space,
+            first,
+            lost,
+            acknowledged,
+        } = self;
+        write!(
+            f,
+            "the journal of space {space:?} is damaged: block {} ({} at byte {} of {}); {} of {} \
+             acknowledged blocks and {} of {} samples cannot be read. `cogmap store verify` says more, \
+             `cogmap store repair --space {space}` goes on with the rest",
+            first.block,
+            first.flaw,
+            first.offset,
+            first.file,
+            lost.blocks,
+            acknowledged.blocks,
+            lost.samples,
+            acknowledged.samples,
+        )
+    }
+}
+
+impl std::error::Error for DamagedJournal {}
+
+impl std::fmt::Display for Flaw {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Block => "its bytes have changed",
+            Self::Header => "no block begins",
+            Self::CutShort => "the file ends inside a block",
+            Self::Order => "a block of another number stands",
+            Self::Unreadable => "the disk does not read on",
+            Self::Missing => "blocks are missing",
+        })
+    }
+}
+
+/// Why what is derived from the journal cannot be read or written. The journal holds all of it, and
+/// the next start makes it anew.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("what is derived from the journal: {0}; the next start makes it anew")]
+pub struct DerivedError(pub String);

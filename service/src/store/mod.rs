@@ -1,20 +1,27 @@
-//! The store: where the journal and what is derived from it are kept.
+//! The store: the journal, which is the ground state, and what is derived from it.
 //!
-//! A port ([`Store`]) and its embedded end ([`FjallStore`]). Everything else of the service speaks
-//! to the port, and only the ends know a disk format.
+//! Two ports, [`Journal`] and [`Derived`], and their embedded end ([`LocalStore`]). They share nothing on
+//! disk: whatever happens to derived state, it is dropped and made again from the journal. Everything
+//! else of the service speaks to the ports, and only the ends know a disk format.
 
+mod backup;
+mod derived;
 mod error;
-mod fjall;
+mod format1;
+mod local;
+mod log;
 
 use cognitive_map::CheckpointPage;
 
-/// Most files of tables that the store keeps open to read.
-const CACHED_FILES_MAX: usize = 256;
-/// Most files that it has open, those of journals and of merges among them.
-pub const OPEN_FILES_MAX: usize = CACHED_FILES_MAX + 128;
+/// Most files that the store has open: a journal for each of the most spaces, the tables of what is
+/// derived, and those of merges.
+pub const OPEN_FILES_MAX: usize = 256 + 2 * derived::CACHED_FILES_MAX;
 
-pub use error::StoreError;
-pub use fjall::{FORMAT_VERSION, FjallStore};
+pub use backup::{BackupReport, SpaceBackup, backup, restore};
+pub use error::{DamagedJournal, DerivedError, StoreError};
+pub use format1::migrate;
+pub use local::{FORMAT_VERSION, LocalJournal, LocalStore, Replacement, SpaceSurvey, verify};
+pub use log::{Damage, Extent, Flaw, Survey};
 
 /// A space as the store knows it. The number is never used again, the name may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -25,10 +32,22 @@ pub struct SpaceNumber(pub u32);
 pub struct StoredSpace {
     /// Its number.
     pub number: SpaceNumber,
-    /// Its name.
+    /// Its name; `space-` and its number where its record is lost.
     pub name: String,
-    /// Its settings, as the engine wrote them.
-    pub settings: Vec<u8>,
+    /// Its settings, as the engine wrote them; none where its record is lost.
+    pub settings: Option<Vec<u8>>,
+}
+
+/// A journal that is ready to be appended to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OpenJournal {
+    /// What it holds: the number of its blocks is that of the next one.
+    pub extent: Extent,
+    /// What was cut off its end: a block that was never acknowledged, caught by a crash.
+    pub cut: Option<Damage>,
+    /// Whether it could not be told how far the journal was acknowledged, and so whether blocks at its
+    /// end are missing.
+    pub mark_lost: bool,
 }
 
 /// Derived state as it was after a block of the journal.
@@ -53,78 +72,110 @@ pub struct ChunkKey {
     pub first_stamp_ns: i64,
 }
 
-/// Blocks of the journal, with their numbers, in order.
+/// A chunk of a trajectory under its key.
+pub type StoredChunk = (ChunkKey, Vec<u8>);
+
+/// Blocks of the journal, with their numbers, in order. After an error there are no more.
 pub type Blocks<'a> = Box<dyn Iterator<Item = Result<(u64, Vec<u8>), StoreError>> + 'a>;
 
-/// The port. All methods may be called from any thread; each space has one writer.
+/// The port of a journal for each space. All methods may be called from any thread; each space has one
+/// writer.
 ///
-/// What [`Store::append`] and [`Store::put_chunk`] have written survives the process at once and a
-/// power cut after the next [`Store::sync`] has returned. After any error of a writing method the
-/// store refuses further writes ([`StoreError::Broken`]); reading goes on.
-pub trait Store: std::fmt::Debug + Send + Sync + 'static {
+/// What [`Journal::append`] has written survives the process at once and a power cut after the next
+/// [`Journal::sync`] has returned. After any error of a writing method the journal refuses further
+/// writes ([`StoreError::Broken`]); reading goes on.
+pub trait Journal: std::fmt::Debug + Send + Sync + 'static {
     /// The spaces, by number.
     ///
     /// # Errors
-    /// The store cannot be read.
+    /// The journal cannot be read.
     fn spaces(&self) -> Result<Vec<StoredSpace>, StoreError>;
 
     /// Creates a space durably, under a new number.
     ///
     /// # Errors
-    /// The name is taken, or the store cannot be written.
+    /// The name is taken, or the journal cannot be written.
     fn create_space(&self, name: &str, settings: &[u8]) -> Result<SpaceNumber, StoreError>;
 
     /// Deletes a space durably, with all that belongs to it.
     ///
     /// # Errors
-    /// The store cannot be written.
+    /// The journal cannot be written.
     fn delete_space(&self, space: SpaceNumber) -> Result<(), StoreError>;
 
-    /// Appends block number `block` to the journal of a space.
+    /// Checks every block of a space's journal, and makes it ready to be appended to. This may take
+    /// as long as the disk needs to read it.
     ///
     /// # Errors
-    /// The store cannot be written.
-    fn append(&self, space: SpaceNumber, block: u64, bytes: &[u8]) -> Result<(), StoreError>;
+    /// [`StoreError::Damaged`] when something that was acknowledged is damaged or missing.
+    fn open_journal(&self, space: SpaceNumber) -> Result<OpenJournal, StoreError>;
 
-    /// Makes durable all that was written before the call.
+    /// Appends block number `block`, which holds `samples` samples, to the open journal of a space.
     ///
     /// # Errors
-    /// The store cannot be written.
+    /// The journal cannot be written.
+    fn append(
+        &self,
+        space: SpaceNumber,
+        block: u64,
+        samples: u64,
+        bytes: &[u8],
+    ) -> Result<(), StoreError>;
+
+    /// Makes durable all that was appended before the call, and remembers outside the journal how far
+    /// that is.
+    ///
+    /// # Errors
+    /// The journal cannot be written.
     fn sync(&self) -> Result<(), StoreError>;
 
-    /// The journal of a space from block `from` on.
+    /// The journal of a space from block `from` on: up to its end when asked, or to the first damage.
     fn journal(&self, space: SpaceNumber, from: u64) -> Blocks<'_>;
+}
 
+/// The port of what is derived from the journals: checkpoints and trajectories. A failure loses
+/// nothing that the journal does not hold, and stops nobody: after a failed write, further ones fail
+/// at once, and the next start finds no derived state and makes it anew.
+pub trait Derived: std::fmt::Debug + Send + Sync + 'static {
     /// Writes, in one atomic step, the pages that changed since the checkpoint before, the state of
     /// the trajectory recorders, and up to where in the journal they reach. A page of no bytes removes
     /// what is stored of it.
     ///
     /// # Errors
-    /// The store cannot be written.
-    fn write_checkpoint(&self, space: SpaceNumber, changed: &Checkpoint) -> Result<(), StoreError>;
+    /// It cannot be written.
+    fn write_checkpoint(
+        &self,
+        space: SpaceNumber,
+        changed: &Checkpoint,
+    ) -> Result<(), DerivedError>;
 
     /// The whole checkpoint of a space: all pages, merged over the writes.
     ///
     /// # Errors
-    /// The store cannot be read.
-    fn checkpoint(&self, space: SpaceNumber) -> Result<Option<Checkpoint>, StoreError>;
+    /// It cannot be read.
+    fn checkpoint(&self, space: SpaceNumber) -> Result<Option<Checkpoint>, DerivedError>;
 
-    /// Forgets the checkpoint of a space: one from another version, which the journal rebuilds.
+    /// Forgets all that is derived of a space.
     ///
     /// # Errors
-    /// The store cannot be written.
-    fn drop_checkpoint(&self, space: SpaceNumber) -> Result<(), StoreError>;
+    /// It cannot be written.
+    fn forget(&self, space: SpaceNumber) -> Result<(), DerivedError>;
 
     /// Writes (or writes again) a chunk of a trajectory.
     ///
     /// # Errors
-    /// The store cannot be written.
-    fn put_chunk(&self, space: SpaceNumber, key: ChunkKey, bytes: &[u8]) -> Result<(), StoreError>;
+    /// It cannot be written.
+    fn put_chunk(
+        &self,
+        space: SpaceNumber,
+        key: ChunkKey,
+        bytes: &[u8],
+    ) -> Result<(), DerivedError>;
 
     /// Chunks of an agent's session, in order, from the last one that begins at or before `from_ns`.
     ///
     /// # Errors
-    /// The store cannot be read.
+    /// They cannot be read.
     fn chunks(
         &self,
         space: SpaceNumber,
@@ -132,5 +183,10 @@ pub trait Store: std::fmt::Debug + Send + Sync + 'static {
         session: u64,
         from_ns: i64,
         limit: usize,
-    ) -> Result<Vec<(ChunkKey, Vec<u8>)>, StoreError>;
+    ) -> Result<Vec<StoredChunk>, DerivedError>;
 }
+
+/// Both ports.
+pub trait Store: Journal + Derived {}
+
+impl<T: Journal + Derived> Store for T {}

@@ -154,10 +154,15 @@ async fn answer(
 
 /// The space that a key names.
 pub(super) fn space(engine: &Engine, name: &str) -> Result<Arc<Space>, Problem> {
-    engine.space(name).ok_or_else(|| match Name::check(name) {
+    let found = engine.space(name).ok_or_else(|| match Name::check(name) {
         Ok(()) => Problem::unknown_space(name),
         Err(error) => Problem::new(Kind::InvalidPath, format!("{name:?}: {error}")),
-    })
+    });
+    let space = found?;
+    match space.stop_reason() {
+        Some(reason) => Err(Problem::space_stopped(reason)),
+        None => Ok(space),
+    }
 }
 
 /// The agent that a question names.

@@ -1,9 +1,9 @@
 //! A disk that takes no more: the service says so, goes on answering, and recovers with room.
 
 use std::fs::File;
-use std::io::Write;
-use std::path::PathBuf;
-use std::process::Command;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
 
 use cogmap_proto::{Codec, Sample};
 use cogmap_tests::{Answer, Drive, Server, batch, eventually, seed};
@@ -13,33 +13,51 @@ use crate::feeding::{Feeder, Outcome, assert_exactly_once, has_kept};
 
 const AGENT: &str = "ada";
 const SESSION: u64 = 7;
+/// What `mount` takes before the directory.
+const MOUNT_ARGS: [&str; 5] = ["-t", "tmpfs", "-o", "size=200m", "tmpfs"];
 /// Room that the ballast leaves: more than nothing, so that the disk fills in the midst of writes.
 const ROOM_BYTES: u64 = 4 << 20;
 
 /// A small disk of its own, taken down at the end.
 struct SmallDisk {
+    /// Where it is mounted.
     mount: TempDir,
+    /// The process in whose name space it is mounted, where this one may not mount.
+    holder: Option<Child>,
 }
 
 impl SmallDisk {
-    /// None where the system does not let this process mount.
-    fn mount() -> Option<Self> {
+    /// Mounts it: here if this process may, else in a name space in which anyone may.
+    fn mount() -> Self {
         let mount = tempfile::tempdir().unwrap();
         let mounted = Command::new("mount")
-            .args(["-t", "tmpfs", "-o", "size=200m", "tmpfs"])
+            .args(MOUNT_ARGS)
             .arg(mount.path())
             .output();
-        match mounted {
-            Ok(output) if output.status.success() => Some(Self { mount }),
+        let holder = match mounted {
+            Ok(output) if output.status.success() => None,
             refused => {
-                eprintln!("a disk of its own needs the right to mount: {refused:?}");
-                None
+                eprintln!("mounting is refused, so a name space is made: {refused:?}");
+                Some(hold_mount(mount.path()))
+            }
+        };
+        Self { mount, holder }
+    }
+
+    /// Its root, as this process reaches it.
+    fn path(&self) -> PathBuf {
+        let mount = self.mount.path();
+        match &self.holder {
+            None => mount.to_owned(),
+            Some(holder) => {
+                let root = PathBuf::from(format!("/proc/{}/root", holder.id()));
+                root.join(mount.strip_prefix("/").unwrap())
             }
         }
     }
 
     fn ballast(&self) -> PathBuf {
-        self.mount.path().join("ballast")
+        self.path().join("ballast")
     }
 
     /// Fills the disk but for [`ROOM_BYTES`].
@@ -52,8 +70,36 @@ impl SmallDisk {
     }
 }
 
+/// A process that has mounted a small disk in a name space of its own, and stays.
+fn hold_mount(mount: &Path) -> Child {
+    let script = format!(
+        "mount {} \"$0\" && echo mounted && exec sleep infinity",
+        MOUNT_ARGS.join(" ")
+    );
+    let mut holder = Command::new("unshare")
+        .args(["--user", "--map-root-user", "--mount", "sh", "-c", &script])
+        .arg(mount)
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("unshare can be started");
+    let mut said = String::new();
+    let stdout = holder.stdout.take().expect("it is piped");
+    BufReader::new(stdout).read_line(&mut said).unwrap();
+    assert_eq!(
+        said, "mounted\n",
+        "this drill fills a disk of its own: it needs the right to mount, or to make a name space"
+    );
+    holder
+}
+
 impl Drop for SmallDisk {
     fn drop(&mut self) {
+        if let Some(holder) = &mut self.holder {
+            // The mount goes with the process.
+            let _ = holder.kill();
+            let _ = holder.wait();
+            return;
+        }
         // Lazily, because a failed test leaves a service on it that is only about to go.
         let unmounted = Command::new("umount")
             .arg("-l")
@@ -112,11 +158,9 @@ fn feed_until_broken(server: &Server, feeder: &Feeder) -> u64 {
 
 #[test]
 fn a_full_disk_is_said_and_room_heals_it() {
-    let Some(disk) = SmallDisk::mount() else {
-        return; // the test below needs no rights
-    };
+    let disk = SmallDisk::mount();
     let settings = ["engine.checkpoint_interval_s=0.5"];
-    let mut server = Server::stopped(&settings).with_data_in(&disk.mount.path().join("data"));
+    let mut server = Server::stopped(&settings).with_data_in(&disk.path().join("data"));
     server.run();
     let feeder = Feeder::start(server.robot(AGENT, SESSION), drive(seed(6)));
     eventually("progress", || {

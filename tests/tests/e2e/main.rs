@@ -16,6 +16,7 @@ mod nobody_waits; // connections that say next to nothing
 mod pause; // a process that stands still
 mod readers; // readers and senders at once
 mod secure; // the example of docs/security.md: who may say and hear what
+mod store; // damage on the disk, repair and backups
 
 // What the service does for the outside.
 mod cli; // the commands

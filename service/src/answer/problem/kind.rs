@@ -61,6 +61,8 @@ pub enum Kind {
     Busy,
     /// The space is still loading; come back.
     Recovering,
+    /// The space's journal is damaged; an operator must look after it.
+    SpaceStopped,
     /// The service or the space is closing.
     Closing,
     /// The service cannot do its work until it is looked after.
@@ -73,7 +75,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, by status.
-    pub const ALL: [Self; 33] = [
+    pub const ALL: [Self; 34] = [
         Self::InvalidPath,
         Self::InvalidParameter,
         Self::MalformedBody,
@@ -103,6 +105,7 @@ impl Kind {
         Self::StoreFailed,
         Self::Busy,
         Self::Recovering,
+        Self::SpaceStopped,
         Self::Closing,
         Self::NotReady,
         Self::Timeout,
@@ -141,6 +144,7 @@ impl Kind {
             Self::StoreFailed => ("store-failed", 500, "The store has failed"),
             Self::Busy => ("busy", 503, "Too much is under way"),
             Self::Recovering => ("recovering", 503, "The space is loading"),
+            Self::SpaceStopped => ("space-stopped", 503, "The space is stopped"),
             Self::Closing => ("closing", 503, "The service is closing"),
             Self::NotReady => ("not-ready", 503, "The service is not ready"),
             Self::Timeout => ("timeout", 504, "The answer took too long"),

@@ -53,6 +53,11 @@ impl Problem {
         )
     }
 
+    /// The space is stopped.
+    pub fn space_stopped(reason: &str) -> Self {
+        Self::new(Kind::SpaceStopped, reason)
+    }
+
     /// There is no agent of that name; there may have been one.
     pub(crate) fn no_agent(space: &Space, name: &str) -> Self {
         if space.has_removed(name) {
@@ -103,6 +108,7 @@ impl From<Unavailable> for Problem {
             Unavailable::Recovering => Kind::Recovering,
             Unavailable::Closing => Kind::Closing,
             Unavailable::Interrupted => Kind::Internal,
+            Unavailable::Stopped(_) => Kind::SpaceStopped,
             Unavailable::Failed(_) => Kind::StoreFailed,
         };
         Self::new(kind, error.to_string())
@@ -188,7 +194,11 @@ impl From<TrajectoryError> for Problem {
         match error {
             TrajectoryError::UnknownAgent => Self::new(Kind::UnknownAgent, error.to_string()),
             TrajectoryError::RemovedAgent => Self::new(Kind::RemovedAgent, error.to_string()),
-            TrajectoryError::Store(error) => error.into(),
+            TrajectoryError::Derived(error) => {
+                tracing::error!(%error, "read a trajectory");
+                Self::new(Kind::StoreFailed, error.to_string())
+            }
+            TrajectoryError::Interrupted => Self::interrupted(),
             TrajectoryError::Unavailable(error) => error.into(),
         }
     }
@@ -225,6 +235,7 @@ impl From<IngestError> for Problem {
             IngestError::TooManyAgents => Self::new(Kind::TooManyAgents, detail),
             IngestError::DiskFull(_) => Self::new(Kind::StoreFull, detail),
             IngestError::Store(_) => Self::new(Kind::StoreFailed, detail),
+            IngestError::Stopped(_) => Self::new(Kind::SpaceStopped, detail),
             IngestError::Closed => Self::new(Kind::Closing, detail),
         }
     }

@@ -198,11 +198,10 @@ impl Writer {
     fn finish_round(&mut self) {
         if !self.block.is_empty() {
             let bytes = self.block.bytes();
-            match self
-                .shared
-                .store
-                .append(self.shared.number, self.next_block, bytes)
-            {
+            let is_sample = |record: &&Record| matches!(record, Record::Sample { .. });
+            let samples = self.records.iter().filter(is_sample).count() as u64;
+            let (space, block) = (self.shared.number, self.next_block);
+            match self.shared.store.append(space, block, samples, bytes) {
                 Ok(()) => {
                     self.counters.journaled(bytes.len());
                     self.next_block += 1;
@@ -261,7 +260,7 @@ impl Writer {
                 };
                 let bytes = trajectory::encode(&chunk.rows);
                 if let Err(error) = self.shared.store.put_chunk(self.shared.number, key, &bytes) {
-                    self.shared.health.fail(&error);
+                    self.shared.health.derived_fail(&error);
                 }
             }
         }

@@ -30,7 +30,7 @@ use tower::ServiceExt;
 
 use super::*;
 use crate::engine::{EngineSettings, Silent};
-use crate::store::FjallStore;
+use crate::store::LocalStore;
 
 /// A service with the space `lab`, and the store that it lives on.
 struct Rig {
@@ -58,7 +58,7 @@ fn rig() -> Rig {
 
 fn rig_with(settings: &HttpSettings, engine: EngineSettings) -> Rig {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let store = FjallStore::open(directory.path()).expect("the store opens");
+    let store = LocalStore::open(directory.path()).expect("the store opens");
     let engine = Engine::open(Arc::new(store), engine, Arc::new(Silent)).expect("opens");
     let name = "lab".parse().expect("a name");
     let (space, _) = engine

@@ -1,0 +1,153 @@
+//! Journals with holes, and what becomes of what follows them.
+
+use cogmap_proto::{Marker, Sample, SampleBatch, SampleBody};
+
+use super::*;
+use crate::store::Journal;
+
+fn enrol(agent: u32, name: &'static str) -> Entry<'static> {
+    Entry::Enrol {
+        agent,
+        name: name.into(),
+    }
+}
+
+fn samples(agent: u32, session: u64, first_seq: u64, count: usize) -> Entry<'static> {
+    let body = SampleBody::Marker(Marker {
+        label: "dock".into(),
+        ends_trip: false,
+    });
+    let samples = vec![Sample { stamp_ns: 5, body }; count];
+    let batch = SampleBatch {
+        session,
+        first_seq,
+        samples,
+    };
+    Entry::Samples { agent, batch }
+}
+
+fn forget(number: u64) -> Entry<'static> {
+    let name = "cup".into();
+    Entry::Forget { number, name }
+}
+
+fn lost(agent: u32, session: u64, from: u64, to: u64) -> Entry<'static> {
+    Entry::Skip {
+        agent,
+        session,
+        from,
+        to,
+        reason: SkipReason::Lost,
+    }
+}
+
+/// The entries of a journal of these blocks after a repair in which one of them is lost, with the
+/// report.
+fn repaired(blocks: &[&[Entry<'static>]], gone: usize) -> (Vec<Entry<'static>>, RepairReport) {
+    let directory = tempfile::tempdir().unwrap();
+    let store = LocalStore::open(directory.path()).unwrap();
+    let settings = serde_json::to_vec(&SpaceSettings::default()).unwrap();
+    let number = store.create_space("lab", &settings).unwrap();
+    store.open_journal(number).unwrap();
+    let (mut writer, mut end) = (BlockWriter::new(), 0);
+    for (number_of_block, block) in (0..).zip(blocks) {
+        writer.clear();
+        block.iter().for_each(|entry| writer.push(entry));
+        let count = crate::engine::samples_in(writer.bytes());
+        store
+            .append(number, number_of_block, count, writer.bytes())
+            .unwrap();
+        if number_of_block as usize <= gone {
+            end += 64 + writer.bytes().len();
+        }
+    }
+    store.sync().unwrap();
+    drop(store);
+    let segment = directory.path().join("spaces/0/0000000000000000.log");
+    let mut bytes = std::fs::read(&segment).unwrap();
+    bytes[end - 1] ^= 1;
+    std::fs::write(&segment, bytes).unwrap();
+
+    let store = LocalStore::open(directory.path()).unwrap();
+    let space = store.journals().space("lab").unwrap();
+    let report = repair(&store, &space).unwrap().expect("it is damaged");
+    let space = store.journals().space("lab").unwrap();
+    let mut read = Vec::new();
+    for block in store.journal(space.number, 0) {
+        read.extend(entries(&block.unwrap().1).unwrap());
+    }
+    assert!(repair(&store, &space).unwrap().is_none(), "it is whole");
+    (read, report)
+}
+
+#[test]
+fn samples_in_a_hole_are_journaled_as_lost() {
+    let (read, report) = repaired(
+        &[
+            &[enrol(0, "ada"), enrol(1, "bea"), samples(0, 7, 0, 3)],
+            &[samples(0, 7, 3, 2), samples(1, 4, 0, 1)],
+            &[samples(0, 7, 5, 1), samples(1, 4, 1, 2)],
+            &[samples(1, 5, 0, 1)],
+        ],
+        1,
+    );
+    let expected = [
+        enrol(0, "ada"),
+        enrol(1, "bea"),
+        samples(0, 7, 0, 3),
+        lost(0, 7, 3, 5),
+        lost(1, 4, 0, 1),
+        samples(0, 7, 5, 1),
+        samples(1, 4, 1, 2),
+        samples(1, 5, 0, 1),
+    ];
+    assert_eq!(read, expected);
+    assert_eq!(
+        (report.blocks_kept, report.samples_kept, report.samples_lost),
+        (3, 7, 3)
+    );
+    let missing = [MissingSamples {
+        session: 7,
+        from: 3,
+        to: 5,
+    }];
+    assert_eq!(
+        (&*report.agents[0].name, &*report.agents[0].missing),
+        ("ada", &missing[..])
+    );
+    assert_eq!(
+        (report.damage[0].first, report.damage[0].next),
+        (1, Some(2))
+    );
+}
+
+#[test]
+fn agents_keep_their_numbers_and_lessons_get_new_ones() {
+    let (read, report) = repaired(
+        &[
+            &[enrol(0, "ada"), forget(0)],
+            &[enrol(1, "bea"), forget(1), forget(2)],
+            &[enrol(2, "cid"), forget(3), samples(1, 9, 4, 1)],
+        ],
+        1,
+    );
+    let expected = [
+        enrol(0, "ada"),
+        forget(0),
+        enrol(1, "unknown-1"),
+        lost(1, 9, 0, 4),
+        enrol(2, "cid"),
+        forget(1),
+        samples(1, 9, 4, 1),
+    ];
+    assert_eq!(read, expected);
+    assert!(report.agents[0].name_lost);
+}
+
+#[test]
+fn a_damaged_end_is_cut_off() {
+    let (read, report) = repaired(&[&[enrol(0, "ada")], &[samples(0, 1, 0, 2)]], 1);
+    assert_eq!(read, [enrol(0, "ada")]);
+    assert_eq!(report.samples_lost, 2);
+    assert_eq!((report.damage[0].first, report.damage[0].next), (1, None));
+}

@@ -1,0 +1,237 @@
+//! Checkpoints and chunks, whole and damaged.
+
+use std::fs;
+
+use super::super::Derived;
+use super::*;
+
+fn chunk_key(agent: u32, session: u64, first_stamp_ns: i64) -> ChunkKey {
+    ChunkKey {
+        agent,
+        session,
+        first_stamp_ns,
+    }
+}
+
+fn page(kind: u8, index: u32, bytes: &[u8]) -> CheckpointPage {
+    let bytes = bytes.to_vec();
+    CheckpointPage { kind, index, bytes }
+}
+
+fn checkpoint(next_block: u64, recorders: &[u8], pages: Vec<CheckpointPage>) -> Checkpoint {
+    Checkpoint {
+        next_block,
+        pages,
+        recorders: recorders.to_vec(),
+    }
+}
+
+/// Kind, index and bytes of each page.
+fn contents(checkpoint: &Checkpoint) -> Vec<(u8, u32, &[u8])> {
+    let pages = checkpoint.pages.iter();
+    pages
+        .map(|page| (page.kind, page.index, page.bytes.as_slice()))
+        .collect()
+}
+
+fn open(directory: &Path) -> FjallDerived {
+    let spaces = [0, 3, 4].map(SpaceNumber);
+    FjallDerived::open(&directory.join("derived"), spaces.into_iter()).unwrap()
+}
+
+#[test]
+fn a_checkpoint_is_the_merge_of_its_writes() {
+    let directory = tempfile::tempdir().unwrap();
+    let store = open(directory.path());
+    let (space, other) = (SpaceNumber(3), SpaceNumber(4));
+    assert!(store.checkpoint(space).unwrap().is_none());
+    let first = vec![page(0, 0, b"a0"), page(0, 256, b"a256"), page(1, 0, b"b0")];
+    let write = |store: &FjallDerived, space, state| store.write_checkpoint(space, &state).unwrap();
+    write(&store, space, checkpoint(10, b"r1", first));
+    // A page of no bytes is none: it removes what was stored.
+    let second = vec![page(0, 256, b"A256"), page(1, 0, b""), page(2, 7, b"")];
+    write(&store, space, checkpoint(20, b"r2", second));
+    write(&store, other, checkpoint(5, b"", vec![page(0, 0, b"z")]));
+    write(&store, space, checkpoint(u64::MAX, b"", Vec::new()));
+    drop(store);
+
+    let store = open(directory.path());
+    let merged = store.checkpoint(space).unwrap().unwrap();
+    assert_eq!(
+        (merged.next_block, &*merged.recorders),
+        (u64::MAX, &b""[..])
+    );
+    let expected: [(u8, u32, &[u8]); 2] = [(0, 0, b"a0"), (0, 256, b"A256")];
+    assert_eq!(contents(&merged), expected);
+
+    store.forget(space).unwrap();
+    assert!(store.checkpoint(space).unwrap().is_none());
+    assert!(store.checkpoint(other).unwrap().is_some());
+    write(&store, space, checkpoint(1, b"", vec![page(0, 1, b"new")]));
+    let read = store.checkpoint(space).unwrap().unwrap();
+    assert_eq!(contents(&read), [(0, 1, &b"new"[..])]);
+}
+
+#[test]
+fn a_space_that_is_gone_is_dropped_when_the_store_is_opened() {
+    let directory = tempfile::tempdir().unwrap();
+    let store = open(directory.path());
+    store
+        .put_chunk(SpaceNumber(3), chunk_key(0, 0, 0), b"chunk")
+        .unwrap();
+    drop(store);
+    let path = directory.path().join("derived");
+    drop(FjallDerived::open(&path, [SpaceNumber(4)].into_iter()).unwrap());
+    let store = open(directory.path());
+    assert_eq!(store.chunks(SpaceNumber(3), 0, 0, 0, 1).unwrap(), []);
+}
+
+#[test]
+fn chunks_start_at_the_last_one_that_begins_at_or_before() {
+    let directory = tempfile::tempdir().unwrap();
+    let store = open(directory.path());
+    let space = SpaceNumber(0);
+    let stamps = [i64::MIN, -256, -1, 0, 1, 300, i64::MAX];
+    // Backwards, so that the order is the store's own.
+    for stamp in stamps.into_iter().rev() {
+        let bytes = stamp.to_string();
+        let put = store.put_chunk(space, chunk_key(7, 2, stamp), bytes.as_bytes());
+        put.unwrap();
+    }
+    for neighbour in [chunk_key(7, 1, 0), chunk_key(7, 3, 0), chunk_key(6, 2, 0)] {
+        store.put_chunk(space, neighbour, b"other").unwrap();
+    }
+    let read = |from_ns, limit| -> Vec<i64> {
+        let chunks = store.chunks(space, 7, 2, from_ns, limit).unwrap();
+        for (key, bytes) in &chunks {
+            assert_eq!((key.agent, key.session), (7, 2));
+            assert_eq!(*bytes, key.first_stamp_ns.to_string().into_bytes());
+        }
+        let stamps = chunks.iter().map(|(key, _)| key.first_stamp_ns);
+        stamps.collect()
+    };
+    assert_eq!(read(i64::MIN, 100), stamps);
+    assert_eq!(read(0, 100), stamps[3..]);
+    assert_eq!(read(-2, 100), stamps[1..]);
+    assert_eq!(read(299, 2), stamps[4..6]);
+    assert_eq!(read(i64::MAX, 100), [i64::MAX]);
+    assert_eq!(read(0, 0), [0; 0]);
+    // One that begins after the instant is found when none begins before.
+    store.put_chunk(space, chunk_key(1, 1, 50), b"old").unwrap();
+    store.put_chunk(space, chunk_key(1, 1, 50), b"new").unwrap();
+    let chunks = store.chunks(space, 1, 1, -50, 10).unwrap();
+    assert_eq!(chunks, [(chunk_key(1, 1, 50), b"new".to_vec())]);
+    assert_eq!(store.chunks(space, 1, 9, 0, 10).unwrap(), []);
+}
+
+#[test]
+fn after_a_failed_write_trajectories_go_on_in_memory() {
+    let directory = tempfile::tempdir().unwrap();
+    let store = open(directory.path());
+    let space = SpaceNumber(0);
+    store
+        .put_chunk(space, chunk_key(1, 1, 10), b"written")
+        .unwrap();
+    let full = || std::io::Error::from(std::io::ErrorKind::StorageFull);
+    let failed = store.write(space, |_| Err(full().into()));
+    assert!(failed.unwrap_err().to_string().contains("no space left"));
+    store
+        .put_chunk(space, chunk_key(1, 1, 20), b"held")
+        .unwrap_err();
+    store
+        .write_checkpoint(space, &checkpoint(1, b"", Vec::new()))
+        .unwrap_err();
+    let chunks = store.chunks(space, 1, 1, 0, 10).unwrap();
+    let stamps: Vec<_> = chunks.iter().map(|(key, _)| key.first_stamp_ns).collect();
+    assert_eq!(stamps, [10, 20]);
+    drop(store);
+    // A full disk has damaged nothing.
+    let store = open(directory.path());
+    assert_eq!(store.chunks(space, 1, 1, 0, 10).unwrap().len(), 1);
+}
+
+#[test]
+fn a_panic_of_the_engine_is_a_failed_write_and_the_next_start_begins_anew() {
+    let directory = tempfile::tempdir().unwrap();
+    let store = open(directory.path());
+    let space = SpaceNumber(0);
+    store
+        .put_chunk(space, chunk_key(1, 1, 10), b"written")
+        .unwrap();
+    let failed = store.write(space, |_| panic!("index out of bounds"));
+    assert!(
+        failed
+            .unwrap_err()
+            .to_string()
+            .contains("index out of bounds")
+    );
+    drop(store);
+    let store = open(directory.path());
+    assert_eq!(store.chunks(space, 1, 1, 0, 10).unwrap(), []);
+    store
+        .put_chunk(space, chunk_key(1, 1, 10), b"written")
+        .unwrap();
+    drop(store);
+    assert_eq!(
+        open(directory.path())
+            .chunks(space, 1, 1, 0, 10)
+            .unwrap()
+            .len(),
+        1
+    );
+}
+
+/// Whatever a flipped bit in a table does: what is read is what was written or nothing, and a store
+/// that is opened again works.
+#[test]
+fn flips_in_tables_are_noticed_and_the_next_start_is_whole() {
+    let directory = tempfile::tempdir().unwrap();
+    let space = SpaceNumber(0);
+    let state = || checkpoint(3, b"recorders", vec![page(0, 0, &[7; 9000])]);
+    let store = open(directory.path());
+    store.write_checkpoint(space, &state()).unwrap();
+    store
+        .keyspace(space)
+        .unwrap()
+        .rotate_memtable_and_wait()
+        .unwrap();
+    drop(store);
+    let mut tables = Vec::new();
+    let mut open_directories = vec![directory.path().join("derived/keyspaces")];
+    while let Some(path) = open_directories.pop() {
+        for entry in fs::read_dir(path).unwrap() {
+            let path = entry.unwrap().path();
+            match path.is_dir() {
+                true => open_directories.push(path),
+                false => tables.push(path),
+            }
+        }
+    }
+    assert!(tables.len() > 2, "{tables:?}");
+    for table in tables {
+        let whole = fs::read(&table).unwrap();
+        for part in 0..5 {
+            if whole.is_empty() {
+                continue;
+            }
+            let copy = tempfile::tempdir().unwrap();
+            super::super::local::copy_for_tests(directory.path(), copy.path());
+            let mut bytes = whole.clone();
+            bytes[(whole.len() - 1) * part / 4] ^= 0x10;
+            let own = table.strip_prefix(directory.path()).unwrap();
+            fs::write(copy.path().join(own), bytes).unwrap();
+            let store = open(copy.path());
+            if let Ok(Some(read)) = store.checkpoint(space) {
+                assert_eq!(contents(&read), contents(&state()), "{}", own.display());
+            }
+            drop(store);
+            let store = open(copy.path());
+            store.write_checkpoint(space, &state()).unwrap();
+            assert!(
+                store.checkpoint(space).unwrap().is_some(),
+                "{}",
+                own.display()
+            );
+        }
+    }
+}

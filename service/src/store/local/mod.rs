@@ -1,0 +1,499 @@
+//! The embedded end of the store: a directory of this machine, which one process has open at a time.
+//!
+//! # Format 2
+//!
+//! ```text
+//! format, next_space                 records, see `record.rs`; each has a second copy, NAME.copy
+//! lock                               locked while a process has the store open
+//! spaces/{number}/space              record: name and settings
+//! spaces/{number}/durable            how far the journal was acknowledged, see `log/mark.rs`
+//! spaces/{number}/{first block}.log  segments of the journal, see `log/frame.rs`; 16 hexadecimal digits
+//! set-aside/{number}                 spaces as they were before a repair
+//! deleted/{number}                   spaces that are being deleted
+//! derived/                           what can be made again, by fjall; see `derived/mod.rs`
+//! ```
+//!
+//! Files of the journal are only appended to, so a running store can be copied up to its marks. Blocks
+//! and settings are the engine's, which versions its own bytes. A name that ends in `.new` is not
+//! finished, and opening the store removes it.
+
+pub(super) mod files;
+mod opening;
+pub(super) mod record;
+mod replacement;
+mod store;
+mod survey;
+
+#[cfg(test)]
+mod damage_tests;
+#[cfg(test)]
+mod tests;
+
+#[cfg(test)]
+pub(super) use tests::copy_files as copy_for_tests;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
+
+use super::log::{Item, LogReader, Pending, SpaceLog, Survey, create_mark};
+use super::{
+    Blocks, DamagedJournal, Extent, Journal, OpenJournal, SpaceNumber, StoreError, StoredSpace,
+};
+use record::{Found, SpaceRecord};
+
+pub(super) use opening::{is_store as is_local_store, lock, refuse_foreign};
+pub use replacement::Replacement;
+pub use store::LocalStore;
+pub use survey::{SpaceSurvey, verify};
+
+/// Newest disk format that this build reads, and the one it writes.
+pub const FORMAT_VERSION: u32 = 2;
+
+/// Directory of the spaces.
+pub(super) const SPACES: &str = "spaces";
+/// Directory of the spaces as they were before a repair.
+const SET_ASIDE: &str = "set-aside";
+/// Directory of the spaces that are being deleted.
+const DELETED: &str = "deleted";
+/// Ending of names that are not finished.
+const UNFINISHED: &str = ".new";
+
+/// Time between syncs of the marks, which bounds what a power cut takes from them.
+const MARK_SYNC_INTERVAL: Duration = Duration::from_secs(1);
+/// Most files that are synced at once.
+const SYNCS_AT_ONCE: usize = 8;
+
+/// The journals in a directory of this machine.
+#[derive(Debug)]
+pub struct LocalJournal {
+    directory: PathBuf,
+    /// Held while the list of spaces changes, so that two creations cannot take the same name.
+    changing: Mutex<()>,
+    /// Held while directories are synced, so that none is moved away meanwhile.
+    syncing: Mutex<()>,
+    logs: Arc<Logs>,
+    /// Set by the first failed write.
+    broken: AtomicBool,
+    marks: Option<MarkSync>,
+    /// Locked as long as it is open.
+    _lock: File,
+}
+
+/// The journals that are open for writing.
+type Logs = RwLock<BTreeMap<SpaceNumber, Arc<SpaceLog>>>;
+
+impl LocalJournal {
+    /// Opens the journals of the store in `directory`.
+    ///
+    /// # Errors
+    /// [`StoreError::Locked`] when another process has it open, [`StoreError::NewerFormat`] and
+    /// [`StoreError::OlderFormat`] when another version has written it, [`StoreError::Corrupt`] when its
+    /// records do not make sense, and [`StoreError::Io`] when the directory holds no store.
+    pub fn open(directory: &Path) -> Result<Self, StoreError> {
+        opening::open(directory, false).map(|opened| opened.journal)
+    }
+
+    /// A space, by name.
+    ///
+    /// # Errors
+    /// There is none of that name.
+    pub fn space(&self, name: &str) -> Result<StoredSpace, StoreError> {
+        let spaces = self.spaces()?;
+        let found = spaces.into_iter().find(|space| space.name == name);
+        found.ok_or_else(|| StoreError::Io(format!("the store has no space {name:?}")))
+    }
+
+    /// Reads the journal of a space from one end to the other. Changes nothing.
+    ///
+    /// # Errors
+    /// Its files cannot be opened.
+    pub fn survey(&self, space: SpaceNumber) -> Result<Survey, StoreError> {
+        let directory = self.space_directory(space);
+        Survey::of(&directory, space).map_err(|error| files::fault(&error, &directory))
+    }
+
+    /// Passes every readable block of a space to `take`, in order, with its number and samples, and
+    /// every damage between them.
+    ///
+    /// # Errors
+    /// The files cannot be opened.
+    pub fn read_all(
+        &self,
+        space: SpaceNumber,
+        mut take: impl FnMut(Result<(u64, u64, &[u8]), super::Damage>),
+    ) -> Result<(), StoreError> {
+        let directory = self.space_directory(space);
+        let fault = |error: io::Error| files::fault(&error, &directory);
+        let mut reader = LogReader::open(&directory, space, 0).map_err(fault)?;
+        while let Some(item) = reader.next().map_err(fault)? {
+            match item {
+                Item::Block(header) => take(Ok((header.block, header.samples, reader.payload()))),
+                Item::Damage(damage) => take(Err(damage)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs a write, unless one has failed before.
+    fn write<T>(
+        &self,
+        what: &Path,
+        write: impl FnOnce() -> io::Result<T>,
+    ) -> Result<T, StoreError> {
+        self.write_store(|| write().map_err(|error| files::fault(&error, what)))
+    }
+
+    fn write_store<T>(
+        &self,
+        write: impl FnOnce() -> Result<T, StoreError>,
+    ) -> Result<T, StoreError> {
+        if self.broken.load(Ordering::Acquire) {
+            return Err(StoreError::Broken);
+        }
+        write().inspect_err(|_| self.broken.store(true, Ordering::Release))
+    }
+
+    fn space_directory(&self, space: SpaceNumber) -> PathBuf {
+        self.directory.join(SPACES).join(space.0.to_string())
+    }
+
+    fn log(&self, space: SpaceNumber) -> Option<Arc<SpaceLog>> {
+        let logs = self.logs.read().unwrap_or_else(PoisonError::into_inner);
+        logs.get(&space).cloned()
+    }
+
+    fn keep_log(&self, space: SpaceNumber, log: SpaceLog) -> Arc<SpaceLog> {
+        let log = Arc::new(log);
+        let mut logs = self.logs.write().unwrap_or_else(PoisonError::into_inner);
+        logs.insert(space, Arc::clone(&log));
+        log
+    }
+
+    /// Takes the number of a new space.
+    fn take_number(&self) -> Result<SpaceNumber, StoreError> {
+        let next = match record::read(&self.directory, record::NEXT_SPACE)? {
+            Found::Contents(contents) => record::number(&contents),
+            Found::Nothing | Found::Damaged => None,
+        };
+        // Where the record is lost, the numbers that are in use tell enough.
+        let used = [SPACES, SET_ASIDE, DELETED].map(|part| numbers(&self.directory.join(part)));
+        let beyond_used = used.into_iter().flatten().flatten().max();
+        let beyond_used = beyond_used.map_or(0, |number| number.saturating_add(1));
+        let number = next.unwrap_or(0).max(beyond_used);
+        let next = number
+            .checked_add(1)
+            .ok_or_else(|| StoreError::Io("all space numbers are used up".to_owned()))?;
+        record::write(&self.directory, record::NEXT_SPACE, &next.to_le_bytes())?;
+        Ok(SpaceNumber(number))
+    }
+
+    /// Writes a space without a journal under an unfinished name, and opens its journal.
+    fn begin_space(&self, record: &SpaceRecord) -> Result<(PathBuf, SpaceLog), StoreError> {
+        let space = record.space.number;
+        let directory = self.space_directory(space);
+        let unfinished = self
+            .directory
+            .join(SPACES)
+            .join(format!("{}{UNFINISHED}", space.0));
+        let fault = |error: io::Error| files::fault(&error, &directory);
+        files::remove_tree(&unfinished).map_err(fault)?;
+        std::fs::create_dir(&unfinished).map_err(fault)?;
+        record::write(&unfinished, record::SPACE, &record.encode()?)?;
+        create_mark(&unfinished, space, Extent::default()).map_err(fault)?;
+        let survey = Survey::of(&unfinished, space).map_err(fault)?;
+        let log = SpaceLog::open(&unfinished, space, &survey).map_err(fault)?;
+        Ok((unfinished, log))
+    }
+
+    fn lock_spaces(&self) -> MutexGuard<'_, ()> {
+        // The lock guards no data of its own, so a panic under it leaves nothing half done.
+        self.changing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Journal for LocalJournal {
+    fn spaces(&self) -> Result<Vec<StoredSpace>, StoreError> {
+        let parent = self.directory.join(SPACES);
+        let mut spaces = Vec::new();
+        for number in numbers(&parent).map_err(|error| files::fault(&error, &parent))? {
+            spaces.push(stored_space(&parent, SpaceNumber(number))?);
+        }
+        Ok(spaces)
+    }
+
+    fn create_space(&self, name: &str, settings: &[u8]) -> Result<SpaceNumber, StoreError> {
+        let _changing = self.lock_spaces();
+        if self.spaces()?.iter().any(|space| space.name == name) {
+            return Err(StoreError::SpaceExists(name.to_owned()));
+        }
+        self.write_store(|| {
+            let number = self.take_number()?;
+            let space = StoredSpace {
+                number,
+                name: name.to_owned(),
+                settings: Some(settings.to_vec()),
+            };
+            let replaces = None;
+            let (unfinished, _) = self.begin_space(&SpaceRecord { space, replaces })?;
+            let directory = self.space_directory(number);
+            files::rename(&unfinished, &directory)
+                .map_err(|error| files::fault(&error, &directory))?;
+            Ok(number)
+        })
+    }
+
+    fn delete_space(&self, space: SpaceNumber) -> Result<(), StoreError> {
+        let _changing = self.lock_spaces();
+        let directory = self.space_directory(space);
+        if !directory.exists() {
+            return Ok(());
+        }
+        let parent = self.directory.join(DELETED);
+        let doomed = parent.join(space.0.to_string());
+        self.write(&directory, || {
+            let _not_syncing = self.syncing.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut logs = self.logs.write().unwrap_or_else(PoisonError::into_inner);
+            logs.remove(&space);
+            files::create_directory(&parent)?;
+            files::remove_tree(&doomed)?;
+            // One step decides: before it the space is whole, after it the space is gone, and what is
+            // left are files that nobody reads.
+            files::rename(&directory, &doomed)
+        })?;
+        self.write(&doomed, || files::remove_tree(&doomed))
+    }
+
+    fn open_journal(&self, space: SpaceNumber) -> Result<OpenJournal, StoreError> {
+        if let Some(log) = self.log(space) {
+            return Ok(OpenJournal {
+                extent: log.appended(),
+                cut: None,
+                mark_lost: false,
+            });
+        }
+        let directory = self.space_directory(space);
+        let survey = self.survey(space)?;
+        let name = stored_space(&self.directory.join(SPACES), space)?.name;
+        if let Some(damaged) = DamagedJournal::of(&name, &survey) {
+            return Err(StoreError::Damaged(Box::new(damaged)));
+        }
+        let log = self.write(&directory, || SpaceLog::open(&directory, space, &survey))?;
+        self.keep_log(space, log);
+        Ok(OpenJournal {
+            extent: survey.end,
+            cut: survey.torn_tail,
+            mark_lost: survey.mark_lost,
+        })
+    }
+
+    fn append(
+        &self,
+        space: SpaceNumber,
+        block: u64,
+        samples: u64,
+        bytes: &[u8],
+    ) -> Result<(), StoreError> {
+        let Some(log) = self.log(space) else {
+            return Err(StoreError::Io(format!(
+                "the journal of space {} is not open",
+                space.0
+            )));
+        };
+        self.write(&self.directory, || log.append(block, samples, bytes))
+    }
+
+    fn sync(&self) -> Result<(), StoreError> {
+        let _syncing = self.syncing.lock().unwrap_or_else(PoisonError::into_inner);
+        let pending: Vec<(Arc<SpaceLog>, Pending)> = {
+            let logs = self.logs.read().unwrap_or_else(PoisonError::into_inner);
+            let pending = logs.values().map(|log| (log, log.pending()));
+            pending
+                .filter_map(|(log, pending)| Some((Arc::clone(log), pending?)))
+                .collect()
+        };
+        self.write(&self.directory, || sync_all(&pending))?;
+        if let Some(marks) = &self.marks {
+            marks.wake(!pending.is_empty());
+        }
+        Ok(())
+    }
+
+    fn journal(&self, space: SpaceNumber, from: u64) -> Blocks<'_> {
+        let end = self
+            .log(space)
+            .map_or(u64::MAX, |log| log.appended().blocks);
+        let directory = self.space_directory(space);
+        match LogReader::open(&directory, space, from) {
+            Ok(reader) => Box::new(Reading {
+                journal: self,
+                space,
+                reader: Some(reader),
+                end,
+            }),
+            Err(error) => Box::new(std::iter::once(Err(files::fault(&error, &directory)))),
+        }
+    }
+}
+
+/// Syncs several journals: side by side, for the disk can join what comes at the same time.
+fn sync_all(pending: &[(Arc<SpaceLog>, Pending)]) -> io::Result<()> {
+    let sync_some = |some: &[(Arc<SpaceLog>, Pending)]| {
+        some.iter().try_for_each(|(log, pending)| log.sync(pending))
+    };
+    if pending.len() <= 1 {
+        return sync_some(pending);
+    }
+    std::thread::scope(|scope| {
+        let some = pending.chunks(pending.len().div_ceil(SYNCS_AT_ONCE));
+        let threads: Vec<_> = some
+            .map(|some| scope.spawn(move || sync_some(some)))
+            .collect();
+        let interrupted = |_| Err(io::Error::other("a sync ended with a panic"));
+        let results = threads
+            .into_iter()
+            .map(|thread| thread.join().unwrap_or_else(interrupted));
+        // All have ended before the first error is told.
+        results.collect::<Vec<_>>().into_iter().collect()
+    })
+}
+
+/// Blocks of a journal, up to the first damage.
+struct Reading<'a> {
+    journal: &'a LocalJournal,
+    space: SpaceNumber,
+    /// None after the end or an error.
+    reader: Option<LogReader>,
+    /// Number of the block that was next when the reading began.
+    end: u64,
+}
+
+impl Iterator for Reading<'_> {
+    type Item = Result<(u64, Vec<u8>), StoreError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let mut reader = self.reader.take()?;
+        match reader.next() {
+            Ok(Some(Item::Block(header))) if header.block < self.end => {
+                let payload = reader.payload().to_vec();
+                self.reader = Some(reader);
+                Some(Ok((header.block, payload)))
+            }
+            Ok(Some(Item::Damage(damage))) if damage.block < self.end => {
+                Some(Err(self.damaged(damage)))
+            }
+            Ok(_) => None,
+            Err(error) => Some(Err(files::fault(&error, &self.journal.directory))),
+        }
+    }
+}
+
+impl Reading<'_> {
+    /// The error of a damage: what a survey says of the whole, if it finds the damage too.
+    fn damaged(&self, damage: super::Damage) -> StoreError {
+        let name = match stored_space(&self.journal.directory.join(SPACES), self.space) {
+            Ok(space) => space.name,
+            Err(error) => return error,
+        };
+        let surveyed = match self.journal.survey(self.space) {
+            Ok(survey) => DamagedJournal::of(&name, &survey),
+            Err(error) => return error,
+        };
+        let damaged = surveyed.unwrap_or(DamagedJournal {
+            space: name,
+            first: damage,
+            lost: Extent::default(),
+            acknowledged: Extent::default(),
+        });
+        StoreError::Damaged(Box::new(damaged))
+    }
+}
+
+/// A space as its record says, or a placeholder where the record is lost.
+pub(super) fn stored_space(spaces: &Path, number: SpaceNumber) -> Result<StoredSpace, StoreError> {
+    let found = record::read(&spaces.join(number.0.to_string()), record::SPACE)?;
+    let record = match found {
+        Found::Contents(contents) => SpaceRecord::decode(&contents),
+        Found::Nothing | Found::Damaged => None,
+    };
+    let of_this = record.filter(|record| record.space.number == number);
+    Ok(of_this.map_or_else(
+        || StoredSpace {
+            number,
+            name: format!("space-{}", number.0),
+            settings: None,
+        },
+        |record| record.space,
+    ))
+}
+
+/// Numbers of the spaces in a directory, in order.
+pub(super) fn numbers(directory: &Path) -> io::Result<Vec<u32>> {
+    let names = files::names(directory)?;
+    let number = |name: &String| {
+        let number: u32 = name.parse().ok()?;
+        (number.to_string() == *name).then_some(number)
+    };
+    let mut numbers: Vec<_> = names.iter().filter_map(number).collect();
+    // In decimal, 10 comes before 9.
+    numbers.sort_unstable();
+    Ok(numbers)
+}
+
+/// The thread that syncs the marks beside the committer.
+#[derive(Debug)]
+struct MarkSync {
+    stop: Sender<()>,
+    thread: JoinHandle<()>,
+    due: Arc<AtomicBool>,
+}
+
+impl MarkSync {
+    fn start(logs: Arc<Logs>) -> io::Result<Self> {
+        let (stop, stopped) = channel::<()>();
+        let due = Arc::new(AtomicBool::new(false));
+        let is_due = Arc::clone(&due);
+        let run = move || loop {
+            let stopping = stopped.recv_timeout(MARK_SYNC_INTERVAL);
+            if is_due.swap(false, Ordering::AcqRel) {
+                let logs: Vec<_> = {
+                    let logs = logs.read().unwrap_or_else(PoisonError::into_inner);
+                    logs.values().cloned().collect()
+                };
+                for log in logs {
+                    if let Err(error) = log.sync_mark() {
+                        tracing::warn!(%error, "sync how far a space is durable");
+                    }
+                }
+            }
+            if stopping != Err(RecvTimeoutError::Timeout) {
+                break;
+            }
+        };
+        let thread = Builder::new().name("marks".into()).spawn(run)?;
+        Ok(Self { stop, thread, due })
+    }
+
+    fn wake(&self, written: bool) {
+        if written {
+            self.due.store(true, Ordering::Release);
+        }
+    }
+}
+
+impl Drop for LocalJournal {
+    fn drop(&mut self) {
+        if let Some(MarkSync { stop, thread, .. }) = self.marks.take() {
+            drop(stop);
+            if thread.join().is_err() {
+                tracing::error!("the thread that syncs marks ended with a panic");
+            }
+        }
+    }
+}
