@@ -104,4 +104,6 @@ def _probe(endpoint: str) -> str:
         socket.create_connection((host.strip("[]"), int(port)), _PROBE_S).close()
     except (OSError, ValueError, OverflowError) as error:
         return f"does not answer ({getattr(error, 'strerror', None) or error})"
-    return "is open, but no Zenoh router there lets a robot in (is it another port, such as HTTP's?)"
+    return (
+        "is open, but no Zenoh router there lets a robot in (is it another port, such as HTTP's?)"
+    )
