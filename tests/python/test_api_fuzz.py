@@ -35,8 +35,9 @@ def fill(service: Server) -> None:
     """Gives a service something to find and to page through."""
     for agent, seed in (("ada", 1), ("bea", 2)):
         with service.robot(agent) as robot:
-            robot.send(itertools.islice(drive(seed), 1000))
-            robot.marker("home", ends_trip=True)
+            samples = list(itertools.islice(drive(seed), 1000))
+            robot.send(samples)
+            robot.marker("home", ends_trip=True, stamp_ns=samples[-1].stamp_ns)
 
 
 def fuzz(service: Server, directory: Path, config: Path, *options: str) -> None:

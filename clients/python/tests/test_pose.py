@@ -58,6 +58,14 @@ def test_the_yaw_is_that_of_the_usual_order_of_turns(yaw: float, pitch: float, r
     assert math.atan2(forward[1], forward[0]) == pytest.approx(one.yaw_rad)
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.3, -3.0, math.pi / 2, 7.0])
+def test_a_yaw_makes_a_rotation_and_a_rotation_a_yaw(yaw: float) -> None:
+    one = estimate(rotation_xyzw=cogmap.quaternion_from_yaw(yaw))
+    assert math.cos(one.yaw_rad - yaw) == pytest.approx(1)
+    with pytest.raises(cogmap.InvalidValue, match="^yaw_rad: "):
+        cogmap.quaternion_from_yaw(math.nan)
+
+
 def product(a: Any, b: Any) -> Any:
     """The product of two quaternions `[x, y, z, w]`."""
     (ax, ay, az, aw), (bx, by, bz, bw) = a, b

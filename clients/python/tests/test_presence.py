@@ -64,6 +64,30 @@ def test_a_space_that_is_deleted_is_an_error_until_it_is_there_again(service: St
     assert [sample.body for sample in service.journal] == [cogmap.Marker(label) for label in "xyz"]
 
 
+def test_a_space_that_is_there_again_is_noticed_although_nothing_is_outstanding(
+    service: StandIn,
+) -> None:
+    with ada(service) as robot:
+        robot.marker("x")
+        robot.flush()
+        problem = Problem("/problems/unknown-space", "unknown space", 404, "no space 'lab'")
+        # As when an answer that was on its way comes after the space is there again.
+        robot._run._take_problem(problem)
+        robot._run._wake.set()
+        with pytest.raises(cogmap.ApiError):
+            robot.marker("y")
+        assert eventually(lambda: not raises(robot))
+        robot.marker("y")
+
+
+def raises(robot: cogmap.Robot) -> bool:
+    try:
+        robot.estimate(0.0)
+    except cogmap.ApiError:
+        return True
+    return False
+
+
 def test_a_service_that_is_not_there_is_told_with_key_and_address() -> None:
     service = StandIn()
     try:

@@ -99,6 +99,13 @@ def test_a_stream_of_events_that_is_cut_off_is_told(serve: Callable[[Speak], int
         next(client.events("lab"))
 
 
+def test_an_event_that_is_none_is_told_with_the_address(serve: Callable[[Speak], int]) -> None:
+    stream = b"HTTP/1.1 200 OK\r\nConnection: close\r\n\r\ndata: nothing\n\n"
+    client = cogmap.Client(f"http://127.0.0.1:{serve(answers(stream))}")
+    with pytest.raises(cogmap.WireError, match="/v1/spaces/lab/events: malformed"):
+        next(client.events("lab"))
+
+
 def test_an_answer_of_another_kind_is_told_with_the_address(serve: Callable[[Speak], int]) -> None:
     page = b"<html></html>"
     head = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n" % len(page)
@@ -141,7 +148,7 @@ def test_no_router_is_told_with_the_endpoint_and_without_sources() -> None:
 
 
 def test_a_port_of_another_protocol_is_told(serve: Callable[[Speak], int]) -> None:
-    assert "does not speak Zenoh" in connected(serve(answers(b"HTTP/1.1 400 Bad Request\r\n\r\n")))
+    assert "is open, but no Zenoh router there" in connected(serve(answers(b"HTTP/1.1 400 Bad Request\r\n\r\n")))
 
 
 def test_a_closed_session_is_told_with_the_key() -> None:

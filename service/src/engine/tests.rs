@@ -236,6 +236,36 @@ fn samples_that_make_no_sense_are_named_in_the_watermark() {
 }
 
 #[test]
+fn samples_refused_in_a_row_are_one_range_of_the_watermark() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let engine = open(directory.path(), EngineSettings::default());
+    let mut drive = drive();
+    for sample in &mut drive[20..80] {
+        // Not 50, which is refused for another reason.
+        sample.stamp_ns = 0;
+    }
+    offer(&engine, 0, &drive);
+    wait_for(|| applied(&engine) == SAMPLES);
+    let desk = engine
+        .space(SPACE)
+        .and_then(|space| space.agent(AGENT))
+        .expect("the agent");
+    let rejected: Vec<_> = { desk.watermark().rejected.into_iter() }
+        .map(|one| (one.range.from, one.range.to, one.reason))
+        .collect();
+    assert_eq!(
+        rejected,
+        [
+            (20, 50, SkipReason::TimeBackwards),
+            (50, 51, SkipReason::NumberOutOfRange),
+            (51, 80, SkipReason::TimeBackwards),
+            (90, 91, SkipReason::TimeBackwards),
+        ]
+    );
+    engine.shutdown();
+}
+
+#[test]
 fn what_never_comes_is_lost_after_its_time_and_the_rest_goes_on() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let settings = EngineSettings {

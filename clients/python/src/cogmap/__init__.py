@@ -139,6 +139,7 @@ from .sample import (
 )
 from .settings import Bernoulli, NoiseSettings, Novelty, Recruitment, SpaceSettings
 from .trajectory import StampedPose, Trajectory
+from .vector import quaternion_from_yaw
 
 __version__ = "0.1.0"
 
@@ -278,4 +279,5 @@ __all__ = [
     "WindowFull",
     "WireError",
     "open_session",
+    "quaternion_from_yaw",
 ]

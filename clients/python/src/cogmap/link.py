@@ -112,4 +112,6 @@ def _probe(endpoint: str) -> str:
         socket.create_connection((host.strip("[]"), int(port)), _PROBE_S).close()
     except (OSError, ValueError, OverflowError) as error:
         return f"does not answer ({getattr(error, 'strerror', None) or error})"
-    return "is open but does not speak Zenoh (is it another service, or its HTTP port?)"
+    return (
+        "is open, but no Zenoh router there lets a robot in (is it another port, such as HTTP's?)"
+    )

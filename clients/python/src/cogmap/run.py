@@ -48,6 +48,8 @@ _MATCH_POLL_S = 0.01
 #: before the first batch if none came [s].
 _FIRST_ANSWER_S = 0.5
 _SECOND_ANSWER_S = 0.2
+#: How often is asked whether a problem is over [s].
+_PROBLEM_S = 1.0
 #: How long a dropped robot's samples are flushed in the background [s].
 DROPPED_FLUSH_S = 10.0
 
@@ -88,6 +90,7 @@ class Run:
         self.superseded_told = False
         self._superseded_by: Optional[int] = None
         self._problem: Optional[Problem] = None
+        self._ask_again_at = 0.0
         # What Zenoh says of its session once that is closed.
         self._broken: Optional[str] = None
         self._listeners = WeakListeners(listeners)
@@ -331,7 +334,10 @@ class Run:
             ask = not self._is_useless() and self.window.watch(now)
             if self._is_back:
                 self._is_back = False
-                ask = self.window.rejoin(now) or self._problem is not None or ask
+                ask = self.window.rejoin(now) or ask
+            if self._problem is not None and now >= self._ask_again_at:
+                self._ask_again_at = now + _PROBLEM_S
+                ask = True
         if ask:
             _log.debug("no progress of %s: asking for the watermark", self.agent)
             self._ask(lambda: None)
@@ -345,9 +351,9 @@ class Run:
                 return _MATCH_POLL_S
             else:
                 at = self.window.wake_at()
-            times = [
-                one for one in (at, self.rejections.tell_at(), self._stop_at) if one is not None
-            ]
+            again = None if self._problem is None else self._ask_again_at
+            candidates = (at, again, self.rejections.tell_at(), self._stop_at)
+            times = [one for one in candidates if one is not None]
         return max(0.0, min(times) - time.monotonic()) if times else None
 
     def _is_useless(self) -> bool:

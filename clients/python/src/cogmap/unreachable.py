@@ -8,7 +8,7 @@ import urllib.error
 from contextlib import contextmanager
 from typing import Iterator
 
-from .errors import CogmapError, Timeout, Unreachable
+from .errors import CogmapError, Timeout, Unreachable, WireError
 
 
 @contextmanager
@@ -16,6 +16,8 @@ def translated(where: str) -> Iterator[None]:
     """Raises what goes wrong inside with `where`, a method and an address, in its message."""
     try:
         yield
+    except WireError as error:
+        raise WireError(f"{where}: {error}") from error
     except CogmapError:
         raise
     except (OSError, http.client.HTTPException) as error:

@@ -15,6 +15,7 @@ from .limits import (
     METRES_MAX,
     UNIT_TOLERANCE,
 )
+from .scalar import number as finite
 from .scalar import within
 
 Vec3 = Tuple[float, float, float]
@@ -73,6 +74,13 @@ def _of_unit_norm(name: str, numbers: Tuple[float, ...], what: str) -> Tuple[flo
             name, numbers, f"expected a {what}", f"{numbers}, whose norm is {norm:.6g}"
         )
     return numbers
+
+
+def quaternion_from_yaw(yaw_rad: float) -> Quaternion:
+    """The unit quaternion `[x, y, z, w]` of a turn about the z axis, left positive [rad]: all that a
+    robot on a floor needs."""
+    half = finite("yaw_rad", yaw_rad) / 2
+    return (0.0, 0.0, math.sin(half), math.cos(half))
 
 
 def single_precision(name: str, values: Iterable[float]) -> Tuple[float, ...]:
