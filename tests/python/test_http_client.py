@@ -55,6 +55,26 @@ def client(service: Server) -> cogmap.Client:
     return client
 
 
+def test_a_removed_agent_leaves_its_past_and_its_name(client: cogmap.Client) -> None:
+    places, trips = list(client.places("default")), list(client.trips("default"))
+    client.delete_agent("default", AGENT)
+    assert list(client.agents("default")) == []
+    with pytest.raises(cogmap.ApiError, match="removed") as refused:
+        client.agent("default", AGENT)
+    assert (refused.value.status, refused.value.kind) == (410, "/problems/removed-agent")
+    assert [place.id for place in client.places("default")] == [place.id for place in places]
+    assert [trip.agent for trip in client.trips("default")] == [AGENT] * len(trips)
+    assert client.export("default", "tum", agent=AGENT, session=SESSION).count(b"\n") > STEPS / 2
+    later = cogmap.SampleBatch(SESSION - 1, 0, circle().samples)
+    assert client.post_samples("default", AGENT, later).watermark.session == SESSION - 1
+
+
+def test_a_session_of_the_future_is_refused_by_name(client: cogmap.Client) -> None:
+    with pytest.raises(cogmap.ApiError, match="future") as refused:
+        client.post_samples("default", "bob", cogmap.SampleBatch(1 << 63, 0, circle().samples))
+    assert (refused.value.status, refused.value.kind) == (422, "/problems/session-in-future")
+
+
 def test_samples_sent_again_are_told_as_duplicates(client: cogmap.Client) -> None:
     answer = client.post_samples("default", AGENT, circle())
     assert answer.duplicates == STEPS + 3

@@ -107,6 +107,8 @@ def test_spaces_are_listed_created_shown_and_deleted(server: Server, client: cog
     assert created == client.space("lab")
     assert created.settings.recruitment == cogmap.Novelty()
     client.delete_space("lab")
+    server.routes["DELETE /v1/spaces/lab/agents/ada"] = lambda _: (204, JSON, None)
+    client.delete_agent("lab", "ada")
 
     put = server.seen[1]
     assert json.loads(put.body) == {"seed": 7, "recruitment": {"bernoulli": {"probability": 0.05}}}

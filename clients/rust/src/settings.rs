@@ -146,12 +146,11 @@ impl RobotBuilder {
         Name::check(&self.space).map_err(ClientError::Space)?;
         Name::check(&self.agent).map_err(ClientError::Agent)?;
         self.settings.check()?;
-        let session = match self.shared {
-            Some(session) => session,
-            None => {
-                let timeout = self.settings.connect_timeout;
-                link::open_session_as(&self.endpoints, &self.credentials, timeout)?
-            }
+        let session = if let Some(session) = self.shared {
+            session
+        } else {
+            let timeout = self.settings.connect_timeout;
+            link::open_session_as(&self.endpoints, &self.credentials, timeout)?
         };
         Robot::start(session, self.space, self.agent, &self.settings)
     }

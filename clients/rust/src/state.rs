@@ -166,12 +166,13 @@ impl Shared {
         self.caller_bell.notify_all();
     }
 
-    /// Takes in the refusal of a query for the watermark. Of those that the service may come to think
-    /// otherwise of nothing is kept: it may not know the agent yet, or be loading.
+    /// Takes in why a query for the watermark is refused. Only a session in the future ends the run: any other
+    /// reason may pass, as when the service is loading or has not met the agent yet.
     pub(crate) fn hear_refusal(&self, refusal: &ReplyError) {
-        let problem = Codec::of_encoding(&refusal.encoding().to_string())
-            .and_then(|codec| codec.decode::<Problem>(&refusal.payload().to_bytes()));
-        let Ok(problem) = problem else {
+        let Ok(codec) = Codec::of_encoding(&refusal.encoding().to_string()) else {
+            return; // Zenoh says that no answer came
+        };
+        let Ok(problem) = codec.decode::<Problem>(&refusal.payload().to_bytes()) else {
             self.lock().counters.undecodable += 1;
             return;
         };

@@ -15,7 +15,7 @@ const ROUTES: [(&str, &[&str]); 25] = [
     ("/v1/spaces", &["get"]),
     ("/v1/spaces/{space}", &["delete", "get", "put"]),
     ("/v1/spaces/{space}/agents", &["get"]),
-    ("/v1/spaces/{space}/agents/{agent}", &["get"]),
+    ("/v1/spaces/{space}/agents/{agent}", &["delete", "get"]),
     ("/v1/spaces/{space}/agents/{agent}/grid", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/object", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/predict", &["post"]),

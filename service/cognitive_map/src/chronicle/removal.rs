@@ -29,7 +29,7 @@ impl Chronicle {
             number = previous;
         }
         if let Some(life) = self.lives.get_mut(agent as usize, self.revision) {
-            // The runs go on, so that nothing which is remembered of an earlier one is taken for the next agent's.
+            // Runs are counted on: milestones and searches of earlier ones must not pass for the next agent's.
             *life = Life {
                 session,
                 ..Life::new()

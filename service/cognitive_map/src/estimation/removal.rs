@@ -25,6 +25,9 @@ impl Estimator {
 
     /// Forgets an agent that was never in the map: its number is as it was when it enrolled, at the
     /// identity of a frame of its own. Landmarks of the frame that it leaves stay as long as others are in it.
+    ///
+    /// # Panics
+    /// Never: beside the map's there is one frame for each agent, and this one is in none.
     pub fn clear(&mut self, agent: u32) {
         self.begin();
         self.forget_pending(agent);
@@ -41,7 +44,7 @@ impl Estimator {
             frame.forget_observer(agent);
         }
         let own = (1..self.frames.len()).find(|&number| self.frame(number).population == 0);
-        let own = own.expect("there is a frame for each agent beside the map's");
+        let own = own.expect("there are as many frames as agents beside the map's");
         *self.frame_mut(own) = Frame {
             population: 1,
             ..Frame::default()
