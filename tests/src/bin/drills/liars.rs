@@ -1,6 +1,8 @@
-//! Robots that lie, in thousands of short runs: whatever valid samples say, no answer holds `null` for a number.
+//! Robots that lie, in thousands of short runs: whatever valid samples say, no answer holds `null`
+//! for a number.
 //!
-//! `COGMAP_DRILL_LIARS` is the number of runs, 1000 when absent; `COGMAP_TEST_SEED` repeats a failure.
+//! `COGMAP_DRILL_LIARS` is the number of runs, 1000 when absent; `COGMAP_TEST_SEED` repeats a
+//! failure.
 
 use cogmap_proto::{
     Increment, Level, MotionNoise, Relation, Sample, SampleBody, Sighting, StartPose, Target,
