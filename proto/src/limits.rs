@@ -7,8 +7,9 @@ pub const MESSAGE_BYTES_MAX: usize = 1 << 20;
 /// Most samples in one batch: four seconds of a 1 kHz sensor.
 pub const BATCH_SAMPLES_MAX: usize = 4096;
 
-/// Farthest that the number of a sample may be ahead of the next one in order: a year and more of samples at 100 Hz that
-/// a service has lost and their robot no longer has. What is farther ahead is a mistake or a forgery.
+/// Farthest that the number of a sample may be ahead of the next one in order: a year and more of
+/// samples at 100 Hz that a service has lost and their robot no longer has. What is farther ahead
+/// is a mistake or a forgery.
 pub const SEQUENCE_LEAP_MAX: u64 = 1 << 32;
 
 /// Shortest descriptor: below this, unit vectors hardly tell places apart.

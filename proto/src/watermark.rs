@@ -65,6 +65,6 @@ pub enum SkipReason {
     InvalidNormal,
     /// The sample never came, and the wait for it is over.
     Lost,
-    /// The sample's number is more than [`crate::limits::SEQUENCE_LEAP_MAX`] ahead of the next one in order.
+    /// The sample's number is more than 2³² ahead of the next one in order.
     SequenceLeap,
 }

@@ -28,8 +28,8 @@ pub(crate) struct Sequencer<T> {
     gap_since: Option<Instant>,
 }
 
-/// Consecutive samples that begin beyond the window: those of a robot that no longer has the ones before, or of somebody who
-/// made a number up. The former keep coming.
+/// Consecutive samples that begin beyond the window: those of a robot that no longer has the ones
+/// before, or of somebody who made a number up. The former keep coming.
 #[derive(Clone, Copy, Debug)]
 struct Leap {
     from: u64,
@@ -41,7 +41,8 @@ struct Leap {
     latest: Instant,
 }
 
-/// Waits for which a leap is remembered that nothing follows: as long as a slow robot may take between two samples.
+/// Waits for which a leap is remembered that nothing follows: as long as a slow robot may take
+/// between two samples.
 const LEAP_WAITS: u32 = 8;
 
 /// Something that waits, and what it takes.
@@ -169,7 +170,8 @@ impl<T: Weight> Sequencer<T> {
         first == self.next && is_whole
     }
 
-    /// Whether a run of samples from `first` on leaps farther ahead than any loss explains. It is not to be offered.
+    /// Whether a run of samples from `first` on leaps farther ahead than any loss explains. It is
+    /// not to be offered.
     pub(crate) fn is_out_of_reach(&self, first: u64, count: usize) -> bool {
         let end = first.checked_add(count as u64);
         end.is_none_or(|end| end.saturating_sub(self.next) > SEQUENCE_LEAP_MAX)
@@ -227,9 +229,9 @@ impl<T: Weight> Sequencer<T> {
     /// Gives up a gap that has been waited for long enough: returns the lost range, and passes what
     /// waited for it to `accept`.
     ///
-    /// One up to samples beyond the window is given up only if these have kept coming, one after the other or again, for half
-    /// of the wait; if they have not, they are forgotten. So a message with a number that somebody made up loses nobody's
-    /// samples.
+    /// One up to samples beyond the window is given up only if these have kept coming, one after
+    /// the other or again, for half of the wait; if they have not, they are forgotten. So a message
+    /// with a number that somebody made up loses nobody's samples.
     pub(crate) fn give_up(
         &mut self,
         timeout: Duration,
@@ -293,7 +295,8 @@ impl<T: Weight> Sequencer<T> {
         if self.next != before
             && let Some(leap) = self.leap.take()
         {
-            // The robot goes on: what is ahead of it is missing if it is near, and else was not its own.
+            // The robot goes on: what is ahead of it is missing if it is near, and else was not its
+            // own.
             let is_near = leap.from.saturating_sub(self.next) < leap.reach;
             if is_near && leap.to > self.next {
                 self.dropped_to = self.dropped_to.max(Some(leap.to));

@@ -79,7 +79,8 @@ fn a_robot_that_has_lost_samples_for_good_goes_on() {
     let mut raw = RawPublisher::connect(&server.endpoint());
     let start = batch(7, 0, samples[..2].to_vec());
     raw.put_batch("default", "ada", Codec::Postcard, &start);
-    // What is far beyond the window keeps coming, one sample after the other and again from the first.
+    // What is far beyond the window keeps coming, one sample after the other and again from the
+    // first.
     let from = 1 << 30;
     let mut sent = 2;
     let durable = eventually("the robot's stream", || {

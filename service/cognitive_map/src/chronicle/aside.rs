@@ -5,7 +5,8 @@ use nalgebra::Isometry3;
 use super::chronicle::Chronicle;
 
 impl Chronicle {
-    /// An agent was set aside: it begins anew in a frame of its own, and what it did and saw in the map no longer counts there.
+    /// An agent was set aside: it begins anew in a frame of its own, and what it did and saw in the
+    /// map no longer counts there.
     pub fn set_aside(&mut self, agent: u32) {
         let revision = self.revision;
         let Some(life) = self.lives.get_mut(agent as usize, revision) else {

@@ -230,7 +230,8 @@ impl Fold<'_> {
         self.agent.still_since = None;
     }
 
-    /// Takes the agent out of the map, for it was set aside: it begins anew, as one that has just joined.
+    /// Takes the agent out of the map, for it was set aside: it begins anew, as one that has just
+    /// joined.
     fn fall(&mut self) {
         self.end_trip(TripEnd::Gap);
         self.end_episode();

@@ -254,7 +254,8 @@ impl CognitiveMap {
                 .count()
     }
 
-    /// The landmarks, in the order of learning; one with several names once, and those that are set aside not at all.
+    /// The landmarks, in the order of learning; one with several names once, and those that are set
+    /// aside not at all.
     pub fn landmarks(&self) -> impl Iterator<Item = (LandmarkId, &Landmark)> {
         let landmarks = (0..).map(LandmarkId).zip(self.landmarks.landmarks().iter());
         landmarks.filter(|(_, landmark)| self.is_told(landmark))

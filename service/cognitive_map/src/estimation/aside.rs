@@ -1,13 +1,14 @@
 //! Agents whose evidence contradicts the estimate: how much that counts, and when it is absurd.
 //!
-//! Each sighting that is refused is one more against its observer, and each that is where it should be one less. An agent that many
-//! speak against is *doubted*: what it sees corrects itself alone, and sightings of it correct only it. One that nearly all speak
-//! against for long is *set aside*: it begins anew in a frame of its own, as one that has just joined, and what only it has seen
-//! is nobody else's landmark any more. So is an agent whose pose may be anywhere, or where nothing is.
+//! Each sighting that is refused is one more against its observer, and each that is where it should
+//! be one less. An agent that many speak against is *doubted*: what it sees corrects itself alone,
+//! and sightings of it correct only it. One that nearly all speak against for long is *set aside*:
+//! it begins anew in a frame of its own, as one that has just joined, and what only it has seen is
+//! nobody else's landmark any more. So is an agent whose pose may be anywhere, or where nothing is.
 //!
-//! It comes back as a newcomer does, when enough of what it sees lies as the map has it; its landmarks in the map, which have been
-//! kept for that, are then everybody's again. One that is told where it stands is in the map at once, and stays doubted until its
-//! sightings fit.
+//! It comes back as a newcomer does, when enough of what it sees lies as the map has it; its
+//! landmarks in the map, which have been kept for that, are then everybody's again. One that is
+//! told where it stands is in the map at once, and stays doubted until its sightings fit.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -23,10 +24,11 @@ use super::sight::REFUSED_TO_WIDEN;
 use crate::geometry::is_somewhere;
 use crate::sample::Label;
 
-/// Doubt from which on an agent corrects nobody but itself: what it takes to search farther around once.
+/// Doubt from which on an agent corrects nobody but itself: what it takes to search farther around
+/// once.
 pub(super) const DOUBTED: u32 = REFUSED_TO_WIDEN;
-/// Doubt at which an agent is set aside: an agent that slipped or was carried off a few metres has found its way back before, by
-/// searching farther around once for each [`REFUSED_TO_WIDEN`].
+/// Doubt at which an agent is set aside: an agent that slipped or was carried off a few metres has
+/// found its way back before, by searching farther around once for each [`REFUSED_TO_WIDEN`].
 const ABSURD: u32 = 64;
 
 impl Traveller {
@@ -57,7 +59,8 @@ impl Frame {
         }
     }
 
-    /// The components that a sighting of another member corrects, and whether it speaks for or against the observer.
+    /// The components that a sighting of another member corrects, and whether it speaks for or
+    /// against the observer.
     pub(super) fn corrected_between(&self, observer: usize, target: usize) -> (Range<usize>, bool) {
         let is_doubted = |index: usize| self.members[index].traveller.is_doubted();
         match (is_doubted(observer), is_doubted(target)) {
@@ -76,7 +79,8 @@ impl Frame {
 }
 
 impl Estimator {
-    /// Whether an agent was set aside because what it said was absurd, and has said nothing since that fits.
+    /// Whether an agent was set aside because what it said was absurd, and has said nothing since
+    /// that fits.
     pub fn is_aside(&self, agent: u32) -> bool {
         self.seat(agent).is_some_and(|seat| seat.is_aside)
     }
@@ -86,12 +90,14 @@ impl Estimator {
         Some(&self.frame(MAP).marks.get(label)?.observers)
     }
 
-    /// Takes which agents the latest call set aside. What is not taken is dropped by the next motion or sighting.
+    /// Takes which agents the latest call set aside. What is not taken is dropped by the next
+    /// motion or sighting.
     pub fn take_set_aside(&mut self) -> Vec<u32> {
         std::mem::take(&mut self.set_aside)
     }
 
-    /// Whether a landmark of a frame was seen only by others that are set aside: then it is not there for this agent.
+    /// Whether a landmark of a frame was seen only by others that are set aside: then it is not
+    /// there for this agent.
     pub(super) fn is_aside_for(&self, agent: u32, number: usize, label: &Label) -> bool {
         let frame = self.frame(number);
         let is_other = |other: u32| other != agent && self.is_aside(other);
@@ -140,7 +146,8 @@ impl Estimator {
             return;
         };
         self.depart(from);
-        // There are as many frames beside the map's as agents, and the others are in one each at most.
+        // There are as many frames beside the map's as agents, and the others are in one each at
+        // most.
         let empty = (MAP + 1..self.frames.len()).find(|&number| self.frame(number).population == 0);
         let number = empty.unwrap_or(from);
         *self.frame_mut(number) = Frame {

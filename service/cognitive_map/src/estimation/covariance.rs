@@ -6,10 +6,12 @@ use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
 
-/// Least variance of a component of a measurement that the estimate expects, as a part of the variances of whose differences it
-/// is made: below that it is rounding. A measurement then says at most so much more than was known.
+/// Least variance of a component of a measurement that the estimate expects, as a part of the
+/// variances of whose differences it is made: below that it is rounding. A measurement then says at
+/// most so much more than was known.
 const CONDITION: f64 = 1e-8;
-/// By how much variances grow with each update, as a part of what they were: more than what rounding takes away.
+/// By how much variances grow with each update, as a part of what they were: more than what
+/// rounding takes away.
 const ROUNDING: f64 = 1e-10;
 
 /// A covariance of any dimension, exactly symmetric, row by row. A clone shares the entries.
@@ -210,12 +212,13 @@ impl JointCovariance {
     /// S = L Lᵀ      W = P Hᵀ L⁻ᵀ      δ = W L⁻¹ ν      P ← P − W Wᵀ + ε diag P
     /// ```
     ///
-    /// Each entry of W Wᵀ is the same sum as its mirror image, so that P stays exactly symmetric. What rounding can take
-    /// away of it, to first order in the precision of a float and in units of the variances, is less than the ε that is
-    /// added, because S is not smaller than a part of the variances of whose differences it is made: so P stays positive.
+    /// Each entry of W Wᵀ is the same sum as its mirror image, so that P stays exactly symmetric.
+    /// What rounding can take away of it, to first order in the precision of a float and in units
+    /// of the variances, is less than the ε that is added, because S is not smaller than a part of
+    /// the variances of whose differences it is made: so P stays positive.
     ///
-    /// Of a measurement that is to correct some components only, the others and what ties them to one another stay as they
-    /// are (Schmidt 1966); P stays positive, too.
+    /// Of a measurement that is to correct some components only, the others and what ties them to
+    /// one another stay as they are (Schmidt 1966); P stays positive, too.
     pub(super) fn update<const M: usize>(
         &mut self,
         projection: Projection<M>,

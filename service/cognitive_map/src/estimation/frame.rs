@@ -205,10 +205,11 @@ impl Frame {
         self.hold_turns();
     }
 
-    /// Takes into account that no rotation is off by more than half a turn, wherever motion or doubt have made one less certain.
+    /// Takes into account that no rotation is off by more than half a turn, wherever motion or
+    /// doubt have made one less certain.
     ///
-    /// It is a measurement that finds what is expected, so that all that is correlated with the rotation becomes more certain with
-    /// it.
+    /// It is a measurement that finds what is expected, so that all that is correlated with the
+    /// rotation becomes more certain with it.
     fn hold_turns(&mut self) {
         let most = ANY_TURN_SD_RAD * ANY_TURN_SD_RAD;
         let turns = |member: &Member| member.offset + 3..member.offset + 6;
@@ -271,8 +272,9 @@ impl Frame {
     /// the estimate: a correction Δ of a position changes its error by θ × Δ. Without this, corrections
     /// would feign knowledge of the whole map's direction (Huang, Mourikis & Roumeliotis 2010).
     ///
-    /// Landmarks go along the arcs on which that rotation takes them, as they do in the group of that filter, and not along
-    /// tangents: or else each large correction of a rotation would enlarge the map.
+    /// Landmarks go along the arcs on which that rotation takes them, as they do in the group of
+    /// that filter, and not along tangents: or else each large correction of a rotation would
+    /// enlarge the map.
     ///
     /// Answers how much of a correction of a position is left along the arc.
     pub(super) fn correct(

@@ -12,7 +12,7 @@ use super::outcome::{Merged, Settled};
 use super::parameters::ANY_TURN_SD_RAD;
 use super::sight::{Glance, Verdict};
 use super::tie::{Pair, Tie, tie};
-use crate::geometry::{PoseCovariance, se3};
+use crate::geometry::{PoseCovariance, is_somewhere, positive, se3};
 use crate::sample::{Label, Relation};
 
 /// Sightings of agents that wait for the other agent's motion to come up to them.
@@ -222,8 +222,13 @@ impl Estimator {
         let (Some(own), Some(in_frame)) = (self.frame_of(agent), self.in_frame(agent)) else {
             return;
         };
+        let covariance = positive(covariance.matrix());
+        let is_known = covariance.iter().all(|entry| entry.is_finite());
+        if !is_known || !is_somewhere(&pose.translation.vector) {
+            return;
+        }
         if own == MAP {
-            self.put(agent, pose, covariance.matrix());
+            self.put(agent, pose, &covariance);
             self.seat_mut(agent).is_aside = false;
             return;
         }
@@ -231,7 +236,7 @@ impl Estimator {
         let adjoint = se3::adjoint(in_frame);
         let tie = Tie {
             pose: pose * in_frame.inverse(),
-            covariance: adjoint * covariance.matrix() * adjoint.transpose(),
+            covariance: positive(&(adjoint * covariance * adjoint.transpose())),
         };
         self.merge(MAP, own, &tie);
     }

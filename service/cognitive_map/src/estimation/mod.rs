@@ -24,7 +24,8 @@
 //! - **Doubt.** Components far from what is expected lose weight, sightings farther off are refused; an
 //!   agent whose sightings are refused again and again searches farther around, and a landmark that only
 //!   contradicts is forgotten. The noise of each agent's sensor is learned, upwards from what it states.
-//! - **Absurd evidence.** What a doubted agent sees corrects itself alone; one that contradicts everything for long, or may be
+//! - **Absurd evidence.** What a doubted agent sees corrects itself alone; one that contradicts
+//!   everything for long, or may be
 //!   anywhere, is set aside in a frame of its own, with its landmarks (`aside`).
 //! - **Frames.** Agents whose place in the map is unknown have frames of their own until enough points
 //!   are known in both, or their landmarks lie alike whatever they are called (`constellation`).

@@ -28,7 +28,8 @@ const RUN_STEPS_MAX: u32 = 64;
 /// Length of a run after which it is \[m\]: far from where it began, digits are lost.
 const RUN_LENGTH_MAX_M: f64 = 10.0;
 
-/// Deviation of a position from which on it says nothing \[m\]: the largest that settings may call lost.
+/// Deviation of a position from which on it says nothing \[m\]: the largest that settings may call
+/// lost.
 pub(super) const POSITION_SD_MAX_M: f64 = 1e6;
 /// Most that rounding takes away of a variance, as a part of those that it is made of.
 const ROUNDING: f64 = 1e-14;
@@ -310,7 +311,8 @@ impl Mover {
         transition
     }
 
-    /// Corrects the body by an estimated error. Lasting errors of odometry stay within what the settings allow.
+    /// Corrects the body by an estimated error. Lasting errors of odometry stay within what the
+    /// settings allow.
     pub(super) fn correct(&mut self, error: &SVector<f64, BODY_DIM>, parameters: &Parameters) {
         let linear = error.fixed_rows::<3>(0).into_owned();
         let angular = error.fixed_rows::<3>(3).into_owned();
@@ -322,9 +324,11 @@ impl Mover {
         self.calibration = Calibration::of_components(&bounded);
     }
 
-    /// Whether the body may be anywhere, or is where nothing is: its pose then tells nobody anything.
+    /// Whether the body may be anywhere, or is where nothing is: its pose then tells nobody
+    /// anything.
     ///
-    /// Cheap, for every motion asks: what the lasting errors of odometry add in the run under way does not count yet.
+    /// Cheap, for every motion asks: what the lasting errors of odometry add in the run under way
+    /// does not count yet.
     pub(super) fn is_nowhere(&self) -> bool {
         let settled: f64 = (0..3).map(|k| self.settled[(k, k)]).sum();
         let variance = settled + self.run.motion.position_variance();
@@ -333,8 +337,8 @@ impl Mover {
     }
 }
 
-/// Adds to the variances of a pose what rounding may have taken away, as parts of the sums of variances that they were made
-/// of. What is known without error stays so.
+/// Adds to the variances of a pose what rounding may have taken away, as parts of the sums of
+/// variances that they were made of. What is known without error stays so.
 pub(super) fn make_up_for_rounding(covariance: &mut Matrix6<f64>, position: f64, turn: f64) {
     for k in 0..6 {
         if covariance.row(k).iter().any(|&entry| entry != 0.0) {

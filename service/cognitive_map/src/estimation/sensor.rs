@@ -89,7 +89,8 @@ impl Sensor {
 
     /// Correlation of successive errors of distance of one target, from 0 to 1.
     fn correlation(&self) -> f64 {
-        // Where errors have been exactly zero for ever, nothing is left of what was assumed at first.
+        // Where errors have been exactly zero for ever, nothing is left of what was assumed at
+        // first.
         (self.product / self.square.max(SQUARE_MIN)).clamp(0.0, 1.0)
     }
 

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-/// Farthest that anything is from the origin of a frame, along an axis \[m\]: as far as a sample may say.
+/// Farthest that anything is from the origin of a frame, along an axis \[m\]: as far as a sample
+/// may say.
 const FARTHEST_M: f64 = 1e8;
 
 /// Whether a position \[m\] lies where something may be. One with a number that is none does not.

@@ -2,17 +2,21 @@
 
 use nalgebra::SMatrix;
 
-/// Least variance along or about an axis, as a part of those of its three axes: what lies below is rounding.
+/// Least variance along or about an axis, as a part of those of its three axes: what lies below is
+/// rounding.
 const AXIS_MIN: f64 = 1e-15;
 /// Least pivot of a matrix of correlations.
 const PIVOT_MIN: f64 = 1e-14;
-/// By how much variances grow at first where rounding has left a covariance without a root, as a part of each.
+/// By how much variances grow at first where rounding has left a covariance without a root, as a
+/// part of each.
 const GROWTH_MIN: f64 = 1e-12;
 
-/// A covariance of one or two vectors of three components, symmetric, as a positive semidefinite one: unchanged where it is one
-/// already; elsewhere all its variances are enlarged, each by the same part of itself, by as little as is needed.
+/// A covariance of one or two vectors of three components, symmetric, as a positive semidefinite
+/// one: unchanged where it is one already; elsewhere all its variances are enlarged, each by the
+/// same part of itself, by as little as is needed.
 ///
-/// What is known without error, a row of zeros, stays so. Of a matrix with an entry that is not finite nothing is changed.
+/// What is known without error, a row of zeros, stays so. Of a matrix with an entry that is not
+/// finite nothing is changed.
 pub(crate) fn positive<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
     if !matrix.iter().all(|entry| entry.is_finite()) {
         return *matrix;

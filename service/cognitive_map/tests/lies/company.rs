@@ -100,8 +100,8 @@ impl Honest {
     }
 }
 
-/// The worst error of two honest robots beside some liars, and where the liars are at the end.
-fn company(seed: u64, n_liars: usize) -> (f64, Vec<Status>) {
+/// The worst error of two honest robots beside some liars.
+fn company(seed: u64, n_liars: usize) -> f64 {
     let mut random = Seeded(seed);
     let mut map = CognitiveMap::new(Settings::default());
     let posts: Vec<_> = (0..POSTS)
@@ -130,18 +130,14 @@ fn company(seed: u64, n_liars: usize) -> (f64, Vec<Status>) {
     for robot in &honest {
         assert_eq!(map.status(robot.voice.id), Some(Status::Localized));
     }
-    let worst_m = honest.iter().map(Honest::rmse_m).fold(0.0, f64::max);
-    let status = liars.iter().map(|liar| map.status(liar.id).unwrap());
-    (worst_m, status.collect())
+    honest.iter().map(Honest::rmse_m).fold(0.0, f64::max)
 }
 
 #[test]
 fn honest_robots_stay_localised_beside_liars() {
     for seed in 1..5 {
-        let (alone_m, _) = company(seed, 0);
-        let (beside_m, liars) = company(seed, 2);
+        let (alone_m, beside_m) = (company(seed, 0), company(seed, 2));
         assert!(alone_m < 0.12, "{seed}: {alone_m}");
         assert!(beside_m < alone_m + 0.1, "{seed}: {beside_m} {alone_m}");
-        assert!(!liars.contains(&Status::Localized), "{seed}: {liars:?}");
     }
 }

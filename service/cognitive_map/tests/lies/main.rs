@@ -1,4 +1,5 @@
-//! Robots that lie: whatever valid samples say, numbers stay finite, covariances positive, honest robots localised.
+//! Robots that lie: whatever valid samples say, numbers stay finite, covariances positive, honest
+//! robots localised.
 
 #![expect(
     clippy::unwrap_used,

@@ -118,7 +118,8 @@ fn finite(what: &str, numbers: &[f64]) -> Result<(), String> {
     }
 }
 
-/// Symmetric, without negative eigenvalues beyond rounding, each component in units of its own deviation.
+/// Symmetric, without negative eigenvalues beyond rounding, each component in units of its own
+/// deviation.
 fn check_covariance<const N: usize>(covariance: &SMatrix<f64, N, N>) -> Result<(), String>
 where
     nalgebra::Const<N>: nalgebra::DimName,

@@ -158,7 +158,8 @@ impl Writer {
         offered.duplicates
     }
 
-    /// Tells that samples leap too far ahead. The journal hears nothing of it, for nothing has changed.
+    /// Tells that samples leap too far ahead. The journal hears nothing of it, for nothing has
+    /// changed.
     fn refuse_leap(&mut self, slot: usize, session: u64, first: u64, count: usize) {
         let range = SeqRange {
             from: first,
