@@ -1,6 +1,6 @@
-//! Recognition of point clouds: `points DIR [--contacts independent|walk|policy] [--told yes|no] [--learned N]
-//! [--noise-mm X] [--noise-deg X] [--trials N] [--leave-out N] [--looks K,K,…] [--seed N]`; one JSON
-//! object on stdout.
+//! Recognition of point clouds: `points DIR [--contacts independent|walk|policy] [--told yes|no]
+//! [--learned N] [--noise-mm X] [--noise-deg X] [--trials N] [--leave-out N] [--looks K,K,…]
+//! [--seed N]`; one JSON object on stdout.
 
 #![expect(clippy::print_stdout, reason = "the report is what it is run for")]
 

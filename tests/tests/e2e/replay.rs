@@ -205,7 +205,8 @@ fn four_false_matches_for_each_true_one_do_not_bend_a_recording() {
     assert_ne!(other["digest"], doubtful["digest"]);
 }
 
-/// The memory of a service gets the same recording as samples, with the default settings of a space.
+/// The memory of a service gets the same recording as samples, with the default settings of a
+/// space.
 #[test]
 fn a_recording_goes_through_the_memory_as_samples() {
     let home = TempDir::new().unwrap();

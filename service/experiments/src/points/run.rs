@@ -31,7 +31,8 @@ const OFFSET_M: f64 = 1.0;
 pub struct PointsSettings {
     /// How contacts of a trial come about.
     pub exploration: Exploration,
-    /// Whether contacts say how they were come by. If not they count as found, as an agent's do; who asks over HTTP may say it.
+    /// Whether contacts say how they were come by. If not they count as found, as an agent's do;
+    /// who asks over HTTP may say it.
     pub is_reach_told: bool,
     /// Contacts by which each object is learned.
     pub learned: usize,

@@ -23,8 +23,8 @@ pub struct TouchProtocol {
     pub noise: TouchNoise,
     /// Which turns the objects may have made since they were learned.
     pub rotate: Rotate,
-    /// Whether touches say that they were drawn from the whole object. If not they count as found, as an agent's do; who asks over HTTP
-    /// may say it.
+    /// Whether touches say that they were drawn from the whole object. If not they count as found,
+    /// as an agent's do; who asks over HTTP may say it.
     pub is_reach_told: bool,
     /// Explorations of each object.
     pub trials: u32,

@@ -22,7 +22,8 @@ fn few(trials: u32) -> WakingProtocol {
 #[test]
 fn robots_find_out_where_they_woke_up() {
     let report = run(&few(4));
-    // 98.5 % are claimed, after 1 m and 0.06 m off, where the explorer went farther. Of 4 two are missed once in 700 times.
+    // 98.5 % are claimed, after 1 m and 0.06 m off, where the explorer went farther. Of 4 two are
+    // missed once in 700 times.
     assert!(report.relocalised >= 0.75, "{report:?}");
     assert_eq!(report.false_claims, 0);
     assert!(report.travel_m.p50.unwrap() < 2.0, "{report:?}");

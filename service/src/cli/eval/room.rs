@@ -67,7 +67,8 @@ pub(in crate::cli) struct RoomArgs {
     /// Distance at which a place's confidence is one half [m]; the default of a space when absent.
     #[arg(long, value_name = "M")]
     field_radius_m: Option<f64>,
-    /// Most places in memory, for one more the weakest is forgotten; the default of a space when absent.
+    /// Most places in memory, for one more the weakest is forgotten; the default of a space when
+    /// absent.
     #[arg(long, value_name = "N")]
     places_max: Option<u32>,
     /// Steps of 0.1 m in each run; the paper's number when absent.

@@ -19,8 +19,8 @@ pub(in crate::cli) struct PointsArgs {
     /// How contacts come about.
     #[arg(long, value_enum, default_value = "independent")]
     contacts: Contacts,
-    /// Contacts say whether they were drawn from the whole surface or asked for, as those of a question over HTTP may; otherwise
-    /// they count as found, as those of an agent do.
+    /// Contacts say whether they were drawn from the whole surface or asked for, as those of a
+    /// question over HTTP may; otherwise they count as found, as those of an agent do.
     #[arg(long)]
     told: bool,
     /// Contacts by which each object is learned.

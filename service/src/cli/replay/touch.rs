@@ -37,8 +37,8 @@ pub(in crate::cli) struct TouchArgs {
     /// Which turns the objects may have made since they were learned.
     #[arg(long, value_enum, default_value = "none")]
     rotate: Turns,
-    /// Touches say that they were drawn from the whole object, as those of a question over HTTP may; otherwise they count as found, as
-    /// those of an agent do.
+    /// Touches say that they were drawn from the whole object, as those of a question over HTTP
+    /// may; otherwise they count as found, as those of an agent do.
     #[arg(long)]
     told: bool,
     /// An answer is given as soon as its probability is this high.

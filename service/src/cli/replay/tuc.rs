@@ -19,8 +19,8 @@ pub(in crate::cli) struct TucArgs {
     /// Seed of the false matches.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Send odometry and matches as samples through the memory that a service keeps, with the default settings of a space, instead
-    /// of straight into the solver.
+    /// Send odometry and matches as samples through the memory that a service keeps, with the
+    /// default settings of a space, instead of straight into the solver.
     #[arg(long, conflicts_with_all = ["no_causal", "out", "plot"])]
     samples: bool,
     #[command(flatten)]

@@ -21,7 +21,8 @@ const ROBOT: &str = "robot";
 /// Standard deviations of a match, which says no more than that two places are one \[m, rad\].
 const MATCH_SD: (f64, f64) = (0.5, 0.2);
 
-/// Errors are RMSE of position on a grid of 10 Hz, in the frame of the truth and after the best rigid motion in the plane.
+/// Errors are RMSE of position on a grid of 10 Hz, in the frame of the truth and after the best
+/// rigid motion in the plane.
 #[derive(Debug, Serialize)]
 struct Report {
     samples: u64,
@@ -31,7 +32,8 @@ struct Report {
     causal_aligned_ate_rmse_m: f64,
     refined_ate_rmse_m: f64,
     refined_aligned_ate_rmse_m: f64,
-    /// Normalised squared error of the position in the plane, per component, once a second; 1 is right, more is too sure.
+    /// Normalised squared error of the position in the plane, per component, once a second; 1 is
+    /// right, more is too sure.
     nees_mean: Option<f64>,
     /// Times that samples took \[ms\].
     update_ms: Option<Timing>,
@@ -74,7 +76,8 @@ pub(super) fn run(set: &Tuc, matches: &[Match], is_json: bool) -> anyhow::Result
     Ok(())
 }
 
-/// The start pose, a motion at each further step of odometry, and each match at the later of its moments.
+/// The start pose, a motion at each further step of odometry, and each match at the later of its
+/// moments.
 fn samples(set: &Tuc, matches: &[Match]) -> Vec<Sample> {
     let mut ends: Vec<(usize, usize)> = matches
         .iter()

@@ -19,13 +19,15 @@ impl<'a> Laid<'a> {
         Self { older, newer, laid }
     }
 
-    /// The pairs, numbers of an older and a newer landmark, in which no other landmark of either frame may be meant.
+    /// The pairs, numbers of an older and a newer landmark, in which no other landmark of either
+    /// frame may be meant.
     pub(super) fn unambiguous(&self, pairs: &[(usize, usize)]) -> Vec<(usize, usize)> {
         let is_sure = |pair: &&(usize, usize)| self.is_sure(**pair, &|_| true, &|_| true);
         pairs.iter().filter(is_sure).copied().collect()
     }
 
-    /// The pairs in which no landmark that is in none of them may be meant. Two pairs may still be meant crosswise.
+    /// The pairs in which no landmark that is in none of them may be meant. Two pairs may still be
+    /// meant crosswise.
     pub(super) fn unrivalled(&self, pairs: &[(usize, usize)]) -> Vec<(usize, usize)> {
         let is_free_older = |at: usize| pairs.iter().all(|pair| pair.0 != at);
         let is_free_newer = |at: usize| pairs.iter().all(|pair| pair.1 != at);
@@ -69,7 +71,8 @@ mod tests {
 
     #[test]
     fn who_has_a_rival_is_left_out() {
-        // The second and third lie 0.4 m apart: 0.16 m² are 8 of their variance, where 12 would be sure.
+        // The second and third lie 0.4 m apart: 0.16 m² are 8 of their variance, where 12 would be
+        // sure.
         let stars = [star(0.0), star(5.0), star(5.4), star(10.0)];
         let laid = Laid::new(&Isometry3::identity(), &stars, &stars);
         let all = [(0, 0), (1, 1), (2, 2), (3, 3)];

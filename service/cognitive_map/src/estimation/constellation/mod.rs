@@ -39,7 +39,8 @@ pub(super) use sky::Sky;
 pub(super) const SOUGHT_MAX: usize = 24;
 /// Deviations within which two landmarks, or two distances, may be the same.
 pub(super) const GATE: f64 = 3.0;
-/// Difference of squared distances over the variance from which it is sure which of two landmarks is meant: 400 to 1.
+/// Difference of squared distances over the variance from which it is sure which of two landmarks
+/// is meant: 400 to 1.
 pub(super) const SURE_MARGIN: f64 = 12.0;
 /// Fewest twins between planar frames, and between frames in space.
 const TWINS_MIN: (usize, usize) = (5, 6);
@@ -72,8 +73,9 @@ pub(super) struct Star {
 pub(super) struct Likeness {
     /// Pose of the newer frame in the older one.
     pub(super) pose: Isometry3<f64>,
-    /// Numbers of the landmarks that lie over one another, in the older and in the newer frame. Of two pairs close together it is
-    /// open which is which; a pair in which a landmark of no pair may be meant is left out.
+    /// Numbers of the landmarks that lie over one another, in the older and in the newer frame. Of
+    /// two pairs close together it is open which is which; a pair in which a landmark of no pair
+    /// may be meant is left out.
     pub(super) twins: Vec<(usize, usize)>,
     /// Log₁₀ of the expected number of motions as good as this one by chance.
     pub(super) log10_chance: f64,
@@ -204,8 +206,9 @@ pub(super) fn apart_m(one: &Isometry3<f64>, other: &Isometry3<f64>, stars: &[Sta
     stars.iter().map(apart).fold(0.0, f64::max)
 }
 
-/// Fits a motion to its twins and seeks them again, until nothing changes. Twins in which another landmark may be meant are left out
-/// of the fit as long as the others alone are enough for a motion to be believed.
+/// Fits a motion to its twins and seeks them again, until nothing changes. Twins in which another
+/// landmark may be meant are left out of the fit as long as the others alone are enough for a
+/// motion to be believed.
 fn settle(
     mut pose: Isometry3<f64>,
     sky: &Sky<'_>,

@@ -192,8 +192,9 @@ fn most_worlds_tell_enough() {
     assert_eq!(found[3], 0, "four say too little");
 }
 
-/// In these a landmark lies nearer to another one than to itself, since both estimates are off: on the floor, then in space. Such
-/// a pair was taken for one landmark, and the first motions were fitted to it.
+/// In these a landmark lies nearer to another one than to itself, since both estimates are off: on
+/// the floor, then in space. Such a pair was taken for one landmark, and the first motions were
+/// fitted to it.
 #[test]
 fn landmarks_that_may_be_others_are_no_twins() {
     let known = [(1617, true), (2317, true), (40, false), (1217, false)];
