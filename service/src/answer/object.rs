@@ -47,7 +47,9 @@ pub fn lesson(lesson: &wire::ObjectLesson) -> Result<Lesson, InvalidContacts> {
 pub fn journaled_lesson(lesson: &wire::ObjectLesson) -> Result<Lesson, InvalidContacts> {
     check_count(lesson.contacts.len(), LESSON_CONTACTS_MAX)?;
     let spacing = decode::spacing(lesson.spacing_m);
-    let spacing = spacing.map_err(|error| InvalidContacts::Field(format!("spacing_m {}", lesson.spacing_m), error))?;
+    let spacing = spacing.map_err(|error| {
+        InvalidContacts::Field(format!("spacing_m {}", lesson.spacing_m), error)
+    })?;
     let noise = decode::touch_noise(&lesson.noise);
     let noise = noise.map_err(|error| of_noise(&lesson.noise, error))?;
     let touches = decode::touches(&lesson.contacts, noise);
@@ -65,7 +67,8 @@ pub fn touches_to_identify(
     check_count(query.contacts.len(), IDENTIFY_CONTACTS_MAX)?;
     check_channels(&query.contacts)?;
     let orientation = decode::orientation(&query.orientation);
-    let orientation = orientation.map_err(|error| InvalidContacts::Field("orientation".to_owned(), error))?;
+    let orientation =
+        orientation.map_err(|error| InvalidContacts::Field("orientation".to_owned(), error))?;
     let noise = decode::touch_noise(&query.noise);
     let noise = noise.map_err(|error| of_noise(&query.noise, error))?;
     let touches = decode::touches(&query.contacts, noise);
@@ -225,10 +228,7 @@ fn check_channels(contacts: &[wire::Contact]) -> Result<(), InvalidContacts> {
     checked.map_err(|refused| of_contact(contacts, refused))
 }
 
-fn of_contact(
-    contacts: &[wire::Contact],
-    (at, error): (usize, InvalidSample),
-) -> InvalidContacts {
+fn of_contact(contacts: &[wire::Contact], (at, error): (usize, InvalidSample)) -> InvalidContacts {
     InvalidContacts::Contact(fault::in_contact(at, &contacts[at]), error)
 }
 

@@ -4,9 +4,7 @@
 use std::fmt::Debug;
 
 use cogmap_proto as wire;
-use cognitive_map::{
-    Descriptor, Label, Level, Motion, PoseNoise, StartPose, Touch, TouchNoise,
-};
+use cognitive_map::{Descriptor, Label, Level, Motion, PoseNoise, StartPose, Touch, TouchNoise};
 
 use super::{check_name, noise, relation, touch, touch_noise};
 
@@ -46,8 +44,16 @@ pub(crate) fn in_sample(sample: &wire::Sample) -> String {
             .or("relation", &body.relation, relation(&body.relation))
             .within("body.sighting"),
         wire::SampleBody::StartPose(body) => Fault(None)
-            .or("translation_m", &body.translation_m, pose(body.translation_m, IDENTITY_XYZW))
-            .or("rotation_xyzw", &body.rotation_xyzw, pose([0.0; 3], body.rotation_xyzw))
+            .or(
+                "translation_m",
+                &body.translation_m,
+                pose(body.translation_m, IDENTITY_XYZW),
+            )
+            .or(
+                "rotation_xyzw",
+                &body.rotation_xyzw,
+                pose([0.0; 3], body.rotation_xyzw),
+            )
             .or("noise", &body.noise, noise(body.noise))
             .within("body.start_pose"),
         wire::SampleBody::Marker(marker) => Fault(None)
@@ -96,7 +102,11 @@ pub(crate) fn in_contact(at: usize, contact: &wire::Contact) -> String {
         .or("position_m", &contact.position_m, position)
         .or("normal", &contact.normal, normal.transpose())
         .or("drift_sd_m", &contact.drift_sd_m, drift)
-        .or("levels", &contact.levels, channels.map_err(|(_, error)| error).and(felt))
+        .or(
+            "levels",
+            &contact.levels,
+            channels.map_err(|(_, error)| error).and(felt),
+        )
         .within(&format!("contacts[{at}]"))
 }
 
@@ -116,9 +126,21 @@ pub(crate) fn in_touch_noise(given: &wire::TouchNoise) -> String {
         level_sd: level,
     } = *given;
     Fault(None)
-        .or("position_sd_m", &position, alone(position, plain.normal_sd_rad, plain.level_sd))
-        .or("normal_sd_rad", &normal, alone(plain.position_sd_m, normal, plain.level_sd))
-        .or("level_sd", &level, alone(plain.position_sd_m, plain.normal_sd_rad, level))
+        .or(
+            "position_sd_m",
+            &position,
+            alone(position, plain.normal_sd_rad, plain.level_sd),
+        )
+        .or(
+            "normal_sd_rad",
+            &normal,
+            alone(plain.position_sd_m, normal, plain.level_sd),
+        )
+        .or(
+            "level_sd",
+            &level,
+            alone(plain.position_sd_m, plain.normal_sd_rad, level),
+        )
         .within("noise")
 }
 
@@ -136,8 +158,16 @@ fn in_velocity(body: &wire::Velocity) -> Fault {
     let still = [0.0; 3];
     let held = Motion::from_velocity(still, still, body.duration_s, None);
     Fault(None)
-        .or("linear_m_s", &linear, Motion::from_velocity(linear, still, 0.0, None))
-        .or("angular_rad_s", &angular, Motion::from_velocity(still, angular, 0.0, None))
+        .or(
+            "linear_m_s",
+            &linear,
+            Motion::from_velocity(linear, still, 0.0, None),
+        )
+        .or(
+            "angular_rad_s",
+            &angular,
+            Motion::from_velocity(still, angular, 0.0, None),
+        )
         .or("duration_s", &body.duration_s, held)
         .or("noise", &body.noise, noise(body.noise))
 }
@@ -147,7 +177,11 @@ fn in_level(level: &wire::Level) -> Fault {
     Fault(None)
         .or("channel", &level.channel, check_name(&level.channel))
         .or("value", &level.value, alone(level.value, [0.0; 3], None))
-        .or("offset_m", &level.offset_m, alone(0.0, level.offset_m, None))
+        .or(
+            "offset_m",
+            &level.offset_m,
+            alone(0.0, level.offset_m, None),
+        )
         .or("normal", &level.normal, alone(0.0, [0.0; 3], level.normal))
 }
 

@@ -373,7 +373,11 @@ impl Space {
         }
     }
 
-    fn available(&self) -> Result<(), Unavailable> {
+    /// Whether the space can be read.
+    ///
+    /// # Errors
+    /// It is still loading, or could not be loaded.
+    pub fn available(&self) -> Result<(), Unavailable> {
         match self.failure() {
             Some(detail) => Err(Unavailable::Failed(detail)),
             None if self.recovering() => Err(Unavailable::Recovering),

@@ -15,11 +15,11 @@ use futures_util::stream;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::extract::{Query, SpaceOfPath, SpaceParam, named};
+use super::extract::{Query, SpaceOfPath, SpaceParam};
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::trajectory::{TUM, tum};
-use crate::answer;
+use crate::answer::{self, agent_named};
 use crate::engine::{Space, TrajectoryError};
 
 /// Items that are written at once: an answer of any length takes the memory of this many.
@@ -99,7 +99,7 @@ pub(crate) async fn get(
             let agent = query
                 .agent
                 .ok_or_else(|| Problem::new(Kind::InvalidQuery, detail))?;
-            named(&space, &agent)?;
+            agent_named(&space, &agent)?;
             let file = format!("{}-{agent}.tum", space.name());
             (trajectory(space, agent, query.session).await?, file)
         }

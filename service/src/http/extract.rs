@@ -127,15 +127,7 @@ pub(crate) fn name(text: &str) -> Result<Name, Problem> {
 
 /// The space of a name in a path.
 pub(crate) fn space(service: &Service, text: &str) -> Result<Arc<Space>, Problem> {
-    let found = service.engine.space(text);
-    // Only what was not found needs the name's rules: what exists has a valid one.
-    found.map_or_else(|| Err(Problem::unknown_space(name(text)?.as_str())), Ok)
-}
-
-/// The agent that a parameter names.
-pub(crate) fn named(space: &Space, name: &str) -> Result<Arc<AgentDesk>, Problem> {
-    let found = space.agent(name);
-    found.ok_or_else(|| answer::unknown_agent(name).into())
+    answer::space_named(&service.engine, text)
 }
 
 /// The parameters of a path.
@@ -173,10 +165,9 @@ impl FromRequestParts<Service> for AgentOfPath {
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: AgentParams = path(parts, service).await?;
         let space = space(service, &params.space)?;
-        match space.agent(&params.agent) {
-            Some(desk) => Ok(Self(space, desk)),
-            None => Err(Problem::unknown_agent(name(&params.agent)?.as_str())),
-        }
+        let agent = name(&params.agent)?;
+        let desk = answer::agent_named(&space, agent.as_str())?;
+        Ok(Self(space, desk))
     }
 }
 

@@ -6,12 +6,12 @@ use cogmap_proto::{TripDetail, TripPage};
 use cognitive_map::TripId;
 use serde::Deserialize;
 
-use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam, named};
+use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam};
 use super::page;
 use super::places::{MemoryOfPath, forgotten, unknown};
 use super::problem::Problem;
 use super::reply;
-use crate::answer;
+use crate::answer::{self, agent_named};
 
 /// Which trips.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -42,7 +42,7 @@ pub(crate) async fn list(
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
     let map = space.snapshot().await?;
-    let agent = query.agent.as_deref().map(|name| named(&space, name));
+    let agent = query.agent.as_deref().map(|name| agent_named(&space, name));
     let agent = agent.transpose()?.map(|desk| desk.id());
     let first = page::first(query.after);
     let listed = first

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use cogmap_proto::{
-    Codec, IdentifyQuery, LocalizeQuery, Name, PredictQuery, RecallQuery, Verb, WatermarkQuery,
-    query_key,
+    Codec, IdentifyQuery, LocalizeQuery, PredictQuery, RecallQuery, Verb, WatermarkQuery, query_key,
 };
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
@@ -15,7 +14,7 @@ use zenoh::query::{Query, Queryable};
 use super::latest;
 use super::session::TransportError;
 use crate::answer::{self, InvalidPrediction, Kind, Problem};
-use crate::engine::{AgentDesk, Engine, Space};
+use crate::engine::Engine;
 
 /// Most queries under way; further ones are told to come back.
 const QUERIES_MAX: usize = 64;
@@ -97,7 +96,7 @@ async fn answer(
     codec: Codec,
 ) -> Result<Vec<u8>, Problem> {
     let key = query.key_expr().as_str();
-    let space = space(engine, key.split('/').nth(1).unwrap_or_default())?;
+    let space = answer::space_named(engine, key.split('/').nth(1).unwrap_or_default())?;
     match verb {
         Verb::Recall => {
             let body: RecallQuery = body(query, codec)?;
@@ -110,12 +109,12 @@ async fn answer(
         }
         Verb::Watermark => {
             let body: WatermarkQuery = body(query, codec)?;
-            Ok(codec.encode(&agent(&space, &body.agent)?.watermark()))
+            Ok(codec.encode(&answer::agent_named(&space, &body.agent)?.watermark()))
         }
         Verb::Predict => {
             let body: PredictQuery = body(query, codec)?;
             let name = body.agent.as_deref().ok_or(InvalidPrediction::NoAgent)?;
-            let desk = agent(&space, name)?;
+            let desk = answer::agent_named(&space, name)?;
             let map = space.snapshot().await?;
             let predicted = answer::predict(space.name(), &map, desk.id(), &body)?;
             Ok(codec.encode(&predicted))
@@ -135,20 +134,6 @@ async fn answer(
             Ok(codec.encode(&answer))
         }
     }
-}
-
-/// The space that a key names.
-pub(super) fn space(engine: &Engine, name: &str) -> Result<Arc<Space>, Problem> {
-    engine.space(name).ok_or_else(|| match Name::check(name) {
-        Ok(()) => Problem::unknown_space(name),
-        Err(error) => Problem::new(Kind::InvalidPath, format!("{name:?}: {error}")),
-    })
-}
-
-/// The agent that a question names.
-pub(super) fn agent(space: &Space, name: &str) -> Result<Arc<AgentDesk>, Problem> {
-    let found = space.agent(name);
-    found.ok_or_else(|| answer::unknown_agent(name).into())
 }
 
 fn body<T: DeserializeOwned>(query: &Query, codec: Codec) -> Result<T, Problem> {

@@ -26,7 +26,10 @@ fn over_http(server: &Server, verb: &str, body: &Value) -> Problem {
     let answer = server
         .http()
         .post_json(&format!("/v1/spaces/default/{verb}"), body);
-    assert_eq!(answer.content_type, "application/problem+json", "{answer:?}");
+    assert_eq!(
+        answer.content_type, "application/problem+json",
+        "{answer:?}"
+    );
     serde_json::from_str(&answer.body).unwrap()
 }
 
@@ -42,7 +45,8 @@ fn one_mistake_is_one_problem_over_http_and_zenoh() {
     let server = Server::start(&[]);
     post_all(&server, AGENT, SESSION, &samples(50));
     let raw = RawPublisher::connect(&server.endpoint());
-    let step = json!({ "increment": { "translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1] } });
+    let step =
+        json!({ "increment": { "translation_m": [0, 0, 0], "rotation_xyzw": [0, 0, 0, 1] } });
     let cases = [
         ("recall", json!({ "agent": "nobody" }), "unknown-agent"),
         ("recall", json!({ "agent": "a b" }), "invalid-query"),
@@ -89,7 +93,11 @@ fn one_mistake_is_one_problem_over_http_and_zenoh() {
     let zenoh = over_zenoh(&raw, "predict", &body, Codec::Json);
     assert_eq!((zenoh.kind, zenoh.detail), (http.kind, http.detail));
     // An encoding that nobody reads.
-    let refused = raw.ask(&query_key("default", "recall"), "text/plain", b"{}".to_vec());
+    let refused = raw.ask(
+        &query_key("default", "recall"),
+        "text/plain",
+        b"{}".to_vec(),
+    );
     let refused: Problem = Codec::Json.decode(&refused.unwrap_err()).unwrap();
     assert_eq!(
         (&*refused.kind, refused.status),
@@ -168,7 +176,10 @@ fn json_is_there_for_whoever_listens_or_asks_whatever_the_service_publishes_in()
             let sample = reply.result().unwrap();
             assert_eq!(sample.encoding().to_string(), Codec::Json.encoding());
             let estimate: Estimate = serde_json::from_slice(&sample.payload().to_bytes()).unwrap();
-            assert_eq!(sample.key_expr().as_str(), estimate_key("default", &estimate.agent));
+            assert_eq!(
+                sample.key_expr().as_str(),
+                estimate_key("default", &estimate.agent)
+            );
             estimate.agent
         })
         .collect();
@@ -199,7 +210,11 @@ fn events_have_one_id_over_zenoh_in_pages_and_after_a_kill() {
     }
     server.kill();
     server.run();
-    assert_eq!(page(&server), before, "what is durable is told again as it was");
+    assert_eq!(
+        page(&server),
+        before,
+        "what is durable is told again as it was"
+    );
 }
 
 #[test]
@@ -207,7 +222,10 @@ fn a_robot_that_closes_ends_its_trip() {
     let server = Server::start(&[]);
     let ended = || -> Vec<(u64, Option<TripEnd>)> {
         let trips = server.api().trips("default").unwrap();
-        trips.iter().map(|trip| (trip.session, trip.ended)).collect()
+        trips
+            .iter()
+            .map(|trip| (trip.session, trip.ended))
+            .collect()
     };
     for (session, ends_session) in [(1, true), (2, false)] {
         let settings = RobotSettings {
@@ -240,7 +258,12 @@ fn names_of_channels_are_checked_over_zenoh_as_over_http() {
     });
     robot.send_now(level).unwrap();
     robot.flush(LONG).unwrap();
-    let rejected = server.api().agent("default", AGENT).unwrap().watermark.rejected;
+    let rejected = server
+        .api()
+        .agent("default", AGENT)
+        .unwrap()
+        .watermark
+        .rejected;
     let reasons: Vec<_> = rejected.iter().map(|one| json!(one.reason)).collect();
     assert_eq!(reasons, [json!("invalid_label")]);
 }
@@ -263,7 +286,9 @@ fn metrics_say_what_the_process_takes_and_how_agents_stand() {
         if known && (agents, behind) == (1, 0) && localized <= 1 {
             Ok(())
         } else {
-            Err(format!("{memory} {open} {most} {store} {localized} {agents} {behind}"))
+            Err(format!(
+                "{memory} {open} {most} {store} {localized} {agents} {behind}"
+            ))
         }
     });
 }

@@ -293,7 +293,11 @@ async fn a_body_that_breaks_a_rule_is_refused_by_its_field_and_value() {
     let sample = |body: &str| format!("{{\"samples\": [{{\"stamp_ns\": 0, \"body\": {body}}}]}}");
     let turned = "{\"increment\": {\"translation_m\": [0, 0, 0], \"rotation_xyzw\": [0, 0, 0, 2]}}";
     let cases = [
-        ("localize", sample(turned), "samples[0].body.increment.rotation_xyzw [0.0, 0.0, 0.0, 2.0]"),
+        (
+            "localize",
+            sample(turned),
+            "samples[0].body.increment.rotation_xyzw [0.0, 0.0, 0.0, 2.0]",
+        ),
         (
             "localize",
             sample("{\"descriptor\": {\"channel\": \"view\", \"vector\": [1, 2]}}"),
@@ -301,8 +305,10 @@ async fn a_body_that_breaks_a_rule_is_refused_by_its_field_and_value() {
         ),
         (
             "localize",
-            sample("{\"velocity\": {\"linear_m_s\": [0, 0, 0], \"angular_rad_s\": [0, 0, 0], \
-                \"duration_s\": -1}}"),
+            sample(
+                "{\"velocity\": {\"linear_m_s\": [0, 0, 0], \"angular_rad_s\": [0, 0, 0], \
+                \"duration_s\": -1}}",
+            ),
             "samples[0].body.velocity.duration_s -1.0",
         ),
         (
@@ -317,7 +323,8 @@ async fn a_body_that_breaks_a_rule_is_refused_by_its_field_and_value() {
         ),
         (
             "objects/identify",
-            "{\"contacts\": [{\"position_m\": [0, 0, 0]}], \"noise\": {\"level_sd\": -1}}".to_owned(),
+            "{\"contacts\": [{\"position_m\": [0, 0, 0]}], \"noise\": {\"level_sd\": -1}}"
+                .to_owned(),
             "noise.level_sd -1.0",
         ),
         (
