@@ -1,6 +1,8 @@
 //! From wire samples to samples that make sense: the only place that refuses them. Questions that hold
 //! a motion or a percept are read by the same rules.
 
+pub(crate) mod fault;
+
 use cogmap_proto as wire;
 use cogmap_proto::limits::ROTATIONS_MAX;
 use cognitive_map::recognition::{Orientation, Reached};
@@ -285,4 +287,29 @@ fn relation(relation: &wire::Relation) -> Result<Relation, InvalidSample> {
             Relation::Pose(RelativePose::new(translation_m, rotation_xyzw, noise)?)
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_channels_are_checked_on_arrival_and_read_from_old_journals_as_they_are() {
+        let felt = |channel: &str| wire::Sample {
+            stamp_ns: 0,
+            body: wire::SampleBody::Level(wire::Level {
+                channel: channel.to_owned(),
+                value: 1.0,
+                offset_m: [0.0; 3],
+                normal: None,
+            }),
+        };
+        for name in ["my channel!", "-x", &"a".repeat(65)] {
+            let refused = sample(&felt(name)).expect_err("no name");
+            assert_eq!(refused, InvalidSample::InvalidLabel, "{name}");
+            assert!(journaled_sample(&felt(name)).is_ok(), "{name}");
+        }
+        assert!(sample(&felt("touch-1.left_hand")).is_ok());
+        assert!(journaled_sample(&felt("")).is_err());
+    }
 }

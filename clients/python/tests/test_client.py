@@ -12,7 +12,7 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 
 import cogmap
-from cogmap.sse import data_fields
+from cogmap.sse import ServerSentEvent, server_sent_events
 from cogmap.wire import JSON, decode, encode
 
 GOLDEN = Path(__file__).resolve().parents[3] / "proto" / "golden"
@@ -219,7 +219,7 @@ def test_events_are_read_as_they_come(server: Server, client: cogmap.Client) -> 
     first, second = golden("event_place_entered"), golden("event_trip_ended")
     stream = [
         b": keep-alive\n\n",
-        b"event: place_entered\r\nid: 1\r\ndata: " + json.dumps(first).encode() + b"\r\n\r\n",
+        b"event: message\r\nid: 1-0\r\ndata: " + json.dumps(first).encode() + b"\r\n\r\n",
         b"data: " + json.dumps(second).encode()[:40],
         json.dumps(second).encode()[40:] + b"\n\n",
         b"data: cut off",
@@ -228,12 +228,40 @@ def test_events_are_read_as_they_come(server: Server, client: cogmap.Client) -> 
     events = list(client.events("lab", timeout_s=5.0))
     kinds = [type(event.kind) for event in events]
     assert kinds == [cogmap.PlaceEntered, cogmap.TripEnded]
+    assert "Last-Event-ID" not in server.seen[0].headers
+
+
+def test_a_stream_is_taken_up_again_and_says_what_was_missed(
+    server: Server, client: cogmap.Client
+) -> None:
+    event = golden("event_trip_ended")
+    stream = [
+        b'event: missed\ndata: {"events":3,"next":"9-0"}\n\n',
+        b"id: 9-0\nevent: message\ndata: " + json.dumps(event).encode() + b"\n\n",
+        b"event: of another version\ndata: x\n\n",
+    ]
+    server.routes["GET /v1/spaces/lab/events"] = lambda _: (200, "text/event-stream", stream)
+    missed, record = client.follow("lab", after="5-1", timeout_s=5.0)
+    assert missed == cogmap.MissedEvents(3, "9-0")
+    assert isinstance(record, cogmap.EventRecord) and record.id == "9-0"
+    assert server.seen[0].headers["Last-Event-ID"] == "5-1"
+    assert len(list(client.events("lab", timeout_s=5.0))) == 1, "a miss is no event"
+    page = golden("event_page")
+    server.answer("GET /v1/spaces/lab/events", page)
+    assert client.latest_events("lab", after="5-1", limit=2).next == page["next"]
+    assert server.seen[-1].query == {"format": "json", "after": "5-1", "limit": "2"}
+
+
+def test_a_stream_is_asked_for_as_one(server: Server, client: cogmap.Client) -> None:
+    server.routes["GET /v1/spaces/lab/events"] = lambda _: (200, "text/event-stream", [])
+    assert list(client.events("lab", timeout_s=5.0)) == []
     assert server.seen[0].headers["Accept"] == "text/event-stream"
 
 
 def test_an_event_may_have_several_lines() -> None:
     lines = [b"data:{\n", b"data: }\n", b"\n", b"retry: 5\n", b"\n", b"data\n", b"\n"]
-    assert list(data_fields(lines)) == ["{\n}", ""]
+    told = list(server_sent_events(lines))
+    assert told == [ServerSentEvent("message", data, None) for data in ("{\n}", "")]
 
 
 def test_export_is_the_file_as_it_came(server: Server, client: cogmap.Client) -> None:

@@ -1,9 +1,9 @@
 //! What the service publishes, and the bodies of queries.
 
 use cogmap_proto::{
-    Descriptor, Estimate, Event, EventKind, Increment, Level, MotionBody, PerceptCue, PerceptKind,
-    PredictQuery, RecallQuery, Rejection, SeqRange, SkipReason, Status, TripEnd, Velocity,
-    Watermark, WatermarkQuery,
+    Descriptor, Estimate, Event, EventId, EventKind, EventPage, EventRecord, Increment, Level,
+    MissedEvents, MotionBody, PerceptCue, PerceptKind, PredictQuery, RecallQuery, Rejection,
+    SeqRange, SkipReason, Status, TripEnd, Velocity, Watermark, WatermarkQuery,
 };
 
 use super::Visit;
@@ -44,6 +44,33 @@ pub(super) fn each(visit: &mut impl Visit) {
     for (name, kind) in event_kinds().into_iter().chain(object_events()) {
         visit.message(&format!("event_{name}"), &event(kind));
     }
+    let id = |revision, index| EventId { revision, index };
+    let record = EventRecord {
+        id: id(4_711, 2),
+        event: event(EventKind::TripStarted { trip: 12 }),
+    };
+    let missed = MissedEvents {
+        events: Some(7),
+        next: Some(id(4_700, 0)),
+    };
+    visit.message("event_record", &record);
+    visit.message("missed_events", &missed);
+    visit.message(
+        "event_page",
+        &EventPage {
+            events: vec![record],
+            missed: Some(missed),
+            next: Some(id(4_711, 2)),
+        },
+    );
+    visit.message(
+        "event_page_empty",
+        &EventPage {
+            events: Vec::new(),
+            missed: None,
+            next: None,
+        },
+    );
     visit.message("recall_query_empty", &RecallQuery::default());
     visit.message("recall_query_full", &recall_query());
     let level = PerceptCue::Level(Level {

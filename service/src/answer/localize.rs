@@ -7,7 +7,7 @@ use cognitive_map::{CognitiveMap, Guess, InvalidSample, Localization, Sample};
 use nalgebra::Isometry3;
 
 use super::FRAME;
-use crate::decode;
+use crate::decode::{self, fault};
 use crate::engine::status;
 
 /// Why samples cannot be localised.
@@ -17,8 +17,8 @@ pub enum InvalidSequence {
     #[error("samples must be 1 to {LOCALIZE_SAMPLES_MAX}, not {0}")]
     Count(usize),
     /// A sample makes no sense.
-    #[error("samples[{0}]: {1}")]
-    Sample(usize, InvalidSample),
+    #[error("samples[{0}].{1}: {2}")]
+    Sample(usize, String, InvalidSample),
     /// A stamp is earlier than the one before.
     #[error("samples[{0}]: the stamp runs backwards")]
     TimeBackwards(usize),
@@ -47,7 +47,10 @@ pub fn samples_to_localize(query: &wire::LocalizeQuery) -> Result<Vec<Sample>, I
             _ if sample.stamp_ns < latest_ns => return Err(InvalidSequence::TimeBackwards(at)),
             _ => latest_ns = sample.stamp_ns,
         }
-        decode::sample(sample).map_err(|error| InvalidSequence::Sample(at, error))
+        decode::sample(sample).map_err(|error| {
+            let field = fault::in_sample(sample);
+            InvalidSequence::Sample(at, field, error)
+        })
     });
     samples.collect()
 }

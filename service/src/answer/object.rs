@@ -8,7 +8,7 @@ use cognitive_map::recognition::{
 };
 use cognitive_map::{AgentId, CognitiveMap, Identified, InvalidSample, KnownObject, Lesson, Touch};
 
-use crate::decode;
+use crate::decode::{self, fault};
 
 /// Least probability of an object that is named in an answer.
 const PROBABILITY_MIN: f64 = 1e-6;
@@ -19,12 +19,12 @@ pub enum InvalidContacts {
     /// There are none, or too many.
     #[error("contacts must be 1 to {0}, not {1}")]
     Count(usize, usize),
-    /// A contact makes no sense.
-    #[error("contacts[{0}]: {1}")]
-    Contact(usize, InvalidSample),
+    /// A contact makes no sense; which field of which.
+    #[error("{0}: {1}")]
+    Contact(String, InvalidSample),
     /// The noise, the spacing or the orientation makes no sense.
     #[error("{0}: {1}")]
-    Field(&'static str, InvalidSample),
+    Field(String, InvalidSample),
     /// The name is none.
     #[error("name: {0}")]
     Name(InvalidSample),
@@ -47,11 +47,13 @@ pub fn lesson(lesson: &wire::ObjectLesson) -> Result<Lesson, InvalidContacts> {
 pub fn journaled_lesson(lesson: &wire::ObjectLesson) -> Result<Lesson, InvalidContacts> {
     check_count(lesson.contacts.len(), LESSON_CONTACTS_MAX)?;
     let spacing = decode::spacing(lesson.spacing_m);
-    let spacing = spacing.map_err(|error| InvalidContacts::Field("spacing_m", error))?;
+    let spacing = spacing.map_err(|error| {
+        InvalidContacts::Field(format!("spacing_m {}", lesson.spacing_m), error)
+    })?;
     let noise = decode::touch_noise(&lesson.noise);
-    let noise = noise.map_err(|error| InvalidContacts::Field("noise", error))?;
+    let noise = noise.map_err(|error| of_noise(&lesson.noise, error))?;
     let touches = decode::touches(&lesson.contacts, noise);
-    let touches = touches.map_err(|(at, error)| InvalidContacts::Contact(at, error))?;
+    let touches = touches.map_err(|refused| of_contact(&lesson.contacts, refused))?;
     Ok(Lesson::new(spacing, touches))
 }
 
@@ -65,11 +67,12 @@ pub fn touches_to_identify(
     check_count(query.contacts.len(), IDENTIFY_CONTACTS_MAX)?;
     check_channels(&query.contacts)?;
     let orientation = decode::orientation(&query.orientation);
-    let orientation = orientation.map_err(|error| InvalidContacts::Field("orientation", error))?;
+    let orientation =
+        orientation.map_err(|error| InvalidContacts::Field("orientation".to_owned(), error))?;
     let noise = decode::touch_noise(&query.noise);
-    let noise = noise.map_err(|error| InvalidContacts::Field("noise", error))?;
+    let noise = noise.map_err(|error| of_noise(&query.noise, error))?;
     let touches = decode::touches(&query.contacts, noise);
-    let touches = touches.map_err(|(at, error)| InvalidContacts::Contact(at, error))?;
+    let touches = touches.map_err(|refused| of_contact(&query.contacts, refused))?;
     Ok((orientation, touches))
 }
 
@@ -222,7 +225,15 @@ fn object_pose(object: String, pose: &PoseEstimate) -> wire::ObjectPose {
 
 fn check_channels(contacts: &[wire::Contact]) -> Result<(), InvalidContacts> {
     let checked = decode::check_channels(contacts);
-    checked.map_err(|(at, error)| InvalidContacts::Contact(at, error))
+    checked.map_err(|refused| of_contact(contacts, refused))
+}
+
+fn of_contact(contacts: &[wire::Contact], (at, error): (usize, InvalidSample)) -> InvalidContacts {
+    InvalidContacts::Contact(fault::in_contact(at, &contacts[at]), error)
+}
+
+fn of_noise(noise: &wire::TouchNoise, error: InvalidSample) -> InvalidContacts {
+    InvalidContacts::Field(fault::in_touch_noise(noise), error)
 }
 
 fn check_count(count: usize, most: usize) -> Result<(), InvalidContacts> {

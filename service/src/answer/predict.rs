@@ -8,14 +8,14 @@ use nalgebra::Vector3;
 
 use super::FRAME;
 use super::channel::{InvalidChannel, check_channel};
-use crate::decode;
+use crate::decode::{self, fault};
 
 /// Why nothing can be predicted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InvalidPrediction {
     /// The motion makes no sense.
-    #[error("motion: {0}")]
-    Motion(InvalidSample),
+    #[error("{0}: {1}")]
+    Motion(String, InvalidSample),
     /// A coordinate of `offset_m` is not a number or is too large.
     #[error("offset_m must hold finite numbers of at most {METRES_MAX} m, not {0:?}")]
     Offset([f64; 3]),
@@ -43,7 +43,8 @@ pub fn predict(
     agent: AgentId,
     query: &PredictQuery,
 ) -> Result<wire::PredictAnswer, InvalidPrediction> {
-    let motion = decode::motion(&query.motion).map_err(InvalidPrediction::Motion)?;
+    let motion = decode::motion(&query.motion)
+        .map_err(|error| InvalidPrediction::Motion(fault::in_motion(&query.motion), error))?;
     // A comparison with NaN is false.
     if !query.offset_m.iter().all(|metre| metre.abs() <= METRES_MAX) {
         return Err(InvalidPrediction::Offset(query.offset_m));

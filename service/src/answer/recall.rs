@@ -9,7 +9,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::channel::{InvalidChannel, check_cue};
 use super::{FRAME, place};
-use crate::decode;
+use crate::decode::{self, fault};
 
 /// Places of an answer when the query names no limit.
 const LIMIT_DEFAULT: u32 = 10;
@@ -39,8 +39,8 @@ pub enum InvalidQuery {
     #[error("the space has no agent {0:?}")]
     UnknownAgent(String),
     /// The percept makes no sense.
-    #[error("percept: {0}")]
-    Percept(InvalidSample),
+    #[error("{0}: {1}")]
+    Percept(String, InvalidSample),
     /// The percept's channel cannot be asked for.
     #[error("percept: {0}")]
     Channel(#[from] InvalidChannel),
@@ -69,8 +69,11 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<RecallCue, Invalid
         .as_deref()
         .map(|phases| code(map, phases))
         .transpose()?;
-    let percept = query.percept.as_ref().map(decode::percept).transpose();
-    let percept = percept.map_err(InvalidQuery::Percept)?;
+    let percept = query.percept.as_ref().map(|cue| {
+        let read = decode::percept(cue);
+        read.map_err(|error| InvalidQuery::Percept(fault::in_percept(cue), error))
+    });
+    let percept = percept.transpose()?;
     if let Some(percept) = &percept {
         check_cue(map, percept)?;
     }

@@ -364,7 +364,11 @@ impl Space {
         }
     }
 
-    fn available(&self) -> Result<(), Unavailable> {
+    /// Whether the space can be read.
+    ///
+    /// # Errors
+    /// It is still loading, or could not be loaded.
+    pub fn available(&self) -> Result<(), Unavailable> {
         if let Some(detail) = self.failure() {
             return Err(Unavailable::Failed(detail));
         }

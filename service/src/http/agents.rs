@@ -40,6 +40,7 @@ pub(crate) async fn list(
     Query(query): Query<AgentsQuery>,
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
+    space.available()?;
     let desks = space.agents_after(query.after.as_deref(), limit + 1);
     let (desks, next) = page::cut(desks.into_iter(), limit, |desk| desk.name().to_owned());
     let summary = |name: &str, estimate| AgentSummary {

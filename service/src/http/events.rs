@@ -17,11 +17,12 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::OwnedSemaphorePermit;
 use utoipa::ToSchema;
 
-use super::extract::{Query, SpaceOfPath, SpaceParam, known};
+use super::extract::{Query, SpaceOfPath, SpaceParam};
 use super::page;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
+use crate::answer::agent_once_named;
 use crate::engine::{EVENTS_KEPT, EventFollower, Space};
 use crate::metrics::HTTP_STREAMS;
 
@@ -106,8 +107,9 @@ pub(crate) async fn get(
     Query(query): Query<EventsQuery>,
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
+    loaded(&space).await;
     if let Some(name) = &query.agent {
-        known(&space, name)?;
+        agent_once_named(&space, name)?;
     }
     let after = last_event_id(&headers)?.or(query.after);
     let accepted = || match headers.get(ACCEPT).and_then(|accept| accept.to_str().ok()) {
@@ -117,11 +119,7 @@ pub(crate) async fn get(
     if query.format.unwrap_or_else(accepted) == EventFormat::Json {
         let limit = page::limit(query.limit)?;
         let first = after.unwrap_or_default();
-        let mut page = read_page(
-            follow(&space, Some(first)).await?,
-            limit,
-            query.agent.as_deref(),
-        );
+        let mut page = read_page(space.follow(Some(first))?, limit, query.agent.as_deref());
         page.next = page.next.or(after);
         page.missed = page.missed.filter(|_| after.is_some());
         return Ok(reply::json(&page));
@@ -133,7 +131,7 @@ pub(crate) async fn get(
     let permit = service.streams.clone().try_acquire_owned();
     let permit = permit.map_err(|_| Problem::new(Kind::Busy, "too many event streams are open"))?;
     let open = OpenStream::new(permit);
-    let follower = follow(&space, after).await?;
+    let follower = space.follow(after)?;
     let mut stopping = service.stopping.clone();
     let stopped = async move {
         // A dropped sender means the same as a sent stop.
@@ -162,16 +160,15 @@ fn last_event_id(headers: &HeaderMap) -> Result<Option<EventId>, Problem> {
     Ok(Some(id))
 }
 
-/// Follows a space, once it has loaded.
-async fn follow(space: &Space, after: Option<EventId>) -> Result<EventFollower, Problem> {
+/// Waits until a space has loaded, not for ever: one that is still loading then is refused as others
+/// that cannot be read.
+async fn loaded(space: &Space) {
     let loaded = async {
         while space.recovering() {
             tokio::time::sleep(LOADING_POLL).await;
         }
     };
-    // What is still loading then is refused below.
     let _ = tokio::time::timeout(LOADING_MAX, loaded).await;
-    Ok(space.follow(after)?)
 }
 
 /// Up to `limit` events, those of one agent or of all.

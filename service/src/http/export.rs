@@ -16,13 +16,13 @@ use futures_util::stream;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::extract::{Query, SpaceOfPath, SpaceParam, known};
+use super::extract::{Query, SpaceOfPath, SpaceParam};
 use super::long::LongAnswers;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
 use super::trajectory::{TUM, tum};
-use crate::answer;
+use crate::answer::{self, agent_once_named};
 use crate::engine::Space;
 
 /// Items that are written at once: an answer of any length takes the memory of this many.
@@ -105,7 +105,7 @@ pub(crate) async fn get(
             let agent = query
                 .agent
                 .ok_or_else(|| Problem::new(Kind::InvalidQuery, detail))?;
-            known(&space, &agent)?;
+            agent_once_named(&space, &agent)?;
             let file = format!("{}-{agent}.tum", space.name());
             (trajectory(long, space, agent, query.session).await?, file)
         }

@@ -131,27 +131,7 @@ pub(crate) fn name(text: &str) -> Result<Name, Problem> {
 
 /// The space of a name in a path.
 pub(crate) fn space(service: &Service, text: &str) -> Result<Arc<Space>, Problem> {
-    let space = any_space(service, text)?;
-    match space.stop_reason() {
-        Some(reason) => Err(Problem::space_stopped(reason)),
-        None => Ok(space),
-    }
-}
-
-/// The space of a name in a path, stopped or not.
-fn any_space(service: &Service, text: &str) -> Result<Arc<Space>, Problem> {
-    let found = service.engine.space(text);
-    // Only what was not found needs the name's rules: what exists has a valid one.
-    found.map_or_else(|| Err(Problem::unknown_space(name(text)?.as_str())), Ok)
-}
-
-/// Checks that a parameter names an agent, or one that has been removed.
-pub(crate) fn known(space: &Space, name: &str) -> Result<(), Problem> {
-    if space.agent(name).is_some() || space.has_removed(name) {
-        Ok(())
-    } else {
-        Err(Problem::no_agent(space, name))
-    }
+    answer::space_named(&service.engine, text)
 }
 
 /// The parameters of a path.
@@ -178,7 +158,7 @@ impl FromRequestParts<Service> for AnySpaceOfPath {
 
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: SpaceParam = path(parts, service).await?;
-        any_space(service, &params.space).map(Self)
+        answer::any_space_named(&service.engine, &params.space).map(Self)
     }
 }
 
@@ -198,10 +178,9 @@ impl FromRequestParts<Service> for AgentOfPath {
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: AgentParams = path(parts, service).await?;
         let space = space(service, &params.space)?;
-        match space.agent(&params.agent) {
-            Some(desk) => Ok(Self(space, desk)),
-            None => Err(Problem::no_agent(&space, name(&params.agent)?.as_str())),
-        }
+        let agent = name(&params.agent)?;
+        let desk = answer::agent_named(&space, agent.as_str())?;
+        Ok(Self(space, desk))
     }
 }
 

@@ -7,13 +7,13 @@ use cogmap_proto::{TripDetail, TripPage};
 use cognitive_map::{CognitiveMap, TripId};
 use serde::Deserialize;
 
-use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam, known};
+use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam};
 use super::page;
 use super::places::{MemoryOfPath, forgotten, unknown};
 use super::problem::Problem;
 use super::reply;
 use super::state::Service;
-use crate::answer;
+use crate::answer::{self, agent_once_named};
 
 /// Which trips.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -46,7 +46,7 @@ pub(crate) async fn list(
     let limit = page::limit(query.limit)?;
     let map = space.snapshot().await?;
     if let Some(name) = query.agent.as_deref() {
-        known(&space, name)?;
+        agent_once_named(&space, name)?;
     }
     // A filter may look at every trip.
     let listed = service.long.make(move || trips(&map, &query, limit));

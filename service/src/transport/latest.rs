@@ -9,9 +9,9 @@ use zenoh::Session;
 use zenoh::key_expr::KeyExpr;
 use zenoh::query::{Query, Queryable};
 
-use super::queries::{agent, busy, codec_of, refuse, send, space};
+use super::queries::{busy, codec_of, refuse, send};
 use super::session::TransportError;
-use crate::answer::{Kind, Problem};
+use crate::answer::{Kind, Problem, agent_named, space_named};
 use crate::engine::{AgentDesk, Engine};
 
 /// What is published of each agent.
@@ -85,8 +85,8 @@ fn reply(engine: &Engine, latest: Latest, query: &Query, has_room: bool) {
 fn reply_one(engine: &Engine, latest: Latest, query: &Query, codec: Codec) -> Result<(), Problem> {
     let mut names = query.key_expr().as_str().split('/').skip(1);
     let mut name = || names.next().unwrap_or_default();
-    let space = space(engine, name())?;
-    let desk = agent(&space, name())?;
+    let space = space_named(engine, name())?;
+    let desk = agent_named(&space, name())?;
     let bytes = latest.encoded(&desk, codec).ok_or_else(|| {
         let detail = format!("the agent {:?} has no sample yet", desk.name());
         Problem::new(Kind::UnknownAgent, detail)

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cogmap_proto::{
-    Codec, IdentifyQuery, LocalizeQuery, Name, PredictQuery, RecallQuery, SESSION_PARAMETER, Verb,
+    Codec, IdentifyQuery, LocalizeQuery, PredictQuery, RecallQuery, SESSION_PARAMETER, Verb,
     WatermarkQuery, query_key,
 };
 use serde::de::DeserializeOwned;
@@ -15,7 +15,7 @@ use zenoh::{Session, Wait};
 use super::latest;
 use super::session::TransportError;
 use crate::answer::{self, InvalidPrediction, Kind, Problem};
-use crate::engine::{AgentDesk, Engine, Space};
+use crate::engine::Engine;
 
 /// Most queries under way; further ones are told to come back.
 const QUERIES_MAX: usize = 64;
@@ -109,7 +109,7 @@ async fn answer(
     codec: Codec,
 ) -> Result<Vec<u8>, Problem> {
     let key = query.key_expr().as_str();
-    let space = space(engine, key.split('/').nth(1).unwrap_or_default())?;
+    let space = answer::space_named(engine, key.split('/').nth(1).unwrap_or_default())?;
     match verb {
         Verb::Recall => {
             let body: RecallQuery = body(query, codec)?;
@@ -125,12 +125,12 @@ async fn answer(
             if let Some(session) = session(query)? {
                 space.check_session(&body.agent, session)?;
             }
-            Ok(codec.encode(&agent(&space, &body.agent)?.watermark()))
+            Ok(codec.encode(&answer::agent_named(&space, &body.agent)?.watermark()))
         }
         Verb::Predict => {
             let body: PredictQuery = body(query, codec)?;
             let name = body.agent.as_deref().ok_or(InvalidPrediction::NoAgent)?;
-            let desk = agent(&space, name)?;
+            let desk = answer::agent_named(&space, name)?;
             let map = space.snapshot().await?;
             let predicted = answer::predict(space.name(), &map, desk.id(), &body)?;
             Ok(codec.encode(&predicted))
@@ -150,25 +150,6 @@ async fn answer(
             Ok(codec.encode(&answer))
         }
     }
-}
-
-/// The space that a key names.
-pub(super) fn space(engine: &Engine, name: &str) -> Result<Arc<Space>, Problem> {
-    let found = engine.space(name).ok_or_else(|| match Name::check(name) {
-        Ok(()) => Problem::unknown_space(name),
-        Err(error) => Problem::new(Kind::InvalidPath, format!("{name:?}: {error}")),
-    });
-    let space = found?;
-    match space.stop_reason() {
-        Some(reason) => Err(Problem::space_stopped(reason)),
-        None => Ok(space),
-    }
-}
-
-/// The agent that a question names.
-pub(super) fn agent(space: &Space, name: &str) -> Result<Arc<AgentDesk>, Problem> {
-    let found = space.agent(name);
-    found.ok_or_else(|| Problem::no_agent(space, name))
 }
 
 /// The session that a robot asks as, if it says so: the service tells whether it may begin.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import ssl
 import urllib.error
 import urllib.parse
@@ -27,7 +28,7 @@ from .answer import (
     TripPage,
 )
 from .errors import ApiError, InvalidValue, WireError
-from .event import Event
+from .event import Event, EventPage, EventRecord, MissedEvents
 from .landmark import Landmark, LandmarkPage
 from .localize import Localization, LocalizeQuery
 from .object import (
@@ -43,7 +44,7 @@ from .object import (
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
 from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
 from .settings import SpaceSettings
-from .sse import data_fields
+from .sse import server_sent_events
 from .trajectory import StampedPose, Trajectory
 from .unreachable import translated
 from .vector import vec3
@@ -51,6 +52,8 @@ from .wire import CBOR, JSON, decode, encode, to_wire
 
 #: Members that every problem has (RFC 9457).
 _PROBLEM = frozenset(("type", "title", "status", "detail"))
+
+_log = logging.getLogger("cogmap")
 
 T = TypeVar("T")
 _Query = Dict[str, Union[None, str, int, float]]
@@ -330,11 +333,44 @@ class Client:
     def events(self, space: str, timeout_s: Optional[float] = None) -> Iterator[Event]:
         """What happens in a space from now on. Ends when the service ends the stream; close the
         generator to end it here. A silence longer than `timeout_s`, if given, raises `TimeoutError`.
+        Missed events are logged; `follow` hands them over.
+        """
+        for told in self.follow(space, timeout_s=timeout_s):
+            if isinstance(told, MissedEvents):
+                _log.warning("events of %s were missed: %s", space, told.events or "unknown how many")
+            else:
+                yield told.event
+
+    def follow(
+        self, space: str, *, after: Optional[str] = None, timeout_s: Optional[float] = None
+    ) -> Iterator[Union[EventRecord, MissedEvents]]:
+        """The events of a space with their ids, from the one after `after` on, or from now on; `0-0` is
+        before all that the service keeps. `MissedEvents` stands where some were missed, because this
+        program was too slow or came back too late. Otherwise as `events`.
         """
         request = self._make_request("GET", _path(space, "events"), accept="text/event-stream")
+        if after is not None:
+            request.add_header("Last-Event-ID", after)
         with translated(f"GET {request.full_url}"), self._open(request, timeout_s) as response:
-            for data in data_fields(response):
-                yield decode(Event, data.encode(), JSON)
+            for told in server_sent_events(response):
+                if told.event == "missed":
+                    yield decode(MissedEvents, told.data.encode(), JSON)
+                elif told.event == "message":
+                    event = decode(Event, told.data.encode(), JSON)
+                    yield EventRecord(told.id or "", event)
+
+    def latest_events(
+        self,
+        space: str,
+        *,
+        after: Optional[str] = None,
+        agent: Optional[str] = None,
+        limit: Optional[int] = None,
+    ) -> EventPage:
+        """One page of the events that the service keeps, oldest first. Ask again with its `next` as
+        `after` for what comes later."""
+        query: _Query = {"format": "json", "after": after, "agent": agent, "limit": limit}
+        return self._get(EventPage, _path(space, "events"), query)
 
     def export(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, ClassVar, Dict, Union
+from typing import Any, ClassVar, Dict, Optional, Tuple, Union
 
 from .answer import SkipReason, TripEnd
 from .vector import Vec3
@@ -279,3 +279,34 @@ class Event:
     #: Stamp of the sample that caused it [ns].
     stamp_ns: int
     kind: EventKind
+
+
+@dataclass(frozen=True)
+class EventRecord:
+    """An event with its id."""
+
+    #: Map revision and index, such as `4711-0`: the same after a restart, and larger for later events.
+    id: str
+    event: Event
+
+
+@dataclass(frozen=True)
+class MissedEvents:
+    """Events that will not come: there were more than the service keeps."""
+
+    #: How many; `None` where nobody counted them.
+    events: Optional[int] = None
+    #: Id of the oldest event that is kept; `None` where none is.
+    next: Optional[str] = None
+
+
+@dataclass(frozen=True)
+class EventPage:
+    """One page of the latest events."""
+
+    #: Oldest first.
+    events: Tuple[EventRecord, ...]
+    #: What happened before them and is not kept any more.
+    missed: Optional[MissedEvents] = None
+    #: Pass as `after` for the events that come after these.
+    next: Optional[str] = None

@@ -186,4 +186,16 @@ mod tests {
         let plain = |name: &str| name.chars().all(|c| c.is_ascii_lowercase() || c == '-');
         assert!(names.iter().all(|name| plain(name)), "{names:?}");
     }
+    #[test]
+    fn the_page_of_problems_has_the_same_table() {
+        let page = include_str!("../../../../docs/problems.md");
+        let rows: Vec<_> = { page.lines() }
+            .filter(|line| line.starts_with("| `/problems/"))
+            .collect();
+        assert_eq!(rows.len(), Kind::ALL.len());
+        for kind in Kind::ALL {
+            let row = format!("| `/problems/{}` | {} | ", kind.name(), kind.status());
+            assert!(rows.iter().any(|line| line.starts_with(&row)), "{row}");
+        }
+    }
 }

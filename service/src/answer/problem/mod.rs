@@ -10,7 +10,7 @@ use super::{
     InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence,
     unknown_agent,
 };
-use crate::engine::{IngestError, QuestionError, Space, SpaceError, TrajectoryError, Unavailable};
+use crate::engine::{IngestError, QuestionError, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
 
 /// A problem, as an answer.
@@ -56,16 +56,6 @@ impl Problem {
     /// The space is stopped.
     pub fn space_stopped(reason: &str) -> Self {
         Self::new(Kind::SpaceStopped, reason)
-    }
-
-    /// There is no agent of that name; there may have been one.
-    pub(crate) fn no_agent(space: &Space, name: &str) -> Self {
-        if space.has_removed(name) {
-            let detail = format!("the agent {name:?} has been removed");
-            Self::new(Kind::RemovedAgent, detail)
-        } else {
-            unknown_agent(name).into()
-        }
     }
 
     /// Work in another thread ended with a panic.

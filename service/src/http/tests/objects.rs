@@ -126,7 +126,7 @@ async fn contacts_tell_the_object_and_its_pose() {
     assert!(
         problem["detail"]
             .as_str()
-            .is_some_and(|text| text.starts_with("contacts[1]:"))
+            .is_some_and(|text| text.starts_with("contacts[1].normal Some([2.0"))
     );
 }
 

@@ -286,3 +286,58 @@ async fn parameters_of_another_form_are_refused_and_not_ignored() {
         answer.problem(422, "invalid-query");
     }
 }
+
+#[tokio::test]
+async fn a_body_that_breaks_a_rule_is_refused_by_its_field_and_value() {
+    let rig = driven().await;
+    let sample = |body: &str| format!("{{\"samples\": [{{\"stamp_ns\": 0, \"body\": {body}}}]}}");
+    let turned = "{\"increment\": {\"translation_m\": [0, 0, 0], \"rotation_xyzw\": [0, 0, 0, 2]}}";
+    let cases = [
+        (
+            "localize",
+            sample(turned),
+            "samples[0].body.increment.rotation_xyzw [0.0, 0.0, 0.0, 2.0]",
+        ),
+        (
+            "localize",
+            sample("{\"descriptor\": {\"channel\": \"view\", \"vector\": [1, 2]}}"),
+            "samples[0].body.descriptor.vector of 2 numbers",
+        ),
+        (
+            "localize",
+            sample(
+                "{\"velocity\": {\"linear_m_s\": [0, 0, 0], \"angular_rad_s\": [0, 0, 0], \
+                \"duration_s\": -1}}",
+            ),
+            "samples[0].body.velocity.duration_s -1.0",
+        ),
+        (
+            "agents/rover/predict",
+            format!("{{\"motion\": {turned}}}"),
+            "motion.increment.rotation_xyzw [0.0, 0.0, 0.0, 2.0]",
+        ),
+        (
+            "objects/identify",
+            "{\"contacts\": [{\"position_m\": [0, 0, 1e9]}]}".to_owned(),
+            "contacts[0].position_m [0.0, 0.0, 1000000000.0]",
+        ),
+        (
+            "objects/identify",
+            "{\"contacts\": [{\"position_m\": [0, 0, 0]}], \"noise\": {\"level_sd\": -1}}"
+                .to_owned(),
+            "noise.level_sd -1.0",
+        ),
+        (
+            "recall",
+            "{\"percept\": {\"descriptor\": {\"channel\": \"view\", \"vector\": [1]}}}".to_owned(),
+            "percept.descriptor.vector of 1 numbers",
+        ),
+    ];
+    for (path, body, named) in cases {
+        let path = format!("/v1/spaces/lab/{path}");
+        let problem = rig.send(Method::POST, &path, JSON, body).await;
+        let problem = problem.problem(422, "invalid-query");
+        let detail = problem["detail"].as_str().expect("a text");
+        assert!(detail.starts_with(named), "{path}: {detail}");
+    }
+}

@@ -1,0 +1,202 @@
+//! Which field breaks a rule, for whoever asked. Each field is tried by itself by the rules that refused
+//! the whole; so nothing is decided here, and what makes sense pays nothing for it.
+
+use std::fmt::Debug;
+
+use cogmap_proto as wire;
+use cognitive_map::{Descriptor, Label, Level, Motion, PoseNoise, StartPose, Touch, TouchNoise};
+
+use super::{check_name, noise, relation, touch, touch_noise};
+
+/// A rotation by nothing.
+const IDENTITY_XYZW: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+
+/// The first field that is refused, with its value; nothing where each by itself makes sense.
+struct Fault(Option<String>);
+
+impl Fault {
+    /// Goes on to the next field: its name and value, and what the rules say of it alone.
+    fn or<T, E>(self, name: &str, value: &dyn Debug, alone: Result<T, E>) -> Self {
+        match (self.0, alone) {
+            (None, Err(_)) => Self(Some(format!("{name} {value:?}"))),
+            (found, _) => Self(found),
+        }
+    }
+
+    /// The path of the field and its value, or the path of the whole.
+    fn within(self, whole: &str) -> String {
+        match self.0 {
+            Some(field) => format!("{whole}.{field}"),
+            None => whole.to_owned(),
+        }
+    }
+}
+
+/// The field of a sample.
+pub(crate) fn in_sample(sample: &wire::Sample) -> String {
+    match &sample.body {
+        wire::SampleBody::Increment(body) => in_increment(body).within("body.increment"),
+        wire::SampleBody::Velocity(body) => in_velocity(body).within("body.velocity"),
+        wire::SampleBody::Level(level) => in_level(level).within("body.level"),
+        wire::SampleBody::Descriptor(body) => in_descriptor(body).within("body.descriptor"),
+        wire::SampleBody::Sighting(body) => Fault(None)
+            .or("target", &body.target, super::target(&body.target))
+            .or("relation", &body.relation, relation(&body.relation))
+            .within("body.sighting"),
+        wire::SampleBody::StartPose(body) => Fault(None)
+            .or(
+                "translation_m",
+                &body.translation_m,
+                pose(body.translation_m, IDENTITY_XYZW),
+            )
+            .or(
+                "rotation_xyzw",
+                &body.rotation_xyzw,
+                pose([0.0; 3], body.rotation_xyzw),
+            )
+            .or("noise", &body.noise, noise(body.noise))
+            .within("body.start_pose"),
+        wire::SampleBody::Marker(marker) => Fault(None)
+            .or("label", &marker.label, Label::new(&marker.label))
+            .within("body.marker"),
+        wire::SampleBody::Object(_) => "body.object".to_owned(),
+        wire::SampleBody::SessionEnd {} => "body.session_end".to_owned(),
+    }
+}
+
+/// The field of a motion that is asked about.
+pub(crate) fn in_motion(motion: &wire::MotionBody) -> String {
+    match motion {
+        wire::MotionBody::Increment(body) => in_increment(body).within("motion.increment"),
+        wire::MotionBody::Velocity(body) => in_velocity(body).within("motion.velocity"),
+    }
+}
+
+/// The field of a percept that is a cue.
+pub(crate) fn in_percept(cue: &wire::PerceptCue) -> String {
+    match cue {
+        wire::PerceptCue::Level(level) => in_level(level).within("percept.level"),
+        wire::PerceptCue::Descriptor(body) => in_descriptor(body).within("percept.descriptor"),
+    }
+}
+
+/// The field of a contact that stands at a place of a list.
+pub(crate) fn in_contact(at: usize, contact: &wire::Contact) -> String {
+    let plain = || TouchNoise::new(0.001, 0.1, 0.1);
+    let at_origin = || plain().and_then(|noise| Touch::new([0.0; 3], noise));
+    let normal = contact.normal.map(|normal| {
+        let touch = at_origin()?;
+        touch.with_normal(normal)
+    });
+    let drift = at_origin().and_then(|touch| touch.with_drift(contact.drift_sd_m));
+    let position = plain().and_then(|noise| Touch::new(contact.position_m, noise));
+    let felt = wire::Contact {
+        position_m: [0.0; 3],
+        normal: None,
+        drift_sd_m: 0.0,
+        ..contact.clone()
+    };
+    let felt = plain().and_then(|noise| touch(&felt, noise));
+    let channels = super::check_channels(std::slice::from_ref(contact));
+    Fault(None)
+        .or("position_m", &contact.position_m, position)
+        .or("normal", &contact.normal, normal.transpose())
+        .or("drift_sd_m", &contact.drift_sd_m, drift)
+        .or(
+            "levels",
+            &contact.levels,
+            channels.map_err(|(_, error)| error).and(felt),
+        )
+        .within(&format!("contacts[{at}]"))
+}
+
+/// The field of the noise of contacts.
+pub(crate) fn in_touch_noise(given: &wire::TouchNoise) -> String {
+    let alone = |position_sd_m, normal_sd_rad, level_sd| {
+        touch_noise(&wire::TouchNoise {
+            position_sd_m,
+            normal_sd_rad,
+            level_sd,
+        })
+    };
+    let plain = wire::TouchNoise::default();
+    let wire::TouchNoise {
+        position_sd_m: position,
+        normal_sd_rad: normal,
+        level_sd: level,
+    } = *given;
+    Fault(None)
+        .or(
+            "position_sd_m",
+            &position,
+            alone(position, plain.normal_sd_rad, plain.level_sd),
+        )
+        .or(
+            "normal_sd_rad",
+            &normal,
+            alone(plain.position_sd_m, normal, plain.level_sd),
+        )
+        .or(
+            "level_sd",
+            &level,
+            alone(plain.position_sd_m, plain.normal_sd_rad, level),
+        )
+        .within("noise")
+}
+
+fn in_increment(body: &wire::Increment) -> Fault {
+    let turned = Motion::from_increment([0.0; 3], body.rotation_xyzw, None);
+    let moved = Motion::from_increment(body.translation_m, IDENTITY_XYZW, None);
+    Fault(None)
+        .or("translation_m", &body.translation_m, moved)
+        .or("rotation_xyzw", &body.rotation_xyzw, turned)
+        .or("noise", &body.noise, noise(body.noise))
+}
+
+fn in_velocity(body: &wire::Velocity) -> Fault {
+    let (linear, angular) = (body.linear_m_s, body.angular_rad_s);
+    let still = [0.0; 3];
+    let held = Motion::from_velocity(still, still, body.duration_s, None);
+    Fault(None)
+        .or(
+            "linear_m_s",
+            &linear,
+            Motion::from_velocity(linear, still, 0.0, None),
+        )
+        .or(
+            "angular_rad_s",
+            &angular,
+            Motion::from_velocity(still, angular, 0.0, None),
+        )
+        .or("duration_s", &body.duration_s, held)
+        .or("noise", &body.noise, noise(body.noise))
+}
+
+fn in_level(level: &wire::Level) -> Fault {
+    let alone = |value, offset_m, normal| Level::new(Label::new("level")?, value, offset_m, normal);
+    Fault(None)
+        .or("channel", &level.channel, check_name(&level.channel))
+        .or("value", &level.value, alone(level.value, [0.0; 3], None))
+        .or(
+            "offset_m",
+            &level.offset_m,
+            alone(0.0, level.offset_m, None),
+        )
+        .or("normal", &level.normal, alone(0.0, [0.0; 3], level.normal))
+}
+
+fn in_descriptor(body: &wire::Descriptor) -> Fault {
+    let alone = Label::new("view").and_then(|label| Descriptor::new(label, &body.vector));
+    // All of its numbers would hide what is said.
+    let length = format!("of {} numbers", body.vector.len());
+    Fault(None)
+        .or("channel", &body.channel, check_name(&body.channel))
+        .or("vector", &format_args!("{length}"), alone)
+}
+
+fn pose(
+    translation_m: [f64; 3],
+    rotation_xyzw: [f64; 4],
+) -> Result<StartPose, cognitive_map::InvalidSample> {
+    StartPose::new(translation_m, rotation_xyzw, PoseNoise::none())
+}
