@@ -110,6 +110,7 @@ fn samples_in_a_hole_are_journaled_as_lost() {
         session: 7,
         from: 3,
         to: 5,
+        at_end: false,
     }];
     assert_eq!(
         (&*report.agents[0].name, &*report.agents[0].missing),
