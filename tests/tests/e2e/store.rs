@@ -79,11 +79,9 @@ fn assert_one_is_stopped(server: &Server, other: &str) -> String {
     let listed = http.get("/v1/spaces").json(200);
     assert_eq!(listed["spaces"][0]["name"], "other", "{listed}");
     assert_eq!(listed["stopped"][0], ready["stopped"][0]);
-    let mut detail = String::new();
     for path in ["", "/agents", "/agents/ada", "/places", "/events"] {
         let answer = http.get(&format!("/v1/spaces/default{path}"));
-        let problem = answer.problem(503, "space-stopped");
-        detail = problem["detail"].as_str().unwrap().to_owned();
+        answer.problem(503, "space-stopped");
     }
     let samples: Vec<_> = Drive::new(1).take(1).collect();
     let batch = batch(SESSION + 1, 0, samples);
@@ -99,12 +97,15 @@ fn assert_one_is_stopped(server: &Server, other: &str) -> String {
 
     assert_eq!(digest(server, "other"), other);
     server.api().post_samples("other", "bea", &batch).unwrap();
-    detail
+    ready["stopped"][0]["reason"].as_str().unwrap().to_owned()
 }
+
+/// What is damaged, and how.
+type Damage = (&'static str, fn(&mut Vec<u8>));
 
 #[test]
 fn damage_anywhere_in_a_journal_stops_its_space_and_repair_brings_it_back() {
-    let damages: [(&str, fn(&mut Vec<u8>)); 3] = [
+    let damages: [Damage; 3] = [
         ("the first header", |bytes| bytes[9] ^= 1),
         ("a block in the middle", |bytes| {
             let middle = bytes.len() / 2;
@@ -225,7 +226,7 @@ fn a_journal_cut_to_half_is_told_against_what_was_acknowledged() {
     let before = digest(&server, "other");
     server.kill();
     change(&segment(server.data()), |bytes| {
-        bytes.truncate(bytes.len() / 2)
+        bytes.truncate(bytes.len() / 2);
     });
     server.run();
     let detail = assert_one_is_stopped(&server, &before);

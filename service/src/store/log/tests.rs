@@ -12,7 +12,8 @@ const SPACE: SpaceNumber = SpaceNumber(5);
 
 fn block(number: u64) -> Vec<u8> {
     let byte = u8::try_from(number % 251).unwrap();
-    vec![byte; 1 + (number as usize * 37) % 300]
+    let length = usize::try_from(1 + (number * 37) % 300).unwrap();
+    vec![byte; length]
 }
 
 /// Opens a journal; there must be nothing wrong with it but a torn tail.
