@@ -137,6 +137,29 @@ fn a_full_segment_is_followed_by_another_one() {
     }
 }
 
+/// As a crash leaves it between the creation of a file and the first write to it.
+#[test]
+fn an_empty_segment_hides_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path();
+    create_mark(path, SPACE, Extent::default()).unwrap();
+    fs::write(path.join(segment_name(0)), b"").unwrap();
+    let log = open(path);
+    append(&log, 10);
+    sync(&log);
+    drop(log);
+    fs::write(path.join(segment_name(10)), b"").unwrap();
+    let log = open(path);
+    append(&log, 5);
+    let mut reader = LogReader::open(path, SPACE, 12).unwrap();
+    let first = reader.next().unwrap();
+    assert!(
+        matches!(first, Some(Item::Block(header)) if header.block == 12),
+        "{first:?}"
+    );
+    assert_eq!(read(path), ((0..15).collect(), Vec::new()));
+}
+
 #[test]
 fn a_torn_tail_is_cut_and_what_was_acknowledged_is_not() {
     let directory = tempfile::tempdir().unwrap();
