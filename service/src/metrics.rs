@@ -162,6 +162,7 @@ fn builder() -> Result<PrometheusBuilder, BuildError> {
 
 /// Tells the recorder what the metrics mean.
 fn describe() {
+    describe_damage();
     describe_counter!(
         RECEIVED_MESSAGES,
         Unit::Count,
@@ -199,31 +200,6 @@ fn describe() {
     describe_counter!(DURABLE_SAMPLES, Unit::Count, "Samples made durable");
     describe_counter!(JOURNAL_BYTES, Unit::Bytes, "Bytes appended to journals");
     describe_histogram!(COMMIT_SECONDS, Unit::Seconds, "Time of a sync of the store");
-    describe_gauge!(
-        SPACE_STOPPED,
-        Unit::Count,
-        "Whether a space is stopped because it is damaged"
-    );
-    describe_counter!(
-        TORN_TAILS,
-        Unit::Count,
-        "Ends of journals cut off that were never acknowledged"
-    );
-    describe_counter!(
-        LOST_MARKS,
-        Unit::Count,
-        "Journals of which it was not known how far they were acknowledged"
-    );
-    describe_counter!(
-        DERIVED_REBUILDS,
-        Unit::Count,
-        "Times that derived state was dropped"
-    );
-    describe_counter!(
-        DERIVED_FAILURES,
-        Unit::Count,
-        "Derived state that could not be read or written"
-    );
     describe_gauge!(AGENTS, Unit::Count, "Agents of a space");
     describe_counter!(
         AGENTS_MADE_ROOM,
@@ -306,6 +282,35 @@ fn describe() {
         PROCESS_FDS_MAX,
         Unit::Count,
         "Most file descriptors that may be open"
+    );
+}
+
+/// Tells the recorder what the metrics of damage mean.
+fn describe_damage() {
+    describe_gauge!(
+        SPACE_STOPPED,
+        Unit::Count,
+        "Whether a space is stopped because it is damaged"
+    );
+    describe_counter!(
+        TORN_TAILS,
+        Unit::Count,
+        "Ends of journals cut off that were never acknowledged"
+    );
+    describe_counter!(
+        LOST_MARKS,
+        Unit::Count,
+        "Journals of which it was not known how far they were acknowledged"
+    );
+    describe_counter!(
+        DERIVED_REBUILDS,
+        Unit::Count,
+        "Times that derived state was dropped"
+    );
+    describe_counter!(
+        DERIVED_FAILURES,
+        Unit::Count,
+        "Derived state that could not be read or written"
     );
 }
 

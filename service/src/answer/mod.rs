@@ -17,7 +17,7 @@ pub use channel::InvalidChannel;
 pub use grid::grid_state;
 pub use landmark::landmark;
 pub use localize::{InvalidSequence, localization, samples_to_localize};
-pub use named::{agent_named, agent_once_named, any_space_named, space_named};
+pub use named::{agent_named, agent_once_named, any_space_named, nobody_named, space_named};
 pub use object::{
     InvalidContacts, agent_object, identification, journaled_lesson, lesson, object_detail,
     object_summary, touches_to_identify,

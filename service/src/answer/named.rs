@@ -40,7 +40,7 @@ pub fn agent_named(space: &Space, name: &str) -> Result<Arc<AgentDesk>, Problem>
     if let Some(desk) = space.agent(name) {
         return Ok(desk);
     }
-    Err(nobody(space, name))
+    Err(nobody_named(space, name))
 }
 
 /// Checks that a question names an agent, or one that has been removed.
@@ -52,11 +52,11 @@ pub fn agent_once_named(space: &Space, name: &str) -> Result<(), Problem> {
     if space.agent(name).is_some() || space.has_removed(name) {
         return Ok(());
     }
-    Err(nobody(space, name))
+    Err(nobody_named(space, name))
 }
 
 /// Why there is no agent of a name; there may have been one.
-fn nobody(space: &Space, name: &str) -> Problem {
+pub fn nobody_named(space: &Space, name: &str) -> Problem {
     if let Err(error) = space.available() {
         error.into()
     } else if space.has_removed(name) {

@@ -205,12 +205,15 @@ fn print_repair(report: &RepairReport) -> anyhow::Result<()> {
             ))?;
         }
         for missing in &agent.missing {
+            let (from, last, session) = (missing.from, missing.to - 1, missing.session);
+            let whence = if missing.at_end {
+                " at the end, and may be sent again"
+            } else {
+                ""
+            };
             output::line(&format!(
-                "  agent {:?}: samples {} to {} of session {} are missing",
-                agent.name,
-                missing.from,
-                missing.to - 1,
-                missing.session
+                "  agent {:?}: samples {from} to {last} of session {session} are missing{whence}",
+                agent.name
             ))?;
         }
     }

@@ -45,6 +45,7 @@ use std::thread::JoinHandle;
 use arc_swap::ArcSwap;
 use cogmap_proto::{Codec, DecodeError, Name, SpaceSettings};
 use cognitive_map::InvalidSettings;
+use metrics::gauge;
 
 pub use block::{CorruptBlock, Entry, entries, samples_in};
 pub use desk::AgentDesk;
@@ -65,6 +66,7 @@ pub use space::{Space, TrajectoryError, Unavailable};
 pub(crate) use trajectory::stamped;
 pub use trajectory::{Chunk, Recorder};
 
+use crate::metrics::SPACE_STOPPED;
 use crate::store::{Store, StoreError, StoredSpace};
 use counters::{Drop, IntakeCounters};
 use health::Health;
@@ -304,6 +306,9 @@ impl Engine {
             spaces
         });
         space.close();
+        if space.stop_reason().is_some() {
+            gauge!(SPACE_STOPPED, "space" => name.to_owned()).set(0.0);
+        }
         Ok(around.store.delete_space(space.number())?)
     }
 

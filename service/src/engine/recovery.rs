@@ -101,6 +101,9 @@ pub(crate) fn recover(
         }
         recovered.next_block = number + 1;
     }
+    if recovered.next_block < journal.extent.blocks {
+        return Err(RecoveryError::MissingBlock(recovered.next_block));
+    }
     recovered
         .recorders
         .resize_with(recovered.map.agent_numbers(), Recorder::default);

@@ -84,7 +84,7 @@ pub(crate) async fn delete(
 ) -> Result<StatusCode, Problem> {
     match space.remove_agent(&agent).await {
         Ok(()) => Ok(StatusCode::NO_CONTENT),
-        Err(IngestError::UnknownAgent(name)) => Err(Problem::no_agent(&space, &name)),
+        Err(IngestError::UnknownAgent(name)) => Err(answer::nobody_named(&space, &name)),
         Err(error) => Err(error.into()),
     }
 }

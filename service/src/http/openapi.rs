@@ -22,7 +22,7 @@ const EVERYWHERE: [(&str, &str); 7] = [
     ("500", "A fault of the service, or the store has failed"),
     (
         "503",
-        "The service is busy, loading or closing; come back after Retry-After",
+        "The service is busy, loading or closing; come back after Retry-After. Or the space is stopped",
     ),
     ("504", "The answer took too long"),
 ];

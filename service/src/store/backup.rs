@@ -199,12 +199,12 @@ impl<'a> Copy<'a> {
         if self.length + bytes > SEGMENT_BYTES {
             self.finish()?;
         }
-        let file = match &mut self.file {
-            Some(file) => file,
-            None => {
-                let file = File::create_new(self.directory.join(segment_name(block)))?;
-                self.file.insert(BufWriter::new(file))
-            }
+        if self.file.is_none() {
+            let file = File::create_new(self.directory.join(segment_name(block)))?;
+            self.file = Some(BufWriter::new(file));
+        }
+        let Some(file) = &mut self.file else {
+            return Err(io::Error::other("the copy has no segment"));
         };
         file.write_all(header)?;
         file.write_all(payload)?;

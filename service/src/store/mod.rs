@@ -82,8 +82,8 @@ pub type Blocks<'a> = Box<dyn Iterator<Item = Result<(u64, Vec<u8>), StoreError>
 /// writer.
 ///
 /// What [`Journal::append`] has written survives the process at once and a power cut after the next
-/// [`Journal::sync`] has returned. After any error of a writing method the journal refuses further
-/// writes ([`StoreError::Broken`]); reading goes on.
+/// [`Journal::sync`] has returned. After an error of either the journal refuses all
+/// further changes ([`StoreError::Broken`]); reading goes on.
 pub trait Journal: std::fmt::Debug + Send + Sync + 'static {
     /// The spaces, by number.
     ///

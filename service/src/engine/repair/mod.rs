@@ -81,6 +81,9 @@ pub struct MissingSamples {
     pub from: u64,
     /// First beyond.
     pub to: u64,
+    /// Whether nothing of the session follows them, so that they are not journaled as lost: whoever still
+    /// has them may send them again.
+    pub at_end: bool,
 }
 
 /// Replaces the damaged journal of a space by one of all blocks that can be read. The old one is kept.
@@ -102,7 +105,7 @@ pub fn repair(store: &LocalStore, space: &StoredSpace) -> Result<Option<RepairRe
     }
     let mut repair = Repair {
         journal: journals.replace(space)?,
-        names: names_of_checkpoint(store, space),
+        checkpoint: agents_of_checkpoint(store, space),
         agents: Vec::new(),
         lessons: 0,
         holes: false,
@@ -117,6 +120,7 @@ pub fn repair(store: &LocalStore, space: &StoredSpace) -> Result<Option<RepairRe
     if let Some(damage) = survey.damage.last().filter(at_end) {
         repair.note(damage);
     }
+    repair.note_ends();
     let agents = repair.agents.into_iter().map(|agent| agent.loss);
     let agents = agents.filter(|loss| loss.name_lost || !loss.missing.is_empty());
     let agents = agents.collect();
@@ -132,8 +136,15 @@ pub fn repair(store: &LocalStore, space: &StoredSpace) -> Result<Option<RepairRe
     }))
 }
 
-/// Names of agents, by number, as the latest checkpoint has them.
-fn names_of_checkpoint(store: &LocalStore, space: &StoredSpace) -> Vec<String> {
+/// An agent as the latest checkpoint has it.
+struct CheckpointAgent {
+    name: String,
+    session: u64,
+    next_seq: u64,
+}
+
+/// The agents of the latest checkpoint, by number; none where that cannot be read either.
+fn agents_of_checkpoint(store: &LocalStore, space: &StoredSpace) -> Vec<CheckpointAgent> {
     let settings = space.settings.as_deref().unwrap_or_default();
     let settings = serde_json::from_slice::<SpaceSettings>(settings).ok();
     let settings = settings.and_then(|settings| core_settings(&settings).ok());
@@ -145,8 +156,12 @@ fn names_of_checkpoint(store: &LocalStore, space: &StoredSpace) -> Vec<String> {
     map.map_or_else(
         |_| Vec::new(),
         |map| {
-            let names = map.agents_ever().map(|(_, agent)| agent.name().as_str());
-            names.map(str::to_owned).collect()
+            let agents = map.agents_ever().map(|(_, agent)| CheckpointAgent {
+                name: agent.name().as_str().to_owned(),
+                session: agent.session(),
+                next_seq: agent.next_seq(),
+            });
+            agents.collect()
         },
     )
 }
@@ -154,8 +169,8 @@ fn names_of_checkpoint(store: &LocalStore, space: &StoredSpace) -> Vec<String> {
 /// A journal that is being repaired.
 struct Repair<'a> {
     journal: Replacement<'a>,
-    /// Names of agents whose enrolment may be lost.
-    names: Vec<String>,
+    /// What a checkpoint knows of blocks that may be lost.
+    checkpoint: Vec<CheckpointAgent>,
     agents: Vec<KnownAgent>,
     /// Lessons in the new journal.
     lessons: u64,
@@ -198,6 +213,25 @@ impl Repair<'_> {
             },
         })?;
         self.failure.take().map_or(Ok(()), Err)
+    }
+
+    /// Notes samples that the checkpoint has seen and that nothing in the journal follows.
+    fn note_ends(&mut self) {
+        for (known, seen) in self.agents.iter_mut().zip(&self.checkpoint) {
+            let from = match known.next {
+                Some((session, next)) if session == seen.session => next,
+                Some((session, _)) if session > seen.session => continue,
+                _ => 0,
+            };
+            if from < seen.next_seq {
+                known.loss.missing.push(MissingSamples {
+                    session: seen.session,
+                    from,
+                    to: seen.next_seq,
+                    at_end: true,
+                });
+            }
+        }
     }
 
     fn note(&mut self, damage: &Damage) {
@@ -318,7 +352,8 @@ impl Repair<'_> {
     /// Enrols agents whose enrolment is lost, up to and without `agent`.
     fn enrol_to(&mut self, agent: u32, before: &mut BlockWriter) {
         for number in (0..agent).skip(self.agents.len()) {
-            let known = self.names.get(number as usize).cloned();
+            let known = self.checkpoint.get(number as usize);
+            let known = known.map(|agent| agent.name.clone());
             let name = known
                 .clone()
                 .unwrap_or_else(|| format!("{NAME_PREFIX}{number}"));
@@ -359,10 +394,12 @@ impl Repair<'_> {
                 to,
                 reason: SkipReason::Lost,
             });
-            known
-                .loss
-                .missing
-                .push(MissingSamples { session, from, to });
+            known.loss.missing.push(MissingSamples {
+                session,
+                from,
+                to,
+                at_end: false,
+            });
         }
         known.next = Some((session, end));
     }

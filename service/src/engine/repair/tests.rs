@@ -43,7 +43,7 @@ fn lost(agent: u32, session: u64, from: u64, to: u64) -> Entry<'static> {
 
 /// The entries of a journal of these blocks after a repair in which one of them is lost, with the
 /// report.
-fn repaired(blocks: &[&[Entry<'static>]], gone: usize) -> (Vec<Entry<'static>>, RepairReport) {
+fn repaired(blocks: &[&[Entry<'static>]], gone: u64) -> (Vec<Entry<'static>>, RepairReport) {
     let directory = tempfile::tempdir().unwrap();
     let store = LocalStore::open(directory.path()).unwrap();
     let settings = serde_json::to_vec(&SpaceSettings::default()).unwrap();
@@ -57,7 +57,7 @@ fn repaired(blocks: &[&[Entry<'static>]], gone: usize) -> (Vec<Entry<'static>>, 
         store
             .append(number, number_of_block, count, writer.bytes())
             .unwrap();
-        if number_of_block as usize <= gone {
+        if number_of_block <= gone {
             end += 64 + writer.bytes().len();
         }
     }
@@ -110,6 +110,7 @@ fn samples_in_a_hole_are_journaled_as_lost() {
         session: 7,
         from: 3,
         to: 5,
+        at_end: false,
     }];
     assert_eq!(
         (&*report.agents[0].name, &*report.agents[0].missing),

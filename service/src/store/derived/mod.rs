@@ -179,6 +179,7 @@ impl FjallDerived {
             Ok(Err(error)) => error.to_string(),
             Err(panic) => panic,
         };
+        metrics::counter!(names::DERIVED_FAILURES).increment(1);
         self.mark_damaged();
         Err(DerivedError(reason))
     }

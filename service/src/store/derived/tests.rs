@@ -201,9 +201,10 @@ fn flips_in_tables_are_noticed_and_the_next_start_is_whole() {
     while let Some(path) = open_directories.pop() {
         for entry in fs::read_dir(path).unwrap() {
             let path = entry.unwrap().path();
-            match path.is_dir() {
-                true => open_directories.push(path),
-                false => tables.push(path),
+            if path.is_dir() {
+                open_directories.push(path);
+            } else {
+                tables.push(path);
             }
         }
     }

@@ -141,23 +141,29 @@ impl LocalJournal {
         Ok(())
     }
 
-    /// Runs a write, unless one has failed before.
-    fn write<T>(
-        &self,
-        what: &Path,
-        write: impl FnOnce() -> io::Result<T>,
-    ) -> Result<T, StoreError> {
-        self.write_store(|| write().map_err(|error| files::fault(&error, what)))
+    /// Runs a write of a journal, unless one has failed before. What a failed one has left on the disk is
+    /// unknown, so it is the last one.
+    fn write(&self, write: impl FnOnce() -> io::Result<()>) -> Result<(), StoreError> {
+        self.change(&self.directory, write)
+            .inspect_err(|_| self.broken.store(true, Ordering::Release))
     }
 
-    fn write_store<T>(
+    /// Runs a change beside the journals that are being written, unless a write has failed before. A
+    /// failed one leaves what the next opening clears.
+    fn change<T>(
         &self,
-        write: impl FnOnce() -> Result<T, StoreError>,
+        what: &Path,
+        change: impl FnOnce() -> io::Result<T>,
     ) -> Result<T, StoreError> {
+        self.refuse_if_broken()?;
+        change().map_err(|error| files::fault(&error, what))
+    }
+
+    fn refuse_if_broken(&self) -> Result<(), StoreError> {
         if self.broken.load(Ordering::Acquire) {
             return Err(StoreError::Broken);
         }
-        write().inspect_err(|_| self.broken.store(true, Ordering::Release))
+        Ok(())
     }
 
     fn space_directory(&self, space: SpaceNumber) -> PathBuf {
@@ -233,20 +239,18 @@ impl Journal for LocalJournal {
         if self.spaces()?.iter().any(|space| space.name == name) {
             return Err(StoreError::SpaceExists(name.to_owned()));
         }
-        self.write_store(|| {
-            let number = self.take_number()?;
-            let space = StoredSpace {
-                number,
-                name: name.to_owned(),
-                settings: Some(settings.to_vec()),
-            };
-            let replaces = None;
-            let (unfinished, _) = self.begin_space(&SpaceRecord { space, replaces })?;
-            let directory = self.space_directory(number);
-            files::rename(&unfinished, &directory)
-                .map_err(|error| files::fault(&error, &directory))?;
-            Ok(number)
-        })
+        self.refuse_if_broken()?;
+        let number = self.take_number()?;
+        let space = StoredSpace {
+            number,
+            name: name.to_owned(),
+            settings: Some(settings.to_vec()),
+        };
+        let replaces = None;
+        let (unfinished, _) = self.begin_space(&SpaceRecord { space, replaces })?;
+        let directory = self.space_directory(number);
+        self.change(&directory, || files::rename(&unfinished, &directory))?;
+        Ok(number)
     }
 
     fn delete_space(&self, space: SpaceNumber) -> Result<(), StoreError> {
@@ -257,7 +261,7 @@ impl Journal for LocalJournal {
         }
         let parent = self.directory.join(DELETED);
         let doomed = parent.join(space.0.to_string());
-        self.write(&directory, || {
+        self.change(&directory, || {
             let _not_syncing = self.syncing.lock().unwrap_or_else(PoisonError::into_inner);
             let mut logs = self.logs.write().unwrap_or_else(PoisonError::into_inner);
             logs.remove(&space);
@@ -267,7 +271,7 @@ impl Journal for LocalJournal {
             // left are files that nobody reads.
             files::rename(&directory, &doomed)
         })?;
-        self.write(&doomed, || files::remove_tree(&doomed))
+        self.change(&doomed, || files::remove_tree(&doomed))
     }
 
     fn open_journal(&self, space: SpaceNumber) -> Result<OpenJournal, StoreError> {
@@ -284,7 +288,7 @@ impl Journal for LocalJournal {
         if let Some(damaged) = DamagedJournal::of(&name, &survey) {
             return Err(StoreError::Damaged(Box::new(damaged)));
         }
-        let log = self.write(&directory, || SpaceLog::open(&directory, space, &survey))?;
+        let log = self.change(&directory, || SpaceLog::open(&directory, space, &survey))?;
         self.keep_log(space, log);
         Ok(OpenJournal {
             extent: survey.end,
@@ -306,7 +310,7 @@ impl Journal for LocalJournal {
                 space.0
             )));
         };
-        self.write(&self.directory, || log.append(block, samples, bytes))
+        self.write(|| log.append(block, samples, bytes))
     }
 
     fn sync(&self) -> Result<(), StoreError> {
@@ -318,7 +322,7 @@ impl Journal for LocalJournal {
                 .filter_map(|(log, pending)| Some((Arc::clone(log), pending?)))
                 .collect()
         };
-        self.write(&self.directory, || sync_all(&pending))?;
+        self.write(|| sync_all(&pending))?;
         if let Some(marks) = &self.marks {
             marks.wake(!pending.is_empty());
         }
@@ -385,9 +389,7 @@ impl Iterator for Reading<'_> {
                 self.reader = Some(reader);
                 Some(Ok((header.block, payload)))
             }
-            Ok(Some(Item::Damage(damage))) if damage.block < self.end => {
-                Some(Err(self.damaged(damage)))
-            }
+            Ok(Some(Item::Damage(damage))) if damage.block < self.end => self.damaged().map(Err),
             Ok(_) => None,
             Err(error) => Some(Err(files::fault(&error, &self.journal.directory))),
         }
@@ -395,23 +397,17 @@ impl Iterator for Reading<'_> {
 }
 
 impl Reading<'_> {
-    /// The error of a damage: what a survey says of the whole, if it finds the damage too.
-    fn damaged(&self, damage: super::Damage) -> StoreError {
-        let name = match stored_space(&self.journal.directory.join(SPACES), self.space) {
-            Ok(space) => space.name,
-            Err(error) => return error,
-        };
-        let surveyed = match self.journal.survey(self.space) {
-            Ok(survey) => DamagedJournal::of(&name, &survey),
-            Err(error) => return error,
-        };
-        let damaged = surveyed.unwrap_or(DamagedJournal {
-            space: name,
-            first: damage,
-            lost: Extent::default(),
-            acknowledged: Extent::default(),
+    /// What a survey says of a damage: none where it is a torn tail, and so the end.
+    fn damaged(&self) -> Option<StoreError> {
+        let spaces = self.journal.directory.join(SPACES);
+        let damaged = self.journal.survey(self.space).and_then(|survey| {
+            let name = stored_space(&spaces, self.space)?.name;
+            Ok(DamagedJournal::of(&name, &survey))
         });
-        StoreError::Damaged(Box::new(damaged))
+        match damaged {
+            Ok(damaged) => Some(StoreError::Damaged(Box::new(damaged?))),
+            Err(error) => Some(error),
+        }
     }
 }
 

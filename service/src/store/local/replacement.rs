@@ -27,22 +27,21 @@ impl LocalJournal {
     pub fn replace(&self, space: &StoredSpace) -> Result<Replacement<'_>, StoreError> {
         let _changing = self.lock_spaces();
         let replaced = space.number;
-        self.write_store(|| {
-            let record = SpaceRecord {
-                space: StoredSpace {
-                    number: self.take_number()?,
-                    ..space.clone()
-                },
-                replaces: Some(replaced),
-            };
-            let (unfinished, log) = self.begin_space(&record)?;
-            Ok(Replacement {
-                journal: self,
-                record,
-                replaced,
-                unfinished,
-                log,
-            })
+        self.refuse_if_broken()?;
+        let record = SpaceRecord {
+            space: StoredSpace {
+                number: self.take_number()?,
+                ..space.clone()
+            },
+            replaces: Some(replaced),
+        };
+        let (unfinished, log) = self.begin_space(&record)?;
+        Ok(Replacement {
+            journal: self,
+            record,
+            replaced,
+            unfinished,
+            log,
         })
     }
 }
@@ -55,7 +54,7 @@ impl Replacement<'_> {
     pub fn append(&mut self, samples: u64, bytes: &[u8]) -> Result<(), StoreError> {
         let block = self.log.appended().blocks;
         let write = || self.log.append(block, samples, bytes);
-        self.journal.write(&self.unfinished, write)
+        self.journal.change(&self.unfinished, write)
     }
 
     /// Puts the journal in the place of the other one, durably. Returns the space's new number, and the
@@ -67,7 +66,7 @@ impl Replacement<'_> {
         let journal = self.journal;
         let number = self.record.space.number;
         let directory = journal.space_directory(number);
-        journal.write(&self.unfinished, || {
+        journal.change(&self.unfinished, || {
             if let Some(pending) = self.log.pending() {
                 self.log.sync(&pending)?;
             }
@@ -75,7 +74,7 @@ impl Replacement<'_> {
             // From here on the store is repaired; a crash leaves the rest to the next opening.
             files::rename(&self.unfinished, &directory)
         })?;
-        let aside = journal.write_store(|| set_aside(&journal.directory, self.replaced))?;
+        let aside = set_aside(&journal.directory, self.replaced)?;
         self.record.replaces = None;
         record::write(&directory, record::SPACE, &self.record.encode()?)?;
         Ok((number, aside))

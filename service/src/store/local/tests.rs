@@ -264,8 +264,8 @@ fn after_a_failed_write_the_journal_reads_and_no_longer_writes() {
     let store = LocalStore::open(directory.path()).unwrap();
     let space = store.create_space("hall", b"").unwrap();
     fill(&store, space, 1);
-    let full = || Err::<(), _>(io::ErrorKind::StorageFull.into());
-    let failed = store.journals().write(directory.path(), full);
+    let full = || Err(io::ErrorKind::StorageFull.into());
+    let failed = store.journals().write(full);
     assert!(matches!(failed, Err(StoreError::DiskFull)));
     let refused = [
         store.append(space, 1, 1, b"block"),

@@ -54,9 +54,7 @@ impl SpaceLog {
         space: SpaceNumber,
         survey: &Survey,
     ) -> io::Result<Self> {
-        if survey.torn_tail.is_some() {
-            cut(directory, survey)?;
-        }
+        cut(directory, survey)?;
         let mut segment = None;
         if let Some((name, length)) = &survey.last {
             let file = File::options().append(true).open(directory.join(name))?;
@@ -114,8 +112,12 @@ impl SpaceLog {
         let has_room = |(_, length): &(Arc<File>, u64)| length + frame_bytes <= SEGMENT_BYTES;
         if !end.segment.as_ref().is_some_and(has_room) {
             let path = self.directory.join(file_name(block));
-            let file = File::options().append(true).create_new(true).open(path)?;
-            (end.segment, end.grown) = (Some((Arc::new(file), 0)), true);
+            match File::options().append(true).create(true).open(path) {
+                Ok(file) => (end.segment, end.grown) = (Some((Arc::new(file), 0)), true),
+                // A segment that grows longer is better than none, where descriptors have run out.
+                Err(_) if end.segment.is_some() => {}
+                Err(error) => return Err(error),
+            }
         }
         let End {
             segment: Some((file, length)),
@@ -182,7 +184,8 @@ impl SpaceLog {
     }
 }
 
-/// Cuts off what stands after the last whole block.
+/// Cuts off what stands after the last whole block: a torn tail, and a segment that was begun and never
+/// written to, which would hide later blocks of the one before it.
 fn cut(directory: &Path, survey: &Survey) -> io::Result<()> {
     let (last, length) = match &survey.last {
         Some((name, length)) => (Some(name.as_str()), *length),
@@ -195,8 +198,10 @@ fn cut(directory: &Path, survey: &Survey) -> io::Result<()> {
     }
     if let Some(name) = last {
         let file = File::options().write(true).open(directory.join(name))?;
-        file.set_len(length)?;
-        file.sync_all()?;
+        if file.metadata()?.len() > length {
+            file.set_len(length)?;
+            file.sync_all()?;
+        }
     }
     files::sync_directory(directory)
 }
