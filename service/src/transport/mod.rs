@@ -2,10 +2,12 @@
 
 mod board;
 mod intake;
+mod linger;
 mod outlet;
 mod queries;
 mod session;
 
 pub use intake::Intake;
+pub use linger::forbid as forbid_lingering;
 pub use outlet::ZenohOutlet;
 pub use session::{TransportError, TransportSettings, open};
