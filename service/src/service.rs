@@ -34,7 +34,7 @@ pub struct Service {
     intake: Option<Intake>,
     stop_http: oneshot::Sender<()>,
     http: JoinHandle<std::io::Result<()>>,
-    upkeep: JoinHandle<()>,
+    upkeep: [JoinHandle<()>; 2],
 }
 
 /// Why the service does not start.
@@ -155,7 +155,10 @@ impl Service {
             Some(session) => Some(Intake::start(session, &engine).await?),
             None => None,
         };
-        let upkeep = tokio::spawn(metrics::upkeep(prometheus.clone(), directory.clone()));
+        let upkeep = [
+            tokio::spawn(metrics::upkeep(prometheus.clone(), directory.clone())),
+            tokio::spawn(transport::forbid_lingering()),
+        ];
         let (stop_http, stopped) = oneshot::channel();
         let http = tokio::spawn(http::run(
             listener,
@@ -203,7 +206,7 @@ impl Service {
             Ok(Err(error)) => tracing::error!(%error, "http"),
             Err(error) => tracing::error!(%error, "the http task ended with a panic"),
         }
-        self.upkeep.abort();
+        self.upkeep.iter().for_each(JoinHandle::abort);
         let (engine, outlet) = (self.engine, self.outlet);
         let end = move || {
             engine.shutdown();

@@ -30,7 +30,7 @@ impl Slow {
             thread::spawn(move || {
                 while !stop.load(Ordering::Relaxed) {
                     for stream in &mut streams {
-                        let alive = stream.as_mut().is_some_and(|stream| goes_on(stream));
+                        let alive = stream.as_mut().is_some_and(goes_on);
                         if !alive {
                             *stream = open(&address);
                             opened += usize::from(stream.is_some());

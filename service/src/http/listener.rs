@@ -16,6 +16,9 @@ use tokio::time::{Instant, Sleep};
 use super::seat::{Seat, Seats};
 use super::settings::HttpSettings;
 
+/// How long is waited for room before one more connection is sent away.
+const ROOM_PAUSE: Duration = Duration::from_millis(50);
+
 /// Accepts connections. Where as many are open as may be, the one that has waited longest without a
 /// request under way makes room; where there is none such, others wait in the system's queue.
 #[derive(Debug)]
@@ -60,9 +63,14 @@ impl BoundedListener {
         if let Ok(permit) = Arc::clone(&self.room).try_acquire_owned() {
             return permit;
         }
-        self.seats.send_away();
-        let permit = Arc::clone(&self.room).acquire_owned().await;
-        permit.expect("nobody closes the semaphore")
+        loop {
+            self.seats.send_away();
+            let permit = Arc::clone(&self.room).acquire_owned();
+            // Where none waits now, one may soon.
+            if let Ok(permit) = tokio::time::timeout(ROOM_PAUSE, permit).await {
+                return permit.expect("nobody closes the semaphore");
+            }
+        }
     }
 }
 

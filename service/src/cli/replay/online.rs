@@ -16,8 +16,11 @@ use zenoh::{Session, Wait};
 use super::mrclam::TeamBatch;
 use super::outcome::{Outcome, RobotOutcome};
 
-/// Messages under way: far fewer than a service's queue takes, so none is dropped.
-const MESSAGES_AHEAD_MAX: usize = 2048;
+/// Bytes under way: so few of a robot wait at the service in the order in which they came, beside those
+/// of other robots. Of who sends more, the service takes some at a time.
+const BYTES_AHEAD_MAX: usize = 64 << 10;
+/// What a message counts beside its bytes.
+const MESSAGE_BYTES: usize = 64;
 /// Without an acknowledgement for this long the replay gives up.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Longest wait for the service to be there.
@@ -94,7 +97,7 @@ fn send(session: &Session, space: &str, batches: &[TeamBatch]) -> anyhow::Result
         .map_err(anyhow::Error::from_boxed)?;
     let mut sent: BTreeMap<&str, u64> = BTreeMap::new();
     let mut durable: BTreeMap<String, u64> = BTreeMap::new();
-    let mut ahead: VecDeque<(&str, u64)> = VecDeque::new();
+    let mut ahead = Ahead::default();
     let mut samples = 0;
     for batch in batches {
         let next = sent.entry(&batch.robot).or_default();
@@ -105,43 +108,46 @@ fn send(session: &Session, space: &str, batches: &[TeamBatch]) -> anyhow::Result
         };
         *next += batch.samples.len() as u64;
         samples += batch.samples.len() as u64;
+        let message = Codec::Postcard.encode(&message);
+        let bytes = message.len() + MESSAGE_BYTES;
+        if ahead.bytes + bytes > BYTES_AHEAD_MAX {
+            await_durable(&watermarks, &mut durable, &mut ahead, BYTES_AHEAD_MAX / 2)?;
+        }
         session
-            .put(
-                samples_key(space, &batch.robot),
-                Codec::Postcard.encode(&message),
-            )
+            .put(samples_key(space, &batch.robot), message)
             .encoding(Codec::Postcard.encoding())
             .congestion_control(CongestionControl::Block)
             .wait()
             .map_err(anyhow::Error::from_boxed)?;
-        ahead.push_back((&batch.robot, *next));
-        if ahead.len() >= MESSAGES_AHEAD_MAX {
-            await_durable(
-                &watermarks,
-                &mut durable,
-                &mut ahead,
-                MESSAGES_AHEAD_MAX / 2,
-            )?;
-        }
+        ahead.bytes += bytes;
+        ahead.messages.push_back((&batch.robot, *next, bytes));
     }
     await_durable(&watermarks, &mut durable, &mut ahead, 0)?;
     Ok(samples)
 }
 
-/// Waits until at most `left` messages are not yet durable.
+/// Messages that are not yet durable.
+#[derive(Default)]
+struct Ahead<'a> {
+    /// Robot, the number after its last sample, and bytes of each.
+    messages: VecDeque<(&'a str, u64, usize)>,
+    bytes: usize,
+}
+
+/// Waits until messages of at most `left` bytes are not yet durable.
 fn await_durable(
     watermarks: &Receiver<(String, Watermark)>,
     durable: &mut BTreeMap<String, u64>,
-    ahead: &mut VecDeque<(&str, u64)>,
+    ahead: &mut Ahead<'_>,
     left: usize,
 ) -> anyhow::Result<()> {
     let mut deadline = Instant::now() + PATIENCE;
-    while ahead.len() > left {
+    while ahead.bytes > left {
         let patience = deadline.saturating_duration_since(Instant::now());
         let Ok((robot, watermark)) = watermarks.recv_timeout(patience) else {
             bail!(
                 "{} messages were not acknowledged within {PATIENCE:?}",
-                ahead.len()
+                ahead.messages.len()
             );
         };
         if let Some(gap) = watermark.gap {
@@ -152,13 +158,14 @@ fn await_durable(
             );
         }
         durable.insert(robot, watermark.durable);
-        let before = ahead.len();
-        while let Some((robot, next)) = ahead.front()
+        let before = ahead.bytes;
+        while let Some((robot, next, bytes)) = ahead.messages.front()
             && durable.get(*robot).is_some_and(|durable| durable >= next)
         {
-            ahead.pop_front();
+            ahead.bytes -= bytes;
+            ahead.messages.pop_front();
         }
-        if ahead.len() < before {
+        if ahead.bytes < before {
             deadline = Instant::now() + PATIENCE;
         }
     }

@@ -1,7 +1,7 @@
 //! The bounded queue of a space's writer.
 //!
-//! A lane for each agent: whoever sends more than the writer can take fills his own and waits in it.
-//! A message costs a copy at each end and no allocation, and the lock is held for these copies only.
+//! A lane for each agent: whoever sends more than the writer can take fills his own and waits in it;
+//! otherwise messages are taken in the order in which they came. A message costs a copy at each end and no allocation, and the lock is held for these copies only.
 
 mod frames;
 mod lanes;
@@ -161,7 +161,7 @@ impl Inbox {
         waiting.load.messages
     }
 
-    /// The next message, each agent's in the order in which they came.
+    /// The next message.
     pub(crate) fn next(&mut self) -> Option<Message<'_>> {
         if self.taken.is_empty() {
             let mut waiting = self.channel.lock();
@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_of_an_agent_come_out_as_they_went_in() {
+    fn messages_come_out_as_they_went_in() {
         let (queue, mut inbox) = queue(100, 100_000);
         let sent = [
             ("ada", Codec::Cbor, vec![1, 2, 3]),
@@ -377,8 +377,7 @@ mod tests {
         {
             received.push((agent.to_owned(), codec, payload.to_vec()));
         }
-        let mut sent = sent.map(|(agent, codec, payload)| (agent.to_owned(), codec, payload));
-        sent.swap(1, 2); // a turn of an agent's lane
+        let sent = sent.map(|(agent, codec, payload)| (agent.to_owned(), codec, payload));
         assert_eq!(received, sent);
         assert_eq!(inbox.wait(Duration::ZERO), 0);
     }

@@ -166,7 +166,36 @@ async fn more_streams_than_the_bound_are_told_to_come_back() {
 }
 
 #[tokio::test]
-async fn more_connections_than_the_bound_wait() {
+async fn a_connection_that_waits_makes_room_for_one_that_comes() {
+    let rig = rig();
+    let running = run_on(
+        &rig,
+        HttpSettings {
+            connections_max: 2,
+            ..settings()
+        },
+    )
+    .await;
+    let mut first = connect(&running, "/healthz").await;
+    read_until(&mut first, "\"ok\"").await;
+    // This one is under way as long as its stream is.
+    let mut stream = connect(&running, "/v1/spaces/lab/events").await;
+    read_until(&mut stream, "\r\n\r\n").await;
+    for _ in 0..3 {
+        let mut next = connect(&running, "/healthz").await;
+        read_until(&mut next, "\"ok\"").await;
+        let mut rest = Vec::new();
+        let closed = tokio::time::timeout(Duration::from_secs(10), first.read_to_end(&mut rest));
+        let _ = closed.await.expect("the one that waited is closed");
+        first = next;
+    }
+    rig.samples("rover", &steps(1, 0, 2)).await.good();
+    read_until(&mut stream, "agent_enrolled").await;
+    drop((running.stop, rig.stop.clone()));
+}
+
+#[tokio::test]
+async fn where_no_connection_waits_the_next_one_does() {
     let rig = rig();
     let running = run_on(
         &rig,
@@ -176,20 +205,12 @@ async fn more_connections_than_the_bound_wait() {
         },
     )
     .await;
-    let mut first = connect(&running, "/healthz").await;
-    read_until(&mut first, "\"ok\"").await;
-    let address = running.address;
-    let second = tokio::task::spawn_blocking(move || {
-        use std::io::Write;
-        let mut stream = std::net::TcpStream::connect(address).expect("the system takes it");
-        let request = "GET /healthz HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n";
-        stream.write_all(request.as_bytes()).expect("sent");
-        let mut answer = String::new();
-        stream.read_to_string(&mut answer).expect("a text");
-        answer
-    });
-    // The second is answered once the first has gone, however long that takes.
-    drop(first);
-    assert!(second.await.expect("joined").starts_with("HTTP/1.1 200"));
-    running.stop.send(()).expect("it runs");
+    let mut stream = connect(&running, "/v1/spaces/lab/events").await;
+    read_until(&mut stream, "\r\n\r\n").await;
+    let mut second = connect(&running, "/healthz").await;
+    let early = tokio::time::timeout(Duration::from_millis(200), second.read(&mut [0; 64]));
+    assert!(early.await.is_err(), "there is no room for it");
+    drop(stream);
+    read_until(&mut second, "\"ok\"").await;
+    drop((running.stop, rig.stop.clone()));
 }
