@@ -47,7 +47,7 @@ pub(crate) enum Drop {
 }
 
 impl Drop {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::BadKey,
         Self::UnknownSpace,
         Self::QueueFull,

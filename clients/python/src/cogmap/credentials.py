@@ -9,6 +9,8 @@ from typing import Any, Dict, Optional, Union
 
 import zenoh
 
+from .errors import InvalidValue
+
 _Path = Union[str, "os.PathLike[str]"]
 
 
@@ -19,7 +21,7 @@ class Credentials:
     `docs/security.md` of the project has an example with the files of both sides.
 
     Raises:
-        ValueError: A user without a password, a certificate without its key, or the reverse.
+        InvalidValue: A user without a password, a certificate without its key, or the reverse.
     """
 
     #: User name, with its password.
@@ -35,9 +37,10 @@ class Credentials:
 
     def __post_init__(self) -> None:
         if (self.user is None) != (self.password is None):
-            raise ValueError("credentials: user and password go together")
+            raise InvalidValue("credentials", self, "expected user and password together")
         if (self.client_certificate is None) != (self.client_key is None):
-            raise ValueError("credentials: client_certificate and client_key go together")
+            expected = "expected client_certificate and client_key together"
+            raise InvalidValue("credentials", self, expected)
 
     def config(self) -> zenoh.Config:
         """The Zenoh configuration that they make."""

@@ -60,8 +60,8 @@ class Robot(Sampler):
         send_timeout_s: How long a sample method waits for room before `WindowFull` [s].
         connect_timeout_s: How long to wait for the router [s].
         match_timeout_s: How long samples wait for the service before they are sent anyway [s].
-        ends_session: Whether `close` ends the session, and the trip under way, by a last sample. Without
-            it they end when the agent's next session begins.
+        ends_session: Whether the robot's end also ends the session, and the trip under way, by a last
+            sample. Without it they end when the agent's next session begins.
 
     Raises:
         InvalidValue: A name or another argument makes no sense, or `connect` or `credentials` are
@@ -108,7 +108,6 @@ class Robot(Sampler):
         )
         super().__init__(motion_noise)
         self._send_timeout_s = send_timeout_s
-        self._ends_session = ends_session
         if session is None:
             wanted = DEFAULT_ENDPOINT if connect is None else connect
             endpoints = [wanted] if isinstance(wanted, str) else list(wanted)
@@ -128,6 +127,7 @@ class Robot(Sampler):
             owns_session=session is None,
             address=address,
             match_timeout_s=match_timeout_s,
+            ends_session=ends_session,
             listeners=self._listeners,
         )
         self._run.start()
@@ -271,8 +271,7 @@ class Robot(Sampler):
         with run.changed:
             if run.closing:
                 return
-            if self._ends_session:
-                run.end_session()
+            run.end_session()
             run.closing = True
             run.changed.notify_all()
         missing = 0

@@ -61,6 +61,7 @@ class Run:
         owns_session: Whether the Zenoh session is closed with the run.
         address: Where the Zenoh session leads, for messages.
         match_timeout_s: How long samples wait for the service before they are sent anyway [s].
+        ends_session: Whether the run ends its session by a last sample.
     """
 
     def __init__(
@@ -74,6 +75,7 @@ class Run:
         owns_session: bool,
         address: str,
         match_timeout_s: float,
+        ends_session: bool,
         listeners: Listeners,
     ) -> None:
         self.space = space
@@ -101,6 +103,7 @@ class Run:
         self._was_away = False
         self._is_back = False
         self._may_send = False
+        self._ends_session = ends_session
         self._match_deadline = time.monotonic() + match_timeout_s
         # Held while a batch is taken and put, so that batches leave in order.
         self._publishing = threading.Lock()
@@ -184,10 +187,12 @@ class Run:
         return seq
 
     def end_session(self) -> None:
-        """Appends the session's last sample, with the condition held: at the stamp of the one before, because
-        the robot's clock may be another than this machine's. A full window is left as it is."""
-        if self._is_refused() or not self.window.next_seq:
+        """Appends the session's last sample, once, with the condition held: at the stamp of the one
+        before, because the robot's clock may be another than this machine's. A full window is left as
+        it is."""
+        if not self._ends_session or self._is_refused() or not self.window.next_seq:
             return
+        self._ends_session = False
         data = encode_sample(Sample(self.clock.latest_ns, SessionEnd()))
         if self.window.has_room(len(data)):
             self.window.append(data, time.monotonic())
@@ -287,6 +292,8 @@ class Run:
         if self._stop_at is None:
             return False
         with self.changed:
+            # Also of a robot that was dropped, or that the program's end has left open.
+            self.end_session()
             done = self.window.pending == 0 or self._is_refused()
         return done or time.monotonic() >= self._stop_at
 

@@ -6,10 +6,7 @@ mod kind;
 use cogmap_proto::DecodeError;
 pub use kind::Kind;
 
-use super::{
-    InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence,
-    unknown_agent,
-};
+use super::{InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence};
 use crate::engine::{IngestError, QuestionError, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
 

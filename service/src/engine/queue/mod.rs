@@ -120,7 +120,8 @@ impl Queue {
         let bytes = size_of_call(&call);
         let agent = match &call {
             Call::Samples(request) => &*request.agent,
-            Call::Object(_) => "",
+            // A removal does not wait behind what the agent itself has sent.
+            Call::Object(_) | Call::Removal(_) => "",
         };
         let (mut waiting, lane) = self.0.room_for(agent, bytes)?;
         waiting.lanes.push_call(lane, call, bytes);
