@@ -10,6 +10,8 @@
 
 #![allow(clippy::print_stdout)] // The report is what it is for.
 
+mod bit_flips; // one bit anywhere in a store
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
@@ -19,7 +21,7 @@ use serde_json::{Value, json};
 type Drill = fn() -> Value;
 
 /// All drills, in the order in which they run.
-const DRILLS: &[(&str, Drill)] = &[];
+const DRILLS: &[(&str, Drill)] = &[("bit_flips", bit_flips::drill)];
 
 fn main() -> ExitCode {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
