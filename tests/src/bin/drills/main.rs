@@ -10,6 +10,7 @@
 
 #![allow(clippy::print_stdout)] // The report is what it is for.
 
+mod bit_flips; // one bit anywhere in a store
 mod descriptors;
 mod flood;
 mod half_open;
@@ -30,6 +31,7 @@ type Drill = fn() -> Value;
 
 /// All drills, in the order in which they run.
 const DRILLS: &[(&str, Drill)] = &[
+    ("bit-flips", bit_flips::drill),
     ("liars", liars::liars),
     ("stopped-subscribers", stopped_subscribers::run),
     ("flood", flood::run),
