@@ -159,7 +159,10 @@ impl Estimator {
         self.frame_mut(MAP).population += 1;
         let is_aside = self.is_aside(agent);
         let Traveller {
-            mover, mut sensor, ..
+            mover,
+            mut sensor,
+            doubt,
+            ..
         } = Arc::unwrap_or_clone(traveller);
         // Numbers of landmarks change.
         sensor.latest.clear();
@@ -167,7 +170,12 @@ impl Estimator {
             mover: mover.placed(*pose, covariance),
             sensor,
             refused: 0,
-            doubt: if is_aside { DOUBTED } else { 0 },
+            // Who was doubted stays so until what it sees fits.
+            doubt: if is_aside {
+                DOUBTED
+            } else {
+                doubt.min(DOUBTED)
+            },
         };
         let seat = self.seat_mut(agent);
         seat.frame = MAP;
