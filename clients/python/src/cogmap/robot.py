@@ -6,11 +6,12 @@ import logging
 import threading
 import time
 from types import TracebackType
-from typing import Any, Callable, Dict, Iterable, List, Optional, Tuple, Type, Union
+from typing import Callable, Dict, Iterable, List, Optional, Tuple, Type, Union
 
 import zenoh
 
 from .answer import Estimate, Rejection, Watermark
+from .callback import call_each
 from .errors import Closed, CogmapError, SessionSuperseded, Timeout, WindowFull
 from .inbox import Inbox
 from .key import check_name, durable_key, estimate_key, query_key, samples_key
@@ -58,8 +59,7 @@ class Robot(Sampler):
         send_timeout_s: How long a sample method waits for room before `WindowFull` [s].
         connect_timeout_s: How long to wait for the router [s].
         match_timeout_s: How long samples wait for the service before they are sent anyway [s].
-        ends_session: Whether `close` ends the session, and the trip under way, by a last sample. Without
-            it they end when the agent's next session begins.
+        ends_session: Whether `close` ends the session, and the trip under way, by a last sample.
 
     Raises:
         ValueError: A name is not valid, or both `connect` and `session` are given.
@@ -313,8 +313,8 @@ class Robot(Sampler):
             raise Timeout(f"closed with {missing} samples that are not durable")
 
     def _end_session(self) -> None:
-        """Appends the last sample, with the condition held: at the stamp of the one before, because the
-        robot's clock may be another than this machine's. A full window is left as it is."""
+        """Appends the last sample, with the condition held: at the stamp of the one before, for the
+        robot's clock may be another. A full window is left as it is."""
         if not self._ends_session or self._superseded_by is not None or not self._window.next_seq:
             return
         data = encode_sample(Sample(self._last_stamp_ns, SessionEnd()))
@@ -458,7 +458,7 @@ class Robot(Sampler):
                 with self._changed:
                     self._estimate = estimate
                     self._changed.notify_all()
-                _call(callbacks, estimate)
+                call_each(callbacks, estimate)
         for _ in range(min(watermarks, len(self._watermarks_in))):
             watermark = self._watermarks_in.take()
             if watermark is not None:
@@ -497,12 +497,4 @@ class Robot(Sampler):
                 entry.range.stop - 1,
                 entry.reason.value,
             )
-            _call(callbacks, entry)
-
-
-def _call(callbacks: List[Callable[[Any], object]], argument: Any) -> None:
-    for callback in callbacks:
-        try:
-            callback(argument)
-        except Exception:  # An error of the user's callback must not end the robot's thread.
-            _log.exception("callback %r", callback)
+            call_each(callbacks, entry)
