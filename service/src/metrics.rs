@@ -252,6 +252,11 @@ fn describe() {
         "Time to the head of an answer"
     );
     describe_gauge!(HTTP_STREAMS, Unit::Count, "Event streams open now");
+    describe_states();
+}
+
+/// Tells the recorder what the metrics of the agents' and the process's state mean.
+fn describe_states() {
     describe_gauge!(
         AGENTS_BY_STATUS,
         Unit::Count,

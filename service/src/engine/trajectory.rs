@@ -31,6 +31,9 @@ pub struct Recorder {
     latest_ns: Option<i64>,
 }
 
+/// A recorder as it is stored: session, stamp of the latest row, and rows as a chunk has them.
+type PlainRecorder = (u64, Option<i64>, Vec<u8>);
+
 /// Rows that are complete: a full chunk, or the rest of an ended session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chunk {
@@ -128,7 +131,7 @@ impl Recorder {
 
     /// Reads what [`Recorder::write_all`] wrote, and gives the bytes after it.
     pub(crate) fn read_all(bytes: &[u8]) -> Result<(Vec<Self>, &[u8]), CorruptChunk> {
-        let (plain, rest): (Vec<(u64, Option<i64>, Vec<u8>)>, _) =
+        let (plain, rest): (Vec<PlainRecorder>, _) =
             postcard::take_from_bytes(bytes).map_err(|_| CorruptChunk)?;
         let recorders: Result<_, _> = plain
             .into_iter()

@@ -112,11 +112,7 @@ pub(crate) async fn get(
         agent_once_named(&space, name)?;
     }
     let after = last_event_id(&headers)?.or(query.after);
-    let accepted = || match headers.get(ACCEPT).and_then(|accept| accept.to_str().ok()) {
-        Some(accept) if accept.contains("application/json") => EventFormat::Json,
-        _ => EventFormat::Stream,
-    };
-    if query.format.unwrap_or_else(accepted) == EventFormat::Json {
+    if query.format.unwrap_or_else(|| accepted(&headers)) == EventFormat::Json {
         let limit = page::limit(query.limit)?;
         let first = after.unwrap_or_default();
         let mut page = read_page(space.follow(Some(first))?, limit, query.agent.as_deref());
@@ -145,6 +141,17 @@ pub(crate) async fn get(
     Ok(Sse::new(events)
         .keep_alive(KeepAlive::new().interval(KEEP_ALIVE))
         .into_response())
+}
+
+/// The form that `Accept` asks for; a stream if it asks for none, or for both.
+fn accepted(headers: &HeaderMap) -> EventFormat {
+    let accept = headers.get(ACCEPT).and_then(|accept| accept.to_str().ok());
+    let accept = accept.unwrap_or_default();
+    if accept.contains("application/json") && !accept.contains("text/event-stream") {
+        EventFormat::Json
+    } else {
+        EventFormat::Stream
+    }
 }
 
 /// The id in the header of a reader that comes back.

@@ -228,7 +228,7 @@ fn fits(template: &str, path: &str) -> bool {
     template.clone().count() == path.clone().count()
         && template
             .zip(path)
-            .all(|(chunk, given)| chunk.starts_with('{') || chunk == given)
+            .all(|(chunk, given)| (chunk.starts_with('{') && !given.is_empty()) || chunk == given)
 }
 
 /// `count` steps of 0.1 m along x, ten a second.

@@ -432,6 +432,7 @@ async fn the_description_lists_every_route_with_every_status() {
         "GET /healthz",
         "GET /metrics",
         "GET /readyz",
+        "GET /v1",
         "GET /v1/spaces",
         "GET /v1/spaces/{space}",
         "GET /v1/spaces/{space}/agents",
