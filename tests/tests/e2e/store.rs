@@ -288,6 +288,29 @@ fn files_below(directory: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
+fn a_space_whose_name_is_lost_is_not_begun_anew() {
+    let mut server = server_of_two();
+    let before = digest(&server, "other");
+    server.terminate();
+    for copy in ["space", "space.copy"] {
+        change(&server.data().join("spaces/0").join(copy), |bytes| {
+            bytes[20] ^= 1
+        });
+    }
+    server.run();
+    let listed = server.http().get("/v1/spaces").json(200);
+    assert_eq!(listed["stopped"][0]["name"], "space-0", "{listed}");
+    let reason = listed["stopped"][0]["reason"].as_str().unwrap();
+    assert!(reason.contains("backup"), "{reason}");
+    server
+        .http()
+        .get("/v1/spaces/default")
+        .problem(404, "unknown-space");
+    assert_eq!(digest(&server, "other"), before);
+    assert_eq!(command(&server, &["store", "verify"]).code(), 1);
+}
+
+#[test]
 fn a_torn_tail_is_cut_and_told() {
     let mut server = Server::start(&[]);
     let samples: Vec<_> = Drive::new(seed(82)).take(1000).collect();
