@@ -1,5 +1,5 @@
-//! Damage on the disk: one space stops and says so, the others serve, and the commands tell, repair,
-//! copy and restore.
+//! Damage on the disk: one space stops and says so, the others serve, and the commands tell,
+//! repair, copy and restore.
 
 use std::fs::{self, File};
 use std::io::Write;
@@ -294,7 +294,7 @@ fn a_space_whose_name_is_lost_is_not_begun_anew() {
     server.terminate();
     for copy in ["space", "space.copy"] {
         change(&server.data().join("spaces/0").join(copy), |bytes| {
-            bytes[20] ^= 1
+            bytes[20] ^= 1;
         });
     }
     server.run();
