@@ -16,7 +16,7 @@ use crate::descriptors::{self, Shares};
 use crate::engine::{self, Engine, Outlet, Silent, SpaceError, core_settings};
 use crate::http::{self, HttpSettings};
 use crate::metrics;
-use crate::store::{self, LocalStore, StoreError};
+use crate::store::{self, Journal, LocalStore, StoreError};
 use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohOutlet};
 
 /// Longest wait for the Zenoh session to close.
@@ -135,6 +135,8 @@ impl Service {
             source,
         };
         let store = Arc::new(open_store(directory).map_err(of_store)?);
+        let stored = store.spaces().map_err(of_store)?;
+        let name_lost = stored.iter().any(|space| space.settings.is_none());
         let engine = Engine::open(store, config.engine.settings(), outlet).map_err(of_store)?;
         for (name, settings) in &config.spaces {
             if let Some(space) = engine.space(name.as_str()) {
@@ -142,6 +144,12 @@ impl Service {
                     tracing::warn!(space = %name,
                         "the settings given for the space are without effect: they were fixed when it was created");
                 }
+                continue;
+            }
+            if name_lost {
+                // A robot must not find an empty map where its own may be.
+                tracing::error!(space = %name,
+                    "the space is not created: it may be one whose name is lost, see /v1/spaces");
                 continue;
             }
             engine

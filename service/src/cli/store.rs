@@ -13,7 +13,8 @@ use crate::store::{self, BackupReport, Damage, SpaceSurvey};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum StoreCommand {
-    /// Read every block of every space, and say what is damaged or missing. The service may run on it.
+    /// Read every block of every space, and say what is damaged or missing. The service may run on
+    /// it.
     Verify(VerifyArgs),
     /// Make a new journal of the blocks of a damaged space that can be read. The old one is kept.
     Repair(RepairArgs),

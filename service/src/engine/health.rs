@@ -36,8 +36,8 @@ impl Health {
         }
     }
 
-    /// Notes that derived state could not be read or written. Samples are taken all the same, for the
-    /// journal holds them.
+    /// Notes that derived state could not be read or written. Samples are taken all the same, for
+    /// the journal holds them.
     pub(crate) fn derived_fail(&self, error: &DerivedError) {
         counter!(DERIVED_FAILURES).increment(1);
         if !self.derived_failed.swap(true, Ordering::AcqRel) {

@@ -114,7 +114,8 @@ pub(crate) fn recover(
 fn report(space: &str, journal: &OpenJournal) {
     if let Some(cut) = &journal.cut {
         counter!(TORN_TAILS, "space" => space.to_owned()).increment(1);
-        tracing::warn!(space, block = cut.block, file = cut.file, offset = cut.offset, flaw = %cut.flaw,
+        let (block, file, offset, flaw) = (cut.block, &cut.file, cut.offset, cut.flaw);
+        tracing::warn!(space, block, file, offset, %flaw,
             "what was never acknowledged has been cut off the end of the journal");
     }
     if journal.mark_lost {
@@ -128,8 +129,8 @@ fn report(space: &str, journal: &OpenJournal) {
     }
 }
 
-/// The checkpoint, if there is one that this build understands and whose blocks the journal has. Any
-/// other one is dropped, together with the trajectories: the journal holds all that they held.
+/// The checkpoint, if there is one that this build understands and whose blocks the journal has.
+/// Any other one is dropped, together with the trajectories: the journal holds all that they held.
 fn load_checkpoint(loading: &Loading<'_>, blocks: u64) -> Option<Recovered> {
     let Loading {
         store,

@@ -36,8 +36,8 @@ pub struct SpaceBackup {
     pub extent: Extent,
 }
 
-/// Copies the store in `directory`, on which a service may run, to the directory `to`, which is empty or
-/// absent. A damaged space is left out and named.
+/// Copies the store in `directory`, on which a service may run, to the directory `to`, which is
+/// empty or absent. A damaged space is left out and named.
 ///
 /// # Errors
 /// There is no store, `to` holds something, or a disk fails.
@@ -52,8 +52,8 @@ pub fn backup(directory: &Path, to: &Path) -> Result<BackupReport, StoreError> {
     copy_store(directory, to)
 }
 
-/// Makes the store in `to`, which is empty or absent, from the backup in `backup`. Every block of the
-/// backup is read and checked before anything is written.
+/// Makes the store in `to`, which is empty or absent, from the backup in `backup`. Every block of
+/// the backup is read and checked before anything is written.
 ///
 /// # Errors
 /// `backup` holds no whole backup, `to` holds something, or a disk fails.

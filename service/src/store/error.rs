@@ -77,8 +77,8 @@ impl std::fmt::Display for DamagedJournal {
         write!(
             f,
             "the journal of space {space:?} is damaged: block {} ({} at byte {} of {}); {} of {} \
-             acknowledged blocks and {} of {} samples cannot be read. `cogmap store verify` says more, \
-             `cogmap store repair --space {space}` goes on with the rest",
+             acknowledged blocks and {} of {} samples cannot be read. `cogmap store verify` \
+             says more, `cogmap store repair --space {space}` goes on with the rest",
             first.block,
             first.flaw,
             first.offset,

@@ -1,8 +1,9 @@
 //! The store: the journal, which is the ground state, and what is derived from it.
 //!
-//! Two ports, [`Journal`] and [`Derived`], and their embedded end ([`LocalStore`]). They share nothing on
-//! disk: whatever happens to derived state, it is dropped and made again from the journal. Everything
-//! else of the service speaks to the ports, and only the ends know a disk format.
+//! Two ports, [`Journal`] and [`Derived`], and their embedded end ([`LocalStore`]). They share
+//! nothing on disk: whatever happens to derived state, it is dropped and made again from the
+//! journal. Everything else of the service speaks to the ports, and only the ends know a disk
+//! format.
 
 mod backup;
 mod derived;
@@ -45,8 +46,8 @@ pub struct OpenJournal {
     pub extent: Extent,
     /// What was cut off its end: a block that was never acknowledged, caught by a crash.
     pub cut: Option<Damage>,
-    /// Whether it could not be told how far the journal was acknowledged, and so whether blocks at its
-    /// end are missing.
+    /// Whether it could not be told how far the journal was acknowledged, and so whether blocks at
+    /// its end are missing.
     pub mark_lost: bool,
 }
 
@@ -78,8 +79,8 @@ pub type StoredChunk = (ChunkKey, Vec<u8>);
 /// Blocks of the journal, with their numbers, in order. After an error there are no more.
 pub type Blocks<'a> = Box<dyn Iterator<Item = Result<(u64, Vec<u8>), StoreError>> + 'a>;
 
-/// The port of a journal for each space. All methods may be called from any thread; each space has one
-/// writer.
+/// The port of a journal for each space. All methods may be called from any thread; each space has
+/// one writer.
 ///
 /// What [`Journal::append`] has written survives the process at once and a power cut after the next
 /// [`Journal::sync`] has returned. After an error of either the journal refuses all
@@ -122,24 +123,25 @@ pub trait Journal: std::fmt::Debug + Send + Sync + 'static {
         bytes: &[u8],
     ) -> Result<(), StoreError>;
 
-    /// Makes durable all that was appended before the call, and remembers outside the journal how far
-    /// that is.
+    /// Makes durable all that was appended before the call, and remembers outside the journal how
+    /// far that is.
     ///
     /// # Errors
     /// The journal cannot be written.
     fn sync(&self) -> Result<(), StoreError>;
 
-    /// The journal of a space from block `from` on: up to its end when asked, or to the first damage.
+    /// The journal of a space from block `from` on: up to its end when asked, or to the first
+    /// damage.
     fn journal(&self, space: SpaceNumber, from: u64) -> Blocks<'_>;
 }
 
 /// The port of what is derived from the journals: checkpoints and trajectories. A failure loses
-/// nothing that the journal does not hold, and stops nobody: after a failed write, further ones fail
-/// at once, and the next start finds no derived state and makes it anew.
+/// nothing that the journal does not hold, and stops nobody: after a failed write, further ones
+/// fail at once, and the next start finds no derived state and makes it anew.
 pub trait Derived: std::fmt::Debug + Send + Sync + 'static {
     /// Writes, in one atomic step, the pages that changed since the checkpoint before, the state of
-    /// the trajectory recorders, and up to where in the journal they reach. A page of no bytes removes
-    /// what is stored of it.
+    /// the trajectory recorders, and up to where in the journal they reach. A page of no bytes
+    /// removes what is stored of it.
     ///
     /// # Errors
     /// It cannot be written.
@@ -172,7 +174,8 @@ pub trait Derived: std::fmt::Debug + Send + Sync + 'static {
         bytes: &[u8],
     ) -> Result<(), DerivedError>;
 
-    /// Chunks of an agent's session, in order, from the last one that begins at or before `from_ns`.
+    /// Chunks of an agent's session, in order, from the last one that begins at or before
+    /// `from_ns`.
     ///
     /// # Errors
     /// They cannot be read.

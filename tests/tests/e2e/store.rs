@@ -1,5 +1,5 @@
-//! Damage on the disk: one space stops and says so, the others serve, and the commands tell, repair,
-//! copy and restore.
+//! Damage on the disk: one space stops and says so, the others serve, and the commands tell,
+//! repair, copy and restore.
 
 use std::fs::{self, File};
 use std::io::Write;
@@ -285,6 +285,29 @@ fn files_below(directory: &Path) -> Vec<PathBuf> {
         }
     }
     files
+}
+
+#[test]
+fn a_space_whose_name_is_lost_is_not_begun_anew() {
+    let mut server = server_of_two();
+    let before = digest(&server, "other");
+    server.terminate();
+    for copy in ["space", "space.copy"] {
+        change(&server.data().join("spaces/0").join(copy), |bytes| {
+            bytes[20] ^= 1;
+        });
+    }
+    server.run();
+    let listed = server.http().get("/v1/spaces").json(200);
+    assert_eq!(listed["stopped"][0]["name"], "space-0", "{listed}");
+    let reason = listed["stopped"][0]["reason"].as_str().unwrap();
+    assert!(reason.contains("backup"), "{reason}");
+    server
+        .http()
+        .get("/v1/spaces/default")
+        .problem(404, "unknown-space");
+    assert_eq!(digest(&server, "other"), before);
+    assert_eq!(command(&server, &["store", "verify"]).code(), 1);
 }
 
 #[test]

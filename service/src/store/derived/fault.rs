@@ -10,7 +10,8 @@ use super::super::local::files::disk_full;
 /// in one go.
 const TRIAL_BYTES: usize = 80 << 20;
 
-/// Whether an error says that the disk in `directory` is full. What was written before is whole then.
+/// Whether an error says that the disk in `directory` is full. What was written before is whole
+/// then.
 pub(super) fn is_disk_full(error: &fjall::Error, directory: &Path) -> bool {
     match error {
         // One of the engine's threads has failed earlier and kept the reason to itself. A full disk

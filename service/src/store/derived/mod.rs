@@ -40,7 +40,8 @@ use crate::metrics as names;
 /// Sealed write buffers of a keyspace at which its writers wait for the disk.
 ///
 /// At four the engine itself would wait, without looking whether the threads that write the buffers
-/// out are still alive: on a full disk it would wait for ever. Below that we wait ourselves and look.
+/// out are still alive: on a full disk it would wait for ever. Below that we wait ourselves and
+/// look.
 const SEALED_BUFFERS_MAX: usize = 3;
 /// Time between two looks at the sealed write buffers.
 const BUFFER_POLL: Duration = Duration::from_millis(5);
@@ -84,7 +85,8 @@ impl std::fmt::Debug for FjallDerived {
 }
 
 impl FjallDerived {
-    /// Opens the derived state of `spaces`, and drops that of others. What is damaged is dropped whole.
+    /// Opens the derived state of `spaces`, and drops that of others. What is damaged is dropped
+    /// whole.
     ///
     /// # Errors
     /// Not even an empty directory can be opened.

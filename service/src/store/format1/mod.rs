@@ -8,11 +8,11 @@
 //! journal     space: u32, block: u64               the block
 //! ```
 //!
-//! All numbers are big-endian. Checkpoints and trajectories, in further keyspaces, are not read: they
-//! are made again from the journal.
+//! All numbers are big-endian. Checkpoints and trajectories, in further keyspaces, are not read:
+//! they are made again from the journal.
 //!
-//! The new store is written beside the old one, whose files stay until the new one is whole: a crash
-//! leaves a store of format 1, or one of format 2 with files that the next migration removes.
+//! The new store is written beside the old one, whose files stay until the new one is whole: a
+//! crash leaves a store of format 1, or one of format 2 with files that the next migration removes.
 
 #[cfg(test)]
 mod fixture;
@@ -42,8 +42,9 @@ pub(super) fn is_store(directory: &Path) -> bool {
     directory.join(MARKER).is_file() && directory.join(KEYSPACES).is_dir()
 }
 
-/// Makes a store of format 1 one of the present format, with the same spaces and journals; leaves any
-/// other directory as it is. `samples_in` counts the samples in a block. Says whether there was one.
+/// Makes a store of format 1 one of the present format, with the same spaces and journals; leaves
+/// any other directory as it is. `samples_in` counts the samples in a block. Says whether there was
+/// one.
 ///
 /// # Errors
 /// The old store is in use or damaged, or there is no room for the new one beside it.

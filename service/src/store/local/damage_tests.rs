@@ -1,4 +1,5 @@
-//! Damage in a store: one space stops, the others do not, and repair and backups know what is whole.
+//! Damage in a store: one space stops, the others do not, and repair and backups know what is
+//! whole.
 
 use std::fs;
 use std::path::Path;

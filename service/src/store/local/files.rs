@@ -36,8 +36,8 @@ pub(in crate::store) fn sync_directory(directory: &Path) -> io::Result<()> {
     File::open(directory)?.sync_all()
 }
 
-/// Creates `directory` and what is missing above it, durably. Returns the uppermost directory that it
-/// has created, if it was not there.
+/// Creates `directory` and what is missing above it, durably. Returns the uppermost directory that
+/// it has created, if it was not there.
 pub(in crate::store) fn create_directory(directory: &Path) -> io::Result<Option<PathBuf>> {
     if directory.is_dir() {
         return Ok(None);

@@ -1,4 +1,5 @@
-//! The embedded end of the store: a directory of this machine, which one process has open at a time.
+//! The embedded end of the store: a directory of this machine, which one process has open at a
+//! time.
 //!
 //! # Format 2
 //!
@@ -7,15 +8,15 @@
 //! lock                               locked while a process has the store open
 //! spaces/{number}/space              record: name and settings
 //! spaces/{number}/durable            how far the journal was acknowledged, see `log/mark.rs`
-//! spaces/{number}/{first block}.log  segments of the journal, see `log/frame.rs`; 16 hexadecimal digits
+//! spaces/{number}/{first block}.log  segments of the journal, see `log/frame.rs`; 16 hex digits
 //! set-aside/{number}                 spaces as they were before a repair
 //! deleted/{number}                   spaces that are being deleted
 //! derived/                           what can be made again, by fjall; see `derived/mod.rs`
 //! ```
 //!
-//! Files of the journal are only appended to, so a running store can be copied up to its marks. Blocks
-//! and settings are the engine's, which versions its own bytes. A name that ends in `.new` is not
-//! finished, and opening the store removes it.
+//! Files of the journal are only appended to, so a running store can be copied up to its marks.
+//! Blocks and settings are the engine's, which versions its own bytes. A name that ends in `.new`
+//! is not finished, and opening the store removes it.
 
 pub(super) mod files;
 mod opening;
@@ -94,8 +95,9 @@ impl LocalJournal {
     ///
     /// # Errors
     /// [`StoreError::Locked`] when another process has it open, [`StoreError::NewerFormat`] and
-    /// [`StoreError::OlderFormat`] when another version has written it, [`StoreError::Corrupt`] when its
-    /// records do not make sense, and [`StoreError::Io`] when the directory holds no store.
+    /// [`StoreError::OlderFormat`] when another version has written it, [`StoreError::Corrupt`]
+    /// when its records do not make sense, and [`StoreError::Io`] when the directory holds no
+    /// store.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         opening::open(directory, false).map(|opened| opened.journal)
     }
@@ -141,15 +143,15 @@ impl LocalJournal {
         Ok(())
     }
 
-    /// Runs a write of a journal, unless one has failed before. What a failed one has left on the disk is
-    /// unknown, so it is the last one.
+    /// Runs a write of a journal, unless one has failed before. What a failed one has left on the
+    /// disk is unknown, so it is the last one.
     fn write(&self, write: impl FnOnce() -> io::Result<()>) -> Result<(), StoreError> {
         self.change(&self.directory, write)
             .inspect_err(|_| self.broken.store(true, Ordering::Release))
     }
 
-    /// Runs a change beside the journals that are being written, unless a write has failed before. A
-    /// failed one leaves what the next opening clears.
+    /// Runs a change beside the journals that are being written, unless a write has failed before.
+    /// A failed one leaves what the next opening clears.
     fn change<T>(
         &self,
         what: &Path,
@@ -267,8 +269,8 @@ impl Journal for LocalJournal {
             logs.remove(&space);
             files::create_directory(&parent)?;
             files::remove_tree(&doomed)?;
-            // One step decides: before it the space is whole, after it the space is gone, and what is
-            // left are files that nobody reads.
+            // One step decides: before it the space is whole, after it the space is gone, and what
+            // is left are files that nobody reads.
             files::rename(&directory, &doomed)
         })?;
         self.change(&doomed, || files::remove_tree(&doomed))

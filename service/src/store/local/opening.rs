@@ -50,7 +50,8 @@ pub(super) fn remove_created(created: Option<&Path>) {
     if let Some(created) = created
         && let Err(error) = files::remove_tree(created)
     {
-        tracing::warn!(%error, directory = %created.display(), "remove what a failed start has created");
+        let directory = created.display();
+        tracing::warn!(%error, %directory, "remove what a failed start has created");
     }
 }
 

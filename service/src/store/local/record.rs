@@ -5,7 +5,8 @@
 //!
 //! format      format of the store: u32
 //! next_space  number that the next space gets: u32
-//! space       number: u32, number that it replaces: u32 or 0xffffffff, length of the name: u32, name, settings
+//! space       number: u32, number that it replaces: u32 or 0xffffffff, length of the name: u32,
+//!             name, settings
 //! ```
 //!
 //! All numbers are little-endian. A damaged copy is made anew from the other one.

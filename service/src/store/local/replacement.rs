@@ -57,8 +57,8 @@ impl Replacement<'_> {
         self.journal.change(&self.unfinished, write)
     }
 
-    /// Puts the journal in the place of the other one, durably. Returns the space's new number, and the
-    /// directory where the other journal is kept.
+    /// Puts the journal in the place of the other one, durably. Returns the space's new number, and
+    /// the directory where the other journal is kept.
     ///
     /// # Errors
     /// The store cannot be written.

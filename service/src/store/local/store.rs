@@ -22,7 +22,8 @@ impl LocalStore {
     /// cannot be opened is dropped. A failure leaves no directory behind that was not there.
     ///
     /// # Errors
-    /// Those of [`LocalJournal::open`], and [`StoreError::Io`] when the directory holds something else.
+    /// Those of [`LocalJournal::open`], and [`StoreError::Io`] when the directory holds something
+    /// else.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let opened = opening::open(directory, true)?;
         let opening::Opened { journal, created } = opened;

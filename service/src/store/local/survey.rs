@@ -19,8 +19,8 @@ pub struct SpaceSurvey {
     pub survey: Survey,
 }
 
-/// Reads the journals of all spaces of the store in `directory`, or of one. Changes nothing and needs
-/// no lock, so a service may run on it.
+/// Reads the journals of all spaces of the store in `directory`, or of one. Changes nothing and
+/// needs no lock, so a service may run on it.
 ///
 /// # Errors
 /// There is no store, no such space, or files that cannot be opened.

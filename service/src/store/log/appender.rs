@@ -13,8 +13,8 @@ use super::mark::{Extent, Mark};
 use super::segment::file_name;
 use super::survey::Survey;
 
-/// Length at which a segment is closed and the next one begun \[bytes\]. A damage of the file system
-/// takes one of them at most, and a backup copies whole ones.
+/// Length at which a segment is closed and the next one begun \[bytes\]. A damage of the file
+/// system takes one of them at most, and a backup copies whole ones.
 const SEGMENT_BYTES: u64 = 64 << 20;
 
 /// A journal that is open for writing. One thread appends; another one syncs beside it.
@@ -58,7 +58,8 @@ impl SpaceLog {
         let mut segment = None;
         if let Some((name, length)) = &survey.last {
             let file = File::options().append(true).open(directory.join(name))?;
-            // What survived the process is the truth from here on, and has to survive a power cut too.
+            // What survived the process is the truth from here on, and has to survive a power cut
+            // too.
             file.sync_all()?;
             files::sync_directory(directory)?;
             segment = Some((Arc::new(file), *length));
@@ -184,8 +185,8 @@ impl SpaceLog {
     }
 }
 
-/// Cuts off what stands after the last whole block: a torn tail, and a segment that was begun and never
-/// written to, which would hide later blocks of the one before it.
+/// Cuts off what stands after the last whole block: a torn tail, and a segment that was begun and
+/// never written to, which would hide later blocks of the one before it.
 fn cut(directory: &Path, survey: &Survey) -> io::Result<()> {
     let (last, length) = match &survey.last {
         Some((name, length)) => (Some(name.as_str()), *length),

@@ -13,9 +13,9 @@
 //!           header check   u64   XXH3 of the bytes before, seeded with the space's number
 //! ```
 //!
-//! All numbers are little-endian. Since the checks are seeded, a frame is valid in its own space and
-//! under its own number only. `durable` is what tells a block that was acknowledged from one that a
-//! crash caught before: a valid frame that calls an earlier block durable is proof of it.
+//! All numbers are little-endian. Since the checks are seeded, a frame is valid in its own space
+//! and under its own number only. `durable` is what tells a block that was acknowledged from one
+//! that a crash caught before: a valid frame that calls an earlier block durable is proof of it.
 
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 

@@ -5,10 +5,10 @@
 //! slot  = magic "CGMK", space: u32, blocks: u64, samples: u64, check: u64       little endian
 //! ```
 //!
-//! The two slots are written in turn, so that one of them is whole whenever a write is cut short. The
-//! larger one holds. A mark is written after each sync of the journal and before anybody is told, which
-//! survives the process; the file itself is synced about once a second, which bounds what a power cut
-//! takes from it. What it says was durable is durable in either case.
+//! The two slots are written in turn, so that one of them is whole whenever a write is cut short.
+//! The larger one holds. A mark is written after each sync of the journal and before anybody is
+//! told, which survives the process; the file itself is synced about once a second, which bounds
+//! what a power cut takes from it. What it says was durable is durable in either case.
 
 use std::fs::File;
 use std::io;

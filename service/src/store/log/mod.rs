@@ -1,8 +1,9 @@
 //! The log engine: the journal of one space in files of its own.
 //!
-//! Blocks are appended as frames to segments, each with one system call and without a copy. A damage
-//! takes the blocks that it lies in and no others: what a block's bytes should be is in its header, and
-//! the next header is found again by its own check. Nothing of the journal is kept in memory.
+//! Blocks are appended as frames to segments, each with one system call and without a copy. A
+//! damage takes the blocks that it lies in and no others: what a block's bytes should be is in its
+//! header, and the next header is found again by its own check. Nothing of the journal is kept in
+//! memory.
 
 mod appender;
 mod frame;

@@ -34,8 +34,8 @@ pub(in crate::store) enum Item {
     Damage(Damage),
 }
 
-/// Reads the journal in a space's directory. The space may be in use: what is being appended is then
-/// a damage at the end.
+/// Reads the journal in a space's directory. The space may be in use: what is being appended is
+/// then a damage at the end.
 #[derive(Debug)]
 pub(in crate::store) struct LogReader {
     directory: PathBuf,

@@ -22,8 +22,8 @@ pub struct Survey {
     pub mark_lost: bool,
     /// Damage of what was acknowledged, or may have been; in order.
     pub damage: Vec<Damage>,
-    /// What stands after the last acknowledged block and cannot be read: what a crash has caught while
-    /// it was written.
+    /// What stands after the last acknowledged block and cannot be read: what a crash has caught
+    /// while it was written.
     pub torn_tail: Option<Damage>,
     /// What lies before the next block to be appended.
     pub end: Extent,

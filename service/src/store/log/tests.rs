@@ -190,7 +190,8 @@ fn a_torn_tail_is_cut_and_what_was_acknowledged_is_not() {
     }
 }
 
-/// The mark may be a second old after a power cut. What the blocks say of those before them holds too.
+/// The mark may be a second old after a power cut. What the blocks say of those before them holds
+/// too.
 #[test]
 fn a_block_that_a_later_one_calls_durable_was_acknowledged() {
     let directory = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! One flipped bit anywhere in a store: the service starts, what it serves is what was acknowledged, and
-//! a space of which something is lost is stopped by name.
+//! One flipped bit anywhere in a store: the service starts, what it serves is what was
+//! acknowledged, and a space of which something is lost is stopped by name.
 
 use std::fs;
 use std::path::{Path, PathBuf};
