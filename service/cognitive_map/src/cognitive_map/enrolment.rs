@@ -11,11 +11,12 @@ use crate::sample::Label;
 use crate::trip::TripEnd;
 
 impl CognitiveMap {
-    /// Enrols an agent under the next number, or under one that is vacant.
+    /// Enrols an agent under the next number, or under one that is vacant. A name is one agent's at a time.
     pub(super) fn enrol(&mut self, id: AgentId, name: &Label, events: &mut Vec<Event>) {
         let index = id.0 as usize;
         let is_next = index == self.agents.len();
-        if !is_next && !self.is_vacant(id) {
+        let is_free = is_next || self.is_vacant(id);
+        if !is_free || self.names.contains_key(name) {
             return;
         }
         self.revision += 1;
@@ -30,9 +31,7 @@ impl CognitiveMap {
             // The estimate and the chronicle have held a new agent under this number since it is vacant.
             *vacant = agent;
         }
-        Arc::make_mut(&mut self.names)
-            .entry(name.clone())
-            .or_insert(id);
+        Arc::make_mut(&mut self.names).insert(name.clone(), id);
         events.push(Event {
             agent: id,
             stamp_ns: 0,
@@ -47,10 +46,7 @@ impl CognitiveMap {
             return;
         };
         let name = agent.name().clone();
-        let names = Arc::make_mut(&mut self.names);
-        if names.get(&name) == Some(&id) {
-            names.remove(&name);
-        }
+        Arc::make_mut(&mut self.names).remove(&name);
         if let Some(mut fold) = self.open(id, events) {
             fold.remove(name);
         }

@@ -92,8 +92,8 @@ impl CognitiveMap {
     /// Applies the next record of the journal, and appends to `events` what it brought about.
     ///
     /// Every record is legal. One that says nothing new has no effect at all: the enrolment of an
-    /// agent that is there (or is neither next in line nor vacant), the removal of one that is not, a lesson that is not next in
-    /// line, a sample of an unknown or removed agent, of an earlier session, or with a sequence number that has been applied or
+    /// agent that is there (or is neither next in line nor vacant, or has another one's name), the removal of one that is not, a
+    /// lesson that is not next in line, a sample of an unknown or removed agent, of an earlier session, or with a sequence number that has been applied or
     /// skipped. A sample whose number is
     /// ahead first skips the missing ones as [`SkipReason::Lost`]. Work and memory per sample are
     /// bounded, whatever the size of the map.
