@@ -7,7 +7,7 @@ use cogmap_proto::Trajectory;
 
 use super::*;
 use crate::engine::{IngestError, TrajectoryError};
-use crate::store::Store;
+use crate::store::{Derived, Journal};
 
 fn wait<T>(answer: impl Future<Output = T>) -> T {
     let runtime = tokio::runtime::Builder::new_current_thread().build();
@@ -50,10 +50,10 @@ fn names(engine: &Engine) -> Vec<String> {
     desks.iter().map(|desk| desk.name().to_owned()).collect()
 }
 
-fn drop_checkpoint(directory: &Path) {
-    let store = FjallStore::open(directory).expect("the store opens");
+fn forget_checkpoint(directory: &Path) {
+    let store = LocalStore::open(directory).expect("the store opens");
     let number = store.spaces().expect("spaces")[0].number;
-    store.drop_checkpoint(number).expect("dropped");
+    store.forget(number).expect("forgotten");
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn a_removed_agent_stays_removed_and_its_past_stays_readable() {
         engine.shutdown();
         drop(engine);
         if round == 1 {
-            drop_checkpoint(directory.path());
+            forget_checkpoint(directory.path());
         }
         engine = open(directory.path(), settings);
         assert_eq!(digest(&engine), digest_before, "round {round}");
@@ -183,7 +183,7 @@ fn agents_that_were_never_in_the_map_make_room_and_others_do_not() {
     let before = digest(&engine);
     engine.shutdown();
     drop(engine);
-    drop_checkpoint(directory.path());
+    forget_checkpoint(directory.path());
     engine = open(directory.path(), settings);
     assert_eq!(digest(&engine), before);
     assert_eq!(names(&engine), [AGENT, "fourth", "third"]);

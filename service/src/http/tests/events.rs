@@ -186,7 +186,7 @@ async fn whoever_falls_behind_is_told_how_many_events_it_missed() {
 async fn events_keep_their_ids_over_a_restart_and_in_a_replay() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let start = || {
-        let store = FjallStore::open(directory.path()).expect("the store opens");
+        let store = LocalStore::open(directory.path()).expect("the store opens");
         let settings = EngineSettings::default();
         let engine = Engine::open(Arc::new(store), settings, Arc::new(Silent)).expect("opens");
         let name = "lab".parse().expect("a name");
@@ -218,9 +218,9 @@ async fn events_keep_their_ids_over_a_restart_and_in_a_replay() {
     engine.shutdown();
     drop((engine, space));
     // Without it the journal tells the same.
-    let store = FjallStore::open(directory.path()).expect("the store opens");
-    let stored = &crate::store::Store::spaces(&store).expect("readable")[0];
-    crate::store::Store::drop_checkpoint(&store, stored.number).expect("dropped");
+    let store = LocalStore::open(directory.path()).expect("the store opens");
+    let stored = &crate::store::Journal::spaces(&store).expect("readable")[0];
+    crate::store::Derived::forget(&store, stored.number).expect("forgotten");
     drop(store);
     let (engine, space) = start();
     assert_eq!(all(&space), before);
