@@ -200,7 +200,11 @@ fn places_and_recall_agree_with_the_way() {
         agent: Some("nobody".to_owned()),
         ..RecallQuery::default()
     };
-    assert!(api.recall("default", &elsewhere).unwrap().places.is_empty());
+    let unknown = api.recall("default", &elsewhere).unwrap_err().to_string();
+    assert!(
+        unknown.contains("\"nobody\"") && unknown.contains("404"),
+        "{unknown}"
+    );
     // The agent stands where it began, and says at which place.
     let estimate = api.agent("default", AGENT).unwrap().estimate.unwrap();
     assert_eq!(estimate.seq + 1, driven.samples.len() as u64);
