@@ -377,6 +377,12 @@ fn events_and_export_tell_what_the_lists_tell() {
 fn only_the_events_of_the_agent_that_was_asked_for_come() {
     let driven = Driven::new();
     let mut server = driven.server;
+    // An agent that is not there yet is unknown, to whoever wants to follow it, too.
+    let first = batch(1, 0, driven.samples[..1].to_vec());
+    server
+        .api()
+        .post_samples("default", "cleo", &first)
+        .unwrap();
     let (http, (opened, open)) = (server.http(), channel());
     let stream = thread::spawn(move || {
         let mut agents = BTreeSet::new();
