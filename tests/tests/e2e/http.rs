@@ -200,7 +200,11 @@ fn places_and_recall_agree_with_the_way() {
         agent: Some("nobody".to_owned()),
         ..RecallQuery::default()
     };
-    assert!(api.recall("default", &elsewhere).unwrap().places.is_empty());
+    let unknown = api.recall("default", &elsewhere).unwrap_err().to_string();
+    assert!(
+        unknown.contains("\"nobody\"") && unknown.contains("404"),
+        "{unknown}"
+    );
     // The agent stands where it began, and says at which place.
     let estimate = api.agent("default", AGENT).unwrap().estimate.unwrap();
     assert_eq!(estimate.seq + 1, driven.samples.len() as u64);
@@ -373,6 +377,12 @@ fn events_and_export_tell_what_the_lists_tell() {
 fn only_the_events_of_the_agent_that_was_asked_for_come() {
     let driven = Driven::new();
     let mut server = driven.server;
+    // An agent that is not there yet is unknown, to whoever wants to follow it, too.
+    let first = batch(1, 0, driven.samples[..1].to_vec());
+    server
+        .api()
+        .post_samples("default", "cleo", &first)
+        .unwrap();
     let (http, (opened, open)) = (server.http(), channel());
     let stream = thread::spawn(move || {
         let mut agents = BTreeSet::new();

@@ -8,10 +8,11 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 25] = [
+const ROUTES: [(&str, &[&str]); 26] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
+    ("/v1", &["get"]),
     ("/v1/spaces", &["get"]),
     ("/v1/spaces/{space}", &["delete", "get", "put"]),
     ("/v1/spaces/{space}/agents", &["get"]),

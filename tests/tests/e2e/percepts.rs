@@ -116,7 +116,11 @@ fn a_percept_recalls_where_it_was_felt() {
         ..roughness(1.0)
     };
     let answer = api.recall("default", &recall(PerceptCue::Level(unknown)));
-    assert!(answer.unwrap().places.is_empty());
+    let unknown = answer.unwrap_err().to_string();
+    assert!(
+        unknown.contains("\"warmth\"") && unknown.contains("404"),
+        "{unknown}"
+    );
 }
 
 #[test]
