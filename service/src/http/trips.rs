@@ -44,11 +44,17 @@ pub(crate) async fn list(
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
     let map = space.snapshot().await?;
-    // Nobody has the number of an agent that is not there.
-    let agent = query
-        .agent
-        .as_deref()
-        .map(|name| space.agent(name).map(|desk| desk.id()));
+    // An agent that is not there has no trips.
+    let agent = match &query.agent {
+        None => None,
+        Some(name) => {
+            let Some(desk) = space.agent(name) else {
+                let (trips, next) = (Vec::new(), None);
+                return Ok(reply::json(&TripPage { trips, next }));
+            };
+            Some(desk.id())
+        }
+    };
     // A filter may look at every trip.
     let listed = service.long.make(move || trips(&map, &query, agent, limit));
     listed.await
@@ -57,7 +63,7 @@ pub(crate) async fn list(
 fn trips(
     map: &CognitiveMap,
     query: &TripsQuery,
-    agent: Option<Option<AgentId>>,
+    agent: Option<AgentId>,
     limit: usize,
 ) -> Response<Body> {
     let first = page::first(query.after);
@@ -65,7 +71,7 @@ fn trips(
         .into_iter()
         .flat_map(|first| map.trips_from(TripId(first)));
     let wanted = listed.filter(|(_, trip)| {
-        agent.is_none_or(|agent| agent == Some(trip.agent()))
+        agent.is_none_or(|agent| agent == trip.agent())
             && query
                 .since_ns
                 .is_none_or(|since| trip.end_stamp_ns() >= since)
