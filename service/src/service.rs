@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use metrics_exporter_prometheus::PrometheusHandle;
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpSocket};
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use zenoh::Session;
@@ -21,6 +21,8 @@ use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohOut
 
 /// Longest wait for the Zenoh session to close.
 const SESSION_CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
+/// Most connections of HTTP that are not yet accepted.
+const HTTP_BACKLOG: u32 = 4096;
 /// Most connections that are not yet a session of Zenoh.
 const ZENOH_HANDSHAKES_MAX: usize = 128;
 
@@ -87,27 +89,10 @@ impl Service {
                 source: source.into(),
             })?;
         }
-        let limit = descriptors::raise_limit();
-        let shares = descriptors::share_out(limit, wanted(config));
-        let http_settings = fitting(config.http.settings(), shares.http);
-        if shares.sessions < config.zenoh.sessions_max {
-            let (key, wanted, most) = (
-                "zenoh.sessions_max",
-                config.zenoh.sessions_max,
-                shares.sessions,
-            );
-            tracing::warn!(key, wanted, most, "lowered: too few open files are allowed");
-        }
-        tracing::info!(
-            limit,
-            http_connections = http_settings.connections_max,
-            zenoh_sessions = shares.sessions,
-            zenoh_handshakes = shares.handshakes,
-            "open files"
-        );
+        let (http_settings, shares) = share_descriptors(config);
         let address = config.http.listen;
         let of_http = |source| StartError::Http { address, source };
-        let listener = TcpListener::bind(address).await.map_err(of_http)?;
+        let listener = listen(address).map_err(of_http)?;
         if config.http.is_open() {
             tracing::warn!(%address, "anyone who reaches this address can read and write: set http.token");
         }
@@ -244,13 +229,40 @@ pub fn open_store(directory: &Path) -> Result<LocalStore, StoreError> {
     LocalStore::open(directory)
 }
 
-/// How many descriptors connections may use, by the settings.
-fn wanted(config: &Config) -> Shares {
-    Shares {
+/// Listens on an address. Connections that come faster than they are accepted wait in a long queue: of
+/// those beyond it the system drops the first packet, and they come again after a second.
+fn listen(address: SocketAddr) -> std::io::Result<TcpListener> {
+    let socket = match address {
+        SocketAddr::V4(_) => TcpSocket::new_v4()?,
+        SocketAddr::V6(_) => TcpSocket::new_v6()?,
+    };
+    socket.set_reuseaddr(true)?;
+    socket.bind(address)?;
+    socket.listen(HTTP_BACKLOG)
+}
+
+/// Shares out the descriptors that the system allows. Bounds of the settings that do not fit are lowered.
+fn share_descriptors(config: &Config) -> (HttpSettings, Shares) {
+    let limit = descriptors::raise_limit();
+    let wanted = Shares {
         http: config.http.connections_max,
         sessions: config.zenoh.sessions_max,
         handshakes: ZENOH_HANDSHAKES_MAX,
+    };
+    let shares = descriptors::share_out(limit, wanted);
+    if shares.sessions < wanted.sessions {
+        let (key, wanted, most) = ("zenoh.sessions_max", wanted.sessions, shares.sessions);
+        tracing::warn!(key, wanted, most, "lowered: too few open files are allowed");
     }
+    let http = fitting(config.http.settings(), shares.http);
+    tracing::info!(
+        limit,
+        http_connections = http.connections_max,
+        zenoh_sessions = shares.sessions,
+        zenoh_handshakes = shares.handshakes,
+        "open files"
+    );
+    (http, shares)
 }
 
 /// The settings of HTTP with so many connections: bounds that do not fit are lowered.

@@ -1,6 +1,7 @@
 //! Trajectories, as JSON or in the TUM format.
 
 use axum::body::Body;
+use axum::extract::State;
 use axum::http::header::{ACCEPT, HeaderMap, HeaderValue, LINK};
 use axum::http::{Response, Uri};
 use cogmap_proto::{StampedPose, Trajectory};
@@ -11,6 +12,7 @@ use super::extract::{AgentName, AgentParams, Query};
 use super::page;
 use super::problem::{Kind, Problem};
 use super::reply;
+use super::state::Service;
 
 /// Media type of the TUM format.
 pub(crate) const TUM: &str = "text/plain; charset=utf-8";
@@ -72,6 +74,7 @@ pub(crate) struct TrajectoryQuery {
         (status = 404, description = "There is no such space or agent"),
         (status = 422, description = "A session was named for a refined trajectory")))]
 pub(crate) async fn get(
+    State(service): State<Service>,
     AgentName(space, agent): AgentName,
     Query(query): Query<TrajectoryQuery>,
     uri: Uri,
@@ -98,16 +101,20 @@ pub(crate) async fn get(
         }
     };
     let format = query.format.unwrap_or_else(|| accepted(&headers));
-    if format == TrajectoryFormat::Json {
-        return Ok(reply::json(&read));
-    }
-    let mut response = reply::with_type(TUM, Body::from(tum(&read.poses)));
-    if let Some(next) = read.next_from_ns {
-        let session = (read.kind == "causal").then_some(read.session);
-        let link = next_page(&uri, session, next);
-        response.headers_mut().insert(LINK, link);
-    }
-    Ok(response)
+    // A page is a text of a thousand poses.
+    let written = service.long.make(move || {
+        if format == TrajectoryFormat::Json {
+            return reply::json(&read);
+        }
+        let mut response = reply::with_type(TUM, Body::from(tum(&read.poses)));
+        if let Some(next) = read.next_from_ns {
+            let session = (read.kind == "causal").then_some(read.session);
+            let link = next_page(&uri, session, next);
+            response.headers_mut().insert(LINK, link);
+        }
+        response
+    });
+    written.await
 }
 
 fn accepted(headers: &HeaderMap) -> TrajectoryFormat {

@@ -32,14 +32,14 @@ const KEPT_BYTES: usize = 4 << 10;
 /// The lanes.
 #[derive(Debug)]
 pub(super) struct Lanes {
-    lanes: Vec<Lane>,
+    all: Vec<Lane>,
     by_name: HashMap<Box<str>, usize>,
     /// Whose first message is taken next: a lane for each message that has come into the order.
     order: VecDeque<usize>,
     /// Where an empty lane is looked for next.
     hand: usize,
     /// Most lanes; smaller in tests.
-    lanes_max: usize,
+    most: usize,
 }
 
 #[derive(Debug, Default)]
@@ -62,11 +62,11 @@ enum Item {
 impl Default for Lanes {
     fn default() -> Self {
         Self {
-            lanes: vec![Lane::default()],
+            all: vec![Lane::default()],
             by_name: HashMap::new(),
             order: VecDeque::new(),
             hand: 0,
-            lanes_max: LANES_MAX,
+            most: LANES_MAX,
         }
     }
 }
@@ -86,7 +86,7 @@ impl Lanes {
         free: Load,
     ) -> Result<usize, NotQueued> {
         let lane = self.lane_of(agent);
-        let load = self.lanes[lane].load;
+        let load = self.all[lane].load;
         if load.messages + 1 > free.messages || load.bytes + bytes > free.bytes {
             return Err(NotQueued::LaneFull);
         }
@@ -100,7 +100,7 @@ impl Lanes {
             agent_len: agent.len(),
             payload_len: payload.len(),
         };
-        let bytes = &mut self.lanes[lane].bytes;
+        let bytes = &mut self.all[lane].bytes;
         bytes.extend(agent.as_bytes());
         bytes.extend(payload);
         self.push_item(lane, Item::Encoded(head));
@@ -112,7 +112,7 @@ impl Lanes {
     }
 
     fn push_item(&mut self, lane: usize, item: Item) {
-        let into = &mut self.lanes[lane];
+        let into = &mut self.all[lane];
         let size = item.bytes();
         let takes_turns = into.ordered.messages < into.items.len();
         into.items.push_back(item);
@@ -130,7 +130,7 @@ impl Lanes {
         while taken < bytes
             && let Some(&first) = self.order.front()
         {
-            let lane = &mut self.lanes[first];
+            let lane = &mut self.all[first];
             let is_call = matches!(lane.items.front(), Some(Item::Call(..)));
             if is_call && !frames.is_empty() {
                 break;
@@ -166,27 +166,27 @@ impl Lanes {
         if agent.is_empty() {
             return SHARED;
         }
-        let lane = if self.lanes.len() < self.lanes_max {
-            self.lanes.push(Lane::default());
-            self.lanes.len() - 1
+        let lane = if self.all.len() < self.most {
+            self.all.push(Lane::default());
+            self.all.len() - 1
         } else {
             match self.empty_lane() {
                 Some(lane) => lane,
                 None => return SHARED,
             }
         };
-        self.by_name.remove(&*self.lanes[lane].name);
-        self.lanes[lane].name = agent.into();
+        self.by_name.remove(&*self.all[lane].name);
+        self.all[lane].name = agent.into();
         self.by_name.insert(agent.into(), lane);
         lane
     }
 
     /// A lane with nothing in it, the hand's next one.
     fn empty_lane(&mut self) -> Option<usize> {
-        let own = self.lanes.len() - 1;
+        let own = self.all.len() - 1;
         for _ in 0..own {
             self.hand = self.hand % own + 1;
-            if self.lanes[self.hand].items.is_empty() {
+            if self.all[self.hand].items.is_empty() {
                 return Some(self.hand);
             }
         }
@@ -289,7 +289,7 @@ mod tests {
         // Messages larger than a turn are taken, too.
         let mut lanes = Lanes::default();
         for _ in 0..8 {
-            push(&mut lanes, "large", &[0; FEW_BYTES]);
+            push(&mut lanes, "large", &vec![0; FEW_BYTES]);
         }
         assert_eq!(take(&mut lanes, 8 * FEW_BYTES).len(), 8);
     }
@@ -297,14 +297,14 @@ mod tests {
     #[test]
     fn names_of_the_network_take_bounded_room() {
         let mut lanes = Lanes {
-            lanes_max: 8,
+            most: 8,
             ..Lanes::default()
         };
         for name in 0..1000 {
             push(&mut lanes, &format!("one-{name}"), b"x");
             take(&mut lanes, 1000);
         }
-        assert!(lanes.lanes.len() <= 8 && lanes.by_name.len() <= 8);
+        assert!(lanes.all.len() <= 8 && lanes.by_name.len() <= 8);
         // With every lane in use, further names share one, and nothing is mixed up.
         for name in 0..20 {
             push(&mut lanes, &format!("busy-{name:02}"), b"x");

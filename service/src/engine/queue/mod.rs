@@ -337,7 +337,10 @@ mod tests {
     #[test]
     fn one_agent_alone_cannot_fill_the_queue() {
         let (queue, mut inbox) = queue(1_000_000, 1_000_000);
-        let fill = |agent: &str| (0..).find(|_| push(&queue, agent, 1000).is_err()).unwrap();
+        let fill = |agent: &str| {
+            let taken = (0..1000).take_while(|_| push(&queue, agent, 1000).is_ok());
+            taken.count()
+        };
         let first = fill("first");
         assert_eq!(
             (first, push(&queue, "first", 1000)),

@@ -1,7 +1,5 @@
 //! The interface on a socket: streams, and the end of the service.
 
-use std::io::Read;
-
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::sync::oneshot;
@@ -208,7 +206,8 @@ async fn where_no_connection_waits_the_next_one_does() {
     let mut stream = connect(&running, "/v1/spaces/lab/events").await;
     read_until(&mut stream, "\r\n\r\n").await;
     let mut second = connect(&running, "/healthz").await;
-    let early = tokio::time::timeout(Duration::from_millis(200), second.read(&mut [0; 64]));
+    let mut answer = [0; 64];
+    let early = tokio::time::timeout(Duration::from_millis(200), second.read(&mut answer));
     assert!(early.await.is_err(), "there is no room for it");
     drop(stream);
     read_until(&mut second, "\"ok\"").await;
