@@ -68,7 +68,7 @@ def open_session(
     session = _opened(config)
     if session is None:
         found = "; ".join(f"{endpoint} {_probe(endpoint)}" for endpoint in endpoints)
-        raise Timeout(f"no Zenoh router let this robot in within {timeout_s:g} s: {found}")
+        raise Timeout(f"no Zenoh router answers within {timeout_s:g} s: {found}")
     return session
 
 

@@ -153,6 +153,9 @@ impl Tuc {
     }
 
     /// The step that ended next to a moment; of two equally near ones the earlier.
+    ///
+    /// # Panics
+    /// The set has no odometry, which reading refuses.
     pub fn step_at(&self, stamp_ns: i64) -> usize {
         let after = self.steps.partition_point(|step| step.stamp_ns < stamp_ns);
         let candidates = after.saturating_sub(1)..(after + 1).min(self.steps.len());

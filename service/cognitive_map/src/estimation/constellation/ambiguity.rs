@@ -10,13 +10,17 @@ pub(super) struct Laid<'a> {
     older: &'a [Star],
     newer: &'a [Star],
     /// Positions of the newer ones in the older frame.
-    laid: Vec<Point3<f64>>,
+    positions: Vec<Point3<f64>>,
 }
 
 impl<'a> Laid<'a> {
     pub(super) fn new(pose: &Isometry3<f64>, older: &'a [Star], newer: &'a [Star]) -> Self {
-        let laid = newer.iter().map(|star| pose * star.position).collect();
-        Self { older, newer, laid }
+        let positions = newer.iter().map(|star| pose * star.position).collect();
+        Self {
+            older,
+            newer,
+            positions,
+        }
     }
 
     /// The pairs, numbers of an older and a newer landmark, in which no other landmark of either
@@ -54,7 +58,7 @@ impl<'a> Laid<'a> {
     }
 
     fn squared_m2(&self, older: usize, newer: usize) -> f64 {
-        (self.laid[newer] - self.older[older].position).norm_squared()
+        (self.positions[newer] - self.older[older].position).norm_squared()
     }
 }
 
