@@ -1,5 +1,7 @@
 //! A space, as everyone but its writer sees it.
 
+mod loading;
+
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
@@ -12,7 +14,7 @@ use cognitive_map::{AgentId, CognitiveMap, Label, Lesson, Settings};
 use metrics::gauge;
 use tokio::sync::oneshot;
 
-use super::checkpointer::{Checkpointer, Job};
+use super::checkpointer::Job;
 use super::committer::Commit;
 use super::desk::AgentDesk;
 use super::events::{EventFollower, EventLog};
@@ -20,12 +22,10 @@ use super::health::Health;
 use super::message::{Call, IngestError, ObjectRequest, Request};
 use super::outlet::Outlet;
 use super::question::QuestionRoom;
-use super::queue::{Inbox, NotQueued, Queue, queue};
-use super::recovery::{self, Loading, RecoveryError};
+use super::queue::{NotQueued, Queue, queue};
 use super::refinement::Refinements;
 use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
-use super::writer::Writer;
 use crate::metrics::SPACE_STOPPED;
 use crate::store::{DerivedError, SpaceNumber, Store};
 
@@ -144,7 +144,7 @@ impl Space {
             let (shared, around) = (Arc::clone(&shared), around.clone());
             Builder::new()
                 .name(format!("space {name}"))
-                .spawn(move || load_and_run(&shared, inbox, around, &core))
+                .spawn(move || loading::load_and_run(&shared, inbox, around, &core))
                 .expect("the system can start a thread")
         };
         Self {
@@ -374,63 +374,6 @@ impl Space {
         }
         let loaded = self.shared.loaded.get();
         loaded.cloned().unwrap_or(Err(Unavailable::Recovering))
-    }
-}
-
-/// Stands for the writer's thread: when it ends, also by a panic, nobody waits for it any more.
-struct Presence<'a>(&'a Shared);
-
-impl Drop for Presence<'_> {
-    fn drop(&mut self) {
-        if !self.0.closing.load(Ordering::Acquire) {
-            self.0.broken.store(true, Ordering::Release);
-            tracing::error!(space = %self.0.name, "the space's writer has ended");
-        }
-        // Whoever waits learns it by the end of the channel.
-        *self.0.wishes() = None;
-    }
-}
-
-fn load_and_run(shared: &Arc<Shared>, inbox: Inbox, around: Surroundings, core: &Settings) {
-    let Surroundings {
-        store,
-        health,
-        commits,
-        jobs,
-        settings,
-        ..
-    } = around;
-    let closing = || shared.closing.load(Ordering::Acquire);
-    let loading = Loading {
-        store: &*store,
-        health: &health,
-        name: &shared.name,
-        space: shared.number,
-        settings: core,
-        interval_ns: shared.interval_ns,
-    };
-    match recovery::recover(&loading, closing) {
-        Ok(recovered) => {
-            let progress = (recovered.checkpoint_revision, recovered.next_block);
-            let interval = settings.checkpoint_interval;
-            let checkpointer =
-                Checkpointer::new(shared.number, store, health, jobs, interval, progress);
-            let space = &*shared.name;
-            tracing::info!(space, revision = recovered.map.revision(), "space loaded");
-            shared
-                .revision
-                .store(recovered.map.revision(), Ordering::Release);
-            shared.events.begin(recovered.events.clone());
-            let writer = Writer::new(Arc::clone(shared), commits, checkpointer, recovered);
-            let _present = Presence(shared);
-            let _ = shared.loaded.set(Ok(()));
-            writer.run(inbox);
-        }
-        Err(RecoveryError::Closing) => {
-            let closing = "the space is closing".to_owned();
-            let _ = shared.loaded.set(Err(Unavailable::Failed(closing)));
-        }
-        Err(error) => shared.stop(error.to_string()),
     }
 }
 

@@ -11,9 +11,9 @@ pub(crate) fn of(operation: &str) -> Option<Value> {
         "create_space" => json!({ "seed": 1, "localized_sd_m": 0.5, "trip_stillness_s": 5 }),
         // The session is one run of the agent, by convention the time of its start in nanoseconds.
         "send_samples" => {
-            json!({ "session": 1_800_000_000_000_000_000_u64, "first_seq": 0, "samples": [
-            { "stamp_ns": 1_800_000_000_000_000_000_i64, "body": step },
-            { "stamp_ns": 1_800_000_000_100_000_000_i64, "body": touched },
+            json!({ "session": 1_700_000_000_000_000_000_u64, "first_seq": 0, "samples": [
+            { "stamp_ns": 1_700_000_000_000_000_000_i64, "body": step },
+            { "stamp_ns": 1_700_000_000_100_000_000_i64, "body": touched },
         ] })
         }
         "recall" => json!({ "position_m": [1, 0, 0], "radius_m": 5, "limit": 3 }),

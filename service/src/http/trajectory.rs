@@ -13,6 +13,7 @@ use super::page;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
+use crate::answer::agent_once_named;
 
 /// Media type of the TUM format.
 pub(crate) const TUM: &str = "text/plain; charset=utf-8";
@@ -81,6 +82,7 @@ pub(crate) async fn get(
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
+    agent_once_named(&space, agent.as_str())?;
     let (name, from_ns, to_ns) = (agent.as_str(), query.from_ns, query.to_ns);
     let read = match query.kind.unwrap_or_default() {
         TrajectoryKind::Causal => {

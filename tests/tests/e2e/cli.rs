@@ -210,7 +210,8 @@ fn exports_hold_all_that_was_sent() {
             .collect()
     };
     let (exported, served) = (numbers(exported.text()), numbers(&tum.body));
-    assert_eq!((exported.len(), served.len()), (rows, rows));
+    // A page has at most a thousand.
+    assert_eq!((exported.len(), served.len()), (rows, rows.min(1000)));
     for (exported, served) in exported.iter().zip(&served) {
         let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-8;
         assert!(

@@ -47,6 +47,7 @@ from .settings import SpaceSettings
 from .sse import server_sent_events
 from .trajectory import StampedPose, Trajectory
 from .unreachable import translated
+from .url import checked_url
 from .vector import vec3
 from .wire import CBOR, JSON, decode, encode, to_wire
 
@@ -87,7 +88,7 @@ class Client:
         timeout_s: float = 10.0,
         ca_file: Optional[str] = None,
     ) -> None:
-        self._url = _checked_url(url)
+        self._url = checked_url(url)
         self._token = token
         self._timeout_s = timeout_s
         self._tls = None if ca_file is None else ssl.create_default_context(cafile=ca_file)
@@ -467,19 +468,6 @@ class Client:
                 where += " without a token" if self._token is None else " with the given token"
             with error:
                 raise _api_error(error.code, error.reason, error.read(), where) from None
-
-
-def _checked_url(url: str) -> str:
-    """`url` without a slash at its end, if requests can go there."""
-    expected = "expected an address such as http://127.0.0.1:8080"
-    try:
-        parts = urllib.parse.urlsplit(url)
-        usable = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0
-    except (ValueError, TypeError, AttributeError):
-        usable = False
-    if not usable:
-        raise InvalidValue("url", url, expected)
-    return url.rstrip("/")
 
 
 def _path(*segments: str) -> str:

@@ -151,7 +151,7 @@ class AgentTarget:
     name: str
 
     def __post_init__(self) -> None:
-        label("name", self.name)
+        check_name("name", self.name)
 
 
 @dataclass(frozen=True)

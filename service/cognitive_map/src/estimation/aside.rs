@@ -79,6 +79,11 @@ impl Frame {
 }
 
 impl Estimator {
+    /// Whether an agent is in the map, or was there when it was set aside.
+    pub fn has_been_in_map(&self, agent: u32) -> bool {
+        self.is_in_map(agent) || self.is_aside(agent)
+    }
+
     /// Whether an agent was set aside because what it said was absurd, and has said nothing since
     /// that fits.
     pub fn is_aside(&self, agent: u32) -> bool {
