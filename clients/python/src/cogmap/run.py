@@ -42,6 +42,9 @@ _log = logging.getLogger("cogmap")
 _ESTIMATES_WAITING_MAX = 4096
 #: Watermarks and refusals that wait; a later one says all that an earlier one did.
 _ANSWERS_WAITING_MAX = 256
+#: How long a full batch waits for its turn on the caller's thread [s]: longer than a put takes, and
+#: far less than one on a congested network.
+_TURN_S = 0.1
 #: How often the arrival of the service is looked for [s].
 _MATCH_POLL_S = 0.01
 #: How long a robot waits at its start for the watermark that the service has of it, and again
@@ -175,9 +178,9 @@ class Run:
             if stamp_ns is not None:
                 self.clock.take(seq, stamp_ns)
             due = self.window.ready(now)
-        if due and self._may_send and self._publishing.acquire(blocking=False):
-            # A full batch leaves on the caller's thread, for the other one might wait long for its
-            # turn.
+        if due and self._may_send and self._publishing.acquire(timeout=_TURN_S):
+            # A full batch leaves on the caller's thread, so that what one program sends for several
+            # robots leaves in that order.
             try:
                 self._send_due()
             finally:
