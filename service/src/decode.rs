@@ -5,12 +5,12 @@ pub(crate) mod fault;
 
 use cogmap_proto as wire;
 use cogmap_proto::limits::ROTATIONS_MAX;
-use cognitive_map::recognition::{Orientation, Reached};
 use cognitive_map::{
     Descriptor, InvalidSample, Label, Level, Marker, Motion, ObjectMark, PerceptCue, PoseNoise,
     RangeBearing, Relation, RelativePose, RelativePosition, Sample, SampleBody, Sighting, Spacing,
     StartPose, Target, Touch, TouchLevel, TouchNoise,
 };
+use object_recognition::{Orientation, Reached};
 
 /// Reads one sample that has just come.
 ///

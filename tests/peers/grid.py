@@ -2,7 +2,7 @@
 
 Nothing about the modules stands here. How many there are, their spacings and orientations are what
 the service's grid answers say at four positions; the formulas are those of
-`service/cognitive_map/src/grid/` (`lattice.rs`, `population.rs`).
+`service/core/grid/src/` (`lattice.rs`, `population.rs`).
 """
 
 from __future__ import annotations

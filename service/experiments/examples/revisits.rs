@@ -14,9 +14,9 @@ use std::num::NonZeroUsize;
 use cogmap_experiments::eval::{
     Environment, Experiment, Percept, Protocol, Report, ViewSettings, Walk,
 };
-use cogmap_experiments::g2o::write_g2o;
 use cogmap_experiments::world::OdometryNoise;
 use cognitive_map::Recruitment;
+use pose_graph::g2o::write_g2o;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -17,10 +17,10 @@ use std::error::Error;
 use std::time::Instant;
 
 use cogmap_experiments::objects::{EDGE_M, ExplorationNoise, Explorer, VoxelObject};
-use cognitive_map::recognition::{
+use nalgebra::Point3;
+use object_recognition::{
     Contact, ModelSettings, ObjectId, ObjectLibrary, ObjectModel, Orientation, Recognition,
 };
-use nalgebra::Point3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

@@ -1,10 +1,10 @@
 //! Grid-cell state of an agent.
 
 use cogmap_proto as wire;
-use cognitive_map::grid::heading::heading_rad;
-use cognitive_map::grid::octant_activation;
-use cognitive_map::grid::population::{TUNING_WIDTH, activation, interference_pattern};
 use cognitive_map::{Agent, CognitiveMap};
+use grid::heading::heading_rad;
+use grid::octant_activation;
+use grid::population::{TUNING_WIDTH, activation, interference_pattern};
 use nalgebra::{Point3, Vector3};
 
 /// The grid state of an agent; nothing before its first sample.
@@ -24,7 +24,7 @@ pub fn grid_state(map: &CognitiveMap, agent: &Agent) -> Option<wire::GridState> 
                 spacing_m: lattice.spacing_m(),
                 reference: state.reference,
                 reference_m: lattice
-                    .position(state.reference, &cognitive_map::grid::Phase::zero())
+                    .position(state.reference, &grid::Phase::zero())
                     .coords
                     .into(),
                 phase: (*state.phase.turns()).into(),

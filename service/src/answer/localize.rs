@@ -2,8 +2,8 @@
 
 use cogmap_proto as wire;
 use cogmap_proto::limits::LOCALIZE_SAMPLES_MAX;
-use cognitive_map::geometry::{PoseCovariance, upper_triangle};
 use cognitive_map::{CognitiveMap, Guess, InvalidSample, Localization, Sample};
+use geometry::{PoseCovariance, upper_triangle};
 use nalgebra::Isometry3;
 
 use super::FRAME;

@@ -2,11 +2,11 @@
 
 use cogmap_proto as wire;
 use cogmap_proto::limits::{IDENTIFY_CONTACTS_MAX, LESSON_CONTACTS_MAX};
-use cognitive_map::geometry::upper_triangle;
-use cognitive_map::recognition::{
+use cognitive_map::{AgentId, CognitiveMap, Identified, InvalidSample, KnownObject, Lesson, Touch};
+use geometry::upper_triangle;
+use object_recognition::{
     LevelMemory, ModelPlace, ObjectId, ObjectModel, Orientation, PoseEstimate, Posterior, Verdict,
 };
-use cognitive_map::{AgentId, CognitiveMap, Identified, InvalidSample, KnownObject, Lesson, Touch};
 
 use crate::decode::{self, fault};
 

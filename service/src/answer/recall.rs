@@ -3,8 +3,8 @@
 use cogmap_proto as wire;
 use cogmap_proto::limits::{METRES_MAX, PAGE_ITEMS_MAX};
 use cogmap_proto::{Name, NameError, RecallQuery};
-use cognitive_map::grid::{InvalidCode, PartialCode, Phase};
 use cognitive_map::{AgentId, CognitiveMap, InvalidSample, RecallCue};
+use grid::{InvalidCode, PartialCode, Phase};
 use nalgebra::{Point3, Vector3};
 
 use super::channel::{InvalidChannel, check_cue};

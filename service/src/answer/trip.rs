@@ -1,8 +1,8 @@
 //! Trips and their legs.
 
 use cogmap_proto as wire;
-use cognitive_map::geometry::upper_triangle;
 use cognitive_map::{CognitiveMap, Leg, Trip, TripId};
+use geometry::upper_triangle;
 
 use super::place::agent_name;
 use crate::engine::trip_end;

@@ -4,8 +4,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use cognitive_map::recognition::Orientation;
 use cognitive_map::{CognitiveMap, Identified, Localization, Sample, Touch};
+use object_recognition::Orientation;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 use super::space::{Space, Unavailable};

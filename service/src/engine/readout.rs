@@ -31,7 +31,7 @@ pub(crate) fn readout(space: &str, map: &CognitiveMap, id: AgentId) -> Option<Re
         status: status(map.status(id)?),
         translation_m: pose.translation_m,
         rotation_xyzw: pose.rotation_xyzw,
-        covariance: cognitive_map::geometry::upper_triangle(&covariance),
+        covariance: geometry::upper_triangle(&covariance),
         place,
         confidence,
     };

@@ -8,11 +8,11 @@ use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::Response;
 use axum::http::header::{CONTENT_DISPOSITION, HeaderValue};
-use cogmap_experiments::g2o::write_g2o;
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{AgentSummary, Landmark, Place, SpaceInfo, TripDetail};
 use cognitive_map::{CognitiveMap, LandmarkId, PlaceId, TripId};
 use futures_util::stream;
+use pose_graph::g2o::write_g2o;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 

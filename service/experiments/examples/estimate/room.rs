@@ -2,8 +2,8 @@
 
 use cogmap_experiments::world::{ObstacleWorld, Odometer, OdometryNoise, PureWalker, Step, Walker};
 use cognitive_map::estimation::{Estimator, Parameters};
-use cognitive_map::geometry::se3;
 use cognitive_map::{Label, PoseNoise, RangeBearing, Relation, Sample, SampleBody, StartPose};
+use geometry::se3;
 use nalgebra::{Isometry3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -7,9 +7,9 @@ use cogmap_experiments::metrics::{Alignment, Span, StampedPose, Trajectory, ate_
 use cogmap_experiments::tuc::{Match, Tuc};
 use cognitive_map::chronicle::{Chronicle, ChronicleSettings, Moment};
 use cognitive_map::estimation::Calibrated;
-use cognitive_map::experience::Link;
 use cognitive_map::{PoseNoise, Relation, RelativePose};
 use nalgebra::Isometry3;
+use pose_graph::Link;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -2,15 +2,15 @@
 
 use std::collections::VecDeque;
 
-use cognitive_map::experience::ExperienceMap;
-use cognitive_map::grid::population::{TUNING_WIDTH, interference_pattern, population_vector};
-use cognitive_map::grid::similarity::{cosine, exponential_confidence};
-use cognitive_map::grid::{GridCode, GridModules, PartialCode, decode};
 use cognitive_map::{
     AgentId, CognitiveMap, Descriptor, Event, EventKind, InvalidSample, Label, PerceptCue, PlaceId,
     RecallCue, Recalled, Record, Sample,
 };
+use grid::population::{TUNING_WIDTH, interference_pattern, population_vector};
+use grid::similarity::{cosine, exponential_confidence};
+use grid::{GridCode, GridModules, PartialCode, decode};
 use nalgebra::{Isometry3, Point3, Vector3};
+use pose_graph::PoseGraph;
 
 use super::agent::{Agent, stamp_ns};
 use super::curve::Curve;
@@ -72,7 +72,7 @@ pub struct Path {
     /// The obstacles.
     pub cubes: Vec<Cube>,
     /// What is remembered of the walk, relaxed.
-    pub experience: ExperienceMap,
+    pub experience: PoseGraph,
 }
 
 /// Whether a run keeps its path.

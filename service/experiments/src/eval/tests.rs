@@ -353,13 +353,13 @@ fn views_of_places_seen_before_refine_the_walk_and_its_graph_can_be_read() {
     assert!(causal_m < 0.75 * drift_m, "{report:?}");
     assert!(refined_m < 0.6 * drift_m, "{report:?}");
     let path = experiment.path().unwrap();
-    let text = crate::g2o::write_g2o(&path.experience);
-    let graph = crate::g2o::PoseGraph::read(&text).unwrap();
+    let text = pose_graph::g2o::write_g2o(&path.experience);
+    let graph = pose_graph::g2o::G2oGraph::read(&text).unwrap();
     assert_eq!(graph.poses().len(), path.experience.poses().count());
     let between = path
         .experience
         .links()
-        .filter(|link| matches!(link, cognitive_map::experience::Link::Between { .. }));
+        .filter(|link| matches!(link, pose_graph::Link::Between { .. }));
     assert_eq!(graph.edges().len(), between.count());
 }
 

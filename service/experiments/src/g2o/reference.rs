@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::graph::PoseGraph;
+use pose_graph::g2o::G2oGraph;
 
 /// Positions by the id of the pose: a text with id, x, y and, in space, z \[m\] in columns.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +52,7 @@ impl Reference {
     ///
     /// # Errors
     /// There is none for any.
-    pub fn of_poses(&self, graph: &PoseGraph) -> Result<Vec<Option<Vector3<f64>>>, ReferenceError> {
+    pub fn of_poses(&self, graph: &G2oGraph) -> Result<Vec<Option<Vector3<f64>>>, ReferenceError> {
         let positions: Vec<_> = graph
             .poses()
             .keys()

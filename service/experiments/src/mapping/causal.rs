@@ -1,10 +1,8 @@
 //! The pose as it was known when it arrived.
 
-use cognitive_map::experience::{
-    ExpectedPose, Freedom, IncrementalRelaxation, IncrementalSettings, Innovation,
-};
-use cognitive_map::geometry::{PoseCovariance, upper_triangle};
+use geometry::{PoseCovariance, upper_triangle};
 use nalgebra::{Isometry3, Matrix3, Matrix6};
+use pose_graph::{ExpectedPose, Freedom, IncrementalRelaxation, IncrementalSettings, Innovation};
 
 use super::consistency::Consistency;
 use super::growth::{Growth, Lead};

@@ -1,6 +1,6 @@
 //! Whether errors are as large as the map says.
 
-use cognitive_map::experience::Innovation;
+use pose_graph::Innovation;
 
 /// Squared errors in standard deviations, by the degrees of freedom that they had.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,8 +1,8 @@
 //! A recording on its way into a map.
 
-use cognitive_map::experience::{ExperienceMap, Freedom, Kernel, Link, LinkId, PointId, PoseId};
-use cognitive_map::experience::{PoseInformation, SightingTarget};
 use nalgebra::{Isometry3, Point3};
+use pose_graph::{Freedom, Kernel, Link, LinkId, PointId, PoseGraph, PoseId};
+use pose_graph::{PoseInformation, SightingTarget};
 
 use super::recording::{Matches, Measured, Recording};
 
@@ -10,7 +10,7 @@ use super::recording::{Matches, Measured, Recording};
 #[derive(Clone, Debug)]
 pub(super) struct Growth<'a> {
     pub(super) recording: &'a Recording,
-    pub(super) map: ExperienceMap,
+    pub(super) map: PoseGraph,
     pub(super) poses: Vec<PoseId>,
     /// Landmarks that were seen.
     pub(super) landmarks: Vec<Option<PointId>>,
@@ -42,7 +42,7 @@ impl<'a> Growth<'a> {
     pub(super) fn new(recording: &'a Recording) -> Self {
         Self {
             recording,
-            map: ExperienceMap::new(),
+            map: PoseGraph::new(),
             poses: Vec::with_capacity(recording.steps.len()),
             landmarks: vec![None; recording.landmarks.len()],
             judged: Vec::new(),

@@ -1,10 +1,8 @@
 //! Which matches hold, and the map that fits them best.
 
 use cognitive_map::Digest;
-use cognitive_map::experience::{
-    ExperienceMap, Graduation, Innovation, Kernel, RelaxationSettings, Scale, Start,
-};
 use nalgebra::{Isometry3, Point3};
+use pose_graph::{Graduation, Innovation, Kernel, PoseGraph, RelaxationSettings, Scale, Start};
 
 use super::growth::Growth;
 use super::recording::{Matches, Recording};
@@ -187,7 +185,7 @@ fn truncated(growth: &Growth<'_>) -> f64 {
     growth.map.chi_squared() + rejected
 }
 
-fn relax(map: &mut ExperienceMap, start: Start, graduation: Graduation) {
+fn relax(map: &mut PoseGraph, start: Start, graduation: Graduation) {
     map.relax(&RelaxationSettings {
         start,
         graduation,

@@ -1,7 +1,7 @@
 //! What one robot measured, in the order in which it arrived.
 
-use cognitive_map::experience::{Freedom, Kernel, PoseInformation, PositionInformation};
 use nalgebra::{Isometry3, Point3, Vector3};
+use pose_graph::{Freedom, Kernel, PoseInformation, PositionInformation};
 
 /// A recording. Poses are numbered as their steps, landmarks by themselves.
 #[derive(Clone, Debug, PartialEq)]

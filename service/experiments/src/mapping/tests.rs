@@ -6,7 +6,8 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 use super::{CausalRun, Recording, Refined, Verdict};
-use crate::g2o::PoseGraph;
+use crate::g2o::recording;
+use pose_graph::g2o::G2oGraph;
 
 /// Poses of one round.
 const ROUND: u64 = 20;
@@ -31,8 +32,8 @@ fn rounds() -> String {
     text
 }
 
-fn recording(text: &str) -> Recording {
-    PoseGraph::read(text).unwrap().recording()
+fn read(text: &str) -> Recording {
+    recording(&G2oGraph::read(text).unwrap())
 }
 
 fn causal(recording: &Recording) -> (Vec<Vector3<f64>>, Verdict) {
@@ -54,14 +55,14 @@ fn positions(refined: &Refined) -> Vec<Vector3<f64>> {
 
 #[test]
 fn false_matches_are_left_out_and_the_map_is_the_one_without_them() {
-    let clean = recording(&rounds());
+    let clean = read(&rounds());
     let mut text = rounds();
     // Half as many false matches as true ones, each between places on different sides of the round.
     for k in 0..20 {
         let (from, to) = (k, k + 2 * ROUND - 7 - k % 3);
         writeln!(text, "EDGE_SE2 {from} {to} 0.3 -0.2 1.5 100 0 0 100 0 2500").unwrap();
     }
-    let doubtful = recording(&text);
+    let doubtful = read(&text);
     let (clean_causal, clean_verdict) = causal(&clean);
     let (doubtful_causal, verdict) = causal(&doubtful);
     assert_eq!(
@@ -88,7 +89,7 @@ fn false_matches_that_come_first_and_agree_do_not_stay() {
         let (from, to) = (k, ROUND - 6 + k);
         writeln!(text, "EDGE_SE2 {from} {to} -4 0 1 4 0 0 4 0 36").unwrap();
     }
-    let recording = recording(&text);
+    let recording = read(&text);
     let (estimate, verdict) = causal(&recording);
     let refined = Refined::of(&recording, Some(&verdict));
     let last = estimate.len() - 1;
@@ -105,7 +106,7 @@ fn the_same_recording_gives_the_same_bits() {
     let mut text = rounds();
     text.push_str("EDGE_SE2 2 33 5 5 1 100 0 0 100 0 2500\n");
     let run = || {
-        let recording = recording(&text);
+        let recording = read(&text);
         let (estimate, verdict) = causal(&recording);
         (estimate, Refined::of(&recording, Some(&verdict)).digest)
     };
@@ -156,7 +157,7 @@ fn odd_graphs_are_relaxed_as_far_as_they_say_something() {
             "EDGE_SE2 0 18446744073709551615 1 0 0 1 0 0 1 0 1\n",
         ),
     ] {
-        let recording = recording(text);
+        let recording = read(text);
         let (estimate, verdict) = causal(&recording);
         let refined = Refined::of(&recording, Some(&verdict));
         let all = estimate
@@ -178,7 +179,7 @@ fn odd_graphs_are_relaxed_as_far_as_they_say_something() {
 fn a_held_node_stays_and_the_others_come() {
     let text = "FIX 2\nFIX 0\nVERTEX_SE2 2 3 0 0\nVERTEX_SE2 0 0 0 0\n\
         EDGE_SE2 0 1 1 0 0 1 0 0 1 0 100\nEDGE_SE2 1 2 1 0 0 1 0 0 1 0 100\n";
-    let recording = recording(text);
+    let recording = read(text);
     let refined = Refined::of(&recording, None);
     let expected = [0.0, 1.5, 3.0].map(|x| Vector3::new(x, 0.0, 0.0));
     assert!(largest(&positions(&refined), &expected) < 1e-6);
@@ -190,7 +191,7 @@ fn a_held_node_stays_and_the_others_come() {
 #[test]
 fn a_sensor_is_where_its_entry_puts_it() {
     let text = "PARAMS_SE3OFFSET 4 0 0 1 0 0 1 0\nVERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nEDGE_SE3_TRACKXYZ 0 9 4 2 0 0 1 0 0 4 0 9\n";
-    let refined = Refined::of(&recording(text), None);
+    let refined = Refined::of(&read(text), None);
     assert!((refined.landmarks[0].coords - Vector3::new(-2.0, 0.0, 1.0)).norm() < 1e-9);
 }
 
@@ -213,8 +214,8 @@ proptest! {
         for (pose, point, x, information) in sightings {
             writeln!(text, "EDGE_SE2_XY {pose} {point} {x} 1 {information} 0 {information}").unwrap();
         }
-        if let Ok(graph) = PoseGraph::read(&text) {
-            let recording = graph.recording();
+        if let Ok(graph) = G2oGraph::read(&text) {
+            let recording = recording(&graph);
             let (estimate, verdict) = causal(&recording);
             let refined = Refined::of(&recording, Some(&verdict));
             prop_assert!(estimate.iter().chain(&positions(&refined)).all(|p| p.norm() < 1e6));

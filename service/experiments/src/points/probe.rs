@@ -1,7 +1,7 @@
 //! How contacts with an object come about.
 
-use cognitive_map::recognition::NextTouch;
 use nalgebra::{Isometry3, Vector3};
+use object_recognition::NextTouch;
 use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 

@@ -1,6 +1,6 @@
 //! The error of a rotation, modulo an object's own symmetries.
 
-use cognitive_map::geometry::se3;
+use geometry::se3;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 
 use super::cloud::Cloud;

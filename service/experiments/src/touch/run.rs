@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use cognitive_map::recognition::{Contact, ModelSettings, ObjectLibrary, ObjectModel};
+use object_recognition::{Contact, ModelSettings, ObjectLibrary, ObjectModel};
 
 use super::data_set::{Touch, TouchSet};
 use super::episode::{Episode, TouchNoise, episode_random};

@@ -288,7 +288,7 @@ fn step(columns: &[&str], before_ns: Option<i64>) -> Result<OdometryStep, TucRea
     let sd = variances.map(|variance: f64| variance.sqrt() * duration_s);
     Ok(OdometryStep {
         stamp_ns,
-        motion: cognitive_map::geometry::se3::exp(&linear, &angular),
+        motion: geometry::se3::exp(&linear, &angular),
         noise_sd: Vector6::new(sd[0], sd[1], 0.0, 0.0, 0.0, sd[2]),
     })
 }

@@ -1,8 +1,8 @@
 //! A data set as the robot recorded it.
 
-use cognitive_map::experience::{Freedom, Kernel, PoseInformation, Scale};
-use cognitive_map::geometry::PoseCovariance;
+use geometry::PoseCovariance;
 use nalgebra::{Isometry3, Matrix3, Matrix6};
+use pose_graph::{Freedom, Kernel, PoseInformation, Scale};
 
 use super::data_set::{Match, Tuc};
 use crate::mapping::{Matches, Measured, Recording, Step};

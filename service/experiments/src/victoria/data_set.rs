@@ -5,8 +5,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use cognitive_map::experience::{InvalidInformation, PoseInformation, PositionInformation};
 use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Vector3};
+use pose_graph::{InvalidInformation, PoseInformation, PositionInformation};
 
 /// Name of the file in a directory.
 const FILE: &str = "victoria_park.txt";

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use cognitive_map::experience::Freedom;
 use nalgebra::Isometry3;
+use pose_graph::Freedom;
 
 use super::data_set::Victoria;
 use crate::mapping::{Landmark, Matches, Measured, Recording, Step};

@@ -84,7 +84,7 @@ fn a_bad_line_is_named() {
         ("ODOMETRY 3 3 1 0 0 1 0 0 1 0 1", VictoriaReason::Loop),
         (
             "ODOMETRY 3 4 1 0 0 1 0 0 1 0 0",
-            VictoriaReason::Covariance(cognitive_map::experience::InvalidInformation::Singular),
+            VictoriaReason::Covariance(pose_graph::InvalidInformation::Singular),
         ),
     ] {
         match Victoria::read(&format!("{TEXT}{line}\n")) {

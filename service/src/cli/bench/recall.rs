@@ -8,8 +8,8 @@ use std::time::Instant;
 use anyhow::Context;
 use clap::Args;
 use cogmap_experiments::eval::code::{CueSource, Damage, DrawnCue, survey};
-use cognitive_map::grid::similarity;
 use cognitive_map::{CognitiveMap, Settings, SettingsValues};
+use grid::similarity;
 use nalgebra::Point3;
 use serde::Serialize;
 

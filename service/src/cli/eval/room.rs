@@ -9,11 +9,11 @@ use cogmap_experiments::eval::{
     Environment, Experiment, PAPER_P_NEW, Percept, Protocol, Report, SightingSettings, Table,
     ViewSettings, Walk, figures,
 };
-use cogmap_experiments::g2o::write_g2o;
 use cogmap_experiments::metrics::StampedPose;
 use cogmap_experiments::tum::write_tum;
 use cogmap_experiments::world::OdometryNoise;
 use cognitive_map::{Recruitment, SettingsValues};
+use pose_graph::g2o::write_g2o;
 
 use super::progress::Progress;
 use crate::cli::output;

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use cogmap_experiments::g2o::{PoseGraph, Reference};
+use cogmap_experiments::g2o::{Reference, recording};
 use cogmap_experiments::metrics::Alignment;
+use pose_graph::g2o::G2oGraph;
 
 use super::recorded::{self, Case, RecordedArgs, Truth};
 
@@ -27,7 +28,7 @@ pub(super) fn run(args: &G2oArgs) -> anyhow::Result<()> {
     let named = |path: &Path| path.display().to_string();
     let text = std::fs::read_to_string(&args.file)
         .with_context(|| format!("read {}", args.file.display()))?;
-    let graph = PoseGraph::read(&text).with_context(|| named(&args.file))?;
+    let graph = G2oGraph::read(&text).with_context(|| named(&args.file))?;
     let beside = args.file.with_extension("opt_xyz.txt");
     let reference = args
         .reference
@@ -49,7 +50,7 @@ pub(super) fn run(args: &G2oArgs) -> anyhow::Result<()> {
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned(),
-        recording: &graph.recording(),
+        recording: &recording(&graph),
         truth,
         alignment: if graph.is_planar() {
             Alignment::Planar

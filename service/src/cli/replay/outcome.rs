@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use cogmap_proto::{Evidence, StampedPose};
-use cognitive_map::geometry::PoseCovariance;
+use geometry::PoseCovariance;
 use serde::Serialize;
 
 /// What came out of a replay.

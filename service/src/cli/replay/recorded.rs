@@ -8,8 +8,8 @@ use clap::Args;
 use cogmap_experiments::mapping::{self, CausalRun, Consistency, Recording, Refined};
 use cogmap_experiments::metrics::{Alignment, Pairs, Span, StampedPose, Trajectory};
 use cogmap_experiments::tum::write_tum;
-use cognitive_map::experience::Innovation;
 use nalgebra::{Isometry3, Vector3};
+use pose_graph::Innovation;
 
 use super::recorded_report::{Closures, ConsistencyReport, Report, UpdateMs};
 use crate::cli::eval::Progress;

@@ -10,7 +10,7 @@ use cogmap_experiments::touch::{
     TouchExperiment, TouchNoise, TouchProtocol, TouchReport, TouchSet,
 };
 
-use cognitive_map::recognition::SURE;
+use object_recognition::SURE;
 
 use crate::cli::eval::{Progress, Turns};
 use crate::cli::output;

@@ -1,7 +1,7 @@
 //! What the interface answers when all is well.
 
-use cogmap_experiments::g2o::PoseGraph;
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
+use pose_graph::g2o::G2oGraph;
 
 use super::*;
 
@@ -327,7 +327,7 @@ async fn exports_hold_everything() {
         g2o.header("content-disposition"),
         "attachment; filename=\"lab.g2o\""
     );
-    let graph = PoseGraph::read(g2o.text()).expect("the format");
+    let graph = G2oGraph::read(g2o.text()).expect("the format");
     let way_m = { graph.edges().iter() }.map(|edge| edge.transform.translation.vector.norm());
     assert!((way_m.sum::<f64>() - 5.0).abs() < 1e-6, "{}", g2o.text());
     assert_eq!(graph.point_edges().len(), 2, "two posts were seen");

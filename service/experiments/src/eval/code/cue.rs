@@ -1,7 +1,7 @@
 //! Codes to recall places by, as good or as bad as asked for.
 
-use cognitive_map::grid::{PartialCode, Phase};
 use cognitive_map::{CognitiveMap, PlaceId, RecallCue};
+use grid::{PartialCode, Phase};
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use cognitive_map::Settings;
-use cognitive_map::grid::decode;
+use grid::decode;
 
 use super::*;
 use crate::eval::InvalidProtocol;

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use cognitive_map::Settings;
-use cognitive_map::grid::{GridModules, Lattice, unique_range_m};
+use grid::{GridModules, Lattice, unique_range_m};
 use serde::Serialize;
 
 /// Precision and range of a code with independent Gaussian noise of s turns on each phase component.
@@ -29,7 +29,7 @@ pub struct CodeTheory {
 impl CodeTheory {
     /// Of a space's code, with `s` turns of noise and so many places.
     pub fn of(settings: &Settings, s: f64, places: u64) -> Self {
-        let modules = GridModules::new(settings);
+        let modules = GridModules::new(&settings.grid());
         let spacings = modules.lattices().iter().map(Lattice::spacing_m);
         let spacings_m: Vec<f64> = spacings.collect();
         let stiffness: f64 = spacings_m.iter().map(|d| d.powi(-2)).sum();

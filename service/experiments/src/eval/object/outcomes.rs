@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use cognitive_map::recognition::ObjectId;
+use object_recognition::ObjectId;
 
 use super::trace::{Answer, Trace};
 use crate::eval::statistic::quantile;

@@ -1,6 +1,6 @@
 //! What is done with how many objects.
 
-use cognitive_map::recognition::SURE;
+use object_recognition::SURE;
 
 use crate::eval::object::Rotate;
 use crate::objects::ExplorationNoise;

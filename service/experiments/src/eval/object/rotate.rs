@@ -1,7 +1,7 @@
 //! How an object lies when it is to be recognised.
 
-use cognitive_map::recognition::Orientation;
 use nalgebra::{Quaternion, UnitQuaternion};
+use object_recognition::Orientation;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

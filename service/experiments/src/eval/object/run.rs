@@ -2,8 +2,8 @@
 
 use std::num::NonZeroUsize;
 
-use cognitive_map::recognition::{Contact, ModelSettings, ObjectId, ObjectLibrary, ObjectModel};
 use nalgebra::{Point3, Unit, UnitQuaternion};
+use object_recognition::{Contact, ModelSettings, ObjectId, ObjectLibrary, ObjectModel};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -2,8 +2,8 @@
 
 use std::num::NonZeroUsize;
 
-use cognitive_map::recognition::ObjectId;
 use nalgebra::UnitQuaternion;
+use object_recognition::ObjectId;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

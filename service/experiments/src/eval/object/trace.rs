@@ -1,8 +1,6 @@
 //! One exploration as the recogniser sees it, touch by touch.
 
-use cognitive_map::recognition::{
-    Contact, ObjectId, ObjectLibrary, Orientation, Posterior, Recognition,
-};
+use object_recognition::{Contact, ObjectId, ObjectLibrary, Orientation, Posterior, Recognition};
 
 /// Objects whose probabilities differ by less are tied.
 const TIE: f64 = 1e-9;

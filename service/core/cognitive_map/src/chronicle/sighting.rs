@@ -1,0 +1,206 @@
+//! What was seen from an anchor.
+
+use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
+
+use crate::input::Relation;
+use geometry::PoseCovariance;
+use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+
+/// Least deviation of a sighting, so that one that states none has an inverse \[m\].
+const DEVIATION_MIN_M: f64 = 1e-3;
+/// Shortest distance at which a direction means something \[m\].
+const DISTANCE_MIN_M: f64 = 0.02;
+
+/// What was seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Shown {
+    /// A landmark, by number.
+    Landmark(u32),
+    /// An agent, at this place in the frame of one of its anchors.
+    Agent(u32, Vector3<f64>),
+}
+
+/// A position seen from an anchor.
+#[derive(Clone, Debug)]
+pub(super) struct Sighting {
+    /// The anchor from which, and the next sighting made there.
+    pub(super) anchor: u32,
+    pub(super) next: u32,
+    pub(super) shown: Shown,
+    /// The next sighting that shows the same anchor.
+    pub(super) next_shown: u32,
+    pub(super) point: SeenPoint,
+}
+
+/// A position in the frame of an anchor \[m\], with the covariance of its error \[m²\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SeenPoint {
+    pub(super) position: Vector3<f64>,
+    /// Of what is another error each time.
+    pub(super) fresh: Matrix3<f64>,
+    /// Of what is the same error each time that the point is seen from the same place.
+    pub(super) lasting: Matrix3<f64>,
+}
+
+state_of_struct!(SeenPoint {
+    position,
+    fresh,
+    lasting
+});
+state_of_struct!(Sighting {
+    anchor,
+    next,
+    shown,
+    next_shown,
+    point
+});
+
+impl State for Shown {
+    fn write(&self, out: &mut StateWriter) {
+        match self {
+            Self::Landmark(landmark) => {
+                0_u8.write(out);
+                landmark.write(out);
+            }
+            Self::Agent(anchor, lever) => {
+                1_u8.write(out);
+                anchor.write(out);
+                lever.write(out);
+            }
+        }
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        match u8::read(input)? {
+            0 => u32::read(input).map(Self::Landmark),
+            1 => Ok(Self::Agent(State::read(input)?, State::read(input)?)),
+            _ => Err(CorruptState::Invalid),
+        }
+    }
+}
+
+impl SeenPoint {
+    /// Of a relation, with the variances of its components: along the axes \[m²\], or of the distance \[m²\] and of the
+    /// two angles about the seen direction, along growing azimuth and elevation \[rad²\]. What these are beyond what the
+    /// relation itself states counts as an error that lasts.
+    pub(super) fn new(relation: &Relation, variance: &Vector3<f64>) -> Self {
+        let floor = DEVIATION_MIN_M * DEVIATION_MIN_M;
+        let (position, axes, scale) = match relation {
+            Relation::Position(seen) => (
+                *seen.translation_m(),
+                Matrix3::identity(),
+                Vector3::repeat(1.0),
+            ),
+            Relation::Pose(seen) => (
+                seen.pose().translation.vector,
+                seen.pose().rotation.to_rotation_matrix().into_inner(),
+                Vector3::repeat(1.0),
+            ),
+            Relation::RangeBearing(seen) => {
+                let (sin_azimuth, cos_azimuth) = seen.azimuth_rad().sin_cos();
+                let (sin_elevation, cos_elevation) = seen.elevation_rad().sin_cos();
+                let forward = Vector3::new(
+                    cos_elevation * cos_azimuth,
+                    cos_elevation * sin_azimuth,
+                    sin_elevation,
+                );
+                let left = Vector3::new(-sin_azimuth, cos_azimuth, 0.0);
+                let range_m = seen.range_m().max(DISTANCE_MIN_M);
+                (
+                    forward * range_m,
+                    Matrix3::from_columns(&[forward, left, forward.cross(&left)]),
+                    Vector3::new(1.0, range_m * range_m, range_m * range_m),
+                )
+            }
+        };
+        let fresh = stated_variance(relation).inf(variance);
+        let lasting = variance - fresh;
+        let in_body = |variance: &Vector3<f64>| {
+            let along = Matrix3::from_diagonal(&variance.component_mul(&scale));
+            symmetric(&(axes * along * axes.transpose()))
+        };
+        Self {
+            position,
+            fresh: in_body(&fresh) + Matrix3::from_diagonal_element(floor),
+            lasting: in_body(&lasting),
+        }
+    }
+
+    /// Covariance of the whole error \[m²\].
+    pub(super) fn covariance(&self) -> Matrix3<f64> {
+        self.fresh + self.lasting
+    }
+
+    /// The point in the frame of an anchor from which a motion with this covariance led to where it was seen:
+    /// Δ exp(ξ) p.
+    pub(super) fn before(&self, motion: &Isometry3<f64>, covariance: &PoseCovariance) -> Self {
+        let turn = motion.rotation.to_rotation_matrix().into_inner();
+        let fresh = self.fresh + swing(&self.position, covariance);
+        Self {
+            position: turn * self.position + motion.translation.vector,
+            fresh: symmetric(&(turn * fresh * turn.transpose())),
+            lasting: symmetric(&(turn * self.lasting * turn.transpose())),
+        }
+    }
+
+    /// The point in the frame of the anchor to which a motion led from where it was seen: exp(−ξ) Δ⁻¹ p.
+    pub(super) fn after(&self, motion: &Isometry3<f64>, covariance: &PoseCovariance) -> Self {
+        let back = motion
+            .rotation
+            .to_rotation_matrix()
+            .into_inner()
+            .transpose();
+        let position = back * (self.position - motion.translation.vector);
+        let fresh = back * self.fresh * back.transpose() + swing(&position, covariance);
+        Self {
+            position,
+            fresh: symmetric(&fresh),
+            lasting: symmetric(&(back * self.lasting * back.transpose())),
+        }
+    }
+
+    /// The mean of two points that were seen from one place, weighted by how sure they are but for what lasts. That
+    /// the mean keeps.
+    pub(super) fn mean(&self, other: &Self) -> Option<Self> {
+        let own = self.fresh.try_inverse()?;
+        let others = other.fresh.try_inverse()?;
+        let fresh = symmetric(&(own + others).try_inverse()?);
+        let shift = fresh * (others * (other.position - self.position));
+        let is_surer = other.lasting.trace() < self.lasting.trace();
+        Some(Self {
+            position: self.position + shift,
+            fresh,
+            lasting: if is_surer {
+                other.lasting
+            } else {
+                self.lasting
+            },
+        })
+    }
+}
+
+/// Variances of a relation's components as it states them \[m², or m², rad², rad²\].
+pub(super) fn stated_variance(relation: &Relation) -> Vector3<f64> {
+    let sd = match relation {
+        Relation::Position(seen) => *seen.sd_m(),
+        Relation::Pose(seen) => seen.noise().sd().fixed_rows::<3>(0).into_owned(),
+        Relation::RangeBearing(seen) => {
+            let bearing = seen.bearing_sd_rad();
+            Vector3::new(seen.range_sd_m(), bearing, bearing)
+        }
+    };
+    sd.component_mul(&sd)
+}
+
+/// What an error ξ of a pose does to a point p in its frame, ρ + φ×p: the covariance of that.
+pub(super) fn swing(point: &Vector3<f64>, covariance: &PoseCovariance) -> Matrix3<f64> {
+    let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
+    jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+    let lever = -point.cross_matrix();
+    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+    jacobian * covariance.matrix() * jacobian.transpose()
+}
+
+pub(super) fn symmetric(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    (matrix + matrix.transpose()) * 0.5
+}

@@ -1,0 +1,127 @@
+//! Names that turned out to be those of one landmark.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::sight::Verdict;
+use crate::input::Label;
+
+/// Most names that stand for others. Beyond that no landmarks are found to be the same.
+pub(super) const ALIASES_MAX: usize = 4096;
+/// A name whose sightings were refused this often in a row, by agents that are where they should be, is not that of the
+/// landmark that it was taken for. Less often than a landmark is forgotten for.
+const REFUSED_TO_PART: u32 = 6;
+
+/// What a name stands for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Alias {
+    /// The landmark's name.
+    pub(super) name: Label,
+    /// Sightings under the other name refused one after the other.
+    pub(super) refused: u32,
+}
+
+/// The names that stand for others. A clone shares them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Aliases {
+    pub(super) names: Arc<BTreeMap<Label, Alias>>,
+}
+
+impl Aliases {
+    /// The landmark's name, of a name that may stand for another.
+    pub(super) fn name_of<'a>(&'a self, label: &'a Label) -> &'a Label {
+        self.names.get(label).map_or(label, |alias| &alias.name)
+    }
+
+    /// The names that others stand for, in order.
+    pub(super) fn names_of_others(&self) -> Vec<&Label> {
+        let mut names: Vec<&Label> = self.names.values().map(|alias| &alias.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// Whether there is room for more.
+    pub(super) fn has_room(&self, n: usize) -> bool {
+        self.names.len() + n <= ALIASES_MAX
+    }
+
+    /// A name stands for another one from now on, and so does what stood for it.
+    pub(super) fn insert(&mut self, label: &Label, name: &Label) {
+        let names = Arc::make_mut(&mut self.names);
+        for alias in names.values_mut().filter(|alias| alias.name == *label) {
+            alias.name = name.clone();
+        }
+        let alias = Alias {
+            name: name.clone(),
+            refused: 0,
+        };
+        names.insert(label.clone(), alias);
+        names.remove(name);
+    }
+
+    /// A landmark was seen under a name. One that contradicts the landmark it stands for is its own again.
+    ///
+    /// `observer_refused` counts the observer's sightings refused one after the other: of an agent that contradicts everything, the
+    /// name is not to blame.
+    pub(super) fn weigh(&mut self, label: &Label, verdict: Verdict, observer_refused: u32) {
+        let Some(alias) = self.names.get(label) else {
+            return;
+        };
+        let refused = match verdict {
+            Verdict::Refused => alias.refused + 1,
+            _ => 0,
+        };
+        if refused == alias.refused {
+            return; // as most often: nothing is copied
+        }
+        let names = Arc::make_mut(&mut self.names);
+        if refused >= REFUSED_TO_PART && observer_refused < REFUSED_TO_PART / 2 {
+            names.remove(label);
+        } else if let Some(alias) = names.get_mut(label) {
+            alias.refused = refused;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn label(text: &str) -> Label {
+        Label::new(text).unwrap()
+    }
+
+    #[test]
+    fn a_name_of_a_name_is_that_of_the_landmark() {
+        let mut aliases = Aliases::default();
+        aliases.insert(&label("c"), &label("b"));
+        aliases.insert(&label("b"), &label("a"));
+        for name in ["a", "b", "c"] {
+            assert_eq!(aliases.name_of(&label(name)), &label("a"));
+        }
+        assert_eq!(aliases.name_of(&label("d")), &label("d"));
+    }
+
+    #[test]
+    fn a_name_parts_from_what_it_contradicts_unless_the_observer_is_to_blame() {
+        let mut aliases = Aliases::default();
+        let (name, alias) = (label("a"), label("b"));
+        aliases.insert(&alias, &name);
+        for _ in 0..20 {
+            aliases.weigh(&alias, Verdict::Refused, 7);
+        }
+        assert_eq!(aliases.name_of(&alias), &name);
+        let accepted = Verdict::Accepted {
+            nis: 1.0,
+            components: 2,
+        };
+        aliases.weigh(&alias, accepted, 0);
+        for _ in 0..5 {
+            aliases.weigh(&alias, Verdict::Refused, 1);
+        }
+        assert_eq!(aliases.name_of(&alias), &name);
+        aliases.weigh(&alias, Verdict::Refused, 1);
+        assert_eq!(aliases.name_of(&alias), &alias);
+    }
+}

@@ -1,0 +1,104 @@
+//! What odometry gets wrong all the time.
+
+use nalgebra::{Isometry3, SVector, Vector3};
+
+use ::state::state_of_struct;
+use geometry::se3;
+
+/// Least factor by which a reading was multiplied.
+const FACTOR_MIN: f64 = 0.1;
+
+/// What odometry gets wrong all the time: reading = true · (1 + error) + bias.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Calibration {
+    /// Relative error of lengths.
+    pub length: f64,
+    /// Relative error of angles.
+    pub angle: f64,
+    /// Bias about the body axes \[rad/s\].
+    pub bias_rad_s: Vector3<f64>,
+}
+
+/// How a motion was corrected by what was known of its odometry then.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Calibrated {
+    /// What it was corrected by.
+    pub calibration: Calibration,
+    /// Variances of that, in the order of the fields.
+    pub variance: SVector<f64, 5>,
+    /// Variances by which the true errors may have changed with the motion.
+    pub wander: SVector<f64, 5>,
+    /// How long the body moved, and the bias with it \[s\].
+    pub moving_s: f64,
+}
+
+state_of_struct!(Calibration {
+    length,
+    angle,
+    bias_rad_s
+});
+state_of_struct!(Calibrated {
+    calibration,
+    variance,
+    wander,
+    moving_s
+});
+
+impl Calibrated {
+    /// The same odometry, and no motion yet.
+    pub(crate) fn without_motion(&self) -> Self {
+        Self {
+            wander: SVector::zeros(),
+            moving_s: 0.0,
+            ..*self
+        }
+    }
+
+    /// This motion, then the `next` one.
+    pub(crate) fn then(&self, next: &Self) -> Self {
+        Self {
+            wander: self.wander + next.wander,
+            moving_s: self.moving_s + next.moving_s,
+            ..*next
+        }
+    }
+
+    /// A motion that was corrected so, as it would have been corrected by another calibration.
+    ///
+    /// As if the motion had been an even one, of this twist over the time T that the body moved, with the
+    /// calibration c by which it was corrected and the new one c′:
+    ///
+    /// ```text
+    /// v′ = v (1 − c′_l) / (1 − c_l)      ω′ = (ω + b T) (1 − c′_a) / (1 − c_a) − b′ T
+    /// ```
+    pub(crate) fn corrected_by(
+        &self,
+        motion: &Isometry3<f64>,
+        calibration: &Calibration,
+    ) -> Isometry3<f64> {
+        let (linear, angular) = se3::log(motion);
+        let then = &self.calibration;
+        let length = (1.0 - calibration.length) / (1.0 - then.length).max(FACTOR_MIN);
+        let angle = (1.0 - calibration.angle) / (1.0 - then.angle).max(FACTOR_MIN);
+        let angles = (angular + then.bias_rad_s * self.moving_s) * angle;
+        let bias = calibration.bias_rad_s * self.moving_s;
+        se3::exp(&(linear * length), &(angles - bias))
+    }
+}
+
+impl Calibration {
+    /// Of its components: length, angle, bias.
+    pub(crate) fn of_components(components: &SVector<f64, 5>) -> Self {
+        Self {
+            length: components[0],
+            angle: components[1],
+            bias_rad_s: components.fixed_rows::<3>(2).into_owned(),
+        }
+    }
+
+    /// Its components: length, angle, bias.
+    pub(crate) fn components(&self) -> SVector<f64, 5> {
+        let bias = &self.bias_rad_s;
+        SVector::from([self.length, self.angle, bias.x, bias.y, bias.z])
+    }
+}

@@ -1,0 +1,359 @@
+//! One frame: the agents and landmarks whose errors are estimated together.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
+
+use super::covariance::{Block, JointCovariance};
+use super::dormant::{Dormant, DormantMarks};
+use super::mover::{BODY_DIM, Mover, make_up_for_rounding};
+use super::observers::Observers;
+use super::parameters::{ANY_TURN_SD_RAD, Parameters};
+use super::seat::Traveller;
+use crate::input::Label;
+use geometry::{positive, se3};
+
+/// Agents whose errors are estimated jointly; of more, those that saw and were seen longest ago leave.
+pub(super) const MEMBERS_MAX: usize = 32;
+
+/// Landmarks that are estimated jointly; of more, those seen longest ago leave.
+pub(super) const MARKS_MAX: usize = 96;
+/// Components of a landmark.
+pub(super) const MARK_DIM: usize = 3;
+
+/// An agent that takes part in a frame's joint estimate.
+#[derive(Clone, Debug)]
+pub(super) struct Member {
+    /// Its number.
+    pub(super) agent: u32,
+    /// Where its error begins.
+    pub(super) offset: usize,
+    /// The sighting of the frame that it took part in last.
+    pub(super) used: u64,
+    pub(super) traveller: Arc<Traveller>,
+}
+
+/// A landmark in a frame.
+#[derive(Clone, Debug)]
+pub(super) struct Mark {
+    /// Its number in the frame, never given twice.
+    pub(super) number: u64,
+    pub(super) position: Point3<f64>,
+    /// Where its error begins.
+    pub(super) offset: usize,
+    /// The sighting of the frame that saw it last.
+    pub(super) used: u64,
+    /// Its sightings refused one after the other.
+    pub(super) refused: u32,
+    /// Who has seen it.
+    pub(super) observers: Observers,
+}
+
+/// One frame. A clone shares what it holds.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Frame {
+    /// Number of agents, whether they take part in the joint estimate or not.
+    pub(super) population: u32,
+    pub(super) members: Vec<Member>,
+    pub(super) marks: Arc<BTreeMap<Label, Mark>>,
+    pub(super) dormant: DormantMarks,
+    pub(super) covariance: JointCovariance,
+    /// Landmarks numbered so far.
+    pub(super) numbered: u64,
+    /// Sightings so far.
+    pub(super) sightings: u64,
+}
+
+impl Member {
+    /// Its components of the joint error.
+    pub(super) fn components(&self) -> Range<usize> {
+        self.offset..self.offset + BODY_DIM
+    }
+
+    /// Its body.
+    pub(super) fn mover(&self) -> &Mover {
+        &self.traveller.mover
+    }
+
+    /// The agent itself, to be changed.
+    pub(super) fn traveller_mut(&mut self) -> &mut Traveller {
+        Arc::make_mut(&mut self.traveller)
+    }
+}
+
+impl Frame {
+    /// Lets an agent take part that nothing ties to the others yet.
+    pub(super) fn join(&mut self, agent: u32, mut traveller: Arc<Traveller>) {
+        let offset = self.covariance.grow(BODY_DIM);
+        let own = Arc::make_mut(&mut traveller).mover.covariance_mut();
+        self.covariance.set_diagonal(offset, own);
+        self.members.push(Member {
+            agent,
+            offset,
+            used: self.sightings,
+            traveller,
+        });
+    }
+
+    /// An agent takes part no longer.
+    pub(super) fn leave(&mut self, agent: u32) -> Option<Arc<Traveller>> {
+        let index = self.member(agent)?;
+        let member = self.members.remove(index);
+        self.drop_components(member.offset, BODY_DIM);
+        Some(member.traveller)
+    }
+
+    /// The agent that saw and was seen longest ago.
+    pub(super) fn idlest(&self) -> Option<u32> {
+        let idlest = self.members.iter().min_by_key(|member| member.used)?;
+        Some(idlest.agent)
+    }
+
+    /// Counts a sighting that an agent takes part in.
+    pub(super) fn note_use(&mut self, index: usize) {
+        self.sightings += 1;
+        self.members[index].used = self.sightings;
+    }
+
+    /// Where an agent is in the list of members.
+    pub(super) fn member(&self, agent: u32) -> Option<usize> {
+        self.members.iter().position(|member| member.agent == agent)
+    }
+
+    /// Covariance of a landmark \[m²\].
+    pub(super) fn mark_covariance(&self, mark: &Mark) -> Matrix3<f64> {
+        positive(&self.covariance.block(mark.offset, mark.offset))
+    }
+
+    /// Whether all motion was in the plane.
+    pub(super) fn is_planar(&self) -> bool {
+        self.members.iter().all(|member| member.mover().is_planar)
+    }
+
+    /// Removes components and closes the gap.
+    pub(super) fn drop_components(&mut self, offset: usize, width: usize) {
+        self.covariance.remove(offset, width);
+        let behind = |own: &mut usize| {
+            if *own > offset {
+                *own -= width;
+            }
+        };
+        for member in &mut self.members {
+            behind(&mut member.offset);
+        }
+        for mark in Arc::make_mut(&mut self.marks).values_mut() {
+            behind(&mut mark.offset);
+        }
+    }
+
+    /// Forgets where a landmark is.
+    pub(super) fn forget(&mut self, label: &Label) {
+        if let Some(mark) = Arc::make_mut(&mut self.marks).remove(label) {
+            self.drop_components(mark.offset, MARK_DIM);
+        }
+        self.dormant.remove(label);
+    }
+
+    /// Takes a landmark out of the list, and leaves its components.
+    pub(super) fn take_out(&mut self, label: &Label) -> Option<Mark> {
+        self.marks
+            .contains_key(label)
+            .then(|| Arc::make_mut(&mut self.marks).remove(label))?
+    }
+
+    /// Makes room for one more landmark: those seen longest ago keep their own covariance only.
+    pub(super) fn make_room(&mut self) {
+        while self.marks.len() >= MARKS_MAX {
+            let oldest = self.marks.iter().min_by_key(|(_, mark)| mark.used);
+            let Some(label) = oldest.map(|(label, _)| label.clone()) else {
+                return;
+            };
+            if let Some(mark) = Arc::make_mut(&mut self.marks).remove(&label) {
+                let dormant = Dormant {
+                    position: mark.position,
+                    covariance: self.mark_covariance(&mark),
+                    left: self.sightings,
+                    only: mark.observers.only(),
+                };
+                self.drop_components(mark.offset, MARK_DIM);
+                self.dormant.insert(label, dormant);
+            }
+        }
+    }
+
+    /// Forgets that an agent saw landmarks, whose number will be another one's: it may have been anybody.
+    pub(super) fn forget_observer(&mut self, agent: u32) {
+        for mark in Arc::make_mut(&mut self.marks).values_mut() {
+            mark.observers.forget(agent);
+        }
+    }
+
+    /// Brings all cross terms up to date.
+    ///
+    /// Between sightings a moving body keeps only its own covariance and its transition; what ties it to
+    /// the others waits until it is needed.
+    pub(super) fn flush(&mut self) {
+        for member in &mut self.members {
+            if member.mover().is_stale() {
+                let transition = member.traveller_mut().mover.flush();
+                let own = member.traveller.mover.covariance();
+                self.covariance.transform(member.offset, &transition, own);
+            }
+        }
+        self.hold_turns();
+    }
+
+    /// Takes into account that no rotation is off by more than half a turn, wherever motion or
+    /// doubt have made one less certain.
+    ///
+    /// It is a measurement that finds what is expected, so that all that is correlated with the
+    /// rotation becomes more certain with it.
+    fn hold_turns(&mut self) {
+        let most = ANY_TURN_SD_RAD * ANY_TURN_SD_RAD;
+        let turns = |member: &Member| member.offset + 3..member.offset + 6;
+        let turns: Vec<usize> = self.members.iter().flat_map(turns).collect();
+        let mut has_changed = false;
+        for component in turns {
+            let variance = self.covariance.variance(component);
+            if variance > 1.001 * most {
+                let mut jacobian = SMatrix::<f64, 1, 6>::zeros();
+                jacobian[0] = 1.0;
+                let block = Block {
+                    offset: component,
+                    width: 1,
+                    jacobian,
+                };
+                let projection = self.covariance.project(&[block]);
+                let noise = most * variance / (variance - most);
+                let s = projection.spread + SMatrix::<f64, 1, 1>::new(noise);
+                let all = self.covariance.all();
+                self.covariance
+                    .update(projection, &SVector::zeros(), &s, &all);
+                has_changed = true;
+            }
+        }
+        if has_changed {
+            self.tell_members();
+        }
+    }
+
+    /// Tells the members their own parts of the joint covariance.
+    fn tell_members(&mut self) {
+        for member in &mut self.members {
+            let own = self.covariance.block(member.offset, member.offset);
+            *member.traveller_mut().mover.covariance_mut() = own;
+        }
+    }
+
+    /// Adds to the uncertainty of an agent's pose: it is not where it should be.
+    pub(super) fn widen(&mut self, index: usize, sd_m: f64, sd_rad: f64) {
+        self.flush();
+        let member = &mut self.members[index];
+        let mover = &mut member.traveller_mut().mover;
+        for k in 0..6 {
+            let out_of_plane = matches!(k, 2..=4);
+            if !(mover.is_planar && out_of_plane) {
+                let sd = if k < 3 { sd_m } else { sd_rad };
+                mover.covariance_mut()[(k, k)] += sd * sd;
+            }
+        }
+        self.covariance
+            .set_diagonal(member.offset, member.traveller.mover.covariance());
+    }
+
+    /// Corrects everything by what an observer's sighting tells, and carries the errors over to the
+    /// corrected estimate.
+    ///
+    /// What nobody can know is where the whole map lies: an error θ of the observer's rotation goes with
+    /// errors θ × (x − x̂₀) of all positions. Errors are therefore counted relative to the observer's
+    /// rotation (the right-invariant error of Barrau & Bonnabel 2015), which makes them independent of
+    /// the estimate: a correction Δ of a position changes its error by θ × Δ. Without this, corrections
+    /// would feign knowledge of the whole map's direction (Huang, Mourikis & Roumeliotis 2010).
+    ///
+    /// Landmarks go along the arcs on which that rotation takes them, as they do in the group of
+    /// that filter, and not along tangents: or else each large correction of a rotation would
+    /// enlarge the map.
+    ///
+    /// Answers how much of a correction of a position is left along the arc.
+    pub(super) fn correct(
+        &mut self,
+        index: usize,
+        correction: &[f64],
+        parameters: &Parameters,
+    ) -> Matrix3<f64> {
+        let observer = &self.members[index];
+        let world = observer
+            .mover()
+            .pose
+            .rotation
+            .to_rotation_matrix()
+            .into_inner();
+        let source = observer.offset + 3;
+        let turn = world * Vector3::from_fn(|k, _| correction[source + k]);
+        let along = |axis: Vector3<f64>| se3::exp(&axis, &turn).translation.vector;
+        let arc = Matrix3::from_columns(&[Vector3::x(), Vector3::y(), Vector3::z()].map(along));
+        let mut levers: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; correction.len()]);
+        let mut lever = |offset: usize, matrix: Matrix3<f64>| {
+            for (column, lever) in levers.iter_mut().enumerate() {
+                for row in 0..3 {
+                    lever[offset + row] = matrix[(row, column)];
+                }
+            }
+        };
+        let mut turns = Vec::with_capacity(self.members.len());
+        for member in &mut self.members {
+            let error = SVector::from_fn(|k, _| correction[member.offset + k]);
+            let mover = &mut Arc::make_mut(&mut member.traveller).mover;
+            let before = mover.pose;
+            mover.correct(&error, parameters);
+            let moved = mover.pose.translation.vector - before.translation.vector;
+            let to_body = before
+                .rotation
+                .to_rotation_matrix()
+                .into_inner()
+                .transpose();
+            lever(member.offset, -(to_body * moved.cross_matrix() * world));
+            turns.push(mover.pose.rotation.inverse() * before.rotation);
+        }
+        for mark in Arc::make_mut(&mut self.marks).values_mut() {
+            let moved = arc * Vector3::from_fn(|k, _| correction[mark.offset + k]);
+            mark.position += moved;
+            lever(mark.offset, -(moved.cross_matrix() * world));
+        }
+        self.covariance.shear(source, &levers);
+        // Errors of a body are stated along its axes, which a correction has turned.
+        for (member, turn) in self.members.iter_mut().zip(turns) {
+            let turn = turn.to_rotation_matrix().into_inner();
+            let mut axes = SMatrix::<f64, 6, 6>::zeros();
+            axes.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+            axes.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+            let own = self.covariance.block(member.offset, member.offset);
+            let mut own = axes * own * axes.transpose();
+            let position = (0..3).map(|k| own[(k, k)]).sum();
+            let turn = (3..6).map(|k| own[(k, k)]).sum();
+            make_up_for_rounding(&mut own, position, turn);
+            self.covariance.transform(member.offset, &axes, &own);
+        }
+        self.tell_members();
+        arc
+    }
+}
+
+/// Derivative of d = Rᵀ (p − x) by the error of the observer's pose: | −I  d× |.
+pub(super) fn point_by_pose(point: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
+    let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
+    jacobian
+        .fixed_view_mut::<3, 3>(0, 0)
+        .copy_from(&-Matrix3::identity());
+    jacobian
+        .fixed_view_mut::<3, 3>(0, 3)
+        .copy_from(&point.cross_matrix());
+    jacobian
+}
+
+/// Without the asymmetry of rounding.
+pub(super) fn symmetric(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    (matrix + matrix.transpose()) * 0.5
+}

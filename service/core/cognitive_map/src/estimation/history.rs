@@ -1,0 +1,63 @@
+//! Where odometry was lately: other agents look back, and streams of agents interleave.
+
+use std::collections::VecDeque;
+
+use nalgebra::Isometry3;
+
+use geometry::se3;
+
+/// Instants kept.
+pub(super) const KEPT: usize = 64;
+/// Least interval between two instants \[ns\]: 64 of them last three seconds.
+const INTERVAL_NS: i64 = 50_000_000;
+
+/// Odometry's poses at the latest instants, oldest first.
+#[derive(Clone, Debug, Default)]
+pub(super) struct History {
+    pub(super) instants: VecDeque<(i64, Isometry3<f64>)>,
+    /// The latest instant of all, which need not be kept.
+    pub(super) latest: Option<(i64, Isometry3<f64>)>,
+}
+
+impl History {
+    /// Odometry came to a pose.
+    pub(super) fn note(&mut self, stamp_ns: i64, in_odom: &Isometry3<f64>) {
+        self.latest = Some((stamp_ns, *in_odom));
+        let is_due = |&(last, _): &(i64, _)| stamp_ns.saturating_sub(last) >= INTERVAL_NS;
+        if self.instants.back().is_none_or(is_due) {
+            if self.instants.len() == KEPT {
+                self.instants.pop_front();
+            }
+            self.instants.push_back((stamp_ns, *in_odom));
+        }
+    }
+
+    /// Forgets everything, as a new session begins.
+    pub(super) fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Motion from an instant until the latest one; `None` when the instant is too long ago or not
+    /// yet over.
+    pub(super) fn motion_since(&self, stamp_ns: i64) -> Option<Isometry3<f64>> {
+        let (last_ns, last) = self.latest?;
+        if stamp_ns == last_ns {
+            return Some(Isometry3::identity());
+        }
+        if stamp_ns > last_ns {
+            return None;
+        }
+        let after = self
+            .instants
+            .partition_point(|&(stamp, _)| stamp <= stamp_ns);
+        let (start_ns, start) = *self.instants.get(after.checked_sub(1)?)?;
+        let (end_ns, end) = self.instants.get(after).copied().unwrap_or((last_ns, last));
+        if start_ns == stamp_ns || end_ns <= start_ns {
+            return Some(start.inv_mul(&last));
+        }
+        let share = (stamp_ns - start_ns) as f64 / (end_ns - start_ns) as f64;
+        let (linear, angular) = se3::log(&start.inv_mul(&end));
+        let then = start * se3::exp(&(linear * share), &(angular * share));
+        Some(then.inv_mul(&last))
+    }
+}

@@ -1,0 +1,157 @@
+//! What a sighting says against what the estimate expects.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3};
+
+use crate::input::{RangeBearing, Relation, RelativePosition};
+use geometry::se3;
+
+/// Shortest distance at which a direction means something \[m\].
+const DISTANCE_MIN_M: f64 = 0.02;
+/// Least deviation of a component, as a part of what the sighting states for others of its kind.
+const DEVIATION_MIN: f64 = 1e-6;
+
+/// A sighting of a point, linearised about where the observer and the point are thought to be.
+///
+/// All is a function of the point in the observer's frame, d = Rᵀ (p − x).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PointInnovation {
+    /// Seen minus expected, in three independent components.
+    pub(super) residual: Vector3<f64>,
+    /// Derivative of the expected components by d.
+    pub(super) by_point: Matrix3<f64>,
+    /// Variance of each component as the sighting states it.
+    pub(super) variance: Vector3<f64>,
+    /// Length of d \[m\].
+    pub(super) distance_m: f64,
+    /// Whether the components are a distance and two angles, and not three lengths.
+    pub(super) is_polar: bool,
+}
+
+impl PointInnovation {
+    /// Of a sighting, if the point is expected at d. `None` where it has no direction.
+    pub(super) fn new(relation: &Relation, expected: &Vector3<f64>) -> Option<Self> {
+        match relation {
+            Relation::Position(seen) => Some(Self::of_position(seen, expected)),
+            Relation::RangeBearing(seen) => Self::of_range_and_bearing(seen, expected),
+            Relation::Pose(seen) => {
+                let rotation = seen.pose().rotation.to_rotation_matrix().into_inner();
+                let sd = seen.noise().sd().fixed_rows::<3>(0).into_owned();
+                let residual = rotation.transpose() * (seen.pose().translation.vector - expected);
+                Some(Self {
+                    residual,
+                    by_point: rotation.transpose(),
+                    variance: variances(&sd),
+                    distance_m: expected.norm(),
+                    is_polar: false,
+                })
+            }
+        }
+    }
+
+    fn of_position(seen: &RelativePosition, expected: &Vector3<f64>) -> Self {
+        Self {
+            residual: seen.translation_m() - expected,
+            by_point: Matrix3::identity(),
+            variance: variances(seen.sd_m()),
+            distance_m: expected.norm(),
+            is_polar: false,
+        }
+    }
+
+    /// By distance and direction. The angles are taken about the seen direction, along growing azimuth
+    /// and elevation, where they are linear also above and below the observer:
+    ///
+    /// ```text
+    /// α = atan2(e_α·d, e_r·d)      ε = atan2(e_ε·d, h)      h = hypot(e_r·d, e_α·d)
+    /// ```
+    fn of_range_and_bearing(seen: &RangeBearing, expected: &Vector3<f64>) -> Option<Self> {
+        let (forward, left, up, cos_elevation) = directions(seen);
+        let distance_m = expected.norm();
+        let (ahead, aside, above) = (forward.dot(expected), left.dot(expected), up.dot(expected));
+        let level = ahead.hypot(aside);
+        if level < DISTANCE_MIN_M {
+            return None;
+        }
+        let residual = Vector3::new(
+            seen.range_m() - distance_m,
+            -aside.atan2(ahead),
+            -above.atan2(level),
+        );
+        let by_range = expected / distance_m;
+        let by_azimuth = (left * ahead - forward * aside) / (level * level);
+        let by_elevation = (up * level - (forward * ahead + left * aside) * (above / level))
+            / (distance_m * distance_m);
+        let by_point = Matrix3::from_rows(&[
+            by_range.transpose(),
+            by_azimuth.transpose(),
+            by_elevation.transpose(),
+        ]);
+        let bearing = seen.bearing_sd_rad();
+        // Azimuth turns the direction by cos ε of it; overhead the second order is left.
+        let across = bearing * cos_elevation.hypot(bearing.min(1.0));
+        Some(Self {
+            residual,
+            by_point,
+            variance: variances(&Vector3::new(seen.range_sd_m(), across, bearing)),
+            distance_m,
+            is_polar: true,
+        })
+    }
+}
+
+/// Where a sighting puts its target, in the observer's frame, and the covariance there.
+pub(super) fn seen_at(relation: &Relation) -> (Vector3<f64>, Matrix3<f64>) {
+    let point = match relation {
+        Relation::Position(seen) => *seen.translation_m(),
+        Relation::RangeBearing(seen) => directions(seen).0 * seen.range_m().max(DISTANCE_MIN_M),
+        Relation::Pose(seen) => seen.pose().translation.vector,
+    };
+    let covariance = PointInnovation::new(relation, &point).and_then(|innovation| {
+        let inverse = innovation.by_point.try_inverse()?;
+        Some(inverse * Matrix3::from_diagonal(&innovation.variance) * inverse.transpose())
+    });
+    (point, covariance.unwrap_or_else(Matrix3::identity))
+}
+
+/// A sighting of a full pose, linearised: residual of the target's pose, derivatives by the errors of
+/// the observer's and of the target's pose, and variances.
+pub(super) fn pose_innovation(
+    seen: &crate::input::RelativePose,
+    observer: &Isometry3<f64>,
+    target: &Isometry3<f64>,
+) -> (SVector<f64, 6>, Matrix6<f64>, Matrix6<f64>, SVector<f64, 6>) {
+    // exp(residual) takes the expected relative pose to the seen one.
+    let expected = observer.inv_mul(target);
+    let (linear, angular) = se3::log(&expected.inv_mul(seen.pose()));
+    let mut residual = SVector::<f64, 6>::zeros();
+    residual.fixed_rows_mut::<3>(0).copy_from(&linear);
+    residual.fixed_rows_mut::<3>(3).copy_from(&angular);
+    let by_observer = -se3::adjoint(&expected.inverse());
+    let sd = seen.noise().sd();
+    let floor = SVector::<f64, 6>::repeat(DEVIATION_MIN);
+    let variance = sd.component_mul(sd) + floor.component_mul(&floor);
+    (residual, by_observer, SMatrix::identity(), variance)
+}
+
+/// The unit vectors along growing range, azimuth and elevation, and the cosine of the elevation.
+fn directions(seen: &RangeBearing) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>, f64) {
+    let (sin_azimuth, cos_azimuth) = seen.azimuth_rad().sin_cos();
+    let (sin_elevation, cos_elevation) = seen.elevation_rad().sin_cos();
+    let forward = Vector3::new(
+        cos_elevation * cos_azimuth,
+        cos_elevation * sin_azimuth,
+        sin_elevation,
+    );
+    let left = Vector3::new(-sin_azimuth, cos_azimuth, 0.0);
+    let up = Vector3::new(
+        -sin_elevation * cos_azimuth,
+        -sin_elevation * sin_azimuth,
+        cos_elevation,
+    );
+    (forward, left, up, cos_elevation.abs())
+}
+
+/// Squares, never quite zero.
+fn variances(sd: &Vector3<f64>) -> Vector3<f64> {
+    sd.map(|sd| sd * sd + DEVIATION_MIN * DEVIATION_MIN)
+}

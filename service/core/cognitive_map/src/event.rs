@@ -1,0 +1,177 @@
+//! Events: what a record brought about.
+
+use nalgebra::Point3;
+
+use crate::input::Label;
+use crate::input::{AgentId, SkipReason};
+use crate::landmark::LandmarkId;
+use crate::percept::ChannelId;
+use crate::place::PlaceId;
+use crate::trip::{TripEnd, TripId};
+use object_recognition::ObjectId;
+
+/// One event.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// The agent that caused it.
+    pub agent: AgentId,
+    /// Stamp of the sample that caused it \[ns\]; for a skip, of the latest sample before it;
+    /// 0 where there is none.
+    pub stamp_ns: i64,
+    /// What happened.
+    pub kind: EventKind,
+}
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EventKind {
+    /// The space met a new agent.
+    AgentEnrolled,
+    /// The agent began a session.
+    SessionStarted {
+        /// The session.
+        session: u64,
+    },
+    /// The agent entered a new lattice cell of a grid module; the reference point moved there.
+    CellEntered {
+        /// Index of the module, finest first.
+        module: u8,
+        /// Lattice index of the new reference point.
+        reference: [i64; 3],
+    },
+    /// A place cell was recruited.
+    PlaceRecruited {
+        /// The place.
+        place: PlaceId,
+        /// Its position in `map` \[m\].
+        position: Point3<f64>,
+    },
+    /// The agent came to a known place.
+    PlaceEntered {
+        /// The place.
+        place: PlaceId,
+        /// Confidence of the recall, in \[0, 1\].
+        confidence: f64,
+    },
+    /// A trip began.
+    TripStarted {
+        /// The trip.
+        trip: TripId,
+    },
+    /// A trip ended.
+    TripEnded {
+        /// The trip.
+        trip: TripId,
+        /// Its number of legs.
+        legs: usize,
+        /// Why.
+        reason: TripEnd,
+    },
+    /// It became known where an agent stands in the map, by what it and others saw.
+    AgentPlaced {
+        /// Its position in `map` \[m\].
+        position: Point3<f64>,
+    },
+    /// A landmark was seen for the first time.
+    LandmarkLearned {
+        /// The landmark.
+        landmark: LandmarkId,
+        /// Its position in `map` \[m\].
+        position: Point3<f64>,
+    },
+    /// Samples were skipped.
+    SamplesSkipped {
+        /// First sequence number.
+        from: u64,
+        /// First beyond.
+        to: u64,
+        /// Why.
+        reason: SkipReason,
+    },
+    /// The agent passed a marker.
+    MarkerPassed {
+        /// Its label.
+        label: Label,
+    },
+    /// A place was forgotten, because there was no room for the one recruited next.
+    PlaceForgotten {
+        /// The place.
+        place: PlaceId,
+        /// Its position in `map` \[m\].
+        position: Point3<f64>,
+    },
+    /// A trip was forgotten, because there was no room for the leg recorded next.
+    TripForgotten {
+        /// The trip.
+        trip: TripId,
+        /// Its number of legs.
+        legs: usize,
+    },
+    /// Fewer objects come into question for what the agent touches.
+    ObjectsNarrowed {
+        /// How many.
+        live: u32,
+    },
+    /// What the agent touches is known.
+    ObjectRecognised {
+        /// The object.
+        object: ObjectId,
+        /// Its name.
+        name: Label,
+        /// How probable that is.
+        probability: f64,
+    },
+    /// What the agent touches is none of the objects that were learned.
+    ObjectUnknown,
+    /// An object was learned, or more of it.
+    ObjectLearned {
+        /// The object.
+        object: ObjectId,
+        /// Its name.
+        name: Label,
+        /// Contacts of this episode.
+        contacts: u64,
+    },
+    /// An episode was to teach an object and has not: it did not become clear how its frame lies in the object's.
+    ObjectNotLearned {
+        /// Contacts of this episode.
+        contacts: u64,
+    },
+    /// Two objects turned out to be one.
+    ObjectsMerged {
+        /// The one that they are.
+        object: ObjectId,
+        /// Its name.
+        name: Label,
+        /// Name of the one that is no more.
+        absorbed: Label,
+    },
+    /// What had been joined to an object turned out to be another one.
+    ObjectSplit {
+        /// The object.
+        object: ObjectId,
+        /// Its name.
+        name: Label,
+        /// The other one.
+        part: ObjectId,
+        /// Its name.
+        part_name: Label,
+    },
+    /// A percept was felt where a place remembers its channel; before the place learned from it.
+    PerceptCompared {
+        /// The place.
+        place: PlaceId,
+        /// The channel.
+        channel: ChannelId,
+        /// Number of percepts that taught what to expect.
+        percepts: u64,
+        /// How far it was from that: for a level in deviations, of which the channel's floor is the
+        /// least; for a descriptor one minus the cosine, 0 to 2.
+        surprise: f64,
+    },
+    /// The agent was removed: by that name the space knows nobody any more.
+    AgentRemoved {
+        /// Its name.
+        name: Label,
+    },
+}

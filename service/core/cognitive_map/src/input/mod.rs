@@ -1,0 +1,23 @@
+//! Input of the fold: records of samples that make sense.
+//!
+//! Constructors refuse what could not have been sensed, so an invalid sample can't exist further in.
+
+mod invalid;
+mod label;
+mod motion;
+mod object_mark;
+mod percept;
+mod record;
+mod sample;
+mod sighting;
+mod touch;
+
+pub use invalid::InvalidSample;
+pub use label::Label;
+pub use motion::{Motion, PoseNoise, StartPose};
+pub use object_mark::{ObjectMark, Spacing, TouchNoise};
+pub use percept::{Descriptor, Level};
+pub use record::{AgentId, Record, SkipReason};
+pub use sample::{Marker, Sample, SampleBody};
+pub use sighting::{RangeBearing, Relation, RelativePose, RelativePosition, Sighting, Target};
+pub use touch::{Lesson, Touch, TouchLevel};

@@ -1,0 +1,431 @@
+//! Journals: arbitrary ones, and a robot to write readable ones.
+
+use cognitive_map::{
+    AgentId, CognitiveMap, Descriptor, Event, EventKind, InvalidSample, Label, Lesson, Level,
+    Marker, Motion, ObjectMark, PoseNoise, RangeBearing, Record, Recruitment, Relation,
+    RelativePose, RelativePosition, Sample, SampleBody, Settings, SettingsValues, Sighting,
+    SkipReason, Spacing, StartPose, Target, Touch, TouchNoise,
+};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use object_recognition::Orientation;
+use proptest::prelude::*;
+
+pub(crate) fn label(text: &str) -> Label {
+    Label::new(text).unwrap()
+}
+
+pub(crate) fn settings(change: impl FnOnce(&mut SettingsValues)) -> Settings {
+    let mut values = SettingsValues::default();
+    change(&mut values);
+    Settings::new(values).unwrap()
+}
+
+/// Applies records and collects the events.
+pub(crate) fn run(map: &mut CognitiveMap, records: &[Record]) -> Vec<Event> {
+    let mut events = Vec::new();
+    for record in records {
+        map.apply(record, &mut events);
+    }
+    events
+}
+
+fn xyzw(rotation_vector: [f64; 3]) -> [f64; 4] {
+    UnitQuaternion::from_scaled_axis(Vector3::from(rotation_vector))
+        .coords
+        .into()
+}
+
+pub(crate) fn motion(translation_m: [f64; 3], rotation_vector: [f64; 3]) -> SampleBody {
+    let rotation = xyzw(rotation_vector);
+    SampleBody::Motion(Motion::from_increment(translation_m, rotation, None).unwrap())
+}
+
+pub(crate) fn start_pose(translation_m: [f64; 3], rotation_vector: [f64; 3]) -> SampleBody {
+    let rotation = xyzw(rotation_vector);
+    SampleBody::StartPose(StartPose::new(translation_m, rotation, PoseNoise::none()).unwrap())
+}
+
+pub(crate) fn sighting(text: &str, translation_m: [f64; 3], sd_m: f64) -> SampleBody {
+    let relation = Relation::Position(RelativePosition::new(translation_m, [sd_m; 3]).unwrap());
+    SampleBody::Sighting(Sighting {
+        target: Target::Landmark(label(text)),
+        relation,
+    })
+}
+
+pub(crate) fn marker(text: &str, ends_trip: bool) -> SampleBody {
+    SampleBody::Marker(Marker {
+        label: label(text),
+        ends_trip,
+    })
+}
+
+pub(crate) fn level(channel: &str, value: f64, offset_m: [f64; 3]) -> SampleBody {
+    SampleBody::Level(Level::new(label(channel), value, offset_m, None).unwrap())
+}
+
+pub(crate) fn descriptor(channel: &str, vector: &[f32]) -> SampleBody {
+    SampleBody::Descriptor(Descriptor::new(label(channel), vector).unwrap())
+}
+
+/// An agent that writes its samples straight into a map, ten a second.
+pub(crate) struct Robot {
+    pub(crate) id: AgentId,
+    pub(crate) session: u64,
+    pub(crate) seq: u64,
+    pub(crate) stamp_ns: i64,
+}
+
+impl Robot {
+    /// Enrols in the map.
+    pub(crate) fn enrol(map: &mut CognitiveMap) -> Self {
+        let id = AgentId(u32::try_from(map.agent_count()).unwrap());
+        let name = label(&format!("robot-{}", id.0));
+        map.apply(&Record::Enrol { agent: id, name }, &mut Vec::new());
+        Self {
+            id,
+            session: 1,
+            seq: 0,
+            stamp_ns: 0,
+        }
+    }
+
+    /// The next sample.
+    pub(crate) fn sample(&mut self, map: &mut CognitiveMap, body: SampleBody) -> Vec<EventKind> {
+        self.stamp_ns += 100_000_000;
+        let sample = Sample {
+            stamp_ns: self.stamp_ns,
+            body,
+        };
+        let (agent, session, seq) = (self.id, self.session, self.seq);
+        self.seq += 1;
+        self.record(
+            map,
+            &Record::Sample {
+                agent,
+                session,
+                seq,
+                sample,
+            },
+        )
+    }
+
+    /// Moves in its body frame.
+    pub(crate) fn go(
+        &mut self,
+        map: &mut CognitiveMap,
+        translation_m: [f64; 3],
+        rotation_vector: [f64; 3],
+    ) -> Vec<EventKind> {
+        self.sample(map, motion(translation_m, rotation_vector))
+    }
+
+    /// Goes straight ahead in equal steps.
+    pub(crate) fn ahead(
+        &mut self,
+        map: &mut CognitiveMap,
+        step_m: f64,
+        n: usize,
+    ) -> Vec<EventKind> {
+        (0..n)
+            .flat_map(|_| self.go(map, [step_m, 0.0, 0.0], [0.0; 3]))
+            .collect()
+    }
+
+    /// Skips its next samples.
+    pub(crate) fn skip(
+        &mut self,
+        map: &mut CognitiveMap,
+        n: u64,
+        reason: SkipReason,
+    ) -> Vec<EventKind> {
+        let (agent, session, from) = (self.id, self.session, self.seq);
+        self.seq += n;
+        self.record(
+            map,
+            &Record::Skip {
+                agent,
+                session,
+                from,
+                to: self.seq,
+                reason,
+            },
+        )
+    }
+
+    fn record(&self, map: &mut CognitiveMap, record: &Record) -> Vec<EventKind> {
+        let events = run(map, std::slice::from_ref(record));
+        assert!(events.iter().all(|event| event.agent == self.id));
+        // Grid cells are entered all the time; the tests on events are about memory.
+        let kinds = events.into_iter().map(|event| event.kind);
+        kinds
+            .filter(|kind| !matches!(kind, EventKind::CellEntered { .. }))
+            .collect()
+    }
+
+    pub(crate) fn pose(&self, map: &CognitiveMap) -> Isometry3<f64> {
+        *map.agent(self.id).unwrap().pose()
+    }
+
+    pub(crate) fn position(&self, map: &CognitiveMap) -> Point3<f64> {
+        self.pose(map).translation.vector.into()
+    }
+}
+
+/// One entry of an arbitrary journal, before it is given its numbers.
+#[derive(Clone, Debug)]
+enum Entry {
+    Sample {
+        agent: u32,
+        pause_ms: i64,
+        body: SampleBody,
+    },
+    Skip {
+        agent: u32,
+        ahead: u64,
+        len: u64,
+        reason: SkipReason,
+    },
+    NextSession {
+        agent: u32,
+    },
+    /// Whatever, in whatever order.
+    Junk(Record),
+}
+
+/// Arbitrary journals of up to three agents: mostly orderly, with sessions, gaps and nonsense.
+pub(crate) fn journals() -> impl Strategy<Value = Vec<Record>> {
+    prop::collection::vec(entries(), 0..120).prop_map(|entries| {
+        let mut records: Vec<_> = (0..2)
+            .map(|id| Record::Enrol {
+                agent: AgentId(id),
+                name: label(&format!("agent-{id}")),
+            })
+            .collect();
+        let mut next = [(1u64, 0u64, 0i64); 3];
+        for entry in entries {
+            match entry {
+                Entry::Sample {
+                    agent,
+                    pause_ms,
+                    body,
+                } => {
+                    let (session, seq, stamp_ns) = &mut next[agent as usize];
+                    *stamp_ns += pause_ms * 1_000_000;
+                    let sample = Sample {
+                        stamp_ns: *stamp_ns,
+                        body,
+                    };
+                    let (agent, session) = (AgentId(agent), *session);
+                    records.push(Record::Sample {
+                        agent,
+                        session,
+                        seq: *seq,
+                        sample,
+                    });
+                    *seq += 1;
+                }
+                Entry::Skip {
+                    agent,
+                    ahead,
+                    len,
+                    reason,
+                } => {
+                    let (session, seq, _) = &mut next[agent as usize];
+                    let (from, to) = (*seq + ahead, *seq + ahead + len);
+                    let (agent, session) = (AgentId(agent), *session);
+                    records.push(Record::Skip {
+                        agent,
+                        session,
+                        from,
+                        to,
+                        reason,
+                    });
+                    *seq = to.max(*seq);
+                }
+                Entry::NextSession { agent } => {
+                    let (session, seq, stamp_ns) = &mut next[agent as usize];
+                    (*session, *seq, *stamp_ns) = (*session + 1, 0, 0);
+                }
+                Entry::Junk(record) => records.push(record),
+            }
+        }
+        records
+    })
+}
+
+/// Settings of either kind of recruitment, with budgets that are hit and others that are not.
+pub(crate) fn any_settings() -> impl Strategy<Value = Settings> {
+    let recruitment = prop_oneof![
+        Just(Recruitment::Novelty),
+        (0.0..=1.0).prop_map(|probability| Recruitment::Bernoulli { probability }),
+    ];
+    let places_max = prop::sample::select(vec![2, 3, 8, 2048]);
+    let legs_max = prop::sample::select(vec![1, 2, 9, 65_536]);
+    let half_life = prop::sample::select(vec![1, 20, 1_000_000]);
+    (
+        any::<u64>(),
+        1usize..=6,
+        recruitment,
+        (places_max, legs_max, half_life),
+    )
+        .prop_map(|(seed, grid_modules, recruitment, budget)| {
+            settings(|values| {
+                values.seed = seed;
+                values.grid_modules = grid_modules;
+                values.recruitment = recruitment;
+                (
+                    values.places_max,
+                    values.legs_max,
+                    values.strength_half_life_samples,
+                ) = budget;
+            })
+        })
+}
+
+fn entries() -> impl Strategy<Value = Entry> {
+    // The third agent is enrolled only if junk happens to enrol it.
+    let agent = prop::sample::select(vec![0u32, 0, 0, 0, 1, 1, 2]);
+    let pause_ms = prop_oneof![20 => Just(100i64), 1 => Just(3_000), 1 => Just(0), 1 => -50i64..0];
+    prop_oneof![
+        40 => (agent.clone(), pause_ms, bodies())
+            .prop_map(|(agent, pause_ms, body)| Entry::Sample { agent, pause_ms, body }),
+        2 => (agent.clone(), 0u64..3, 0u64..4, reasons())
+            .prop_map(|(agent, ahead, len, reason)| Entry::Skip { agent, ahead, len, reason }),
+        1 => agent.prop_map(|agent| Entry::NextSession { agent }),
+        3 => junk().prop_map(Entry::Junk),
+    ]
+}
+
+fn reasons() -> impl Strategy<Value = SkipReason> {
+    prop::sample::select(vec![
+        SkipReason::Lost,
+        SkipReason::TimeBackwards,
+        SkipReason::Invalid(InvalidSample::NumberOutOfRange),
+    ])
+}
+
+fn junk() -> impl Strategy<Value = Record> {
+    let number = || prop_oneof![0u64..5, Just(u64::MAX), Just(u64::MAX - 1)];
+    let agent = || prop_oneof![0u32..4, Just(u32::MAX)].prop_map(AgentId);
+    // A huge number would leave nothing to come after it, so those go to agents that do little else.
+    prop_oneof![
+        2 => agent().prop_map(|agent| Record::Enrol { agent, name: label("late") }),
+        2 => (agent(), 0u64..3, 0u64..200, 0i64..9, bodies())
+            .prop_map(|(agent, session, seq, stamp_ns, body)| {
+                Record::Sample { agent, session, seq, sample: Sample { stamp_ns, body } }
+            }),
+        1 => (2u32..4, number(), number(), bodies()).prop_map(|(agent, session, seq, body)| {
+            let sample = Sample { stamp_ns: i64::MIN, body };
+            Record::Sample { agent: AgentId(agent), session, seq, sample }
+        }),
+        1 => (0u64..4, "[a-c]", prop::array::uniform3(-1.0..1.0f64)).prop_map(|(number, name, at)| {
+            let touch = Touch::new(at, TouchNoise::new(0.002, 0.03, 0.1).unwrap()).unwrap();
+            let lesson = Lesson::new(Spacing::default(), vec![touch]);
+            Record::TeachObject { number, name: label(&name), lesson }
+        }),
+        1 => (0u64..4, "[a-c]")
+            .prop_map(|(number, name)| Record::ForgetObject { number, name: label(&name) }),
+        1 => (2u32..4, number(), number(), number(), reasons())
+            .prop_map(|(agent, session, from, to, reason)| {
+                Record::Skip { agent: AgentId(agent), session, from, to, reason }
+            }),
+    ]
+}
+
+fn bodies() -> impl Strategy<Value = SampleBody> {
+    let turn = || prop::array::uniform3(-0.5..0.5f64);
+    let noise = || {
+        prop::option::of((0.0..0.1f64, 0.0..0.1f64))
+            .prop_map(|noise| noise.map(|(t, r)| PoseNoise::new([t; 3], [r; 3]).unwrap()))
+    };
+    let increment = (prop::array::uniform3(-0.3..0.3f64), turn(), noise())
+        .prop_map(|(t, r, noise)| Motion::from_increment(t, xyzw(r), noise).unwrap());
+    let still = Just(Motion::from_increment([0.0; 3], xyzw([0.0; 3]), None).unwrap());
+    let far = prop::array::uniform3(-1e8..1e8f64)
+        .prop_map(|t| Motion::from_increment(t, xyzw([0.0; 3]), None).unwrap());
+    let velocity = (prop::array::uniform3(-1.0..1.0f64), turn(), 0.0..0.5f64)
+        .prop_map(|(v, w, s)| Motion::from_velocity(v, w, s, None).unwrap());
+    let value = prop_oneof![9 => any::<i16>().prop_map(f64::from), 1 => -f64::MAX..f64::MAX];
+    let offset = prop_oneof![Just([0.0; 3]), prop::array::uniform3(-1.0..1.0f64)];
+    let level = ("(touch|light)", value, offset)
+        .prop_map(|(channel, value, offset)| level(&channel, value, offset));
+    // What a surface feels like, at whatever distance and with whatever normal.
+    let near = prop::array::uniform3(-0.1..0.1f64);
+    let touched = (near, prop::array::uniform3(-1.0..1.0f64)).prop_map(|(offset, normal)| {
+        let normal = Vector3::from(normal)
+            .try_normalize(1e-3)
+            .unwrap_or_else(Vector3::x);
+        let felt = Level::new(label("touch"), 1.0, offset, Some(normal.into()));
+        SampleBody::Level(felt.unwrap())
+    });
+    // Two sorts of camera, and one that shares its channel's label with levels.
+    let vector = prop::collection::vec(-1.0..1.0f32, 8..10);
+    let descriptor = ("(camera|light)", vector).prop_map(|(channel, mut vector)| {
+        vector[0] += 2.0; // never the zero vector
+        descriptor(&channel, &vector)
+    });
+    let start =
+        (prop::array::uniform3(-2.0..2.0f64), turn(), 0.0..1.0f64).prop_map(|(t, r, sd)| {
+            StartPose::new(t, xyzw(r), PoseNoise::new([sd; 3], [sd; 3]).unwrap()).unwrap()
+        });
+    let marker = any::<bool>().prop_map(|ends| marker("door", ends));
+    prop_oneof![
+        20 => increment.prop_map(SampleBody::Motion),
+        5 => velocity.prop_map(SampleBody::Motion),
+        2 => still.prop_map(SampleBody::Motion),
+        1 => far.prop_map(SampleBody::Motion),
+        5 => level,
+        5 => touched,
+        5 => descriptor,
+        4 => sightings().prop_map(SampleBody::Sighting),
+        1 => start.prop_map(SampleBody::StartPose),
+        1 => marker,
+        2 => object_marks().prop_map(SampleBody::Object),
+    ]
+}
+
+fn object_marks() -> impl Strategy<Value = ObjectMark> {
+    let noise = || TouchNoise::new(0.002, 0.03, 0.1).unwrap();
+    let orientation = prop::sample::select(vec![
+        Orientation::Known,
+        Orientation::cube(),
+        Orientation::Free,
+    ]);
+    let name = prop::option::of("[a-c]");
+    prop_oneof![
+        2 => (name, orientation.clone()).prop_map(move |(name, orientation)| ObjectMark::Learn {
+            name: name.map(|name| label(&name)),
+            spacing: Spacing::new(0.1).unwrap(),
+            orientation,
+            noise: noise(),
+        }),
+        2 => orientation
+            .prop_map(move |orientation| ObjectMark::Identify { orientation, noise: noise() }),
+        1 => Just(ObjectMark::End),
+    ]
+}
+
+fn sightings() -> impl Strategy<Value = Sighting> {
+    let target = prop_oneof![
+        6 => "[a-e]".prop_map(|text| Target::Landmark(label(&text))),
+        1 => Just(Target::Agent(label("agent-1"))),
+        1 => (0u64..9).prop_map(Target::OwnSample),
+    ];
+    let sd = || prop_oneof![Just(0.0), 0.0..1.0f64];
+    let at = || prop::array::uniform3(-5.0..5.0f64);
+    let relation = prop_oneof![
+        (at(), sd()).prop_map(|(at, sd)| {
+            Relation::Position(RelativePosition::new(at, [sd; 3]).unwrap())
+        }),
+        (0.0..9.0f64, at(), sd()).prop_map(|(range, [azimuth, elevation, _], sd)| {
+            let seen = RangeBearing::new(range, azimuth, elevation, sd, sd);
+            Relation::RangeBearing(seen.unwrap())
+        }),
+        (at(), at(), sd()).prop_map(|(at, turn, sd)| {
+            let noise = PoseNoise::new([sd; 3], [sd; 3]).unwrap();
+            Relation::Pose(RelativePose::new(at, xyzw(turn), noise).unwrap())
+        }),
+    ];
+    (target, relation).prop_map(|(target, relation)| Sighting { target, relation })
+}

@@ -1,0 +1,20 @@
+#![doc = include_str!("../README.md")]
+
+mod alignment;
+mod bounds;
+mod covariance;
+mod motion_sum;
+mod planar;
+mod positive;
+pub mod se3;
+mod se3_jacobian;
+
+pub use alignment::{align, centre};
+pub use bounds::is_somewhere;
+pub use covariance::{PoseCovariance, upper_triangle};
+pub use motion_sum::MotionSum;
+pub use planar::{
+    OUT_OF_PLANE, PLANAR_AXES, clear_out_of_plane, from_planar_part, hold_in_plane, planar_part,
+};
+pub use positive::positive;
+pub use se3_jacobian::log_jacobian;

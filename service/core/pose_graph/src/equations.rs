@@ -1,0 +1,72 @@
+//! The normal equations of a whole map.
+
+use nalgebra::Isometry3;
+
+use super::elimination::{Equations, Front};
+use super::graph::PoseGraph;
+use super::linearisation::NormalBlocks;
+
+/// The map's links, linearised at given poses of its nodes.
+#[derive(Debug)]
+pub(super) struct NormalEquations<'a> {
+    pub(super) map: &'a PoseGraph,
+    /// Where each node is.
+    pub(super) poses: &'a [Isometry3<f64>],
+    /// Of Geman–McClure kernels.
+    pub(super) widening: f64,
+}
+
+impl Equations for NormalEquations<'_> {
+    const N_RIGHT: usize = 1;
+
+    fn dimension(&self, variable: u32) -> usize {
+        self.map.nodes[variable as usize].axes().len()
+    }
+
+    fn links(&self, variable: u32) -> &[(u32, u32)] {
+        &self.map.links_of[variable as usize]
+    }
+
+    fn ties(&self, link: u32) -> bool {
+        self.map.links[link as usize].is_on
+    }
+
+    fn add(&self, link: u32, front: &mut Front<'_>) {
+        let Some((from, to, blocks)) = self.blocks(link) else {
+            return;
+        };
+        let axes = |node: u32| self.map.nodes[node as usize].axes();
+        let (from, to) = ((from, axes(from)), (to, axes(to)));
+        front.add(to, to, &blocks.to_to);
+        front.add_right(to.0, to.1, 0, (-blocks.to_gradient).as_slice());
+        if from.0 != to.0 {
+            front.add(from, from, &blocks.from_from);
+            front.add(to, from, &blocks.to_from);
+            front.add_right(from.0, from.1, 0, (-blocks.from_gradient).as_slice());
+        }
+    }
+}
+
+impl NormalEquations<'_> {
+    /// The nodes of a link and its part of the equations; `None` if it is switched off.
+    fn blocks(&self, link: u32) -> Option<(u32, u32, NormalBlocks)> {
+        let slot = &self.map.links[link as usize];
+        let (from, to) = slot.link.nodes();
+        let blocks = || {
+            let (from, to) = (&self.poses[from as usize], &self.poses[to as usize]);
+            let weigh = |s| slot.kernel.cost_and_weight(s, self.widening).1;
+            slot.link.normal_blocks(from, to, weigh)
+        };
+        slot.is_on.then(|| (from, to, blocks()))
+    }
+
+    /// Hands out the nodes and the blocks of every link that is on.
+    pub(super) fn for_each_link(&self, mut each: impl FnMut(u32, u32, &NormalBlocks)) {
+        for link in 0..self.map.links.len() {
+            let link = u32::try_from(link).expect("fewer than 2³² links");
+            if let Some((from, to, blocks)) = self.blocks(link) {
+                each(from, to, &blocks);
+            }
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! Nodes and the links between them.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::kernel::Kernel;
+use super::link::{Link, LinkId};
+use super::node::{Freedom, Node, PointId, PoseId};
+use state::Digest;
+
+/// The graph of lived places and landmarks, with what was measured between them.
+///
+/// Nodes and links are only ever added, and keep their numbers. A link may be switched off: it then says nothing, until
+/// it is switched on again.
+#[derive(Clone, Debug, Default)]
+pub struct PoseGraph {
+    pub(super) nodes: Vec<Node>,
+    pub(super) links: Vec<LinkSlot>,
+    /// For each node its links and the nodes at their other ends; the node itself if there is none.
+    pub(super) links_of: Vec<Vec<(u32, u32)>>,
+    /// Nodes whose links have changed since someone last asked.
+    touched: Vec<u32>,
+}
+
+/// A link and how it counts.
+#[derive(Clone, Debug)]
+pub(super) struct LinkSlot {
+    pub(super) link: Link,
+    pub(super) kernel: Kernel,
+    pub(super) is_on: bool,
+}
+
+/// Why a link does not belong to a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidLink {
+    /// A node of another map.
+    #[error("the map has no such node")]
+    UnknownNode,
+    /// Nothing can be measured from itself.
+    #[error("the link joins a node with itself")]
+    Loop,
+}
+
+impl PoseGraph {
+    /// A map without nodes.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a pose where it is supposed to be.
+    pub fn add_pose(&mut self, pose: Isometry3<f64>, freedom: Freedom) -> PoseId {
+        PoseId(self.add_node(Node::pose(pose, freedom)))
+    }
+
+    /// Adds a point where it is supposed to be.
+    pub fn add_point(&mut self, point: Point3<f64>, freedom: Freedom) -> PointId {
+        PointId(self.add_node(Node::point(point, freedom)))
+    }
+
+    /// Puts a pose somewhere else and says how it may move from now on: so a frame that has turned out to lie in another is
+    /// carried there and its origin set free. An [`IncrementalRelaxation`](super::IncrementalRelaxation) does not take
+    /// notice of it; a new one is to be begun.
+    pub fn place_pose(&mut self, id: PoseId, pose: Isometry3<f64>, freedom: Freedom) {
+        self.nodes[id.0 as usize] = Node::pose(pose, freedom);
+    }
+
+    /// As [`place_pose`](Self::place_pose), for a point.
+    pub fn place_point(&mut self, id: PointId, point: Point3<f64>, freedom: Freedom) {
+        self.nodes[id.0 as usize] = Node::point(point, freedom);
+    }
+
+    /// Adds a link.
+    ///
+    /// # Errors
+    /// It names a node that is not of this map, or one node twice.
+    pub fn add_link(&mut self, link: Link, kernel: Kernel) -> Result<LinkId, InvalidLink> {
+        let (from, to) = link.nodes();
+        let id = self.insert(link, kernel, true)?;
+        self.touched.extend([from, to]);
+        Ok(id)
+    }
+
+    /// Adds a link that says nothing until it is switched on. Nothing is computed anew for it.
+    ///
+    /// # Errors
+    /// As [`add_link`](Self::add_link).
+    pub fn add_silent_link(&mut self, link: Link, kernel: Kernel) -> Result<LinkId, InvalidLink> {
+        self.insert(link, kernel, false)
+    }
+
+    /// Makes a link say nothing.
+    pub fn switch_off(&mut self, link: LinkId) {
+        self.switch(link, false);
+    }
+
+    /// Makes a link count again.
+    pub fn switch_on(&mut self, link: LinkId) {
+        self.switch(link, true);
+    }
+
+    /// Where a pose is.
+    pub fn pose(&self, id: PoseId) -> &Isometry3<f64> {
+        &self.nodes[id.0 as usize].pose
+    }
+
+    /// Where a point is.
+    pub fn point(&self, id: PointId) -> Point3<f64> {
+        self.nodes[id.0 as usize].pose.translation.vector.into()
+    }
+
+    /// Whether a pose stays where it is.
+    pub fn is_held(&self, id: PoseId) -> bool {
+        self.nodes[id.0 as usize].freedom() == Freedom::Held
+    }
+
+    /// Whether no pose moves out of the plane.
+    pub fn is_planar(&self) -> bool {
+        let mut poses = self.nodes.iter().filter(|node| !node.is_point());
+        poses.all(|node| node.freedom() != Freedom::Full)
+    }
+
+    /// The links that count, in the order in which they were added.
+    pub fn links(&self) -> impl Iterator<Item = &Link> {
+        let on = self.links.iter().filter(|slot| slot.is_on);
+        on.map(|slot| &slot.link)
+    }
+
+    /// The poses, in the order in which they were added.
+    pub fn poses(&self) -> impl Iterator<Item = (PoseId, &Isometry3<f64>)> {
+        let nodes = (0..).zip(&self.nodes).filter(|(_, node)| !node.is_point());
+        nodes.map(|(number, node)| (PoseId(number), &node.pose))
+    }
+
+    /// The points, in the order in which they were added.
+    pub fn points(&self) -> impl Iterator<Item = (PointId, Point3<f64>)> {
+        let nodes = (0..).zip(&self.nodes).filter(|(_, node)| node.is_point());
+        nodes.map(|(number, node)| (PointId(number), node.pose.translation.vector.into()))
+    }
+
+    /// Number of nodes.
+    pub fn n_nodes(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Number of links, those switched off among them.
+    pub fn n_links(&self) -> usize {
+        self.links.len()
+    }
+
+    /// χ²: what all links cost, each by its kernel. Twice the negative logarithm of the likelihood, up to a constant.
+    pub fn chi_squared(&self) -> f64 {
+        self.cost(|node| &self.nodes[node as usize].pose, 1.0)
+    }
+
+    /// What one link costs without its kernel: its squared error in standard deviations.
+    pub fn squared_error(&self, link: LinkId) -> f64 {
+        let link = &self.links[link.0 as usize].link;
+        let (from, to) = link.nodes();
+        link.squared_error(
+            &self.nodes[from as usize].pose,
+            &self.nodes[to as usize].pose,
+        )
+    }
+
+    /// Whether a link counts.
+    pub fn is_on(&self, link: LinkId) -> bool {
+        self.links[link.0 as usize].is_on
+    }
+
+    /// Digest of where all nodes are and of which links count: equal digests, equal maps, to the last bit.
+    pub fn digest(&self) -> Digest {
+        let mut bytes = Vec::with_capacity(self.nodes.len() * 56 + self.links.len());
+        for node in &self.nodes {
+            let coordinates = node.pose.translation.vector.iter();
+            for number in coordinates.chain(node.pose.rotation.coords.iter()) {
+                bytes.extend(number.to_le_bytes());
+            }
+        }
+        bytes.extend(self.links.iter().map(|slot| u8::from(slot.is_on)));
+        Digest::of(&bytes)
+    }
+
+    /// χ² with the nodes at these poses.
+    pub(super) fn cost<'a>(&self, pose: impl Fn(u32) -> &'a Isometry3<f64>, widening: f64) -> f64 {
+        let mut sum = 0.0;
+        for slot in self.links.iter().filter(|slot| slot.is_on) {
+            let (from, to) = slot.link.nodes();
+            let s = slot.link.squared_error(pose(from), pose(to));
+            sum += slot.kernel.cost_and_weight(s, widening).0;
+        }
+        sum
+    }
+
+    /// Nodes whose links have changed since the last call.
+    pub(super) fn take_touched(&mut self) -> Vec<u32> {
+        std::mem::take(&mut self.touched)
+    }
+
+    fn insert(&mut self, link: Link, kernel: Kernel, is_on: bool) -> Result<LinkId, InvalidLink> {
+        let (from, to) = link.nodes();
+        if from.max(to) as usize >= self.nodes.len() {
+            return Err(InvalidLink::UnknownNode);
+        }
+        let joins_two = matches!(link, Link::Between { .. } | Link::Sighting { .. });
+        if joins_two && from == to {
+            return Err(InvalidLink::Loop);
+        }
+        let id = number(self.links.len());
+        self.links_of[from as usize].push((id, to));
+        if joins_two {
+            self.links_of[to as usize].push((id, from));
+        }
+        self.links.push(LinkSlot {
+            link,
+            kernel,
+            is_on,
+        });
+        Ok(LinkId(id))
+    }
+
+    fn switch(&mut self, link: LinkId, is_on: bool) {
+        let slot = &mut self.links[link.0 as usize];
+        slot.is_on = is_on;
+        let (from, to) = slot.link.nodes();
+        self.touched.extend([from, to]);
+    }
+
+    fn add_node(&mut self, node: Node) -> u32 {
+        let id = number(self.nodes.len());
+        self.nodes.push(node);
+        self.links_of.push(Vec::new());
+        id
+    }
+}
+
+/// The number of the node or link that comes next. Memory ends long before the numbers do.
+fn number(count: usize) -> u32 {
+    u32::try_from(count).expect("fewer than 2³² nodes and links")
+}

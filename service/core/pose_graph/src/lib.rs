@@ -1,0 +1,28 @@
+#![doc = include_str!("../README.md")]
+
+pub mod g2o;
+
+mod descent;
+mod elimination;
+mod equations;
+mod graph;
+mod incremental;
+mod information;
+mod innovation;
+mod kernel;
+mod linearisation;
+mod link;
+mod marginals;
+mod node;
+mod relaxation;
+mod rotation_first;
+
+pub use graph::{InvalidLink, PoseGraph};
+pub use incremental::{IncrementalRelaxation, IncrementalSettings, Updated};
+pub use information::{InvalidInformation, PoseInformation, PositionInformation};
+pub use innovation::{ExpectedPose, ExpectedPosition, Innovation};
+pub use kernel::{InvalidScale, Kernel, Scale};
+pub use link::{Link, LinkId, SightingTarget};
+pub use marginals::Marginals;
+pub use node::{Freedom, PointId, PoseId};
+pub use relaxation::{Graduation, RelaxationSettings, Relaxed, Start};

@@ -1,0 +1,174 @@
+//! Derivatives against difference quotients, for every kind of link.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
+use proptest::prelude::*;
+
+use crate::link::{Link, SightingTarget};
+use crate::node::{Freedom, Node, PointId, PoseId};
+use crate::{PoseInformation, PositionInformation};
+
+/// A node from, a node to, and a link from the first to the second.
+#[derive(Clone, Debug)]
+struct Case {
+    from: Node,
+    to: Node,
+    link: Link,
+}
+
+fn pose() -> impl Strategy<Value = Isometry3<f64>> {
+    (
+        prop::array::uniform3(-5.0..5.0_f64),
+        prop::array::uniform3(-1.7..1.7_f64),
+    )
+        .prop_map(|(shift, turn)| Isometry3::new(shift.into(), turn.into()))
+}
+
+/// A positive matrix that is nothing special.
+fn information(seed: [f64; 6]) -> Matrix6<f64> {
+    let root =
+        Matrix6::from_fn(|r, c| (seed[r] * (c as f64 + 1.3)).sin() + f64::from(u8::from(r == c)));
+    root * root.transpose()
+}
+
+/// All kinds of links between these poses, measured as they are (`error` zero) or with an error.
+fn cases(
+    from: Isometry3<f64>,
+    to: Isometry3<f64>,
+    error: Isometry3<f64>,
+    seed: [f64; 6],
+) -> Vec<Case> {
+    let whole = PoseInformation::new(&information(seed)).expect("a square is positive");
+    let block: Matrix3<f64> = information(seed).fixed_view::<3, 3>(0, 0).into_owned();
+    let position_information = PositionInformation::new(&block).expect("a square is positive");
+    let node = |pose| Node::pose(pose, Freedom::Full);
+    let point = Node::point(to.translation.vector.into(), Freedom::Full);
+    let (a, b) = (PoseId(0), PoseId(1));
+    let position = |target: SightingTarget| {
+        let point = to * Point3::from(target.lever());
+        from.inverse_transform_point(&point).coords + error.translation.vector
+    };
+    let sighting = |target| Link::Sighting {
+        from: a,
+        target,
+        position: position(target),
+        information: position_information,
+    };
+    let at: Point3<f64> = (to.translation.vector + error.translation.vector).into();
+    let links = [
+        (
+            node(to),
+            Link::PosePrior {
+                pose: b,
+                at: to * error,
+                information: whole,
+            },
+        ),
+        (
+            point.clone(),
+            Link::PointPrior {
+                point: PointId(1),
+                at,
+                information: position_information,
+            },
+        ),
+        (
+            node(to),
+            Link::Between {
+                from: a,
+                to: b,
+                transform: from.inv_mul(&to) * error,
+                information: whole,
+            },
+        ),
+        (node(to), sighting(SightingTarget::Pose(b))),
+        (
+            node(to),
+            sighting(SightingTarget::PointOf(b, Vector3::new(0.4, -0.3, 0.2))),
+        ),
+        (point, sighting(SightingTarget::Point(PointId(1)))),
+    ];
+    links
+        .into_iter()
+        .map(|(to, link)| Case {
+            from: node(from),
+            to,
+            link,
+        })
+        .collect()
+}
+
+impl Case {
+    /// The squared error after motions of the two nodes.
+    fn squared_error(&self, from_step: &Vector6<f64>, to_step: &Vector6<f64>) -> f64 {
+        let from = self.from.moved(&self.from.pose, from_step.as_slice());
+        let to = self.to.moved(&self.to.pose, to_step.as_slice());
+        self.link.squared_error(&from, &to)
+    }
+}
+
+proptest! {
+    #[test]
+    fn gradients_are_difference_quotients(
+        (from, to) in (pose(), pose()),
+        shift in prop::array::uniform3(-2.0..2.0_f64),
+        turn in prop::array::uniform3(-1.5..1.5_f64),
+        seed in prop::array::uniform6(0.3..3.0_f64),
+    ) {
+        for case in cases(from, to, Isometry3::new(shift.into(), turn.into()), seed) {
+            let blocks = case.link.normal_blocks(&case.from.pose, &case.to.pose, |_| 1.0);
+            let zero = Vector6::zeros();
+            for axis in 0..6 {
+                let mut step = Vector6::zeros();
+                step[axis] = 1e-5;
+                let by_to = case.squared_error(&zero, &step) - case.squared_error(&zero, &-step);
+                let by_from = case.squared_error(&step, &zero) - case.squared_error(&-step, &zero);
+                // Of a point only three axes count, and a prior has no second node.
+                let moves_to = axis < 3 || !case.to.is_point();
+                let expected_to = if moves_to { 2.0 * blocks.to_gradient[axis] } else { 0.0 };
+                let scale = 1.0 + blocks.to_gradient.norm() + blocks.from_gradient.norm();
+                prop_assert!((by_to / 2e-5 - expected_to).abs() < 1e-6 * scale, "{case:?} {axis}");
+                let expected_from = 2.0 * blocks.from_gradient[axis];
+                prop_assert!((by_from / 2e-5 - expected_from).abs() < 1e-6 * scale, "{case:?} {axis}");
+            }
+        }
+    }
+
+    /// Where a link fits, its cost is the quadratic form of its blocks.
+    #[test]
+    fn blocks_are_the_curvature_of_a_link_that_fits(
+        (from, to) in (pose(), pose()),
+        steps in prop::array::uniform12(-1.0..1.0_f64),
+        seed in prop::array::uniform6(0.3..3.0_f64),
+    ) {
+        for case in cases(from, to, Isometry3::identity(), seed) {
+            let blocks = case.link.normal_blocks(&case.from.pose, &case.to.pose, |_| 1.0);
+            let from_step = Vector6::from_column_slice(&steps[..6]) * 1e-5;
+            let mut to_step = Vector6::from_column_slice(&steps[6..]) * 1e-5;
+            if case.to.is_point() {
+                to_step.fixed_rows_mut::<3>(3).fill(0.0);
+            }
+            let cost = case.squared_error(&from_step, &to_step);
+            let model = from_step.dot(&(blocks.from_from * from_step))
+                + 2.0 * to_step.dot(&(blocks.to_from * from_step))
+                + to_step.dot(&(blocks.to_to * to_step));
+            prop_assert!((cost - model).abs() < 1e-3 * model + 1e-13, "{case:?}: {cost} {model}");
+        }
+    }
+}
+
+#[test]
+fn a_weight_multiplies_all_blocks() {
+    let error = Isometry3::new(Vector3::new(0.3, 0.1, -0.2), Vector3::new(0.1, 0.2, 0.3));
+    let from = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(-0.4, 0.2, 0.1));
+    for case in cases(from, from * error, error, [0.5, 0.7, 1.1, 1.3, 1.7, 1.9]) {
+        let whole = case
+            .link
+            .normal_blocks(&case.from.pose, &case.to.pose, |_| 1.0);
+        let half = case
+            .link
+            .normal_blocks(&case.from.pose, &case.to.pose, |_| 0.5);
+        assert!((whole.to_to - half.to_to * 2.0).norm() < 1e-12);
+        assert!((whole.to_from - half.to_from * 2.0).norm() < 1e-12);
+        assert!((whole.from_gradient - half.from_gradient * 2.0).norm() < 1e-12);
+    }
+}

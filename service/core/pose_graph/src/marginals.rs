@@ -1,0 +1,141 @@
+//! How sure the map is of its nodes.
+
+use nalgebra::{Matrix3, Matrix6, SMatrix};
+
+use super::elimination::{CliqueTree, HalfSolution};
+use super::equations::NormalEquations;
+use super::graph::PoseGraph;
+use super::innovation::{ExpectedPose, ExpectedPosition};
+use super::node::{PointId, PoseId};
+use geometry::{PoseCovariance, se3};
+
+/// Covariances of nodes, given all links.
+///
+/// They are blocks of the inverse of the normal equations at the places where these were linearised, read from their
+/// factor: the cost of one is that of the way from the node to the root of the elimination, and does not grow with the
+/// map where the map is narrow. A link that a robust kernel has discounted counts as little here as there.
+#[derive(Clone, Debug)]
+pub struct Marginals<'a> {
+    pub(super) map: &'a PoseGraph,
+    pub(super) tree: std::borrow::Cow<'a, CliqueTree>,
+}
+
+impl PoseGraph {
+    /// Covariances about the nodes' present places. Factors the whole map once.
+    pub fn marginals(&self) -> Marginals<'_> {
+        let poses: Vec<_> = self.nodes.iter().map(|node| node.pose).collect();
+        let equations = NormalEquations {
+            map: self,
+            poses: &poses,
+            widening: 1.0,
+        };
+        let mut tree = CliqueTree::structured(&equations, self.nodes.len());
+        tree.refactor(&equations, &tree.all());
+        Marginals {
+            map: self,
+            tree: std::borrow::Cow::Owned(tree),
+        }
+    }
+}
+
+impl Marginals<'_> {
+    /// Covariance of a pose T = T̂ exp(ξ). `None` if the links leave it free, as those do that nothing ties to `map`.
+    pub fn pose(&self, pose: PoseId) -> Option<PoseCovariance> {
+        let half = self.half(pose.0)?;
+        let covariance = self.placed(pose.0, pose.0, &half.product(&half));
+        Some(symmetric(&covariance))
+    }
+
+    /// Covariance of a point in the axes of `map` \[m²\]. `None` if the links leave it free.
+    pub fn point(&self, point: PointId) -> Option<Matrix3<f64>> {
+        let half = self.half(point.0)?;
+        let covariance = self.placed(point.0, point.0, &half.product(&half));
+        let block = covariance.fixed_view::<3, 3>(0, 0).into_owned();
+        Some((block + block.transpose()) * 0.5)
+    }
+
+    /// Covariance of the pose of `to` in the frame of `from`, with what the errors of the two have in common: what a match
+    /// between them is to be judged by. `None` if the links leave one of them free.
+    ///
+    /// ```text
+    /// ξ = ξ_to − Ad(T_to⁻¹ T_from) ξ_from
+    /// ```
+    pub fn relative_pose(&self, from: PoseId, to: PoseId) -> Option<PoseCovariance> {
+        let (from_half, to_half) = (self.half(from.0)?, self.half(to.0)?);
+        let from_from = self.placed(from.0, from.0, &from_half.product(&from_half));
+        let to_to = self.placed(to.0, to.0, &to_half.product(&to_half));
+        let to_from = self.placed(to.0, from.0, &to_half.product(&from_half));
+        let moved = se3::adjoint(&self.map.pose(to).inv_mul(self.map.pose(from)));
+        let common = to_from * moved.transpose();
+        let covariance =
+            to_to - common - common.transpose() + moved * from_from * moved.transpose();
+        Some(symmetric(&covariance))
+    }
+
+    /// Where `to` is expected in the frame of `from`. `None` if the links leave one of them free.
+    pub fn expected_pose(&self, from: PoseId, to: PoseId) -> Option<ExpectedPose> {
+        let covariance = if from == to {
+            PoseCovariance::zero()
+        } else {
+            self.relative_pose(from, to)?
+        };
+        let transform = self.map.pose(from).inv_mul(self.map.pose(to));
+        Some(ExpectedPose {
+            transform,
+            covariance,
+        })
+    }
+
+    /// Where a point is expected in the frame of a pose. `None` if the links leave one of them free.
+    ///
+    /// ```text
+    /// d = Rᵀ dp − ρ + seen×φ
+    /// ```
+    pub fn expected_position(&self, from: PoseId, point: PointId) -> Option<ExpectedPosition> {
+        let (from_half, point_half) = (self.half(from.0)?, self.half(point.0)?);
+        let from_from = self.placed(from.0, from.0, &from_half.product(&from_half));
+        let block = self.placed(point.0, point.0, &point_half.product(&point_half));
+        let point_point = block.fixed_view::<3, 3>(0, 0).into_owned();
+        let block = self.placed(point.0, from.0, &point_half.product(&from_half));
+        let point_from = block.fixed_view::<3, 6>(0, 0).into_owned();
+        let pose = self.map.pose(from);
+        let position = pose.inverse_transform_point(&self.map.point(point)).coords;
+        let turn = pose.rotation.inverse().to_rotation_matrix().into_inner();
+        let mut moved = SMatrix::<f64, 3, 6>::zeros();
+        moved
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&-Matrix3::identity());
+        moved
+            .fixed_view_mut::<3, 3>(0, 3)
+            .copy_from(&position.cross_matrix());
+        let common = turn * point_from * moved.transpose();
+        let covariance = turn * point_point * turn.transpose()
+            + common
+            + common.transpose()
+            + moved * from_from * moved.transpose();
+        Some(ExpectedPosition {
+            position,
+            covariance: (covariance + covariance.transpose()) * 0.5,
+        })
+    }
+
+    fn half(&self, node: u32) -> Option<HalfSolution> {
+        let dimension = self.map.nodes[node as usize].axes().len();
+        self.tree.half_solution(node, dimension)
+    }
+
+    /// A block with the unknowns in their places in a twist.
+    fn placed(&self, row: u32, column: u32, block: &Matrix6<f64>) -> Matrix6<f64> {
+        let mut placed = Matrix6::zeros();
+        for (r, &row_axis) in self.map.nodes[row as usize].axes().iter().enumerate() {
+            for (c, &column_axis) in self.map.nodes[column as usize].axes().iter().enumerate() {
+                placed[(row_axis, column_axis)] = block[(r, c)];
+            }
+        }
+        placed
+    }
+}
+
+fn symmetric(covariance: &Matrix6<f64>) -> PoseCovariance {
+    PoseCovariance::from_upper_triangle(&geometry::upper_triangle(covariance))
+}

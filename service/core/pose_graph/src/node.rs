@@ -1,0 +1,119 @@
+//! What has a place in the experience map.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+
+use geometry::{PLANAR_AXES, se3};
+
+/// A pose in an experience map: a place, an agent's anchor, a landmark with an orientation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PoseId(pub(super) u32);
+
+/// A point in an experience map: a landmark of which only the position is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PointId(pub(super) u32);
+
+impl PoseId {
+    /// Its number among the nodes of its map, counted from 0.
+    pub fn number(self) -> u32 {
+        self.0
+    }
+}
+
+impl PointId {
+    /// Its number among the nodes of its map, counted from 0.
+    pub fn number(self) -> u32 {
+        self.0
+    }
+}
+
+/// How a node may move when the map is relaxed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freedom {
+    /// Not at all: surveyed, or the origin of the frame.
+    Held,
+    /// In the plane: along its own x and y and about its own z. A planar robot's nodes keep height, roll and pitch,
+    /// and cost an eighth of free ones.
+    Planar,
+    /// Every way.
+    Full,
+}
+
+/// A node with its place. A point is a pose that keeps the axes of `map`.
+#[derive(Clone, Debug)]
+pub(super) struct Node {
+    pub(super) pose: Isometry3<f64>,
+    axes: &'static [usize],
+    freedom: Freedom,
+    is_point: bool,
+}
+
+impl Node {
+    pub(super) fn pose(pose: Isometry3<f64>, freedom: Freedom) -> Self {
+        let axes: &[usize] = match freedom {
+            Freedom::Held => &[],
+            Freedom::Planar => &PLANAR_AXES,
+            Freedom::Full => &[0, 1, 2, 3, 4, 5],
+        };
+        Self {
+            pose,
+            axes,
+            freedom,
+            is_point: false,
+        }
+    }
+
+    pub(super) fn point(point: Point3<f64>, freedom: Freedom) -> Self {
+        let axes: &[usize] = match freedom {
+            Freedom::Held => &[],
+            Freedom::Planar => &[0, 1],
+            Freedom::Full => &[0, 1, 2],
+        };
+        let pose = Isometry3::from_parts(Translation3::from(point), UnitQuaternion::identity());
+        Self {
+            pose,
+            axes,
+            freedom,
+            is_point: true,
+        }
+    }
+
+    /// The components of a twist ξ = (ρ, φ) along which the node moves.
+    pub(super) fn axes(&self) -> &'static [usize] {
+        self.axes
+    }
+
+    pub(super) fn freedom(&self) -> Freedom {
+        self.freedom
+    }
+
+    pub(super) fn is_point(&self) -> bool {
+        self.is_point
+    }
+
+    /// The translation part \[m\] and the rotation part \[rad\] of a motion by its unknowns.
+    pub(super) fn motion(&self, unknowns: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
+        let mut twist = Vector6::zeros();
+        for (&axis, unknown) in self.axes.iter().zip(unknowns) {
+            twist[axis] = *unknown;
+        }
+        (
+            twist.fixed_rows::<3>(0).into_owned(),
+            twist.fixed_rows::<3>(3).into_owned(),
+        )
+    }
+
+    /// The node's pose `from` after a motion by its unknowns: T exp(ξ), or p + ρ for a point.
+    pub(super) fn moved(&self, from: &Isometry3<f64>, unknowns: &[f64]) -> Isometry3<f64> {
+        let (linear, angular) = self.motion(unknowns);
+        if self.is_point {
+            return Isometry3::from_parts(
+                Translation3::from(from.translation.vector + linear),
+                from.rotation,
+            );
+        }
+        let mut moved = from * se3::exp(&linear, &angular);
+        // Products of unit quaternions drift away from length one.
+        moved.rotation.renormalize_fast();
+        moved
+    }
+}

@@ -1,0 +1,16 @@
+#![doc = include_str!("../README.md")]
+
+mod bytes;
+mod digest;
+mod matrix;
+mod paged;
+mod slab;
+mod sparse;
+mod summary;
+
+pub use bytes::{CorruptState, ITEMS_MAX, State, StateReader, StateWriter, read_list, write_list};
+pub use digest::{Digest, InvalidDigest};
+pub use paged::{PagedVec, write_page};
+pub use slab::{NONE, Slab, Slot};
+pub use sparse::{PageItems, SparseVec};
+pub use summary::{Summary, SummaryTree, merged};
