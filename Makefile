@@ -76,29 +76,29 @@ serve: release ## the service; ARGS="--config service/cogmap.toml"
 	$(TARGET)/release/cogmap serve $(ARGS)
 
 .PHONY: bench
-bench: release ## the benchmarks, each beside its yardstick; ARGS="--json"
-	$(TARGET)/release/cogmap bench step $(ARGS)
-	$(TARGET)/release/cogmap bench recall $(ARGS)
-	$(TARGET)/release/cogmap bench descriptors $(ARGS)
-	$(TARGET)/release/cogmap bench ingest $(ARGS)
-	$(TARGET)/release/cogmap bench http $(ARGS)
+bench: release-lab ## the benchmarks, each beside its yardstick; ARGS="--json"
+	$(TARGET)/release/cogmap-lab bench step $(ARGS)
+	$(TARGET)/release/cogmap-lab bench recall $(ARGS)
+	$(TARGET)/release/cogmap-lab bench descriptors $(ARGS)
+	$(TARGET)/release/cogmap-lab bench ingest $(ARGS)
+	$(TARGET)/release/cogmap-lab bench http $(ARGS)
 
 .PHONY: scorecard
-scorecard: release ## figures of README and docs beside the committed card, half an hour; DATA=DIR with the data sets, ARGS="--quick", "--update"
+scorecard: release-lab ## figures of README and docs beside the committed card, half an hour; DATA=DIR with the data sets, ARGS="--quick", "--update"
 	$(PYTHON) tests/scorecard/scorecard.py --binary $(TARGET)/release/cogmap $(if $(DATA),--data '$(DATA)') $(ARGS)
 
 # Peers are large packages, so they have a venv of their own and no part in the gate.
 .PHONY: peers
-peers: release $(PEERS)/.venv/installed ## cogmap beside its peers in the same run, for minutes; ARGS="--json" DATA=DIR with pose graphs, TOUCH=DIR with touched objects
+peers: release-lab $(PEERS)/.venv/installed ## cogmap beside its peers in the same run, for minutes; ARGS="--json" DATA=DIR with pose graphs, TOUCH=DIR with touched objects
 	cd $(PEERS) && .venv/bin/mypy .
 	$(PEERS)/.venv/bin/python $(PEERS)/recall.py --binary $(TARGET)/release/cogmap $(ARGS)
 	$(PEERS)/.venv/bin/python $(PEERS)/gridness.py --binary $(TARGET)/release/cogmap $(ARGS)
-	$(PEERS)/.venv/bin/python $(PEERS)/revisits.py --binary $(TARGET)/release/cogmap $(ARGS)
+	$(PEERS)/.venv/bin/python $(PEERS)/revisits.py --binary $(TARGET)/release/cogmap-lab $(ARGS)
 ifdef DATA
-	$(PEERS)/.venv/bin/python $(PEERS)/graphs.py --binary $(TARGET)/release/cogmap $(ARGS) $(DATA)
+	$(PEERS)/.venv/bin/python $(PEERS)/graphs.py --binary $(TARGET)/release/cogmap-lab $(ARGS) $(DATA)
 endif
 ifdef TOUCH
-	$(PEERS)/.venv/bin/python $(PEERS)/touch.py --binary $(TARGET)/release/cogmap $(ARGS) $(TOUCH)
+	$(PEERS)/.venv/bin/python $(PEERS)/touch.py --binary $(TARGET)/release/cogmap-lab $(ARGS) $(TOUCH)
 endif
 
 $(PEERS)/.venv/installed: $(PEERS)/requirements.txt $(PEERS)/judge.txt $(CLIENT)/pyproject.toml
@@ -110,8 +110,12 @@ $(PEERS)/.venv/installed: $(PEERS)/requirements.txt $(PEERS)/judge.txt $(CLIENT)
 	touch $@
 
 .PHONY: release
-release: ## the binary, optimised
+release: ## the service, optimised
 	cargo build --release --package cogmap --bin cogmap
+
+.PHONY: release-lab
+release-lab: ## the service and its laboratory, optimised
+	cargo build --release --package cogmap --package cogmap-lab --bins
 
 .PHONY: docs
 docs: ## documentation of the crates, in target/doc

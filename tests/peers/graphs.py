@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Pose graphs: `cogmap replay g2o` beside GTSAM, whole and pose by pose.
+"""Pose graphs: `cogmap-lab replay g2o` beside GTSAM, whole and pose by pose.
 
 Whole, GTSAM starts from rotations (its own chordal start in space; in the plane, where it has none
 for correlated noise, the same written here) and goes on by Levenberg-Marquardt. Pose by pose it is iSAM2 with its default settings, by Cholesky factors, and by
@@ -31,7 +31,7 @@ from scipy.sparse.linalg import splu
 Floats = NDArray[np.float64]
 
 #: What `make release` builds.
-_BINARY = Path("target", "release", "cogmap")
+_BINARY = Path("target", "release", "cogmap-lab")
 #: Deviation of the prior that holds the first pose.
 _HELD_SD = 1e-6
 
@@ -109,7 +109,7 @@ def main() -> int:
     most = "most time for iSAM2 on one graph [s]; what it has not finished by then is left out"
     parser.add_argument("--patience", type=float, default=300.0, help=most)
     parser.add_argument("--whole", action="store_true", help="leave out the runs pose by pose")
-    parser.add_argument("--binary", type=Path, default=_BINARY, help="the program cogmap")
+    parser.add_argument("--binary", type=Path, default=_BINARY, help="the program cogmap-lab")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     args = parser.parse_args()
     rows = []

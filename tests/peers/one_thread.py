@@ -1,7 +1,7 @@
 """One thread for every library: to be imported before any of them.
 
 Numerical libraries read these variables once, when they are loaded. A peer with more threads than
-`cogmap bench recall`, which has one, would be another comparison.
+`cogmap-lab bench recall`, which has one, would be another comparison.
 """
 
 import os

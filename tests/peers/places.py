@@ -1,4 +1,4 @@
-"""The places and queries of `cogmap bench recall`, as it writes them, and the check that a service founds
+"""The places and queries of `cogmap-lab bench recall`, as it writes them, and the check that a service founds
 the same ones."""
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Drawn:
 
 
 def read(directory: Path, size: int) -> Drawn:
-    """What `cogmap bench recall --out` wrote at one number of places."""
+    """What `cogmap-lab bench recall --out` wrote at one number of places."""
     return Drawn(*(_positions(directory / f"{name}-{size}.csv") for name in ("places", "queries")))
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Recall of places by grid code: `cogmap bench recall` beside FAISS and a k-d tree.
+"""Recall of places by grid code: `cogmap-lab bench recall` beside FAISS and a k-d tree.
 
 The peers hold the places of the benchmark and are asked the queries of its last round, in the same
 run, with one thread each. FAISS gets the activations of all grid cells as vectors; the k-d
@@ -118,8 +118,8 @@ def _numbers(text: str) -> List[int]:
 
 
 def _bench(args: argparse.Namespace, size: int, rounds: int, out: Path) -> Dict[str, Any]:
-    """The report of `cogmap bench recall`, which writes places and queries into `out`."""
-    command = [args.binary, "bench", "recall", "--json", "--places", size, "--rounds", rounds]
+    """The report of `cogmap-lab bench recall`, which writes places and queries into `out`."""
+    command = [args.binary.with_name("cogmap-lab"), "bench", "recall", "--json", "--places", size, "--rounds", rounds]
     command += ["--seed", args.seed, "--out", out]
     done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, check=True)
     report: Dict[str, Any] = json.loads(done.stdout)

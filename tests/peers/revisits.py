@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Views alone: a robot's refined map beside GTSAM's optimum of the same links.
 
-For each seed `cogmap eval env2` walks through the second room of the paper with odometry that drifts and
+For each seed `cogmap-lab eval env2` walks through the second room of the paper with odometry that drifts and
 views of the room, and writes what it remembers and believes as a graph. GTSAM solves that graph from
 rotations on, with the same kernel for revisits. What is told is how far both are apart (RMS of positions), and what dead reckoning and cogmap
 are off: where the refined map is farther off than dead reckoning and GTSAM agrees with it, the links do not
@@ -25,7 +25,7 @@ import numpy as np
 from graphs import Graph, whole
 
 #: What `make release` builds.
-_BINARY = Path("target", "release", "cogmap")
+_BINARY = Path("target", "release", "cogmap-lab")
 #: The room, the walk and the noise of `docs/accuracy.md`.
 _WALK = (
     "eval env2 --recruit novelty --walk persistent --percept descriptor --translation-noise 0.05 "
@@ -56,7 +56,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=20, help="number of walks")
     parser.add_argument("--seed", type=int, default=1, help="seed of the first walk")
-    parser.add_argument("--binary", type=Path, default=_BINARY, help="the program cogmap")
+    parser.add_argument("--binary", type=Path, default=_BINARY, help="the program cogmap-lab")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     args = parser.parse_args()
     rows = [_compare(seed, args.binary) for seed in range(args.seed, args.seed + args.runs)]

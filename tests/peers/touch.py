@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Objects by touch: `cogmap replay touch` beside an ideal observer of the same touches.
+"""Objects by touch: `cogmap-lab replay touch` beside an ideal observer of the same touches.
 
 The observer is told what a recogniser is told: the learned touches, the noise of position and level, and that the object is
 moved and not turned. It knows besides that no place is touched twice. Bayes' rule then says how likely each object is. A hypothesis is an object
@@ -64,11 +64,11 @@ class Trial:
 def main() -> int:
     """Runs the comparison that the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("directory", type=Path, help="a set as `cogmap replay touch` reads it")
+    parser.add_argument("directory", type=Path, help="a set as `cogmap-lab replay touch` reads it")
     parser.add_argument("--trials", type=int, default=20, help="of each object")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--noise", type=_noise, action="append", help="MM/LEVEL; three when absent")
-    parser.add_argument("--binary", type=Path, default=BINARY, help="the program cogmap")
+    parser.add_argument("--binary", type=Path, default=BINARY.with_name("cogmap-lab"), help="the program cogmap-lab")
     written = "trials that were written before, instead of running cogmap"
     parser.add_argument("--trials-file", type=Path, help=written)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -119,7 +119,7 @@ def _learned(directory: Path) -> Learned:
 
 
 def _trials(file: Path) -> List[Trial]:
-    """The trials that `cogmap replay touch --out` wrote."""
+    """The trials that `cogmap-lab replay touch --out` wrote."""
     grouped: Dict[str, List[Dict[str, str]]] = {}
     with file.open(newline="") as lines:
         for row in csv.DictReader(lines):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 from pathlib import Path
-from typing import Dict
+from typing import Dict, Sequence
 
 #: What the workspace built last in the dev profile.
 _BUILT = Path(__file__).parents[2] / "target" / "debug" / "cogmap"
@@ -30,9 +30,18 @@ def environment() -> Dict[str, str]:
 
 
 def run(*arguments: object) -> str:
-    """Runs a command of the binary to its end, a good one, and returns what it printed."""
+    """Runs a command of `cogmap` to its end, a good one, and returns what it printed."""
+    return _finish(binary(), arguments)
+
+
+def lab(*arguments: object) -> str:
+    """The same with `cogmap-lab`, which lies beside `cogmap`."""
+    return _finish(str(Path(binary()).with_name("cogmap-lab")), arguments)
+
+
+def _finish(program: str, arguments: Sequence[object]) -> str:
     done = subprocess.run(
-        [binary(), *map(str, arguments)],
+        [program, *map(str, arguments)],
         env=environment(),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

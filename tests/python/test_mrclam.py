@@ -16,7 +16,7 @@ from typing import Any, Dict, List
 import pytest
 
 import cogmap
-from binary import environment, run
+from binary import environment, lab, run
 from recording import write_recording
 from server import Server
 from wait import LONG_S
@@ -55,7 +55,7 @@ def directory(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 def replayed(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> Replayed:
     """The data set, replayed without a service."""
     out = tmp_path_factory.mktemp("replayed")
-    report = json.loads(run("replay", "mrclam", directory, "--out", out, "--json"))
+    report = json.loads(lab("replay", "mrclam", directory, "--out", out, "--json"))
     ways = {robot: (out / f"{robot}.causal.tum").read_text() for robot in report["robots"]}
     return Replayed(report, ways)
 
@@ -154,5 +154,5 @@ def test_another_recording_makes_another_map(tmp_path: Path) -> None:
     digests = set()
     for seed in (1, 2):
         write_recording(tmp_path, seed)
-        digests.add(json.loads(run("replay", "mrclam", tmp_path, "--json"))["digest"])
+        digests.add(json.loads(lab("replay", "mrclam", tmp_path, "--json"))["digest"])
     assert len(digests) == 2, "or equal digests would prove nothing"

@@ -83,7 +83,7 @@ def _options(argv: Optional[Sequence[str]]) -> argparse.Namespace:
         help="directory with the public data sets; without it theirs are skipped",
     )
     binary = ROOT / "target" / "release" / "cogmap"
-    parser.add_argument("--binary", type=Path, default=binary, help="the program cogmap")
+    parser.add_argument("--binary", type=Path, default=binary, help="the program cogmap; cogmap-lab lies beside it")
     parser.add_argument("--card", type=Path, default=CARD, help=argparse.SUPPRESS)
     parser.add_argument(
         "--only", metavar="ID,…", help="only runs, or figures of runs, with these names"
@@ -136,8 +136,8 @@ def _report(run: Run, binary: Path, data: Optional[Path]) -> Any:
     words = shlex.split(run.command)
     if data is not None:
         words = [word.replace(DATA, f"{data.resolve()}/") for word in words]
-    if words[0] == "cogmap":
-        words[0] = str(binary.resolve())
+    if words[0] in ("cogmap", "cogmap-lab"):
+        words[0] = str(binary.resolve().with_name(words[0]))
     try:
         done = subprocess.run(
             words,

@@ -38,7 +38,7 @@ def _card(directory: Path, **changes: Any) -> Path:
             "quick": True,
             "figures": [{**figure, **changes}, fast],
         },
-        {"id": "set", "command": "cogmap replay DATA/set --json", "figures": [figure]},
+        {"id": "set", "command": "cogmap-lab replay DATA/set --json", "figures": [figure]},
     ]
     path = directory / "card.json"
     path.write_text(json.dumps({"runs": runs}))
@@ -46,7 +46,7 @@ def _card(directory: Path, **changes: Any) -> Path:
 
 
 def _binary(directory: Path, prints: str, code: int = 0) -> Path:
-    path = directory / "cogmap"
+    path = directory / "cogmap-lab"
     path.write_text(
         f"#!/bin/sh\necho \"$@\" >> '{directory}/called'\necho '{prints}'\nexit {code}\n"
     )
@@ -55,7 +55,7 @@ def _binary(directory: Path, prints: str, code: int = 0) -> Path:
 
 
 def _run(directory: Path, *arguments: str) -> int:
-    card, binary = directory / "card.json", directory / "cogmap"
+    card, binary = directory / "card.json", directory / "cogmap-lab"
     return main(["--card", str(card), "--binary", str(binary), *arguments])
 
 

@@ -12,7 +12,7 @@ from verdict import judge
 
 _FIGURE = Figure(
     id="walk.error",
-    command="cogmap eval env1 --json",
+    command="cogmap-lab eval env1 --json",
     pointer="/error_m/mean",
     over=None,
     scale=1.0,
@@ -71,7 +71,7 @@ def test_a_figure_that_is_not_told_fails(report: Any) -> None:
 
 def test_a_failure_names_figure_values_tolerance_and_command() -> None:
     text = judge(_FIGURE, 0.75).explain()
-    for part in ("walk.error", "0.75 m", "0.5 m", "10 %", "cogmap eval env1 --json"):
+    for part in ("walk.error", "0.75 m", "0.5 m", "10 %", "cogmap-lab eval env1 --json"):
         assert part in text
 
 

@@ -37,9 +37,20 @@ pub struct Finished {
     pub stderr: String,
 }
 
-/// Runs a command of the binary to its end. No setting of the caller's environment reaches it.
+/// Runs a command of `cogmap` to its end. No setting of the caller's environment reaches it.
 pub fn run(args: &[&str]) -> Finished {
-    let output = command()
+    finish(command(), args)
+}
+
+/// Runs a command of `cogmap-lab`, which lies beside `cogmap`, to its end.
+pub fn lab(args: &[&str]) -> Finished {
+    let mut command = Command::new(binary().with_file_name("cogmap-lab"));
+    forget_settings(&mut command);
+    finish(command, args)
+}
+
+fn finish(mut command: Command, args: &[&str]) -> Finished {
+    let output = command
         .args(args)
         .output()
         .expect("the binary can be started");

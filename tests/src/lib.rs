@@ -14,7 +14,7 @@ mod server;
 mod slow;
 mod wait;
 
-pub use binary::{Finished, binary, run};
+pub use binary::{Finished, binary, lab, run};
 pub use drive::{Drive, batch, circle, velocity};
 pub use http::{Answer, Http};
 pub use port::Port;

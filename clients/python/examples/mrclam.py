@@ -174,7 +174,7 @@ def main(arguments: Optional[List[str]] = None) -> None:
     parser.add_argument(
         "--session",
         type=int,
-        help="session of every robot; with 1, the map's digest is that of `cogmap replay`",
+        help="session of every robot; with 1, the map's digest is that of `cogmap-lab replay`",
     )
     parser.add_argument("--robots", type=int, nargs="*", help="numbers; all when absent")
     parser.add_argument("--limit", type=int, help="publish only this many samples")

@@ -4,7 +4,10 @@
 const SECONDS_MAX: f64 = 1e6;
 
 /// Reads a duration: a number of seconds, or numbers with their units such as `20s`, `1.5s`, `1m30s`.
-pub(super) fn seconds(text: &str) -> Result<f64, String> {
+///
+/// # Errors
+/// Says what is wrong with the text.
+pub fn seconds(text: &str) -> Result<f64, String> {
     let seconds = match text.parse::<f64>() {
         Ok(seconds) => seconds,
         Err(_) => humantime::parse_duration(text)

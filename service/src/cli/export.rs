@@ -6,13 +6,12 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 
 use super::output;
+use crate::decode::stamped_pose;
 use crate::engine::{Recorder, core_settings, entries, records_of, trajectory_interval_ns};
 use crate::store::{Journal, LocalJournal, SpaceNumber};
-use cogmap_experiments::metrics::StampedPose;
-use cogmap_experiments::tum::write_tum;
 use cogmap_proto::SpaceSettings;
 use cognitive_map::{CognitiveMap, Record};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use trajectory::write_tum;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum ExportCommand {
@@ -116,17 +115,6 @@ fn trajectory(source: &Source, agent: &str) -> anyhow::Result<()> {
     }
     known.with_context(|| format!("the space has no agent {agent:?}"))?;
     rows.extend_from_slice(recorder.rows());
-    let poses: Vec<_> = rows.iter().map(pose).collect();
+    let poses: Vec<_> = rows.iter().map(stamped_pose).collect();
     Ok(output::line(write_tum(&poses).trim_end())?)
-}
-
-/// A pose of the wire as one of the metrics.
-pub(super) fn pose(row: &cogmap_proto::StampedPose) -> StampedPose {
-    let [x, y, z, w] = row.rotation_xyzw;
-    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
-    let translation = Translation3::from(nalgebra::Vector3::from(row.translation_m));
-    StampedPose {
-        stamp_ns: row.stamp_ns,
-        pose: Isometry3::from_parts(translation, rotation),
-    }
 }

@@ -3,7 +3,8 @@
 use clap::Command;
 
 /// The command, its subcommands and their arguments, without rustdoc's backslashes in their help.
-pub(super) fn plain(command: Command) -> Command {
+#[must_use]
+pub fn plain(command: Command) -> Command {
     let (about, long) = (command.get_about(), command.get_long_about());
     let (about, long) = (
         about.map(ToString::to_string),
@@ -55,7 +56,7 @@ mod tests {
     fn no_help_shows_a_backslash() {
         let mut pages = Vec::new();
         all_help(&mut plain(Cli::command()), &mut pages);
-        assert!(pages.len() > 20, "{} pages", pages.len());
+        assert!(pages.len() > 10, "{} pages", pages.len());
         let escaped: Vec<_> = pages.iter().filter(|page| page.contains('\\')).collect();
         assert!(escaped.is_empty(), "{escaped:#?}");
         let demo = pages.iter().find(|page| page.contains("--robots"));

@@ -1,25 +1,23 @@
 //! The command line.
 
-mod bench;
 mod check_config;
 mod demo;
-mod duration;
-mod eval;
+pub mod duration;
 mod export;
-mod help;
-mod output;
-mod replay;
+mod free_port;
+pub mod help;
+pub mod output;
+mod quantile;
 mod serve;
 mod store;
+
+pub use free_port::free_port;
+pub use quantile::quantile;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
-use cogmap_experiments::eval::InvalidProtocol;
-use cogmap_experiments::eval::object::InvalidObjectProtocol;
-use cogmap_experiments::touch::InvalidTouchProtocol;
-use cogmap_experiments::waking::InvalidWaking;
 
 use crate::config::{Config, ConfigError};
 
@@ -49,15 +47,6 @@ enum Command {
     Backup(store::BackupArgs),
     /// Make a store from a backup, into a directory that is empty or absent.
     Restore(store::BackupArgs),
-    /// Send a recorded data set through the map and measure the error.
-    #[command(subcommand)]
-    Replay(replay::ReplayCommand),
-    /// Run the seed paper's experiments: tables and figures, ours beside the paper's.
-    #[command(subcommand)]
-    Eval(eval::EvalCommand),
-    /// Measure speed, each figure beside its yardstick.
-    #[command(subcommand)]
-    Bench(bench::BenchCommand),
 }
 
 /// Where the settings come from.
@@ -112,19 +101,12 @@ pub fn main() -> ExitCode {
         Command::Store(command) => store::run(&command),
         Command::Backup(args) => store::backup(&args),
         Command::Restore(args) => store::restore(&args),
-        Command::Replay(command) => replay::run(&command),
-        Command::Eval(command) => eval::run(&command),
-        Command::Bench(command) => bench::run(&command),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            output::complain(&error);
-            let wrong_usage = error.is::<ConfigError>()
-                || error.is::<InvalidProtocol>()
-                || error.is::<InvalidObjectProtocol>()
-                || error.is::<InvalidTouchProtocol>()
-                || error.is::<InvalidWaking>();
+            output::complain("cogmap", &error);
+            let wrong_usage = error.is::<ConfigError>();
             ExitCode::from(if wrong_usage { 2 } else { 1 })
         }
     }

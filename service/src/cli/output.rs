@@ -8,7 +8,10 @@ use tracing_subscriber::EnvFilter;
 use crate::config::{LogConfig, LogFormat};
 
 /// Writes a line to standard output. A closed pipe (`| head`) is no failure.
-pub(super) fn line(text: &str) -> io::Result<()> {
+///
+/// # Errors
+/// Standard output takes nothing more.
+pub fn line(text: &str) -> io::Result<()> {
     match writeln!(io::stdout().lock(), "{text}") {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         result => result,
@@ -16,23 +19,26 @@ pub(super) fn line(text: &str) -> io::Result<()> {
 }
 
 /// Writes an object as one line of JSON.
-pub(super) fn json<T: Serialize>(value: &T) -> anyhow::Result<()> {
+///
+/// # Errors
+/// As [`line`], or the object is none in JSON.
+pub fn json<T: Serialize>(value: &T) -> anyhow::Result<()> {
     Ok(line(&serde_json::to_string(value)?)?)
 }
 
 /// Writes a line to standard error.
-pub(super) fn progress(text: &str) {
+pub fn progress(text: &str) {
     // With standard error closed there is nobody left to tell.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// Says why a command failed, with all causes.
-pub(super) fn complain(error: &anyhow::Error) {
-    progress(&format!("cogmap: {error:#}"));
+/// Says why a command of a program failed, with all causes.
+pub fn complain(program: &str, error: &anyhow::Error) {
+    progress(&format!("{program}: {error:#}"));
 }
 
 /// Begins to log to standard error.
-pub(super) fn start_log(log: &LogConfig) {
+pub fn start_log(log: &LogConfig) {
     // The filter was checked with the settings.
     let filter = EnvFilter::try_new(&log.filter).unwrap_or_else(|_| EnvFilter::new("info"));
     let builder = tracing_subscriber::fmt()

@@ -63,7 +63,7 @@ pub use refinement::{SharedText, refined_trajectories};
 pub use repair::{AgentLoss, LostBlocks, MissingSamples, RepairReport, repair};
 pub use settings::EngineSettings;
 pub use space::{Space, TrajectoryError, Unavailable};
-pub(crate) use trajectory::stamped;
+pub use trajectory::stamped;
 pub use trajectory::{Chunk, Recorder};
 
 use crate::metrics::SPACE_STOPPED;

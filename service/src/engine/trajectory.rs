@@ -166,7 +166,7 @@ pub(crate) fn note_all(
 }
 
 /// A pose at a time, as the wire has it.
-pub(crate) fn stamped(stamp_ns: i64, pose: &nalgebra::Isometry3<f64>) -> StampedPose {
+pub fn stamped(stamp_ns: i64, pose: &nalgebra::Isometry3<f64>) -> StampedPose {
     let rotation = pose.rotation.coords;
     StampedPose {
         stamp_ns,

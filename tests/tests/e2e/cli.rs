@@ -7,7 +7,7 @@ use std::net::TcpListener;
 use std::path::Path;
 
 use cogmap_proto::SeqRange;
-use cogmap_tests::{Drive, Server, run, seed};
+use cogmap_tests::{Drive, Server, lab, run, seed};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -90,7 +90,6 @@ fn wrong_usage_is_two_and_a_failure_is_one() {
         &["fly"],
         &["serve", "--fast"],
         &["demo", "--robots", "0"],
-        &["replay"],
     ] {
         let refused = run(args);
         assert_eq!(refused.code(), USAGE, "{args:?}: {refused:?}");
@@ -100,13 +99,16 @@ fn wrong_usage_is_two_and_a_failure_is_one() {
             refused.stderr
         );
     }
-    for args in [
-        &["export", "journal", "--data-dir", "/nowhere"][..],
-        &["replay", "mrclam", "/nowhere"],
+    assert_eq!(lab(&["replay"]).code(), USAGE);
+    for (failed, name) in [
+        (
+            run(&["export", "journal", "--data-dir", "/nowhere"]),
+            "cogmap: ",
+        ),
+        (lab(&["replay", "mrclam", "/nowhere"]), "cogmap-lab: "),
     ] {
-        let failed = run(args);
-        assert_eq!((failed.code(), &*failed.stdout), (FAILED, ""), "{args:?}");
-        assert!(failed.stderr.starts_with("cogmap: "), "{}", failed.stderr);
+        assert_eq!((failed.code(), &*failed.stdout), (FAILED, ""), "{name}");
+        assert!(failed.stderr.starts_with(name), "{}", failed.stderr);
     }
     assert!(run(&["--version"]).text().starts_with("cogmap "));
     assert!(run(&["serve", "--help"]).text().contains("--data-dir"));
@@ -348,7 +350,7 @@ fn a_replay_gives_the_same_map_offline_and_through_the_service_in_any_batches() 
             "--out",
             text(&out),
         ];
-        let mut report = run(&args.iter().chain(more).copied().collect::<Vec<_>>()).json();
+        let mut report = lab(&args.iter().chain(more).copied().collect::<Vec<_>>()).json();
         let times = timeless(&mut report);
         assert_eq!(
             times,
@@ -398,12 +400,12 @@ fn a_replay_gives_the_same_map_offline_and_through_the_service_in_any_batches() 
         online[2],
         online[3],
     ];
-    let refused = run(&again);
+    let refused = lab(&again);
     assert_eq!(refused.code(), FAILED);
     assert!(refused.stderr.contains("exists"), "{}", refused.stderr);
     // Another set is another map.
     write_data_set(&set, seed(61) + 1);
-    let other = run(&["replay", "mrclam", text(&set), "--json"]).json();
+    let other = lab(&["replay", "mrclam", text(&set), "--json"]).json();
     assert_ne!(other["digest"], results[0].1["digest"]);
 }
 

@@ -1,12 +1,12 @@
-//! `cogmap eval`: the experiments of the paper from the command line.
+//! `cogmap-lab eval`: the experiments of the paper from the command line.
 
-use cogmap_tests::run;
+use cogmap_tests::lab;
 
 #[test]
 fn an_experiment_is_the_same_on_any_number_of_threads() {
     let figures = |threads| {
         let arguments = ["--runs", "3", "--json", "--threads", threads];
-        let finished = run(&[&["eval", "env1"][..], &arguments].concat());
+        let finished = lab(&[&["eval", "env1"][..], &arguments].concat());
         finished.text().to_owned()
     };
     let alone = figures("1");
@@ -25,7 +25,7 @@ fn an_experiment_is_the_same_on_any_number_of_threads() {
 fn figures_and_trajectories_are_written() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().to_str().unwrap();
-    let finished = run(&["eval", "env2", "--runs", "1", "--steps", "50", "--out", out]);
+    let finished = lab(&["eval", "env2", "--runs", "1", "--steps", "50", "--out", out]);
     assert!(
         finished.text().contains("0.42"),
         "the paper's figure is beside ours"
@@ -42,11 +42,11 @@ fn figures_and_trajectories_are_written() {
 #[test]
 fn views_are_measured_and_what_makes_no_sense_is_refused() {
     let views = ["eval", "env1", "--percept", "descriptor", "--runs", "2"];
-    let report = run(&[&views[..], &["--json"]].concat()).json();
+    let report = lab(&[&views[..], &["--json"]].concat()).json();
     let error_m = report["view_recall_ate_mean_m"]["mean"].as_f64().unwrap();
     // A view recalls a place in the same part of the room, a step or two of a short walk away.
     assert!((0.0..2.0).contains(&error_m), "{report}");
-    let refused = run(&[&views[..], &["--percept-noise", "2"]].concat());
+    let refused = lab(&[&views[..], &["--percept-noise", "2"]].concat());
     assert_eq!(refused.code(), 2, "{refused:?}");
 }
 
@@ -55,7 +55,7 @@ fn objects_are_told_apart_and_figures_are_written() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().to_str().unwrap();
     let small = ["eval", "env3", "--objects", "2", "--trials", "100"];
-    let report = run(&[&small[..], &["--json", "--out", out]].concat()).json();
+    let report = lab(&[&small[..], &["--json", "--out", out]].concat()).json();
     let number = |name: &str| report[name].as_f64().unwrap();
     // 99.5 % is claimed, after 6 touches. Of 100 more than 4 are wrong once in 5000 times.
     assert!(number("accuracy") >= 0.96, "{report}");
@@ -69,7 +69,7 @@ fn objects_are_told_apart_and_figures_are_written() {
     for name in ["active-objects.svg", "object-confidence.svg", "report.json"] {
         assert!(directory.path().join(name).exists(), "{name}");
     }
-    let refused = run(&[&small[..], &["--value-noise", "-1"]].concat());
+    let refused = lab(&[&small[..], &["--value-noise", "-1"]].concat());
     assert_eq!(refused.code(), 2, "{refused:?}");
 }
 
@@ -82,7 +82,7 @@ fn robots_that_wake_up_are_found_on_any_number_of_threads() {
         &["--explorer-steps", "1000"],
     ]
     .concat();
-    let report = |threads| run(&[&small[..], &["--json", "--threads", threads]].concat()).json();
+    let report = |threads| lab(&[&small[..], &["--json", "--threads", threads]].concat()).json();
     let alone = report("1");
     assert_eq!(alone, report("2"));
     assert_eq!(alone["protocol"]["trials"], 4, "{alone}");
@@ -92,14 +92,14 @@ fn robots_that_wake_up_are_found_on_any_number_of_threads() {
     assert!(error_m < 0.2, "{alone}");
     // Nobody is put where it is not.
     assert_eq!(alone["false_claims"], 0, "{alone}");
-    let table = run(&small);
+    let table = lab(&small);
     assert!(table.text().contains("error at the end [m]"), "{table:?}");
     for senseless in [
         ["--view-wrong", "1.5"],
         ["--rooms", "9"],
         ["--travel-m", "0"],
     ] {
-        let refused = run(&[&small[..], &senseless].concat());
+        let refused = lab(&[&small[..], &senseless].concat());
         assert_eq!(refused.code(), 2, "{refused:?}");
     }
 }

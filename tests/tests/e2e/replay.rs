@@ -1,11 +1,11 @@
-//! `cogmap replay` of pose graphs and recordings, on small ones written here.
+//! `cogmap-lab replay` of pose graphs and recordings, on small ones written here.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use cogmap_tests::run;
+use cogmap_tests::lab;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -77,7 +77,7 @@ fn a_graph_is_relaxed_to_its_optimum_and_written() {
         "--out",
         text(&out),
     ];
-    let report = run(&args).json();
+    let report = lab(&args).json();
     assert_eq!(report["poses"], 72);
     assert_eq!(report["closures"]["accepted"], 48);
     assert_eq!(report["closures"]["rejected"], 0);
@@ -112,7 +112,7 @@ fn a_graph_is_relaxed_to_its_optimum_and_written() {
         assert!(figure.contains(label), "the figure names the path {label}");
     }
     // The text says the same.
-    let printed = run(&["replay", "g2o", text(&file)]);
+    let printed = lab(&["replay", "g2o", text(&file)]);
     assert!(printed.text().contains(report["digest"].as_str().unwrap()));
 }
 
@@ -136,15 +136,15 @@ fn false_closures_are_rejected_and_the_run_repeats_itself() {
         "--reference",
         text(&elsewhere),
     ];
-    let report = run(&args).json();
+    let report = lab(&args).json();
     assert_eq!(report["closures"]["accepted"], 48);
     assert_eq!(report["closures"]["rejected"], 12);
     assert!(number(&report, "/refined_ate_rmse_m") < 1e-4, "{report}");
     assert!(number(&report, "/causal_ate_rmse_m") < 1e-4, "{report}");
     assert!(number(&report, "/chi2_half_of_all") > 100.0, "{report}");
-    assert_eq!(run(&args).json()["digest"], report["digest"]);
+    assert_eq!(lab(&args).json()["digest"], report["digest"]);
     // Without the causal run there is nothing causal to tell, and the map is the same.
-    let batch = run(&[&args[..], &["--no-causal"]].concat()).json();
+    let batch = lab(&[&args[..], &["--no-causal"]].concat()).json();
     assert_eq!(batch["causal_ate_rmse_m"], Value::Null);
     assert_eq!(batch["update_ms"], Value::Null);
     assert_eq!(batch["closures"]["rejected"], 12);
@@ -182,7 +182,7 @@ fn four_false_matches_for_each_true_one_do_not_bend_a_recording() {
     write_tuc(home.path());
     let replay = |more: &[&str]| {
         let args = ["replay", "tuc", text(home.path()), "--json"];
-        run(&[&args[..], more].concat()).json()
+        lab(&[&args[..], more].concat()).json()
     };
     let clean = replay(&[]);
     assert_eq!(clean["false_share"], 0.0);
@@ -213,7 +213,7 @@ fn a_recording_goes_through_the_memory_as_samples() {
     write_tuc(home.path());
     let replay = |more: &[&str]| {
         let args = ["replay", "tuc", text(home.path()), "--samples", "--json"];
-        run(&[&args[..], more].concat()).json()
+        lab(&[&args[..], more].concat()).json()
     };
     let clean = replay(&[]);
     // A start pose, 600 motions and 81 matches.
@@ -233,7 +233,7 @@ fn a_recording_goes_through_the_memory_as_samples() {
         "{doubtful}"
     );
     assert_eq!(replay(&[])["digest"], clean["digest"]);
-    let refused = run(&[
+    let refused = lab(&[
         &["replay", "tuc", "--samples", "--no-causal"][..],
         &[text(home.path())],
     ]
@@ -258,7 +258,7 @@ fn trees_correct_a_car() {
         writeln!(set, "LANDMARK {k} {} 1 -3 0.01 0 0.01", 1000 + k % ROUND).unwrap();
     }
     fs::write(home.path().join("victoria_park.txt"), set).unwrap();
-    let report = run(&["replay", "victoria", text(home.path()), "--json"]).json();
+    let report = lab(&["replay", "victoria", text(home.path()), "--json"]).json();
     assert_eq!(
         (&report["poses"], &report["landmarks"]),
         (&48.into(), &24.into())
@@ -272,7 +272,7 @@ fn trees_correct_a_car() {
     );
     assert!(number(&report, "/chi2_half") > 0.0);
     assert!(
-        run(&["replay", "victoria", "--help"])
+        lab(&["replay", "victoria", "--help"])
             .text()
             .contains("aa3_dr.mat")
     );
@@ -335,7 +335,7 @@ fn what_cannot_be_read_is_named_with_its_line() {
             &["trees.txt", "line 2", "TREE"],
         ),
     ] {
-        let refused = run(&[&["replay"][..], &args].concat());
+        let refused = lab(&[&["replay"][..], &args].concat());
         assert_eq!(
             (refused.code(), &*refused.stdout),
             (1, ""),
@@ -346,11 +346,11 @@ fn what_cannot_be_read_is_named_with_its_line() {
         }
     }
     // Numbers that no map can hold end in an answer or an error, not in a crash.
-    assert!(run(&["replay", "g2o", text(&path("huge.g2o"))]).code() <= 1);
+    assert!(lab(&["replay", "g2o", text(&path("huge.g2o"))]).code() <= 1);
     for usage in [
         vec!["replay", "tuc", text(&path("tuc")), "--add-false", "1.0"],
         vec!["replay", "g2o", text(&good), "--plot"],
     ] {
-        assert_eq!(run(&usage).code(), 2, "{usage:?}");
+        assert_eq!(lab(&usage).code(), 2, "{usage:?}");
     }
 }

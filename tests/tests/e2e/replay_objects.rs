@@ -1,9 +1,9 @@
-//! `cogmap replay touch` and `points`, on objects written here.
+//! `cogmap-lab replay touch` and `points`, on objects written here.
 
 use std::fmt::Write as _;
 use std::fs;
 
-use cogmap_tests::run;
+use cogmap_tests::lab;
 use tempfile::TempDir;
 
 /// Three objects of twelve touches along a helix, whose levels come in different orders.
@@ -35,18 +35,18 @@ fn touched_objects_are_recognised_and_their_touches_written() {
         "6",
         "--json",
     ];
-    let report = run(&[&arguments[..], &["--out", out.to_str().unwrap()]].concat()).json();
+    let report = lab(&[&arguments[..], &["--out", out.to_str().unwrap()]].concat()).json();
     assert_eq!(report["objects"], 3);
     let share = |touches: &str| report["top1_after"][touches].as_f64().unwrap();
     assert!(share("6") > 0.9 && share("1") < share("6"), "{report}");
     for name in ["steps_mean", "wrong_rate", "unknown_rate", "accuracy"] {
         assert!(report[name].is_number(), "{name} in {report}");
     }
-    let told = run(&[&arguments[..], &["--told"]].concat()).json();
+    let told = lab(&[&arguments[..], &["--told"]].concat()).json();
     assert!(told["top1_after"]["6"].as_f64().unwrap() > 0.9, "{told}");
     let trials = fs::read_to_string(out.join("trials.csv")).unwrap();
     assert_eq!(trials.lines().count(), 1 + 3 * 4 * 6);
-    let refused = run(&[&arguments[..], &["--noise-mm", "-2"]].concat());
+    let refused = lab(&[&arguments[..], &["--noise-mm", "-2"]].concat());
     assert_eq!(refused.code(), 2, "{refused:?}");
 }
 
@@ -55,7 +55,7 @@ fn a_directory_without_objects_is_named() {
     let empty = tempfile::tempdir().unwrap();
     let directory = empty.path().to_str().unwrap();
     for kind in ["touch", "points"] {
-        let refused = run(&["replay", kind, directory]);
+        let refused = lab(&["replay", kind, directory]);
         assert_eq!(refused.code(), 1, "{kind}: {refused:?}");
     }
 }

@@ -8,7 +8,7 @@ use cogmap_proto::{
     Codec, Estimate, Event, EventPage, Level, Problem, RecallQuery, Sample, SampleBody, TripEnd,
     Watermark, durable_key, estimate_key, events_key, json_key, query_key,
 };
-use cogmap_tests::{Drive, LONG, RawPublisher, Server, eventually, run, seed};
+use cogmap_tests::{Drive, LONG, RawPublisher, Server, eventually, lab, run, seed};
 use serde_json::{Value, json};
 use zenoh::Wait;
 
@@ -297,8 +297,13 @@ fn metrics_say_what_the_process_takes_and_how_agents_stand() {
 fn help_shows_brackets_and_durations_have_units() {
     let help = run(&["demo", "--help"]);
     assert!(help.text().contains("--duration"), "{}", help.text());
-    for command in ["demo", "bench", "replay", "eval", "export"] {
-        let help = run(&[command, "--help"]);
+    let help = |command| run(&[command, "--help"]);
+    let of_lab = |command| lab(&[command, "--help"]);
+    let of_service = ["demo", "export"].map(help);
+    for help in of_service
+        .into_iter()
+        .chain(["bench", "replay", "eval"].map(of_lab))
+    {
         assert!(!help.text().contains('\\'), "{}", help.text());
     }
     let refused = run(&["demo", "--duration", "soon"]);

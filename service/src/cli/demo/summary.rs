@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::cli::bench::quantile;
-use crate::cli::output;
+use crate::cli::{output, quantile};
 
 /// The demo's result. Errors are RMSE of position on a 10 Hz grid, in the frame of the truth.
 #[derive(Debug, Serialize)]

@@ -5,17 +5,15 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 use cogmap_client::{Api, Robot, open_session};
-use cogmap_experiments::metrics::{Alignment, DeadReckoning, StampedPose, Trajectory, ate_rmse_m};
-use cogmap_experiments::reading::robot_name;
-use cogmap_experiments::world::{ObstacleWorld, Team, TeamSettings};
-use cogmap_proto::RecallQuery;
+use cogmap_proto::{RecallQuery, Sample};
+use cogmap_worlds::{DeadReckoning, ObstacleWorld, Team, TeamSettings, robot_name};
 use zenoh::{Session, Wait};
 
 use super::Stop;
 use super::progress::{Progress, RobotLine};
 use super::summary::{Latency, RobotSummary, Summary};
-use crate::cli::export::pose;
-use crate::cli::replay::sample_of;
+use crate::decode::stamped_pose;
+use trajectory::{Alignment, StampedPose, Trajectory, ate_rmse_m};
 
 /// Longest wait for connections, and for the last samples to be durable.
 const TIMEOUT: Duration = Duration::from_secs(20);
@@ -105,7 +103,7 @@ impl DemoTeam {
                 let mut samples = Vec::with_capacity(of_robot.readings.len());
                 for reading in &of_robot.readings {
                     robot.reckoned.extend(robot.reckoning.apply(reading)?);
-                    samples.push(sample_of(reading));
+                    samples.push(Sample::from(reading));
                 }
                 robot.sent += samples.len() as u64;
                 if !samples.is_empty() {
@@ -180,7 +178,7 @@ impl DemoTeam {
             durable += agent.watermark.durable;
             resent += robot.client.counters().samples_resent;
             let trajectory = api.trajectory(&self.space, &robot.name)?;
-            let causal: Vec<_> = trajectory.poses.iter().map(pose).collect();
+            let causal: Vec<_> = trajectory.poses.iter().map(stamped_pose).collect();
             let truth = Trajectory::from_poses(&robot.truth)?;
             let error = |poses: &[StampedPose]| -> anyhow::Result<f64> {
                 let estimate = Trajectory::from_poses(poses)?;

@@ -1,0 +1,172 @@
+//! A team's samples through the joint estimate and the chronicle.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use cognitive_map::chronicle::{Chronicle, ChronicleSettings, Moment, Refined};
+use cognitive_map::estimation::{Estimator, Parameters};
+use cognitive_map::{Sample, SampleBody, Target};
+use trajectory::{Alignment, Span, StampedPose, Trajectory, ate_rmse_m};
+
+/// A team as it lives.
+pub(crate) struct Lived {
+    pub(crate) estimator: Estimator,
+    pub(crate) chronicle: Chronicle,
+    agents: BTreeMap<u32, u32>,
+    names: BTreeMap<String, u32>,
+    seqs: BTreeMap<u32, u64>,
+    pub(crate) causal: BTreeMap<u32, Vec<StampedPose>>,
+    /// Seconds that the chronicle took for each sample.
+    pub(crate) times_s: Vec<f64>,
+}
+
+impl Lived {
+    pub(crate) fn new(anchors_max: Option<u32>) -> Self {
+        let mut settings = ChronicleSettings::default();
+        if let Some(anchors_max) = anchors_max {
+            settings.anchors_max = anchors_max;
+        }
+        Self {
+            estimator: Estimator::new(Parameters::default()),
+            chronicle: Chronicle::new(settings),
+            agents: BTreeMap::new(),
+            names: BTreeMap::new(),
+            seqs: BTreeMap::new(),
+            causal: BTreeMap::new(),
+            times_s: Vec::new(),
+        }
+    }
+
+    /// A robot of the team.
+    pub(crate) fn enrol(&mut self, robot: u32, name: String) {
+        let agent = self.estimator.enrol();
+        self.chronicle.enrol();
+        self.agents.insert(robot, agent);
+        self.names.insert(name, agent);
+    }
+
+    /// A sample of a robot.
+    pub(crate) fn sample(&mut self, robot: u32, sample: &Sample, sees_robots: bool) {
+        let (agent, stamp_ns) = (self.agents[&robot], sample.stamp_ns);
+        let seq = self.seqs.entry(agent).or_default();
+        *seq += 1;
+        let seq = *seq;
+        let mut step = None;
+        let mut taken = None;
+        match &sample.body {
+            SampleBody::Motion(motion) => {
+                step = Some(self.estimator.motion(agent, stamp_ns, motion));
+            }
+            SampleBody::StartPose(start) => self.estimator.start_pose(agent, start),
+            SampleBody::Sighting(sighting) => match &sighting.target {
+                Target::Landmark(label) => {
+                    let relation = &sighting.relation;
+                    taken = Some(self.estimator.landmark(agent, stamp_ns, label, relation));
+                }
+                Target::Agent(name) if sees_robots => {
+                    let target = self.names[name.as_str()];
+                    self.estimator
+                        .sighting(agent, stamp_ns, target, &sighting.relation);
+                }
+                _ => {}
+            },
+            _ => {}
+        }
+        let Some((pose, _)) = self.estimator.pose(agent) else {
+            return;
+        };
+        let moment = Moment {
+            agent,
+            seq,
+            stamp_ns,
+            pose,
+        };
+        let (settled, merged) = (self.estimator.take_settled(), self.estimator.take_merged());
+        let begin = Instant::now();
+        match (&sample.body, step, taken) {
+            (SampleBody::Motion(_), Some(step), _) => {
+                self.chronicle
+                    .motion(&moment, &step.increment, &step.variance, &step.calibrated);
+            }
+            (SampleBody::StartPose(start), ..) => self.chronicle.start_pose(&moment, start),
+            (SampleBody::Sighting(sighting), _, Some(taken)) if taken.accepted => {
+                if let Target::Landmark(label) = &sighting.target {
+                    let (relation, variance) = (&sighting.relation, &taken.variance);
+                    self.chronicle.landmark(&moment, label, relation, variance);
+                }
+            }
+            _ => {}
+        }
+        for merged in merged {
+            for agent in merged.agents {
+                if merged.into == 0 {
+                    self.chronicle.placed(agent, &merged.pose);
+                } else {
+                    self.chronicle.carried(agent, &merged.pose);
+                }
+            }
+        }
+        for seen in settled.iter().filter(|seen| seen.accepted) {
+            let variance = seen.variance.fixed_rows::<3>(0).into_owned();
+            self.chronicle.sighted(
+                seen.observer,
+                seen.target,
+                seen.stamp_ns,
+                &seen.relation,
+                &variance,
+            );
+        }
+        self.times_s.push(begin.elapsed().as_secs_f64());
+        let poses = self.causal.entry(robot).or_default();
+        poses.pop_if(|last| last.stamp_ns == stamp_ns);
+        poses.push(StampedPose { stamp_ns, pose });
+    }
+
+    /// Prints causal and refined errors against the truth; answers their means over the robots.
+    pub(crate) fn compare(
+        &self,
+        refined: &Refined,
+        truths: &BTreeMap<u32, Trajectory>,
+        span: Span,
+        alignment: Alignment,
+    ) -> [f64; 4] {
+        let mut sums = [0.0; 4];
+        for (robot, causal) in &self.causal {
+            let agent = self.agents[robot] as usize;
+            let poses: Vec<StampedPose> = refined.agents[agent]
+                .poses
+                .iter()
+                .map(|row| StampedPose {
+                    stamp_ns: row.stamp_ns,
+                    pose: row.pose,
+                })
+                .collect();
+            let error = |poses: &[StampedPose], alignment| {
+                let trajectory = Trajectory::from_poses(poses).ok();
+                trajectory
+                    .and_then(|estimate| {
+                        ate_rmse_m(&estimate, &truths[robot], span, alignment).ok()
+                    })
+                    .unwrap_or(f64::NAN)
+            };
+            let errors = [
+                error(causal, Alignment::None),
+                error(causal, alignment),
+                error(&poses, Alignment::None),
+                error(&poses, alignment),
+            ];
+            for (sum, error) in sums.iter_mut().zip(errors) {
+                *sum += error;
+            }
+            println!(
+                "robot {robot}: causal {:.4} m, aligned {:.4} m; refined {:.4} m, aligned {:.4} m; {} poses",
+                errors[0],
+                errors[1],
+                errors[2],
+                errors[3],
+                poses.len(),
+            );
+        }
+        sums.map(|sum| sum / self.causal.len().max(1) as f64)
+    }
+}

@@ -1,0 +1,38 @@
+//! `cogmap-lab bench`: speed, each figure beside its yardstick from the same run.
+
+mod descriptors;
+mod http;
+mod ingest;
+mod load;
+mod recall;
+mod step;
+
+use clap::Subcommand;
+
+#[derive(Debug, Subcommand)]
+pub(in crate::cli) enum BenchCommand {
+    /// A motion step through the map, at different numbers of places.
+    Step(step::StepArgs),
+    /// Recall of places by a grid code, at different numbers of places.
+    Recall(recall::RecallArgs),
+    /// Recall of places by a descriptor, at different numbers of places.
+    Descriptors(descriptors::DescriptorsArgs),
+    /// Samples that become durable, beside the raw rate of the same messages.
+    Ingest(ingest::IngestArgs),
+    /// Answers to "where is this agent" while samples come in, beside a bare handler.
+    Http(http::HttpArgs),
+    /// Publishes samples for the other benchmarks, from a process of its own.
+    #[command(hide = true)]
+    Load(load::LoadArgs),
+}
+
+pub(super) fn run(command: &BenchCommand) -> anyhow::Result<()> {
+    match command {
+        BenchCommand::Step(args) => step::run(args),
+        BenchCommand::Recall(args) => recall::run(args),
+        BenchCommand::Descriptors(args) => descriptors::run(args),
+        BenchCommand::Ingest(args) => ingest::run(args),
+        BenchCommand::Http(args) => http::run(args),
+        BenchCommand::Load(args) => load::run(args),
+    }
+}

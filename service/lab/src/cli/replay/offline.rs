@@ -1,0 +1,119 @@
+//! A replay straight into the core.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use cogmap_proto::{SampleBatch, SpaceSettings};
+use cognitive_map::{AgentId, CognitiveMap, Record};
+
+use super::mrclam::TeamBatch;
+use super::outcome::{Outcome, RobotOutcome, Timing};
+use cogmap::engine::{
+    Entry, Recorder, core_settings, evidence, records_of, refined_trajectories, stamped,
+    trajectory_interval_ns,
+};
+
+/// Time between two beliefs that are kept \[ns\].
+const BELIEF_INTERVAL_NS: i64 = 1_000_000_000;
+
+/// Folds the batches, in order, as a service would that got them in this order.
+pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow::Result<Outcome> {
+    let mut map = CognitiveMap::new(core_settings(settings)?);
+    let interval_ns = trajectory_interval_ns(settings);
+    let mut team: BTreeMap<&str, Robot> = BTreeMap::new();
+    let mut events = Vec::new();
+    let mut samples = 0;
+    let mut times_s = Vec::new();
+    for TeamBatch {
+        robot,
+        samples: batch,
+    } in batches
+    {
+        samples += batch.len() as u64;
+        let number = u32::try_from(team.len())?;
+        let robot = team.entry(robot).or_insert_with(|| {
+            let name = robot.as_str().into();
+            records_of(
+                &Entry::Enrol {
+                    agent: number,
+                    name,
+                },
+                |record| {
+                    map.apply(&record, &mut events);
+                },
+            );
+            Robot {
+                agent: number,
+                ..Robot::default()
+            }
+        });
+        let batch = SampleBatch {
+            session: 1,
+            first_seq: robot.next,
+            samples: batch.clone(),
+        };
+        robot.next += batch.samples.len() as u64;
+        records_of(
+            &Entry::Samples {
+                agent: robot.agent,
+                batch,
+            },
+            |record| {
+                let begin = Instant::now();
+                map.apply(&record, &mut events);
+                times_s.push(begin.elapsed().as_secs_f64());
+                events.clear();
+                robot.note(&record, &map, interval_ns);
+            },
+        );
+    }
+    let mut refined = refined_trajectories(&map);
+    let finish = |(name, mut robot): (&str, Robot)| {
+        let rest = robot.recorder.rows();
+        robot.outcome.causal.extend_from_slice(rest);
+        robot.outcome.refined = refined.remove(name).unwrap_or_default();
+        let agent = map.agent(AgentId(robot.agent));
+        robot.outcome.evidence = agent.map(evidence).unwrap_or_default();
+        (name.to_owned(), robot.outcome)
+    };
+    Ok(Outcome {
+        robots: team.into_iter().map(finish).collect(),
+        samples,
+        digest: map.digest().to_string(),
+        places: map.place_count() as u64,
+        trips: map.trip_count() as u64,
+        landmarks: map.landmark_count() as u64,
+        timing: Timing::of(times_s),
+    })
+}
+
+#[derive(Default)]
+struct Robot {
+    agent: u32,
+    next: u64,
+    recorder: Recorder,
+    outcome: RobotOutcome,
+}
+
+impl Robot {
+    /// Notes where the agent is after a record.
+    fn note(&mut self, record: &Record, map: &CognitiveMap, interval_ns: i64) {
+        let id = AgentId(self.agent);
+        let Some((agent, covariance)) = map.agent(id).zip(map.covariance(id)) else {
+            return;
+        };
+        if let Some(chunk) = self.recorder.note(record, agent, interval_ns) {
+            self.outcome.causal.extend(chunk.rows);
+        }
+        let Some(stamp_ns) = agent.stamp_ns().filter(|_| agent.placed()) else {
+            return;
+        };
+        let beliefs = &mut self.outcome.beliefs;
+        let is_due = |(last, _): &(cogmap_proto::StampedPose, _)| {
+            stamp_ns.saturating_sub(last.stamp_ns) >= BELIEF_INTERVAL_NS
+        };
+        if beliefs.last().is_none_or(is_due) {
+            beliefs.push((stamped(stamp_ns, agent.pose()), covariance));
+        }
+    }
+}

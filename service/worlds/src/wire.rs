@@ -1,0 +1,74 @@
+//! Readings as samples of the wire.
+
+use crate::reading::{Reading, ReadingBody, ReadingTarget};
+use cogmap_proto::{
+    Descriptor, Level, MotionNoise, Relation, Sample, SampleBody, Sighting, StartPose, Target,
+    Velocity,
+};
+
+impl From<&Reading> for Sample {
+    /// The sample that a robot would send for a reading.
+    fn from(reading: &Reading) -> Self {
+        let body = match &reading.body {
+            ReadingBody::Velocity {
+                linear_m_s,
+                angular_rad_s,
+                duration_s,
+                noise,
+            } => {
+                let noise = noise.map(|(translation_sd_m, rotation_sd_rad)| MotionNoise {
+                    translation_sd_m,
+                    rotation_sd_rad,
+                });
+                SampleBody::Velocity(Velocity {
+                    linear_m_s: *linear_m_s,
+                    angular_rad_s: *angular_rad_s,
+                    duration_s: *duration_s,
+                    noise,
+                })
+            }
+            ReadingBody::Sighting {
+                target,
+                range_m,
+                azimuth_rad,
+                elevation_rad,
+                range_sd_m,
+                bearing_sd_rad,
+            } => SampleBody::Sighting(Sighting {
+                target: match target {
+                    ReadingTarget::Landmark(label) => Target::Landmark(label.clone()),
+                    ReadingTarget::Robot(name) => Target::Agent(name.clone()),
+                },
+                relation: Relation::RangeBearing {
+                    range_m: *range_m,
+                    azimuth_rad: *azimuth_rad,
+                    elevation_rad: *elevation_rad,
+                    range_sd_m: *range_sd_m,
+                    bearing_sd_rad: *bearing_sd_rad,
+                },
+            }),
+            ReadingBody::StartPose {
+                translation_m,
+                rotation_xyzw,
+            } => SampleBody::StartPose(StartPose {
+                translation_m: *translation_m,
+                rotation_xyzw: *rotation_xyzw,
+                noise: None,
+            }),
+            ReadingBody::Level { channel, value } => SampleBody::Level(Level {
+                channel: channel.clone(),
+                value: *value,
+                offset_m: [0.0; 3],
+                normal: None,
+            }),
+            ReadingBody::Descriptor { channel, vector } => SampleBody::Descriptor(Descriptor {
+                channel: channel.clone(),
+                vector: vector.clone(),
+            }),
+        };
+        Self {
+            stamp_ns: reading.stamp_ns,
+            body,
+        }
+    }
+}
