@@ -217,7 +217,7 @@ impl<'a> Copy<'a> {
         self.length = 0;
         if let Some(file) = self.file.take() {
             let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-            file.sync_all()?;
+            files::sync_all(&file)?;
         }
         Ok(())
     }

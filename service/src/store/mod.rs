@@ -18,6 +18,9 @@ use cognitive_map::CheckpointPage;
 /// derived, and those of merges.
 pub const OPEN_FILES_MAX: usize = 256 + 2 * derived::CACHED_FILES_MAX;
 
+#[cfg(test)]
+pub(crate) use local::disk_model;
+
 pub use backup::{BackupReport, SpaceBackup, backup, restore};
 pub use error::{DamagedJournal, DerivedError, StoreError};
 pub use format1::migrate;

@@ -28,6 +28,10 @@ mod survey;
 #[cfg(test)]
 mod damage_tests;
 #[cfg(test)]
+pub(crate) mod disk_model;
+#[cfg(test)]
+mod power_cut_tests;
+#[cfg(test)]
 mod tests;
 
 #[cfg(test)]
