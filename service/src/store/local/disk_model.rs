@@ -1,8 +1,11 @@
-//! A model of the disk below a directory, for tests: it makes calls fail, and says what a power cut would
+//! A model of the disk below a directory, for tests: it makes calls fail, and says what a power
+//! cut would
 //! leave.
 //!
-//! The model knows of each file the bytes, and of each directory the names, as they were at the latest sync.
-//! A power cut leaves that much, and of what came later anything: nothing, all, or some pages of the bytes and
+//! The model knows of each file the bytes, and of each directory the names, as they were at the
+//! latest sync.
+//! A power cut leaves that much, and of what came later anything: nothing, all, or some pages of
+//! the bytes and
 //! some of the names. Renaming is one step, as every file system with a journal has it.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -324,7 +327,8 @@ pub(super) fn synced(file: &File) {
     with(file, |state, inode, path| state.note(inode, path));
 }
 
-/// Runs `run` on the model of the disk that a file is on, if there is one, with the file's number and path.
+/// Runs `run` on the model of the disk that a file is on, if there is one, with the file's number
+/// and path.
 fn with<T>(file: &File, run: impl FnOnce(&mut State, Inode, &Path) -> T) -> Option<T> {
     let known: Vec<_> = models().iter().filter_map(Weak::upgrade).collect();
     if known.is_empty() {

@@ -1,4 +1,5 @@
-//! What a power cut leaves between any two steps, and what a failing disk does: nothing that was acknowledged
+//! What a power cut leaves between any two steps, and what a failing disk does: nothing that was
+//! acknowledged
 //! is lost, and nothing is acknowledged that is not on the disk.
 
 use std::collections::BTreeMap;
@@ -14,7 +15,8 @@ use crate::store::{backup, restore};
 /// Ways in which a power cut is tried at each step.
 const CUTS: [Cut; 4] = [Cut::Lost, Cut::Kept, Cut::Torn(1), Cut::Torn(2)];
 
-/// What somebody has been told: number of the blocks of a space that are durable, or that it is gone.
+/// What somebody has been told: number of the blocks of a space that are durable, or that it is
+/// gone.
 type Promise = BTreeMap<&'static str, Option<u64>>;
 
 fn open(path: &Path) -> LocalJournal {
