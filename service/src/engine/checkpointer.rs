@@ -182,6 +182,8 @@ impl Checkpointer {
 
 #[cfg(test)]
 mod tests {
+    use cogmap_proto::SpaceSettings;
+
     use super::super::fold::core_settings;
     use super::*;
     use crate::store::{Derived, Journal, LocalStore};
@@ -191,7 +193,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let store = Arc::new(LocalStore::open(directory.path()).unwrap());
         let space = store.create_space("lab", b"").unwrap();
-        let map = CognitiveMap::new(core_settings(&Default::default()).unwrap());
+        let map = CognitiveMap::new(core_settings(&SpaceSettings::default()).unwrap());
         let beside = || Beside {
             recorders: Vec::new(),
             events: EventRing::since(0),

@@ -226,7 +226,7 @@ impl State {
         let more = now.len().saturating_sub(durable.len());
         let grown = usize::try_from(next(&mut random)).unwrap() % (more + 1);
         // The file may have been made shorter, or longer without its bytes.
-        let is_cut = now.len() < durable.len() && next(&mut random) % 2 == 0;
+        let is_cut = now.len() < durable.len() && next(&mut random).is_multiple_of(2);
         bytes.resize(
             if is_cut {
                 now.len()
@@ -237,7 +237,7 @@ impl State {
         );
         for (at, page) in bytes.chunks_mut(SECTOR).enumerate() {
             let now = now.get(at * SECTOR..).unwrap_or_default();
-            if next(&mut random) % 2 == 0 && !now.is_empty() {
+            if next(&mut random).is_multiple_of(2) && !now.is_empty() {
                 let length = page.len().min(now.len());
                 page[..length].copy_from_slice(&now[..length]);
             }
@@ -324,7 +324,7 @@ pub(super) fn before_sync(file: &File) -> io::Result<()> {
 
 /// A file or directory has been synced.
 pub(super) fn synced(file: &File) {
-    with(file, |state, inode, path| state.note(inode, path));
+    with(file, State::note);
 }
 
 /// Runs `run` on the model of the disk that a file is on, if there is one, with the file's number
