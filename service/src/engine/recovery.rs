@@ -34,6 +34,8 @@ pub(crate) enum RecoveryError {
     Block { block: u64, error: CorruptBlock },
     #[error("block {0} of the journal is missing")]
     MissingBlock(u64),
+    #[error("the work on it ended with a panic; the log says where")]
+    Interrupted,
     #[error("the space is closing")]
     Closing,
 }

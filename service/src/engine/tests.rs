@@ -16,6 +16,8 @@ use super::{
 };
 use crate::store::{Derived, Journal, LocalStore};
 
+mod faults;
+mod mangled;
 mod removal;
 
 const SPACE: &str = "lab";
