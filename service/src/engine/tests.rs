@@ -17,6 +17,7 @@ use super::{
 use crate::store::{Derived, Journal, LocalStore};
 
 mod removal;
+mod window;
 
 const SPACE: &str = "lab";
 const AGENT: &str = "ada";

@@ -42,7 +42,7 @@ const ROUND_MESSAGES_MAX: usize = 2048;
 /// How long a writer waits for a message before it looks after gaps and wishes.
 const PATIENCE: Duration = Duration::from_millis(100);
 /// Most samples of all agents that wait for earlier ones, and the most memory that they take
-/// \[bytes\]: bounds whoever sends.
+/// \[bytes\]: bounds whoever sends. One agent may hold as much as is free.
 const WAITING_MAX: Window = Window {
     samples: 16_384,
     bytes: 64 << 20,
