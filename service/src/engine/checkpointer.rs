@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 
 use cognitive_map::CognitiveMap;
 
+use super::episodes::EndedEpisodes;
 use super::events::EventRing;
 use super::health::Health;
-use super::trajectory::Recorder;
+use super::trajectory::{CorruptChunk, Recorder};
 use crate::store::{Checkpoint, SpaceNumber, Store};
 
 /// A space's side of the checkpoints.
@@ -52,14 +53,29 @@ pub(crate) struct Beside {
     pub(crate) recorders: Vec<Recorder>,
     /// The latest events.
     pub(crate) events: EventRing,
+    /// The latest episode of each agent that has ended.
+    pub(crate) episodes: EndedEpisodes,
 }
 
 impl Beside {
-    /// Its bytes: the recorders as older versions read them, and the events behind them.
+    /// Its bytes: the recorders, the events and the episodes, each behind what older versions read.
     fn write(&self) -> Vec<u8> {
         let mut bytes = Recorder::write_all(&self.recorders);
         bytes.extend(self.events.write());
+        bytes.extend(self.episodes.write());
         bytes
+    }
+
+    /// Reads what [`Beside::write`] or an older version wrote beside the map.
+    pub(crate) fn read(bytes: &[u8], map: &CognitiveMap) -> Result<Self, CorruptChunk> {
+        let (recorders, rest) = Recorder::read_all(bytes)?;
+        let events = EventRing::read(rest);
+        let (events, rest) = events.unwrap_or_else(|| (EventRing::since(map.revision()), &[]));
+        Ok(Self {
+            recorders,
+            events,
+            episodes: EndedEpisodes::read(rest, map.agent_numbers()),
+        })
     }
 }
 
