@@ -50,9 +50,10 @@ pub use key::{
 pub use localize::{Localization, LocalizationHypothesis, LocalizeQuery, LocalizedPose};
 pub use name::{Name, NameError};
 pub use object::{
-    AgentObject, Contact, ContactLevel, EpisodeKind, Identification, IdentifyQuery, NextTouch,
-    ObjectDetail, ObjectLesson, ObjectLevel, ObjectMark, ObjectPage, ObjectPlace, ObjectPose,
-    ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached, TouchNoise,
+    AgentObject, Contact, ContactLevel, EndedEpisode, EpisodeKind, Identification, IdentifyQuery,
+    NextTouch, ObjectDetail, ObjectLesson, ObjectLevel, ObjectMark, ObjectPage, ObjectPlace,
+    ObjectPose, ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached,
+    TouchNoise,
 };
 pub use predict::{ExpectedPercept, MotionBody, PredictAnswer, PredictQuery, PredictedPercept};
 pub use query::{PerceptCue, RecallQuery, Verb, WatermarkQuery};

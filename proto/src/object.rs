@@ -364,6 +364,25 @@ pub struct AgentObject {
     pub episode: Option<EpisodeKind>,
     /// What its contacts say; in the frame of the body when the episode began.
     pub identification: Option<Identification>,
+    /// The latest episode that has ended; absent when there was none in which something was felt. Also kept
+    /// when the robot has closed its session, and over a restart of the service.
+    #[serde(default)]
+    pub last: Option<EndedEpisode>,
+}
+
+/// An episode with an object that has ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct EndedEpisode {
+    /// What it was for.
+    pub episode: EpisodeKind,
+    /// Session of the agent that it was part of.
+    pub session: u64,
+    /// Stamp of the sample that ended it \[ns\].
+    pub stamp_ns: i64,
+    /// What its contacts said in the end, before anything was learned from it; absent when it taught an
+    /// object by its name.
+    pub identification: Option<Identification>,
 }
 
 /// What an episode is for.
@@ -375,4 +394,11 @@ pub enum EpisodeKind {
     Learn,
     /// It is to recognise one.
     Identify,
+}
+
+impl EpisodeKind {
+    /// What an episode is for that teaches or does not.
+    pub fn of(teaches: bool) -> Self {
+        if teaches { Self::Learn } else { Self::Identify }
+    }
 }

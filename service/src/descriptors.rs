@@ -70,6 +70,6 @@ mod tests {
         let all = shares.http + shares.sessions + shares.handshakes;
         assert!(all + store::OPEN_FILES_MAX + OTHERS <= 1024, "{shares:?}");
         assert_eq!(shares.handshakes, 64);
-        assert!(shares.sessions >= 200 && shares.http >= 200, "{shares:?}");
+        assert!(shares.sessions >= 90 && shares.http >= 90, "{shares:?}");
     }
 }

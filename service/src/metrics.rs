@@ -14,7 +14,7 @@ pub const RECEIVED_MESSAGES: &str = "cogmap_received_messages_total";
 /// Bytes of messages received; label `codec`.
 pub const RECEIVED_BYTES: &str = "cogmap_received_bytes_total";
 /// Messages dropped whole; label `reason` (`queue_full`, `agent_queue_full`, `unknown_space`, `bad_key`,
-/// `too_many_agents`, `stale_session`, `session_in_future` and others).
+/// `too_many_agents`, `stale_session`, `session_in_future`, `space_closed`, `store_failed`).
 pub const DROPPED_MESSAGES: &str = "cogmap_dropped_messages_total";
 /// Messages that could not be read; label `kind`.
 pub const DECODE_ERRORS: &str = "cogmap_decode_errors_total";
@@ -78,6 +78,9 @@ pub const UNPUBLISHED_EVENTS: &str = "cogmap_unpublished_events_total";
 pub const HTTP_REQUESTS: &str = "cogmap_http_requests_total";
 /// Time from a request's head to its answer's head \[s\]; label `route`.
 pub const HTTP_REQUEST_SECONDS: &str = "cogmap_http_request_seconds";
+/// HTTP connections that the service closed; label `reason` (`room` for one that came, `head` that took
+/// too long, `idle`).
+pub const HTTP_CLOSED_CONNECTIONS: &str = "cogmap_http_closed_connections_total";
 /// Event streams open now.
 pub const HTTP_STREAMS: &str = "cogmap_http_streams";
 /// Agents of a space by how they are localised; labels `space`, `status` (`localized`, `uncertain`,
@@ -250,6 +253,11 @@ fn describe() {
         HTTP_REQUEST_SECONDS,
         Unit::Seconds,
         "Time to the head of an answer"
+    );
+    describe_counter!(
+        HTTP_CLOSED_CONNECTIONS,
+        Unit::Count,
+        "HTTP connections that the service closed, by reason"
     );
     describe_gauge!(HTTP_STREAMS, Unit::Count, "Event streams open now");
     describe_states();

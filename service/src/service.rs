@@ -267,7 +267,9 @@ fn share_descriptors(config: &Config) -> (HttpSettings, Shares) {
 
 /// The settings of HTTP with so many connections: bounds that do not fit are lowered.
 fn fitting(mut settings: HttpSettings, connections: usize) -> HttpSettings {
-    if connections < settings.connections_max {
+    let connections = connections.min(settings.connections_max);
+    let busy = settings.requests_max + settings.streams_max;
+    if connections < settings.connections_max || busy >= connections {
         // Some always wait for requests, and make room for others.
         let bounds = [
             (
@@ -278,12 +280,12 @@ fn fitting(mut settings: HttpSettings, connections: usize) -> HttpSettings {
             (
                 "http.requests_max",
                 &mut settings.requests_max,
-                connections / 2,
+                (connections / 2).max(1),
             ),
             (
                 "http.streams_max",
                 &mut settings.streams_max,
-                connections / 4,
+                (connections / 4).max(1),
             ),
         ];
         for (key, bound, most) in bounds {
@@ -292,7 +294,7 @@ fn fitting(mut settings: HttpSettings, connections: usize) -> HttpSettings {
                     key,
                     wanted = *bound,
                     most,
-                    "lowered: too few open files are allowed"
+                    "lowered: too few connections or open files are allowed"
                 );
                 *bound = most;
             }
@@ -311,4 +313,35 @@ fn transport_settings(config: &Config, shares: Shares) -> Option<TransportSettin
         sessions_max: shares.sessions,
         handshakes_max: shares.handshakes,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bounds(settings: &HttpSettings) -> [usize; 3] {
+        [
+            settings.connections_max,
+            settings.requests_max,
+            settings.streams_max,
+        ]
+    }
+
+    #[test]
+    fn some_connections_always_wait_for_requests() {
+        let wanted = || HttpSettings {
+            requests_max: 1024,
+            streams_max: 256,
+            connections_max: 4096,
+            ..Config::default().http.settings()
+        };
+        assert_eq!(bounds(&fitting(wanted(), 4096)), [4096, 1024, 256]);
+        assert_eq!(bounds(&fitting(wanted(), 400)), [400, 200, 100]);
+        // Whoever allows for few connections has as few under way.
+        let few = HttpSettings {
+            connections_max: 1000,
+            ..wanted()
+        };
+        assert_eq!(bounds(&fitting(few, 4096)), [1000, 500, 250]);
+    }
 }

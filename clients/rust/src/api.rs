@@ -346,7 +346,7 @@ impl Api {
         self.send(Method::POST, &path, &json(query))
     }
 
-    /// What an agent's episode with an object says so far.
+    /// What an agent's episode with an object says so far, and what the latest one said that has ended.
     ///
     /// # Errors
     /// See [`ApiError`].

@@ -1,9 +1,10 @@
 //! Objects: lessons, questions and answers.
 
 use cogmap_proto::{
-    AgentObject, Contact, ContactLevel, Descriptor, EpisodeKind, Identification, IdentifyQuery,
-    NextTouch, ObjectDetail, ObjectLesson, ObjectLevel, ObjectPage, ObjectPlace, ObjectPose,
-    ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached, TouchNoise,
+    AgentObject, Contact, ContactLevel, Descriptor, EndedEpisode, EpisodeKind, Identification,
+    IdentifyQuery, NextTouch, ObjectDetail, ObjectLesson, ObjectLevel, ObjectPage, ObjectPlace,
+    ObjectPose, ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached,
+    TouchNoise,
 };
 
 use super::Visit;
@@ -20,6 +21,7 @@ pub(super) fn each(visit: &mut impl Visit) {
     visit.message("identification_undecided", &undecided());
     visit.message("agent_object", &episode());
     visit.message("agent_object_none", &no_episode());
+    visit.message("agent_object_ended", &ended());
 }
 
 fn contacts() -> Vec<Contact> {
@@ -171,6 +173,19 @@ fn episode() -> AgentObject {
             verdict: ObjectVerdict::Unknown {},
             ..undecided()
         }),
+        last: None,
+    }
+}
+
+fn ended() -> AgentObject {
+    AgentObject {
+        last: Some(EndedEpisode {
+            episode: EpisodeKind::Identify,
+            session: 7,
+            stamp_ns: 1_700_000_000_000_000_000,
+            identification: Some(recognised()),
+        }),
+        ..no_episode()
     }
 }
 

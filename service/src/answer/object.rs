@@ -76,25 +76,21 @@ pub fn touches_to_identify(
     Ok((orientation, touches))
 }
 
-/// The episode of an agent.
+/// The episode of an agent, and the latest one that has ended.
 pub fn agent_object(
     space: &str,
     map: &CognitiveMap,
     agent: AgentId,
     name: &str,
+    last: Option<wire::EndedEpisode>,
 ) -> wire::AgentObject {
     let episode = map.episode(agent);
     wire::AgentObject {
         space: space.to_owned(),
         agent: name.to_owned(),
-        episode: episode.as_ref().map(|(teaches, _)| {
-            if *teaches {
-                wire::EpisodeKind::Learn
-            } else {
-                wire::EpisodeKind::Identify
-            }
-        }),
+        episode: { episode.as_ref() }.map(|(teaches, _)| wire::EpisodeKind::of(*teaches)),
         identification: episode.map(|(_, identified)| identification(space, map, &identified)),
+        last,
     }
 }
 

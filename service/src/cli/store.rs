@@ -166,11 +166,9 @@ fn in_words(damage: &Damage) -> String {
 
 fn repair(args: &RepairArgs) -> anyhow::Result<()> {
     let directory = &args.data_dir;
-    anyhow::ensure!(
-        directory.is_dir(),
-        "there is no store at {}",
-        directory.display()
-    );
+    // An empty directory would be made a store.
+    let is_empty = std::fs::read_dir(directory).map_or(true, |mut names| names.next().is_none());
+    anyhow::ensure!(!is_empty, "there is no store at {}", directory.display());
     let store =
         open_store(directory).with_context(|| format!("open the store {}", directory.display()))?;
     let space = store.journals().space(&args.space)?;

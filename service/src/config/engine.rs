@@ -22,7 +22,7 @@ pub struct EngineConfig {
     pub session_ahead_max_s: f64,
     /// Most spaces.
     pub spaces_max: usize,
-    /// Most samples of one agent that wait for earlier ones.
+    /// How far ahead of the next sample of an agent one may be that waits for it.
     pub reorder_window_samples: usize,
     /// How long missing samples are waited for before they count as lost \[s\].
     pub gap_timeout_s: f64,

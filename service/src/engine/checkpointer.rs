@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 
 use cognitive_map::CognitiveMap;
 
+use super::episodes::EndedEpisodes;
 use super::events::EventRing;
 use super::health::Health;
-use super::trajectory::Recorder;
+use super::trajectory::{CorruptChunk, Recorder};
 use crate::store::{Checkpoint, SpaceNumber, Store};
 
 /// A space's side of the checkpoints.
@@ -52,14 +53,29 @@ pub(crate) struct Beside {
     pub(crate) recorders: Vec<Recorder>,
     /// The latest events.
     pub(crate) events: EventRing,
+    /// The latest episode of each agent that has ended.
+    pub(crate) episodes: EndedEpisodes,
 }
 
 impl Beside {
-    /// Its bytes: the recorders as older versions read them, and the events behind them.
+    /// Its bytes: the recorders, the events and the episodes, each behind what older versions read.
     fn write(&self) -> Vec<u8> {
         let mut bytes = Recorder::write_all(&self.recorders);
         bytes.extend(self.events.write());
+        bytes.extend(self.episodes.write());
         bytes
+    }
+
+    /// Reads what [`Beside::write`] or an older version wrote beside the map.
+    pub(crate) fn read(bytes: &[u8], map: &CognitiveMap) -> Result<Self, CorruptChunk> {
+        let (recorders, rest) = Recorder::read_all(bytes)?;
+        let events = EventRing::read(rest);
+        let (events, rest) = events.unwrap_or_else(|| (EventRing::since(map.revision()), &[]));
+        Ok(Self {
+            recorders,
+            events,
+            episodes: EndedEpisodes::read(rest, map.agent_numbers()),
+        })
     }
 }
 
@@ -76,7 +92,6 @@ pub(crate) fn start(store: Arc<dyn Store>, health: Arc<Health>) -> (Sender<Job>,
 fn run(store: &dyn Store, health: &Health, jobs: &Receiver<Job>) {
     while let Ok(job) = jobs.recv() {
         write(store, health, &job);
-        job.progress.writing.store(false, Ordering::Release);
     }
 }
 
@@ -96,6 +111,13 @@ fn write(store: &dyn Store, health: &Health, job: &Job) {
             .revision
             .store(job.map.revision(), Ordering::Release),
         Err(error) => health.derived_fail(&error),
+    }
+}
+
+/// However it ends, the next one may begin: nobody waits for a thread that has ended with a panic.
+impl Drop for Job {
+    fn drop(&mut self) {
+        self.progress.writing.store(false, Ordering::Release);
     }
 }
 
@@ -171,5 +193,41 @@ impl Checkpointer {
             beside,
             progress,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cogmap_proto::SpaceSettings;
+
+    use super::super::fold::core_settings;
+    use super::*;
+    use crate::store::{Derived, Journal, LocalStore};
+
+    #[test]
+    fn the_last_checkpoint_is_written_although_the_thread_is_gone() {
+        let directory = tempfile::tempdir().unwrap();
+        let store = Arc::new(LocalStore::open(directory.path()).unwrap());
+        let space = store.create_space("lab", b"").unwrap();
+        let map = CognitiveMap::new(core_settings(&SpaceSettings::default()).unwrap());
+        let beside = || Beside {
+            recorders: Vec::new(),
+            events: EventRing::since(0),
+        };
+        let (jobs, receiver) = channel();
+        let health = Arc::new(Health::default());
+        let mut checkpointer = Checkpointer::new(
+            space,
+            Arc::clone(&store) as Arc<dyn Store>,
+            health,
+            jobs,
+            Duration::ZERO,
+            (0, 0),
+        );
+        drop(receiver);
+        checkpointer.offer(1, &map, beside);
+        checkpointer.finish(2, &map, beside);
+        let written = store.checkpoint(space).unwrap().unwrap();
+        assert_eq!(written.next_block, 2);
     }
 }

@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use arc_swap::ArcSwapOption;
 use cogmap_proto::limits::WATERMARK_REJECTIONS_MAX;
-use cogmap_proto::{AgentDetail, Estimate, Evidence, Rejection, SeqRange, StampedPose, Watermark};
+use cogmap_proto::{
+    AgentDetail, EndedEpisode, Estimate, Evidence, Rejection, SeqRange, StampedPose, Watermark,
+};
 use cognitive_map::AgentId;
 use serde::Serialize;
 
@@ -22,6 +24,7 @@ pub struct AgentDesk {
     readout: ArcSwapOption<Readout>,
     marks: Mutex<Marks>,
     recorder: Mutex<Recorder>,
+    ended_episode: ArcSwapOption<EndedEpisode>,
     due: Due,
 }
 
@@ -87,6 +90,7 @@ impl AgentDesk {
             readout: ArcSwapOption::empty(),
             marks: Mutex::new(marks),
             recorder: Mutex::new(recorder),
+            ended_episode: ArcSwapOption::empty(),
             due: Due::default(),
         }
     }
@@ -122,6 +126,16 @@ impl AgentDesk {
     pub(crate) fn read_estimate<T>(&self, read: impl FnOnce(&Estimate) -> T) -> Option<T> {
         let readout = self.readout.load();
         readout.as_ref().map(|readout| read(&readout.estimate))
+    }
+
+    /// Its latest episode with an object that has ended.
+    pub fn ended_episode(&self) -> Option<Arc<EndedEpisode>> {
+        self.ended_episode.load_full()
+    }
+
+    /// Puts another ended episode on the desk, or none.
+    pub(crate) fn put_ended_episode(&self, episode: Option<Arc<EndedEpisode>>) {
+        self.ended_episode.store(episode);
     }
 
     /// Makes messages due to be published. Says whether none was before.

@@ -111,16 +111,19 @@ impl EventRing {
         postcard::to_stdvec(&(self.since, events)).expect("plain data encodes")
     }
 
-    /// Reads what [`EventRing::write`] wrote; nothing where that is not what the bytes are.
-    pub(crate) fn read(bytes: &[u8]) -> Option<Self> {
-        let (since, events): (EventId, Vec<EventRecord>) = postcard::from_bytes(bytes).ok()?;
+    /// Reads what [`EventRing::write`] wrote, and gives the bytes after it; nothing where that is not
+    /// what the bytes are.
+    pub(crate) fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
+        type Plain = (EventId, Vec<EventRecord>);
+        let ((since, events), rest) = postcard::take_from_bytes::<Plain>(bytes).ok()?;
         let ordered = events.is_sorted_by(|a, b| a.id < b.id);
         let fits = events.len() <= EVENTS_KEPT && ordered;
-        fits.then(|| Self {
+        let ring = fits.then(|| Self {
             kept: events.into_iter().map(Arc::new).collect(),
             dropped: 0,
             since,
-        })
+        });
+        Some((ring?, rest))
     }
 }
 

@@ -77,7 +77,15 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
         Entry::Samples { agent, batch } => {
             let agent = AgentId(*agent);
             let session = batch.session;
-            for (seq, wire) in (batch.first_seq..).zip(&batch.samples) {
+            for (ahead, wire) in (0..).zip(&batch.samples) {
+                // The last number of all has no successor, so it is never a sample's.
+                let Some(seq) = batch
+                    .first_seq
+                    .checked_add(ahead)
+                    .filter(|seq| *seq < u64::MAX)
+                else {
+                    return;
+                };
                 take(match decode::journaled_sample(wire) {
                     Ok(sample) => Record::Sample {
                         agent,

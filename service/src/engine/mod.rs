@@ -15,6 +15,7 @@ mod committer;
 mod counters;
 mod desk;
 mod due;
+mod episodes;
 mod events;
 mod fold;
 mod health;

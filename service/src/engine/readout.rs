@@ -68,10 +68,10 @@ pub(crate) fn status(status: Status) -> wire::Status {
 }
 
 /// The published form of an event; cell crossings stay inside, there are too many, and so do
-/// percepts that are as expected.
+/// percepts that are as expected and the ends of episodes, which the agent's desk tells.
 pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wire::Event> {
     let kind = match &event.kind {
-        EventKind::CellEntered { .. } => return None,
+        EventKind::CellEntered { .. } | EventKind::EpisodeEnded { .. } => return None,
         EventKind::AgentEnrolled => wire::EventKind::AgentEnrolled {},
         EventKind::AgentRemoved { .. } => wire::EventKind::AgentRemoved {},
         EventKind::SessionStarted { session } => {

@@ -4,6 +4,8 @@ use cognitive_map::{CognitiveMap, Settings};
 use metrics::counter;
 
 use super::block::{self, CorruptBlock};
+use super::checkpointer::Beside;
+use super::episodes::EndedEpisodes;
 use super::events::EventRing;
 use super::fold::records_of;
 use super::health::Health;
@@ -19,6 +21,8 @@ pub(crate) struct Recovered {
     pub(crate) recorders: Vec<Recorder>,
     /// The latest events.
     pub(crate) events: EventRing,
+    /// The latest episode of each agent that has ended.
+    pub(crate) episodes: EndedEpisodes,
     /// Number of the next journal block.
     pub(crate) next_block: u64,
     /// Revision of the map that the store's checkpoint holds.
@@ -34,6 +38,8 @@ pub(crate) enum RecoveryError {
     Block { block: u64, error: CorruptBlock },
     #[error("block {0} of the journal is missing")]
     MissingBlock(u64),
+    #[error("the work on it ended with a panic; the log says where")]
+    Interrupted,
     #[error("the space is closing")]
     Closing,
 }
@@ -69,6 +75,7 @@ pub(crate) fn recover(
             map: CognitiveMap::new(settings.clone()),
             recorders: Vec::new(),
             events: EventRing::since(0),
+            episodes: EndedEpisodes::default(),
             next_block: 0,
             checkpoint_revision: 0,
         },
@@ -91,6 +98,7 @@ pub(crate) fn recover(
             records_of(entry, |record| {
                 recovered.map.apply(&record, &mut events);
                 recovered.events.note(name, &recovered.map, &events);
+                recovered.episodes.note(name, &recovered.map, &events);
                 events.clear();
                 let (map, recorders) = (&recovered.map, &mut recovered.recorders);
                 chunks.extend(trajectory::note_all(recorders, map, &record, interval_ns));
@@ -146,21 +154,20 @@ fn load_checkpoint(loading: &Loading<'_>, blocks: u64) -> Option<Recovered> {
             Err("it holds blocks that the journal has not".to_owned())
         }
         Ok(Some(checkpoint)) => {
-            let map = CognitiveMap::restore(settings.clone(), checkpoint.pages);
-            let beside = Recorder::read_all(&checkpoint.recorders);
-            match (map, beside) {
-                (Ok(map), Ok((recorders, events))) => Ok(Recovered {
+            let restored = CognitiveMap::restore(settings.clone(), checkpoint.pages);
+            let restored = restored.map_err(|error| error.to_string());
+            restored.and_then(|map| {
+                let beside = Beside::read(&checkpoint.recorders, &map);
+                let beside = beside.map_err(|error| error.to_string())?;
+                Ok(Recovered {
                     checkpoint_revision: map.revision(),
-                    // Older versions wrote none.
-                    events: EventRing::read(events)
-                        .unwrap_or_else(|| EventRing::since(map.revision())),
                     map,
-                    recorders,
+                    recorders: beside.recorders,
+                    events: beside.events,
+                    episodes: beside.episodes,
                     next_block: checkpoint.next_block,
-                }),
-                (Err(error), _) => Err(error.to_string()),
-                (_, Err(error)) => Err(error.to_string()),
-            }
+                })
+            })
         }
         Err(error) => Err(error.to_string()),
     };

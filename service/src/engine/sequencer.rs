@@ -54,7 +54,7 @@ pub(crate) trait Weight {
 /// How much may wait, or does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Window {
-    /// Samples, and how far ahead of the next one they may be.
+    /// Samples.
     pub(crate) samples: usize,
     /// Memory \[bytes\].
     pub(crate) bytes: usize,
@@ -73,11 +73,12 @@ impl Window {
         self.bytes = self.bytes - before.bytes + after.bytes;
     }
 
-    /// What is left of it beside `used`.
-    pub(crate) fn beside(self, used: Self) -> Self {
+    /// How much of it one may hold where `others` do: as much as it leaves free. So nobody takes it
+    /// all, however many want to, and who comes later always finds some.
+    pub(crate) fn fair_share(self, others: Self) -> Self {
         Self {
-            samples: self.samples.saturating_sub(used.samples),
-            bytes: self.bytes.saturating_sub(used.bytes),
+            samples: self.samples.saturating_sub(others.samples) / 2,
+            bytes: self.bytes.saturating_sub(others.bytes) / 2,
         }
     }
 }
@@ -183,19 +184,20 @@ impl<T: Weight> Sequencer<T> {
     }
 
     /// Offers consecutive samples from `first` on; passes those that are in order now to `accept`.
+    /// Those that are not wait, up to `reach` ahead of the next one and as many as there is `room` for.
     ///
     /// They must not be [out of reach](Self::is_out_of_reach).
     pub(crate) fn offer(
         &mut self,
         first: u64,
         items: impl IntoIterator<Item = T>,
-        window: Window,
+        (reach, room): (u64, Window),
         now: Instant,
         mut accept: impl FnMut(u64, T),
     ) -> Offered {
         let mut offered = Offered::default();
         let before = self.next;
-        let is_leap = first.saturating_sub(self.next) >= window.samples as u64;
+        let is_leap = first.saturating_sub(self.next) >= reach;
         for (seq, item) in (first..).zip(items) {
             let bytes = item.bytes();
             if seq < self.next || self.waiting.contains_key(&seq) {
@@ -204,9 +206,9 @@ impl<T: Weight> Sequencer<T> {
                 self.next += 1;
                 accept(seq, item);
                 self.release(&mut accept);
-            } else if self.waiting.len() < window.samples
-                && seq - self.next < window.samples as u64
-                && self.waiting_bytes + bytes <= window.bytes
+            } else if seq - self.next < reach
+                && self.waiting.len() < room.samples
+                && self.waiting_bytes + bytes <= room.bytes
             {
                 self.waiting.insert(seq, item);
                 self.waiting_bytes += bytes;
@@ -219,7 +221,6 @@ impl<T: Weight> Sequencer<T> {
             }
         }
         if is_leap && offered.beyond_window > 0 {
-            let reach = window.samples as u64;
             self.note_leap(first, first + offered.beyond_window, reach, now);
         }
         self.note_gap(before, now);

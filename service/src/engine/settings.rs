@@ -15,8 +15,8 @@ pub struct EngineSettings {
     pub session_ahead_max: Duration,
     /// Most spaces of the service.
     pub spaces_max: usize,
-    /// Most samples of one agent that wait for earlier ones; further ones are dropped and counted,
-    /// and the client sends them again.
+    /// How far ahead of the next sample of an agent one may be that waits for it; further ones are
+    /// dropped and counted, and the client sends them again.
     pub reorder_window: usize,
     /// How long missing samples are waited for before they count as lost.
     pub gap_timeout: Duration,

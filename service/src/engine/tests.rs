@@ -16,7 +16,10 @@ use super::{
 };
 use crate::store::{Derived, Journal, LocalStore};
 
+mod faults;
+mod mangled;
 mod removal;
+mod window;
 
 const SPACE: &str = "lab";
 const AGENT: &str = "ada";

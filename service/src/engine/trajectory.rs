@@ -157,11 +157,13 @@ pub(crate) fn note_all(
     let (Record::Sample { agent, .. } | Record::Remove { agent }) = record else {
         return None;
     };
+    // First, for a number that nobody has says nothing of how many there are.
+    let of_map = map.agent(*agent)?;
     let index = agent.0 as usize;
     if recorders.len() <= index {
         recorders.resize_with(index + 1, Recorder::default);
     }
-    let chunk = recorders[index].note(record, map.agent(*agent)?, interval_ns)?;
+    let chunk = recorders[index].note(record, of_map, interval_ns)?;
     Some((agent.0, chunk))
 }
 

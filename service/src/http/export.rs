@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::extract::{Query, SpaceOfPath, SpaceParam};
+use super::held::holding;
 use super::long::LongAnswers;
 use super::problem::{Kind, Problem};
 use super::reply;
@@ -98,7 +99,7 @@ pub(crate) async fn get(
     let long = &service.long;
     let (mut response, file) = match format {
         ExportFormat::Json => (map(long, &space).await?, format!("{}.json", space.name())),
-        ExportFormat::G2o => (graph(&space).await?, format!("{}.g2o", space.name())),
+        ExportFormat::G2o => (graph(long, &space).await?, format!("{}.g2o", space.name())),
         ExportFormat::Ply => (cloud(long, &space).await?, format!("{}.ply", space.name())),
         ExportFormat::Tum => {
             let detail = "format=tum needs agent";
@@ -153,8 +154,14 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
                 .collect()
         }),
         ("landmarks", |map, _, first| {
-            let ids = (first..).take(CHUNK_ITEMS).map(LandmarkId);
-            ids.map_while(|id| Some((id.0, text(&answer::landmark(map.landmark(id)?)))))
+            let known = (first..).map_while(|id| Some((id, map.landmark(LandmarkId(id))?)));
+            // One with several names once, and those that are set aside not at all.
+            let told = known.filter(|(id, landmark)| {
+                let named = map.landmark_by_label(landmark.label().as_str());
+                named.is_some_and(|(named, _)| named.0 == *id)
+            });
+            told.take(CHUNK_ITEMS)
+                .map(|(id, landmark)| (id, text(&answer::landmark(landmark))))
                 .collect()
         }),
     ];
@@ -186,9 +193,12 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
 }
 
 /// The graph, in the memory of its whole text: that of the relaxation is larger.
-async fn graph(space: &Space) -> Result<Response<Body>, Problem> {
+async fn graph(long: &LongAnswers, space: &Space) -> Result<Response<Body>, Problem> {
+    let room = long.enter()?;
     let graph = space.graph(|map| write_g2o(&map.experience_map())).await?;
-    Ok(reply::with_type(TUM, Body::from(Bytes::from_owner(graph))))
+    let body = Body::from(Bytes::from_owner(graph));
+    // Who reads it slowly holds on to all of it.
+    Ok(reply::with_type(TUM, holding(body, room)))
 }
 
 async fn cloud(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, Problem> {

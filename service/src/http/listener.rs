@@ -4,10 +4,11 @@ use std::io;
 use std::net::SocketAddr;
 use std::pin::Pin;
 use std::sync::Arc;
-use std::task::{Context, Poll};
+use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use axum::serve::Listener;
+use metrics::{Counter, counter};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -15,6 +16,7 @@ use tokio::time::{Instant, Sleep};
 
 use super::seat::{Seat, Seats};
 use super::settings::HttpSettings;
+use crate::metrics::HTTP_CLOSED_CONNECTIONS;
 
 /// How long is waited for room before one more connection is sent away.
 const ROOM_PAUSE: Duration = Duration::from_millis(50);
@@ -26,6 +28,7 @@ pub(crate) struct BoundedListener {
     listener: TcpListener,
     room: Arc<Semaphore>,
     seats: Arc<Seats>,
+    closed: ClosedCounters,
     head_timeout: Duration,
     idle_timeout: Duration,
 }
@@ -42,10 +45,27 @@ pub(crate) struct Connection {
     /// Requests that had begun when this was looked at last.
     requests: u64,
     watch: Pin<Box<Sleep>>,
+    /// Why it is being closed, once it is.
+    closed: Option<Closed>,
+    counters: ClosedCounters,
     head_timeout: Duration,
     idle_timeout: Duration,
     _permit: OwnedSemaphorePermit,
 }
+
+/// Why the service closes a connection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Closed {
+    /// It waited, and another one came.
+    Room,
+    /// The head of a request did not come in its time.
+    Head,
+    /// Nothing passed either way in its time.
+    Idle,
+}
+
+/// What is counted of each reason.
+type ClosedCounters = Arc<[Counter; Closed::ALL.len()]>;
 
 impl BoundedListener {
     pub(crate) fn new(listener: TcpListener, settings: &HttpSettings) -> Self {
@@ -53,6 +73,7 @@ impl BoundedListener {
             listener,
             room: Arc::new(Semaphore::new(settings.connections_max)),
             seats: Arc::default(),
+            closed: Closed::counters(),
             head_timeout: settings.head_timeout,
             idle_timeout: settings.idle_timeout,
         }
@@ -94,6 +115,8 @@ impl Listener for BoundedListener {
             head_since: Some(now),
             requests: 0,
             watch: Box::pin(tokio::time::sleep(self.head_timeout.min(self.idle_timeout))),
+            closed: None,
+            counters: Arc::clone(&self.closed),
             head_timeout: self.head_timeout,
             idle_timeout: self.idle_timeout,
             _permit: permit,
@@ -116,19 +139,35 @@ impl Connection {
     /// its time, or nothing has passed either way in its time. Without it, whoever opens connections
     /// and says nothing, or hardly anything, keeps all others out.
     fn poll_patience(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        if self.seat.is_sent_away(context) {
-            return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
+        let reason = if let Some(reason) = self.closed {
+            reason
+        } else {
+            let reason = ready!(self.poll_close(context));
+            self.counters[reason as usize].increment(1);
+            *self.closed.insert(reason)
+        };
+        Poll::Ready(Err(reason.error_kind().into()))
+    }
+
+    /// Waits for a reason to close the connection.
+    fn poll_close(&mut self, context: &mut Context<'_>) -> Poll<Closed> {
+        // One whose next request came meanwhile answers it first.
+        if self.seat.is_sent_away(context) && !self.seat.has_request() {
+            return Poll::Ready(Closed::Room);
         }
         self.look_at_requests();
-        let idle = self.used + self.idle_timeout;
+        let idle = (self.used + self.idle_timeout, Closed::Idle);
         let head = self.head_since.map(|since| since + self.head_timeout);
-        let due = head.map_or(idle, |head| head.min(idle));
+        let head = head
+            .filter(|head| *head < idle.0)
+            .map(|head| (head, Closed::Head));
+        let (due, reason) = head.unwrap_or(idle);
         if due < self.watch.deadline() {
             self.watch.as_mut().reset(due);
         }
         while self.watch.as_mut().poll(context).is_ready() {
             if Instant::now() >= due {
-                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+                return Poll::Ready(reason);
             }
             self.watch.as_mut().reset(due);
         }
@@ -149,6 +188,32 @@ impl Connection {
         if requests != self.requests {
             self.requests = requests;
             self.head_since = None;
+        }
+    }
+}
+
+impl Closed {
+    const ALL: [Self; 3] = [Self::Room, Self::Head, Self::Idle];
+
+    fn counters() -> ClosedCounters {
+        let counters =
+            Self::ALL.map(|reason| counter!(HTTP_CLOSED_CONNECTIONS, "reason" => reason.name()));
+        Arc::new(counters)
+    }
+
+    /// The label of its counter.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Room => "room",
+            Self::Head => "head",
+            Self::Idle => "idle",
+        }
+    }
+
+    fn error_kind(self) -> io::ErrorKind {
+        match self {
+            Self::Room => io::ErrorKind::ConnectionAborted,
+            Self::Head | Self::Idle => io::ErrorKind::TimedOut,
         }
     }
 }

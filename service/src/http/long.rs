@@ -14,7 +14,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::problem::{Kind, Problem};
 
-/// Most answers that are sent piece by piece at once: each holds on to a whole map.
+/// Most long answers that are sent at once: each holds on to a whole map, or its graph.
 const ANSWERS_MAX: usize = 64;
 /// Bytes of a piece: about a millisecond's work.
 const PIECE_BYTES: usize = 64 << 10;

@@ -164,22 +164,27 @@ pub(crate) async fn identify(
     Ok(reply::json(&answer))
 }
 
-/// What an agent's episode with an object says so far.
+/// What an agent's episode with an object says so far, and what the latest one said that has ended.
 #[utoipa::path(get, path = "/v1/spaces/{space}/agents/{agent}/object", tag = "agents",
     operation_id = "get_agent_object", params(AgentParams),
     responses(
-        (status = 200, description = "The episode under way, if there is one", body = AgentObject),
+        (status = 200, description = "The episode under way and the latest that has ended, if there are any",
+            body = AgentObject),
         (status = 404, description = "There is no such space or agent")))]
 pub(crate) async fn of_agent(
+    State(service): State<Service>,
     AgentOfPath(space, desk): AgentOfPath,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    let answered = tokio::task::spawn_blocking(move || {
-        let answer = answer::agent_object(space.name(), &map, desk.id(), desk.name());
+    // After the map: an episode that ends in between is told twice and never missed.
+    let last = desk.ended_episode().as_deref().cloned();
+    // All contacts of the episode may be judged anew.
+    let answered = service.long.make(move || {
+        let answer = answer::agent_object(space.name(), &map, desk.id(), desk.name(), last);
         reply::json(&answer)
     });
-    answered.await.map_err(|_| Problem::interrupted())
+    answered.await
 }
 
 fn detail(map: &CognitiveMap, name: &Label) -> Option<ObjectDetail> {

@@ -1,4 +1,4 @@
-//! Backups: the journals as far as they were acknowledged, copied beside the running service.
+//! Backups: the journals as far as they are written, copied beside the running service.
 //!
 //! A backup is a store directory itself, without derived state. Every block is checked while it is
 //! copied, and whatever was acknowledged before the backup began is in it.
@@ -130,7 +130,7 @@ impl From<StoreError> for NotCopied {
     }
 }
 
-/// Copies a space up to its mark.
+/// Copies a space, at least up to its mark.
 fn copy_space(from: &Path, to: &Path, space: SpaceNumber) -> Result<Extent, NotCopied> {
     let on_read = |error: io::Error| NotCopied::Store(files::fault(&error, from));
     let on_write = |error: io::Error| NotCopied::Store(files::fault(&error, to));
@@ -147,8 +147,10 @@ fn copy_space(from: &Path, to: &Path, space: SpaceNumber) -> Result<Extent, NotC
     let mut copy = Copy::new(to);
     let mut reader = LogReader::open(from, space, 0).map_err(on_read)?;
     let mut extent = Extent::default();
-    while extent.blocks < mark.blocks {
-        match reader.next().map_err(on_read)? {
+    // To the end, and not to the mark alone: after a power cut that is older than what was
+    // acknowledged.
+    loop {
+        let flaw = match reader.next().map_err(on_read)? {
             Some(Item::Block(header)) => {
                 let head = header.encode(space);
                 copy.append(header.block, &head, reader.payload())
@@ -157,20 +159,18 @@ fn copy_space(from: &Path, to: &Path, space: SpaceNumber) -> Result<Extent, NotC
                     blocks: header.block + 1,
                     samples: header.total,
                 };
+                continue;
             }
-            Some(Item::Damage(damage)) => {
-                let (block, flaw) = (damage.block, damage.flaw);
-                return Err(NotCopied::Damaged(format!(
-                    "block {block} is damaged: {flaw}"
-                )));
-            }
-            None => {
-                let (block, all) = (extent.blocks, mark.blocks);
-                return Err(NotCopied::Damaged(format!(
-                    "blocks {block} to {all} are missing"
-                )));
-            }
+            Some(Item::Damage(damage)) => Some(damage),
+            None => None,
+        };
+        if extent.blocks >= mark.blocks {
+            break; // what follows is being written
         }
+        return Err(NotCopied::Damaged(match flaw {
+            Some(damage) => format!("block {} is damaged: {}", damage.block, damage.flaw),
+            None => format!("blocks {} to {} are missing", extent.blocks, mark.blocks),
+        }));
     }
     copy.finish().map_err(on_write)?;
     create_mark(to, space, extent).map_err(on_write)?;
@@ -217,7 +217,7 @@ impl<'a> Copy<'a> {
         self.length = 0;
         if let Some(file) = self.file.take() {
             let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-            file.sync_all()?;
+            files::sync_all(&file)?;
         }
         Ok(())
     }

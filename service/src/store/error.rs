@@ -28,8 +28,8 @@ pub enum StoreError {
     #[error("the space {0:?} exists")]
     SpaceExists(String),
     /// An earlier write failed; writes are refused until the service is restarted.
-    #[error("the store refuses writes since an earlier failure; restart the service")]
-    Broken,
+    #[error("the store refuses writes since an earlier failure ({0}); restart the service")]
+    Broken(String),
     /// The journal of a space is damaged, or a part of it is missing.
     #[error(transparent)]
     Damaged(Box<DamagedJournal>),

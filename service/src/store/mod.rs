@@ -14,9 +14,12 @@ mod log;
 
 use cognitive_map::CheckpointPage;
 
-/// Most files that the store has open: a journal for each of the most spaces, the tables of what is
-/// derived, and those of merges.
-pub const OPEN_FILES_MAX: usize = 256 + 2 * derived::CACHED_FILES_MAX;
+/// Most files that the store has open: segment and mark of each of the most spaces, the tables of
+/// what is derived, and those of merges.
+pub const OPEN_FILES_MAX: usize = 2 * 256 + 2 * derived::CACHED_FILES_MAX;
+
+#[cfg(test)]
+pub(crate) use local::disk_model;
 
 pub use backup::{BackupReport, SpaceBackup, backup, restore};
 pub use error::{DamagedJournal, DerivedError, StoreError};
@@ -83,8 +86,8 @@ pub type Blocks<'a> = Box<dyn Iterator<Item = Result<(u64, Vec<u8>), StoreError>
 /// one writer.
 ///
 /// What [`Journal::append`] has written survives the process at once and a power cut after the next
-/// [`Journal::sync`] has returned. After an error of either the journal refuses all
-/// further changes ([`StoreError::Broken`]); reading goes on.
+/// [`Journal::sync`] has returned. After an error of either the journal refuses all further
+/// changes ([`StoreError::DiskFull`] once more, or [`StoreError::Broken`]); reading goes on.
 pub trait Journal: std::fmt::Debug + Send + Sync + 'static {
     /// The spaces, by number.
     ///

@@ -9,6 +9,7 @@
 // What the outside does to the service.
 mod bad_input; // what no client would send
 mod crash; // kill -9, and what recovery makes of it
+mod episodes; // what was recognised, when the robot and the service have ended
 mod full_disk; // a disk that takes no more
 mod leaps; // sequence numbers that somebody made up
 mod names; // names that others claim, and agents that are removed

@@ -402,3 +402,16 @@ fn a_start_that_fails_leaves_nothing_behind() {
         );
     }
 }
+
+#[test]
+fn a_repair_makes_no_store_where_there_is_none() {
+    let empty = TempDir::new().unwrap();
+    let data = text(empty.path());
+    let repaired = run(&["store", "repair", "--space", "default", "--data-dir", data]);
+    assert_eq!(repaired.code(), 1, "{repaired:?}");
+    assert!(
+        repaired.stderr.contains("there is no store"),
+        "{repaired:?}"
+    );
+    assert_eq!(fs::read_dir(empty.path()).unwrap().count(), 0);
+}

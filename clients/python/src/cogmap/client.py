@@ -326,7 +326,7 @@ class Client:
         return self._send(Identification, "POST", path, JSON, json.dumps(to_wire(query)).encode())
 
     def agent_object(self, space: str, agent: str) -> AgentObject:
-        """What an agent's episode with an object says so far."""
+        """What an agent's episode with an object says so far, and what the latest one said that has ended."""
         return self._get(AgentObject, _path(space, "agents", agent, "object"))
 
     # Streams and files

@@ -287,8 +287,23 @@ class EpisodeKind(Enum):
 
 
 @dataclass(frozen=True)
+class EndedEpisode:
+    """An episode with an object that has ended."""
+
+    #: What it was for.
+    episode: EpisodeKind
+    #: Session of the agent that it was part of.
+    session: int
+    #: Stamp of the sample that ended it [ns].
+    stamp_ns: int
+    #: What its contacts said in the end, before anything was learned from it; absent when it taught an
+    #: object by its name.
+    identification: Optional[Identification]
+
+
+@dataclass(frozen=True)
 class AgentObject:
-    """The episode of an agent with an object."""
+    """The episode of an agent with an object, and the latest one that has ended."""
 
     space: str
     agent: str
@@ -296,3 +311,6 @@ class AgentObject:
     episode: Optional[EpisodeKind]
     #: What its contacts say; in the frame of the body when the episode began.
     identification: Optional[Identification]
+    #: The latest episode that has ended; absent when there was none in which something was felt. Also kept
+    #: when the robot is closed.
+    last: Optional[EndedEpisode] = None

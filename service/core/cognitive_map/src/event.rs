@@ -8,7 +8,7 @@ use crate::landmark::LandmarkId;
 use crate::percept::ChannelId;
 use crate::place::PlaceId;
 use crate::trip::{TripEnd, TripId};
-use object_recognition::ObjectId;
+use object_recognition::{ObjectId, Posterior};
 
 /// One event.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,6 +156,16 @@ pub enum EventKind {
         part: ObjectId,
         /// Its name.
         part_name: Label,
+    },
+    /// An episode with an object ended, in which something was felt.
+    EpisodeEnded {
+        /// Session of the agent that it was part of.
+        session: u64,
+        /// Whether it was to teach an object.
+        teaches: bool,
+        /// What its contacts said in the end, before anything was learned from it; none where it taught
+        /// an object by its name.
+        posterior: Option<Box<Posterior>>,
     },
     /// A percept was felt where a place remembers its channel; before the place learned from it.
     PerceptCompared {

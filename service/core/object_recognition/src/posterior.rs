@@ -20,7 +20,7 @@ pub enum Verdict {
 }
 
 /// Where the episode's frame lies in a map.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PoseEstimate {
     /// Map.
     pub object: ObjectId,
@@ -35,7 +35,7 @@ pub struct PoseEstimate {
 }
 
 /// What an episode says so far.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
     /// Probability of each object, most probable first; equal ones by number.
     pub objects: Vec<(ObjectId, f64)>,

@@ -26,7 +26,7 @@ pub(super) const HEAD_BYTES: usize = 64;
 const LANES_MAX: usize = 4096;
 /// The lane of further names, and of calls that are of no agent.
 const SHARED: usize = 0;
-/// A lane whose buffer has grown beyond this gives it back when it is empty.
+/// A lane whose buffers have grown beyond this gives them back when it is empty.
 const KEPT_BYTES: usize = 4 << 10;
 
 /// The lanes.
@@ -197,7 +197,8 @@ impl Lanes {
 impl Lane {
     /// Gives back what an empty lane does not need: it keeps its name and a small buffer.
     fn rest(&mut self) {
-        if self.items.is_empty() && self.bytes.capacity() > KEPT_BYTES {
+        let kept = self.bytes.capacity() + self.items.capacity() * size_of::<Item>();
+        if self.items.is_empty() && kept > KEPT_BYTES {
             self.bytes = VecDeque::new();
             self.items = VecDeque::new();
         }
@@ -292,6 +293,20 @@ mod tests {
             push(&mut lanes, "large", &vec![0; FEW_BYTES]);
         }
         assert_eq!(take(&mut lanes, 8 * FEW_BYTES).len(), 8);
+    }
+
+    #[test]
+    fn an_empty_lane_keeps_little_whatever_has_been_in_it() {
+        let mut lanes = Lanes::default();
+        for (agent, payload) in [("long", vec![0; 100]), ("a", Vec::new())] {
+            for _ in 0..2000 {
+                push(&mut lanes, agent, &payload);
+            }
+            take(&mut lanes, usize::MAX);
+            let lane = &lanes.all[lanes.by_name[agent]];
+            let kept = lane.bytes.capacity() + lane.items.capacity() * size_of::<Item>();
+            assert!(kept <= KEPT_BYTES, "{agent}: {kept}");
+        }
     }
 
     #[test]

@@ -20,7 +20,7 @@ use cogmap_proto::{SkipReason, SpaceSettings};
 use cognitive_map::CognitiveMap;
 use serde::Serialize;
 
-use super::block::{BlockWriter, Entry, entries};
+use super::block::{BlockWriter, CorruptBlock, Entry, entries};
 use super::fold::core_settings;
 use crate::store::{
     Damage, Derived, Flaw, LocalJournal, LocalStore, Replacement, StoreError, StoredSpace,
@@ -100,7 +100,7 @@ pub fn repair(store: &LocalStore, space: &StoredSpace) -> Result<Option<RepairRe
     }
     let journals = store.journals();
     let survey = journals.survey(space.number)?;
-    if survey.is_sound() {
+    if survey.is_sound() && !holds_malformed(journals, space)? {
         return Ok(None);
     }
     let mut repair = Repair {
@@ -134,6 +134,16 @@ pub fn repair(store: &LocalStore, space: &StoredSpace) -> Result<Option<RepairRe
         agents,
         set_aside,
     }))
+}
+
+/// Whether a journal whose bytes are whole holds a block that no start can fold.
+fn holds_malformed(journals: &LocalJournal, space: &StoredSpace) -> Result<bool, StoreError> {
+    let mut found = false;
+    journals.read_all(space.number, |item| {
+        let malformed = |bytes| matches!(entries(bytes), Err(CorruptBlock::Malformed(_)));
+        found |= item.is_ok_and(|(_, _, bytes)| malformed(bytes));
+    })?;
+    Ok(found)
 }
 
 /// An agent as the latest checkpoint has it.
@@ -201,6 +211,11 @@ impl Repair<'_> {
                 Ok(read) => {
                     let kept = self.keep(samples, bytes, read);
                     self.failure = kept.err();
+                }
+                // Nothing is wrong with it: this build is too old.
+                Err(error @ CorruptBlock::Version(_)) => {
+                    let what = format!("block {number} of {:?}: {error}", space.name);
+                    self.failure = Some(StoreError::Corrupt(what));
                 }
                 Err(error) => {
                     self.holes = true;

@@ -152,3 +152,53 @@ fn a_damaged_end_is_cut_off() {
     assert_eq!(report.samples_lost, 2);
     assert_eq!((report.damage[0].first, report.damage[0].next), (1, None));
 }
+
+/// A store of a space `lab` with these blocks, none of them damaged.
+fn store_of(directory: &std::path::Path, blocks: &[&[u8]]) -> (LocalStore, StoredSpace) {
+    let store = LocalStore::open(directory).unwrap();
+    let settings = serde_json::to_vec(&SpaceSettings::default()).unwrap();
+    let number = store.create_space("lab", &settings).unwrap();
+    store.open_journal(number).unwrap();
+    for (block, bytes) in (0..).zip(blocks) {
+        store.append(number, block, 0, bytes).unwrap();
+    }
+    store.sync().unwrap();
+    let space = store.journals().space("lab").unwrap();
+    (store, space)
+}
+
+#[test]
+fn a_block_that_is_whole_and_makes_no_sense_is_left_out() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut writer = BlockWriter::new();
+    writer.push(&enrol(0, "ada"));
+    let (store, space) = store_of(
+        directory.path(),
+        &[writer.bytes(), &[1, 99], writer.bytes()],
+    );
+    let report = repair(&store, &space)
+        .unwrap()
+        .expect("it cannot be folded");
+    assert_eq!(
+        (report.damage[0].first, report.damage[0].next),
+        (1, Some(2))
+    );
+    assert_eq!(report.blocks_kept, 2);
+    let space = store.journals().space("lab").unwrap();
+    assert!(repair(&store, &space).unwrap().is_none());
+}
+
+/// After an update that was taken back, damage elsewhere must not cost what the newer build has
+/// written.
+#[test]
+fn blocks_of_a_newer_version_are_not_thrown_away() {
+    let directory = tempfile::tempdir().unwrap();
+    let (store, space) = store_of(directory.path(), &[&[1], &[1, 99], &[2, 0]]);
+    let refused = repair(&store, &space).unwrap_err();
+    assert!(refused.to_string().contains("update cogmap"), "{refused}");
+    assert_eq!(
+        store.journals().space("lab").unwrap(),
+        space,
+        "it is as it was"
+    );
+}

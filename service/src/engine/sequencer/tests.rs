@@ -3,10 +3,12 @@
 use super::*;
 use proptest::prelude::*;
 
-const WINDOW: Window = Window {
+const REACH: u64 = 32;
+const ROOM: Window = Window {
     samples: 32,
     bytes: 32 * 8,
 };
+const WINDOW: (u64, Window) = (REACH, ROOM);
 
 impl Weight for u64 {
     fn bytes(&self) -> usize {
@@ -95,14 +97,45 @@ fn what_is_beyond_the_window_is_dropped_and_said() {
 #[test]
 fn what_waits_is_bounded_in_bytes() {
     let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
-    let window = Window {
-        bytes: 20,
-        ..WINDOW
-    };
-    let offered = sequencer.offer(1, [1, 2, 3], window, Instant::now(), |_, item| {
+    let room = Window { bytes: 20, ..ROOM };
+    let offered = sequencer.offer(1, [1, 2, 3], (REACH, room), Instant::now(), |_, item| {
         got.push(item);
     });
     assert_eq!((offered.reordered, offered.beyond_window), (2, 1));
+}
+
+#[test]
+fn nobody_takes_all_the_room_and_who_comes_later_finds_some() {
+    let all = Window {
+        samples: 1000,
+        bytes: 64_000,
+    };
+    let mut held = Window::NONE;
+    for most in [500, 250, 125, 62, 31] {
+        let mut own = Window::NONE;
+        while { all.fair_share(held) }.samples > own.samples {
+            own.samples += 1;
+        }
+        assert_eq!(own.samples, most);
+        held.recount(Window::NONE, own);
+    }
+    assert_eq!(all.fair_share(Window::NONE).bytes, 32_000);
+    assert_eq!(all.fair_share(all), Window::NONE);
+}
+
+#[test]
+fn samples_that_find_no_room_are_missing_and_no_leap() {
+    let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
+    let now = Instant::now();
+    let none = (REACH, Window::NONE);
+    let offered = sequencer.offer(1, [1, 2], none, now, |_, item| got.push(item));
+    assert_eq!((offered.reordered, offered.beyond_window), (0, 2));
+    assert_eq!(sequencer.gap(), Some(SeqRange { from: 0, to: 3 }));
+    // The robot goes on with the first one; the others are still missing, and it is told.
+    sequencer.offer(0, [0], none, now, |_, item| got.push(item));
+    assert_eq!(sequencer.gap(), Some(SeqRange { from: 1, to: 3 }));
+    sequencer.offer(1, [1, 2, 3], none, now, |_, item| got.push(item));
+    assert_eq!((got, sequencer.gap()), (vec![0, 1, 2, 3], None));
 }
 
 #[test]

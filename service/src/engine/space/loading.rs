@@ -1,5 +1,6 @@
 //! The thread of a space: it loads the map, and then is its writer.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -49,7 +50,10 @@ pub(super) fn load_and_run(
         settings: core,
         interval_ns: shared.interval_ns,
     };
-    match recovery::recover(&loading, closing) {
+    // A journal that nobody can fold must not leave everybody waiting.
+    let recovered = catch_unwind(AssertUnwindSafe(|| recovery::recover(&loading, closing)));
+    let interrupted = |_| Err(RecoveryError::Interrupted);
+    match recovered.unwrap_or_else(interrupted) {
         Ok(recovered) => {
             let progress = (recovered.checkpoint_revision, recovered.next_block);
             let interval = settings.checkpoint_interval;

@@ -9,7 +9,7 @@ use super::*;
 use crate::engine::{IngestError, TrajectoryError};
 use crate::store::{Derived, Journal};
 
-fn wait<T>(answer: impl Future<Output = T>) -> T {
+pub(super) fn wait<T>(answer: impl Future<Output = T>) -> T {
     let runtime = tokio::runtime::Builder::new_current_thread().build();
     runtime.expect("a runtime").block_on(answer)
 }
@@ -19,7 +19,7 @@ fn remove(engine: &Engine, agent: &str) -> Result<(), IngestError> {
     wait(space.remove_agent(&agent.parse().expect("a name")))
 }
 
-fn ingest(
+pub(super) fn ingest(
     engine: &Engine,
     agent: &str,
     session: u64,

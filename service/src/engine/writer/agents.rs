@@ -10,6 +10,7 @@ use super::{AgentSlot, Writer};
 use crate::engine::block::Entry;
 use crate::engine::counters::Drop;
 use crate::engine::desk::AgentDesk;
+use crate::engine::episodes::EndedEpisodes;
 use crate::engine::message::{IngestError, RemovalRequest};
 use crate::engine::sequencer::{Sequencer, Window};
 use crate::engine::space::Shared;
@@ -23,14 +24,15 @@ const FULL_PAUSE: Duration = Duration::from_millis(100);
 
 impl Writer {
     /// Seats the agents of a recovered map.
-    pub(super) fn seat_all(&mut self, recorders: Vec<Recorder>) {
+    pub(super) fn seat_all(&mut self, recorders: Vec<Recorder>, episodes: EndedEpisodes) {
         let now = Instant::now();
-        let mut recorders = recorders.into_iter();
+        let (mut recorders, mut episodes) = (recorders.into_iter(), episodes.0.into_iter());
         let known: Vec<_> = { self.map.agents_ever() }
             .map(|(id, agent)| {
                 let recorder = recorders.next().unwrap_or_default();
                 let name = agent.name().as_str();
                 let desk = AgentDesk::new(id, name, agent.session(), agent.next_seq(), recorder);
+                desk.put_ended_episode(episodes.next().flatten());
                 let sequencer = Sequencer::new(agent.session(), agent.next_seq());
                 let latest_ns = agent.stamp_ns().unwrap_or(i64::MIN);
                 let slot = AgentSlot::new(desk, sequencer, latest_ns, now);

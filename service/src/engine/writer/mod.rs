@@ -27,6 +27,7 @@ use super::checkpointer::{Beside, Checkpointer};
 use super::committer::{Answer, Commit};
 use super::counters::SpaceCounters;
 use super::desk::AgentDesk;
+use super::episodes::{self, EndedEpisodes, Latest};
 use super::events::published;
 use super::message::{Call, ChangeReply};
 use super::queue::{Inbox, Message};
@@ -42,7 +43,7 @@ const ROUND_MESSAGES_MAX: usize = 2048;
 /// How long a writer waits for a message before it looks after gaps and wishes.
 const PATIENCE: Duration = Duration::from_millis(100);
 /// Most samples of all agents that wait for earlier ones, and the most memory that they take
-/// \[bytes\]: bounds whoever sends.
+/// \[bytes\]: bounds whoever sends. One agent may hold as much as is free.
 const WAITING_MAX: Window = Window {
     samples: 16_384,
     bytes: 64 << 20,
@@ -110,6 +111,7 @@ impl Writer {
         let Recovered {
             map,
             recorders,
+            episodes,
             next_block,
             ..
         } = recovered;
@@ -139,7 +141,7 @@ impl Writer {
             told: Vec::new(),
             applied: 0,
         };
-        writer.seat_all(recorders);
+        writer.seat_all(recorders, episodes);
         writer
     }
 
@@ -223,6 +225,11 @@ impl Writer {
             self.map.apply(record, &mut self.events);
             for event in &self.events {
                 self.counters.event(&self.map, event);
+                let change = episodes::change(&self.shared.name, &self.map, event);
+                if let Some(Latest(episode)) = change {
+                    let slot = &self.agents[event.agent.0 as usize];
+                    slot.desk.put_ended_episode(episode);
+                }
             }
             self.told
                 .extend(published(&self.shared.name, &self.map, &self.events));
@@ -274,5 +281,10 @@ fn beside(shared: &Shared, agents: &[AgentSlot]) -> Beside {
             .map(|slot| slot.desk.recorder().clone())
             .collect(),
         events: shared.events.ring(),
+        episodes: EndedEpisodes(
+            { agents.iter() }
+                .map(|slot| slot.desk.ended_episode())
+                .collect(),
+        ),
     }
 }

@@ -138,14 +138,15 @@ impl Writer {
         let mut accepted = Vec::new();
         let sequencer = &mut self.agents[slot].sequencer;
         let before = sequencer.waiting();
-        // What others leave, and what is its own already.
-        let mut window = WAITING_MAX.beside(self.waiting);
-        window.recount(Window::NONE, before);
-        window.samples = window.samples.min(self.shared.reorder_window);
+        let mut others = self.waiting;
+        others.recount(before, Window::NONE);
+        // How far ahead samples may be is the agent's own, whatever room others leave.
+        let reach = self.shared.reorder_window as u64;
+        let room = WAITING_MAX.fair_share(others);
         let offered = sequencer.offer(
             batch.first_seq,
             batch.samples,
-            window,
+            (reach, room),
             now,
             |seq, sample| {
                 accepted.push((seq, sample));

@@ -9,6 +9,7 @@ mod problems;
 mod removal;
 mod resources;
 mod running;
+mod told;
 mod trajectories;
 mod uniform;
 mod wayfinding;

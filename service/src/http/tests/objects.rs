@@ -199,6 +199,14 @@ async fn an_agent_learns_and_recognises_by_touch() {
         (&status["episode"], &status["identification"]),
         (&Value::Null, &Value::Null)
     );
+    let last = &status["last"];
+    assert_eq!(
+        (&last["episode"], &last["session"]),
+        (&"identify".into(), &1.into())
+    );
+    let said = &last["identification"];
+    assert_eq!(said["verdict"], told["verdict"], "{said}");
+    assert_eq!(said["contacts"], 8);
     let objects = rig.get("/v1/spaces/lab/objects").await.good();
     assert_eq!(objects["objects"].as_array().map(Vec::len), Some(2));
 }

@@ -144,6 +144,68 @@ async fn a_connection_that_says_nothing_is_closed() {
     drop((running.stop, rig.stop.clone()));
 }
 
+/// How many connections were closed for a reason.
+fn closed(handle: &PrometheusHandle, reason: &str) -> u64 {
+    let name = format!("cogmap_http_closed_connections_total{{reason=\"{reason}\"}} ");
+    let text = handle.render();
+    let line = text.lines().find_map(|line| line.strip_prefix(&name));
+    line.and_then(|count| count.parse().ok()).expect("a count")
+}
+
+/// Reads until the service closes the connection.
+async fn closed_by_service(stream: &mut TcpStream) {
+    let mut rest = Vec::new();
+    let read = tokio::time::timeout(Duration::from_secs(10), stream.read_to_end(&mut rest));
+    // Closed, perhaps after an answer that says why.
+    let _ = read.await.expect("it is closed");
+}
+
+#[tokio::test]
+async fn connections_that_are_closed_are_counted_by_the_reason() {
+    let recorder = PrometheusBuilder::new().build_recorder();
+    let (counted, _recording) = (
+        recorder.handle(),
+        metrics::set_default_local_recorder(&recorder),
+    );
+    let rig = rig();
+    let running = run_on(
+        &rig,
+        HttpSettings {
+            connections_max: 2,
+            head_timeout: Duration::from_millis(200),
+            idle_timeout: Duration::from_millis(1500),
+            ..settings()
+        },
+    )
+    .await;
+    let mut first = connect(&running, "/healthz").await;
+    read_until(&mut first, "\"ok\"").await;
+    let counts = || ["room", "head", "idle"].map(|reason| closed(&counted, reason));
+    assert_eq!(counts(), [0, 0, 0]);
+    // After an answer a connection may wait for longer than a head may take.
+    closed_by_service(&mut first).await;
+    assert_eq!(counts(), [0, 0, 1]);
+    let mut silent = TcpStream::connect(running.address)
+        .await
+        .expect("it listens");
+    closed_by_service(&mut silent).await;
+    assert_eq!(counts(), [0, 1, 1]);
+    let mut waiting = Vec::new();
+    for _ in 0..3 {
+        let mut stream = connect(&running, "/healthz").await;
+        read_until(&mut stream, "\"ok\"").await;
+        waiting.push(stream);
+    }
+    closed_by_service(&mut waiting[0]).await;
+    assert_eq!(counts(), [1, 1, 1]);
+    // Whoever hangs up by itself is not counted.
+    drop(waiting);
+    let mut last = connect(&running, "/healthz").await;
+    read_until(&mut last, "\"ok\"").await;
+    assert_eq!(counts()[1..], [1, 1]);
+    drop((running.stop, rig.stop.clone()));
+}
+
 #[tokio::test]
 async fn more_streams_than_the_bound_are_told_to_come_back() {
     let rig = rig();

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::super::disk_model::{Cut, DiskModel};
 use super::super::local::copy_for_tests;
 use super::super::{Derived, Journal, LocalStore};
 use super::*;
@@ -91,4 +92,19 @@ fn a_migration_cut_short_is_begun_again_or_finished() {
     copy_for_tests(&old.path().join("keyspaces"), &path.join("keyspaces"));
     assert!(!migrate(path, samples_in).unwrap());
     assert_migrated(path);
+}
+
+#[test]
+fn whenever_the_power_is_cut_a_migration_is_begun_again_or_finished() {
+    let directory = fixture();
+    let model = DiskModel::of(directory.path());
+    model.cut_before_each_sync(&[Cut::Lost]);
+    assert!(migrate(directory.path(), samples_in).unwrap());
+    let images = model.take_images();
+    assert!(images.len() > 10, "{}", images.len());
+    for image in images {
+        let migrated = migrate(image.directory.path(), samples_in);
+        assert!(migrated.is_ok(), "{:?}: {migrated:?}", image.cut);
+        assert_migrated(image.directory.path());
+    }
 }

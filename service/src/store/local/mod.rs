@@ -28,22 +28,26 @@ mod survey;
 #[cfg(test)]
 mod damage_tests;
 #[cfg(test)]
+pub(crate) mod disk_model;
+#[cfg(test)]
+mod power_cut_tests;
+#[cfg(test)]
 mod tests;
 
 #[cfg(test)]
 pub(super) use tests::copy_files as copy_for_tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
-use super::log::{Item, LogReader, Pending, SpaceLog, Survey, create_mark};
+use super::log::{Item, LogReader, Pending, SpaceLog, Survey, create_mark, read_mark};
 use super::{
     Blocks, DamagedJournal, Extent, Journal, OpenJournal, SpaceNumber, StoreError, StoredSpace,
 };
@@ -80,11 +84,18 @@ pub struct LocalJournal {
     /// Held while directories are synced, so that none is moved away meanwhile.
     syncing: Mutex<()>,
     logs: Arc<Logs>,
-    /// Set by the first failed write.
-    broken: AtomicBool,
+    /// The first failed write of a journal.
+    failure: OnceLock<FirstFailure>,
     marks: Option<MarkSync>,
     /// Locked as long as it is open.
     _lock: File,
+}
+
+/// What all are told who want to write after it.
+#[derive(Debug)]
+struct FirstFailure {
+    disk_full: bool,
+    detail: String,
 }
 
 /// The journals that are open for writing.
@@ -146,8 +157,12 @@ impl LocalJournal {
     /// Runs a write of a journal, unless one has failed before. What a failed one has left on the
     /// disk is unknown, so it is the last one.
     fn write(&self, write: impl FnOnce() -> io::Result<()>) -> Result<(), StoreError> {
-        self.change(&self.directory, write)
-            .inspect_err(|_| self.broken.store(true, Ordering::Release))
+        self.change(&self.directory, write).inspect_err(|error| {
+            self.failure.get_or_init(|| FirstFailure {
+                disk_full: matches!(error, StoreError::DiskFull),
+                detail: error.to_string(),
+            });
+        })
     }
 
     /// Runs a change beside the journals that are being written, unless a write has failed before.
@@ -162,10 +177,11 @@ impl LocalJournal {
     }
 
     fn refuse_if_broken(&self) -> Result<(), StoreError> {
-        if self.broken.load(Ordering::Acquire) {
-            return Err(StoreError::Broken);
+        match self.failure.get() {
+            None => Ok(()),
+            Some(failure) if failure.disk_full => Err(StoreError::DiskFull),
+            Some(failure) => Err(StoreError::Broken(failure.detail.clone())),
         }
-        Ok(())
     }
 
     fn space_directory(&self, space: SpaceNumber) -> PathBuf {
@@ -233,6 +249,14 @@ impl Journal for LocalJournal {
         for number in numbers(&parent).map_err(|error| files::fault(&error, &parent))? {
             spaces.push(stored_space(&parent, SpaceNumber(number))?);
         }
+        // The placeholder of a lost name must not be another space's name.
+        let known = spaces.iter().filter(|space| space.settings.is_some());
+        let known: BTreeSet<_> = known.map(|space| space.name.clone()).collect();
+        for lost in spaces.iter_mut().filter(|space| space.settings.is_none()) {
+            while known.contains(&lost.name) {
+                lost.name.push_str("-lost");
+            }
+        }
         Ok(spaces)
     }
 
@@ -265,8 +289,9 @@ impl Journal for LocalJournal {
         let doomed = parent.join(space.0.to_string());
         self.change(&directory, || {
             let _not_syncing = self.syncing.lock().unwrap_or_else(PoisonError::into_inner);
-            let mut logs = self.logs.write().unwrap_or_else(PoisonError::into_inner);
-            logs.remove(&space);
+            // Held for a moment only, for the writers of all spaces pass here.
+            let logs = self.logs.write();
+            logs.unwrap_or_else(PoisonError::into_inner).remove(&space);
             files::create_directory(&parent)?;
             files::remove_tree(&doomed)?;
             // One step decides: before it the space is whole, after it the space is gone, and what
@@ -336,11 +361,16 @@ impl Journal for LocalJournal {
             .log(space)
             .map_or(u64::MAX, |log| log.appended().blocks);
         let directory = self.space_directory(space);
-        match LogReader::open(&directory, space, from) {
-            Ok(reader) => Box::new(Reading {
+        // The mark first: what it says is in the journal by then.
+        let opened = read_mark(&directory, space)
+            .and_then(|mark| Ok((mark, LogReader::open(&directory, space, from)?)));
+        match opened {
+            Ok((mark, reader)) => Box::new(Reading {
                 journal: self,
                 space,
                 reader: Some(reader),
+                next: from,
+                acknowledged: mark.unwrap_or_default().blocks.min(end),
                 end,
             }),
             Err(error) => Box::new(std::iter::once(Err(files::fault(&error, &directory)))),
@@ -359,12 +389,18 @@ fn sync_all(pending: &[(Arc<SpaceLog>, Pending)]) -> io::Result<()> {
     std::thread::scope(|scope| {
         let some = pending.chunks(pending.len().div_ceil(SYNCS_AT_ONCE));
         let threads: Vec<_> = some
-            .map(|some| scope.spawn(move || sync_some(some)))
+            .map(|some| {
+                let thread = Builder::new().name("sync".into());
+                // Where the system has no thread to spare, one after the other.
+                let spawned = thread.spawn_scoped(scope, move || sync_some(some));
+                spawned.map_err(|_| sync_some(some))
+            })
             .collect();
         let interrupted = |_| Err(io::Error::other("a sync ended with a panic"));
-        let results = threads
-            .into_iter()
-            .map(|thread| thread.join().unwrap_or_else(interrupted));
+        let results = threads.into_iter().map(|thread| match thread {
+            Ok(thread) => thread.join().unwrap_or_else(interrupted),
+            Err(synced) => synced,
+        });
         // All have ended before the first error is told.
         results.collect::<Vec<_>>().into_iter().collect()
     })
@@ -376,6 +412,10 @@ struct Reading<'a> {
     space: SpaceNumber,
     /// None after the end or an error.
     reader: Option<LogReader>,
+    /// Number of the next block.
+    next: u64,
+    /// Blocks that were acknowledged when the reading began.
+    acknowledged: u64,
     /// Number of the block that was next when the reading began.
     end: u64,
 }
@@ -389,9 +429,11 @@ impl Iterator for Reading<'_> {
             Ok(Some(Item::Block(header))) if header.block < self.end => {
                 let payload = reader.payload().to_vec();
                 self.reader = Some(reader);
+                self.next = header.block + 1;
                 Some(Ok((header.block, payload)))
             }
             Ok(Some(Item::Damage(damage))) if damage.block < self.end => self.damaged().map(Err),
+            Ok(None) if self.next < self.acknowledged => self.damaged().map(Err),
             Ok(_) => None,
             Err(error) => Some(Err(files::fault(&error, &self.journal.directory))),
         }

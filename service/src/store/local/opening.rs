@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex, RwLock};
+use std::sync::{Arc, Mutex, OnceLock, RwLock};
 
 use super::super::{SpaceNumber, StoreError};
 use super::record::{self, Found, SpaceRecord};
@@ -78,7 +77,7 @@ fn open_in(directory: &Path) -> Result<LocalJournal, StoreError> {
         syncing: Mutex::new(()),
         marks: Some(MarkSync::start(Arc::clone(&logs)).map_err(on_disk)?),
         logs,
-        broken: AtomicBool::new(false),
+        failure: OnceLock::new(),
         _lock: lock,
     })
 }

@@ -11,7 +11,6 @@
 //!
 //! All numbers are little-endian. A damaged copy is made anew from the other one.
 
-use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -66,12 +65,13 @@ pub(in crate::store) fn read(directory: &Path, name: &str) -> Result<Found, Stor
     let mut found = Found::Nothing;
     for name in [name.to_owned(), format!("{name}{COPY}")] {
         let path = directory.join(name);
-        match fs::read(&path) {
+        match files::read(&path) {
             Ok(bytes) => match decode(&bytes) {
                 Some(contents) => return Ok(Found::Contents(contents)),
                 None => found = Found::Damaged,
             },
             Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) if files::is_unreadable(&error) => found = Found::Damaged,
             Err(error) => return Err(files::fault(&error, &path)),
         }
     }
@@ -81,7 +81,7 @@ pub(in crate::store) fn read(directory: &Path, name: &str) -> Result<Found, Stor
 /// Makes a damaged or missing copy anew; says whether there was one.
 pub(in crate::store) fn heal(directory: &Path, name: &str) -> Result<bool, StoreError> {
     let copies = [name.to_owned(), format!("{name}{COPY}")].map(|name| {
-        let bytes = fs::read(directory.join(name)).ok();
+        let bytes = files::read(&directory.join(name)).ok();
         bytes.and_then(|bytes| decode(&bytes))
     });
     match copies {
@@ -165,7 +165,29 @@ fn decode(bytes: &[u8]) -> Option<Vec<u8>> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
+    use super::super::disk_model::DiskModel;
     use super::*;
+
+    #[test]
+    fn a_copy_that_the_disk_does_not_read_is_made_anew_from_the_other_one() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path();
+        for unreadable in ["space", "space.copy"] {
+            write(path, SPACE, b"contents").unwrap();
+            let model = DiskModel::of(path);
+            model.make_unreadable(&path.join(unreadable), 0..1);
+            let whole = Found::Contents(b"contents".to_vec());
+            assert_eq!(read(path, SPACE).unwrap(), whole, "{unreadable}");
+            assert!(heal(path, SPACE).unwrap());
+            assert!(!heal(path, SPACE).unwrap());
+            for name in ["space", "space.copy"] {
+                model.make_unreadable(&path.join(name), 0..1);
+            }
+            assert_eq!(read(path, SPACE).unwrap(), Found::Damaged);
+        }
+    }
 
     #[test]
     fn one_damaged_copy_is_healed_and_two_are_told() {

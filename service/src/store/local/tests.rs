@@ -260,25 +260,35 @@ fn a_creation_cut_short_is_begun_again() {
 
 #[test]
 fn after_a_failed_write_the_journal_reads_and_no_longer_writes() {
-    let directory = directory();
-    let store = LocalStore::open(directory.path()).unwrap();
-    let space = store.create_space("hall", b"").unwrap();
-    fill(&store, space, 1);
-    let full = || Err(io::ErrorKind::StorageFull.into());
-    let failed = store.journals().write(full);
-    assert!(matches!(failed, Err(StoreError::DiskFull)));
-    let refused = [
-        store.append(space, 1, 1, b"block"),
-        store.sync(),
-        store.delete_space(space),
-        store.create_space("new", b"").map(drop),
-    ];
-    for refusal in refused {
-        assert!(matches!(refusal, Err(StoreError::Broken)), "{refusal:?}");
+    let failures = [io::ErrorKind::StorageFull, io::ErrorKind::PermissionDenied];
+    for failure in failures {
+        let directory = directory();
+        let store = LocalStore::open(directory.path()).unwrap();
+        let space = store.create_space("hall", b"").unwrap();
+        fill(&store, space, 1);
+        let failed = store.journals().write(|| Err(failure.into()));
+        let said = failed.unwrap_err().to_string();
+        let refused = [
+            store.append(space, 1, 1, b"block"),
+            store.sync(),
+            store.delete_space(space),
+            store.create_space("new", b"").map(drop),
+        ];
+        for refusal in refused {
+            // Whoever comes later is told the first reason, whoever has met it.
+            let refusal = refusal.unwrap_err();
+            let is_full = matches!(refusal, StoreError::DiskFull);
+            assert_eq!(
+                is_full,
+                failure == io::ErrorKind::StorageFull,
+                "{refusal:?}"
+            );
+            assert!(refusal.to_string().contains(&said), "{refusal}");
+        }
+        assert_eq!(blocks(&store, space, 0).len(), 1);
+        drop(store);
+        let store = LocalStore::open(directory.path()).unwrap();
+        fill(&store, space, 1);
+        assert_eq!(blocks(&store, space, 0).len(), 2);
     }
-    assert_eq!(blocks(&store, space, 0).len(), 1);
-    drop(store);
-    let store = LocalStore::open(directory.path()).unwrap();
-    fill(&store, space, 1);
-    assert_eq!(blocks(&store, space, 0).len(), 2);
 }

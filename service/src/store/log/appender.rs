@@ -1,16 +1,16 @@
 //! The end of a journal, where blocks are appended.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, IoSlice, Write};
+use std::io::{self, IoSlice};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::super::SpaceNumber;
 use super::super::local::files;
-use super::frame::{HEADER_BYTES, Header, payload_check};
+use super::frame::{Header, payload_check};
 use super::mark::{Extent, Mark};
-use super::segment::file_name;
+use super::segment::{file_name, first_block};
 use super::survey::Survey;
 
 /// Length at which a segment is closed and the next one begun \[bytes\]. A damage of the file
@@ -57,11 +57,13 @@ impl SpaceLog {
         cut(directory, survey)?;
         let mut segment = None;
         if let Some((name, length)) = &survey.last {
-            let file = File::options().append(true).open(directory.join(name))?;
             // What survived the process is the truth from here on, and has to survive a power cut
-            // too.
-            file.sync_all()?;
+            // too. What was acknowledged does.
+            for name in unsynced(directory, survey.acknowledged)? {
+                files::sync_all(&File::open(directory.join(name))?)?;
+            }
             files::sync_directory(directory)?;
+            let file = files::open_to_append(&directory.join(name))?;
             segment = Some((Arc::new(file), *length));
         }
         let mut mark = Mark::open(directory, space)?;
@@ -113,7 +115,7 @@ impl SpaceLog {
         let has_room = |(_, length): &(Arc<File>, u64)| length + frame_bytes <= SEGMENT_BYTES;
         if !end.segment.as_ref().is_some_and(has_room) {
             let path = self.directory.join(file_name(block));
-            match File::options().append(true).create(true).open(path) {
+            match files::open_to_append(&path) {
                 Ok(file) => (end.segment, end.grown) = (Some((Arc::new(file), 0)), true),
                 // A segment that grows longer is better than none, where descriptors have run out.
                 Err(_) if end.segment.is_some() => {}
@@ -129,7 +131,8 @@ impl SpaceLog {
         else {
             return Err(io::Error::other("the journal has no segment"));
         };
-        write_all(file, &header.encode(self.space), bytes)?;
+        let head = header.encode(self.space);
+        files::write_all(file, &mut [IoSlice::new(&head), IoSlice::new(bytes)])?;
         *length += frame_bytes;
         appended.blocks += 1;
         appended.samples = header.total;
@@ -155,7 +158,7 @@ impl SpaceLog {
     /// Makes durable what is pending, and then says so in the mark.
     pub(in crate::store) fn sync(&self, pending: &Pending) -> io::Result<()> {
         for file in &pending.files {
-            file.sync_data()?;
+            files::sync_data(file)?;
         }
         if pending.grown {
             files::sync_directory(&self.directory)?;
@@ -173,7 +176,7 @@ impl SpaceLog {
         }
         // Not under the lock: the committer must not wait for this sync.
         let file = self.mark().file()?;
-        file.sync_data()
+        files::sync_data(&file)
     }
 
     fn end(&self) -> MutexGuard<'_, End> {
@@ -185,6 +188,17 @@ impl SpaceLog {
     }
 }
 
+/// Names of the segments that may hold blocks which no sync has covered: of those behind
+/// `acknowledged`.
+fn unsynced(directory: &Path, acknowledged: Extent) -> io::Result<Vec<String>> {
+    let names = files::names(directory)?.into_iter();
+    let segments = names.filter_map(|name| Some((first_block(&name)?, name)));
+    let mut segments: Vec<_> = segments.collect();
+    let later = segments.partition_point(|(first, _)| *first <= acknowledged.blocks);
+    segments.drain(..later.saturating_sub(1));
+    Ok(segments.into_iter().map(|(_, name)| name).collect())
+}
+
 /// Cuts off what stands after the last whole block: a torn tail, and a segment that was begun and
 /// never written to, which would hide later blocks of the one before it.
 fn cut(directory: &Path, survey: &Survey) -> io::Result<()> {
@@ -193,7 +207,7 @@ fn cut(directory: &Path, survey: &Survey) -> io::Result<()> {
         None => (None, 0),
     };
     for name in files::names(directory)? {
-        if super::segment::first_block(&name).is_some() && last.is_none_or(|last| &*name > last) {
+        if first_block(&name).is_some() && last.is_none_or(|last| &*name > last) {
             files::remove(&directory.join(name))?;
         }
     }
@@ -201,23 +215,8 @@ fn cut(directory: &Path, survey: &Survey) -> io::Result<()> {
         let file = File::options().write(true).open(directory.join(name))?;
         if file.metadata()?.len() > length {
             file.set_len(length)?;
-            file.sync_all()?;
+            files::sync_all(&file)?;
         }
     }
     files::sync_directory(directory)
-}
-
-/// Writes a header and a block: in one call, unless the system takes less at once.
-fn write_all(mut file: &File, header: &[u8; HEADER_BYTES], bytes: &[u8]) -> io::Result<()> {
-    let mut slices = [IoSlice::new(header), IoSlice::new(bytes)];
-    let mut rest = &mut slices[..];
-    while !rest.is_empty() {
-        match file.write_vectored(rest) {
-            Ok(0) => return Err(ErrorKind::WriteZero.into()),
-            Ok(written) => IoSlice::advance_slices(&mut rest, written),
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(())
 }

@@ -2,14 +2,16 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind};
-use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 use super::super::SpaceNumber;
+use super::super::local::files;
 use super::frame::{HEADER_BYTES, Header, MAGIC};
 
 /// Bytes that are read from the disk at once.
 const WINDOW_BYTES: usize = 1 << 20;
+/// Bytes that a disk reads whole or not at all.
+const SECTOR_BYTES: u64 = 4096;
 
 /// Ending of a segment's name.
 const ENDING: &str = ".log";
@@ -70,6 +72,7 @@ impl SegmentReader {
             length,
             start: 0,
             bytes: Vec::new(),
+            careful_to: 0,
         };
         Ok(Self {
             space,
@@ -101,7 +104,7 @@ impl SegmentReader {
         }
         let begin = self.at;
         let header = match self.window.get(begin, HEADER_BYTES as u64) {
-            Err(_) => return Some(self.give_up(Flaw::Unreadable)),
+            Err(_) => return Some(self.search(begin + 1, Flaw::Unreadable)),
             Ok(None) => return Some(self.give_up(Flaw::CutShort)),
             Ok(Some(bytes)) => Header::decode(bytes, self.space),
         };
@@ -109,7 +112,10 @@ impl SegmentReader {
             return Some(self.search(begin + 1, Flaw::Header));
         };
         match self.window.get(begin, header.frame_bytes()) {
-            Err(_) => Some(self.give_up(Flaw::Unreadable)),
+            Err(_) => {
+                self.at += header.frame_bytes();
+                Some(Piece::Flawed(Flaw::Unreadable))
+            }
             // Later blocks may have been written over its end.
             Ok(None) => Some(self.search(begin + 1, Flaw::CutShort)),
             Ok(Some(frame)) => {
@@ -126,13 +132,27 @@ impl SegmentReader {
 
     /// Looks for the next valid header from `from` on, and stands there or at the end of the file.
     fn search(&mut self, mut from: u64, flaw: Flaw) -> Piece {
+        const WHOLE: u64 = WINDOW_BYTES as u64;
+        let mut step = WHOLE;
         loop {
             let left = self.window.length.saturating_sub(from);
             if left < HEADER_BYTES as u64 {
                 return self.give_up(flaw);
             }
-            let Ok(Some(bytes)) = self.window.get(from, left.min(WINDOW_BYTES as u64)) else {
-                return self.give_up(Flaw::Unreadable);
+            let bytes = match self.window.get(from, left.min(step)) {
+                Ok(Some(bytes)) => bytes,
+                Ok(None) => return self.give_up(flaw),
+                Err(_) => {
+                    // Sector by sector, and past the one that is not read.
+                    let next = (from / SECTOR_BYTES + 1) * SECTOR_BYTES;
+                    let to_next = (next - from).max(HEADER_BYTES as u64);
+                    (from, step) = if step > to_next {
+                        (from, to_next)
+                    } else {
+                        (next, WHOLE)
+                    };
+                    continue;
+                }
             };
             let found = (0..=bytes.len() - HEADER_BYTES).find(|&i| {
                 bytes[i..].starts_with(&MAGIC) && Header::decode(&bytes[i..], self.space).is_some()
@@ -142,6 +162,7 @@ impl SegmentReader {
                 return Piece::Flawed(flaw);
             }
             from += (bytes.len() - HEADER_BYTES + 1) as u64;
+            step = step.max(SECTOR_BYTES);
         }
     }
 
@@ -159,6 +180,8 @@ struct Window {
     length: u64,
     start: u64,
     bytes: Vec<u8>,
+    /// Up to here nothing is read ahead, for something there is not read.
+    careful_to: u64,
 }
 
 impl Window {
@@ -169,11 +192,18 @@ impl Window {
         };
         let held = self.start + self.bytes.len() as u64;
         if at < self.start || end > held {
-            let wanted = count.max(WINDOW_BYTES as u64).min(self.length - at);
-            let wanted = usize::try_from(wanted).map_err(io::Error::other)?;
-            self.start = at;
-            self.bytes.resize(wanted, 0);
-            if let Err(error) = self.file.read_exact_at(&mut self.bytes, at) {
+            let ahead = if at < self.careful_to {
+                SECTOR_BYTES
+            } else {
+                WINDOW_BYTES as u64
+            };
+            let wanted = count.max(ahead).min(self.length - at);
+            let mut read = self.read(at, wanted);
+            if read.is_err() && wanted > count {
+                self.careful_to = self.careful_to.max(at + wanted);
+                read = self.read(at, count);
+            }
+            if let Err(error) = read {
                 self.bytes.clear();
                 return match error.kind() {
                     // Cut while it was read.
@@ -185,5 +215,12 @@ impl Window {
         let begin = usize::try_from(at - self.start).map_err(io::Error::other)?;
         let count = usize::try_from(count).map_err(io::Error::other)?;
         Ok(Some(&self.bytes[begin..begin + count]))
+    }
+
+    fn read(&mut self, at: u64, count: u64) -> io::Result<()> {
+        let count = usize::try_from(count).map_err(io::Error::other)?;
+        self.start = at;
+        self.bytes.resize(count, 0);
+        files::read_exact_at(&self.file, &mut self.bytes, at)
     }
 }

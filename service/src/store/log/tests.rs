@@ -7,6 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::store::SpaceNumber;
+use crate::store::disk_model::DiskModel;
 
 const SPACE: SpaceNumber = SpaceNumber(5);
 
@@ -277,6 +278,35 @@ fn a_zero_page_costs_the_blocks_that_it_covers() {
         samples,
     };
     assert_eq!((survey.lost, survey.acknowledged.blocks), (lost, 400));
+}
+
+/// What lies in a bad sector is lost, and nothing before or behind it.
+#[test]
+fn a_sector_that_the_disk_does_not_read_costs_the_blocks_that_lie_in_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path();
+    journal(path, 400);
+    let length = fs::metadata(segment(path)).unwrap().len();
+    let mut ends = Vec::new();
+    for number in 0..400 {
+        let end: u64 = ends.last().copied().unwrap_or(0);
+        ends.push(end + 64 + block(number).len() as u64);
+    }
+    for sector in [0, 1, 9, length / 4096 - 1, length / 4096] {
+        let model = DiskModel::of(path);
+        let bad = 4096 * sector..4096 * (sector + 1);
+        model.make_unreadable(&segment(path), bad.clone());
+        let (blocks, damages) = read(path);
+        let first = ends.partition_point(|end| *end <= bad.start) as u64;
+        let last = ends.partition_point(|end| *end < bad.end) as u64;
+        let expected: Vec<_> = (0..first).chain(last + 1..400).collect();
+        assert_eq!(blocks, expected, "sector {sector}");
+        assert_eq!(damages.len(), 1, "{damages:?}");
+        assert_eq!(
+            (damages[0].block, damages[0].flaw),
+            (first, Flaw::Unreadable)
+        );
+    }
 }
 
 proptest! {

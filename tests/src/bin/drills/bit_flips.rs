@@ -82,6 +82,13 @@ pub(crate) fn drill() -> Value {
                 assert_eq!(*before, after, "{}, bit {bit}", damaged.display());
             }
         }
+        // A checkpoint that is whole must not hide a journal that is not.
+        let is_journal = damaged.extension().is_some_and(|ending| ending == "log");
+        assert!(
+            !(is_journal && damaged.starts_with("spaces")) || ready.get("stopped").is_some(),
+            "{}, bit {bit}: nobody has noticed",
+            damaged.display()
+        );
         unnoticed += usize::from(ready.get("stopped").is_none());
         eprintln!("flip {flip}: bit {bit} of {}", damaged.display());
         victim.terminate();

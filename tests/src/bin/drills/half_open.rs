@@ -32,6 +32,11 @@ pub(crate) fn run() -> Value {
         thread::sleep(PAUSE);
     }
     let opened = attack.stop();
+    let closed = |reason| {
+        let labels = [("reason", reason)];
+        { server.metrics() }.sum("cogmap_http_closed_connections_total", &labels)
+    };
+    let (for_room, for_head) = (closed("room"), closed("head"));
     let (p50, longest) = (quantile(&mut times, 0.5), quantile(&mut times, 1.0));
     eprintln!("{opened} connections; health: {p50:?}, at most {longest:?}");
     assert!(opened >= CONNECTIONS, "only {opened} connections were made");
@@ -39,6 +44,8 @@ pub(crate) fn run() -> Value {
     server.terminate();
     json!({
         "connections": opened,
+        "closed_for_room": for_room,
+        "closed_for_head": for_head,
         "health_p50_s": p50.as_secs_f64(),
         "health_max_s": longest.as_secs_f64(),
     })

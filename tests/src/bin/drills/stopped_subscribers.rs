@@ -69,6 +69,8 @@ pub(crate) fn run() -> Value {
         let agent = server.api().agent("default", &format!("robot-{number}"));
         let durable = agent.expect("the agent is known").watermark.durable;
         assert_eq!(durable, of_robot, "robot {number} has lost samples");
+        let heard = watermarks.of(&format!("robot-{number}"));
+        assert!(!heard.is_empty(), "robot {number} was never heard of");
         sent += of_robot;
     }
     let before = watermarks.longest_gap(begun, stopped);

@@ -45,9 +45,17 @@ impl Fold<'_> {
 
     /// Ends the episode under way, if any.
     pub(super) fn end_episode(&mut self) {
-        if let Some(mut episode) = self.agent.episode.take() {
-            let news = episode.end(self.objects, (self.now, self.revision));
-            self.tell(news, episode.count());
+        let Some(mut episode) = self.agent.episode.take() else {
+            return;
+        };
+        let (news, said) = episode.end(self.objects, (self.now, self.revision));
+        self.tell(news, episode.count());
+        if episode.count() > 0 {
+            self.emit(EventKind::EpisodeEnded {
+                session: self.agent.session(),
+                teaches: episode.teaches(),
+                posterior: said.map(Box::new),
+            });
         }
     }
 

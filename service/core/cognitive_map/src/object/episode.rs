@@ -168,16 +168,17 @@ impl Episode {
         self.take(contact, memory)
     }
 
-    /// The episode ends.
+    /// The episode ends. Answers what it brought about, and what its contacts said before anything was
+    /// learned from it, if that was asked.
     pub(crate) fn end(
         &mut self,
         memory: &mut ObjectMemory,
         (now, revision): (Clock, u64),
-    ) -> Vec<News> {
+    ) -> (Vec<News>, Option<Posterior>) {
         if self.count == 0 {
-            return Vec::new();
+            return (Vec::new(), None);
         }
-        let mut news = self.reflect(memory, (now, revision));
+        let (mut news, mut said) = self.reflect(memory, (now, revision));
         let learned = match &self.purpose {
             Purpose::Learn(Some(name)) => match memory.by_name(name) {
                 None => self.name_or_find(name, memory, (now, revision)),
@@ -186,9 +187,9 @@ impl Episode {
                     .map(|pose| self.extend(id, &pose, memory, (now, revision))),
             },
             Purpose::Learn(None) => {
-                let posterior = self.posterior(memory);
-                match (posterior.verdict(), posterior.pose) {
-                    (Verdict::Object(id), Some(pose)) => (pose.object == id && is_clear(&pose))
+                let posterior = said.insert(self.posterior(memory));
+                match (posterior.verdict(), &posterior.pose) {
+                    (Verdict::Object(id), Some(pose)) => (pose.object == id && is_clear(pose))
                         .then(|| self.extend(id, &pose.map_from_episode, memory, (now, revision))),
                     (Verdict::Unknown, _) => self.found(None, memory, (now, revision)),
                     _ if memory.library().is_empty() => self.found(None, memory, (now, revision)),
@@ -209,11 +210,16 @@ impl Episode {
             None if self.teaches() => news.push(News::NotLearned),
             None => {}
         }
-        news
+        (news, said)
     }
 
-    /// What all contacts say of the objects that are known by now, in their own light.
-    fn reflect(&mut self, memory: &mut ObjectMemory, when: (Clock, u64)) -> Vec<News> {
+    /// What all contacts say of the objects that are known by now, in their own light; and what an
+    /// episode that is to recognise says after that.
+    fn reflect(
+        &mut self,
+        memory: &mut ObjectMemory,
+        when: (Clock, u64),
+    ) -> (Vec<News>, Option<Posterior>) {
         let mut news = Vec::new();
         // Each turn makes one object of two, or two of one that was in doubt.
         for _ in 0..REFLECTIONS_MAX {
@@ -227,11 +233,12 @@ impl Episode {
             };
             news.push(News::Insight(insight));
         }
-        if matches!(self.purpose, Purpose::Identify) {
-            let posterior = self.posterior(memory);
-            news.extend(self.heed(&posterior));
+        if !matches!(self.purpose, Purpose::Identify) {
+            return (news, None);
         }
-        news
+        let posterior = self.posterior(memory);
+        news.extend(self.heed(&posterior));
+        (news, Some(posterior))
     }
 
     /// What all contacts say now.

@@ -159,7 +159,12 @@ impl Robot {
         // Grid cells are entered all the time; the tests on events are about memory.
         let kinds = events.into_iter().map(|event| event.kind);
         kinds
-            .filter(|kind| !matches!(kind, EventKind::CellEntered { .. }))
+            .filter(|kind| {
+                !matches!(
+                    kind,
+                    EventKind::CellEntered { .. } | EventKind::EpisodeEnded { .. }
+                )
+            })
             .collect()
     }
 

@@ -1,8 +1,8 @@
 //! Objects: taught, known again, learned on the spot, forgotten.
 
 use cognitive_map::{
-    CognitiveMap, EventKind, Lesson, Motion, ObjectMark, PoseNoise, Record, SampleBody, Settings,
-    Spacing, Touch, TouchLevel, TouchNoise,
+    CognitiveMap, Event, EventKind, Lesson, Motion, ObjectMark, PoseNoise, Record, Sample,
+    SampleBody, Settings, SkipReason, Spacing, Touch, TouchLevel, TouchNoise,
 };
 use object_recognition::{Orientation, Verdict};
 
@@ -424,4 +424,56 @@ fn an_episode_goes_on_where_a_checkpoint_was_taken() {
     assert_eq!(on, again);
     assert_eq!(recognised(&on).last(), Some(&"spoon"));
     assert_eq!(restored.digest(), map.digest());
+}
+
+#[test]
+fn the_end_of_an_episode_tells_what_was_recognised() {
+    let (mut map, mut hand) = taught();
+    hand.sample(&mut map, identify());
+    feel(&mut map, &mut hand, &RODS[1].1, &UP);
+    let (_, said) = map.episode(hand.id).unwrap();
+    let knife = map.object_by_name(&label("knife")).unwrap();
+    assert_eq!(said.posterior.verdict(), Verdict::Object(knife));
+    let mut restored = CognitiveMap::restore(Settings::default(), map.checkpoint(0)).unwrap();
+    let end = Record::Sample {
+        agent: hand.id,
+        session: hand.session,
+        seq: hand.seq,
+        sample: Sample {
+            stamp_ns: hand.stamp_ns,
+            body: SampleBody::SessionEnd,
+        },
+    };
+    for map in [&mut map, &mut restored] {
+        let events = run(map, std::slice::from_ref(&end));
+        let ended: Vec<_> = { events.iter() }
+            .filter(|event| matches!(event.kind, EventKind::EpisodeEnded { .. }))
+            .collect();
+        let [event] = &ended[..] else {
+            panic!("{events:?}");
+        };
+        assert_eq!(event.stamp_ns, hand.stamp_ns);
+        let told = EventKind::EpisodeEnded {
+            session: hand.session,
+            teaches: false,
+            posterior: Some(Box::new(said.posterior.clone())),
+        };
+        assert_eq!(event.kind, told);
+        assert!(map.episode(hand.id).is_none());
+    }
+    assert_eq!(map.digest(), restored.digest());
+    // Nothing more is to be told, and an episode in which nothing was felt tells nothing.
+    hand.seq += 1;
+    let again = hand.sample(&mut map, identify());
+    assert_eq!(again, []);
+    let end = Record::Skip {
+        agent: hand.id,
+        session: hand.session,
+        from: hand.seq,
+        to: hand.seq + 1,
+        reason: SkipReason::Lost,
+    };
+    let events = run(&mut map, &[end]);
+    let ends = |event: &Event| matches!(event.kind, EventKind::EpisodeEnded { .. });
+    assert!(!events.iter().any(ends), "{events:?}");
 }
