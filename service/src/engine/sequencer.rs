@@ -54,7 +54,7 @@ pub(crate) trait Weight {
 /// How much may wait, or does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Window {
-    /// Samples, and how far ahead of the next one they may be.
+    /// Samples.
     pub(crate) samples: usize,
     /// Memory \[bytes\].
     pub(crate) bytes: usize,
@@ -183,19 +183,21 @@ impl<T: Weight> Sequencer<T> {
     }
 
     /// Offers consecutive samples from `first` on; passes those that are in order now to `accept`.
+    /// Those beyond a gap wait if they are less than `reach` ahead and there is `room`.
     ///
     /// They must not be [out of reach](Self::is_out_of_reach).
     pub(crate) fn offer(
         &mut self,
         first: u64,
         items: impl IntoIterator<Item = T>,
-        window: Window,
+        room: Window,
+        reach: u64,
         now: Instant,
         mut accept: impl FnMut(u64, T),
     ) -> Offered {
         let mut offered = Offered::default();
         let before = self.next;
-        let is_leap = first.saturating_sub(self.next) >= window.samples as u64;
+        let is_leap = first.saturating_sub(self.next) >= reach;
         for (seq, item) in (first..).zip(items) {
             let bytes = item.bytes();
             if seq < self.next || self.waiting.contains_key(&seq) {
@@ -204,9 +206,9 @@ impl<T: Weight> Sequencer<T> {
                 self.next += 1;
                 accept(seq, item);
                 self.release(&mut accept);
-            } else if self.waiting.len() < window.samples
-                && seq - self.next < window.samples as u64
-                && self.waiting_bytes + bytes <= window.bytes
+            } else if self.waiting.len() < room.samples
+                && seq - self.next < reach
+                && self.waiting_bytes + bytes <= room.bytes
             {
                 self.waiting.insert(seq, item);
                 self.waiting_bytes += bytes;
@@ -219,7 +221,6 @@ impl<T: Weight> Sequencer<T> {
             }
         }
         if is_leap && offered.beyond_window > 0 {
-            let reach = window.samples as u64;
             self.note_leap(first, first + offered.beyond_window, reach, now);
         }
         self.note_gap(before, now);

@@ -7,6 +7,7 @@ const WINDOW: Window = Window {
     samples: 32,
     bytes: 32 * 8,
 };
+const REACH: u64 = 32;
 
 impl Weight for u64 {
     fn bytes(&self) -> usize {
@@ -19,6 +20,7 @@ fn offer(sequencer: &mut Sequencer<u64>, first: u64, count: u64, got: &mut Vec<u
         first,
         first..first + count,
         WINDOW,
+        REACH,
         Instant::now(),
         |seq, item| {
             assert_eq!(seq, item, "each sample keeps its number");
@@ -48,7 +50,7 @@ fn a_gap_is_given_up_only_after_its_time_without_progress() {
     let start = Instant::now();
     let timeout = Duration::from_secs(10);
     let at = |s: u64| start + Duration::from_secs(s);
-    sequencer.offer(2, [2_u64], WINDOW, at(0), |_, item| got.push(item));
+    sequencer.offer(2, [2_u64], WINDOW, REACH, at(0), |_, item| got.push(item));
     let mut lost = None;
     sequencer.give_up(
         timeout,
@@ -58,7 +60,7 @@ fn a_gap_is_given_up_only_after_its_time_without_progress() {
     );
     assert_eq!((lost, got.len()), (None, 0));
     // One missing sample comes: the wait begins anew.
-    sequencer.offer(0, [0], WINDOW, at(9), |_, item| got.push(item));
+    sequencer.offer(0, [0], WINDOW, REACH, at(9), |_, item| got.push(item));
     sequencer.give_up(
         timeout,
         at(18),
@@ -99,10 +101,32 @@ fn what_waits_is_bounded_in_bytes() {
         bytes: 20,
         ..WINDOW
     };
-    let offered = sequencer.offer(1, [1, 2, 3], window, Instant::now(), |_, item| {
+    let offered = sequencer.offer(1, [1, 2, 3], window, REACH, Instant::now(), |_, item| {
         got.push(item);
     });
     assert_eq!((offered.reordered, offered.beyond_window), (2, 1));
+}
+
+#[test]
+fn what_others_leave_no_room_for_is_missing() {
+    let (mut sequencer, mut got) = (Sequencer::new(7, 0), Vec::new());
+    let offered = sequencer.offer(
+        10,
+        10..15,
+        Window::NONE,
+        REACH,
+        Instant::now(),
+        |_, item| {
+            got.push(item);
+        },
+    );
+    assert_eq!(offered.beyond_window, 5);
+    assert_eq!(sequencer.gap(), Some(SeqRange { from: 0, to: 15 }));
+    // Those before come: the others were there, and are asked for again.
+    offer(&mut sequencer, 0, 10, &mut got);
+    assert_eq!(sequencer.gap(), Some(SeqRange { from: 10, to: 15 }));
+    offer(&mut sequencer, 10, 5, &mut got);
+    assert_eq!((got, sequencer.gap()), ((0..15).collect(), None));
 }
 
 #[test]
@@ -111,8 +135,10 @@ fn a_gap_wider_than_the_window_is_given_up_too() {
     let timeout = Duration::from_secs(10);
     let start = Instant::now();
     let at = |s| start + Duration::from_secs(s);
-    sequencer.offer(1000, [1000_u64], WINDOW, at(0), |_, item| got.push(item));
-    sequencer.offer(1001, [1001], WINDOW, at(5), |_, item| got.push(item));
+    sequencer.offer(1000, [1000_u64], WINDOW, REACH, at(0), |_, item| {
+        got.push(item)
+    });
+    sequencer.offer(1001, [1001], WINDOW, REACH, at(5), |_, item| got.push(item));
     assert!(!sequencer.is_next(0), "a gap is open");
     assert_eq!(sequencer.waiting(), Window::NONE);
     assert_eq!(sequencer.gap(), Some(SeqRange { from: 0, to: 1002 }));
@@ -134,7 +160,9 @@ fn a_leap_that_nothing_follows_loses_nothing() {
     let at = |s| start + Duration::from_secs(s);
     // Somebody made a number up, twice within the wait, and the robot rests meanwhile.
     for s in [0, 4] {
-        sequencer.offer(1 << 20, [1 << 20], WINDOW, at(s), |_, item| got.push(item));
+        sequencer.offer(1 << 20, [1 << 20], WINDOW, REACH, at(s), |_, item| {
+            got.push(item)
+        });
     }
     let mut lost = None;
     for s in [10, 13, 15, 90] {
@@ -154,9 +182,11 @@ fn a_leap_does_not_lose_the_samples_of_a_robot_that_goes_on() {
     let mut lost = None;
     for s in 0..60 {
         let now = start + Duration::from_secs(s);
-        sequencer.offer(s, [s], WINDOW, now, |_, item| got.push(item));
+        sequencer.offer(s, [s], WINDOW, REACH, now, |_, item| got.push(item));
         let forged = (1 << 20) + s;
-        sequencer.offer(forged, [forged], WINDOW, now, |_, item| got.push(item));
+        sequencer.offer(forged, [forged], WINDOW, REACH, now, |_, item| {
+            got.push(item)
+        });
         sequencer.give_up(timeout, now, |range| lost = Some(range), |_, _| {});
     }
     assert_eq!((got, lost), ((0..60).collect(), None));

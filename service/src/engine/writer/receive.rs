@@ -139,13 +139,15 @@ impl Writer {
         let sequencer = &mut self.agents[slot].sequencer;
         let before = sequencer.waiting();
         // What others leave, and what is its own already.
-        let mut window = WAITING_MAX.beside(self.waiting);
-        window.recount(Window::NONE, before);
-        window.samples = window.samples.min(self.shared.reorder_window);
+        let mut room = WAITING_MAX.beside(self.waiting);
+        room.recount(Window::NONE, before);
+        let reach = self.shared.reorder_window;
+        room.samples = room.samples.min(reach);
         let offered = sequencer.offer(
             batch.first_seq,
             batch.samples,
-            window,
+            room,
+            reach as u64,
             now,
             |seq, sample| {
                 accepted.push((seq, sample));
