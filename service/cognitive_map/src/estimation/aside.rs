@@ -94,8 +94,8 @@ impl Estimator {
         self.seat(agent).is_some_and(|seat| seat.is_aside)
     }
 
-    /// Whether an agent's sightings contradict the estimate, or did before it was set aside and have
-    /// not fitted since it is back.
+    /// Whether an agent's sightings contradict the estimate, or did before it was set aside and
+    /// have not fitted since it is back.
     pub fn is_doubted(&self, agent: u32) -> bool {
         self.traveller(agent).is_some_and(Traveller::is_doubted)
     }

@@ -54,8 +54,8 @@ impl Frame {
         self.lay(newer, tie, Some(parameters));
     }
 
-    /// The same for a newer frame whose agents are doubted: landmarks known in both stay as they are
-    /// here.
+    /// The same for a newer frame whose agents are doubted: landmarks known in both stay as they
+    /// are here.
     pub(super) fn take_in_doubted(&mut self, newer: Self, tie: &Tie) {
         self.lay(newer, tie, None);
     }
