@@ -12,8 +12,9 @@ const PIVOT_MIN: f64 = 1e-14;
 const GROWTH_MIN: f64 = 1e-12;
 
 /// A covariance of one or two vectors of three components, symmetric, as a positive semidefinite
-/// one: unchanged where it is one already; elsewhere all its variances are enlarged, each by the
-/// same part of itself, by as little as is needed.
+/// one: unchanged where it has a Cholesky factor. Elsewhere variances that rounding has lost become
+/// what it may have left, covariances are held to what the variances allow, and all variances are
+/// enlarged, each by the same part of itself, by at most ten times as much as is needed.
 ///
 /// What is known without error, a row of zeros, stays so. Of a matrix with an entry that is not
 /// finite nothing is changed.
@@ -24,10 +25,11 @@ pub fn positive<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, 
     let mut positive = *matrix;
     for block in (0..N).step_by(3) {
         let axes = block..(block + 3).min(N);
-        let trace: f64 = axes.clone().map(|k| matrix[(k, k)].max(0.0)).sum();
+        let part = axes.clone().map(|k| AXIS_MIN * matrix[(k, k)].max(0.0));
+        let least: f64 = part.sum();
         for k in axes {
             if matrix.row(k).iter().any(|&entry| entry != 0.0) {
-                positive[(k, k)] = matrix[(k, k)].max(AXIS_MIN * trace);
+                positive[(k, k)] = matrix[(k, k)].max(least);
             }
             if positive[(k, k)] <= 0.0 {
                 positive.row_mut(k).fill(0.0);
@@ -90,7 +92,8 @@ fn has_root<const N: usize>(covariance: &SMatrix<f64, N, N>, growth: f64) -> boo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix3, Matrix6, Vector3};
+    use nalgebra::{DimName, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+    use proptest::prelude::*;
 
     #[test]
     fn a_covariance_stays_as_it_is() {
@@ -112,5 +115,110 @@ mod tests {
         assert!((mended - matrix).fixed_view::<2, 2>(0, 0).amax() < 1e-9);
         let absurd = Matrix6::from_fn(|row, column| if row == column { 1.0 } else { -3.0 });
         assert!(positive(&absurd).symmetric_eigenvalues().min() >= 0.0);
+    }
+
+    /// Numbers of either sign and of any size that the estimate meets, and zero.
+    fn number() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            1 => Just(0.0),
+            6 => (-12.0..12.0_f64, -1.0..1.0_f64).prop_map(|(order, unit)| {
+                unit.signum() * 10_f64.powf(order)
+            }),
+            3 => -1.0..1.0_f64,
+        ]
+    }
+
+    fn symmetric<const N: usize>(entries: &[f64]) -> SMatrix<f64, N, N> {
+        SMatrix::from_fn(|row, column| entries[row.max(column) * N + row.min(column)])
+    }
+
+    /// What holds of whatever is repaired.
+    fn is_sound<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Result<(), TestCaseError>
+    where
+        nalgebra::Const<N>: DimName,
+    {
+        let mended = positive(matrix);
+        prop_assert!(mended.iter().all(|entry| entry.is_finite()), "{mended}");
+        prop_assert_eq!(mended, mended.transpose());
+        prop_assert!(mended.diagonal().iter().all(|&variance| variance >= 0.0));
+        prop_assert!(has_root(&mended, 1e-13), "{mended}");
+        for k in 0..N {
+            let is_zero = matrix.row(k).iter().all(|&entry| entry == 0.0);
+            prop_assert!(!is_zero || mended.row(k).iter().all(|&entry| entry == 0.0));
+            // Variances grow by what is needed at most, and covariances do not grow.
+            prop_assert!(mended[(k, k)] >= matrix[(k, k)]);
+            for other in (0..N).filter(|&other| other != k) {
+                prop_assert!(mended[(k, other)].abs() <= matrix[(k, other)].abs());
+            }
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn any_symmetric_matrix_becomes_a_covariance(
+            entries in prop::collection::vec(number(), 36),
+            zeros in prop::array::uniform6(prop::bool::weighted(0.1)),
+        ) {
+            let mut six = symmetric::<6>(&entries);
+            for k in (0..6).filter(|&k| zeros[k]) {
+                six.row_mut(k).fill(0.0);
+                six.column_mut(k).fill(0.0);
+            }
+            is_sound(&six)?;
+            is_sound(&six.fixed_view::<3, 3>(0, 0).into_owned())?;
+            is_sound(&-six)?;
+            is_sound(&(six * 1e12))?;
+        }
+
+        /// A covariance turned in space is one, however large: the repair changes it by rounding.
+        #[test]
+        fn a_turned_covariance_is_changed_by_rounding(
+            factors in prop::collection::vec(-1.0..1.0_f64, 36),
+            orders in prop::array::uniform2(-6.0..6.0_f64),
+            axis in prop::array::uniform3(-3.2..3.2_f64),
+            rank in 1..7_usize,
+        ) {
+            let mut root = Matrix6::from_iterator(factors);
+            root.columns_mut(rank.min(6), 6 - rank.min(6)).fill(0.0);
+            let scale = Vector6::from_fn(|k, _| 10_f64.powf(orders[k / 3]));
+            let root = Matrix6::from_diagonal(&scale) * root;
+            let turn = UnitQuaternion::from_scaled_axis(axis.into()).to_rotation_matrix();
+            let mut both = Matrix6::zeros();
+            both.fixed_view_mut::<3, 3>(0, 0).copy_from(turn.matrix());
+            both.fixed_view_mut::<3, 3>(3, 3).copy_from(turn.matrix());
+            let turned = both * root * root.transpose() * both.transpose();
+            let turned = (turned + turned.transpose()) * 0.5;
+            is_sound(&turned)?;
+            let changed = positive(&turned) - turned;
+            for (row, column) in (0..6).flat_map(|row| (0..6).map(move |column| (row, column))) {
+                let block = |k: usize| {
+                    let first = 3 * (k / 3);
+                    turned.fixed_view::<3, 3>(first, first).trace().sqrt()
+                };
+                let most = 1e-9 * block(row) * block(column);
+                prop_assert!(changed[(row, column)].abs() <= most, "{changed} of {turned}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_near_the_end_of_all_numbers_stay_finite() {
+        for size in [1e300, 1e-300] {
+            let own = Matrix6::from_fn(|row, column| if row == column { size } else { -size });
+            let mended = positive(&own);
+            assert!(mended.iter().all(|entry| entry.is_finite()), "{mended}");
+        }
+        let large = Matrix3::from_diagonal_element(0.5 * f64::MAX);
+        assert_eq!(
+            positive(&large),
+            large,
+            "also where the sum of variances is no number"
+        );
+        let not = Matrix3::from_element(f64::NAN);
+        assert!(
+            positive(&not).iter().all(|entry| entry.is_nan()),
+            "left as it is"
+        );
     }
 }

@@ -90,7 +90,9 @@ impl Fold<'_> {
 
     /// Whether an agent in the map is known so little that it may be anywhere.
     fn is_lost(&self, covariance: &PoseCovariance) -> bool {
-        Status::of(self.agent, covariance.position_sd_m(), self.settings) == Status::Lost
+        let is_doubted = self.estimator.is_doubted(self.agent_id.0);
+        let sd_m = covariance.position_sd_m();
+        Status::of(self.agent, sd_m, is_doubted, self.settings) == Status::Lost
     }
 
     /// What the agent sees contradicts where it is believed to be: it may be anywhere from now on.

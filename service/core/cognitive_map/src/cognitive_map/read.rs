@@ -98,6 +98,7 @@ impl CognitiveMap {
         Some(Status::of(
             self.agent(agent)?,
             position_sd_m,
+            self.estimator.is_doubted(agent.0),
             &self.settings,
         ))
     }

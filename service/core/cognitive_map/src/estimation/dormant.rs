@@ -70,6 +70,23 @@ impl DormantMarks {
         is_next
     }
 
+    /// Forgets that an agent was the one that had seen landmarks. Walks them all.
+    pub(super) fn forget_observer(&mut self, agent: u32) {
+        let is_its = |mark: &Dormant| mark.only == Some(agent);
+        for number in 0..self.parts.len() {
+            let part = self.parts.get(number);
+            if !part.is_some_and(|part| part.values().any(is_its)) {
+                continue;
+            }
+            if let Some(part) = self.parts.get_mut(number, 0) {
+                let marks = Arc::make_mut(part).values_mut();
+                marks
+                    .filter(|mark| is_its(mark))
+                    .for_each(|mark| mark.only = None);
+            }
+        }
+    }
+
     /// A landmark that sleeps here.
     pub(super) fn get(&self, label: &Label) -> Option<&Dormant> {
         self.parts.get(part_of(label))?.get(label)

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector6};
 
 use super::alias::Aliases;
-use super::aside::DOUBTED;
 use super::frame::{Frame, MEMBERS_MAX, Mark};
 use super::meeting::{Meeting, Pending};
 use super::mover::Mover;
@@ -152,17 +151,14 @@ impl Estimator {
 
     /// Puts an agent somewhere in the map, by itself.
     pub(super) fn put(&mut self, agent: u32, pose: &Isometry3<f64>, covariance: &Matrix6<f64>) {
+        let doubt = self.doubt_of_return(agent);
         let Some((from, traveller)) = self.leave(agent) else {
             return;
         };
         self.depart(from);
         self.frame_mut(MAP).population += 1;
-        let is_aside = self.is_aside(agent);
         let Traveller {
-            mover,
-            mut sensor,
-            doubt,
-            ..
+            mover, mut sensor, ..
         } = Arc::unwrap_or_clone(traveller);
         // Numbers of landmarks change.
         sensor.latest.clear();
@@ -171,11 +167,7 @@ impl Estimator {
             sensor,
             refused: 0,
             // Who was doubted stays so until what it sees fits.
-            doubt: if is_aside {
-                DOUBTED
-            } else {
-                doubt.min(DOUBTED)
-            },
+            doubt,
         };
         let seat = self.seat_mut(agent);
         seat.frame = MAP;
@@ -401,6 +393,17 @@ impl Estimator {
         }
         let frame = self.frame(seat.frame);
         Some(&frame.members[frame.member(agent)?].traveller)
+    }
+
+    /// The same, to be changed.
+    pub(super) fn traveller_mut(&mut self, agent: u32) -> Option<&mut Traveller> {
+        let seat = self.seats.get_mut(agent as usize, 0)?;
+        if let Some(apart) = &mut seat.apart {
+            return Some(Arc::make_mut(&mut apart.traveller));
+        }
+        let frame = self.frames.get_mut(seat.frame, 0)?;
+        let index = frame.member(agent)?;
+        Some(frame.members[index].traveller_mut())
     }
 
     /// The body of an agent.

@@ -188,6 +188,7 @@ impl Frame {
         for mark in Arc::make_mut(&mut self.marks).values_mut() {
             mark.observers.forget(agent);
         }
+        self.dormant.forget_observer(agent);
     }
 
     /// Brings all cross terms up to date.

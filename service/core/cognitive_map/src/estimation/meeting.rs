@@ -219,7 +219,8 @@ impl Estimator {
     /// into the map's, with all that is in it; one that was in the map is put there.
     pub fn recognised(&mut self, agent: u32, pose: &Isometry3<f64>, covariance: &PoseCovariance) {
         self.begin();
-        let (Some(own), Some(in_frame)) = (self.frame_of(agent), self.in_frame(agent)) else {
+        let (Some(own), Some(in_frame)) = (self.frame_of(agent), self.in_frame(agent).copied())
+        else {
             return;
         };
         let covariance = positive(covariance.matrix());
@@ -227,13 +228,13 @@ impl Estimator {
         if !is_known || !is_somewhere(&pose.translation.vector) {
             return;
         }
+        self.seat_mut(agent).is_aside = false;
         if own == MAP {
             self.put(agent, pose, &covariance);
-            self.seat_mut(agent).is_aside = false;
             return;
         }
         // The error ξ of the body is Ad(T_b) ξ of the frame.
-        let adjoint = se3::adjoint(in_frame);
+        let adjoint = se3::adjoint(&in_frame);
         let tie = Tie {
             pose: pose * in_frame.inverse(),
             covariance: positive(&(adjoint * covariance * adjoint.transpose())),
@@ -264,8 +265,13 @@ impl Estimator {
     pub(super) fn merge(&mut self, older: usize, newer: usize, tie: &Tie) {
         let moved = std::mem::take(self.frame_mut(newer));
         let parameters = self.parameters.clone();
-        self.frame_mut(older).merge(moved, tie, &parameters);
         let agents = self.move_seats(newer, older);
+        let is_trusted = |&agent: &u32| older != MAP || !self.was_contradicted(agent);
+        if agents.iter().any(is_trusted) {
+            self.frame_mut(older).merge(moved, tie, &parameters);
+        } else {
+            self.frame_mut(older).take_in_doubted(moved, tie);
+        }
         for &agent in &agents {
             if let Some(apart) = &mut self.seat_mut(agent).apart {
                 let mover = &mut Arc::make_mut(&mut apart.traveller).mover;
@@ -274,10 +280,15 @@ impl Estimator {
                 apart.was_joint = true;
             }
         }
-        for &agent in &agents {
-            if older == MAP {
-                // What it has seen lies as the map has it.
-                self.seat_mut(agent).is_aside = false;
+        if older == MAP {
+            for &agent in &agents {
+                let doubt = self.doubt_of_return(agent);
+                if let Some(traveller) = self.traveller_mut(agent) {
+                    traveller.doubt = doubt;
+                }
+                // What one has seen that was nowhere lies as the map has it.
+                let is_doubted = self.was_contradicted(agent);
+                self.seat_mut(agent).is_aside &= is_doubted;
             }
         }
         let is_nowhere = |&agent: &u32| self.mover(agent).is_some_and(Mover::is_nowhere);

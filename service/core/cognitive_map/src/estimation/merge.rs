@@ -50,7 +50,19 @@ impl Frame {
     /// With the newer frame's pose T in this one, whose error is τ, a body's error gains `Ad(T_b⁻¹) τ` and
     /// a landmark's error δ becomes R (δ + ρ − l × φ). The landmarks known in both then say how T really
     /// lies, so that its covariance need only be wide.
-    pub(super) fn merge(&mut self, mut newer: Self, tie: &Tie, parameters: &Parameters) {
+    pub(super) fn merge(&mut self, newer: Self, tie: &Tie, parameters: &Parameters) {
+        self.lay(newer, tie, Some(parameters));
+    }
+
+    /// The same for a newer frame whose agents are doubted: landmarks known in both stay as they
+    /// are here.
+    pub(super) fn take_in_doubted(&mut self, newer: Self, tie: &Tie) {
+        self.lay(newer, tie, None);
+    }
+
+    /// Lays a newer frame into this one, and equates the landmarks known in both if there are
+    /// parameters for that.
+    fn lay(&mut self, mut newer: Self, tie: &Tie, parameters: Option<&Parameters>) {
         self.flush();
         newer.flush();
         let start = self.covariance.grow(newer.covariance.dim());
@@ -96,8 +108,10 @@ impl Frame {
             let own = self.covariance.block(member.offset, member.offset);
             *member.traveller_mut().mover.covariance_mut() = own;
         }
-        for index in 0..twins.len() {
-            self.equate(&mut twins, index, parameters);
+        if let Some(parameters) = parameters {
+            for index in 0..twins.len() {
+                self.equate(&mut twins, index, parameters);
+            }
         }
         // From the end, so that the offsets of the others stay as they are.
         twins.sort_by_key(|(_, twin)| std::cmp::Reverse(twin.offset));

@@ -106,11 +106,13 @@ impl Frame {
         let is_doubted = self.members[glance.observer].traveller.is_doubted();
         if let Some(mark) = Arc::make_mut(&mut self.marks).get_mut(label) {
             mark.used = sightings;
-            if weighed.verdict == Verdict::Refused {
-                mark.refused += u32::from(!is_doubted);
-            } else {
-                mark.refused = 0;
+            // Who is doubted speaks neither against a landmark nor for it.
+            if weighed.verdict != Verdict::Refused {
                 mark.observers.note(agent);
+            }
+            if !is_doubted {
+                let is_refused = weighed.verdict == Verdict::Refused;
+                mark.refused = if is_refused { mark.refused + 1 } else { 0 };
             }
             // Of an agent that contradicts everything, the landmark is not to blame.
             if mark.refused >= REFUSED_TO_FORGET && observer_refused < REFUSED_TO_WIDEN / 2 {
@@ -160,6 +162,13 @@ impl Frame {
     /// A landmark that is not among those estimated jointly.
     fn learn(&mut self, glance: &Glance<'_>, label: &Label) -> Weighed {
         self.make_room();
+        if self.members[glance.observer].traveller.is_doubted()
+            && let Some(dormant) = self.dormant.remove(label)
+        {
+            // It corrects itself by it, as by one that is awake.
+            self.wake(label, &dormant);
+            return self.see_mark(glance, label);
+        }
         let member = &self.members[glance.observer];
         let side = Side::new(member, glance.back);
         let (point, stated) = seen_at(glance.relation);
@@ -199,6 +208,27 @@ impl Frame {
             Some(dormant) => self.recall(glance, offset, &dormant),
         };
         Weighed { verdict, variance }
+    }
+
+    /// A landmark wakes up as it was, and correlated with nothing.
+    fn wake(&mut self, label: &Label, dormant: &Dormant) {
+        let offset = self.covariance.grow(MARK_DIM);
+        self.covariance.set_diagonal(offset, &dormant.covariance);
+        let mut observers = Observers::default();
+        match dormant.only {
+            Some(agent) => observers.note(agent),
+            None => observers = Observers::unknown(),
+        }
+        let mark = Mark {
+            number: self.numbered,
+            position: dormant.position,
+            offset,
+            used: self.sightings,
+            refused: 0,
+            observers,
+        };
+        self.numbered += 1;
+        Arc::make_mut(&mut self.marks).insert(label.clone(), mark);
     }
 
     /// A landmark came back whose earlier estimate may be correlated with everything.
