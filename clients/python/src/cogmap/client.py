@@ -9,7 +9,7 @@ import urllib.error
 import urllib.parse
 import urllib.request
 from dataclasses import replace
-from typing import Any, Dict, Iterable, Iterator, List, Optional, Type, TypeVar, Union
+from typing import Any, Dict, Iterable, Iterator, List, Optional, Tuple, Type, TypeVar, Union, cast
 
 from .answer import (
     AgentDetail,
@@ -43,6 +43,7 @@ from .object import (
 )
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
 from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
+from .scalar import positive_seconds, text
 from .settings import SpaceSettings
 from .sse import server_sent_events
 from .trajectory import StampedPose, Trajectory
@@ -89,9 +90,9 @@ class Client:
         ca_file: Optional[str] = None,
     ) -> None:
         self._url = checked_url(url)
-        self._token = token
-        self._timeout_s = timeout_s
-        self._tls = None if ca_file is None else ssl.create_default_context(cafile=ca_file)
+        self._token = _checked_token(token)
+        self._timeout_s = positive_seconds("timeout_s", timeout_s)
+        self._tls = _tls(ca_file)
 
     def __repr__(self) -> str:
         return f"Client({self._url!r}{'' if self._token is None else ', token=...'})"
@@ -105,8 +106,9 @@ class Client:
     def create_space(self, space: str, **settings: Any) -> SpaceInfo:
         """Creates a space. Settings that are not given take the service's defaults; their values are
         plain data or messages (`recruitment=Bernoulli(0.05)`)."""
-        body = {name: to_wire(value) for name, value in settings.items()}
-        return self._send(SpaceInfo, "PUT", _path(space), JSON, json.dumps(body).encode())
+        for name, value in settings.items():
+            _json(name, value)  # The setting that cannot be written is named.
+        return self._send(SpaceInfo, "PUT", _path(space), JSON, _json("settings", settings))
 
     def create_space_from(self, space: str, settings: SpaceSettings) -> SpaceInfo:
         """Creates a space with all settings given, for example those of another space."""
@@ -209,15 +211,15 @@ class Client:
         )
         body = {name: value for name, value in to_wire(query).items() if value is not None}
         path = _path(space, "recall")
-        return self._send(RecallAnswer, "POST", path, JSON, json.dumps(body).encode())
+        return self._send(RecallAnswer, "POST", path, JSON, _json("query", body))
 
     def localize(self, space: str, samples: Iterable[Sample]) -> Localization:
         """Where a sequence of samples of one robot was taken, 1 to 4096 of them. They need no agent and change
         nothing. Start poses and episodes with objects are refused; a service that is at several of these already
         asks to come back (503)."""
-        query = LocalizeQuery(tuple(samples))
+        query = LocalizeQuery(cast(Tuple[Sample, ...], samples))
         path = _path(space, "localize")
-        return self._send(Localization, "POST", path, JSON, json.dumps(to_wire(query)).encode())
+        return self._send(Localization, "POST", path, JSON, _json("query", query))
 
     def predict(
         self,
@@ -233,7 +235,7 @@ class Client:
         felt on that one."""
         query = PredictQuery(None, motion, vec3("offset_m", offset_m), channel)
         path = _path(space, "agents", agent, "predict")
-        return self._send(PredictAnswer, "POST", path, JSON, json.dumps(to_wire(query)).encode())
+        return self._send(PredictAnswer, "POST", path, JSON, _json("query", query))
 
     def places(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Place]:
         """All places of a space, by id. `filters` are passed on as query parameters."""
@@ -304,9 +306,9 @@ class Client:
     ) -> ObjectSummary:
         """Teaches an object at once, by contacts in its own frame, in place of what was known of it; returns
         when that is on the service's disk."""
-        lesson = ObjectLesson(spacing_m, noise, tuple(contacts))
+        lesson = ObjectLesson(spacing_m, noise, cast(Tuple[Contact, ...], contacts))
         path = _path(space, "objects", name)
-        return self._send(ObjectSummary, "PUT", path, JSON, json.dumps(to_wire(lesson)).encode())
+        return self._send(ObjectSummary, "PUT", path, JSON, _json("lesson", lesson))
 
     def forget_object(self, space: str, name: str) -> None:
         """Forgets an object."""
@@ -321,9 +323,9 @@ class Client:
         noise: TouchNoise = TouchNoise(),
     ) -> Identification:
         """Which object a sequence of contacts is of, in which pose, and where the next touch would tell most."""
-        query = IdentifyQuery(orientation, noise, tuple(contacts))
+        query = IdentifyQuery(orientation, noise, cast(Tuple[Contact, ...], contacts))
         path = _path(space, "objects", "identify")
-        return self._send(Identification, "POST", path, JSON, json.dumps(to_wire(query)).encode())
+        return self._send(Identification, "POST", path, JSON, _json("query", query))
 
     def agent_object(self, space: str, agent: str) -> AgentObject:
         """What an agent's episode with an object says so far."""
@@ -349,6 +351,8 @@ class Client:
         before all that the service keeps. `MissedEvents` stands where some were missed, because this
         program was too slow or came back too late. Otherwise as `events`.
         """
+        if timeout_s is not None:
+            timeout_s = positive_seconds("timeout_s", timeout_s)
         request = self._make_request("GET", _path(space, "events"), accept="text/event-stream")
         if after is not None:
             request.add_header("Last-Event-ID", after)
@@ -471,7 +475,47 @@ class Client:
 
 
 def _path(*segments: str) -> str:
+    for segment in segments:
+        # An empty one would lead to another route.
+        if not text("name", segment):
+            raise InvalidValue("name", segment, "expected a name")
     return "/v1/spaces" + "".join(f"/{urllib.parse.quote(segment, safe='')}" for segment in segments)
+
+
+def _json(name: str, value: Any) -> bytes:
+    """A message or plain data as JSON; numpy's numbers and arrays too."""
+    try:
+        data = {key: to_wire(part) for key, part in value.items()} if isinstance(value, dict) else to_wire(value)
+        return json.dumps(data, allow_nan=False, default=_plain).encode()
+    except (TypeError, ValueError) as error:
+        raise InvalidValue(name, value, f"expected what JSON can carry ({error})") from error
+
+
+def _plain(value: Any) -> Any:
+    if not hasattr(value, "tolist"):
+        raise TypeError(f"{type(value).__name__} is no number, text, list or dict")
+    return value.tolist()
+
+
+def _checked_token(token: Optional[str]) -> Optional[str]:
+    """A token without the line break that a file ends with. It is in no message."""
+    if token is None:
+        return None
+    stripped = token.strip() if isinstance(token, str) else None
+    if stripped is None or not all(" " < character <= "~" for character in stripped):
+        expected = "expected a text of printable ASCII without blanks"
+        raise InvalidValue("token", None, expected, "the one that was given")
+    return stripped
+
+
+def _tls(ca_file: Optional[str]) -> Optional[ssl.SSLContext]:
+    if ca_file is None:
+        return None
+    try:
+        return ssl.create_default_context(cafile=ca_file)
+    except (OSError, TypeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidValue("ca_file", ca_file, f"expected a file of certificates ({reason})") from error
 
 
 def _api_error(status: int, reason: str, body: bytes, where: str) -> ApiError:

@@ -13,6 +13,7 @@ import zenoh
 
 from .credentials import Credentials
 from .errors import CogmapError, InvalidValue, Timeout
+from .scalar import seconds
 
 _log = logging.getLogger("cogmap")
 
@@ -44,9 +45,8 @@ def open_session(
     when none answers in time or accepts the credentials, and `CogmapError` when the credentials' files
     cannot be used.
     """
-    endpoints = [connect] if isinstance(connect, str) else list(connect)
-    for endpoint in endpoints:
-        _check_endpoint(endpoint)
+    endpoints = endpoints_of(connect)
+    timeout_s = seconds("connect_timeout_s", timeout_s)
     try:
         config = (credentials or Credentials()).config()
     except zenoh.ZError as error:
@@ -70,6 +70,19 @@ def open_session(
         found = "; ".join(f"{endpoint} {_probe(endpoint)}" for endpoint in endpoints)
         raise Timeout(f"no Zenoh router answers within {timeout_s:g} s: {found}")
     return session
+
+
+def endpoints_of(connect: Union[str, Iterable[str]]) -> List[str]:
+    """One endpoint or several, each checked."""
+    if isinstance(connect, str):
+        endpoints = [connect]
+    else:
+        endpoints = list(connect) if isinstance(connect, Iterable) else []
+    if not endpoints:
+        raise InvalidValue("connect", connect, f"expected a Zenoh endpoint such as {DEFAULT_ENDPOINT}")
+    for endpoint in endpoints:
+        _check_endpoint(endpoint)
+    return endpoints
 
 
 def _opened(config: zenoh.Config) -> Optional[zenoh.Session]:

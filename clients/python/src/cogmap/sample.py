@@ -21,7 +21,7 @@ from .limits import (
     SPACING_M_MIN,
     TOUCH_SD_MAX,
 )
-from .scalar import COUNT_RANGE, STAMP_RANGE, counted, label, number, one_of, whole, within
+from .scalar import COUNT_RANGE, STAMP_RANGE, all_of, counted, label, number, one_of, whole, within
 from .vector import (
     IDENTITY,
     Quaternion,
@@ -448,7 +448,8 @@ class SampleBatch:
     def __post_init__(self) -> None:
         _set(self, "session", whole("session", self.session, COUNT_RANGE))
         _set(self, "first_seq", whole("first_seq", self.first_seq, COUNT_RANGE))
-        _set(self, "samples", counted("samples", tuple(self.samples), BATCH_SAMPLES_MAX))
+        samples = all_of("samples", self.samples, (Sample,))
+        _set(self, "samples", counted("samples", samples, BATCH_SAMPLES_MAX))
 
 
 def _check_noise(noise: Optional[MotionNoise]) -> None:

@@ -28,9 +28,11 @@ IDENTITY: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 def floats(name: str, values: Iterable[float], length: int) -> Tuple[float, ...]:
     """`values` as a tuple of `length` floats."""
+    if isinstance(values, (str, bytes)):
+        raise InvalidValue(name, values, f"expected {length} numbers")
     try:
         numbers = tuple(float(value) for value in values)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidValue(name, values, f"expected {length} numbers") from error
     if len(numbers) != length:
         raise InvalidValue(name, values, f"expected {length} numbers", f"{len(numbers)} of them")
