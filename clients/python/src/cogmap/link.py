@@ -13,6 +13,7 @@ import zenoh
 
 from .credentials import Credentials
 from .errors import CogmapError, InvalidValue, Timeout
+from .fork import zenoh_begins
 from .scalar import seconds
 
 _log = logging.getLogger("cogmap")
@@ -47,6 +48,7 @@ def open_session(
     """
     endpoints = endpoints_of(connect)
     timeout_s = seconds("connect_timeout_s", timeout_s)
+    zenoh_begins()
     try:
         config = (credentials or Credentials()).config()
     except zenoh.ZError as error:

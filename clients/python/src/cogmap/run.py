@@ -27,6 +27,7 @@ from .errors import (
     Unreachable,
     WindowFull,
 )
+from .fork import zenoh_begins
 from .inbox import Inbox
 from .listeners import Listeners, WeakListeners
 from .problem import Problem
@@ -81,6 +82,7 @@ class Run:
         ends_session: bool,
         listeners: Listeners,
     ) -> None:
+        zenoh_begins()
         self.space = space
         self.agent = agent
         self.session_id = session_id
@@ -92,6 +94,8 @@ class Run:
         self.watermark: Optional[Watermark] = None
         self.estimate: Optional[Estimate] = None
         self.closing = False
+        # Whether it is the copy of a run in a process that was forked off.
+        self._is_behind = False
         self.superseded_told = False
         self._superseded_by: Optional[int] = None
         self._problem: Optional[Problem] = None
@@ -255,6 +259,11 @@ class Run:
 
     def check_open(self) -> None:
         """Raises if no sample can be taken in."""
+        if self._is_behind:
+            raise Closed(
+                f"robot {self.agent} of space {self.space} is that of another process, which forked "
+                "this one off"
+            )
         if self.closing:
             raise Closed(f"robot {self.agent} of space {self.space} is closed")
         self.check_usable()
@@ -280,6 +289,13 @@ class Run:
         at = time.monotonic() + flush_s
         self._stop_at = at if self._stop_at is None else min(at, self._stop_at)
         self._wake.set()
+
+    def stay_behind(self) -> None:
+        """This process was forked off: the run goes on in the other one, and is closed here."""
+        # Another thread may have held the locks, and is not here to release them.
+        self.changed = threading.Condition()
+        self._publishing = threading.Lock()
+        self.closing = self._is_behind = True
 
     def join(self, timeout_s: float) -> bool:
         """Waits for the end of the thread; says whether it came."""
