@@ -42,6 +42,20 @@ class Credentials:
             expected = "expected client_certificate and client_key together"
             raise InvalidValue("credentials", self, expected)
 
+    def check_files(self) -> None:
+        """Raises `InvalidValue` for a file that cannot be read: Zenoh would try again with it until its
+        time is over, and not say why."""
+        for name in ("root_certificate", "client_certificate", "client_key", "config_file"):
+            file: Optional[_Path] = getattr(self, name)
+            if file is None:
+                continue
+            try:
+                with open(file, "rb"):
+                    pass
+            except OSError as error:
+                expected = f"expected a file that can be read ({error.strerror})"
+                raise InvalidValue(f"credentials.{name}", str(file), expected) from None
+
     def config(self) -> zenoh.Config:
         """The Zenoh configuration that they make."""
         if self.config_file is None:

@@ -49,8 +49,10 @@ def open_session(
     endpoints = endpoints_of(connect)
     timeout_s = seconds("connect_timeout_s", timeout_s)
     zenoh_begins()
+    credentials = credentials or Credentials()
+    credentials.check_files()
     try:
-        config = (credentials or Credentials()).config()
+        config = credentials.config()
     except zenoh.ZError as error:
         raise CogmapError(f"credentials: {reason(error)}") from None
     config.insert_json5("mode", json.dumps("client"))
@@ -127,6 +129,9 @@ def _probe(endpoint: str) -> str:
         socket.create_connection((host.strip("[]"), int(port)), _PROBE_S).close()
     except (OSError, ValueError, OverflowError) as error:
         return f"does not answer ({getattr(error, 'strerror', None) or error})"
-    return (
-        "is open, but no Zenoh router there lets a robot in (is it another port, such as HTTP's?)"
-    )
+    causes = ["the credentials are wrong", "it is another port, such as HTTP's"]
+    if protocol == "tls":
+        causes.insert(0, "no authority that is known here has signed the router's certificate")
+    else:
+        causes.insert(1, "the router wants tls/")
+    return f"is open, but no Zenoh router there lets a robot in: {', or '.join(causes)}"

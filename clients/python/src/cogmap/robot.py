@@ -209,7 +209,7 @@ class Robot(Sampler):
         if missing:
             raise Timeout(
                 f"{missing} samples of agent {self.agent} are not durable after {timeout_s:g} s"
-                f"{self._run.connection.silence()}"
+                f"{self._run.silence()}"
             )
 
     @property
@@ -296,7 +296,7 @@ class Robot(Sampler):
         if missing:
             raise Timeout(
                 f"closed with {missing} samples of agent {self.agent} that are not durable"
-                f"{run.connection.silence()}"
+                f"{run.silence()}"
             )
 
     def __enter__(self) -> Robot:

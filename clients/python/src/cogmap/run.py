@@ -152,6 +152,17 @@ class Run:
 
     # For the robot
 
+    def silence(self) -> str:
+        """Why nothing may come back, to be added to a message; empty if something has."""
+        silence = self.connection.silence()
+        if not silence and self.watermark is None and self.window.sent:
+            # Zenoh tells nobody what its rules drop.
+            return (
+                ", and the service has acknowledged none: the access rules of Zenoh may not let this "
+                "user publish under the agent's name, or hear of it"
+            )
+        return silence
+
     def append(
         self, body: SampleBody, stamp_ns: Optional[int], deadline: float, accepted: int
     ) -> int:
@@ -174,7 +185,7 @@ class Run:
                 self._wake.set()
                 remaining = deadline - time.monotonic()
                 if remaining <= 0:
-                    raise WindowFull(accepted, self.window.pending, self.connection.silence())
+                    raise WindowFull(accepted, self.window.pending, self.silence())
                 self.changed.wait(remaining)
             now = time.monotonic()
             starts_batch = self.window.sent == self.window.next_seq
@@ -232,7 +243,7 @@ class Run:
                 return self.estimate
             self.check_usable()
             what = "no estimate" if seq is None else f"no estimate of sample {seq}"
-            silence = self.connection.silence()
+            silence = self.silence()
             refused = None if seq is None else self.rejections.reason_of(seq)
             why = f": the sample was refused ({refused.value})" if refused is not None else silence
             raise Timeout(f"{what} of agent {self.agent} within {timeout_s:g} s{why}")
@@ -327,7 +338,7 @@ class Run:
             self._receive()
             self._tell_rejections(at_once=True)
             if self.window.pending and not self.closing:
-                missing, silence = self.window.pending, self.connection.silence()
+                missing, silence = self.window.pending, self.silence()
                 _log.warning(
                     "%s: %d samples are lost, not acknowledged%s", self.agent, missing, silence
                 )
