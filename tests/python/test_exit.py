@@ -220,7 +220,8 @@ def test_a_dropped_robot_ends_its_thread_after_it_has_flushed(service: Server) -
         check=True,
     )
     assert done.stdout == b"1\n"
-    assert service.client().agent("default", "ada").watermark.durable == SAMPLES + 1  # the session's end
+    # The last one is the session's end.
+    assert service.client().agent("default", "ada").watermark.durable == SAMPLES + 1
 
 
 def test_a_closed_robot_leaves_no_thread(service: Server) -> None:

@@ -148,7 +148,8 @@ def test_no_router_is_told_with_the_endpoint_and_without_sources() -> None:
 
 
 def test_a_port_of_another_protocol_is_told(serve: Callable[[Speak], int]) -> None:
-    assert "is open, but no Zenoh router there" in connected(serve(answers(b"HTTP/1.1 400 Bad Request\r\n\r\n")))
+    told = connected(serve(answers(b"HTTP/1.1 400 Bad Request\r\n\r\n")))
+    assert "is open, but no Zenoh router there" in told
 
 
 def test_a_closed_session_is_told_with_the_key() -> None:

@@ -64,15 +64,15 @@ _Query = Dict[str, Union[None, str, int, float]]
 class Client:
     """Asks a cogmap service over HTTP.
 
-    Holds no connection between calls, so it may be shared by threads. Lists that the service answers in
-    pages are iterated to the end, page by page as they are consumed.
+    Holds no connection between calls, so it may be shared by threads. Lists that the service
+    answers in pages are iterated to the end, page by page as they are consumed.
 
     Args:
         url: Address of the service, for example `http://127.0.0.1:8080`.
         token: Bearer token, if the service asks for one.
         timeout_s: Longest silence of a connection [s].
-        ca_file: File (PEM) with the authority that has signed the certificate of an `https://` service; the
-            system's authorities when absent.
+        ca_file: File (PEM) with the authority that has signed the certificate of an `https://`
+            service; the system's authorities when absent.
 
     Raises (all methods, each with the address in its message):
         InvalidValue: An argument makes no sense; nothing was asked.
@@ -104,8 +104,8 @@ class Client:
         return list(self._get(SpaceList, _path()).spaces)
 
     def create_space(self, space: str, **settings: Any) -> SpaceInfo:
-        """Creates a space. Settings that are not given take the service's defaults; their values are
-        plain data or messages (`recruitment=Bernoulli(0.05)`)."""
+        """Creates a space. Settings that are not given take the service's defaults; their values
+        are plain data or messages (`recruitment=Bernoulli(0.05)`)."""
         for name, value in settings.items():
             _json(name, value)  # The setting that cannot be written is named.
         return self._send(SpaceInfo, "PUT", _path(space), JSON, _json("settings", settings))
@@ -142,7 +142,8 @@ class Client:
         """Removes an agent; returns when that is on the service's disk.
 
         Its name is free, and what it did in the map stays: places, trips, landmarks and the causal
-        trajectories of its sessions. A robot that goes on sending under the name comes back as a new agent.
+        trajectories of its sessions. A robot that goes on sending under the name comes back as a
+        new agent.
         """
         self._request("DELETE", _path(space, "agents", agent))
 
@@ -161,8 +162,8 @@ class Client:
         """The poses of an agent within a span of stamps, all pages in one.
 
         Args:
-            kind: `causal`, each pose as it was known when its sample was applied, or `refined`, by all
-                that has been seen since.
+            kind: `causal`, each pose as it was known when its sample was applied, or `refined`, by
+                all that has been seen since.
         """
         path = _path(space, "agents", agent, "trajectory")
         poses: List[StampedPose] = []
@@ -194,9 +195,10 @@ class Client:
         limit: Optional[int] = None,
         percept: Optional[PerceptCue] = None,
     ) -> RecallAnswer:
-        """Places that answer a cue, best first: a position [m], a grid code (a phase per module, `None`
-        for an erased one), a percept (`Level` or `Descriptor`), or several of them. The other arguments filter: places within `radius_m` of the
-        position, founded by `agent`, visited from `since_ns` on, founded before `until_ns`."""
+        """Places that answer a cue, best first: a position [m], a grid code (a phase per module,
+        `None` for an erased one), a percept (`Level` or `Descriptor`), or several of them. The
+        other arguments filter: places within `radius_m` of the position, founded by `agent`,
+        visited from `since_ns` on, founded before `until_ns`."""
         query = RecallQuery(
             position_m=None if position_m is None else vec3("position_m", position_m),
             code=None
@@ -214,9 +216,9 @@ class Client:
         return self._send(RecallAnswer, "POST", path, JSON, _json("query", body))
 
     def localize(self, space: str, samples: Iterable[Sample]) -> Localization:
-        """Where a sequence of samples of one robot was taken, 1 to 4096 of them. They need no agent and change
-        nothing. Start poses and episodes with objects are refused; a service that is at several of these already
-        asks to come back (503)."""
+        """Where a sequence of samples of one robot was taken, 1 to 4096 of them. They need no agent
+        and change nothing. Start poses and episodes with objects are refused; a service that is at
+        several of these already asks to come back (503)."""
         query = LocalizeQuery(cast(Tuple[Sample, ...], samples))
         path = _path(space, "localize")
         return self._send(Localization, "POST", path, JSON, _json("query", query))
@@ -231,8 +233,8 @@ class Client:
         channel: Optional[str] = None,
     ) -> PredictAnswer:
         """What an agent would feel after a motion (`Increment` or `Velocity`) from where it is now.
-        Levels are those of a sensor at `offset_m` in the body frame [m]. With `channel` only what is
-        felt on that one."""
+        Levels are those of a sensor at `offset_m` in the body frame [m]. With `channel` only what
+        is felt on that one."""
         query = PredictQuery(None, motion, vec3("offset_m", offset_m), channel)
         path = _path(space, "agents", agent, "predict")
         return self._send(PredictAnswer, "POST", path, JSON, _json("query", query))
@@ -281,7 +283,9 @@ class Client:
 
     # Objects
 
-    def objects(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[ObjectSummary]:
+    def objects(
+        self, space: str, **filters: Union[None, str, int, float]
+    ) -> Iterator[ObjectSummary]:
         """All objects of a space, by name. `filters` are passed on as query parameters."""
         query: _Query = dict(filters)
         while True:
@@ -304,8 +308,8 @@ class Client:
         spacing_m: float = 0.004,
         noise: TouchNoise = TouchNoise(),
     ) -> ObjectSummary:
-        """Teaches an object at once, by contacts in its own frame, in place of what was known of it; returns
-        when that is on the service's disk."""
+        """Teaches an object at once, by contacts in its own frame, in place of what was known of
+        it; returns when that is on the service's disk."""
         lesson = ObjectLesson(spacing_m, noise, cast(Tuple[Contact, ...], contacts))
         path = _path(space, "objects", name)
         return self._send(ObjectSummary, "PUT", path, JSON, _json("lesson", lesson))
@@ -322,7 +326,8 @@ class Client:
         orientation: Orientation = NoTurn(),
         noise: TouchNoise = TouchNoise(),
     ) -> Identification:
-        """Which object a sequence of contacts is of, in which pose, and where the next touch would tell most."""
+        """Which object a sequence of contacts is of, in which pose, and where the next touch would
+        tell most."""
         query = IdentifyQuery(orientation, noise, cast(Tuple[Contact, ...], contacts))
         path = _path(space, "objects", "identify")
         return self._send(Identification, "POST", path, JSON, _json("query", query))
@@ -335,21 +340,22 @@ class Client:
 
     def events(self, space: str, timeout_s: Optional[float] = None) -> Iterator[Event]:
         """What happens in a space from now on. Ends when the service ends the stream; close the
-        generator to end it here. A silence longer than `timeout_s`, if given, raises `TimeoutError`.
-        Missed events are logged; `follow` hands them over.
+        generator to end it here. A silence longer than `timeout_s`, if given, raises
+        `TimeoutError`. Missed events are logged; `follow` hands them over.
         """
         for told in self.follow(space, timeout_s=timeout_s):
             if isinstance(told, MissedEvents):
-                _log.warning("events of %s were missed: %s", space, told.events or "unknown how many")
+                how_many = told.events or "unknown how many"
+                _log.warning("events of %s were missed: %s", space, how_many)
             else:
                 yield told.event
 
     def follow(
         self, space: str, *, after: Optional[str] = None, timeout_s: Optional[float] = None
     ) -> Iterator[Union[EventRecord, MissedEvents]]:
-        """The events of a space with their ids, from the one after `after` on, or from now on; `0-0` is
-        before all that the service keeps. `MissedEvents` stands where some were missed, because this
-        program was too slow or came back too late. Otherwise as `events`.
+        """The events of a space with their ids, from the one after `after` on, or from now on;
+        `0-0` is before all that the service keeps. `MissedEvents` stands where some were missed,
+        because this program was too slow or came back too late. Otherwise as `events`.
         """
         if timeout_s is not None:
             timeout_s = positive_seconds("timeout_s", timeout_s)
@@ -479,14 +485,17 @@ def _path(*segments: str) -> str:
         # An empty one would lead to another route.
         if not text("name", segment):
             raise InvalidValue("name", segment, "expected a name")
-    return "/v1/spaces" + "".join(f"/{urllib.parse.quote(segment, safe='')}" for segment in segments)
+    quoted = (urllib.parse.quote(segment, safe="") for segment in segments)
+    return "/".join(("/v1/spaces", *quoted))
 
 
 def _json(name: str, value: Any) -> bytes:
     """A message or plain data as JSON; numpy's numbers and arrays too."""
+    data = value
+    if isinstance(value, dict):
+        data = {key: to_wire(part) for key, part in value.items()}
     try:
-        data = {key: to_wire(part) for key, part in value.items()} if isinstance(value, dict) else to_wire(value)
-        return json.dumps(data, allow_nan=False, default=_plain).encode()
+        return json.dumps(to_wire(data), allow_nan=False, default=_plain).encode()
     except (TypeError, ValueError) as error:
         raise InvalidValue(name, value, f"expected what JSON can carry ({error})") from error
 
@@ -515,7 +524,8 @@ def _tls(ca_file: Optional[str]) -> Optional[ssl.SSLContext]:
         return ssl.create_default_context(cafile=ca_file)
     except (OSError, TypeError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InvalidValue("ca_file", ca_file, f"expected a file of certificates ({reason})") from error
+        expected = f"expected a file of certificates ({reason})"
+        raise InvalidValue("ca_file", ca_file, expected) from error
 
 
 def _api_error(status: int, reason: str, body: bytes, where: str) -> ApiError:

@@ -7,8 +7,8 @@ import os
 import time
 from typing import Protocol, Set, Tuple
 
-#: How long the samples of all robots are flushed at the end of the program [s], and how long they may
-#: take to leave Zenoh afterwards.
+#: How long the samples of all robots are flushed at the end of the program [s], and how long they
+#: may take to leave Zenoh afterwards.
 _FLUSH_S = 1.0
 _LEAVE_S = 0.5
 

@@ -7,8 +7,8 @@ from typing import Any, Dict, Mapping, Optional, Tuple, Type
 
 
 class CogmapError(Exception):
-    """Parent of every error of this package. Errors can be pickled, so that they come through from the
-    processes of a pool."""
+    """Parent of every error of this package. Errors can be pickled, so that they come through from
+    the processes of a pool."""
 
     def __reduce__(self) -> Tuple[Any, ...]:
         return _unpickled, (type(self), self.args, self.__dict__)
@@ -62,8 +62,8 @@ class WindowFull(CogmapError):
 
 
 class SessionSuperseded(CogmapError):
-    """Another run of the agent has taken over its name, or uses this run's session number; what this one
-    sends is ignored."""
+    """Another run of the agent has taken over its name, or uses this run's session number; what
+    this one sends is ignored."""
 
     def __init__(self, agent: str, own: int, other: int) -> None:
         super().__init__(

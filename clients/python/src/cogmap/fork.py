@@ -24,7 +24,7 @@ def zenoh_begins() -> None:
         _process = os.getpid()
     if _process != os.getpid():
         raise CogmapError(
-            "this process was forked off from one that uses Zenoh, whose threads are not here: open "
-            "robots in the child alone, or let multiprocessing start processes by "
+            "this process was forked off from one that uses Zenoh, whose threads are not here: "
+            "open robots in the child alone, or let multiprocessing start processes by "
             "get_context('spawn')"
         )

@@ -42,9 +42,9 @@ def open_session(
 ) -> zenoh.Session:
     """Opens a Zenoh session in client mode to one of the endpoints, without multicast.
 
-    Several robots of one process may share it. Raises `InvalidValue` for what is no endpoint, `Timeout`
-    when none answers in time or accepts the credentials, and `CogmapError` when the credentials' files
-    cannot be used.
+    Several robots of one process may share it. Raises `InvalidValue` for what is no endpoint,
+    `Timeout` when none answers in time or accepts the credentials, and `CogmapError` when the
+    credentials' files cannot be used.
     """
     endpoints = endpoints_of(connect)
     timeout_s = seconds("connect_timeout_s", timeout_s)
@@ -83,7 +83,8 @@ def endpoints_of(connect: Union[str, Iterable[str]]) -> List[str]:
     else:
         endpoints = list(connect) if isinstance(connect, Iterable) else []
     if not endpoints:
-        raise InvalidValue("connect", connect, f"expected a Zenoh endpoint such as {DEFAULT_ENDPOINT}")
+        expected = f"expected a Zenoh endpoint such as {DEFAULT_ENDPOINT}"
+        raise InvalidValue("connect", connect, expected)
     for endpoint in endpoints:
         _check_endpoint(endpoint)
     return endpoints

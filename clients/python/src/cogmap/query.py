@@ -28,8 +28,8 @@ class WatermarkQuery:
 
 @dataclass(frozen=True)
 class RecallQuery:
-    """Asks for places. `position_m`, `code` and `percept` are the cues that rank them, the other fields
-    filter; without a cue the latest places come first."""
+    """Asks for places. `position_m`, `code` and `percept` are the cues that rank them, the other
+    fields filter; without a cue the latest places come first."""
 
     #: Cue: a position in `map` [m].
     position_m: Optional[Vec3] = None

@@ -50,8 +50,8 @@ class Robot(Sampler):
         connect: Zenoh endpoint, or several of them to try; `tcp/127.0.0.1:7447` when absent.
         session: An open Zenoh session to use instead; it is left open by `close`.
         credentials: User, password and certificates for the router; none when absent.
-        session_id: Number of this run; it must be larger than those of earlier runs. The time of the
-            start [ns] when absent.
+        session_id: Number of this run; it must be larger than those of earlier runs. The time of
+            the start [ns] when absent.
         batch_samples: Most samples of one message, 1 to 4096.
         batch_delay_s: Longest time that a sample waits for others [s].
         window_samples: Most samples without acknowledgement.
@@ -60,13 +60,14 @@ class Robot(Sampler):
         send_timeout_s: How long a sample method waits for room before `WindowFull` [s].
         connect_timeout_s: How long to wait for the router [s].
         match_timeout_s: How long samples wait for the service before they are sent anyway [s].
-        ends_session: Whether the robot's end also ends the session, and the trip under way, by a last
-            sample. Without it they end when the agent's next session begins.
+        ends_session: Whether the robot's end also ends the session, and the trip under way, by a
+            last sample. Without it they end when the agent's next session begins.
 
     Raises:
         InvalidValue: A name or another argument makes no sense, or `connect` or `credentials` are
             given with `session`.
-        Timeout: No Zenoh router answers within `connect_timeout_s`, or none accepts the credentials.
+        Timeout: No Zenoh router answers within `connect_timeout_s`, or none accepts the
+            credentials.
         ApiError: The service has no such space.
         Unreachable: The given Zenoh session is closed.
     """
@@ -259,7 +260,8 @@ class Robot(Sampler):
         return self._run.wait_estimate(seq, timeout_s)
 
     def on_estimate(self, callback: Callable[[Estimate], object]) -> None:
-        """Calls `callback` with every estimate, on the robot's own thread; it should return soon."""
+        """Calls `callback` with every estimate, on the robot's own thread; it should return
+        soon."""
         self._listeners.estimates.append(callback)
 
     # Life
@@ -269,8 +271,8 @@ class Robot(Sampler):
         return self._run.wait_heard(seconds("timeout_s", timeout_s))
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """Ends the session and the trip under way, flushes for at most `timeout_s`, then closes, also
-        when that fails; a second call does nothing.
+        """Ends the session and the trip under way, flushes for at most `timeout_s`, then closes,
+        also when that fails; a second call does nothing.
 
         Raises `Timeout` when samples are left without acknowledgement: they are lost with this
         process unless they arrived all the same.

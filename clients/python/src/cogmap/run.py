@@ -158,8 +158,8 @@ class Run:
         if not silence and self.watermark is None and self.window.sent:
             # Zenoh tells nobody what its rules drop.
             return (
-                ", and the service has acknowledged none: the access rules of Zenoh may not let this "
-                "user publish under the agent's name, or hear of it"
+                ", and the service has acknowledged none: the access rules of Zenoh may not let "
+                "this user publish under the agent's name, or hear of it"
             )
         return silence
 
@@ -206,8 +206,8 @@ class Run:
 
     def end_session(self) -> None:
         """Appends the session's last sample, once, with the condition held: at the stamp of the one
-        before, because the robot's clock may be another than this machine's. A full window is left as
-        it is."""
+        before, because the robot's clock may be another than this machine's. A full window is left
+        as it is."""
         if not self._ends_session or self._is_refused() or not self.window.next_seq:
             return
         self._ends_session = False
@@ -272,8 +272,8 @@ class Run:
         """Raises if no sample can be taken in."""
         if self._is_behind:
             raise Closed(
-                f"robot {self.agent} of space {self.space} is that of another process, which forked "
-                "this one off"
+                f"robot {self.agent} of space {self.space} is that of another process, which "
+                "forked this one off"
             )
         if self.closing:
             raise Closed(f"robot {self.agent} of space {self.space} is closed")

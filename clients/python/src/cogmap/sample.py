@@ -348,8 +348,9 @@ class LearnObject:
     """What is felt from here on teaches an object."""
 
     TAG: ClassVar[str] = "learn"
-    #: Its name. One that is known is extended if the episode shows how its frame lies in the object's. Without
-    #: a name it is the object that is recognised, or a new one. Nothing can be called `identify`.
+    #: Its name. One that is known is extended if the episode shows how its frame lies in the
+    #: object's. Without a name it is the object that is recognised, or a new one. Nothing can be
+    #: called `identify`.
     name: Optional[str] = None
     #: Contacts within this distance [m] are of one place of a new object.
     spacing_m: float = 0.004

@@ -79,8 +79,8 @@ def _of_unit_norm(name: str, numbers: Tuple[float, ...], what: str) -> Tuple[flo
 
 
 def quaternion_from_yaw(yaw_rad: float) -> Quaternion:
-    """The unit quaternion `[x, y, z, w]` of a turn about the z axis, left positive [rad]: all that a
-    robot on a floor needs."""
+    """The unit quaternion `[x, y, z, w]` of a turn about the z axis, left positive [rad]: all that
+    a robot on a floor needs."""
     half = finite("yaw_rad", yaw_rad) / 2
     return (0.0, 0.0, math.sin(half), math.cos(half))
 
