@@ -1,5 +1,8 @@
 //! The service's HTTP interface.
 
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
@@ -13,6 +16,7 @@ use cogmap_proto::{
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};
+use ureq::tls::{PemItem, RootCerts, TlsConfig, parse_pem};
 use ureq::{Agent, Body};
 
 /// Longest wait for a whole answer; the service itself gives up earlier.
@@ -38,6 +42,14 @@ pub enum ApiError {
         status: u16,
         /// Start of the answer.
         body: String,
+    },
+    /// The file of the authority's certificate cannot be used.
+    #[error("certificates of {}: {source}", file.display())]
+    Authority {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        source: io::Error,
     },
     /// The request did not get through.
     #[error("{0}")]
@@ -69,12 +81,37 @@ pub struct Api {
 impl Api {
     /// A client of the service at `base`, for example `http://127.0.0.1:8080`; `token` is sent as
     /// the bearer token. Nothing is sent yet. A web proxy in the environment is not used, because
-    /// it would not know the robots' network.
+    /// it would not know the robots' network. An `https://` service is checked against Mozilla's
+    /// authorities; for others there is [`Api::trusting`].
     pub fn new(base: &str, token: Option<&str>) -> Self {
+        Self::with_tls(base, token, TlsConfig::default())
+    }
+
+    /// As [`Api::new`], for an `https://` service whose certificate an authority of your own has
+    /// signed: `ca_file` (PEM) has the authority's certificate, and no other is trusted.
+    ///
+    /// # Errors
+    /// The file cannot be read, or has no certificate.
+    pub fn trusting(
+        base: &str,
+        token: Option<&str>,
+        ca_file: impl AsRef<Path>,
+    ) -> Result<Self, ApiError> {
+        let file = ca_file.as_ref();
+        let roots = authorities(file).map_err(|source| ApiError::Authority {
+            file: file.to_owned(),
+            source,
+        })?;
+        let tls = TlsConfig::builder().root_certs(roots).build();
+        Ok(Self::with_tls(base, token, tls))
+    }
+
+    fn with_tls(base: &str, token: Option<&str>, tls: TlsConfig) -> Self {
         let config = Agent::config_builder()
             .http_status_as_error(false)
             .timeout_global(Some(TIMEOUT))
             .proxy(None)
+            .tls_config(tls)
             .build();
         Self {
             base: base.trim_end_matches('/').to_owned(),
@@ -410,6 +447,22 @@ impl Api {
         };
         Ok(response)
     }
+}
+
+/// The certificates of a file.
+fn authorities(file: &Path) -> io::Result<RootCerts> {
+    let text = fs::read(file)?;
+    let mut found = Vec::new();
+    for item in parse_pem(&text) {
+        let item = item.map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
+        if let PemItem::Certificate(certificate) = item {
+            found.push(certificate);
+        }
+    }
+    if found.is_empty() {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, "there is none"));
+    }
+    Ok(RootCerts::new_with_certs(&found))
 }
 
 /// Body of a request.
