@@ -12,7 +12,7 @@ from typing import Any, Callable, Dict, List
 import pytest
 
 import cogmap
-from cogmap.client import _json
+from cogmap.request import json_of
 from stand_in import StandIn
 
 #: An address at which nothing needs to answer.
@@ -115,7 +115,7 @@ def test_a_token_may_end_with_the_line_break_of_its_file(tmp_path: Path) -> None
 def test_numbers_of_numpy_are_numbers() -> None:
     numpy = pytest.importorskip("numpy")
     settings = {"seed": numpy.int64(7), "grid_spacing_m": numpy.float32(1.5), "x": numpy.ones(2)}
-    assert json.loads(_json("settings", settings)) == {
+    assert json.loads(json_of("settings", settings)) == {
         "seed": 7,
         "grid_spacing_m": 1.5,
         "x": [1.0, 1.0],

@@ -1,23 +1,27 @@
 //! The service's HTTP interface.
 
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+mod authorities;
+mod error;
+
+use std::path::Path;
 use std::time::Duration;
 
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
     AgentDetail, AgentObject, AgentPage, AgentSummary, Codec, GridState, Identification,
     IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization, LocalizeQuery, Name,
-    NameError, ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage,
-    PredictAnswer, PredictQuery, Problem, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo,
-    SpaceList, SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
+    ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage, PredictAnswer,
+    PredictQuery, Problem, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo, SpaceList,
+    SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};
-use ureq::tls::{PemItem, RootCerts, TlsConfig, parse_pem};
+use ureq::tls::TlsConfig;
 use ureq::{Agent, Body};
+
+use authorities::authorities;
+pub use error::ApiError;
 
 /// Longest wait for a whole answer; the service itself gives up earlier.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -25,50 +29,6 @@ const TIMEOUT: Duration = Duration::from_secs(30);
 const ANSWER_BYTES_MAX: u64 = 64 << 20;
 /// Longest text kept of an answer that is no problem document \[bytes\].
 const EXCERPT_BYTES_MAX: usize = 400;
-
-/// Why a request got no answer.
-#[derive(Debug, thiserror::Error)]
-pub enum ApiError {
-    /// A name of a space or agent cannot stand in a URL.
-    #[error("{0}")]
-    Name(#[from] NameError),
-    /// The service said what is wrong.
-    #[error("{}: {} ({})", .0.title, .0.detail, .0.status)]
-    Problem(Problem),
-    /// Something that is not the service answered: no problem document.
-    #[error("status {status}: {body}")]
-    Status {
-        /// HTTP status.
-        status: u16,
-        /// Start of the answer.
-        body: String,
-    },
-    /// The file of the authority's certificate cannot be used.
-    #[error("certificates of {}: {source}", file.display())]
-    Authority {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong with it.
-        source: io::Error,
-    },
-    /// The request did not get through.
-    #[error("{0}")]
-    Transport(#[source] Box<ureq::Error>),
-    /// The answer is not what this version expects.
-    #[error("answer of {path}: {source}")]
-    Answer {
-        /// What was asked.
-        path: String,
-        /// What is wrong with the answer.
-        source: serde_json::Error,
-    },
-}
-
-impl From<ureq::Error> for ApiError {
-    fn from(error: ureq::Error) -> Self {
-        Self::Transport(Box::new(error))
-    }
-}
 
 /// Asks a service over HTTP. Cheap to clone; connections are pooled.
 #[derive(Clone, Debug)]
@@ -447,22 +407,6 @@ impl Api {
         };
         Ok(response)
     }
-}
-
-/// The certificates of a file.
-fn authorities(file: &Path) -> io::Result<RootCerts> {
-    let text = fs::read(file)?;
-    let mut found = Vec::new();
-    for item in parse_pem(&text) {
-        let item = item.map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
-        if let PemItem::Certificate(certificate) = item {
-            found.push(certificate);
-        }
-    }
-    if found.is_empty() {
-        return Err(io::Error::new(io::ErrorKind::InvalidData, "there is none"));
-    }
-    Ok(RootCerts::new_with_certs(&found))
 }
 
 /// Body of a request.

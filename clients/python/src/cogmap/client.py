@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import ssl
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -42,8 +41,9 @@ from .object import (
     ObjectSummary,
 )
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
+from .request import checked_token, json_of, path_of, tls_of
 from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
-from .scalar import positive_seconds, text
+from .scalar import positive_seconds
 from .settings import SpaceSettings
 from .sse import server_sent_events
 from .trajectory import StampedPose, Trajectory
@@ -90,9 +90,9 @@ class Client:
         ca_file: Optional[str] = None,
     ) -> None:
         self._url = checked_url(url)
-        self._token = _checked_token(token)
+        self._token = checked_token(token)
         self._timeout_s = positive_seconds("timeout_s", timeout_s)
-        self._tls = _tls(ca_file)
+        self._tls = tls_of(ca_file)
 
     def __repr__(self) -> str:
         return f"Client({self._url!r}{'' if self._token is None else ', token=...'})"
@@ -101,14 +101,14 @@ class Client:
 
     def spaces(self) -> List[SpaceInfo]:
         """All spaces, by name."""
-        return list(self._get(SpaceList, _path()).spaces)
+        return list(self._get(SpaceList, path_of()).spaces)
 
     def create_space(self, space: str, **settings: Any) -> SpaceInfo:
         """Creates a space. Settings that are not given take the service's defaults; their values
         are plain data or messages (`recruitment=Bernoulli(0.05)`)."""
         for name, value in settings.items():
-            _json(name, value)  # The setting that cannot be written is named.
-        return self._send(SpaceInfo, "PUT", _path(space), JSON, _json("settings", settings))
+            json_of(name, value)  # The setting that cannot be written is named.
+        return self._send(SpaceInfo, "PUT", path_of(space), JSON, json_of("settings", settings))
 
     def create_space_from(self, space: str, settings: SpaceSettings) -> SpaceInfo:
         """Creates a space with all settings given, for example those of another space."""
@@ -116,11 +116,11 @@ class Client:
 
     def space(self, space: str) -> SpaceInfo:
         """A space, its settings and the size of its memory."""
-        return self._get(SpaceInfo, _path(space))
+        return self._get(SpaceInfo, path_of(space))
 
     def delete_space(self, space: str) -> None:
         """Deletes a space and everything in it."""
-        self._request("DELETE", _path(space))
+        self._request("DELETE", path_of(space))
 
     # Agents
 
@@ -128,7 +128,7 @@ class Client:
         """All agents of a space, by name."""
         query: _Query = {}
         while True:
-            page = self._get(AgentPage, _path(space, "agents"), query)
+            page = self._get(AgentPage, path_of(space, "agents"), query)
             yield from page.agents
             if page.next is None:
                 return
@@ -136,7 +136,7 @@ class Client:
 
     def agent(self, space: str, agent: str) -> AgentDetail:
         """Where an agent is, how sure that is, and how far its samples have come."""
-        return self._get(AgentDetail, _path(space, "agents", agent))
+        return self._get(AgentDetail, path_of(space, "agents", agent))
 
     def delete_agent(self, space: str, agent: str) -> None:
         """Removes an agent; returns when that is on the service's disk.
@@ -145,11 +145,11 @@ class Client:
         trajectories of its sessions. A robot that goes on sending under the name comes back as a
         new agent.
         """
-        self._request("DELETE", _path(space, "agents", agent))
+        self._request("DELETE", path_of(space, "agents", agent))
 
     def grid(self, space: str, agent: str) -> GridState:
         """Grid-cell state of an agent."""
-        return self._get(GridState, _path(space, "agents", agent, "grid"))
+        return self._get(GridState, path_of(space, "agents", agent, "grid"))
 
     def trajectory(
         self,
@@ -165,7 +165,7 @@ class Client:
             kind: `causal`, each pose as it was known when its sample was applied, or `refined`, by
                 all that has been seen since.
         """
-        path = _path(space, "agents", agent, "trajectory")
+        path = path_of(space, "agents", agent, "trajectory")
         poses: List[StampedPose] = []
         while True:
             query: _Query = {"kind": kind, "from_ns": from_ns, "to_ns": to_ns}
@@ -177,7 +177,7 @@ class Client:
 
     def post_samples(self, space: str, agent: str, batch: SampleBatch) -> IngestAnswer:
         """Sends samples without Zenoh; returns when they are on the service's disk."""
-        path = _path(space, "agents", agent, "samples")
+        path = path_of(space, "agents", agent, "samples")
         return self._send(IngestAnswer, "POST", path, CBOR, encode(batch))
 
     # Memories
@@ -212,16 +212,16 @@ class Client:
             percept=percept,
         )
         body = {name: value for name, value in to_wire(query).items() if value is not None}
-        path = _path(space, "recall")
-        return self._send(RecallAnswer, "POST", path, JSON, _json("query", body))
+        path = path_of(space, "recall")
+        return self._send(RecallAnswer, "POST", path, JSON, json_of("query", body))
 
     def localize(self, space: str, samples: Iterable[Sample]) -> Localization:
         """Where a sequence of samples of one robot was taken, 1 to 4096 of them. They need no agent
         and change nothing. Start poses and episodes with objects are refused; a service that is at
         several of these already asks to come back (503)."""
         query = LocalizeQuery(cast(Tuple[Sample, ...], samples))
-        path = _path(space, "localize")
-        return self._send(Localization, "POST", path, JSON, _json("query", query))
+        path = path_of(space, "localize")
+        return self._send(Localization, "POST", path, JSON, json_of("query", query))
 
     def predict(
         self,
@@ -236,14 +236,14 @@ class Client:
         Levels are those of a sensor at `offset_m` in the body frame [m]. With `channel` only what
         is felt on that one."""
         query = PredictQuery(None, motion, vec3("offset_m", offset_m), channel)
-        path = _path(space, "agents", agent, "predict")
-        return self._send(PredictAnswer, "POST", path, JSON, _json("query", query))
+        path = path_of(space, "agents", agent, "predict")
+        return self._send(PredictAnswer, "POST", path, JSON, json_of("query", query))
 
     def places(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Place]:
         """All places of a space, by id. `filters` are passed on as query parameters."""
         query: _Query = dict(filters)
         while True:
-            page = self._get(PlacePage, _path(space, "places"), query)
+            page = self._get(PlacePage, path_of(space, "places"), query)
             yield from page.places
             if page.next is None:
                 return
@@ -251,13 +251,13 @@ class Client:
 
     def place(self, space: str, place: int) -> Place:
         """A place."""
-        return self._get(Place, _path(space, "places", str(place)))
+        return self._get(Place, path_of(space, "places", str(place)))
 
     def trips(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Trip]:
         """All trips of a space, by id. `filters` are passed on as query parameters."""
         query: _Query = dict(filters)
         while True:
-            page = self._get(TripPage, _path(space, "trips"), query)
+            page = self._get(TripPage, path_of(space, "trips"), query)
             yield from page.trips
             if page.next is None:
                 return
@@ -265,13 +265,13 @@ class Client:
 
     def trip(self, space: str, trip: int) -> TripDetail:
         """A trip with its legs."""
-        return self._get(TripDetail, _path(space, "trips", str(trip)))
+        return self._get(TripDetail, path_of(space, "trips", str(trip)))
 
     def landmarks(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Landmark]:
         """All landmarks of a space, by label. `filters` are passed on as query parameters."""
         query: _Query = dict(filters)
         while True:
-            page = self._get(LandmarkPage, _path(space, "landmarks"), query)
+            page = self._get(LandmarkPage, path_of(space, "landmarks"), query)
             yield from page.landmarks
             if page.next is None:
                 return
@@ -279,7 +279,7 @@ class Client:
 
     def landmark(self, space: str, label: str) -> Landmark:
         """A landmark, by its label."""
-        return self._get(Landmark, _path(space, "landmarks", label))
+        return self._get(Landmark, path_of(space, "landmarks", label))
 
     # Objects
 
@@ -289,7 +289,7 @@ class Client:
         """All objects of a space, by name. `filters` are passed on as query parameters."""
         query: _Query = dict(filters)
         while True:
-            page = self._get(ObjectPage, _path(space, "objects"), query)
+            page = self._get(ObjectPage, path_of(space, "objects"), query)
             yield from page.objects
             if page.next is None:
                 return
@@ -297,7 +297,7 @@ class Client:
 
     def object(self, space: str, name: str) -> ObjectDetail:
         """An object with its places."""
-        return self._get(ObjectDetail, _path(space, "objects", name))
+        return self._get(ObjectDetail, path_of(space, "objects", name))
 
     def teach_object(
         self,
@@ -311,12 +311,12 @@ class Client:
         """Teaches an object at once, by contacts in its own frame, in place of what was known of
         it; returns when that is on the service's disk."""
         lesson = ObjectLesson(spacing_m, noise, cast(Tuple[Contact, ...], contacts))
-        path = _path(space, "objects", name)
-        return self._send(ObjectSummary, "PUT", path, JSON, _json("lesson", lesson))
+        path = path_of(space, "objects", name)
+        return self._send(ObjectSummary, "PUT", path, JSON, json_of("lesson", lesson))
 
     def forget_object(self, space: str, name: str) -> None:
         """Forgets an object."""
-        self._request("DELETE", _path(space, "objects", name))
+        self._request("DELETE", path_of(space, "objects", name))
 
     def identify(
         self,
@@ -329,12 +329,12 @@ class Client:
         """Which object a sequence of contacts is of, in which pose, and where the next touch would
         tell most."""
         query = IdentifyQuery(orientation, noise, cast(Tuple[Contact, ...], contacts))
-        path = _path(space, "objects", "identify")
-        return self._send(Identification, "POST", path, JSON, _json("query", query))
+        path = path_of(space, "objects", "identify")
+        return self._send(Identification, "POST", path, JSON, json_of("query", query))
 
     def agent_object(self, space: str, agent: str) -> AgentObject:
         """What an agent's episode with an object says so far."""
-        return self._get(AgentObject, _path(space, "agents", agent, "object"))
+        return self._get(AgentObject, path_of(space, "agents", agent, "object"))
 
     # Streams and files
 
@@ -359,7 +359,7 @@ class Client:
         """
         if timeout_s is not None:
             timeout_s = positive_seconds("timeout_s", timeout_s)
-        request = self._make_request("GET", _path(space, "events"), accept="text/event-stream")
+        request = self._make_request("GET", path_of(space, "events"), accept="text/event-stream")
         if after is not None:
             request.add_header("Last-Event-ID", after)
         with translated(f"GET {request.full_url}"), self._open(request, timeout_s) as response:
@@ -381,7 +381,7 @@ class Client:
         """One page of the events that the service keeps, oldest first. Ask again with its `next` as
         `after` for what comes later."""
         query: _Query = {"format": "json", "after": after, "agent": agent, "limit": limit}
-        return self._get(EventPage, _path(space, "events"), query)
+        return self._get(EventPage, path_of(space, "events"), query)
 
     def export(
         self,
@@ -402,7 +402,7 @@ class Client:
             session: Which run of the agent; the current one when absent.
         """
         query: _Query = {"format": format, "agent": agent, "session": session}
-        return self._request("GET", _path(space, "export"), query, accept="*/*")
+        return self._request("GET", path_of(space, "export"), query, accept="*/*")
 
     # The service itself
 
@@ -478,54 +478,6 @@ class Client:
                 where += " without a token" if self._token is None else " with the given token"
             with error:
                 raise _api_error(error.code, error.reason, error.read(), where) from None
-
-
-def _path(*segments: str) -> str:
-    for segment in segments:
-        # An empty one would lead to another route.
-        if not text("name", segment):
-            raise InvalidValue("name", segment, "expected a name")
-    quoted = (urllib.parse.quote(segment, safe="") for segment in segments)
-    return "/".join(("/v1/spaces", *quoted))
-
-
-def _json(name: str, value: Any) -> bytes:
-    """A message or plain data as JSON; numpy's numbers and arrays too."""
-    data = value
-    if isinstance(value, dict):
-        data = {key: to_wire(part) for key, part in value.items()}
-    try:
-        return json.dumps(to_wire(data), allow_nan=False, default=_plain).encode()
-    except (TypeError, ValueError) as error:
-        raise InvalidValue(name, value, f"expected what JSON can carry ({error})") from error
-
-
-def _plain(value: Any) -> Any:
-    if not hasattr(value, "tolist"):
-        raise TypeError(f"{type(value).__name__} is no number, text, list or dict")
-    return value.tolist()
-
-
-def _checked_token(token: Optional[str]) -> Optional[str]:
-    """A token without the line break that a file ends with. It is in no message."""
-    if token is None:
-        return None
-    stripped = token.strip() if isinstance(token, str) else None
-    if stripped is None or not all(" " < character <= "~" for character in stripped):
-        expected = "expected a text of printable ASCII without blanks"
-        raise InvalidValue("token", None, expected, "the one that was given")
-    return stripped
-
-
-def _tls(ca_file: Optional[str]) -> Optional[ssl.SSLContext]:
-    if ca_file is None:
-        return None
-    try:
-        return ssl.create_default_context(cafile=ca_file)
-    except (OSError, TypeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        expected = f"expected a file of certificates ({reason})"
-        raise InvalidValue("ca_file", ca_file, expected) from error
 
 
 def _api_error(status: int, reason: str, body: bytes, where: str) -> ApiError:

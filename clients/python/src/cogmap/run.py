@@ -15,6 +15,7 @@ from typing import Callable, Optional
 
 import zenoh
 
+from . import bounds
 from .answer import Estimate, Watermark
 from .clock import SessionClock
 from .connection import Connection
@@ -39,21 +40,6 @@ from .wire import encode_batch, encode_sample
 
 _log = logging.getLogger("cogmap")
 
-#: Estimates that wait for the callback; beyond it the oldest are dropped.
-_ESTIMATES_WAITING_MAX = 4096
-#: Watermarks and refusals that wait; a later one says all that an earlier one did.
-_ANSWERS_WAITING_MAX = 256
-#: How long a full batch waits for its turn on the caller's thread [s]: longer than a put takes, and
-#: far less than one on a congested network.
-_TURN_S = 0.1
-#: How often the arrival of the service is looked for [s].
-_MATCH_POLL_S = 0.01
-#: How long a robot waits at its start for the watermark that the service has of it, and again
-#: before the first batch if none came [s].
-_FIRST_ANSWER_S = 0.5
-_SECOND_ANSWER_S = 0.2
-#: How often is asked whether a problem is over [s].
-_PROBLEM_S = 1.0
 #: How long a dropped robot's samples are flushed in the background [s].
 DROPPED_FLUSH_S = 10.0
 
@@ -115,9 +101,9 @@ class Run:
         # Held while a batch is taken and put, so that batches leave in order.
         self._publishing = threading.Lock()
         self._wake = Wake()
-        self._estimates_in = Inbox(Estimate, _ESTIMATES_WAITING_MAX, self._wake)
-        self._watermarks_in = Inbox(Watermark, _ANSWERS_WAITING_MAX, self._wake)
-        self._problems_in = Inbox(Problem, _ANSWERS_WAITING_MAX, self._wake)
+        self._estimates_in = Inbox(Estimate, bounds.ESTIMATES_WAITING_MAX, self._wake)
+        self._watermarks_in = Inbox(Watermark, bounds.ANSWERS_WAITING_MAX, self._wake)
+        self._problems_in = Inbox(Problem, bounds.ANSWERS_WAITING_MAX, self._wake)
         self.connection = Connection(
             zenoh_session,
             owns_session,
@@ -143,7 +129,7 @@ class Run:
 
         Raises `ApiError` when the service knows no such space; the run is closed then.
         """
-        self._ask_and_wait(_FIRST_ANSWER_S)
+        self._ask_and_wait(bounds.FIRST_ANSWER_S)
         if self._problem is not None:
             self.connection.close()
             raise self._problem.error(self.connection.where_asked)
@@ -156,11 +142,7 @@ class Run:
         """Why nothing may come back, to be added to a message; empty if something has."""
         silence = self.connection.silence()
         if not silence and self.watermark is None and self.window.sent:
-            # Zenoh tells nobody what its rules drop.
-            return (
-                ", and the service has acknowledged none: the access rules of Zenoh may not let "
-                "this user publish under the agent's name, or hear of it"
-            )
+            return bounds.UNHEARD
         return silence
 
     def append(
@@ -193,7 +175,7 @@ class Run:
             if stamp_ns is not None:
                 self.clock.take(seq, stamp_ns)
             due = self.window.ready(now)
-        if due and self._may_send and self._publishing.acquire(timeout=_TURN_S):
+        if due and self._may_send and self._publishing.acquire(timeout=bounds.TURN_S):
             # A full batch leaves on the caller's thread, so that what one program sends for several
             # robots leaves in that order.
             try:
@@ -257,7 +239,7 @@ class Run:
         while not self.connection.is_heard():
             if time.monotonic() >= deadline:
                 return False
-            time.sleep(_MATCH_POLL_S)
+            time.sleep(bounds.MATCH_POLL_S)
         if self.is_own_thread():
             # Only the thread itself ends the wait below.
             return True
@@ -359,7 +341,7 @@ class Run:
                 return
             self._was_away = not is_heard
             if not self._is_known:
-                self._ask_and_wait(_SECOND_ANSWER_S)
+                self._ask_and_wait(bounds.SECOND_ANSWER_S)
             with self.changed:
                 self._may_send = True
                 self.changed.notify_all()
@@ -373,7 +355,7 @@ class Run:
                 self._is_back = False
                 ask = self.window.rejoin(now) or ask
             if self._problem is not None and now >= self._ask_again_at:
-                self._ask_again_at = now + _PROBLEM_S
+                self._ask_again_at = now + bounds.PROBLEM_S
                 ask = True
         if ask:
             _log.debug("no progress of %s: asking for the watermark", self.agent)
@@ -385,7 +367,7 @@ class Run:
             if self._is_useless():
                 at = None
             elif not self._may_send:
-                return _MATCH_POLL_S
+                return bounds.MATCH_POLL_S
             else:
                 at = self.window.wake_at()
             again = None if self._problem is None else self._ask_again_at
