@@ -8,14 +8,14 @@ import socket
 import tempfile
 from pathlib import Path
 
-#: Below the range from which systems take the ports of outgoing connections: such a connection could
-#: otherwise sit on a server's port while the server is down.
+#: Below the range from which systems take the ports of outgoing connections: such a connection
+#: could otherwise sit on a server's port while the server is down.
 _RANGE = range(18_000, 32_000)
 
 
 class Port:
-    """A port of the loopback interface, kept from other tests by a locked file as long as this lives,
-    also while no server listens on it. The end-to-end tests in Rust use the same files."""
+    """A port of the loopback interface, kept from other tests by a locked file as long as this
+    lives, also while no server listens on it. The end-to-end tests in Rust use the same files."""
 
     def __init__(self) -> None:
         locks = Path(tempfile.gettempdir(), "cogmap-test-ports")

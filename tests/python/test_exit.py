@@ -4,6 +4,7 @@ disk."""
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,7 +12,8 @@ import textwrap
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Dict, List
+from pathlib import Path
+from typing import Dict, List, Optional
 
 import pytest
 
@@ -24,6 +26,7 @@ from wait import LONG_S
 #: else runs.
 END_S = 5.0
 SAMPLES = 500
+README = Path(__file__).parents[2] / "clients" / "python" / "README.md"
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,14 @@ class Ending:
     code: int
     #: What it says on standard error.
     says: str = ""
+    #: The signal that it gets in its last line.
+    signal: Optional[signal.Signals] = None
+
+
+def remedy() -> str:
+    """The lines of the Python client's README by which SIGTERM ends a program in good order."""
+    (found,) = re.findall(r"^signal\.signal\(.*$", README.read_text(), re.MULTILINE)
+    return f"import signal\n{found}"
 
 
 ENDINGS: Dict[str, Ending] = {
@@ -45,11 +56,20 @@ ENDINGS: Dict[str, Ending] = {
     "raises in a with block": Ending("with robot:\n    ended()\n    1 / 0", 1, "ZeroDivisionError"),
     "drops the robot": Ending("del robot\nended()", 0),
     "is in a cycle with its callback": Ending("robot.on_estimate(lambda _: robot)\nended()", 0),
-    "is interrupted": Ending("ended()\ntime.sleep(60)", -signal.SIGINT, "KeyboardInterrupt"),
+    "is interrupted": Ending(
+        "ended()\ntime.sleep(60)", -signal.SIGINT, "KeyboardInterrupt", signal.SIGINT
+    ),
     "is interrupted in a flush": Ending(
         "robot.increment([0, 0, 0])\nended()\nwhile True:\n    robot.flush(60)",
         -signal.SIGINT,
         "KeyboardInterrupt",
+        signal.SIGINT,
+    ),
+    "is terminated, as the README advises": Ending(
+        f"{remedy()}\nended()\ntime.sleep(60)", 143, "", signal.SIGTERM
+    ),
+    "is terminated in a with block": Ending(
+        f"{remedy()}\nwith robot:\n    ended()\n    time.sleep(60)", 143, "", signal.SIGTERM
     ),
 }
 
@@ -101,11 +121,11 @@ class Program:
     def assert_ends(self) -> None:
         """Waits for its last line and for its end."""
         ending, last = self._ending, self.line()
-        if ending.code == -signal.SIGINT:
+        if ending.signal is not None:
             # In its last line it waits.
             time.sleep(0.2)
             last = str(time.monotonic())
-            self._process.send_signal(signal.SIGINT)
+            self._process.send_signal(ending.signal)
         try:
             _, errors = self._process.communicate(timeout=LONG_S)
         except subprocess.TimeoutExpired:
@@ -121,7 +141,7 @@ class Program:
 
 
 def agent_of(name: str) -> str:
-    return name.replace(" ", "-")
+    return name.replace(" ", "-").replace(",", "")
 
 
 def assert_all_end(programs: List[Program]) -> None:
@@ -200,7 +220,8 @@ def test_a_dropped_robot_ends_its_thread_after_it_has_flushed(service: Server) -
         check=True,
     )
     assert done.stdout == b"1\n"
-    assert service.client().agent("default", "ada").watermark.durable == SAMPLES + 1  # the session's end
+    # The last one is the session's end.
+    assert service.client().agent("default", "ada").watermark.durable == SAMPLES + 1
 
 
 def test_a_closed_robot_leaves_no_thread(service: Server) -> None:
@@ -251,3 +272,64 @@ def test_a_lost_sample_is_told_at_the_end(service: Server) -> None:
     service.kill()
     program.go_on()
     program.assert_ends()
+
+
+FORKING = """
+import multiprocessing, os, sys
+import cogmap
+
+def say(text):
+    print(text, flush=True)
+
+def in_child():
+    for use in (
+        lambda: robot.increment([0, 0, 0]),
+        robot.flush,
+        robot.estimate,
+        lambda: cogmap.Robot("default", "tim", connect=sys.argv[1]),
+        lambda: cogmap.Robot("default", "tim", session=link),
+    ):
+        try:
+            use()
+        except cogmap.CogmapError as error:
+            say(type(error).__name__ + (" forked" if "forked" in str(error) else f": {error}"))
+    robot.close()
+
+def own_robot():
+    with cogmap.Robot("default", "eve", connect=sys.argv[1]) as eve:
+        eve.increment([0, 0, 0])
+    say("eve closed")
+
+fork = multiprocessing.get_context("fork")
+early = fork.Process(target=own_robot)
+early.start()
+early.join(60)
+link = cogmap.open_session(sys.argv[1])
+with cogmap.Robot("default", "ada", session=link) as robot:
+    robot.increment([0, 0, 0])
+    for target in (in_child, lambda: sys.exit(3)):
+        process = fork.Process(target=target)
+        process.start()
+        process.join(60)
+        say(process.exitcode)
+    child = os.fork()
+    if child == 0:
+        sys.exit(4)
+    say(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+    robot.flush()
+    say(robot.watermark.durable)
+"""
+
+
+def test_a_robot_stays_in_its_process(service: Server) -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore::DeprecationWarning", "-c", FORKING, service.endpoint],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=LONG_S,
+    )
+    assert done.returncode == 0 and not done.stderr, done.stderr
+    told = ["Closed forked"] * 3 + ["CogmapError forked"] * 2
+    assert done.stdout.splitlines() == ["eve closed", *told, "0", "3", "4", "1"]

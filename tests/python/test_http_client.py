@@ -1,5 +1,5 @@
-"""The HTTP side of the Python client against the service: a drive whose every pose is known, and what
-the service refuses."""
+"""The HTTP side of the Python client against the service: a drive whose every pose is known, and
+what the service refuses."""
 
 from __future__ import annotations
 

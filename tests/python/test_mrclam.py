@@ -1,6 +1,6 @@
-"""A recorded team, published robot by robot over Zenoh, makes the map that a replay without any network
-makes, to the last bit. `COGMAP_MRCLAM` names the directory of the real set 6, or the
-one above it, for the same with that."""
+"""A recorded team, published robot by robot over Zenoh, makes the map that a replay without any
+network makes, to the last bit. `COGMAP_MRCLAM` names the directory of the real set 6, or the one
+above it, for the same with that."""
 
 from __future__ import annotations
 

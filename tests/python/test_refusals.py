@@ -1,4 +1,5 @@
-"""What the service refuses reaches the caller of the Python client as a typed error that says why."""
+"""What the service refuses reaches the caller of the Python client as a typed error that says
+why."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ Files in DIR (times in seconds of the Unix clock, SI units, radians; `#` begins 
     Robot<r>_Groundtruth.dat   t, x, y, heading; only the start pose is taken from it
 
 The stream of a robot covers the span t0 to t1 that all odometry and truth tables have in common. It
-begins with the true pose at t0; each command becomes velocity samples, cut where a sighting falls, so
-that motion and sightings are in their exact order.
+begins with the true pose at t0; each command becomes velocity samples, cut where a sighting falls,
+so that motion and sightings are in their exact order.
 """
 
 from __future__ import annotations
@@ -73,7 +73,8 @@ def table(path: Path) -> List[Row]:
 
 def load(directory: Path) -> Dict[int, Recording]:
     """The recordings by robot number. A robot without odometry or truth is left out."""
-    subject_of = {int(barcode): int(subject) for subject, barcode in lines(directory / "Barcodes.dat")}
+    barcodes = lines(directory / "Barcodes.dat")
+    subject_of = {int(barcode): int(subject) for subject, barcode in barcodes}
     recordings = {}
     for robot in range(1, FIRST_LANDMARK):
         odometry = directory / f"Robot{robot}_Odometry.dat"
@@ -150,7 +151,8 @@ def motion(rows: List[Row], cuts: Sequence[int], t0: int, t1: int) -> Iterator[c
 def stream(
     robot: int, recordings: Dict[int, Recording], t0: int, t1: int
 ) -> List[cogmap.Sample]:
-    """All samples of a robot in order: at the same stamp motion comes before the sighting at its end."""
+    """All samples of a robot in order: at the same stamp motion comes before the sighting at its
+    end."""
     recording = recordings[robot]
     seen = sightings(robot, recordings, recording.sightings, t0, t1)
     moved = motion(recording.odometry, [sample.stamp_ns for sample in seen], t0, t1)

@@ -128,7 +128,8 @@ class StandIn:
         while len(self.journal) in self._waiting:
             self.journal.append(self._waiting.pop(len(self.journal)))
         if self.journal:
-            self._zenoh.put(f"cogmap/lab/{self.agent}/estimate", encode(self.estimate()), encoding=CBOR)
+            key = f"cogmap/lab/{self.agent}/estimate"
+            self._zenoh.put(key, encode(self.estimate()), encoding=CBOR)
         if self.publishes_watermarks:
             self.publish(self.watermark())
 

@@ -70,7 +70,8 @@ class Server:
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
         self._server.daemon_threads = True
         self.url = f"http://127.0.0.1:{self._server.server_address[1]}"
-        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,), daemon=True)
+        serve = self._server.serve_forever
+        self._thread = threading.Thread(target=serve, args=(0.01,), daemon=True)
         self._thread.start()
 
     def answer(self, line: str, value: Any, status: int = 200) -> None:
@@ -116,7 +117,9 @@ def test_spaces_are_listed_created_shown_and_deleted(server: Server, client: cog
     assert {seen.headers["Authorization"] for seen in server.seen} == {"Bearer secret"}
 
 
-def test_a_space_is_created_with_the_settings_of_another(server: Server, client: cogmap.Client) -> None:
+def test_a_space_is_created_with_the_settings_of_another(
+    server: Server, client: cogmap.Client
+) -> None:
     info = golden("space_list")["spaces"][0]
     server.answer("GET /v1/spaces/lab", info)
     server.answer("PUT /v1/spaces/copy", info)
@@ -181,7 +184,8 @@ def test_recall_sends_only_what_was_asked(server: Server, client: cogmap.Client)
 
 def test_samples_are_localised(server: Server, client: cogmap.Client) -> None:
     server.answer("POST /v1/spaces/lab/localize", golden("localization"))
-    samples = decode(cogmap.LocalizeQuery, json.dumps(golden("localize_query")).encode(), JSON).samples
+    query = json.dumps(golden("localize_query")).encode()
+    samples = decode(cogmap.LocalizeQuery, query, JSON).samples
     found = client.localize("lab", iter(samples))
     assert json.loads(server.seen[0].body) == golden("localize_query")
     assert (found.status, found.found_after) == (cogmap.Status.LOCALIZED, 41)

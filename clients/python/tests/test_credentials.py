@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Dict
 
 import pytest
 import zenoh
 
-from cogmap import CogmapError, Credentials, Robot, Timeout
+from cogmap import Credentials, InvalidValue, Robot, Timeout
 
 from stand_in import free_port
 
@@ -42,8 +43,22 @@ def test_halves_of_credentials_are_refused() -> None:
         Credentials(user="ada")
     with pytest.raises(ValueError, match="client_key"):
         Credentials(client_certificate="ada.pem")
-    with pytest.raises(CogmapError, match="credentials"):
-        Robot("demo", "ada", credentials=Credentials(config_file="/nowhere/zenoh.json5"))
+
+
+@pytest.mark.parametrize(
+    "name, others",
+    [
+        ("root_certificate", {}),
+        ("client_certificate", {"client_key": __file__}),
+        ("client_key", {"client_certificate": __file__}),
+        ("config_file", {}),
+    ],
+)
+def test_a_file_that_is_not_there_is_named_at_once(name: str, others: Dict[str, str]) -> None:
+    credentials = Credentials(**{name: "/nowhere/x.pem"}, **others)
+    with pytest.raises(InvalidValue, match="/nowhere/x.pem") as caught:
+        Robot("demo", "ada", connect="tls/127.0.0.1:9", credentials=credentials)
+    assert caught.value.field == f"credentials.{name}"
 
 
 def test_a_router_with_users_lets_in_who_has_the_password(tmp_path: Path) -> None:

@@ -333,7 +333,8 @@ def test_estimates_reach_callbacks_and_a_failing_callback_harms_nobody(service: 
         for _ in range(3):
             robot.marker("x")
             robot.flush()
-        # The answer to a query may say that the last sample is applied before its estimate is published.
+        # The answer to a query may say that the last sample is applied before its estimate is
+        # published.
         eventually(lambda: len(seen) == 3)
     assert seen == [0, 1, 2]
 

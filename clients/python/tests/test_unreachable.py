@@ -148,7 +148,8 @@ def test_no_router_is_told_with_the_endpoint_and_without_sources() -> None:
 
 
 def test_a_port_of_another_protocol_is_told(serve: Callable[[Speak], int]) -> None:
-    assert "is open, but no Zenoh router there" in connected(serve(answers(b"HTTP/1.1 400 Bad Request\r\n\r\n")))
+    told = connected(serve(answers(b"HTTP/1.1 400 Bad Request\r\n\r\n")))
+    assert "is open, but no Zenoh router there" in told
 
 
 def test_a_closed_session_is_told_with_the_key() -> None:
@@ -175,3 +176,20 @@ def test_a_session_that_is_closed_under_a_robot_is_told_at_once() -> None:
             robot.marker("z")
         with pytest.raises(cogmap.Unreachable):
             robot.close()
+
+
+def test_a_robot_that_nobody_acknowledges_is_told_of_access_rules() -> None:
+    with StandIn() as service:
+        service.publishes_watermarks = service.answers_queries = False
+        robot = cogmap.Robot("lab", "ada", connect=service.endpoint)
+        robot.marker("x")
+        with pytest.raises(cogmap.Timeout, match="access rules"):
+            robot.flush(1)
+        service.publish(cogmap.Watermark(robot.session_id, 0, 0))
+        robot.marker("y")
+        # Once the service has said something of this run, the rules let it.
+        with pytest.raises(cogmap.Timeout) as caught:
+            robot.flush(1)
+        assert "access rules" not in str(caught.value)
+        with pytest.raises(cogmap.Timeout):
+            robot.close(0)

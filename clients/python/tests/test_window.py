@@ -206,7 +206,8 @@ def test_senseless_limits_are_refused(name: str, value: int) -> None:
 
 
 class LossyService:
-    """Stands in for the service: puts samples in order, forgets what is not durable on a restart."""
+    """Stands in for the service: puts samples in order, forgets what is not durable on a
+    restart."""
 
     def __init__(self) -> None:
         self.waiting: Dict[int, bytes] = {}

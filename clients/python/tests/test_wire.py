@@ -105,8 +105,11 @@ def test_integers_at_their_limits_keep_their_value(stamp_ns: int) -> None:
     assert decode(cogmap.SampleBatch, encode(batch)) == batch
 
 
+SESSIONS = [0, 23, 24, 255, 256, 65535, 65536, 2**32 - 1, 2**32, 2**64 - 1]
+
+
 @pytest.mark.parametrize("count", [1, 23, 24, 255, 256, 4096])
-@pytest.mark.parametrize("session", [0, 23, 24, 255, 256, 65535, 65536, 2**32 - 1, 2**32, 2**64 - 1])
+@pytest.mark.parametrize("session", SESSIONS)
 def test_heads_of_every_size_are_cbor(count: int, session: int) -> None:
     sample = cogmap.Sample(-5, cogmap.Marker("x"))
     data = encode_batch(session, 7, (encode_sample(sample),) * count)
@@ -163,7 +166,8 @@ def test_what_cannot_be_a_sample_is_refused_at_once(make: Any) -> None:
 def test_reading_is_lenient_where_the_protocol_grows() -> None:
     watermark = {"session": 1, "durable": 2, "applied": 3, "news": [1]}
     assert from_wire(cogmap.Watermark, watermark) == cogmap.Watermark(1, 2, 3)
-    event = {"space": "s", "agent": "a", "map_revision": 1, "stamp_ns": 2, "kind": {"dreamt": {"x": 1}}}
+    kind = {"dreamt": {"x": 1}}
+    event = {"space": "s", "agent": "a", "map_revision": 1, "stamp_ns": 2, "kind": kind}
     read = from_wire(cogmap.Event, event)
     assert read.kind == cogmap.UnknownKind("dreamt", {"x": 1})
     assert to_wire(read) == event

@@ -1,19 +1,27 @@
 //! The service's HTTP interface.
 
+mod authorities;
+mod error;
+
+use std::path::Path;
 use std::time::Duration;
 
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
     AgentDetail, AgentObject, AgentPage, AgentSummary, Codec, GridState, Identification,
     IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization, LocalizeQuery, Name,
-    NameError, ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage,
-    PredictAnswer, PredictQuery, Problem, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo,
-    SpaceList, SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
+    ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage, PredictAnswer,
+    PredictQuery, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo, SpaceList, SpaceSettings,
+    Trajectory, Trip, TripDetail, TripPage,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};
+use ureq::tls::TlsConfig;
 use ureq::{Agent, Body};
+
+use authorities::authorities;
+pub use error::ApiError;
 
 /// Longest wait for a whole answer; the service itself gives up earlier.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -21,42 +29,6 @@ const TIMEOUT: Duration = Duration::from_secs(30);
 const ANSWER_BYTES_MAX: u64 = 64 << 20;
 /// Longest text kept of an answer that is no problem document \[bytes\].
 const EXCERPT_BYTES_MAX: usize = 400;
-
-/// Why a request got no answer.
-#[derive(Debug, thiserror::Error)]
-pub enum ApiError {
-    /// A name of a space or agent cannot stand in a URL.
-    #[error("{0}")]
-    Name(#[from] NameError),
-    /// The service said what is wrong.
-    #[error("{}: {} ({})", .0.title, .0.detail, .0.status)]
-    Problem(Problem),
-    /// Something that is not the service answered: no problem document.
-    #[error("status {status}: {body}")]
-    Status {
-        /// HTTP status.
-        status: u16,
-        /// Start of the answer.
-        body: String,
-    },
-    /// The request did not get through.
-    #[error("{0}")]
-    Transport(#[source] Box<ureq::Error>),
-    /// The answer is not what this version expects.
-    #[error("answer of {path}: {source}")]
-    Answer {
-        /// What was asked.
-        path: String,
-        /// What is wrong with the answer.
-        source: serde_json::Error,
-    },
-}
-
-impl From<ureq::Error> for ApiError {
-    fn from(error: ureq::Error) -> Self {
-        Self::Transport(Box::new(error))
-    }
-}
 
 /// Asks a service over HTTP. Cheap to clone; connections are pooled.
 #[derive(Clone, Debug)]
@@ -69,12 +41,37 @@ pub struct Api {
 impl Api {
     /// A client of the service at `base`, for example `http://127.0.0.1:8080`; `token` is sent as
     /// the bearer token. Nothing is sent yet. A web proxy in the environment is not used, because
-    /// it would not know the robots' network.
+    /// it would not know the robots' network. An `https://` service is checked against Mozilla's
+    /// authorities; for others there is [`Api::trusting`].
     pub fn new(base: &str, token: Option<&str>) -> Self {
+        Self::with_tls(base, token, TlsConfig::default())
+    }
+
+    /// As [`Api::new`], for an `https://` service whose certificate an authority of your own has
+    /// signed: `ca_file` (PEM) has the authority's certificate, and no other is trusted.
+    ///
+    /// # Errors
+    /// The file cannot be read, or has no certificate.
+    pub fn trusting(
+        base: &str,
+        token: Option<&str>,
+        ca_file: impl AsRef<Path>,
+    ) -> Result<Self, ApiError> {
+        let file = ca_file.as_ref();
+        let roots = authorities(file).map_err(|source| ApiError::Authority {
+            file: file.to_owned(),
+            source,
+        })?;
+        let tls = TlsConfig::builder().root_certs(roots).build();
+        Ok(Self::with_tls(base, token, tls))
+    }
+
+    fn with_tls(base: &str, token: Option<&str>, tls: TlsConfig) -> Self {
         let config = Agent::config_builder()
             .http_status_as_error(false)
             .timeout_global(Some(TIMEOUT))
             .proxy(None)
+            .tls_config(tls)
             .build();
         Self {
             base: base.trim_end_matches('/').to_owned(),

@@ -7,6 +7,7 @@ use zenoh::{Config, Session, Wait};
 
 use crate::credentials::Credentials;
 use crate::error::ClientError;
+use crate::settings::deadline;
 
 /// Longest time for one attempt at one endpoint: Zenoh's own default.
 const OPEN_TIMEOUT_MAX: Duration = Duration::from_secs(10);
@@ -42,7 +43,7 @@ pub fn open_session_as<S: AsRef<str>>(
     let config = credentials.config().map_err(ClientError::Credentials)?;
     let config = client_config(config, &endpoints, timeout)
         .map_err(|_| ClientError::Settings("an endpoint is like tcp/127.0.0.1:7447"))?;
-    let deadline = Instant::now() + timeout;
+    let deadline = deadline(timeout);
     loop {
         // Zenoh's own retry waits for every endpoint of the list, so one that is down would fail
         // the whole: each attempt here is a single pass over the list.

@@ -16,7 +16,7 @@ use zenoh::{Session, Wait};
 use crate::batch::{self, BATCH_BYTES_MAX};
 use crate::error::ClientError;
 use crate::sender::Sender;
-use crate::settings::{RobotBuilder, RobotSettings};
+use crate::settings::{RobotBuilder, RobotSettings, deadline};
 use crate::state::{Counters, Shared, State};
 use crate::window::{Window, WindowLimits};
 
@@ -234,15 +234,14 @@ impl Robot {
         bytes: usize,
         taken: usize,
     ) -> Result<MutexGuard<'a, State>, ClientError> {
-        let mut deadline = None;
+        let mut until = None;
         loop {
             self.check_session(&state)?;
             if state.window.has_room(bytes) {
                 return Ok(state);
             }
-            let now = Instant::now();
-            let deadline = *deadline.get_or_insert(now + self.send_timeout);
-            let left = deadline.saturating_duration_since(now);
+            let until = *until.get_or_insert_with(|| deadline(self.send_timeout));
+            let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return Err(ClientError::WindowFull {
                     pending: state.window.pending(),
@@ -273,7 +272,7 @@ impl Robot {
     /// # Errors
     /// That takes longer than `timeout`, or another session has taken over.
     pub fn flush(&self, timeout: Duration) -> Result<(), ClientError> {
-        let deadline = Instant::now() + timeout;
+        let deadline = deadline(timeout);
         let mut state = self.shared.lock();
         let target = state.window.next();
         state.window.hurry();
@@ -301,7 +300,7 @@ impl Robot {
     /// # Errors
     /// There is none within `timeout`, or another session has taken over.
     pub fn estimate(&self, timeout: Duration) -> Result<Estimate, ClientError> {
-        let deadline = Instant::now() + timeout;
+        let deadline = deadline(timeout);
         let mut state = self.shared.lock();
         let target = state.window.next();
         state.window.hurry();
@@ -368,7 +367,7 @@ impl Robot {
     /// # Errors
     /// As [`Robot::flush`]; what was not durable by then may be lost.
     pub fn close(self, timeout: Duration) -> Result<(), ClientError> {
-        let deadline = Instant::now() + timeout;
+        let deadline = deadline(timeout);
         if self.ends_session {
             self.end_session(timeout)?;
         }

@@ -11,6 +11,7 @@ use zenoh::{Session, Wait};
 
 use crate::batch;
 use crate::error::ClientError;
+use crate::settings::deadline;
 use crate::state::Shared;
 
 /// How often a service is looked for before the first batch.
@@ -74,7 +75,7 @@ impl Sender {
     /// Waits for a subscriber, because Zenoh drops what is put before one matches. A bounded wait:
     /// what is dropped is still held, and sent again.
     fn await_service(&self) {
-        let deadline = Instant::now() + self.match_timeout;
+        let deadline = deadline(self.match_timeout);
         while Instant::now() < deadline {
             match self.publisher.matching_status().wait() {
                 Ok(status) if !status.matching() => {}

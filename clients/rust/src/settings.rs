@@ -1,6 +1,6 @@
 //! Settings of a robot's connection, and the builder that takes them.
 
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use cogmap_proto::limits::BATCH_SAMPLES_MAX;
 use cogmap_proto::{Codec, Name};
@@ -10,6 +10,15 @@ use crate::credentials::Credentials;
 use crate::error::ClientError;
 use crate::link;
 use crate::robot::Robot;
+
+/// Longest wait, some thirty years: whoever waits for ever gets that, for a clock can only add so
+/// much.
+const WAIT_MAX: Duration = Duration::from_secs(1_000_000_000);
+
+/// When a wait from now on is over.
+pub(crate) fn deadline(timeout: Duration) -> Instant {
+    Instant::now() + timeout.min(WAIT_MAX)
+}
 
 /// How a robot numbers, batches and holds its samples. The defaults suit one robot of up to a few
 /// kilohertz.

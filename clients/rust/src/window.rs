@@ -178,13 +178,18 @@ impl Window {
         self.next() - self.sent == 1 || self.first_sending_due(now)
     }
 
+    /// When the first samples leave even without a full batch.
+    fn batch_due(&self) -> Duration {
+        self.unsent_since.saturating_add(self.limits.batch_delay)
+    }
+
     fn first_sending_due(&self, now: Duration) -> bool {
         let unsent = self.next() - self.sent;
         unsent > 0
             && (unsent >= self.limits.batch_samples as u64
                 || self.unsent_bytes >= self.limits.batch_bytes
                 || self.sent < self.hurry_below
-                || now >= self.unsent_since + self.limits.batch_delay)
+                || now >= self.batch_due())
     }
 
     /// The next batch to send, counted as sent. Repetitions come first, because later samples
@@ -392,8 +397,7 @@ impl Window {
         if !self.repeat.is_empty() {
             return Some(Duration::ZERO);
         }
-        let first_sending =
-            (self.sent < self.next()).then(|| self.unsent_since + self.limits.batch_delay);
+        let first_sending = (self.sent < self.next()).then(|| self.batch_due());
         let gap = self
             .gap
             .as_ref()

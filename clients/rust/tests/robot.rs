@@ -420,3 +420,26 @@ fn closing_ends_the_session_with_a_last_sample_at_the_last_stamp() {
     assert_eq!((journal.len(), &last.body), (4, &SampleBody::SessionEnd {}));
     assert_eq!(last.stamp_ns, journal[2].stamp_ns);
 }
+
+#[test]
+fn waits_without_an_end_are_no_fault() {
+    let endpoint = free_endpoint();
+    let _service = Service::start(&endpoint, "demo", "ada", Faults::default());
+    let settings = RobotSettings {
+        batch_delay: Duration::MAX,
+        window_samples: 2,
+        send_timeout: Duration::MAX,
+        connect_timeout: Duration::MAX,
+        match_timeout: Duration::MAX,
+        ..RobotSettings::default()
+    };
+    let robot = Robot::builder("demo", "ada")
+        .endpoint(&endpoint)
+        .settings(settings)
+        .connect()
+        .unwrap();
+    robot.send_batch(levels(5)).unwrap();
+    robot.flush(Duration::MAX).unwrap();
+    assert_eq!(robot.estimate(Duration::MAX).unwrap().seq, 4);
+    robot.close(Duration::MAX).unwrap();
+}

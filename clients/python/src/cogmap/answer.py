@@ -223,8 +223,8 @@ class AgentDetail:
     lag_samples: int
     #: Path travelled in this session [m].
     travelled_m: float
-    #: Sightings of its own earlier samples that were dropped, because those were not remembered, or no longer;
-    #: over all sessions.
+    #: Sightings of its own earlier samples that were dropped, because those were not remembered, or
+    #: no longer; over all sessions.
     forgotten_matches: int
 
 
@@ -286,7 +286,8 @@ class Place(PoseReadings):
     founder: str
     first_stamp_ns: int
     last_stamp_ns: int
-    #: The founding and each visit count one when they happen, and half as much after every half-life.
+    #: The founding and each visit count one when they happen, and half as much after every
+    #: half-life.
     strength: float
 
     def __str__(self) -> str:
@@ -396,7 +397,8 @@ class PredictAnswer:
     rotation_xyzw: Quaternion
     #: The place that answers there, if one does.
     place: Optional[int]
-    #: Its confidence, in [0, 1], over the positions to which the motion may lead; 0 without a place.
+    #: Its confidence, in [0, 1], over the positions to which the motion may lead; 0 without a
+    #: place.
     confidence: float
     #: What is expected there, in the order of the channels; empty where no place answers.
     percepts: Tuple[PredictedPercept, ...]
@@ -417,8 +419,8 @@ class Trip:
     leg_count: int
     #: Length of its path [m].
     length_m: float
-    #: The recording and travelling it again count one when they happen, and half as much after every
-    #: half-life.
+    #: The recording and travelling it again count one when they happen, and half as much after
+    #: every half-life.
     strength: float
 
 

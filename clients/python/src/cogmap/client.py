@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import logging
-import ssl
 import urllib.error
 import urllib.parse
 import urllib.request
 from dataclasses import replace
-from typing import Any, Dict, Iterable, Iterator, List, Optional, Type, TypeVar, Union
+from typing import Any, Dict, Iterable, Iterator, List, Optional, Tuple, Type, TypeVar, Union, cast
 
 from .answer import (
     AgentDetail,
@@ -42,7 +41,9 @@ from .object import (
     ObjectSummary,
 )
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
+from .request import checked_token, json_of, path_of, tls_of
 from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
+from .scalar import positive_seconds
 from .settings import SpaceSettings
 from .sse import server_sent_events
 from .trajectory import StampedPose, Trajectory
@@ -63,15 +64,15 @@ _Query = Dict[str, Union[None, str, int, float]]
 class Client:
     """Asks a cogmap service over HTTP.
 
-    Holds no connection between calls, so it may be shared by threads. Lists that the service answers in
-    pages are iterated to the end, page by page as they are consumed.
+    Holds no connection between calls, so it may be shared by threads. Lists that the service
+    answers in pages are iterated to the end, page by page as they are consumed.
 
     Args:
         url: Address of the service, for example `http://127.0.0.1:8080`.
         token: Bearer token, if the service asks for one.
         timeout_s: Longest silence of a connection [s].
-        ca_file: File (PEM) with the authority that has signed the certificate of an `https://` service; the
-            system's authorities when absent.
+        ca_file: File (PEM) with the authority that has signed the certificate of an `https://`
+            service; the system's authorities when absent.
 
     Raises (all methods, each with the address in its message):
         InvalidValue: An argument makes no sense; nothing was asked.
@@ -89,9 +90,9 @@ class Client:
         ca_file: Optional[str] = None,
     ) -> None:
         self._url = checked_url(url)
-        self._token = token
-        self._timeout_s = timeout_s
-        self._tls = None if ca_file is None else ssl.create_default_context(cafile=ca_file)
+        self._token = checked_token(token)
+        self._timeout_s = positive_seconds("timeout_s", timeout_s)
+        self._tls = tls_of(ca_file)
 
     def __repr__(self) -> str:
         return f"Client({self._url!r}{'' if self._token is None else ', token=...'})"
@@ -100,13 +101,14 @@ class Client:
 
     def spaces(self) -> List[SpaceInfo]:
         """All spaces, by name."""
-        return list(self._get(SpaceList, _path()).spaces)
+        return list(self._get(SpaceList, path_of()).spaces)
 
     def create_space(self, space: str, **settings: Any) -> SpaceInfo:
-        """Creates a space. Settings that are not given take the service's defaults; their values are
-        plain data or messages (`recruitment=Bernoulli(0.05)`)."""
-        body = {name: to_wire(value) for name, value in settings.items()}
-        return self._send(SpaceInfo, "PUT", _path(space), JSON, json.dumps(body).encode())
+        """Creates a space. Settings that are not given take the service's defaults; their values
+        are plain data or messages (`recruitment=Bernoulli(0.05)`)."""
+        for name, value in settings.items():
+            json_of(name, value)  # The setting that cannot be written is named.
+        return self._send(SpaceInfo, "PUT", path_of(space), JSON, json_of("settings", settings))
 
     def create_space_from(self, space: str, settings: SpaceSettings) -> SpaceInfo:
         """Creates a space with all settings given, for example those of another space."""
@@ -114,11 +116,11 @@ class Client:
 
     def space(self, space: str) -> SpaceInfo:
         """A space, its settings and the size of its memory."""
-        return self._get(SpaceInfo, _path(space))
+        return self._get(SpaceInfo, path_of(space))
 
     def delete_space(self, space: str) -> None:
         """Deletes a space and everything in it."""
-        self._request("DELETE", _path(space))
+        self._request("DELETE", path_of(space))
 
     # Agents
 
@@ -126,7 +128,7 @@ class Client:
         """All agents of a space, by name."""
         query: _Query = {}
         while True:
-            page = self._get(AgentPage, _path(space, "agents"), query)
+            page = self._get(AgentPage, path_of(space, "agents"), query)
             yield from page.agents
             if page.next is None:
                 return
@@ -134,19 +136,20 @@ class Client:
 
     def agent(self, space: str, agent: str) -> AgentDetail:
         """Where an agent is, how sure that is, and how far its samples have come."""
-        return self._get(AgentDetail, _path(space, "agents", agent))
+        return self._get(AgentDetail, path_of(space, "agents", agent))
 
     def delete_agent(self, space: str, agent: str) -> None:
         """Removes an agent; returns when that is on the service's disk.
 
         Its name is free, and what it did in the map stays: places, trips, landmarks and the causal
-        trajectories of its sessions. A robot that goes on sending under the name comes back as a new agent.
+        trajectories of its sessions. A robot that goes on sending under the name comes back as a
+        new agent.
         """
-        self._request("DELETE", _path(space, "agents", agent))
+        self._request("DELETE", path_of(space, "agents", agent))
 
     def grid(self, space: str, agent: str) -> GridState:
         """Grid-cell state of an agent."""
-        return self._get(GridState, _path(space, "agents", agent, "grid"))
+        return self._get(GridState, path_of(space, "agents", agent, "grid"))
 
     def trajectory(
         self,
@@ -159,10 +162,10 @@ class Client:
         """The poses of an agent within a span of stamps, all pages in one.
 
         Args:
-            kind: `causal`, each pose as it was known when its sample was applied, or `refined`, by all
-                that has been seen since.
+            kind: `causal`, each pose as it was known when its sample was applied, or `refined`, by
+                all that has been seen since.
         """
-        path = _path(space, "agents", agent, "trajectory")
+        path = path_of(space, "agents", agent, "trajectory")
         poses: List[StampedPose] = []
         while True:
             query: _Query = {"kind": kind, "from_ns": from_ns, "to_ns": to_ns}
@@ -174,7 +177,7 @@ class Client:
 
     def post_samples(self, space: str, agent: str, batch: SampleBatch) -> IngestAnswer:
         """Sends samples without Zenoh; returns when they are on the service's disk."""
-        path = _path(space, "agents", agent, "samples")
+        path = path_of(space, "agents", agent, "samples")
         return self._send(IngestAnswer, "POST", path, CBOR, encode(batch))
 
     # Memories
@@ -192,9 +195,10 @@ class Client:
         limit: Optional[int] = None,
         percept: Optional[PerceptCue] = None,
     ) -> RecallAnswer:
-        """Places that answer a cue, best first: a position [m], a grid code (a phase per module, `None`
-        for an erased one), a percept (`Level` or `Descriptor`), or several of them. The other arguments filter: places within `radius_m` of the
-        position, founded by `agent`, visited from `since_ns` on, founded before `until_ns`."""
+        """Places that answer a cue, best first: a position [m], a grid code (a phase per module,
+        `None` for an erased one), a percept (`Level` or `Descriptor`), or several of them. The
+        other arguments filter: places within `radius_m` of the position, founded by `agent`,
+        visited from `since_ns` on, founded before `until_ns`."""
         query = RecallQuery(
             position_m=None if position_m is None else vec3("position_m", position_m),
             code=None
@@ -208,16 +212,16 @@ class Client:
             percept=percept,
         )
         body = {name: value for name, value in to_wire(query).items() if value is not None}
-        path = _path(space, "recall")
-        return self._send(RecallAnswer, "POST", path, JSON, json.dumps(body).encode())
+        path = path_of(space, "recall")
+        return self._send(RecallAnswer, "POST", path, JSON, json_of("query", body))
 
     def localize(self, space: str, samples: Iterable[Sample]) -> Localization:
-        """Where a sequence of samples of one robot was taken, 1 to 4096 of them. They need no agent and change
-        nothing. Start poses and episodes with objects are refused; a service that is at several of these already
-        asks to come back (503)."""
-        query = LocalizeQuery(tuple(samples))
-        path = _path(space, "localize")
-        return self._send(Localization, "POST", path, JSON, json.dumps(to_wire(query)).encode())
+        """Where a sequence of samples of one robot was taken, 1 to 4096 of them. They need no agent
+        and change nothing. Start poses and episodes with objects are refused; a service that is at
+        several of these already asks to come back (503)."""
+        query = LocalizeQuery(cast(Tuple[Sample, ...], samples))
+        path = path_of(space, "localize")
+        return self._send(Localization, "POST", path, JSON, json_of("query", query))
 
     def predict(
         self,
@@ -229,17 +233,17 @@ class Client:
         channel: Optional[str] = None,
     ) -> PredictAnswer:
         """What an agent would feel after a motion (`Increment` or `Velocity`) from where it is now.
-        Levels are those of a sensor at `offset_m` in the body frame [m]. With `channel` only what is
-        felt on that one."""
+        Levels are those of a sensor at `offset_m` in the body frame [m]. With `channel` only what
+        is felt on that one."""
         query = PredictQuery(None, motion, vec3("offset_m", offset_m), channel)
-        path = _path(space, "agents", agent, "predict")
-        return self._send(PredictAnswer, "POST", path, JSON, json.dumps(to_wire(query)).encode())
+        path = path_of(space, "agents", agent, "predict")
+        return self._send(PredictAnswer, "POST", path, JSON, json_of("query", query))
 
     def places(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Place]:
         """All places of a space, by id. `filters` are passed on as query parameters."""
         query: _Query = dict(filters)
         while True:
-            page = self._get(PlacePage, _path(space, "places"), query)
+            page = self._get(PlacePage, path_of(space, "places"), query)
             yield from page.places
             if page.next is None:
                 return
@@ -247,13 +251,13 @@ class Client:
 
     def place(self, space: str, place: int) -> Place:
         """A place."""
-        return self._get(Place, _path(space, "places", str(place)))
+        return self._get(Place, path_of(space, "places", str(place)))
 
     def trips(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Trip]:
         """All trips of a space, by id. `filters` are passed on as query parameters."""
         query: _Query = dict(filters)
         while True:
-            page = self._get(TripPage, _path(space, "trips"), query)
+            page = self._get(TripPage, path_of(space, "trips"), query)
             yield from page.trips
             if page.next is None:
                 return
@@ -261,13 +265,13 @@ class Client:
 
     def trip(self, space: str, trip: int) -> TripDetail:
         """A trip with its legs."""
-        return self._get(TripDetail, _path(space, "trips", str(trip)))
+        return self._get(TripDetail, path_of(space, "trips", str(trip)))
 
     def landmarks(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Landmark]:
         """All landmarks of a space, by label. `filters` are passed on as query parameters."""
         query: _Query = dict(filters)
         while True:
-            page = self._get(LandmarkPage, _path(space, "landmarks"), query)
+            page = self._get(LandmarkPage, path_of(space, "landmarks"), query)
             yield from page.landmarks
             if page.next is None:
                 return
@@ -275,15 +279,17 @@ class Client:
 
     def landmark(self, space: str, label: str) -> Landmark:
         """A landmark, by its label."""
-        return self._get(Landmark, _path(space, "landmarks", label))
+        return self._get(Landmark, path_of(space, "landmarks", label))
 
     # Objects
 
-    def objects(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[ObjectSummary]:
+    def objects(
+        self, space: str, **filters: Union[None, str, int, float]
+    ) -> Iterator[ObjectSummary]:
         """All objects of a space, by name. `filters` are passed on as query parameters."""
         query: _Query = dict(filters)
         while True:
-            page = self._get(ObjectPage, _path(space, "objects"), query)
+            page = self._get(ObjectPage, path_of(space, "objects"), query)
             yield from page.objects
             if page.next is None:
                 return
@@ -291,7 +297,7 @@ class Client:
 
     def object(self, space: str, name: str) -> ObjectDetail:
         """An object with its places."""
-        return self._get(ObjectDetail, _path(space, "objects", name))
+        return self._get(ObjectDetail, path_of(space, "objects", name))
 
     def teach_object(
         self,
@@ -302,15 +308,15 @@ class Client:
         spacing_m: float = 0.004,
         noise: TouchNoise = TouchNoise(),
     ) -> ObjectSummary:
-        """Teaches an object at once, by contacts in its own frame, in place of what was known of it; returns
-        when that is on the service's disk."""
-        lesson = ObjectLesson(spacing_m, noise, tuple(contacts))
-        path = _path(space, "objects", name)
-        return self._send(ObjectSummary, "PUT", path, JSON, json.dumps(to_wire(lesson)).encode())
+        """Teaches an object at once, by contacts in its own frame, in place of what was known of
+        it; returns when that is on the service's disk."""
+        lesson = ObjectLesson(spacing_m, noise, cast(Tuple[Contact, ...], contacts))
+        path = path_of(space, "objects", name)
+        return self._send(ObjectSummary, "PUT", path, JSON, json_of("lesson", lesson))
 
     def forget_object(self, space: str, name: str) -> None:
         """Forgets an object."""
-        self._request("DELETE", _path(space, "objects", name))
+        self._request("DELETE", path_of(space, "objects", name))
 
     def identify(
         self,
@@ -320,36 +326,40 @@ class Client:
         orientation: Orientation = NoTurn(),
         noise: TouchNoise = TouchNoise(),
     ) -> Identification:
-        """Which object a sequence of contacts is of, in which pose, and where the next touch would tell most."""
-        query = IdentifyQuery(orientation, noise, tuple(contacts))
-        path = _path(space, "objects", "identify")
-        return self._send(Identification, "POST", path, JSON, json.dumps(to_wire(query)).encode())
+        """Which object a sequence of contacts is of, in which pose, and where the next touch would
+        tell most."""
+        query = IdentifyQuery(orientation, noise, cast(Tuple[Contact, ...], contacts))
+        path = path_of(space, "objects", "identify")
+        return self._send(Identification, "POST", path, JSON, json_of("query", query))
 
     def agent_object(self, space: str, agent: str) -> AgentObject:
-        """What an agent's episode with an object says so far, and what the latest one said that has ended."""
-        return self._get(AgentObject, _path(space, "agents", agent, "object"))
+        """What an agent's episode with an object says so far, and what its latest one said."""
+        return self._get(AgentObject, path_of(space, "agents", agent, "object"))
 
     # Streams and files
 
     def events(self, space: str, timeout_s: Optional[float] = None) -> Iterator[Event]:
         """What happens in a space from now on. Ends when the service ends the stream; close the
-        generator to end it here. A silence longer than `timeout_s`, if given, raises `TimeoutError`.
-        Missed events are logged; `follow` hands them over.
+        generator to end it here. A silence longer than `timeout_s`, if given, raises
+        `TimeoutError`. Missed events are logged; `follow` hands them over.
         """
         for told in self.follow(space, timeout_s=timeout_s):
             if isinstance(told, MissedEvents):
-                _log.warning("events of %s were missed: %s", space, told.events or "unknown how many")
+                how_many = told.events or "unknown how many"
+                _log.warning("events of %s were missed: %s", space, how_many)
             else:
                 yield told.event
 
     def follow(
         self, space: str, *, after: Optional[str] = None, timeout_s: Optional[float] = None
     ) -> Iterator[Union[EventRecord, MissedEvents]]:
-        """The events of a space with their ids, from the one after `after` on, or from now on; `0-0` is
-        before all that the service keeps. `MissedEvents` stands where some were missed, because this
-        program was too slow or came back too late. Otherwise as `events`.
+        """The events of a space with their ids, from the one after `after` on, or from now on;
+        `0-0` is before all that the service keeps. `MissedEvents` stands where some were missed,
+        because this program was too slow or came back too late. Otherwise as `events`.
         """
-        request = self._make_request("GET", _path(space, "events"), accept="text/event-stream")
+        if timeout_s is not None:
+            timeout_s = positive_seconds("timeout_s", timeout_s)
+        request = self._make_request("GET", path_of(space, "events"), accept="text/event-stream")
         if after is not None:
             request.add_header("Last-Event-ID", after)
         with translated(f"GET {request.full_url}"), self._open(request, timeout_s) as response:
@@ -371,7 +381,7 @@ class Client:
         """One page of the events that the service keeps, oldest first. Ask again with its `next` as
         `after` for what comes later."""
         query: _Query = {"format": "json", "after": after, "agent": agent, "limit": limit}
-        return self._get(EventPage, _path(space, "events"), query)
+        return self._get(EventPage, path_of(space, "events"), query)
 
     def export(
         self,
@@ -392,7 +402,7 @@ class Client:
             session: Which run of the agent; the current one when absent.
         """
         query: _Query = {"format": format, "agent": agent, "session": session}
-        return self._request("GET", _path(space, "export"), query, accept="*/*")
+        return self._request("GET", path_of(space, "export"), query, accept="*/*")
 
     # The service itself
 
@@ -468,10 +478,6 @@ class Client:
                 where += " without a token" if self._token is None else " with the given token"
             with error:
                 raise _api_error(error.code, error.reason, error.read(), where) from None
-
-
-def _path(*segments: str) -> str:
-    return "/v1/spaces" + "".join(f"/{urllib.parse.quote(segment, safe='')}" for segment in segments)
 
 
 def _api_error(status: int, reason: str, body: bytes, where: str) -> ApiError:

@@ -73,8 +73,8 @@ class SessionClock:
             if abs(self._own_apart_s) > _CLOCKS_APART_S:
                 self._told_mixed = True
                 return (
-                    "samples with a stamp_ns and samples without one are mixed, and the given stamps "
-                    f"are {self._own_apart_s:+.3g} s from the system's clock: {_ADVICE}"
+                    "samples with a stamp_ns and samples without one are mixed, and the given "
+                    f"stamps are {self._own_apart_s:+.3g} s from the system's clock: {_ADVICE}"
                 )
         if stamp_ns is None and not self._told_fast:
             return self._haste(body, now_ns)

@@ -133,8 +133,7 @@ class Connection:
 
     def close(self) -> None:
         """Undeclares everything, and closes the session if it is the connection's own. It may hang
-        on a dead
-        network: the caller gives it a thread that nobody has to wait for."""
+        on a dead network: the caller gives it a thread that nobody has to wait for."""
         steps = list(self._undeclare)
         if self._owns_session:
             steps.append(self._session.close)

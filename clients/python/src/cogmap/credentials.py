@@ -27,12 +27,14 @@ class Credentials:
     #: User name, with its password.
     user: Optional[str] = None
     password: Optional[str] = field(default=None, repr=False)
-    #: File (PEM) with the certificate of the authority that has signed the router's: for `tls/` endpoints.
+    #: File (PEM) with the certificate of the authority that has signed the router's: for `tls/`
+    #: endpoints.
     root_certificate: Optional[_Path] = None
     #: Files (PEM) with the robot's own certificate and its key, where the router asks for one.
     client_certificate: Optional[_Path] = None
     client_key: Optional[_Path] = None
-    #: A Zenoh configuration file (JSON5) for everything else. The rest and the endpoints are put over it.
+    #: A Zenoh configuration file (JSON5) for everything else. The rest and the endpoints are put
+    #: over it.
     config_file: Optional[_Path] = None
 
     def __post_init__(self) -> None:
@@ -41,6 +43,20 @@ class Credentials:
         if (self.client_certificate is None) != (self.client_key is None):
             expected = "expected client_certificate and client_key together"
             raise InvalidValue("credentials", self, expected)
+
+    def check_files(self) -> None:
+        """Raises `InvalidValue` for a file that cannot be read: Zenoh would try again with it until
+        its time is over, and not say why."""
+        for name in ("root_certificate", "client_certificate", "client_key", "config_file"):
+            file: Optional[_Path] = getattr(self, name)
+            if file is None:
+                continue
+            try:
+                with open(file, "rb"):
+                    pass
+            except OSError as error:
+                expected = f"expected a file that can be read ({error.strerror})"
+                raise InvalidValue(f"credentials.{name}", str(file), expected) from None
 
     def config(self) -> zenoh.Config:
         """The Zenoh configuration that they make."""

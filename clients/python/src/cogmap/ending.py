@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import atexit
+import os
 import time
 from typing import Protocol, Set, Tuple
 
-#: How long the samples of all robots are flushed at the end of the program [s], and how long they may
-#: take to leave Zenoh afterwards.
+#: How long the samples of all robots are flushed at the end of the program [s], and how long they
+#: may take to leave Zenoh afterwards.
 _FLUSH_S = 1.0
 _LEAVE_S = 0.5
 
@@ -20,6 +21,9 @@ class Endable(Protocol):
 
     def join(self, timeout_s: float) -> bool:
         """Waits for its end; says whether it came."""
+
+    def stay_behind(self) -> None:
+        """This process was forked off, and its thread stayed in the other one."""
 
 
 _running: Set[Endable] = set()
@@ -45,4 +49,13 @@ def _end_all() -> None:
         thread.join(max(0.0, end - time.monotonic()))
 
 
+def _forked() -> None:
+    threads = tuple(_running)
+    _running.clear()
+    for thread in threads:
+        thread.stay_behind()
+
+
 atexit.register(_end_all)
+if hasattr(os, "register_at_fork"):  # Windows has no forks.
+    os.register_at_fork(after_in_child=_forked)

@@ -3,11 +3,15 @@ library has an error for the same thing, that one too."""
 
 from __future__ import annotations
 
-from typing import Any, Mapping, Optional
+from typing import Any, Dict, Mapping, Optional, Tuple, Type
 
 
 class CogmapError(Exception):
-    """Parent of every error of this package."""
+    """Parent of every error of this package. Errors can be pickled, so that they come through from
+    the processes of a pool."""
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        return _unpickled, (type(self), self.args, self.__dict__)
 
 
 class InvalidValue(CogmapError, ValueError):
@@ -58,8 +62,8 @@ class WindowFull(CogmapError):
 
 
 class SessionSuperseded(CogmapError):
-    """Another run of the agent has taken over its name, or uses this run's session number; what this one
-    sends is ignored."""
+    """Another run of the agent has taken over its name, or uses this run's session number; what
+    this one sends is ignored."""
 
     def __init__(self, agent: str, own: int, other: int) -> None:
         super().__init__(
@@ -107,6 +111,16 @@ class ApiError(CogmapError):
         self.extra: Mapping[str, Any] = dict(extra or {})
 
 
+def _unpickled(
+    kind: Type[CogmapError], args: Tuple[Any, ...], state: Dict[str, Any]
+) -> CogmapError:
+    """An error as it was; its `__init__` takes other arguments than its message."""
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(state)
+    return error
+
+
 def _short(shown: str) -> str:
-    """At most some hundred characters: a value may be a whole image descriptor."""
+    """One line of at most some hundred characters: a value may be a whole image descriptor."""
+    shown = " ".join(shown.split())
     return shown if len(shown) <= 120 else f"{shown[:100]}... ({len(shown)} characters)"

@@ -19,8 +19,8 @@ class AgentEnrolled:
 
 @dataclass(frozen=True)
 class AgentRemoved:
-    """The agent was removed, by whoever runs the service or to make room. What it did in the map stays; a
-    message under its name enrols another agent."""
+    """The agent was removed, by whoever runs the service or to make room. What it did in the map
+    stays; a message under its name enrols another agent."""
 
     TAG: ClassVar[str] = "agent_removed"
 
@@ -202,7 +202,8 @@ class ObjectLearned:
 
 @dataclass(frozen=True)
 class ObjectNotLearned:
-    """An episode was to teach an object and has not: it did not become clear how its frame lies in it."""
+    """An episode was to teach an object and has not: it did not become clear how its frame lies in
+    it."""
 
     TAG: ClassVar[str] = "object_not_learned"
     #: Contacts of the episode.
@@ -285,7 +286,8 @@ class Event:
 class EventRecord:
     """An event with its id."""
 
-    #: Map revision and index, such as `4711-0`: the same after a restart, and larger for later events.
+    #: Map revision and index, such as `4711-0`: the same after a restart, and larger for later
+    #: events.
     id: str
     event: Event
 

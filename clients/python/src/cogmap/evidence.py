@@ -16,6 +16,7 @@ class Evidence:
     refused: int
     #: Of those, how many one after the other up to now; from 4 on the agent is not `localized`.
     refused_in_a_row: int
-    #: Mean of the squared error of the accepted ones' components, each over what was expected of it: 1
-    #: where the stated noise is honest, more where it is too small. Absent before the first one.
+    #: Mean of the squared error of the accepted ones' components, each over what was expected of
+    #: it: 1 where the stated noise is honest, more where it is too small. Absent before the first
+    #: one.
     nis_mean: Optional[float]

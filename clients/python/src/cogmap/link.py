@@ -13,6 +13,8 @@ import zenoh
 
 from .credentials import Credentials
 from .errors import CogmapError, InvalidValue, Timeout
+from .fork import zenoh_begins
+from .scalar import seconds
 
 _log = logging.getLogger("cogmap")
 
@@ -40,15 +42,17 @@ def open_session(
 ) -> zenoh.Session:
     """Opens a Zenoh session in client mode to one of the endpoints, without multicast.
 
-    Several robots of one process may share it. Raises `InvalidValue` for what is no endpoint, `Timeout`
-    when none answers in time or accepts the credentials, and `CogmapError` when the credentials' files
-    cannot be used.
+    Several robots of one process may share it. Raises `InvalidValue` for what is no endpoint,
+    `Timeout` when none answers in time or accepts the credentials, and `CogmapError` when the
+    credentials' files cannot be used.
     """
-    endpoints = [connect] if isinstance(connect, str) else list(connect)
-    for endpoint in endpoints:
-        _check_endpoint(endpoint)
+    endpoints = endpoints_of(connect)
+    timeout_s = seconds("connect_timeout_s", timeout_s)
+    zenoh_begins()
+    credentials = credentials or Credentials()
+    credentials.check_files()
     try:
-        config = (credentials or Credentials()).config()
+        config = credentials.config()
     except zenoh.ZError as error:
         raise CogmapError(f"credentials: {reason(error)}") from None
     config.insert_json5("mode", json.dumps("client"))
@@ -70,6 +74,20 @@ def open_session(
         found = "; ".join(f"{endpoint} {_probe(endpoint)}" for endpoint in endpoints)
         raise Timeout(f"no Zenoh router answers within {timeout_s:g} s: {found}")
     return session
+
+
+def endpoints_of(connect: Union[str, Iterable[str]]) -> List[str]:
+    """One endpoint or several, each checked."""
+    if isinstance(connect, str):
+        endpoints = [connect]
+    else:
+        endpoints = list(connect) if isinstance(connect, Iterable) else []
+    if not endpoints:
+        expected = f"expected a Zenoh endpoint such as {DEFAULT_ENDPOINT}"
+        raise InvalidValue("connect", connect, expected)
+    for endpoint in endpoints:
+        _check_endpoint(endpoint)
+    return endpoints
 
 
 def _opened(config: zenoh.Config) -> Optional[zenoh.Session]:
@@ -112,6 +130,9 @@ def _probe(endpoint: str) -> str:
         socket.create_connection((host.strip("[]"), int(port)), _PROBE_S).close()
     except (OSError, ValueError, OverflowError) as error:
         return f"does not answer ({getattr(error, 'strerror', None) or error})"
-    return (
-        "is open, but no Zenoh router there lets a robot in (is it another port, such as HTTP's?)"
-    )
+    causes = ["the credentials are wrong", "it is another port, such as HTTP's"]
+    if protocol == "tls":
+        causes.insert(0, "no authority that is known here has signed the router's certificate")
+    else:
+        causes.insert(1, "the router wants tls/")
+    return f"is open, but no Zenoh router there lets a robot in: {', or '.join(causes)}"

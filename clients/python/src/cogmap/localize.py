@@ -9,7 +9,7 @@ from .answer import Status
 from .limits import BATCH_SAMPLES_MAX
 from .pose import UncertainPoseReadings
 from .sample import Sample
-from .scalar import counted
+from .scalar import all_of, counted
 from .vector import Quaternion, Vec3
 
 
@@ -21,7 +21,8 @@ class LocalizeQuery:
     samples: Tuple[Sample, ...]
 
     def __post_init__(self) -> None:
-        counted("samples", self.samples, BATCH_SAMPLES_MAX)
+        samples = all_of("samples", self.samples, (Sample,))
+        object.__setattr__(self, "samples", counted("samples", samples, BATCH_SAMPLES_MAX))
 
 
 @dataclass(frozen=True)

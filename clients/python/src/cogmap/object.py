@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar, Optional, Tuple, Union
+from typing import ClassVar, Optional, Tuple, Union, get_args
 
 from .key import check_name
 from .limits import (
@@ -15,7 +15,7 @@ from .limits import (
     SPACING_M_MIN,
 )
 from .sample import Orientation, TouchNoise
-from .scalar import counted, number, within
+from .scalar import all_of, counted, number, one_of, within
 from .vector import Quaternion, Vec3, direction, unit_vector, vec3
 
 
@@ -79,8 +79,10 @@ class Contact:
         object.__setattr__(self, "position_m", vec3("position_m", self.position_m))
         if self.normal is not None:
             object.__setattr__(self, "normal", unit_vector("normal", self.normal))
-        object.__setattr__(self, "levels", tuple(self.levels))
-        object.__setattr__(self, "descriptors", tuple(self.descriptors))
+        levels = all_of("levels", self.levels, (ContactLevel,))
+        object.__setattr__(self, "levels", levels)
+        descriptors = all_of("descriptors", self.descriptors, (ContactDescriptor,))
+        object.__setattr__(self, "descriptors", descriptors)
         drift = within("drift_sd_m", self.drift_sd_m, 0.0, METRES_MAX)
         object.__setattr__(self, "drift_sd_m", drift)
 
@@ -99,7 +101,9 @@ class ObjectLesson:
     def __post_init__(self) -> None:
         spacing = within("spacing_m", self.spacing_m, SPACING_M_MIN, SPACING_M_MAX)
         object.__setattr__(self, "spacing_m", spacing)
-        counted("contacts", self.contacts, LESSON_CONTACTS_MAX)
+        one_of("noise", self.noise, (TouchNoise,))
+        contacts = all_of("contacts", self.contacts, (Contact,))
+        object.__setattr__(self, "contacts", counted("contacts", contacts, LESSON_CONTACTS_MAX))
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,10 @@ class IdentifyQuery:
     contacts: Tuple[Contact, ...]
 
     def __post_init__(self) -> None:
-        counted("contacts", self.contacts, IDENTIFY_CONTACTS_MAX)
+        one_of("orientation", self.orientation, get_args(Orientation))
+        one_of("noise", self.noise, (TouchNoise,))
+        contacts = all_of("contacts", self.contacts, (Contact,))
+        object.__setattr__(self, "contacts", counted("contacts", contacts, IDENTIFY_CONTACTS_MAX))
 
 
 @dataclass(frozen=True)

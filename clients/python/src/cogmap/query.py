@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Tuple, Union
+from typing import Optional, Tuple, Union, get_args
 
 from .sample import Descriptor, Increment, Level, Velocity
-from .scalar import number
+from .scalar import COUNT_RANGE, STAMP_RANGE, number, one_of, whole
 from .vector import Vec3, vec3
 
 #: A percept to recall places by; a level's `offset_m` and `normal` say nothing there.
 PerceptCue = Union[Level, Descriptor]
 #: A motion that is asked about.
 MotionBody = Union[Increment, Velocity]
+
+
+#: Fields of `RecallQuery` that are integers.
+_WHOLE = (("since_ns", STAMP_RANGE), ("until_ns", STAMP_RANGE), ("limit", COUNT_RANGE))
 
 
 @dataclass(frozen=True)
@@ -24,8 +28,8 @@ class WatermarkQuery:
 
 @dataclass(frozen=True)
 class RecallQuery:
-    """Asks for places. `position_m`, `code` and `percept` are the cues that rank them, the other fields
-    filter; without a cue the latest places come first."""
+    """Asks for places. `position_m`, `code` and `percept` are the cues that rank them, the other
+    fields filter; without a cue the latest places come first."""
 
     #: Cue: a position in `map` [m].
     position_m: Optional[Vec3] = None
@@ -52,6 +56,11 @@ class RecallQuery:
             object.__setattr__(self, "code", code)
         if self.radius_m is not None:
             object.__setattr__(self, "radius_m", number("radius_m", self.radius_m))
+        for name, bounds in _WHOLE:
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, whole(name, getattr(self, name), bounds))
+        if self.percept is not None:
+            one_of("percept", self.percept, get_args(PerceptCue))
 
 
 @dataclass(frozen=True)
@@ -68,4 +77,5 @@ class PredictQuery:
     channel: Optional[str] = None
 
     def __post_init__(self) -> None:
+        one_of("motion", self.motion, get_args(MotionBody))
         object.__setattr__(self, "offset_m", vec3("offset_m", self.offset_m))

@@ -15,12 +15,12 @@ from .answer import Estimate, Rejection, Watermark
 from .credentials import Credentials
 from .errors import ClockWarning, CogmapError, InvalidValue, Timeout
 from .key import check_name
-from .link import DEFAULT_ENDPOINT, open_session
+from .link import DEFAULT_ENDPOINT, endpoints_of, open_session
 from .listeners import Listeners
 from .run import DROPPED_FLUSH_S, Run
 from .sample import MotionNoise, Sample, SampleBody
 from .sampler import Sampler
-from .scalar import COUNT_RANGE, whole
+from .scalar import COUNT_RANGE, STAMP_RANGE, one_of, seconds, whole
 from .window import WindowLimits
 
 _log = logging.getLogger("cogmap")
@@ -50,8 +50,8 @@ class Robot(Sampler):
         connect: Zenoh endpoint, or several of them to try; `tcp/127.0.0.1:7447` when absent.
         session: An open Zenoh session to use instead; it is left open by `close`.
         credentials: User, password and certificates for the router; none when absent.
-        session_id: Number of this run; it must be larger than those of earlier runs. The time of the
-            start [ns] when absent.
+        session_id: Number of this run; it must be larger than those of earlier runs. The time of
+            the start [ns] when absent.
         batch_samples: Most samples of one message, 1 to 4096.
         batch_delay_s: Longest time that a sample waits for others [s].
         window_samples: Most samples without acknowledgement.
@@ -60,13 +60,14 @@ class Robot(Sampler):
         send_timeout_s: How long a sample method waits for room before `WindowFull` [s].
         connect_timeout_s: How long to wait for the router [s].
         match_timeout_s: How long samples wait for the service before they are sent anyway [s].
-        ends_session: Whether the robot's end also ends the session, and the trip under way, by a last
-            sample. Without it they end when the agent's next session begins.
+        ends_session: Whether the robot's end also ends the session, and the trip under way, by a
+            last sample. Without it they end when the agent's next session begins.
 
     Raises:
         InvalidValue: A name or another argument makes no sense, or `connect` or `credentials` are
             given with `session`.
-        Timeout: No Zenoh router answers within `connect_timeout_s`, or none accepts the credentials.
+        Timeout: No Zenoh router answers within `connect_timeout_s`, or none accepts the
+            credentials.
         ApiError: The service has no such space.
         Unreachable: The given Zenoh session is closed.
     """
@@ -95,6 +96,10 @@ class Robot(Sampler):
         if session is not None and credentials is not None:
             expected = "expected none with a session, which has its own"
             raise InvalidValue("credentials", credentials, expected)
+        if session is not None:
+            one_of("session", session, (zenoh.Session,))
+        if motion_noise is not None:
+            one_of("motion_noise", motion_noise, (MotionNoise,))
         check_name("space", space)
         check_name("agent", agent)
         number = (
@@ -107,10 +112,10 @@ class Robot(Sampler):
             batch_delay_s=batch_delay_s,
         )
         super().__init__(motion_noise)
-        self._send_timeout_s = send_timeout_s
+        self._send_timeout_s = seconds("send_timeout_s", send_timeout_s)
+        match_timeout_s = seconds("match_timeout_s", match_timeout_s)
         if session is None:
-            wanted = DEFAULT_ENDPOINT if connect is None else connect
-            endpoints = [wanted] if isinstance(wanted, str) else list(wanted)
+            endpoints = endpoints_of(DEFAULT_ENDPOINT if connect is None else connect)
             link = open_session(
                 endpoints, credentials=credentials, timeout_s=connect_timeout_s
             )
@@ -167,7 +172,10 @@ class Robot(Sampler):
         first: Optional[int] = None
         accepted = 0
         deadline = time.monotonic() + self._send_timeout_s
-        for sample in samples:
+        if not isinstance(samples, Iterable):
+            raise InvalidValue("samples", samples, "expected several Sample")
+        for index, sample in enumerate(samples):
+            one_of(f"samples[{index}]", sample, (Sample,))
             self._warn_of_clocks(sample.body, sample.stamp_ns, stacklevel=3)
             seq = self._run.append(sample.body, sample.stamp_ns, deadline, accepted)
             first = seq if first is None else first
@@ -178,6 +186,8 @@ class Robot(Sampler):
         return range(first, first + accepted)
 
     def _send(self, body: SampleBody, stamp_ns: Optional[int]) -> int:
+        if stamp_ns is not None:
+            stamp_ns = whole("stamp_ns", stamp_ns, STAMP_RANGE)
         self._warn_of_clocks(body, stamp_ns, stacklevel=4)
         return self._run.append(body, stamp_ns, time.monotonic() + self._send_timeout_s, 0)
 
@@ -193,13 +203,14 @@ class Robot(Sampler):
 
         Raises `Timeout` when it takes longer; the samples stay in the window and are sent again.
         """
+        timeout_s = seconds("timeout_s", timeout_s)
         with self._run.changed:
             self._run.check_open()
         missing = self._run.wait_durable(timeout_s)
         if missing:
             raise Timeout(
                 f"{missing} samples of agent {self.agent} are not durable after {timeout_s:g} s"
-                f"{self._run.connection.silence()}"
+                f"{self._run.silence()}"
             )
 
     @property
@@ -237,6 +248,7 @@ class Robot(Sampler):
             seq: Waits for an estimate that includes this sample: the number that the sample's
                 method returned. The estimate may include later samples too, as its own `seq` says.
         """
+        timeout_s = seconds("timeout_s", timeout_s)
         if seq is not None:
             with self._run.changed:
                 latest = self._run.window.next_seq - 1
@@ -248,23 +260,24 @@ class Robot(Sampler):
         return self._run.wait_estimate(seq, timeout_s)
 
     def on_estimate(self, callback: Callable[[Estimate], object]) -> None:
-        """Calls `callback` with every estimate, on the robot's own thread; it should return soon."""
+        """Calls `callback` with every estimate, on the robot's own thread; it should return
+        soon."""
         self._listeners.estimates.append(callback)
 
     # Life
 
     def wait_for_service(self, timeout_s: float = 10.0) -> bool:
         """Waits until the service listens to this robot's samples; says whether it does."""
-        return self._run.wait_heard(timeout_s)
+        return self._run.wait_heard(seconds("timeout_s", timeout_s))
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """Ends the session and the trip under way, flushes for at most `timeout_s`, then closes, also
-        when that fails; a second call does nothing.
+        """Ends the session and the trip under way, flushes for at most `timeout_s`, then closes,
+        also when that fails; a second call does nothing.
 
         Raises `Timeout` when samples are left without acknowledgement: they are lost with this
         process unless they arrived all the same.
         """
-        self._close(timeout_s, _LEAVE_S)
+        self._close(seconds("timeout_s", timeout_s), _LEAVE_S)
 
     def _close(self, timeout_s: float, leave_s: float) -> None:
         run = self._run
@@ -285,7 +298,7 @@ class Robot(Sampler):
         if missing:
             raise Timeout(
                 f"closed with {missing} samples of agent {self.agent} that are not durable"
-                f"{run.connection.silence()}"
+                f"{run.silence()}"
             )
 
     def __enter__(self) -> Robot:

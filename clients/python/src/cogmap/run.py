@@ -15,6 +15,7 @@ from typing import Callable, Optional
 
 import zenoh
 
+from . import bounds
 from .answer import Estimate, Watermark
 from .clock import SessionClock
 from .connection import Connection
@@ -27,6 +28,7 @@ from .errors import (
     Unreachable,
     WindowFull,
 )
+from .fork import zenoh_begins
 from .inbox import Inbox
 from .listeners import Listeners, WeakListeners
 from .problem import Problem
@@ -38,21 +40,6 @@ from .wire import encode_batch, encode_sample
 
 _log = logging.getLogger("cogmap")
 
-#: Estimates that wait for the callback; beyond it the oldest are dropped.
-_ESTIMATES_WAITING_MAX = 4096
-#: Watermarks and refusals that wait; a later one says all that an earlier one did.
-_ANSWERS_WAITING_MAX = 256
-#: How long a full batch waits for its turn on the caller's thread [s]: longer than a put takes, and
-#: far less than one on a congested network.
-_TURN_S = 0.1
-#: How often the arrival of the service is looked for [s].
-_MATCH_POLL_S = 0.01
-#: How long a robot waits at its start for the watermark that the service has of it, and again
-#: before the first batch if none came [s].
-_FIRST_ANSWER_S = 0.5
-_SECOND_ANSWER_S = 0.2
-#: How often is asked whether a problem is over [s].
-_PROBLEM_S = 1.0
 #: How long a dropped robot's samples are flushed in the background [s].
 DROPPED_FLUSH_S = 10.0
 
@@ -81,6 +68,7 @@ class Run:
         ends_session: bool,
         listeners: Listeners,
     ) -> None:
+        zenoh_begins()
         self.space = space
         self.agent = agent
         self.session_id = session_id
@@ -92,6 +80,8 @@ class Run:
         self.watermark: Optional[Watermark] = None
         self.estimate: Optional[Estimate] = None
         self.closing = False
+        # Whether it is the copy of a run in a process that was forked off.
+        self._is_behind = False
         self.superseded_told = False
         self._superseded_by: Optional[int] = None
         self._problem: Optional[Problem] = None
@@ -111,9 +101,9 @@ class Run:
         # Held while a batch is taken and put, so that batches leave in order.
         self._publishing = threading.Lock()
         self._wake = Wake()
-        self._estimates_in = Inbox(Estimate, _ESTIMATES_WAITING_MAX, self._wake)
-        self._watermarks_in = Inbox(Watermark, _ANSWERS_WAITING_MAX, self._wake)
-        self._problems_in = Inbox(Problem, _ANSWERS_WAITING_MAX, self._wake)
+        self._estimates_in = Inbox(Estimate, bounds.ESTIMATES_WAITING_MAX, self._wake)
+        self._watermarks_in = Inbox(Watermark, bounds.ANSWERS_WAITING_MAX, self._wake)
+        self._problems_in = Inbox(Problem, bounds.ANSWERS_WAITING_MAX, self._wake)
         self.connection = Connection(
             zenoh_session,
             owns_session,
@@ -139,7 +129,7 @@ class Run:
 
         Raises `ApiError` when the service knows no such space; the run is closed then.
         """
-        self._ask_and_wait(_FIRST_ANSWER_S)
+        self._ask_and_wait(bounds.FIRST_ANSWER_S)
         if self._problem is not None:
             self.connection.close()
             raise self._problem.error(self.connection.where_asked)
@@ -147,6 +137,13 @@ class Run:
         self._thread.start()
 
     # For the robot
+
+    def silence(self) -> str:
+        """Why nothing may come back, to be added to a message; empty if something has."""
+        silence = self.connection.silence()
+        if not silence and self.watermark is None and self.window.sent:
+            return bounds.UNHEARD
+        return silence
 
     def append(
         self, body: SampleBody, stamp_ns: Optional[int], deadline: float, accepted: int
@@ -170,7 +167,7 @@ class Run:
                 self._wake.set()
                 remaining = deadline - time.monotonic()
                 if remaining <= 0:
-                    raise WindowFull(accepted, self.window.pending, self.connection.silence())
+                    raise WindowFull(accepted, self.window.pending, self.silence())
                 self.changed.wait(remaining)
             now = time.monotonic()
             starts_batch = self.window.sent == self.window.next_seq
@@ -178,7 +175,7 @@ class Run:
             if stamp_ns is not None:
                 self.clock.take(seq, stamp_ns)
             due = self.window.ready(now)
-        if due and self._may_send and self._publishing.acquire(timeout=_TURN_S):
+        if due and self._may_send and self._publishing.acquire(timeout=bounds.TURN_S):
             # A full batch leaves on the caller's thread, so that what one program sends for several
             # robots leaves in that order.
             try:
@@ -191,8 +188,8 @@ class Run:
 
     def end_session(self) -> None:
         """Appends the session's last sample, once, with the condition held: at the stamp of the one
-        before, because the robot's clock may be another than this machine's. A full window is left as
-        it is."""
+        before, because the robot's clock may be another than this machine's. A full window is left
+        as it is."""
         if not self._ends_session or self._is_refused() or not self.window.next_seq:
             return
         self._ends_session = False
@@ -228,7 +225,7 @@ class Run:
                 return self.estimate
             self.check_usable()
             what = "no estimate" if seq is None else f"no estimate of sample {seq}"
-            silence = self.connection.silence()
+            silence = self.silence()
             refused = None if seq is None else self.rejections.reason_of(seq)
             why = f": the sample was refused ({refused.value})" if refused is not None else silence
             raise Timeout(f"{what} of agent {self.agent} within {timeout_s:g} s{why}")
@@ -242,7 +239,7 @@ class Run:
         while not self.connection.is_heard():
             if time.monotonic() >= deadline:
                 return False
-            time.sleep(_MATCH_POLL_S)
+            time.sleep(bounds.MATCH_POLL_S)
         if self.is_own_thread():
             # Only the thread itself ends the wait below.
             return True
@@ -255,6 +252,11 @@ class Run:
 
     def check_open(self) -> None:
         """Raises if no sample can be taken in."""
+        if self._is_behind:
+            raise Closed(
+                f"robot {self.agent} of space {self.space} is that of another process, which "
+                "forked this one off"
+            )
         if self.closing:
             raise Closed(f"robot {self.agent} of space {self.space} is closed")
         self.check_usable()
@@ -280,6 +282,13 @@ class Run:
         at = time.monotonic() + flush_s
         self._stop_at = at if self._stop_at is None else min(at, self._stop_at)
         self._wake.set()
+
+    def stay_behind(self) -> None:
+        """This process was forked off: the run goes on in the other one, and is closed here."""
+        # Another thread may have held the locks, and is not here to release them.
+        self.changed = threading.Condition()
+        self._publishing = threading.Lock()
+        self.closing = self._is_behind = True
 
     def join(self, timeout_s: float) -> bool:
         """Waits for the end of the thread; says whether it came."""
@@ -311,7 +320,7 @@ class Run:
             self._receive()
             self._tell_rejections(at_once=True)
             if self.window.pending and not self.closing:
-                missing, silence = self.window.pending, self.connection.silence()
+                missing, silence = self.window.pending, self.silence()
                 _log.warning(
                     "%s: %d samples are lost, not acknowledged%s", self.agent, missing, silence
                 )
@@ -332,7 +341,7 @@ class Run:
                 return
             self._was_away = not is_heard
             if not self._is_known:
-                self._ask_and_wait(_SECOND_ANSWER_S)
+                self._ask_and_wait(bounds.SECOND_ANSWER_S)
             with self.changed:
                 self._may_send = True
                 self.changed.notify_all()
@@ -346,7 +355,7 @@ class Run:
                 self._is_back = False
                 ask = self.window.rejoin(now) or ask
             if self._problem is not None and now >= self._ask_again_at:
-                self._ask_again_at = now + _PROBLEM_S
+                self._ask_again_at = now + bounds.PROBLEM_S
                 ask = True
         if ask:
             _log.debug("no progress of %s: asking for the watermark", self.agent)
@@ -358,7 +367,7 @@ class Run:
             if self._is_useless():
                 at = None
             elif not self._may_send:
-                return _MATCH_POLL_S
+                return bounds.MATCH_POLL_S
             else:
                 at = self.window.wake_at()
             again = None if self._problem is None else self._ask_again_at

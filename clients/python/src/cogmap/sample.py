@@ -21,7 +21,7 @@ from .limits import (
     SPACING_M_MIN,
     TOUCH_SD_MAX,
 )
-from .scalar import COUNT_RANGE, STAMP_RANGE, counted, label, number, one_of, whole, within
+from .scalar import COUNT_RANGE, STAMP_RANGE, all_of, counted, label, number, one_of, whole, within
 from .vector import (
     IDENTITY,
     Quaternion,
@@ -348,8 +348,9 @@ class LearnObject:
     """What is felt from here on teaches an object."""
 
     TAG: ClassVar[str] = "learn"
-    #: Its name. One that is known is extended if the episode shows how its frame lies in the object's. Without
-    #: a name it is the object that is recognised, or a new one. Nothing can be called `identify`.
+    #: Its name. One that is known is extended if the episode shows how its frame lies in the
+    #: object's. Without a name it is the object that is recognised, or a new one. Nothing can be
+    #: called `identify`.
     name: Optional[str] = None
     #: Contacts within this distance [m] are of one place of a new object.
     spacing_m: float = 0.004
@@ -448,7 +449,8 @@ class SampleBatch:
     def __post_init__(self) -> None:
         _set(self, "session", whole("session", self.session, COUNT_RANGE))
         _set(self, "first_seq", whole("first_seq", self.first_seq, COUNT_RANGE))
-        _set(self, "samples", counted("samples", tuple(self.samples), BATCH_SAMPLES_MAX))
+        samples = all_of("samples", self.samples, (Sample,))
+        _set(self, "samples", counted("samples", samples, BATCH_SAMPLES_MAX))
 
 
 def _check_noise(noise: Optional[MotionNoise]) -> None:

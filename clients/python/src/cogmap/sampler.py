@@ -32,8 +32,8 @@ from .vector import IDENTITY, Quaternion, Vec3
 class Sampler(ABC):
     """One method for each kind of sample.
 
-    Each returns the sample's sequence number. `stamp_ns` is the time on the sensor's clock; without it,
-    the time of the call, though never before an earlier stamp of the session.
+    Each returns the sample's sequence number. `stamp_ns` is the time on the sensor's clock; without
+    it, the time of the call, though never before an earlier stamp of the session.
 
     Any iterable of numbers is a vector, a numpy array included; the messages turn it into a tuple
     of floats. A value that the service would refuse for good raises `InvalidValue`, and no sample

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 import unicodedata
-from typing import Tuple, TypeVar
+from typing import Any, Iterable, Tuple, TypeVar
 
 from .errors import InvalidValue
 from .limits import LABEL_BYTES_MAX
@@ -54,6 +54,23 @@ def within(name: str, value: float, low: float, high: float) -> float:
     )
 
 
+def seconds(name: str, value: float) -> float:
+    """`value` as a time to wait [s]. What would never end is none, nor is what locks cannot wait
+    for."""
+    return within(name, value, 0.0, _SECONDS_MAX)
+
+
+def positive_seconds(name: str, value: float) -> float:
+    """The same, and more than none at all."""
+    if not seconds(name, value) > 0:
+        raise InvalidValue(name, value, "expected more than zero seconds")
+    return float(value)
+
+
+#: Some thirty years.
+_SECONDS_MAX = 1e9
+
+
 def text(name: str, value: str) -> str:
     """`value`, if it is a text that UTF-8 can carry."""
     if not isinstance(value, str):
@@ -81,6 +98,18 @@ def counted(name: str, items: Tuple[_T, ...], most: int) -> Tuple[_T, ...]:
     if not 1 <= len(items) <= most:
         raise InvalidValue(name, items, f"expected 1 to {most} of them", str(len(items)))
     return items
+
+
+def all_of(name: str, items: Iterable[object], kinds: Tuple[type, ...]) -> Tuple[Any, ...]:
+    """`items` as a tuple, if each is one of `kinds`."""
+    try:
+        taken = tuple(items)
+    except TypeError as error:
+        expected = " or ".join(kind.__name__ for kind in kinds)
+        raise InvalidValue(name, items, f"expected several {expected}") from error
+    for index, item in enumerate(taken):
+        one_of(f"{name}[{index}]", item, kinds)
+    return taken
 
 
 def one_of(name: str, value: object, kinds: Tuple[type, ...]) -> None:

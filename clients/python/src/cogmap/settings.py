@@ -32,8 +32,9 @@ Recruitment = Union[Novelty, Bernoulli]
 
 @dataclass(frozen=True)
 class NoiseSettings:
-    """What odometry gets wrong, as standard deviations: noise of motion that carries none, which grows
-    with the square root of the path, and errors that last, which are learned for each agent."""
+    """What odometry gets wrong, as standard deviations: noise of motion that carries none, which
+    grows with the square root of the path, and errors that last, which are learned for each
+    agent."""
 
     #: Of the translation, per square root of metre travelled [m/√m].
     translation_sd_per_sqrt_m: float
@@ -83,8 +84,8 @@ class SpaceSettings:
     legs_max: int
     #: Most moments of all agents that are remembered, so that the past can be smoothed.
     anchors_max: int
-    #: After this many samples of the space, a use counts half as much for the strength of a place or
-    #: trip.
+    #: After this many samples of the space, a use counts half as much for the strength of a place
+    #: or trip.
     strength_half_life_samples: int
     #: Closest two poses of a stored trajectory [s].
     trajectory_interval_s: float

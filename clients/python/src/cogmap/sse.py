@@ -16,8 +16,8 @@ class ServerSentEvent(NamedTuple):
 
 
 def server_sent_events(lines: Iterable[bytes]) -> Iterator[ServerSentEvent]:
-    """The events of a stream. Comments (keep-alives) and other fields are passed over, and so are events
-    without data and one that the end of the stream cuts off."""
+    """The events of a stream. Comments (keep-alives) and other fields are passed over, and so are
+    events without data and one that the end of the stream cuts off."""
     data: List[str] = []
     event, last_id = "message", None
     for raw in lines:

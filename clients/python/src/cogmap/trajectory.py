@@ -34,8 +34,8 @@ class Trajectory:
     session: int
     #: Frame; always `map`.
     frame: str
-    #: `causal`: each pose as it was known when its sample was applied. `refined`: by all that has been
-    #: seen since.
+    #: `causal`: each pose as it was known when its sample was applied. `refined`: by all that has
+    #: been seen since.
     kind: str
     #: Poses, oldest first.
     poses: Tuple[StampedPose, ...]

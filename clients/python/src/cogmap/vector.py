@@ -28,9 +28,11 @@ IDENTITY: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 def floats(name: str, values: Iterable[float], length: int) -> Tuple[float, ...]:
     """`values` as a tuple of `length` floats."""
+    if isinstance(values, (str, bytes)):
+        raise InvalidValue(name, values, f"expected {length} numbers")
     try:
         numbers = tuple(float(value) for value in values)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidValue(name, values, f"expected {length} numbers") from error
     if len(numbers) != length:
         raise InvalidValue(name, values, f"expected {length} numbers", f"{len(numbers)} of them")
@@ -77,8 +79,8 @@ def _of_unit_norm(name: str, numbers: Tuple[float, ...], what: str) -> Tuple[flo
 
 
 def quaternion_from_yaw(yaw_rad: float) -> Quaternion:
-    """The unit quaternion `[x, y, z, w]` of a turn about the z axis, left positive [rad]: all that a
-    robot on a floor needs."""
+    """The unit quaternion `[x, y, z, w]` of a turn about the z axis, left positive [rad]: all that
+    a robot on a floor needs."""
     half = finite("yaw_rad", yaw_rad) / 2
     return (0.0, 0.0, math.sin(half), math.cos(half))
 

@@ -1,18 +1,17 @@
 """The window of unacknowledged samples: numbering, acknowledgement, and what to send again when.
 
-Pure logic: bytes and times come in as arguments (seconds of any clock that never runs backwards), so
-that every loss and delay can be tested without a network. The rules:
+Pure logic: bytes and times come in as arguments (seconds of any clock that never runs backwards),
+so that every loss and delay can be tested without a network. The rules:
 
 * A sample is held until a watermark covers it.
 * A *gap* in a watermark is sent again at once, the same gap at most every `gap_interval_s`.
 * A watermark whose `applied` has fallen back tells of a restarted service: everything from the
   watermark on is sent again, as after a silence.
-* When samples are outstanding and the watermark has not moved for `silence_s`, the watermark is asked
-  for; if it does not move within `grace_s` either, everything from the watermark on is sent again. The
-  wait doubles from time to time, up to `silence_max_s`, until the watermark moves.
+* When samples are outstanding and the watermark has not moved for `silence_s`, the watermark is
+  asked for; if it does not move within `grace_s` either, everything from the watermark on is sent
+  again. The wait doubles from time to time, up to `silence_max_s`, until the watermark moves.
 * When the service is back after it was gone, the watermark is asked for at once, and what it does
-not cover
-  is sent again as soon as it comes, or after `grace_s`.
+  not cover is sent again as soon as it comes, or after `grace_s`.
 """
 
 from __future__ import annotations
@@ -68,8 +67,8 @@ class Outgoing:
 class Window:
     """Samples from the watermark on, by sequence number.
 
-    `durable <= sent <= next_seq`: below `durable` a sample is acknowledged and gone, below `sent` it
-    was sent at least once, from `next_seq` on it does not exist yet.
+    `durable <= sent <= next_seq`: below `durable` a sample is acknowledged and gone, below `sent`
+    it was sent at least once, from `next_seq` on it does not exist yet.
     """
 
     #: Repetitions go in batches of at least this size, whatever the size of first batches.
@@ -268,8 +267,8 @@ class Window:
         return True
 
     def watch(self, now: float) -> bool:
-        """Looks for silence. True: ask for the watermark now. When asking has not helped, everything
-        outstanding is scheduled."""
+        """Looks for silence. True: ask for the watermark now. When asking has not helped,
+        everything outstanding is scheduled."""
         if self._gap_again and now >= self._gap_at + self._limits.gap_interval_s:
             self._repeat_gap(self._gap, now)
         if self._durable == self._sent or self._repeat:
@@ -287,7 +286,8 @@ class Window:
         return False
 
     def wake_at(self) -> Optional[float]:
-        """When `ready` or `watch` may next have something to do; `None` while all is acknowledged."""
+        """When `ready` or `watch` may next have something to do; `None` while all is
+        acknowledged."""
         times = []
         if self._repeat or self._sent < self._hurry_below:
             return float("-inf")

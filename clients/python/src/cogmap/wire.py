@@ -1,10 +1,10 @@
 """Dataclasses to and from the wire: one place for every message.
 
 The wire form is what the Rust side's serde derives give: fields by name, an enum as a map with one
-entry, `{"velocity": {...}}`. A class says with `TAG` that it is such a variant, with `NEWTYPE` that the
-variant holds a bare value, with `WIRE_NAMES` and `WIRE_ORDER` where its fields differ from the wire.
-`to_wire` and `from_wire` convert to and from plain data; `encode` writes
-CBOR with each float in the shortest form that keeps its value, byte for byte as the Rust side does.
+entry, `{"velocity": {...}}`. A class says with `TAG` that it is such a variant, with `NEWTYPE` that
+the variant holds a bare value, with `WIRE_NAMES` and `WIRE_ORDER` where its fields differ from the
+wire. `to_wire` and `from_wire` convert to and from plain data; `encode` writes CBOR with each float
+in the shortest form that keeps its value, byte for byte as the Rust side does.
 
 Readers are lenient where the protocol evolves by addition: unknown fields are ignored, missing ones
 take their default, unknown event kinds become `UnknownKind`.
@@ -205,8 +205,8 @@ def encode_batch(session: int, first_seq: int, samples: Tuple[bytes, ...]) -> by
 
 
 def _encode(value: Any) -> bytes:
-    # cbor2's canonical mode writes the shortest floats but sorts the keys of maps, and the Rust side
-    # keeps the order of the fields: so maps are written here and everything else by cbor2.
+    # cbor2's canonical mode writes the shortest floats but sorts the keys of maps, and the Rust
+    # side keeps the order of the fields: so maps are written here and everything else by cbor2.
     if isinstance(value, dict):
         parts: List[bytes] = [_head(5, len(value))]
         for key, item in value.items():
@@ -246,6 +246,6 @@ def decode(cls: Type[T], data: bytes, encoding: str = CBOR) -> T:
             raise WireError(f"unknown encoding {encoding!r}")
     except WireError:
         raise
-    except Exception as error:  # Any failure of a parser on foreign bytes is the same to the caller.
+    except Exception as error:  # Any failure of a parser on foreign bytes is one to the caller.
         raise WireError(f"malformed {essence}: {error}") from error
     return from_wire(cls, value)
