@@ -213,6 +213,7 @@ mod tests {
         let beside = || Beside {
             recorders: Vec::new(),
             events: EventRing::since(0),
+            episodes: EndedEpisodes::default(),
         };
         let (jobs, receiver) = channel();
         let health = Arc::new(Health::default());
