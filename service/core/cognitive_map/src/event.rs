@@ -4,10 +4,10 @@ use nalgebra::Point3;
 
 use crate::input::Label;
 use crate::input::{AgentId, SkipReason};
-use crate::landmark::LandmarkId;
-use crate::percept::ChannelId;
-use crate::place::PlaceId;
-use crate::trip::{TripEnd, TripId};
+use crate::memory::landmark::LandmarkId;
+use crate::memory::percept::ChannelId;
+use crate::memory::place::PlaceId;
+use crate::memory::trip::{TripEnd, TripId};
 use object_recognition::{ObjectId, Posterior};
 
 /// One event.

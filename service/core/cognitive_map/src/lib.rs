@@ -1,37 +1,31 @@
 //! The pure core of cogmap: a cognitive map as a deterministic fold over a journal of samples.
 
-pub mod chronicle;
-pub mod estimation;
+pub mod estimator;
+pub mod keyframes;
 
 mod agent;
-mod cognitive_map;
 mod event;
+mod fold;
 mod input;
-mod landmark;
-mod object;
-mod percept;
-mod place;
-mod recall;
+mod memory;
 mod settings;
-mod strength;
-mod trip;
 
 pub use agent::{Agent, Status};
-pub use chronicle::Guess;
-pub use cognitive_map::{
+pub use event::{Event, EventKind};
+pub use fold::{
     CheckpointPage, CognitiveMap, CorruptCheckpoint, Localization, Predicted, Prediction,
 };
-pub use event::{Event, EventKind};
 pub use input::{
     AgentId, Descriptor, InvalidSample, Label, Lesson, Level, Marker, Motion, ObjectMark,
     PoseNoise, RangeBearing, Record, Relation, RelativePose, RelativePosition, Sample, SampleBody,
     Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel, TouchNoise,
 };
-pub use landmark::{Landmark, LandmarkId};
-pub use object::{Identified, KnownObject};
-pub use percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
-pub use place::{Place, PlaceId};
-pub use recall::{RecallCue, Recalled, Rivals};
+pub use keyframes::Guess;
+pub use memory::landmark::{Landmark, LandmarkId};
+pub use memory::object::{Identified, KnownObject};
+pub use memory::percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
+pub use memory::place::{Place, PlaceId};
+pub use memory::recall::{RecallCue, Recalled, Rivals};
+pub use memory::trip::{Leg, Trip, TripEnd, TripId};
 pub use settings::{InvalidSettings, Recruitment, Settings, SettingsValues};
 pub use state::{Digest, InvalidDigest};
-pub use trip::{Leg, Trip, TripEnd, TripId};

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use cogmap_lab::mrclam::Mrclam;
 use cogmap_worlds::robot_name;
-use cognitive_map::estimation::{Estimator, Parameters};
+use cognitive_map::estimator::{Estimator, Parameters};
 use cognitive_map::{Label, Sample, SampleBody, Target};
 use nalgebra::Vector2;
 use trajectory::{Alignment, StampedPose, Trajectory, ate_rmse_m};

@@ -1,7 +1,7 @@
 //! Walks through the room of the second experiment.
 
 use cogmap_worlds::{ObstacleWorld, Odometer, OdometryNoise, PureWalker, Step, Walker};
-use cognitive_map::estimation::{Estimator, Parameters};
+use cognitive_map::estimator::{Estimator, Parameters};
 use cognitive_map::{Label, PoseNoise, RangeBearing, Relation, Sample, SampleBody, StartPose};
 use geometry::se3;
 use nalgebra::{Isometry3, Vector6};

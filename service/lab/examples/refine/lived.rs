@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use cognitive_map::chronicle::{Chronicle, ChronicleSettings, Moment, Refined};
-use cognitive_map::estimation::{Estimator, Parameters};
+use cognitive_map::estimator::{Estimator, Parameters};
+use cognitive_map::keyframes::{KeyframeGraph, KeyframeSettings, Moment, Refined};
 use cognitive_map::{Sample, SampleBody, Target};
 use trajectory::{Alignment, Span, StampedPose, Trajectory, ate_rmse_m};
 
 /// A team as it lives.
 pub(crate) struct Lived {
     pub(crate) estimator: Estimator,
-    pub(crate) chronicle: Chronicle,
+    pub(crate) chronicle: KeyframeGraph,
     agents: BTreeMap<u32, u32>,
     names: BTreeMap<String, u32>,
     seqs: BTreeMap<u32, u64>,
@@ -22,13 +22,13 @@ pub(crate) struct Lived {
 
 impl Lived {
     pub(crate) fn new(anchors_max: Option<u32>) -> Self {
-        let mut settings = ChronicleSettings::default();
+        let mut settings = KeyframeSettings::default();
         if let Some(anchors_max) = anchors_max {
             settings.anchors_max = anchors_max;
         }
         Self {
             estimator: Estimator::new(Parameters::default()),
-            chronicle: Chronicle::new(settings),
+            chronicle: KeyframeGraph::new(settings),
             agents: BTreeMap::new(),
             names: BTreeMap::new(),
             seqs: BTreeMap::new(),

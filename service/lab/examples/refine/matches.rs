@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use cogmap_lab::tuc::{Match, Tuc};
-use cognitive_map::chronicle::{Chronicle, ChronicleSettings, Moment};
-use cognitive_map::estimation::Calibrated;
+use cognitive_map::estimator::Calibrated;
+use cognitive_map::keyframes::{KeyframeGraph, KeyframeSettings, Moment};
 use cognitive_map::{PoseNoise, Relation, RelativePose};
 use nalgebra::Isometry3;
 use pose_graph::Link;
@@ -40,7 +40,7 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
         let after = stamps.partition_point(|&stamp| stamp < stamp_ns);
         after.min(stamps.len() - 1)
     };
-    let mut chronicle = Chronicle::new(ChronicleSettings::default());
+    let mut chronicle = KeyframeGraph::new(KeyframeSettings::default());
     let agent = chronicle.enrol();
     chronicle.found(agent);
     let (mut pose, mut alone) = (Isometry3::identity(), Isometry3::identity());
@@ -149,7 +149,7 @@ fn matches_of(set: &Tuc, share: f64) -> (Vec<Match>, usize) {
 }
 
 /// The graph in the plane, as g2o writes it.
-fn text(chronicle: &Chronicle) -> String {
+fn text(chronicle: &KeyframeGraph) -> String {
     use std::fmt::Write as _;
 
     let map = chronicle.experience_map();

@@ -10,11 +10,11 @@ pub(crate) use body::Body;
 pub(crate) use membership::Membership;
 pub use status::Status;
 
-use crate::estimation::Evidence;
+use crate::estimator::Evidence;
 use crate::input::Label;
-use crate::object::Episode;
-use crate::place::PlaceId;
-use crate::trip::{LegUnderWay, Recorder, TripId};
+use crate::memory::object::Episode;
+use crate::memory::place::PlaceId;
+use crate::memory::trip::{LegUnderWay, Recorder, TripId};
 use grid::{GridModules, GridState, octant};
 use state::state_of_struct;
 

@@ -1,0 +1,157 @@
+//! A pose that is told from outside, by an estimate that may know the same samples.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix6, SMatrix, Vector6};
+
+use super::covariance::Block;
+use super::frame::Frame;
+use super::joint::Estimator;
+use super::parameters::Parameters;
+use geometry::{PoseCovariance, is_somewhere, se3};
+
+/// Steps of the search for the weight.
+const WEIGHT_STEPS: u32 = 16;
+/// Least information that a direction gains, as a part of what is known of it.
+const GAIN_MIN: f64 = 0.02;
+/// Most that it gains.
+const GAIN_MAX: f64 = 1e9;
+/// Least variance of a told component, as a part of what is known of it.
+const VARIANCE_MIN: f64 = 1e-9;
+
+impl Estimator {
+    /// Takes in what an outside estimate says of an agent's pose in its frame, with the covariance of its
+    /// error (right perturbation); answers whether it counts. One that lies too far off does not.
+    ///
+    /// How its error is correlated with that of the present estimate is not known: both may rest upon the
+    /// same samples. The pose becomes the covariance intersection (Julier & Uhlmann 1997) of the two, and
+    /// everything correlated with it follows; to say the same twice adds nothing.
+    pub fn fix(&mut self, agent: u32, pose: &Isometry3<f64>, covariance: &PoseCovariance) -> bool {
+        self.begin();
+        let Some(number) = self.frame_of(agent) else {
+            return false;
+        };
+        if !is_somewhere(&pose.translation.vector) {
+            return false;
+        }
+        let told = Told { pose, covariance };
+        if let Some(apart) = &mut self.seat_mut(agent).apart {
+            let traveller = Arc::clone(&apart.traveller);
+            let mut alone = Frame::default();
+            alone.join(agent, traveller);
+            let is_taken = alone.fix(0, &told, &self.parameters);
+            if let Some(traveller) = alone.leave(agent)
+                && is_taken
+                && let Some(apart) = &mut self.seat_mut(agent).apart
+            {
+                apart.traveller = traveller;
+                // The outside estimate may rest upon what the others saw.
+                apart.was_joint = true;
+            }
+            return is_taken;
+        }
+        let Some(frame) = self.frames.get_mut(number, 0) else {
+            return false;
+        };
+        let is_taken = frame
+            .member(agent)
+            .is_some_and(|index| frame.fix(index, &told, &self.parameters));
+        self.sweep(number);
+        is_taken
+    }
+}
+
+/// What is told of a pose.
+struct Told<'a> {
+    pose: &'a Isometry3<f64>,
+    covariance: &'a PoseCovariance,
+}
+
+impl Frame {
+    /// Takes in a told pose of a member; answers whether it counts.
+    ///
+    /// With the member's own P and the told Σ, in units of the own deviations, and the innovation ν:
+    ///
+    /// ```text
+    /// ω of the largest det(ω P⁻¹ + (1 − ω) Σ⁻¹)      G = (1 − ω) (Σ⁻¹ − P⁻¹) = V Λ Vᵀ
+    /// a measurement Vᵀ ξ = Λ⁻¹ Vᵀ (1 − ω) Σ⁻¹ ν of covariance Λ⁻¹, where Λ is large enough
+    /// ```
+    fn fix(&mut self, index: usize, told: &Told<'_>, parameters: &Parameters) -> bool {
+        self.flush();
+        let member = &self.members[index];
+        let mover = member.mover();
+        let own: Matrix6<f64> = mover.covariance().fixed_view::<6, 6>(0, 0).into_owned();
+        let (linear, angular) = se3::log(&mover.pose.inv_mul(told.pose));
+        let innovation = Vector6::from_fn(|k, _| if k < 3 { linear[k] } else { angular[k - 3] });
+        // What is known without error is left alone, e.g. the height of a robot on a floor.
+        let scale = own.diagonal().map(|variance| {
+            let is_open = variance.is_normal() && variance > 0.0;
+            if is_open {
+                variance.sqrt().recip()
+            } else {
+                0.0
+            }
+        });
+        let unit = |matrix: &Matrix6<f64>, floor: f64| {
+            Matrix6::from_fn(|row, column| {
+                let entry = matrix[(row, column)] * scale[row] * scale[column];
+                match (row == column, scale[row] == 0.0) {
+                    (true, true) => 1.0,
+                    (true, false) => entry + floor,
+                    _ => entry,
+                }
+            })
+        };
+        let (own, others) = (
+            unit(&own, VARIANCE_MIN),
+            unit(told.covariance.matrix(), VARIANCE_MIN),
+        );
+        let innovation = innovation.component_mul(&scale);
+        // Of two errors that may be correlated in any way, the variances' sum counts twice.
+        let is_near = (0..6).all(|k| {
+            let expected = 2.0 * (own[(k, k)] + others[(k, k)]);
+            innovation[k].powi(2) <= parameters.gate.powi(2) * expected
+        });
+        let inverses = own.cholesky().zip(others.cholesky());
+        let Some((own, others)) = inverses.map(|(own, others)| (own.inverse(), others.inverse()))
+        else {
+            return false;
+        };
+        let weights = (0..=WEIGHT_STEPS).map(|step| f64::from(step) / f64::from(WEIGHT_STEPS));
+        let known = |weight: f64| (own * weight + others * (1.0 - weight)).determinant();
+        // Of equal ones the last, so that what adds nothing moves nothing.
+        let weight = weights.max_by(|a, b| known(*a).total_cmp(&known(*b)));
+        let share = 1.0 - weight.unwrap_or(1.0);
+        let gain = (others - own) * share;
+        let gain = (gain + gain.transpose()) * 0.5;
+        if !is_near || !gain.iter().all(|entry| entry.is_finite()) {
+            return false;
+        }
+        let gain = gain.symmetric_eigen();
+        let axes = gain.eigenvectors.transpose();
+        let pull = axes * others * innovation * share;
+        let mut jacobian = axes * Matrix6::from_diagonal(&scale);
+        let mut residual = Vector6::zeros();
+        let mut variance = Vector6::repeat(1.0);
+        for (k, &information) in gain.eigenvalues.iter().enumerate() {
+            if information < GAIN_MIN {
+                jacobian.row_mut(k).fill(0.0);
+            } else {
+                residual[k] = pull[k] / information;
+                variance[k] = 1.0 / information.min(GAIN_MAX);
+            }
+        }
+        let block = Block {
+            offset: member.offset,
+            width: 6,
+            jacobian,
+        };
+        let projection = self.covariance.project(&[block]);
+        let s = projection.spread + SMatrix::from_diagonal(&variance);
+        let all = self.covariance.all();
+        if let Some(correction) = self.covariance.update(projection, &residual, &s, &all) {
+            self.correct(index, &correction, parameters);
+        }
+        true
+    }
+}

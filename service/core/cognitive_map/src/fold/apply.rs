@@ -1,0 +1,283 @@
+//! What a sample does to the map.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, Vector6};
+
+use crate::agent::Agent;
+use crate::estimator::Estimator;
+use crate::event::{Event, EventKind};
+use crate::input::{AgentId, SkipReason};
+use crate::input::{Label, Marker, Sample, SampleBody, StartPose};
+use crate::keyframes::KeyframeGraph;
+use crate::memory::landmark::LandmarkMap;
+use crate::memory::object::ObjectMemory;
+use crate::memory::percept::PerceptMap;
+use crate::memory::place::{PlaceId, PlaceMap};
+use crate::memory::strength::Clock;
+use crate::memory::trip::{TripEnd, TripMap, interval_s};
+use crate::settings::Settings;
+use grid::GridModules;
+
+/// What a restart between two sessions adds to the uncertainty of a pose: 1 m and 0.5 rad about
+/// each axis. A robot usually restarts where it stopped, but nobody knows.
+const RESTART_SD: [f64; 6] = [1.0, 1.0, 1.0, 0.5, 0.5, 0.5];
+
+/// The map, open for one record of one agent.
+pub(super) struct Fold<'a> {
+    pub(super) settings: &'a Settings,
+    pub(super) modules: &'a GridModules,
+    pub(super) revision: u64,
+    pub(super) now: Clock,
+    pub(super) framed: &'a mut bool,
+    pub(super) places: &'a mut PlaceMap,
+    pub(super) trips: &'a mut TripMap,
+    pub(super) landmarks: &'a mut LandmarkMap,
+    pub(super) percepts: &'a mut PerceptMap,
+    pub(super) objects: &'a mut ObjectMemory,
+    pub(super) estimator: &'a mut Estimator,
+    pub(super) chronicle: &'a mut KeyframeGraph,
+    pub(super) names: &'a BTreeMap<Label, AgentId>,
+    pub(super) agent_id: AgentId,
+    pub(super) agent: &'a mut Agent,
+    /// The places that are held for the agent.
+    pub(super) held: [Option<PlaceId>; 2],
+    /// Stamp of the events.
+    pub(super) stamp_ns: i64,
+    pub(super) events: &'a mut Vec<Event>,
+}
+
+impl Fold<'_> {
+    /// Lets go of a place and a trip that have been forgotten since the agent's record before this.
+    pub(super) fn notice_what_is_gone(&mut self) {
+        if let Some((place, _)) = self.agent.place
+            && self.places.get(place).is_none()
+        {
+            self.agent.place = None;
+            self.agent.asked_at = None;
+        }
+        if let Some(trip) = self.agent.recorder.trip
+            && self.trips.get(trip).is_none()
+        {
+            self.agent.recorder.trip = None;
+        }
+    }
+
+    /// Begins a session if it is a new one. `stamp_ns` is that of the sample that begins it.
+    pub(super) fn enter_session(&mut self, session: u64, stamp_ns: Option<i64>) {
+        if self.agent.session == Some(session) {
+            return;
+        }
+        if let Some(stamp_ns) = stamp_ns {
+            self.stamp_ns = stamp_ns;
+        }
+        self.end_trip(TripEnd::SessionEnd);
+        self.end_episode();
+        let before = self.agent.session.replace(session);
+        self.agent.next_seq = 0;
+        self.agent.stamp_ns = None;
+        self.agent.still_since = None;
+        self.agent.body.restart();
+        if before.is_some() {
+            let sd = Vector6::from(RESTART_SD);
+            self.estimator.restart(self.agent_id.0, &sd);
+            self.chronicle.restart(self.agent_id.0, &sd);
+        }
+        self.emit(EventKind::SessionStarted { session });
+    }
+
+    /// Skips the samples below `to` that are neither applied nor skipped yet, if any.
+    pub(super) fn skip(&mut self, to: u64, reason: SkipReason) {
+        let from = self.agent.next_seq;
+        if from >= to {
+            return;
+        }
+        self.agent.next_seq = to;
+        // Motion was lost, so nothing measured joins what came before to what comes after.
+        if reason == SkipReason::Lost {
+            self.end_trip(TripEnd::Gap);
+            self.end_episode();
+        }
+        self.emit(EventKind::SamplesSkipped { from, to, reason });
+    }
+
+    /// Applies the next sample.
+    pub(super) fn sample(&mut self, seq: u64, sample: &Sample) {
+        self.stamp_ns = sample.stamp_ns;
+        let before = self.agent.stamp_ns.replace(sample.stamp_ns);
+        self.agent.next_seq = seq + 1;
+        if before
+            .is_some_and(|before| interval_s(before, sample.stamp_ns) > self.settings.trip_gap_s)
+        {
+            self.end_trip(TripEnd::Gap);
+        }
+        match &sample.body {
+            SampleBody::Motion(motion) => return self.motion(seq, motion),
+            SampleBody::Level(level) => self.level(level),
+            SampleBody::Descriptor(descriptor) => self.descriptor(descriptor),
+            SampleBody::Sighting(sighting) => self.sighting(sighting),
+            SampleBody::StartPose(start) => self.start_pose(start),
+            SampleBody::Marker(marker) => self.marker(marker),
+            SampleBody::Object(mark) => self.object_mark(mark),
+            SampleBody::SessionEnd => {
+                self.end_trip(TripEnd::SessionEnd);
+                self.end_episode();
+            }
+        }
+        self.rest();
+    }
+
+    /// The agent was told where it stands.
+    fn start_pose(&mut self, start: &StartPose) {
+        self.end_trip(TripEnd::StartPose);
+        self.estimator.start_pose(self.agent_id.0, start);
+        if !self.estimator.is_in_map(self.agent_id.0) {
+            // One that says that it may be anywhere has said nothing.
+            self.remember_who_was_set_aside();
+            return;
+        }
+        self.chronicle.start_pose(&self.moment(), start);
+        self.chronicle.end_search(self.agent_id.0);
+        let seq = self.agent.next_seq.saturating_sub(1);
+        self.chronicle.dispel_doubt(self.agent_id.0, seq);
+        *self.framed = true;
+        self.stand();
+    }
+
+    /// The agent passed a marker.
+    fn marker(&mut self, marker: &Marker) {
+        self.emit(EventKind::MarkerPassed {
+            label: marker.label.clone(),
+        });
+        if marker.ends_trip {
+            self.end_trip(TripEnd::Marker);
+        }
+    }
+
+    /// Lets the first agent that does something define the `map` frame, by the identity at which it
+    /// stands.
+    pub(super) fn define_frame(&mut self) {
+        if !*self.framed {
+            *self.framed = true;
+            self.estimator.found(self.agent_id.0);
+            self.chronicle.found(self.agent_id.0);
+            self.agent.placed = true;
+        }
+    }
+
+    /// Ends the trip and the leg under way, if any; the next motion starts anew from the place that
+    /// answers then. The unfinished leg leads to no place and is dropped.
+    pub(super) fn end_trip(&mut self, reason: TripEnd) {
+        self.agent.recorder.leg = None;
+        self.agent.asked_at = None;
+        self.close_trip(reason);
+    }
+
+    /// Ends the trip under way, if any, but not the leg.
+    pub(super) fn close_trip(&mut self, reason: TripEnd) {
+        let Some(trip) = self.agent.recorder.trip.take() else {
+            return;
+        };
+        if let Some(legs) = self.trips.end(trip, reason, self.revision) {
+            self.emit(EventKind::TripEnded { trip, legs, reason });
+        }
+    }
+
+    /// Ends the record: the agent is where the estimate has it now, by all that has been seen until now.
+    pub(super) fn finish(&mut self) {
+        self.believe_matches();
+        self.move_places();
+        self.follow();
+        self.hold();
+    }
+
+    /// Brings the agent to where the estimate has it. One that turns out to lie in the map begins there
+    /// anew.
+    pub(super) fn follow(&mut self) {
+        let number = self.agent_id.0;
+        if !self.estimator.is_in_map(number) && self.agent.placed {
+            self.fall();
+        }
+        if self.estimator.is_in_map(number) && !self.agent.placed {
+            self.end_trip(TripEnd::StartPose);
+            self.stand();
+            let position = Point3::from(self.agent.body.in_map().translation.vector);
+            self.emit(EventKind::AgentPlaced { position });
+            return;
+        }
+        let Some(pose) = self.estimator.in_frame(number) else {
+            return;
+        };
+        let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
+        let events = &mut *self.events;
+        let entered = |module, reference| {
+            events.extend(cell_entered(placed, agent, stamp_ns, module, reference));
+        };
+        self.agent.body.follow(pose, self.modules, entered);
+        if let Some(evidence) = self.estimator.evidence(number) {
+            self.agent.evidence = *evidence;
+        }
+    }
+
+    /// Puts the agent where the estimate has it, without a way there.
+    pub(super) fn stand(&mut self) {
+        if let Some(pose) = self.estimator.in_frame(self.agent_id.0) {
+            self.agent.body.place(pose, self.modules);
+        }
+        self.agent.placed = true;
+        self.agent.place = None;
+        self.agent.entered = None;
+        self.agent.still_since = None;
+    }
+
+    /// Takes the agent out of the map, for it was set aside: it begins anew, as one that has just
+    /// joined.
+    fn fall(&mut self) {
+        self.end_trip(TripEnd::Gap);
+        self.end_episode();
+        self.stand();
+        self.agent.placed = false;
+    }
+
+    /// Holds the places that the agent needs now, and releases those that it no longer does.
+    pub(super) fn hold(&mut self) {
+        let needed = self.agent.holds();
+        if needed == self.held {
+            return; // as most often
+        }
+        for place in needed.into_iter().flatten() {
+            self.places.hold(place);
+        }
+        for place in self.held.into_iter().flatten() {
+            self.places.release(place);
+        }
+        self.held = needed;
+    }
+
+    /// Appends an event.
+    pub(super) fn emit(&mut self, kind: EventKind) {
+        self.events.push(Event {
+            agent: self.agent_id,
+            stamp_ns: self.stamp_ns,
+            kind,
+        });
+    }
+}
+
+/// The event that a grid module came into a new lattice cell. Of an agent that is not placed, the cells
+/// are those of no map.
+pub(super) fn cell_entered(
+    placed: bool,
+    agent: AgentId,
+    stamp_ns: i64,
+    module: usize,
+    reference: [i64; 3],
+) -> Option<Event> {
+    let module = u8::try_from(module).ok().filter(|_| placed)?;
+    let kind = EventKind::CellEntered { module, reference };
+    Some(Event {
+        agent,
+        stamp_ns,
+        kind,
+    })
+}

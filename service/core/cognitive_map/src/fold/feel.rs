@@ -1,0 +1,183 @@
+//! What levels and descriptors do to the map.
+
+use nalgebra::Point3;
+
+use super::apply::Fold;
+use super::motion::ANSWER_MIN;
+use crate::agent::Status;
+use crate::event::EventKind;
+use crate::input::{Descriptor, Level};
+use crate::keyframes::{Relocalised, Viewed};
+use crate::memory::percept::Compared;
+use crate::memory::place::{PlaceId, confidence};
+use crate::memory::trip::TripEnd;
+use geometry::PoseCovariance;
+
+/// An agent that is found more than so many deviations from where it was thought to be did not come there by itself.
+const DRIFTED: f64 = 3.0;
+/// How far from where it was believed to be an agent may be that was carried off, in deviations from which on it is lost.
+const ANYWHERE: f64 = 10.0;
+
+impl Fold<'_> {
+    /// A level was felt, where the sensor is.
+    pub(super) fn level(&mut self, level: &Level) {
+        self.agent.percepts += 1;
+        self.touch(|episode, objects| episode.level(level, objects));
+        let sensor = self.agent.body.in_map() * Point3::from(*level.offset_m());
+        let Some((place, weight)) = self.answering(&sensor) else {
+            return;
+        };
+        let compared =
+            self.percepts
+                .feel_level(level.channel(), level.value(), place, weight, self.revision);
+        self.compared(place, compared);
+    }
+
+    /// A descriptor was seen, where the body is.
+    pub(super) fn descriptor(&mut self, descriptor: &Descriptor) {
+        self.agent.percepts += 1;
+        self.touch(|episode, objects| episode.descriptor(descriptor, objects));
+        self.look_back(descriptor);
+        let body = self.agent.body.in_map().translation.vector.into();
+        let Some((place, weight)) = self.answering(&body) else {
+            return;
+        };
+        let revision = self.revision;
+        let compared = self
+            .percepts
+            .feel_descriptor(descriptor, place, weight, revision);
+        self.compared(place, compared);
+    }
+
+    /// Remembers what an agent of the map saw, and finds out whether it has come where something like it was seen. One that
+    /// does not know where it is finds that out.
+    fn look_back(&mut self, descriptor: &Descriptor) {
+        let number = self.agent_id.0;
+        let Some((_, covariance)) = self.estimator.pose(number) else {
+            return;
+        };
+        let Some(in_odom) = self.estimator.in_odom(number) else {
+            return;
+        };
+        let viewed = Viewed {
+            descriptor,
+            in_odom: *in_odom,
+            covariance,
+        };
+        let moment = self.moment();
+        let is_lost = self.is_lost(&viewed.covariance);
+        if self.agent.placed && !is_lost {
+            let accepted = self.agent.evidence.accepted;
+            if self.chronicle.is_contradicted(&moment, &viewed, accepted) {
+                return self.go_astray();
+            }
+        }
+        let is_sought = self.chronicle.is_seeking(number);
+        if self.agent.placed && !is_sought {
+            // Nobody knows where that is seen.
+            if !(is_lost && self.chronicle.is_astray(number)) {
+                self.chronicle.viewed(&moment, &viewed);
+            }
+            if !is_lost {
+                return;
+            }
+        }
+        let sd_max_m = self.settings.field_radius_m;
+        if let Some(found) = self.chronicle.seek(&moment, &viewed, sd_max_m) {
+            self.relocalised(&found);
+        }
+    }
+
+    /// Whether an agent in the map is known so little that it may be anywhere.
+    fn is_lost(&self, covariance: &PoseCovariance) -> bool {
+        let is_doubted = self.estimator.is_doubted(self.agent_id.0);
+        let sd_m = covariance.position_sd_m();
+        Status::of(self.agent, sd_m, is_doubted, self.settings) == Status::Lost
+    }
+
+    /// What the agent sees contradicts where it is believed to be: it may be anywhere from now on.
+    fn go_astray(&mut self) {
+        let moment = self.moment();
+        self.end_trip(TripEnd::Gap);
+        self.end_episode();
+        let sd_m = ANYWHERE * self.settings.lost_sd_m;
+        self.estimator.lose(self.agent_id.0, sd_m);
+        self.chronicle.go_astray(&moment);
+        self.stand();
+    }
+
+    /// The agent recognised where it is.
+    fn relocalised(&mut self, found: &Relocalised) {
+        let number = self.agent_id.0;
+        let was_placed = self.agent.placed;
+        // One that only drifted is where it may have drifted to: its way leads there. One that was put astray, by looks that could
+        // be read in two ways, is put anew.
+        let is_refused = was_placed
+            && !found.is_first
+            && !self.estimator.fix(number, &found.pose, &found.covariance);
+        let is_elsewhere = is_refused || (was_placed && found.is_first && self.is_elsewhere(found));
+        if is_elsewhere || !was_placed {
+            self.estimator
+                .recognised(number, &found.pose, &found.covariance);
+            self.remember_what_was_settled();
+        }
+        if found.is_first {
+            self.estimator.fix(number, &found.pose, &found.covariance);
+        }
+        if found.is_first || found.is_last || is_elsewhere {
+            let moment = self.moment();
+            self.chronicle.relocalised(&moment, found, is_elsewhere);
+        }
+        if found.is_first || is_elsewhere {
+            let seq = self.moment().seq;
+            self.chronicle.dispel_doubt(number, seq);
+        }
+        if is_elsewhere {
+            self.end_trip(TripEnd::StartPose);
+            self.stand();
+            let position = found.pose.translation.vector.into();
+            self.emit(EventKind::AgentPlaced { position });
+        } else {
+            self.follow();
+        }
+    }
+
+    /// Whether an agent of the map was recognised where it cannot have come to.
+    fn is_elsewhere(&self, found: &Relocalised) -> bool {
+        let number = self.agent_id.0;
+        let Some((pose, covariance)) = self.estimator.pose(number) else {
+            return true;
+        };
+        if self.chronicle.is_astray(number) {
+            return true;
+        }
+        let apart_m = (pose.translation.vector - found.pose.translation.vector).norm();
+        let sd_m = covariance
+            .position_sd_m()
+            .hypot(found.covariance.position_sd_m());
+        apart_m > DRIFTED * sd_m
+    }
+
+    /// The place that answers at a position, with its confidence; none for an agent that is not
+    /// placed, whose positions are those of no map.
+    fn answering(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
+        if !self.agent.placed {
+            return None;
+        }
+        let (place, distance_m) = self.places.winner(position)?;
+        let confidence = confidence(distance_m, self.settings.field_radius_m);
+        (confidence >= ANSWER_MIN).then_some((place, confidence))
+    }
+
+    /// Says how well a percept was expected, if the place remembered anything of its channel.
+    fn compared(&mut self, place: PlaceId, compared: Option<Compared>) {
+        if let Some(compared) = compared {
+            self.emit(EventKind::PerceptCompared {
+                place,
+                channel: compared.channel,
+                percepts: compared.percepts,
+                surprise: compared.surprise,
+            });
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! The cognitive map of a space: everything that is derived from its journal.
+
+mod apply;
+mod checkpoint;
+mod enrolment;
+mod feel;
+mod forget;
+mod header;
+mod localize;
+mod motion;
+mod objects;
+mod predict;
+mod read;
+mod remember;
+mod see;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+pub use checkpoint::{CheckpointPage, CorruptCheckpoint};
+pub use localize::Localization;
+pub use predict::{Predicted, Prediction};
+
+use crate::agent::Agent;
+use crate::estimator::{Estimator, Parameters};
+use crate::event::Event;
+use crate::input::Label;
+use crate::input::{AgentId, Record, SkipReason};
+use crate::keyframes::{KeyframeGraph, KeyframeSettings};
+use crate::memory::landmark::LandmarkMap;
+use crate::memory::object::ObjectMemory;
+use crate::memory::percept::PerceptMap;
+use crate::memory::place::PlaceMap;
+use crate::memory::strength::Clock;
+use crate::memory::trip::TripMap;
+use crate::settings::Settings;
+use grid::GridModules;
+use state::PagedVec;
+
+use apply::Fold;
+
+/// Agents per page: few, because the agents change with every sample.
+const AGENT_PAGE: usize = 4;
+
+/// The cognitive map of a space, a fold over its journal: [`CognitiveMap::apply`] is the only way to
+/// change it, and the same records in the same order give the same map, bit by bit.
+///
+/// A clone is a snapshot. It shares all memory with the original and stays as it is while the
+/// original goes on; the original then copies the pages that it changes.
+#[derive(Clone, Debug)]
+pub struct CognitiveMap {
+    settings: Arc<Settings>,
+    modules: Arc<GridModules>,
+    /// Number of records that had an effect.
+    revision: u64,
+    /// Whether some agent has defined the `map` frame.
+    framed: bool,
+    agents: PagedVec<Agent, AGENT_PAGE>,
+    /// The agents by name.
+    names: Arc<BTreeMap<Label, AgentId>>,
+    /// Where agents and the landmarks seen lately are, jointly.
+    estimator: Arc<Estimator>,
+    /// What they did and saw, so that the past can be smoothed.
+    chronicle: Arc<KeyframeGraph>,
+    places: PlaceMap,
+    trips: TripMap,
+    landmarks: LandmarkMap,
+    percepts: PerceptMap,
+    objects: ObjectMemory,
+}
+
+impl CognitiveMap {
+    /// The map of a space where nothing has happened yet.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            modules: Arc::new(GridModules::new(&settings.grid())),
+            places: PlaceMap::new(&settings),
+            estimator: Arc::new(Estimator::new(Parameters::of(&settings))),
+            chronicle: Arc::new(KeyframeGraph::new(KeyframeSettings::of(&settings))),
+            names: Arc::default(),
+            settings: Arc::new(settings),
+            revision: 0,
+            framed: false,
+            agents: PagedVec::default(),
+            trips: TripMap::default(),
+            landmarks: LandmarkMap::default(),
+            percepts: PerceptMap::default(),
+            objects: ObjectMemory::default(),
+        }
+    }
+
+    /// Applies the next record of the journal, and appends to `events` what it brought about.
+    ///
+    /// Every record is legal. One that says nothing new has no effect at all: the enrolment of an
+    /// agent that is there (or is neither next in line nor vacant, or has another one's name), the removal of one that is not, a
+    /// lesson that is not next in line, a sample of an unknown or removed agent, of an earlier session, or with a sequence number that has been applied or
+    /// skipped. A sample whose number is
+    /// ahead first skips the missing ones as [`SkipReason::Lost`]. Work and memory per sample are
+    /// bounded, whatever the size of the map.
+    pub fn apply(&mut self, record: &Record, events: &mut Vec<Event>) {
+        match record {
+            Record::Enrol { agent, name } => self.enrol(*agent, name, events),
+            Record::Remove { agent } => self.remove(*agent, events),
+            Record::Sample {
+                agent,
+                session,
+                seq,
+                sample,
+            } => {
+                // The last number of all has no successor, so it is never a sample's.
+                let Some(next_seq) = seq.checked_add(1) else {
+                    return;
+                };
+                let Some(mut fold) = self.fold(*agent, *session, next_seq, events) else {
+                    return;
+                };
+                fold.notice_what_is_gone();
+                fold.enter_session(*session, Some(sample.stamp_ns));
+                fold.skip(*seq, SkipReason::Lost);
+                fold.sample(*seq, sample);
+                fold.finish();
+            }
+            Record::Skip {
+                agent,
+                session,
+                from,
+                to,
+                reason,
+            } => {
+                if from >= to {
+                    return;
+                }
+                let Some(mut fold) = self.fold(*agent, *session, *to, events) else {
+                    return;
+                };
+                fold.notice_what_is_gone();
+                fold.enter_session(*session, None);
+                fold.skip(*from, SkipReason::Lost);
+                fold.skip(*to, *reason);
+                fold.finish();
+            }
+            Record::TeachObject {
+                number,
+                name,
+                lesson,
+            } => {
+                if self.objects.awaits(*number) {
+                    self.revision += 1;
+                    let now = Clock::at(self.revision, &self.settings);
+                    self.objects.teach(name, lesson, now, self.revision);
+                }
+            }
+            Record::ForgetObject { number, name } => {
+                if self.objects.awaits(*number) {
+                    self.revision += 1;
+                    self.objects.forget(name, self.revision);
+                }
+            }
+        }
+    }
+
+    /// Opens the map for the samples up to and without `to` of an agent, if they hold news.
+    fn fold<'a>(
+        &'a mut self,
+        agent_id: AgentId,
+        session: u64,
+        to: u64,
+        events: &'a mut Vec<Event>,
+    ) -> Option<Fold<'a>> {
+        if !self.agents.get(agent_id.0 as usize)?.awaits(session, to) {
+            return None;
+        }
+        self.open(agent_id, events)
+    }
+
+    /// Opens the map for a record of an agent that has an effect.
+    fn open<'a>(&'a mut self, agent_id: AgentId, events: &'a mut Vec<Event>) -> Option<Fold<'a>> {
+        let index = agent_id.0 as usize;
+        self.agents.get(index)?;
+        self.revision += 1;
+        let agent = self.agents.get_mut(index, self.revision)?;
+        let chronicle = Arc::make_mut(&mut self.chronicle);
+        chronicle.set_revision(self.revision);
+        Some(Fold {
+            settings: &self.settings,
+            modules: &self.modules,
+            revision: self.revision,
+            now: Clock::at(self.revision, &self.settings),
+            framed: &mut self.framed,
+            places: &mut self.places,
+            trips: &mut self.trips,
+            landmarks: &mut self.landmarks,
+            estimator: Arc::make_mut(&mut self.estimator),
+            chronicle,
+            names: &self.names,
+            percepts: &mut self.percepts,
+            objects: &mut self.objects,
+            agent_id,
+            held: agent.holds(),
+            stamp_ns: agent.stamp_ns.unwrap_or(0),
+            agent,
+            events,
+        })
+    }
+}

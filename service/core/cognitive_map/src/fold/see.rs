@@ -1,0 +1,93 @@
+//! What sightings do to the map.
+
+use super::apply::Fold;
+use crate::event::EventKind;
+use crate::input::{Label, Relation, Sighting, Target};
+use crate::memory::landmark::{Landmark, PositionEstimate};
+
+impl Fold<'_> {
+    /// A target was seen.
+    pub(super) fn sighting(&mut self, sighting: &Sighting) {
+        self.agent.sightings += 1;
+        match &sighting.target {
+            Target::Landmark(label) => {
+                self.define_frame();
+                self.landmark(label, &sighting.relation);
+            }
+            Target::Agent(name) => self.other_agent(name, &sighting.relation),
+            Target::OwnSample(seq) => {
+                // It waits until it is found in agreement with the map.
+                let moment = self.moment();
+                let is_remembered = self.chronicle.closure(&moment, *seq, &sighting.relation);
+                self.agent.forgotten_matches += u64::from(!is_remembered);
+                return;
+            }
+        }
+        self.follow();
+        if self.agent.placed {
+            self.place_landmarks();
+        }
+    }
+
+    /// A landmark was seen.
+    fn landmark(&mut self, label: &Label, relation: &Relation) {
+        let agent = self.agent_id.0;
+        let taken = self
+            .estimator
+            .landmark(agent, self.stamp_ns, label, relation);
+        self.remember_who_was_set_aside();
+        // It may just have turned out to be another one's.
+        let name = self.estimator.name_of(label).clone();
+        if taken.accepted {
+            let moment = self.moment();
+            self.chronicle
+                .landmark(&moment, &name, relation, &taken.variance);
+        }
+        self.remember_what_was_settled();
+        if taken.accepted
+            && self.agent.placed
+            && let Some(landmark) = self.landmarks.by_label(name.as_str())
+        {
+            self.landmarks
+                .see(landmark, self.stamp_ns, agent, self.revision);
+        }
+    }
+
+    /// Another agent was seen. One that the space does not know yet is nowhere.
+    fn other_agent(&mut self, name: &Label, relation: &Relation) {
+        if let Some(target) = self.names.get(name) {
+            let (agent, stamp_ns) = (self.agent_id.0, self.stamp_ns);
+            self.estimator.sighting(agent, stamp_ns, target.0, relation);
+            self.remember_what_was_settled();
+        }
+    }
+
+    /// Takes over where the landmarks are now: a sighting corrects all of them that are correlated with
+    /// what it shows, and may have brought those of another frame.
+    fn place_landmarks(&mut self) {
+        for (label, position, covariance) in self.estimator.landmarks() {
+            let estimate = PositionEstimate {
+                position,
+                covariance,
+            };
+            if let Some(landmark) = self.landmarks.by_label(label.as_str()) {
+                self.landmarks.place(landmark, estimate, self.revision);
+                continue;
+            }
+            let observers = self.estimator.observers_of(label).cloned();
+            let landmark = Landmark::learn(
+                label.clone(),
+                estimate,
+                self.stamp_ns,
+                observers.unwrap_or_default(),
+            );
+            if let Some(landmark) = self.landmarks.learn(landmark, self.revision) {
+                self.events.push(crate::event::Event {
+                    agent: self.agent_id,
+                    stamp_ns: self.stamp_ns,
+                    kind: EventKind::LandmarkLearned { landmark, position },
+                });
+            }
+        }
+    }
+}

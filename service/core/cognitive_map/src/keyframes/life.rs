@@ -1,0 +1,110 @@
+//! An agent, as far as the chronicle knows it.
+
+use nalgebra::{Isometry3, Vector6};
+
+use crate::estimator::Calibrated;
+use geometry::MotionSum;
+use state::NONE;
+use state::state_of_struct;
+
+/// An agent with its latest moment.
+#[derive(Clone, Debug)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a state of its own, in any combination"
+)]
+pub(super) struct Life {
+    /// Whether its poses are those of the map.
+    pub(super) is_in_map: bool,
+    /// Where its own frame turned out to lie in the map.
+    pub(super) own_frame: Option<Isometry3<f64>>,
+    /// Whether all motion so far was in the body's x-y plane.
+    pub(super) is_planar: bool,
+    /// Whether the next anchor begins anew, without a motion from the one before.
+    pub(super) is_cut: bool,
+    /// Whether there is to be an anchor before the agent moves on: it has none in its session.
+    pub(super) is_fresh: bool,
+    /// Whether its next anchor is the origin of the map.
+    pub(super) founds: bool,
+    /// Its latest anchor.
+    pub(super) newest: u32,
+    pub(super) session: u32,
+    pub(super) seq: u64,
+    pub(super) stamp_ns: i64,
+    /// Until when it was at the latest anchor.
+    pub(super) until_seq: u64,
+    pub(super) until_ns: i64,
+    /// Motion since the latest anchor, with the covariance of its error.
+    pub(super) since: MotionSum,
+    /// How that motion was corrected.
+    pub(super) calibrated: Calibrated,
+    /// Where it came to rest lately, by the motion since the latest anchor, and when.
+    pub(super) rest: Isometry3<f64>,
+    pub(super) rest_seq: u64,
+    pub(super) rest_ns: i64,
+    /// Where it is thought to be.
+    pub(super) pose: Isometry3<f64>,
+}
+
+state_of_struct!(Life {
+    is_in_map,
+    own_frame,
+    is_planar,
+    is_cut,
+    is_fresh,
+    founds,
+    newest,
+    session,
+    seq,
+    stamp_ns,
+    until_seq,
+    until_ns,
+    since,
+    calibrated,
+    rest,
+    rest_seq,
+    rest_ns,
+    pose
+});
+
+impl Life {
+    pub(super) fn new() -> Self {
+        Self {
+            is_in_map: false,
+            own_frame: None,
+            is_planar: true,
+            is_cut: true,
+            is_fresh: true,
+            founds: false,
+            newest: NONE,
+            session: 0,
+            seq: 0,
+            stamp_ns: 0,
+            until_seq: 0,
+            until_ns: 0,
+            since: MotionSum::default(),
+            calibrated: Calibrated::default(),
+            rest: Isometry3::identity(),
+            rest_seq: 0,
+            rest_ns: 0,
+            pose: Isometry3::identity(),
+        }
+    }
+
+    /// The agent moved on from where it was.
+    pub(super) fn go(
+        &mut self,
+        increment: &Isometry3<f64>,
+        variance: &Vector6<f64>,
+        calibrated: &Calibrated,
+    ) {
+        self.since.append(increment, variance);
+        self.calibrated = self.calibrated.then(calibrated);
+    }
+}
+
+/// Whether a motion is shorter than these \[m, rad\].
+pub(super) fn is_within(motion: &Isometry3<f64>, length_m: f64, angle_rad: f64) -> bool {
+    motion.translation.vector.norm_squared() <= length_m * length_m
+        && motion.rotation.angle() <= angle_rad
+}

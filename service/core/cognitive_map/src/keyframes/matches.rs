@@ -1,0 +1,430 @@
+//! Matches: an agent says that it has been here before. They are believed when they agree with the map or with one another,
+//! and no longer than that.
+
+use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
+
+use super::graph::{Beside, KeyframeGraph, Moment};
+use super::refine::{Among, Graph};
+use super::sighting::{SeenPoint, stated_variance};
+use super::thinning::composed;
+use super::tie::{Standing, Tie};
+use crate::input::Relation;
+use geometry::{PoseCovariance, is_somewhere, se3, upper_triangle};
+use pose_graph::{Graduation, Marginals, RelaxationSettings, Relaxed};
+use state::NONE;
+
+/// Squared deviation up to which a match agrees with the map or with another match: a true one is farther off once in a
+/// hundred times, in the plane.
+const AGREES: f64 = 11.3;
+/// Squared deviation from which a match is no longer believed, after the relaxation with it.
+const CONTRADICTS: f64 = 25.0;
+/// How much less sure than the match the map may be for their agreement alone to be telling.
+const VAGUER_MAX: f64 = 2.0;
+/// Deviation within which agreement is telling, however sure the matches are of themselves: by chance few places
+/// lie so close \[m\].
+const TELLING_M: f64 = 0.5;
+/// Other matches that have to agree with one that the map cannot tell from a false one.
+const PARTNERS: usize = 2;
+/// Matches before it, in the order of time, with which a match is compared.
+const COMPARED: usize = 24;
+/// Deviation of an angle of which nothing is known \[rad\].
+const ANY_ANGLE_RAD: f64 = 3.0;
+/// Least deviation of a match \[m, rad\].
+const DEVIATION_MIN: f64 = 1e-3;
+/// A relaxation waits for one record for so many anchors: then it costs each record about as much as so many anchors.
+const ANCHORS_PER_RECORD: usize = 8;
+/// Rounds of relaxation and doubt at most.
+const ROUNDS_MAX: usize = 3;
+
+/// Where an agent is after a relaxation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correction {
+    /// Number of the agent.
+    pub agent: u32,
+    /// Its pose now, in the map.
+    pub pose: Isometry3<f64>,
+    /// Covariance of that pose, given all that is remembered; `None` where that leaves it free.
+    pub covariance: Option<PoseCovariance>,
+}
+
+/// A match that waits, with what it is compared by.
+struct Candidate {
+    tie: u32,
+    agent: u32,
+    stamp_ns: i64,
+    transform: Isometry3<f64>,
+    /// The poses of its ends, and the variances up to them since their chains began \[m², rad²\].
+    ends: [Isometry3<f64>; 2],
+    variances: [[f64; 2]; 2],
+    /// Its own variances, the largest of each kind \[m², rad²\].
+    own: [f64; 2],
+}
+
+impl KeyframeGraph {
+    /// An agent took the place where it is for one where it was at an earlier sample of its session; the relation is that
+    /// of the earlier body as seen from the one now. Answers whether that sample is remembered.
+    ///
+    /// The match waits until [`relax`](Self::relax) finds it in agreement.
+    pub fn closure(&mut self, moment: &Moment, earlier_seq: u64, relation: &Relation) -> bool {
+        self.note(moment);
+        let Some(now) = self.here(moment.agent) else {
+            return false;
+        };
+        let session = self.session(moment.agent);
+        let Some(then) = self.at_seq(moment.agent, session, earlier_seq) else {
+            return false;
+        };
+        let place = |beside: &Beside| {
+            let anchor = self.anchors.get(beside.anchor);
+            anchor.map(|anchor| anchor.pose * beside.motion)
+        };
+        let (Some(pose_now), Some(pose_then)) = (place(&now), place(&then)) else {
+            return false;
+        };
+        let (seen, noise) = seen_pose(relation, &pose_now.inv_mul(&pose_then));
+        let is_kept = self.tie_beside(&now, &then, &seen, &noise, Standing::Pending);
+        self.fresh_matches += u32::from(is_kept);
+        is_kept
+    }
+
+    /// Ties two places beside anchors by a match; answers whether there is room for it.
+    pub(super) fn tie_beside(
+        &mut self,
+        now: &Beside,
+        then: &Beside,
+        seen: &Isometry3<f64>,
+        noise: &PoseCovariance,
+        standing: Standing,
+    ) -> bool {
+        let from_now = composed(&now.covariance, seen, noise);
+        let both = PoseCovariance::from_matrix(&(from_now.matrix() + then.covariance.matrix()));
+        let back = then.motion.inverse();
+        let tie = Tie {
+            from: now.anchor,
+            to: then.anchor,
+            next_from: NONE,
+            next_to: NONE,
+            transform: now.motion * seen * back,
+            covariance: both.after_motion(&back, &Vector6::zeros()),
+            standing,
+        };
+        if self.ties.len() >= self.settings.ties_max as usize {
+            let doubtful = |tie: &&(u32, &Tie)| {
+                matches!(tie.1.standing, Standing::Pending | Standing::Refuted)
+            };
+            let oldest = self
+                .ties
+                .iter()
+                .find(|tie| doubtful(&tie))
+                .map(|(at, _)| at);
+            oldest.map(|at| self.untie(at));
+        }
+        self.tie(tie) != NONE
+    }
+
+    /// Number of matches that are believed.
+    pub fn n_matches_believed(&self) -> usize {
+        let ties = self.ties.iter();
+        ties.filter(|(_, tie)| tie.standing == Standing::Accepted)
+            .count()
+    }
+
+    /// Whether matches wait, and enough has been told since the last relaxation to pay for another one.
+    pub fn is_due(&self) -> bool {
+        self.fresh_matches > 0 && self.told as usize >= self.anchors.len() / ANCHORS_PER_RECORD
+    }
+
+    /// Moves the anchors to where they most likely are, with the matches that agree, and answers where the agents in the
+    /// map are then; nothing if no match came to be believed or ceased to be.
+    ///
+    /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then the same records give the
+    /// same map.
+    pub fn relax(&mut self) -> Vec<Correction> {
+        self.told = 0;
+        self.fresh_matches = 0;
+        let agreed = std::mem::take(&mut self.agreed) as usize;
+        let mut coarse = self.coarse();
+        let judged = coarse.judge();
+        let (graph, _, refuted) = coarse.relaxed();
+        if agreed + judged + refuted == 0 {
+            return Vec::new();
+        }
+        let marginals = graph.map.marginals();
+        let corrections = coarse.corrections(&graph, &marginals);
+        coarse.move_anchors(&graph);
+        self.take_over(&coarse);
+        corrections
+    }
+
+    /// The relaxed graph, after matches that do not fit into it have ceased to be believed; their number. Moves the anchors on
+    /// the way: for a copy.
+    pub(super) fn relaxed(&mut self) -> (Graph, Relaxed, usize) {
+        let mut refuted = 0;
+        let revision = self.revision;
+        let mut rounds = 0;
+        loop {
+            rounds += 1;
+            let mut graph = self.graph(Among::Believed);
+            let mut settings = settings();
+            if self.fits(&graph) {
+                settings.graduation = Graduation::None;
+            }
+            let relaxed = graph.map.relax(&settings);
+            let before = refuted;
+            for number in 0..self.ties.numbers() {
+                let link = graph.ties.get(number as usize).copied().flatten();
+                let squared = link.map_or(0.0, |link| graph.map.squared_error(link));
+                if squared > CONTRADICTS
+                    && let Some(tie) = self.ties.get(number)
+                    && tie.standing == Standing::Accepted
+                    && let Some(tie) = self.ties.get_mut(number, revision)
+                {
+                    tie.standing = Standing::Refuted;
+                    refuted += 1;
+                }
+            }
+            if refuted == before || rounds >= ROUNDS_MAX {
+                return (graph, relaxed, refuted);
+            }
+            self.move_anchors(&graph);
+        }
+    }
+
+    /// Whether a graph is near enough to where the matches that it believes have it for their kernels to pull.
+    fn fits(&self, graph: &Graph) -> bool {
+        let links = graph.ties.iter().zip(0..);
+        links
+            .filter_map(|(link, number)| Some(((*link)?, self.ties.get(number)?)))
+            .filter(|(_, tie)| tie.standing == Standing::Accepted)
+            .all(|(link, _)| graph.map.squared_error(link) <= CONTRADICTS)
+    }
+
+    /// Finds waiting matches that agree with the map or with one another, and believes them; answers their number. Moves the
+    /// anchors to where all that are believed have them: for a copy.
+    pub(super) fn judge(&mut self) -> usize {
+        if !self.ties.iter().any(|(_, tie)| waits(tie)) {
+            return 0;
+        }
+        let believed = self.graph(Among::Believed);
+        let marginals = believed.map.marginals();
+        // With kernels that begin wide, all matches together find the map that most of them agree with.
+        let mut all = self.graph(Among::All);
+        all.map.relax(&settings());
+        let ways = self.ways();
+        let mut accepted = Vec::new();
+        let mut candidates = Vec::new();
+        for (number, tie) in self.ties.iter().filter(|(_, tie)| tie.is_match()) {
+            let Some(link) = all.ties.get(number as usize).copied().flatten() else {
+                continue;
+            };
+            if waits(tie) && agrees_with(tie, &believed, &marginals) {
+                accepted.push(number);
+            } else if all.map.squared_error(link) <= AGREES {
+                candidates.extend(self.candidate(number, tie, &all, &ways));
+            }
+        }
+        candidates.sort_by_key(|candidate| (candidate.agent, candidate.stamp_ns, candidate.tie));
+        let mut partners = vec![0; candidates.len()];
+        for later in 0..candidates.len() {
+            for earlier in later.saturating_sub(COMPARED)..later {
+                if candidates[later].agrees(&candidates[earlier]) {
+                    partners[later] += 1;
+                    partners[earlier] += 1;
+                }
+            }
+        }
+        let supported = candidates
+            .iter()
+            .zip(partners)
+            .filter(|(candidate, partners)| {
+                *partners >= PARTNERS && self.ties.get(candidate.tie).is_some_and(waits)
+            });
+        accepted.extend(supported.map(|(candidate, _)| candidate.tie));
+        let revision = self.revision;
+        for &number in &accepted {
+            if let Some(tie) = self.ties.get_mut(number, revision) {
+                tie.standing = Standing::Accepted;
+            }
+        }
+        if self.fits(&all) {
+            self.move_anchors(&all);
+        }
+        accepted.len()
+    }
+
+    /// What a match is compared by, with its ends where a graph has them.
+    fn candidate(
+        &self,
+        number: u32,
+        tie: &Tie,
+        graph: &Graph,
+        ways: &[[f64; 2]],
+    ) -> Option<Candidate> {
+        let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
+        let from = self.anchors.get(tie.from)?;
+        let diagonal = tie.covariance.matrix().diagonal();
+        Some(Candidate {
+            tie: number,
+            agent: from.agent,
+            stamp_ns: from.stamp_ns,
+            transform: tie.transform,
+            ends: [
+                *graph.map.pose(node(tie.from)?),
+                *graph.map.pose(node(tie.to)?),
+            ],
+            variances: [*ways.get(tie.from as usize)?, *ways.get(tie.to as usize)?],
+            own: [diagonal.rows(0, 3).max(), diagonal.rows(3, 3).max()],
+        })
+    }
+
+    /// For each anchor the variances of the way since its agent's chain began \[m², rad²\].
+    fn ways(&self) -> Vec<[f64; 2]> {
+        let mut ways = vec![[0.0; 2]; self.anchors.numbers() as usize];
+        for (agent, _) in (0..).zip(self.lives.iter()) {
+            let mut number = self.first_of(agent);
+            let mut way = [0.0; 2];
+            while let Some(anchor) = self.anchors.get(number) {
+                let diagonal = anchor.covariance.matrix().diagonal();
+                way[0] += diagonal.rows(0, 3).max();
+                way[1] += diagonal.rows(3, 3).max();
+                // Nothing is known of the way between two stretches.
+                if anchor.begins {
+                    way[0] += 1e12;
+                }
+                ways[number as usize] = way;
+                number = anchor.next;
+            }
+        }
+        ways
+    }
+
+    /// Where the agents in the map are in a relaxed graph.
+    fn corrections(&self, graph: &Graph, marginals: &Marginals<'_>) -> Vec<Correction> {
+        let mut corrections = Vec::new();
+        for (agent, life) in (0..).zip(self.lives.iter()) {
+            let node = graph.poses.get(life.newest as usize).copied().flatten();
+            let Some(node) = node.filter(|_| !life.is_fresh) else {
+                continue;
+            };
+            let covariance = marginals.pose(node).map(|covariance| {
+                composed(&covariance, life.since.motion(), &life.since.covariance())
+            });
+            corrections.push(Correction {
+                agent,
+                pose: graph.map.pose(node) * life.since.motion(),
+                covariance,
+            });
+        }
+        corrections
+    }
+
+    /// Puts the anchors where a relaxed graph has them.
+    fn move_anchors(&mut self, graph: &Graph) {
+        let revision = self.revision;
+        for number in 0..self.anchors.numbers() {
+            let node = graph.poses.get(number as usize).copied().flatten();
+            let pose = node.map(|node| graph.map.pose(node));
+            let Some(pose) = pose.filter(|pose| is_somewhere(&pose.translation.vector)) else {
+                continue;
+            };
+            if let Some(anchor) = self.anchors.get_mut(number, revision) {
+                anchor.pose = *pose;
+                anchor.is_in_map = true;
+            }
+        }
+    }
+}
+
+/// Whether a match waits to be believed, for the first time or again.
+fn waits(tie: &Tie) -> bool {
+    matches!(tie.standing, Standing::Pending | Standing::Refuted)
+}
+
+/// How a graph with matches is relaxed.
+fn settings() -> RelaxationSettings {
+    RelaxationSettings {
+        graduation: Graduation::FromWide,
+        ..RelaxationSettings::default()
+    }
+}
+
+/// Whether the map knows the relative pose about as well as a match says it, and agrees.
+fn agrees_with(tie: &Tie, graph: &Graph, marginals: &Marginals<'_>) -> bool {
+    let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
+    let (Some(from), Some(to)) = (node(tie.from), node(tie.to)) else {
+        return false;
+    };
+    let own = tie.covariance.matrix();
+    let least = DEVIATION_MIN * DEVIATION_MIN;
+    let expected = graph.map.pose(from).inv_mul(graph.map.pose(to));
+    let (linear, angular) = se3::log(&expected.inv_mul(&tie.transform));
+    let off = Vector6::from_iterator(linear.iter().chain(angular.iter()).copied());
+    // One that is too far off in one direction is so for every map that is sure enough: its covariance, which takes
+    // long to find, need not be known.
+    let vaguest = VAGUER_MAX * VAGUER_MAX + 1.0;
+    if (0..6).any(|k| off[k] * off[k] > AGREES * vaguest * (own[(k, k)] + least)) {
+        return false;
+    }
+    let Some(spread) = marginals.relative_pose(from, to) else {
+        return false;
+    };
+    let is_known =
+        (0..6).all(|k| spread.matrix()[(k, k)] <= VAGUER_MAX * VAGUER_MAX * (own[(k, k)] + least));
+    let whole = spread.matrix() + own + Matrix6::from_diagonal_element(least);
+    let inverse = whole.try_inverse();
+    is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= AGREES)
+}
+
+impl Candidate {
+    /// Whether two matches agree, by the ways between their ends.
+    ///
+    /// ```text
+    /// A now ── match ──> A then
+    ///   │                  │           the ways along the chains, and both matches, close up
+    /// B now ── match ──> B then
+    /// ```
+    fn agrees(&self, other: &Self) -> bool {
+        if self.agent != other.agent {
+            return false;
+        }
+        let between = |end: usize| {
+            let way = other.ends[end].inv_mul(&self.ends[end]);
+            let [a, b] = [self.variances[end], other.variances[end]];
+            (way, [(a[0] - b[0]).abs(), (a[1] - b[1]).abs()])
+        };
+        let (now, now_variance) = between(0);
+        let (then, then_variance) = between(1);
+        let by_other = now.inverse() * other.transform * then;
+        let error = by_other.inv_mul(&self.transform);
+        let [mut shift, mut turn] =
+            [0, 1].map(|k| self.own[k] + other.own[k] + now_variance[k] + then_variance[k]);
+        // What turns on the ways and in the matches moves the ends.
+        let lever = now.translation.vector.norm() + then.translation.vector.norm();
+        shift += turn * lever * lever;
+        shift += DEVIATION_MIN * DEVIATION_MIN;
+        turn += DEVIATION_MIN * DEVIATION_MIN;
+        let squared =
+            error.translation.vector.norm_squared() / shift + error.rotation.angle().powi(2) / turn;
+        // Two that would agree wherever they were say nothing about each other.
+        let own = self.own[0] + other.own[0] + DEVIATION_MIN * DEVIATION_MIN;
+        let telling = (4.0 * VAGUER_MAX * VAGUER_MAX * own).max(TELLING_M * TELLING_M);
+        squared <= AGREES && shift <= telling
+    }
+}
+
+/// The earlier pose as a relation puts it, and its covariance. Of a turn that it does not tell, `expected` is taken.
+fn seen_pose(relation: &Relation, expected: &Isometry3<f64>) -> (Isometry3<f64>, PoseCovariance) {
+    if let Relation::Pose(seen) = relation {
+        return (*seen.pose(), PoseCovariance::from_sd(seen.noise().sd()));
+    }
+    let point = SeenPoint::new(relation, &stated_variance(relation));
+    let rotation: UnitQuaternion<f64> = expected.rotation;
+    let turn = rotation.to_rotation_matrix().into_inner();
+    let mut matrix = Matrix6::from_diagonal_element(ANY_ANGLE_RAD * ANY_ANGLE_RAD);
+    let spread = turn.transpose() * point.fresh * turn;
+    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&spread);
+    (
+        Isometry3::from_parts(point.position.into(), rotation),
+        PoseCovariance::from_upper_triangle(&upper_triangle(&matrix)),
+    )
+}

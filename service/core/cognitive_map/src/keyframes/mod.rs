@@ -1,0 +1,40 @@
+//! The chronicle: what agents did and saw, kept so that the past can be smoothed.
+//!
+//! A chain of *anchors* for each agent, moments that are remembered with the motion from one to the next; on them hang
+//! *sightings*, of landmarks and of other agents, and *ties*, to the map (start poses) or between anchors (matches). From
+//! these alone follows the refined map: the graph of [`experience`](pose_graph), relaxed.
+//!
+//! Memory is bounded. When it is full, anchors from which next to nothing is lost are taken out of their chains: the motions
+//! to and from them are composed, and what hangs on them goes to a neighbour with the noise of the way there.
+
+mod anchor;
+mod aside;
+mod chain;
+mod checkpoint;
+mod coarse;
+mod field;
+mod graph;
+mod landmarks;
+mod life;
+mod matches;
+mod milestones;
+mod mooring;
+mod names;
+mod refine;
+mod relocalisation;
+mod removal;
+mod revisit;
+mod revisited;
+mod settings;
+mod sighting;
+mod smoothing;
+mod thinning;
+mod tie;
+
+pub use checkpoint::{CorruptKeyframes, KeyframePage};
+pub use graph::{KeyframeGraph, Moment};
+pub use matches::Correction;
+pub use refine::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
+pub use relocalisation::{Guess, Relocalised};
+pub use revisited::Viewed;
+pub use settings::KeyframeSettings;

@@ -1,0 +1,33 @@
+//! Landmarks that turn out to be known by two names.
+
+use super::KeyframeGraph;
+use super::sighting::Shown;
+use crate::input::Label;
+
+impl KeyframeGraph {
+    /// Landmarks turned out to be known by two names: each time the one that is given up, and the one that stays. Walks all
+    /// sightings.
+    pub fn same(&mut self, names: &[(Label, Label)]) {
+        let revision = self.revision;
+        let renamed = |shown: &Shown| {
+            let Shown::Landmark(number) = shown else {
+                return None;
+            };
+            let label = &self.landmarks.slots.get(*number)?.label;
+            let (_, name) = names.iter().find(|(other, _)| other == label)?;
+            Some((*number, name))
+        };
+        let sightings = self.sightings.iter();
+        let moved = sightings.filter_map(|(at, one)| Some((at, renamed(&one.shown)?)));
+        let moved: Vec<(u32, (u32, &Label))> = moved.collect();
+        for (at, (before, name)) in moved {
+            let Some(after) = self.landmarks.show(name, revision) else {
+                return;
+            };
+            if let Some(sighting) = self.sightings.get_mut(at, revision) {
+                sighting.shown = Shown::Landmark(after);
+            }
+            self.landmarks.release(before, revision);
+        }
+    }
+}

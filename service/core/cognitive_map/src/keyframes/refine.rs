@@ -1,0 +1,315 @@
+//! The refined map: where everything most likely was, given all that is remembered.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
+
+use super::anchor::Anchor;
+use super::graph::KeyframeGraph;
+use super::sighting::Shown;
+use super::tie::Standing;
+use crate::input::Label;
+use geometry::{PoseCovariance, from_planar_part, is_somewhere, planar_part, positive};
+use pose_graph::{
+    Freedom, Kernel, Link, LinkId, PointId, PoseGraph, PoseId, PoseInformation,
+    PositionInformation, Relaxed, Scale, SightingTarget,
+};
+use state::NONE;
+
+/// Least deviation of a motion, so that one that states none has an inverse \[m, rad\].
+const MOTION_DEVIATION_MIN: f64 = 1e-4;
+/// Deviations beyond which a sighting pulls less the farther it is off.
+const SIGHTING_SCALE: f64 = 3.0;
+/// Deviations far beyond which a match does not pull.
+const MATCH_SCALE: f64 = 3.0;
+
+/// The past after relaxation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refined {
+    /// The agents, by number.
+    pub agents: Vec<RefinedAgent>,
+    /// The landmarks of the map, by label.
+    pub landmarks: Vec<RefinedLandmark>,
+    /// What the relaxation did.
+    pub relaxed: Relaxed,
+}
+
+/// Where an agent was.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RefinedAgent {
+    /// Whether the poses are those of the map. Those of an agent's own frame are as they were estimated when they were
+    /// lived.
+    pub is_in_map: bool,
+    /// Its poses, by stamp; between two of them it moved evenly.
+    pub poses: Vec<RefinedPose>,
+}
+
+/// A pose at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RefinedPose {
+    /// The instant \[ns\].
+    pub stamp_ns: i64,
+    /// The pose.
+    pub pose: Isometry3<f64>,
+}
+
+/// Where a landmark is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RefinedLandmark {
+    /// Its label.
+    pub label: Label,
+    /// Position \[m\].
+    pub position: Point3<f64>,
+    /// Covariance of the position along the axes of the map \[m²\], as far as the sightings determine it.
+    pub covariance: Option<Matrix3<f64>>,
+}
+
+/// Which matches count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Among {
+    /// Those that are believed.
+    Believed,
+    /// All of them, as far as they agree.
+    All,
+}
+
+/// The chronicle as an experience map.
+#[derive(Debug)]
+pub(super) struct Graph {
+    pub(super) map: PoseGraph,
+    /// The node of each anchor.
+    pub(super) poses: Vec<Option<PoseId>>,
+    /// The node of each landmark.
+    pub(super) points: Vec<Option<PointId>>,
+    /// The link of each tie.
+    pub(super) ties: Vec<Option<LinkId>>,
+}
+
+impl KeyframeGraph {
+    /// Where everything most likely was. Depends on nothing but what was told.
+    pub fn refine(&self) -> Refined {
+        // Matches are judged on the way, in a copy that shares all that they do not change.
+        let mut copy = self.clone();
+        copy.judge();
+        let (graph, relaxed, _) = copy.relaxed();
+        let marginals = graph.map.marginals();
+        let mut landmarks: Vec<RefinedLandmark> = Vec::new();
+        for (number, landmark) in self.landmarks.slots.iter() {
+            let Some(point) = graph.points[number as usize] else {
+                continue;
+            };
+            let position = graph.map.point(point);
+            if is_somewhere(&position.coords) {
+                let covariance = marginals
+                    .point(point)
+                    .map(|covariance| positive(&covariance));
+                landmarks.push(RefinedLandmark {
+                    label: landmark.label.clone(),
+                    position,
+                    covariance: covariance.filter(|known| known.iter().all(|x| x.is_finite())),
+                });
+            }
+        }
+        landmarks.sort_by(|a, b| a.label.cmp(&b.label));
+        let agents = (0..self.lives.len()).map(|agent| self.refined_agent(agent, &graph));
+        Refined {
+            agents: agents.collect(),
+            landmarks,
+            relaxed,
+        }
+    }
+
+    /// What is remembered, relaxed, as nodes and links: for other programs.
+    pub fn experience_map(&self) -> PoseGraph {
+        let mut copy = self.clone();
+        copy.judge();
+        copy.relaxed().0.map
+    }
+
+    /// The poses of an agent.
+    fn refined_agent(&self, agent: usize, graph: &Graph) -> RefinedAgent {
+        let Some(life) = self.lives.get(agent) else {
+            return RefinedAgent::default();
+        };
+        let mut poses = Vec::new();
+        let mut number = life.newest;
+        let mut later = RefinedPose {
+            stamp_ns: life.stamp_ns,
+            pose: self.now(life.newest, life.since.motion(), graph),
+        };
+        if life.newest != NONE {
+            poses.push(later);
+        }
+        let mut until_ns = life.until_ns;
+        while let Some(anchor) = self.anchors.get(number) {
+            let pose = self.now(number, &Isometry3::identity(), graph);
+            for stamp_ns in [until_ns, anchor.stamp_ns] {
+                if stamp_ns < later.stamp_ns {
+                    later = RefinedPose { stamp_ns, pose };
+                    poses.push(later);
+                }
+            }
+            number = anchor.previous;
+            until_ns = self
+                .anchors
+                .get(number)
+                .map_or(0, |previous| previous.until_ns);
+        }
+        poses.retain(|refined| is_somewhere(&refined.pose.translation.vector));
+        poses.reverse();
+        RefinedAgent {
+            is_in_map: life.is_in_map,
+            poses,
+        }
+    }
+
+    /// Where a place beside an anchor lies.
+    fn now(&self, anchor: u32, motion: &Isometry3<f64>, graph: &Graph) -> Isometry3<f64> {
+        let refined = graph.poses.get(anchor as usize).copied().flatten();
+        let pose = refined.map(|node| *graph.map.pose(node));
+        let stored = || self.anchors.get(anchor).map(|anchor| anchor.pose);
+        pose.or_else(stored).unwrap_or_default() * motion
+    }
+
+    /// The graph of all agents that are in the map.
+    pub(super) fn graph(&self, among: Among) -> Graph {
+        let mut graph = Graph {
+            map: PoseGraph::new(),
+            poses: vec![None; self.anchors.numbers() as usize],
+            points: vec![None; self.landmarks.slots.numbers() as usize],
+            ties: vec![None; self.ties.numbers() as usize],
+        };
+        for (number, anchor) in self.anchors.iter() {
+            graph.poses[number as usize] = self.add_pose(number, anchor, &mut graph.map);
+        }
+        let motions = self.recalibrated();
+        for (number, anchor) in self.anchors.iter() {
+            self.add_motion(number, anchor, motions[number as usize], &mut graph);
+        }
+        for (number, tie) in self.ties.iter() {
+            graph.ties[number as usize] = self.add_tie(tie, among, &mut graph);
+        }
+        for (_, sighting) in self.sightings.iter() {
+            Self::add_sighting(sighting, &mut graph);
+        }
+        graph
+    }
+
+    /// A node for an anchor in the map.
+    fn add_pose(&self, number: u32, anchor: &Anchor, map: &mut PoseGraph) -> Option<PoseId> {
+        let life = self.lives.get(anchor.agent as usize)?;
+        if !life.is_in_map {
+            return None;
+        }
+        let pose = self.in_map(number)?;
+        let mut tie = anchor.ties;
+        let mut freedom = if life.is_planar {
+            Freedom::Planar
+        } else {
+            Freedom::Full
+        };
+        while let Some(at) = self.ties.get(tie) {
+            if at.standing == Standing::Origin {
+                freedom = Freedom::Held;
+            }
+            tie = self.next_tie(tie, number);
+        }
+        Some(map.add_pose(pose, freedom))
+    }
+
+    fn add_motion(
+        &self,
+        number: u32,
+        anchor: &Anchor,
+        transform: Isometry3<f64>,
+        graph: &mut Graph,
+    ) {
+        let Some(life) = self.lives.get(anchor.agent as usize) else {
+            return;
+        };
+        let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
+        let (Some(from), Some(to), false) = (node(anchor.previous), node(number), anchor.begins)
+        else {
+            return;
+        };
+        let link = Link::Between {
+            from,
+            to,
+            transform,
+            information: information(&anchor.covariance, life.is_planar),
+        };
+        graph.map.add_link(link, Kernel::Gaussian).ok();
+    }
+
+    fn add_tie(&self, tie: &super::tie::Tie, among: Among, graph: &mut Graph) -> Option<LinkId> {
+        let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
+        let to = node(tie.to)?;
+        let agent = self.anchors.get(tie.to)?.agent;
+        let is_planar = self.lives.get(agent as usize)?.is_planar;
+        let information = information(&tie.covariance, is_planar);
+        let link = match tie.standing {
+            Standing::Origin => return None,
+            Standing::Pending | Standing::Refuted if among == Among::Believed => return None,
+            _ if tie.from == NONE => Link::PosePrior {
+                pose: to,
+                at: tie.transform,
+                information,
+            },
+            _ => Link::Between {
+                from: node(tie.from)?,
+                to,
+                transform: tie.transform,
+                information,
+            },
+        };
+        let kernel = if tie.is_match() {
+            Kernel::GemanMcClure(Scale::new(MATCH_SCALE).expect("a positive constant"))
+        } else {
+            Kernel::Gaussian
+        };
+        graph.map.add_link(link, kernel).ok()
+    }
+
+    fn add_sighting(sighting: &super::sighting::Sighting, graph: &mut Graph) -> Option<LinkId> {
+        let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
+        let from = node(sighting.anchor)?;
+        let position = sighting.point.position;
+        let target = match sighting.shown {
+            Shown::Agent(target, lever) => SightingTarget::PointOf(node(target)?, lever),
+            Shown::Landmark(number) => {
+                let point = &mut graph.points[number as usize];
+                let at = graph.map.pose(from) * Point3::from(position);
+                let add = || graph.map.add_point(at, Freedom::Full);
+                SightingTarget::Point(*point.get_or_insert_with(add))
+            }
+        };
+        let information = PositionInformation::of_covariance(&sighting.point.covariance()).ok()?;
+        let link = Link::Sighting {
+            from,
+            target,
+            position,
+            information,
+        };
+        let kernel = Kernel::Cauchy(Scale::new(SIGHTING_SCALE).expect("a positive constant"));
+        graph.map.add_link(link, kernel).ok()
+    }
+}
+
+/// The inverse of a covariance, of its planar part where the rest says nothing.
+fn information(covariance: &PoseCovariance, is_planar: bool) -> PoseInformation {
+    let floor = MOTION_DEVIATION_MIN * MOTION_DEVIATION_MIN;
+    let mut matrix = *covariance.matrix();
+    for k in 0..6 {
+        matrix[(k, k)] += floor;
+    }
+    let mut inverse = Matrix6::zeros();
+    if is_planar {
+        if let Some(planar) = planar_part(&matrix).try_inverse() {
+            inverse = from_planar_part(&planar);
+        }
+    } else if let Some(whole) = matrix.try_inverse() {
+        inverse = whole;
+    }
+    // What is too far from positive to be a covariance says nothing.
+    PoseInformation::new(&inverse).unwrap_or_else(|_| {
+        PoseInformation::new(&Matrix6::zeros()).expect("no information is no less than none")
+    })
+}

@@ -1,0 +1,220 @@
+//! Objects that turn out to be one, and one that turns out to be two.
+//!
+//! Nothing else than [recognition](object_recognition) decides. Two objects that a visit fits alike are one if what was learned of the
+//! one, felt again, is the other. What was joined last to an object stays in doubt: a visit that fits the object as it was before, or
+//! what was joined to it, better than both together takes them apart again; one that fits both together better settles it.
+
+use nalgebra::Isometry3;
+
+use super::memory::{KnownObject, ObjectMemory};
+use crate::input::Label;
+use crate::memory::strength::Clock;
+use object_recognition::{
+    Contact, ObjectId, ObjectLibrary, ObjectModel, Orientation, PoseEstimate, Posterior,
+    Recognition, Verdict,
+};
+
+/// Contacts by which two objects, or the parts of one, are compared: they tell about as much as a whole visit does.
+const CONTACTS_MAX: usize = 48;
+/// Most objects of a visit that are compared with one another.
+const ALIKE_MAX: usize = 4;
+/// Fit below which a model is not explained by another one that it would be taken for, in deviations.
+const FIT_LEAST: f64 = -3.0;
+
+/// Share of the evidence that such a pose holds.
+const CLEAR_SHARE: f64 = 0.9;
+
+/// Numbers of the parts while they are compared.
+const BEFORE: ObjectId = ObjectId(0);
+const ADDED: ObjectId = ObjectId(1);
+const TOGETHER: ObjectId = ObjectId(2);
+
+/// What was joined to an object last, while that may still prove wrong.
+#[derive(Clone, Debug)]
+pub(super) struct Joining {
+    /// The object as it was.
+    pub(super) before: ObjectModel,
+    /// What was joined to it, in its frame.
+    pub(super) added: ObjectModel,
+    /// Visits and contacts that taught what was joined.
+    pub(super) taught: (u64, u64),
+}
+
+/// Where one object's frame lies in that of another.
+#[derive(Clone, Copy)]
+enum Lies {
+    So(Isometry3<f64>),
+    /// Something symmetric, which is explained in each of several poses.
+    InSeveralWays,
+}
+
+impl Lies {
+    /// The other's frame in the one's.
+    fn back(self) -> Self {
+        match self {
+            Self::So(pose) => Self::So(pose.inverse()),
+            Self::InSeveralWays => Self::InSeveralWays,
+        }
+    }
+}
+
+/// What a visit brought to light of what is known already.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Insight {
+    /// Two objects are one, and the name of the one that is no more.
+    Merged { object: ObjectId, absorbed: Label },
+    /// What was joined to an object is one of its own.
+    Split { object: ObjectId, part: ObjectId },
+}
+
+impl ObjectMemory {
+    /// Whether nothing that is known may turn out to be something else.
+    pub(super) fn is_settled(&self) -> bool {
+        self.joinings.is_empty() && self.are_all_named()
+    }
+
+    /// What a visit's contacts say of the objects that they fit.
+    pub(super) fn reflect(
+        &mut self,
+        posterior: &Posterior,
+        orientation: &Orientation,
+        contacts: &[Contact],
+        when: (Clock, u64),
+    ) -> Option<Insight> {
+        if posterior.verdict() == Verdict::Undecided {
+            let live = { posterior.objects.iter() }.filter(|(_, probability)| *probability > 0.01);
+            let live: Vec<ObjectId> = live.map(|&(id, _)| id).take(ALIKE_MAX).collect();
+            return self.unite(&live, orientation, when);
+        }
+        // What was mixed up may explain a visit so badly that it passes for something new.
+        let &(id, _) = posterior.objects.first()?;
+        self.doubt(id, orientation, contacts, when)
+    }
+
+    /// Makes one of the likeliest object and the first that is the same. An object that somebody has named stays what it was said to be.
+    fn unite(
+        &mut self,
+        alike: &[ObjectId],
+        orientation: &Orientation,
+        when: (Clock, u64),
+    ) -> Option<Insight> {
+        let (&one, others) = alike.split_first()?;
+        for &other in others {
+            let (kept, absorbed) = match (self.get(one)?.is_named(), self.get(other)?.is_named()) {
+                (true, true) => continue,
+                (true, false) => (one, other),
+                (false, true) => (other, one),
+                (false, false) => (one.min(other), one.max(other)),
+            };
+            let lies = |part, whole| self.lies_in(part, whole, alike, orientation);
+            let lies = lies(absorbed, kept).or_else(|| Some(lies(kept, absorbed)?.back()));
+            if let Some(lies) = lies {
+                return self.merge(kept, absorbed, lies, when);
+            }
+        }
+        None
+    }
+
+    /// Where the frame of one object lies in that of another one, if what was learned of it is that one, and no
+    /// other of those that are alike.
+    fn lies_in(
+        &self,
+        part: ObjectId,
+        whole: ObjectId,
+        alike: &[ObjectId],
+        orientation: &Orientation,
+    ) -> Option<Lies> {
+        let others = alike.iter().filter(|&&other| other != part);
+        let others = self.library.select(others.map(|&other| (other, other)));
+        let places = self.places(part);
+        let step = places.len().div_ceil(CONTACTS_MAX).max(1);
+        let felt = places
+            .iter()
+            .step_by(step)
+            .map(|place| place.felt().aimed());
+        let posterior = recognised(&others, orientation, felt);
+        if posterior.verdict() != Verdict::Object(whole) || posterior.fit < FIT_LEAST {
+            return None;
+        }
+        match posterior.pose {
+            Some(pose) if is_clear(&pose) => Some(Lies::So(pose.map_from_episode)),
+            Some(_) if *orientation == Orientation::Free => Some(Lies::InSeveralWays),
+            _ => None,
+        }
+    }
+
+    fn merge(
+        &mut self,
+        kept: ObjectId,
+        absorbed: ObjectId,
+        kept_from_absorbed: Lies,
+        (now, revision): (Clock, u64),
+    ) -> Option<Insight> {
+        let other = self.get(absorbed)?.clone();
+        let added = self.library.get(absorbed)?.clone();
+        self.remove(absorbed, revision);
+        match kept_from_absorbed {
+            Lies::So(pose) => {
+                let taught = (other.visits, other.contacts);
+                self.extend(kept, &added, taught, &pose, (now, revision));
+            }
+            Lies::InSeveralWays => self.used(kept, now, revision),
+        }
+        Some(Insight::Merged {
+            object: kept,
+            absorbed: other.name,
+        })
+    }
+
+    /// Settles or undoes what was joined to an object last, if a visit to it tells.
+    fn doubt(
+        &mut self,
+        id: ObjectId,
+        orientation: &Orientation,
+        contacts: &[Contact],
+        (now, revision): (Clock, u64),
+    ) -> Option<Insight> {
+        let joining = self.joinings.get(&id)?.clone();
+        let mut parts = self.library.select([(id, TOGETHER)]);
+        parts.put(BEFORE, joining.before.clone());
+        parts.put(ADDED, joining.added.clone());
+        let step = contacts.len().div_ceil(CONTACTS_MAX).max(1);
+        // Which of them it is should not depend on how far a visit went.
+        let felt = { contacts.iter().step_by(step) }.map(|contact| contact.clone().aimed());
+        let verdict = recognised(&parts, orientation, felt).verdict();
+        match verdict {
+            Verdict::Object(TOGETHER) => {
+                self.settle(id, revision);
+                None
+            }
+            Verdict::Object(_) => {
+                let known = self.get(id)?.clone();
+                let (visits, contacts) = joining.taught;
+                let mut left = KnownObject { revision, ..known };
+                left.visits = left.visits.saturating_sub(visits);
+                left.contacts = left.contacts.saturating_sub(contacts);
+                self.put(id, left, joining.before, None, revision);
+                let part = self.found(None, joining.added, contacts, now, revision)?;
+                Some(Insight::Split { object: id, part })
+            }
+            Verdict::Undecided | Verdict::Unknown => None,
+        }
+    }
+}
+
+/// Whether a pose is clear enough for something to be laid into an object by it.
+pub(super) fn is_clear(pose: &PoseEstimate) -> bool {
+    pose.share > CLEAR_SHARE
+}
+
+fn recognised(
+    library: &ObjectLibrary,
+    orientation: &Orientation,
+    felt: impl Iterator<Item = Contact>,
+) -> Posterior {
+    let mut recognition = Recognition::new(orientation);
+    for contact in felt {
+        recognition.touch(library, contact);
+    }
+    recognition.posterior(library)
+}

@@ -1,0 +1,64 @@
+//! Percepts: what places remember of what was felt and seen there.
+//!
+//! A percept and the place that answers where it was felt are active together, and that strengthens
+//! the association between the two in proportion to the place's confidence there: the Hebbian rule
+//! with the percept's activity at one. It is read both ways: a percept recalls places, and a place
+//! (so a position, a grid code or the end of a motion) recalls percepts.
+
+mod channel;
+mod descriptor;
+mod level;
+mod map;
+mod moments;
+mod sketch;
+
+pub use channel::{Channel, ChannelId, ChannelKind};
+pub(crate) use descriptor::dot;
+pub(crate) use map::{CHANNEL_PAGES_MAX, Compared, PerceptMap};
+pub(crate) use moments::Moments;
+
+use crate::input::{Descriptor, Label};
+use crate::memory::place::PlaceId;
+
+/// A percept to recall places by.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PerceptCue {
+    /// A level.
+    Level {
+        /// Channel.
+        channel: Label,
+        /// Value, in the channel's unit.
+        value: f64,
+    },
+    /// A descriptor.
+    Descriptor(Descriptor),
+}
+
+/// What a place remembers of a channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Remembered {
+    /// The place.
+    pub place: PlaceId,
+    /// The channel.
+    pub channel: ChannelId,
+    /// Number of percepts that taught it.
+    pub percepts: u64,
+    /// Strength of the association: the sum of the place's confidences when they were felt.
+    pub strength: f64,
+    /// What they were like.
+    pub expected: Expected,
+}
+
+/// What a percept is expected to be like.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expected {
+    /// A level.
+    Level {
+        /// Mean, in the channel's unit.
+        mean: f64,
+        /// Standard deviation of single values about it; 0 after the first one.
+        sd: f64,
+    },
+    /// A descriptor: the mean direction, a unit vector. All zeros if what was seen cancels out.
+    Descriptor(Box<[f32]>),
+}

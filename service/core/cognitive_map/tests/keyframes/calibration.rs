@@ -1,0 +1,102 @@
+//! Lasting errors of odometry that are found out late.
+
+use cognitive_map::estimator::{Calibrated, Calibration};
+use cognitive_map::keyframes::{KeyframeGraph, KeyframeSettings, Moment};
+use cognitive_map::{PoseNoise, StartPose};
+use geometry::se3;
+use nalgebra::{Isometry3, SVector, Vector3, Vector6};
+
+/// Samples a second.
+const RATE_HZ: u64 = 10;
+/// What odometry gets wrong.
+const LENGTH: f64 = 0.04;
+const ANGLE: f64 = -0.08;
+const BIAS_RAD_S: f64 = 0.01;
+
+/// A walk whose errors are known from one sample on; answers the largest distances between refined poses and truth, before
+/// that sample and after.
+fn largest_errors(known_from: u64, anchors_max: u32, sense: f64) -> [f64; 2] {
+    let mut chronicle = KeyframeGraph::new(KeyframeSettings {
+        anchors_max,
+        ..KeyframeSettings::default()
+    });
+    let agent = chronicle.enrol();
+    let (mut truth, mut told) = (Isometry3::identity(), Isometry3::identity());
+    let start = StartPose::new([0.0; 3], [0.0, 0.0, 0.0, 1.0], PoseNoise::none()).unwrap();
+    let first = Moment {
+        agent,
+        seq: 0,
+        stamp_ns: 0,
+        pose: truth,
+    };
+    chronicle.start_pose(&first, &start);
+    let mut path = vec![truth];
+    for seq in 1..=600 {
+        let phase = seq as f64 / 40.0;
+        let (linear, angular) = (
+            Vector3::new(0.05, 0.0, 0.0),
+            Vector3::new(0.0, 0.0, sense * 0.06 * phase.sin()),
+        );
+        truth *= se3::exp(&linear, &angular);
+        path.push(truth);
+        let bias = Vector3::new(0.0, 0.0, sense * BIAS_RAD_S / RATE_HZ as f64);
+        let is_known = seq >= known_from;
+        let increment = if is_known {
+            se3::exp(&linear, &angular)
+        } else {
+            let read = (angular + bias) / (1.0 - sense * ANGLE);
+            se3::exp(&(linear / (1.0 - sense * LENGTH)), &read)
+        };
+        let calibration = Calibration {
+            length: sense * LENGTH,
+            angle: sense * ANGLE,
+            bias_rad_s: Vector3::new(0.0, 0.0, sense * BIAS_RAD_S),
+        };
+        let calibrated = Calibrated {
+            calibration: if is_known {
+                calibration
+            } else {
+                Calibration::default()
+            },
+            variance: SVector::repeat(if is_known { 1e-8 } else { 1e-2 }),
+            wander: SVector::repeat(1e-12),
+            moving_s: 1.0 / RATE_HZ as f64,
+        };
+        told *= increment;
+        let moment = Moment {
+            agent,
+            seq,
+            stamp_ns: (seq * 1_000_000_000 / RATE_HZ).cast_signed(),
+            pose: told,
+        };
+        let variance = Vector6::new(1e-6, 1e-6, 0.0, 0.0, 0.0, 1e-6);
+        chronicle.motion(&moment, &increment, &variance, &calibrated);
+    }
+    let mut largest = [0.0_f64; 2];
+    for row in &chronicle.refine().agents[0].poses {
+        let seq = (row.stamp_ns.cast_unsigned() * RATE_HZ + 500_000_000) / 1_000_000_000;
+        let off = (row.pose.translation.vector - path[seq as usize].translation.vector).norm();
+        let side = &mut largest[usize::from(seq >= known_from)];
+        *side = side.max(off);
+    }
+    largest
+}
+
+#[test]
+fn what_is_learned_of_odometry_corrects_the_past() {
+    for sense in [1.0, -1.0] {
+        for anchors_max in [4096, 96] {
+            let [unknown, _] = largest_errors(601, anchors_max, sense);
+            assert!(unknown > 1.0, "the walk tells nothing: {unknown} m");
+            let [before, after] = largest_errors(500, anchors_max, sense);
+            assert!(before < 0.03 * unknown, "{before} m of {unknown} m");
+            assert!(after < 0.03 * unknown, "{after} m of {unknown} m");
+        }
+    }
+}
+
+#[test]
+fn what_is_known_from_the_first_step_changes_nothing() {
+    let [_, after] = largest_errors(1, 4096, 1.0);
+    assert!(after < 1e-6, "{after} m");
+}

@@ -1,0 +1,202 @@
+//! Matches: true ones correct, false ones do not bend.
+
+use cognitive_map::estimator::Calibrated;
+use cognitive_map::keyframes::{Correction, KeyframeGraph, KeyframeSettings, Moment};
+use cognitive_map::{PoseNoise, Relation, RelativePose};
+use nalgebra::{Isometry3, Vector3, Vector6};
+
+/// Steps of a round, and their length \[m\].
+const ROUND: u64 = 80;
+const STEP_M: f64 = 0.3;
+
+/// A robot on a circle whose gyroscope drifts, so that the round does not close.
+struct Rounds {
+    chronicle: KeyframeGraph,
+    told: Isometry3<f64>,
+    truth: Vec<Isometry3<f64>>,
+    corrections: Vec<Correction>,
+}
+
+impl Rounds {
+    fn new(frame: &Isometry3<f64>) -> Self {
+        let mut chronicle = KeyframeGraph::new(KeyframeSettings::default());
+        let agent = chronicle.enrol();
+        let start = cognitive_map::StartPose::new(
+            frame.translation.vector.into(),
+            frame.rotation.coords.into(),
+            PoseNoise::none(),
+        );
+        chronicle.start_pose(&moment(0, frame), &start.unwrap());
+        assert_eq!(agent, 0);
+        Self {
+            chronicle,
+            told: *frame,
+            truth: vec![*frame],
+            corrections: Vec::new(),
+        }
+    }
+
+    fn step(&mut self, drift_rad: f64) {
+        let turn = std::f64::consts::TAU / ROUND as f64;
+        let seq = self.truth.len() as u64;
+        let true_step = Isometry3::new(Vector3::x() * STEP_M, Vector3::z() * turn);
+        let read = Isometry3::new(Vector3::x() * STEP_M, Vector3::z() * (turn + drift_rad));
+        self.truth
+            .push(self.truth[self.truth.len() - 1] * true_step);
+        self.told *= read;
+        let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-4);
+        self.chronicle.motion(
+            &moment(seq, &self.told),
+            &read,
+            &variance,
+            &Calibrated::default(),
+        );
+        if self.chronicle.is_due() {
+            self.corrections = self.chronicle.relax();
+            if let Some(correction) = self.corrections.first() {
+                self.told = correction.pose;
+            }
+        }
+    }
+
+    /// A match with an earlier step, off from what is true by an error.
+    fn matched(&mut self, earlier: u64, error: &Isometry3<f64>) {
+        let seq = self.truth.len() as u64 - 1;
+        let now = self.truth[usize::try_from(seq).unwrap()];
+        let seen = now.inv_mul(&self.truth[usize::try_from(earlier).unwrap()]) * error;
+        self.same_place(earlier, &seen);
+    }
+
+    fn same_place(&mut self, earlier: u64, seen: &Isometry3<f64>) {
+        let noise = PoseNoise::new([0.05, 0.05, 0.0], [0.0, 0.0, 0.02]).unwrap();
+        let relation = RelativePose::new(
+            seen.translation.vector.into(),
+            seen.rotation.coords.into(),
+            noise,
+        );
+        let seq = self.truth.len() as u64 - 1;
+        let told = self.told;
+        let relation = Relation::Pose(relation.unwrap());
+        assert!(
+            self.chronicle
+                .closure(&moment(seq, &told), earlier, &relation)
+        );
+    }
+
+    /// Distance of where the robot is thought to be from where it is \[m\].
+    fn off_m(&self) -> f64 {
+        let truth = self.truth[self.truth.len() - 1].translation.vector;
+        (self.told.translation.vector - truth).norm()
+    }
+}
+
+fn moment(seq: u64, pose: &Isometry3<f64>) -> Moment {
+    Moment {
+        agent: 0,
+        seq,
+        stamp_ns: i64::try_from(seq).unwrap() * 100_000_000,
+        pose: *pose,
+    }
+}
+
+fn rounds(drift_rad: f64, mut at: impl FnMut(&mut Rounds, u64)) -> Rounds {
+    rounds_in(&Isometry3::identity(), drift_rad, &mut at)
+}
+
+fn rounds_in(
+    frame: &Isometry3<f64>,
+    drift_rad: f64,
+    at: &mut impl FnMut(&mut Rounds, u64),
+) -> Rounds {
+    let mut walk = Rounds::new(frame);
+    for seq in 1..=4 * ROUND {
+        walk.step(drift_rad);
+        at(&mut walk, seq);
+    }
+    walk
+}
+
+#[test]
+fn true_matches_close_the_loop_whichever_way_the_gyroscope_drifts() {
+    for drift_rad in [0.004, -0.004] {
+        let alone = rounds(drift_rad, |_, _| {});
+        assert!(alone.off_m() > 1.0, "{}", alone.off_m());
+        let closed = rounds(drift_rad, |walk, seq| {
+            if seq > ROUND && seq.is_multiple_of(5) {
+                walk.matched(seq - ROUND, &Isometry3::identity());
+            }
+        });
+        assert!(closed.chronicle.n_matches_believed() > 20);
+        assert!(closed.off_m() < 0.35 * alone.off_m(), "{}", closed.off_m());
+        let covariance = closed.corrections[0].covariance.unwrap();
+        assert!(covariance.position_sd_m() < 0.5);
+    }
+}
+
+#[test]
+fn a_single_match_that_the_map_cannot_judge_waits() {
+    let walk = rounds(0.004, |walk, seq| {
+        if seq == 3 * ROUND {
+            walk.matched(2 * ROUND, &Isometry3::identity());
+        }
+    });
+    assert_eq!(walk.chronicle.n_matches_believed(), 0);
+}
+
+#[test]
+fn false_matches_do_not_bend() {
+    let elsewhere = Isometry3::identity();
+    let walk = rounds(0.0, |walk, seq| {
+        // Of places a third of a round apart, each with another one.
+        if seq > ROUND && seq.is_multiple_of(7) {
+            walk.same_place(seq * 29 % (seq - 27), &elsewhere);
+        }
+    });
+    assert!(walk.off_m() < 0.2, "{}", walk.off_m());
+    let drifting = |false_ones: bool| {
+        rounds(0.003, |walk, seq| {
+            if seq > ROUND && seq.is_multiple_of(5) {
+                walk.matched(seq - ROUND, &Isometry3::identity());
+            }
+            if false_ones && seq > ROUND && seq.is_multiple_of(2) {
+                walk.same_place(seq * 29 % (seq - 27), &elsewhere);
+            }
+        })
+    };
+    let (clean, doubted) = (drifting(false), drifting(true));
+    assert!(doubted.off_m() < clean.off_m() + 0.2, "{}", doubted.off_m());
+}
+
+#[test]
+fn corrections_move_with_the_start() {
+    let frame = Isometry3::new(Vector3::new(-20.0, 30.0, 0.0), Vector3::z() * -2.0);
+    let mut at = |walk: &mut Rounds, seq: u64| {
+        if seq > ROUND && seq.is_multiple_of(5) {
+            walk.matched(seq - ROUND, &Isometry3::identity());
+        }
+    };
+    let here = rounds_in(&Isometry3::identity(), 0.004, &mut at);
+    let there = rounds_in(&frame, 0.004, &mut at);
+    let off = (frame * here.told).inv_mul(&there.told);
+    assert!(off.translation.vector.norm() < 1e-3 && off.rotation.angle() < 1e-3);
+}
+
+#[test]
+fn a_restored_chronicle_relaxes_to_the_same_bits() {
+    let mut at = |walk: &mut Rounds, seq: u64| {
+        if seq > ROUND && seq.is_multiple_of(5) {
+            walk.matched(seq - ROUND, &Isometry3::identity());
+        }
+    };
+    let live = rounds_in(&Isometry3::identity(), 0.004, &mut at);
+    let recovered = rounds_in(&Isometry3::identity(), 0.004, &mut |walk, seq| {
+        if seq.is_multiple_of(50) {
+            let pages: Vec<_> = walk.chronicle.checkpoint(0).collect();
+            walk.chronicle = KeyframeGraph::restore(KeyframeSettings::default(), 1, pages).unwrap();
+        }
+        at(walk, seq);
+    });
+    assert_eq!(live.chronicle.digest(), recovered.chronicle.digest());
+    assert_eq!(live.told, recovered.told);
+    assert_eq!(live.chronicle.refine(), recovered.chronicle.refine());
+}
