@@ -24,8 +24,9 @@ const NOT_OURS: [&str; 13] = [
 ];
 
 /// What stands at the top of the project.
-const TOP: [&str; 17] = [
+const TOP: [&str; 19] = [
     ".ci",
+    ".config",
     ".gitattributes",
     ".gitignore",
     "ARCHITECTURE.md",
@@ -37,6 +38,7 @@ const TOP: [&str; 17] = [
     "README.md",
     "clients",
     "clippy.toml",
+    "deny.toml",
     "docker",
     "docs",
     "proto",
