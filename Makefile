@@ -17,14 +17,15 @@ PEERS := tests/peers
 export COGMAP_BIN := $(TARGET)/debug/cogmap
 
 # Every step over the workspace names all of its targets, and so gets the same features of every
-# dependency: Zenoh is then built once, not once for each step.
-ALL := --workspace --all-targets
+# dependency: Zenoh is then built once, not once for each step. `--locked` builds the versions of Cargo.lock, and fails
+# where the manifests ask for others.
+ALL := --locked --workspace --all-targets
 
 # nextest runs the tests of all crates at once; without it, cargo's own runner does.
 ifneq ($(shell command -v cargo-nextest),)
-RUN_RUST_TESTS := cargo nextest run --workspace
+RUN_RUST_TESTS := cargo nextest run --locked --workspace
 else
-RUN_RUST_TESTS := cargo test --workspace --lib --bins --tests
+RUN_RUST_TESTS := cargo test --locked --workspace --lib --bins --tests
 endif
 
 .PHONY: help
@@ -37,13 +38,13 @@ help: ## list the targets
 test: ## the whole gate: format, lints, documentation, tests of Rust and Python
 	cargo fmt --all --check
 	cargo clippy $(ALL) -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --lib --examples
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps --lib --examples
 	$(MAKE) --no-print-directory test-rust test-python
 
 .PHONY: test-rust
 test-rust: ## tests of Rust, the end-to-end tests among them
 	cargo build $(ALL)
-	cargo test --workspace --doc
+	cargo test --locked --workspace --doc
 	$(RUN_RUST_TESTS)
 
 .PHONY: test-python
@@ -65,7 +66,7 @@ $(VENV)/installed: $(CLIENT)/pyproject.toml
 
 .PHONY: drills
 drills: release ## attacks and faults that take minutes, as JSON; DRILLS="NAME…" for some of them
-	COGMAP_BIN=$(TARGET)/release/cogmap cargo run --quiet --package cogmap-tests --bin drills -- $(DRILLS)
+	COGMAP_BIN=$(TARGET)/release/cogmap cargo run --quiet --locked --package cogmap-tests --bin drills -- $(DRILLS)
 
 .PHONY: demo
 demo: release ## the service with a simulated team of robots; ARGS="--robots 8 --duration 30"
@@ -111,15 +112,15 @@ $(PEERS)/.venv/installed: $(PEERS)/requirements.txt $(PEERS)/judge.txt $(CLIENT)
 
 .PHONY: release
 release: ## the service, optimised
-	cargo build --release --package cogmap --bin cogmap
+	cargo build --release --locked --package cogmap --bin cogmap
 
 .PHONY: release-lab
 release-lab: ## the service and its laboratory, optimised
-	cargo build --release --package cogmap --package cogmap-lab --bins
+	cargo build --release --locked --package cogmap --package cogmap-lab --bins
 
 .PHONY: docs
 docs: ## documentation of the crates, in target/doc
-	cargo doc --workspace --no-deps --lib --examples
+	cargo doc --locked --workspace --no-deps --lib --examples
 
 .PHONY: fmt
 fmt: ## format the Rust code

@@ -24,19 +24,24 @@ const NOT_OURS: [&str; 13] = [
 ];
 
 /// What stands at the top of the project.
-const TOP: [&str; 17] = [
+const TOP: [&str; 22] = [
     ".ci",
+    ".config",
     ".gitattributes",
     ".gitignore",
     "ARCHITECTURE.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
     "Cargo.lock",
     "Cargo.toml",
     "LICENSE-APACHE",
     "LICENSE-MIT",
     "Makefile",
     "README.md",
+    "SECURITY.md",
     "clients",
     "clippy.toml",
+    "deny.toml",
     "docker",
     "docs",
     "proto",
