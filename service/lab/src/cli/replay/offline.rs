@@ -6,8 +6,8 @@ use std::time::Instant;
 use cogmap_proto::{SampleBatch, SpaceSettings};
 use cognitive_map::{AgentId, CognitiveMap, Record};
 
-use super::mrclam::TeamBatch;
 use super::outcome::{Outcome, RobotOutcome, Timing};
+use super::team_batch::TeamBatch;
 use cogmap::engine::{
     Entry, Recorder, core_settings, evidence, records_of, refined_trajectories, stamped,
     trajectory_interval_ns,
