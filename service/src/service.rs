@@ -12,9 +12,11 @@ use tokio::task::JoinHandle;
 use zenoh::Session;
 
 use crate::config::{Config, ConfigError};
+use crate::decode::core_settings;
 use crate::descriptors::{self, Shares};
-use crate::engine::{self, Engine, Outlet, Silent, SpaceError, core_settings};
+use crate::engine::{Engine, Outlet, Silent, SpaceError};
 use crate::http::{self, HttpSettings};
+use crate::journal;
 use crate::metrics;
 use crate::store::{self, Journal, LocalStore, StoreError};
 use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohOutlet};
@@ -225,7 +227,7 @@ impl Service {
 /// # Errors
 /// See [`LocalStore::open`] and [`store::migrate`].
 pub fn open_store(directory: &Path) -> Result<LocalStore, StoreError> {
-    store::migrate(directory, engine::samples_in)?;
+    store::migrate(directory, journal::samples_in)?;
     LocalStore::open(directory)
 }
 

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use cogmap_proto::Name;
 
-use super::{Kind, Problem, unknown_agent};
+use crate::decode::unknown_agent;
 use crate::engine::{AgentDesk, Engine, Space};
+use crate::problem::{Kind, Problem};
 
 /// The space of a name in a path or a key.
 ///

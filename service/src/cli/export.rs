@@ -6,8 +6,9 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 
 use super::output;
-use crate::decode::stamped_pose;
-use crate::engine::{Recorder, core_settings, entries, records_of, trajectory_interval_ns};
+use crate::decode::{core_settings, records_of, stamped_pose, trajectory_interval_ns};
+use crate::engine::Recorder;
+use crate::journal::entries;
 use crate::store::{Journal, LocalJournal, SpaceNumber};
 use cogmap_proto::SpaceSettings;
 use cognitive_map::{CognitiveMap, Record};

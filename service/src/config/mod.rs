@@ -20,7 +20,7 @@ use std::path::Path;
 use cogmap_proto::{Name, SpaceSettings};
 use serde::{Deserialize, Serialize};
 
-use crate::engine::core_settings;
+use crate::decode::core_settings;
 
 pub use assignment::Assignment;
 pub use engine::EngineConfig;

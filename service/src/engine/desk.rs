@@ -8,12 +8,13 @@ use cogmap_proto::limits::WATERMARK_REJECTIONS_MAX;
 use cogmap_proto::{
     AgentDetail, EndedEpisode, Estimate, Evidence, Rejection, SeqRange, StampedPose, Watermark,
 };
-use cognitive_map::AgentId;
+use cognitive_map::{AgentId, CognitiveMap};
 use serde::Serialize;
 
 use super::counters::Standing;
 use super::due::{Due, Messages};
 use super::trajectory::Recorder;
+use crate::encode;
 
 /// What is known of an agent outside its space's writer. Readers never hold the writer up: the
 /// readout is swapped whole, and the two locks guard a few words each.
@@ -239,21 +240,17 @@ fn evidence(readout: Option<&Readout>) -> Evidence {
 }
 
 impl Readout {
-    pub(crate) fn new(
-        estimate: Estimate,
-        odometry: StampedPose,
-        evidence: Evidence,
-        travelled_m: f64,
-        forgotten_matches: u64,
-    ) -> Self {
-        Self {
-            estimate,
-            odometry,
-            evidence,
-            travelled_m,
-            forgotten_matches,
+    /// What is published of an agent; nothing before its first sample.
+    pub(crate) fn of(space: &str, map: &CognitiveMap, id: AgentId) -> Option<Self> {
+        let agent = map.agent(id)?;
+        Some(Self {
+            estimate: encode::estimate(space, map, id)?,
+            odometry: encode::odometry(agent)?,
+            evidence: encode::evidence(agent),
+            travelled_m: agent.travelled_m(),
+            forgotten_matches: agent.forgotten_matches(),
             json: OnceLock::new(),
-        }
+        })
     }
 }
 

@@ -9,7 +9,6 @@
 //! The writer owns the map; nobody else locks it. Readers take readouts from an agent's desk, or a
 //! snapshot of the whole map, which the writer hands out between two rounds.
 
-mod block;
 mod checkpointer;
 mod committer;
 mod counters;
@@ -17,13 +16,11 @@ mod desk;
 mod due;
 mod episodes;
 mod events;
-mod fold;
 mod health;
 mod message;
 mod outlet;
 mod question;
 mod queue;
-mod readout;
 mod recovery;
 mod refinement;
 mod removal;
@@ -32,7 +29,6 @@ mod sequencer;
 mod session_bound;
 mod settings;
 mod space;
-mod surprise;
 mod trajectory;
 mod writer;
 
@@ -48,25 +44,21 @@ use cogmap_proto::{Codec, DecodeError, Name, SpaceSettings};
 use cognitive_map::InvalidSettings;
 use metrics::gauge;
 
-pub use block::{CorruptBlock, Entry, entries, samples_in};
 pub use desk::AgentDesk;
 #[cfg(test)]
 pub(crate) use desk::desk_of;
 pub(crate) use due::Messages;
 pub use events::{EVENTS_KEPT, EventFollower, Followed};
-pub use fold::{core_settings, records_of, trajectory_interval_ns};
 pub use message::IngestError;
 pub use outlet::{Outlet, Silent};
 pub use question::QuestionError;
-pub use readout::evidence;
-pub(crate) use readout::{status, trip_end};
 pub use refinement::{SharedText, refined_trajectories};
 pub use repair::{AgentLoss, LostBlocks, MissingSamples, RepairReport, repair};
 pub use settings::EngineSettings;
 pub use space::{Space, TrajectoryError, Unavailable};
-pub use trajectory::stamped;
 pub use trajectory::{Chunk, Recorder};
 
+use crate::decode::{core_settings, trajectory_interval_ns};
 use crate::metrics::SPACE_STOPPED;
 use crate::store::{Store, StoreError, StoredSpace};
 use counters::{Drop, IntakeCounters};

@@ -9,7 +9,7 @@ use cognitive_map::{Agent, AgentId, CognitiveMap};
 use tokio::sync::Mutex;
 
 use super::space::{Space, TrajectoryError, Unavailable};
-use super::trajectory::stamped;
+use crate::encode::stamped;
 
 /// How long the later pages of a trajectory are those of the relaxation that its first page came from.
 const PAGES_LAST: Duration = Duration::from_secs(60);

@@ -11,9 +11,9 @@ use cogmap_proto::{
 use cognitive_map::CognitiveMap;
 use proptest::prelude::*;
 
-use super::{
-    Engine, EngineSettings, Entry, QuestionError, Readiness, Silent, core_settings, records_of,
-};
+use super::{Engine, EngineSettings, QuestionError, Readiness, Silent};
+use crate::decode::{core_settings, records_of, trajectory_interval_ns};
+use crate::journal::Entry;
 use crate::store::{Derived, Journal, LocalStore};
 
 mod faults;
@@ -376,7 +376,7 @@ fn lessons_outlive_the_engine_with_and_without_a_checkpoint() {
         assert_eq!(before.object_count(), usize::from(round));
         let name = cognitive_map::Label::new(&format!("cup {round}")).expect("a label");
         let lesson = lesson(f64::from(round));
-        let valid = crate::answer::lesson(&lesson).expect("a lesson");
+        let valid = crate::decode::lesson(&lesson).expect("a lesson");
         runtime
             .block_on(space.teach(&name, lesson, valid))
             .expect("taught");

@@ -12,6 +12,7 @@ use cognitive_map::{Agent, AgentId, CognitiveMap, Record, SampleBody};
 
 use super::desk::AgentDesk;
 use super::space::{Space, TrajectoryError};
+use crate::encode::stamped;
 use crate::store::{DerivedError, SpaceNumber, Store};
 
 /// Rows of a full chunk.
@@ -165,16 +166,6 @@ pub(crate) fn note_all(
     }
     let chunk = recorders[index].note(record, of_map, interval_ns)?;
     Some((agent.0, chunk))
-}
-
-/// A pose at a time, as the wire has it.
-pub fn stamped(stamp_ns: i64, pose: &nalgebra::Isometry3<f64>) -> StampedPose {
-    let rotation = pose.rotation.coords;
-    StampedPose {
-        stamp_ns,
-        translation_m: pose.translation.vector.into(),
-        rotation_xyzw: [rotation.x, rotation.y, rotation.z, rotation.w],
-    }
 }
 
 /// Bytes of a chunk.

@@ -14,6 +14,7 @@ use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
 use crate::answer;
+use crate::encode;
 use crate::engine::IngestError;
 
 /// Which page of the agents.
@@ -103,7 +104,7 @@ pub(crate) async fn grid(
     let map = space.snapshot().await?;
     let state = map
         .agent(desk.id())
-        .and_then(|agent| answer::grid_state(&map, agent));
+        .and_then(|agent| encode::grid_state(&map, agent));
     let detail = || format!("the agent {:?} has no sample yet", desk.name());
     state.map_or_else(
         || Err(Problem::new(Kind::UnknownAgent, detail())),

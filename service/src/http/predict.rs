@@ -7,7 +7,8 @@ use cogmap_proto::{PredictAnswer, PredictQuery};
 use super::extract::{AgentOfPath, AgentParams, Json, NoQuery};
 use super::problem::Problem;
 use super::reply;
-use crate::answer::{self, InvalidPrediction};
+use crate::answer;
+use crate::decode::InvalidPrediction;
 
 /// What an agent would feel after a motion from where it is now, and how sure that is.
 #[utoipa::path(post, path = "/v1/spaces/{space}/agents/{agent}/predict", tag = "memory",

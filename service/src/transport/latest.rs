@@ -11,8 +11,9 @@ use zenoh::query::{Query, Queryable};
 
 use super::queries::{busy, codec_of, refuse, send};
 use super::session::TransportError;
-use crate::answer::{Kind, Problem, agent_named, space_named};
+use crate::answer::{agent_named, space_named};
 use crate::engine::{AgentDesk, Engine};
+use crate::problem::{Kind, Problem};
 
 /// What is published of each agent.
 #[derive(Clone, Copy, Debug)]

@@ -14,8 +14,11 @@ use zenoh::{Session, Wait};
 
 use super::latest;
 use super::session::TransportError;
-use crate::answer::{self, InvalidPrediction, Kind, Problem};
+use crate::answer;
+use crate::decode::{self, InvalidPrediction};
+use crate::encode;
 use crate::engine::Engine;
+use crate::problem::{Kind, Problem};
 
 /// Most queries under way; further ones are told to come back.
 const QUERIES_MAX: usize = 64;
@@ -137,16 +140,16 @@ async fn answer(
         }
         Verb::Identify => {
             let body: IdentifyQuery = body(query, codec)?;
-            let (orientation, touches) = answer::touches_to_identify(&body)?;
+            let (orientation, touches) = decode::touches_to_identify(&body)?;
             let (map, identified) = space.identify(orientation, touches).await?;
-            let answer = answer::identification(space.name(), &map, &identified);
+            let answer = encode::identification(space.name(), &map, &identified);
             Ok(codec.encode(&answer))
         }
         Verb::Localize => {
             let body: LocalizeQuery = body(query, codec)?;
-            let samples = answer::samples_to_localize(&body)?;
+            let samples = decode::samples_to_localize(&body)?;
             let (map, found) = space.localize(samples).await?;
-            let answer = answer::localization(space.name(), &map, &found);
+            let answer = encode::localization(space.name(), &map, &found);
             Ok(codec.encode(&answer))
         }
     }

@@ -7,7 +7,6 @@ use cogmap_proto::Sample;
 use cognitive_map::{AgentId, CognitiveMap, Label, Record};
 
 use super::{AgentSlot, Writer};
-use crate::engine::block::Entry;
 use crate::engine::counters::Drop;
 use crate::engine::desk::AgentDesk;
 use crate::engine::episodes::EndedEpisodes;
@@ -15,6 +14,7 @@ use crate::engine::message::{IngestError, RemovalRequest};
 use crate::engine::sequencer::{Sequencer, Window};
 use crate::engine::space::Shared;
 use crate::engine::trajectory::Recorder;
+use crate::journal::Entry;
 
 /// An agent that was heard of within this time makes no room for others: names that come in great
 /// numbers cannot drive out a robot that is at work.

@@ -2,13 +2,13 @@
 
 use std::time::Instant;
 
-use cogmap_proto::{Rejection, Sample, SampleBatch, SeqRange, SkipReason};
-use cognitive_map::{AgentId, Record};
+use cogmap_proto::{Rejection, Sample, SampleBatch, SeqRange};
+use cognitive_map::{AgentId, Record, SkipReason};
 
 use super::Writer;
 use crate::decode;
-use crate::engine::block::Entry;
-use crate::engine::readout::{skip_reason, skip_reason_of_wire};
+use crate::encode;
+use crate::journal::Entry;
 
 impl Writer {
     /// Journals samples that are in order now, refusing those that make no sense.
@@ -22,7 +22,7 @@ impl Writer {
         for (seq, wire) in accepted {
             let slot = &mut self.agents[slot];
             let refusal = match decode::sample(&wire) {
-                Err(invalid) => skip_reason(cognitive_map::SkipReason::Invalid(invalid)),
+                Err(invalid) => SkipReason::Invalid(invalid),
                 Ok(sample) if sample.stamp_ns < slot.latest_ns => SkipReason::TimeBackwards,
                 Ok(sample) => {
                     slot.latest_ns = sample.stamp_ns;
@@ -69,27 +69,29 @@ impl Writer {
     /// Journals that samples are refused for good.
     fn skip(&mut self, agent: AgentId, session: u64, range: SeqRange, reason: SkipReason) {
         let SeqRange { from, to } = range;
+        let published = encode::skip_reason(reason);
         self.block.push(&Entry::Skip {
             agent: agent.0,
             session,
             from,
             to,
-            reason,
+            reason: published,
         });
-        let reason_of_core = skip_reason_of_wire(reason);
         self.records.push(Record::Skip {
             agent,
             session,
             from,
             to,
-            reason: reason_of_core,
+            reason,
         });
-        self.counters.skipped(to - from, reason);
+        self.counters.skipped(to - from, published);
         let slot = &mut self.agents[agent.0 as usize];
         slot.remind = true;
-        slot.desk
-            .marks()
-            .rejected(session, Rejection { range, reason });
+        let rejection = Rejection {
+            range,
+            reason: published,
+        };
+        slot.desk.marks().rejected(session, rejection);
     }
 
     /// Gives up samples that have been missing for too long.

@@ -22,19 +22,19 @@ use cognitive_map::{CognitiveMap, Event, Record};
 
 use agents::note_removal;
 
-use super::block::BlockWriter;
 use super::checkpointer::{Beside, Checkpointer};
 use super::committer::{Answer, Commit};
 use super::counters::SpaceCounters;
 use super::desk::AgentDesk;
-use super::episodes::{self, EndedEpisodes, Latest};
-use super::events::published;
+use super::episodes::EndedEpisodes;
 use super::message::{Call, ChangeReply};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
 use super::sequencer::{Sequencer, Window};
 use super::space::Shared;
 use super::trajectory;
+use crate::encode::{self, LatestEpisode};
+use crate::journal::BlockWriter;
 use crate::store::ChunkKey;
 use pace::Pace;
 
@@ -225,14 +225,14 @@ impl Writer {
             self.map.apply(record, &mut self.events);
             for event in &self.events {
                 self.counters.event(&self.map, event);
-                let change = episodes::change(&self.shared.name, &self.map, event);
-                if let Some(Latest(episode)) = change {
+                let change = encode::ended_episode(&self.shared.name, &self.map, event);
+                if let Some(LatestEpisode(episode)) = change {
                     let slot = &self.agents[event.agent.0 as usize];
                     slot.desk.put_ended_episode(episode);
                 }
             }
-            self.told
-                .extend(published(&self.shared.name, &self.map, &self.events));
+            let records = encode::event_records(&self.shared.name, &self.map, &self.events);
+            self.told.extend(records.map(Arc::new));
             self.events.clear();
             self.applied += u64::from(matches!(record, Record::Sample { .. }));
             let (Record::Sample { agent, .. }

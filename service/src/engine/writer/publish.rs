@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use super::{AgentSlot, Writer};
 use crate::engine::committer::{Commit, Mark};
 use crate::engine::counters::Standing;
-use crate::engine::readout;
+use crate::engine::desk::Readout;
 
 impl Writer {
     /// Records the sizes of the space, and how its agents stand.
@@ -24,7 +24,7 @@ impl Writer {
         self.measure(0);
         for slot in self.agents.iter().filter(|slot| !slot.removed) {
             let id = slot.desk.id();
-            if let Some(readout) = readout::readout(&self.shared.name, &self.map, id) {
+            if let Some(readout) = Readout::of(&self.shared.name, &self.map, id) {
                 slot.desk.publish(readout);
             }
             self.remind(slot);
@@ -57,7 +57,7 @@ impl Writer {
             };
             let (session, next) = (agent.session(), agent.next_seq());
             if applied {
-                if let Some(readout) = readout::readout(space, &self.map, slot.desk.id()) {
+                if let Some(readout) = Readout::of(space, &self.map, slot.desk.id()) {
                     slot.desk.publish(readout);
                     self.shared.outlet.estimate(space, &slot.desk);
                 }

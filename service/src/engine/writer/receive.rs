@@ -8,11 +8,11 @@ use cognitive_map::Record;
 
 use super::{WAITING_MAX, Writer};
 use crate::decode;
-use crate::engine::block::Entry;
 use crate::engine::committer::Answer;
 use crate::engine::counters::{self, Drop};
 use crate::engine::message::{IngestError, Request};
 use crate::engine::sequencer::{Offered, SessionOrder, Window};
+use crate::journal::Entry;
 
 impl Writer {
     /// Takes a message of Zenoh.

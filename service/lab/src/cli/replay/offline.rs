@@ -8,10 +8,10 @@ use cognitive_map::{AgentId, CognitiveMap, Record};
 
 use super::mrclam::TeamBatch;
 use super::outcome::{Outcome, RobotOutcome, Timing};
-use cogmap::engine::{
-    Entry, Recorder, core_settings, evidence, records_of, refined_trajectories, stamped,
-    trajectory_interval_ns,
-};
+use cogmap::decode::{core_settings, records_of, trajectory_interval_ns};
+use cogmap::encode::{evidence, stamped};
+use cogmap::engine::{Recorder, refined_trajectories};
+use cogmap::journal::Entry;
 
 /// Time between two beliefs that are kept \[ns\].
 const BELIEF_INTERVAL_NS: i64 = 1_000_000_000;
