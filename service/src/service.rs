@@ -14,12 +14,12 @@ use zenoh::Session;
 use crate::config::{Config, ConfigError};
 use crate::decode::core_settings;
 use crate::descriptors::{self, Shares};
-use crate::engine::{Engine, Outlet, Silent, SpaceError};
+use crate::engine::{Engine, Publisher, Silent, SpaceError};
 use crate::http::{self, HttpSettings};
 use crate::journal;
 use crate::metrics;
 use crate::store::{self, Journal, LocalStore, StoreError};
-use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohOutlet};
+use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohPublisher};
 
 /// Longest wait for the Zenoh session to close.
 const SESSION_CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -34,7 +34,7 @@ pub struct Service {
     engine: Engine,
     address: SocketAddr,
     session: Option<Session>,
-    outlet: Option<Arc<ZenohOutlet>>,
+    publisher: Option<Arc<ZenohPublisher>>,
     intake: Option<Intake>,
     stop_http: oneshot::Sender<()>,
     http: JoinHandle<std::io::Result<()>>,
@@ -104,16 +104,16 @@ impl Service {
             Some(settings) => Some(transport::open(&settings).await?),
             None => None,
         };
-        let zenoh_outlet = match &session {
+        let zenoh_publisher = match &session {
             Some(session) => {
                 let codec = config.zenoh.encoding.codec();
-                let outlet = ZenohOutlet::declare(session.clone(), codec).await?;
-                Some(Arc::new(outlet))
+                let publisher = ZenohPublisher::declare(session.clone(), codec).await?;
+                Some(Arc::new(publisher))
             }
             None => None,
         };
-        let outlet: Arc<dyn Outlet> = match &zenoh_outlet {
-            Some(outlet) => Arc::clone(outlet) as Arc<dyn Outlet>,
+        let publisher: Arc<dyn Publisher> = match &zenoh_publisher {
+            Some(publisher) => Arc::clone(publisher) as Arc<dyn Publisher>,
             None => Arc::new(Silent),
         };
         let directory = &config.store.directory;
@@ -124,7 +124,7 @@ impl Service {
         let store = Arc::new(open_store(directory).map_err(of_store)?);
         let stored = store.spaces().map_err(of_store)?;
         let name_lost = stored.iter().any(|space| space.settings.is_none());
-        let engine = Engine::open(store, config.engine.settings(), outlet).map_err(of_store)?;
+        let engine = Engine::open(store, config.engine.settings(), publisher).map_err(of_store)?;
         for (name, settings) in &config.spaces {
             if let Some(space) = engine.space(name.as_str()) {
                 if space.settings() != settings {
@@ -169,7 +169,7 @@ impl Service {
             engine,
             address,
             session,
-            outlet: zenoh_outlet,
+            publisher: zenoh_publisher,
             intake,
             stop_http,
             http,
@@ -202,11 +202,11 @@ impl Service {
             Err(error) => tracing::error!(%error, "the http task ended with a panic"),
         }
         self.upkeep.iter().for_each(JoinHandle::abort);
-        let (engine, outlet) = (self.engine, self.outlet);
+        let (engine, publisher) = (self.engine, self.publisher);
         let end = move || {
             engine.shutdown();
-            if let Some(outlet) = outlet {
-                outlet.close();
+            if let Some(publisher) = publisher {
+                publisher.close();
             }
         };
         if tokio::task::spawn_blocking(end).await.is_err() {

@@ -100,6 +100,78 @@ const CORE: [(&str, &[&str]); 8] = [
     ),
 ];
 
+/// Crates of the core whose types decode/ makes and encode/ reads.
+const TRANSLATED: [&str; 4] = ["cognitive_map", "geometry", "grid", "object_recognition"];
+
+/// Files of `service/src` beside decode/ and encode/ that name messages of the wire and types of the core,
+/// each with what it needs both for. None of them makes one from the other.
+const NAMES_BOTH: [(&str, &str); 16] = [
+    (
+        "answer/mod.rs",
+        "asks the map what decode has read, and hands encode what it says",
+    ),
+    (
+        "cli/export.rs",
+        "reads the settings that a space was stored with, and folds its journal",
+    ),
+    (
+        "engine/agent_view.rs",
+        "keeps an agent's messages beside its number in the map",
+    ),
+    (
+        "engine/counters.rs",
+        "counts refusals as clients are told of them, and events of the map",
+    ),
+    (
+        "engine/message.rs",
+        "carries a lesson as it came, for the journal, and as it was read",
+    ),
+    (
+        "engine/mod.rs",
+        "keeps a space's settings as they came and as they were read",
+    ),
+    (
+        "engine/repair/mod.rs",
+        "reads the settings that a space was stored with, and restores its map",
+    ),
+    (
+        "engine/space.rs",
+        "takes samples and lessons in, and hands snapshots of the map out",
+    ),
+    (
+        "engine/writer/agents.rs",
+        "keeps each agent's samples in order beside its number in the map",
+    ),
+    (
+        "engine/writer/journal.rs",
+        "journals samples as they came, and gathers them as they were read",
+    ),
+    (
+        "engine/writer/mod.rs",
+        "owns the map, and what is to be published of it",
+    ),
+    (
+        "engine/writer/receive.rs",
+        "journals batches as they came, and gathers them as they were read",
+    ),
+    (
+        "http/export.rs",
+        "walks the map, and names its messages for the OpenAPI document",
+    ),
+    (
+        "http/objects.rs",
+        "pages through the map, and names its messages for the OpenAPI document",
+    ),
+    (
+        "http/places.rs",
+        "pages through the map, and names its messages for the OpenAPI document",
+    ),
+    (
+        "http/trips.rs",
+        "pages through the map, and names its messages for the OpenAPI document",
+    ),
+];
+
 /// A text file of the project.
 struct Source {
     /// Path from the root.
@@ -424,7 +496,7 @@ fn each_part_of_the_service_knows_only_its_neighbours() {
                 "config/mod.rs", // its own module of that name
             ],
             "Only the transport speaks Zenoh, the composition root opens it, and commands that play \
-             robots use it from outside. Go through engine::Outlet or Engine::offer.",
+             robots use it from outside. Go through engine::Publisher or Engine::offer.",
         ),
         (
             &["axum::", "use axum"],
@@ -501,6 +573,36 @@ fn each_part_of_the_service_knows_only_its_neighbours() {
             .collect();
         assert_none(&found, advice);
     }
+}
+
+#[test]
+fn decode_and_encode_alone_translate() {
+    let names = |line: &str, name: &str| {
+        line.contains(&format!("use {name}")) || line.contains(&format!("{name}::"))
+    };
+    let sources = sources();
+    let mut both: Vec<_> = sources
+        .iter()
+        .filter_map(|source| Some((source.path.strip_prefix("service/src/")?, &source.text)))
+        .filter(|(path, _)| !path.starts_with("decode/") && !path.starts_with("encode/"))
+        .filter(|(path, _)| !path.contains("/tests"))
+        .filter(|(_, text)| {
+            let code = text
+                .split("#[cfg(test)]\nmod tests {")
+                .next()
+                .unwrap_or_default();
+            let mentions = |name: &str| code.lines().any(|line| names(line, name));
+            mentions("cogmap_proto") && TRANSLATED.iter().any(|name| mentions(name))
+        })
+        .map(|(path, _)| path)
+        .collect();
+    both.sort_unstable();
+    let allowed: Vec<_> = NAMES_BOTH.iter().map(|(path, _)| *path).collect();
+    assert_eq!(
+        both, allowed,
+        "decode/ makes what the core takes of messages, encode/ makes messages of what the core has. Let \
+         them do it; a file that only passes both on has its reason in the list."
+    );
 }
 
 #[test]

@@ -31,7 +31,7 @@ pub use place::place;
 pub use prediction::prediction;
 pub use recall::recall;
 pub use space::space_info;
-pub use trajectory::stamped;
+pub use trajectory::{stamped, trajectory};
 pub use trip::{leg, trip, trip_detail};
 
 /// Frame of all positions in answers.

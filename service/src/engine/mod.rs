@@ -6,19 +6,19 @@
 //!                                            committer: sync ─┴─► watermark
 //! ```
 //!
-//! The writer owns the map; nobody else locks it. Readers take readouts from an agent's desk, or a
+//! The writer owns the map; nobody else locks it. Readers take readouts from an agent's view, or a
 //! snapshot of the whole map, which the writer hands out between two rounds.
 
+mod agent_view;
 mod checkpointer;
 mod committer;
 mod counters;
-mod desk;
 mod due;
 mod episodes;
 mod events;
 mod health;
 mod message;
-mod outlet;
+mod publisher;
 mod question;
 mod queue;
 mod recovery;
@@ -44,19 +44,19 @@ use cogmap_proto::{Codec, DecodeError, Name, SpaceSettings};
 use cognitive_map::InvalidSettings;
 use metrics::gauge;
 
-pub use desk::AgentDesk;
+pub use agent_view::AgentView;
 #[cfg(test)]
-pub(crate) use desk::desk_of;
+pub(crate) use agent_view::view_of;
 pub(crate) use due::Messages;
 pub use events::{EVENTS_KEPT, EventFollower, Followed};
 pub use message::IngestError;
-pub use outlet::{Outlet, Silent};
+pub use publisher::{Publisher, Silent};
 pub use question::QuestionError;
 pub use refinement::{SharedText, refined_trajectories};
 pub use repair::{AgentLoss, LostBlocks, MissingSamples, RepairReport, repair};
 pub use settings::EngineSettings;
 pub use space::{Space, TrajectoryError, Unavailable};
-pub use trajectory::{Chunk, Recorder};
+pub use trajectory::{Chunk, Recorder, TrajectoryPage};
 
 use crate::decode::{core_settings, trajectory_interval_ns};
 use crate::metrics::SPACE_STOPPED;
@@ -159,13 +159,13 @@ impl Engine {
     pub fn open(
         store: Arc<dyn Store>,
         settings: EngineSettings,
-        outlet: Arc<dyn Outlet>,
+        publisher: Arc<dyn Publisher>,
     ) -> Result<Self, StoreError> {
         let health = Arc::new(Health::default());
         let stored = store.spaces()?;
         let (commits, committer) = committer::start(
             Arc::clone(&store),
-            Arc::clone(&outlet),
+            Arc::clone(&publisher),
             Arc::clone(&health),
             settings.commit_interval,
         );
@@ -173,7 +173,7 @@ impl Engine {
         let spaces_max = settings.spaces_max;
         let around = Surroundings {
             store,
-            outlet,
+            publisher,
             health: Arc::clone(&health),
             commits,
             jobs,

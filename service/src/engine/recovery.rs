@@ -203,7 +203,7 @@ fn put(store: &dyn Store, health: &Health, space: SpaceNumber, agent: u32, chunk
         session: chunk.session,
         first_stamp_ns,
     };
-    if let Err(error) = store.put_chunk(space, key, &trajectory::encode(&chunk.rows)) {
+    if let Err(error) = store.put_chunk(space, key, &trajectory::chunk_bytes(&chunk.rows)) {
         health.derived_fail(&error);
     }
 }

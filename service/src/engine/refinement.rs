@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
-use cogmap_proto::{StampedPose, Trajectory};
+use ::trajectory::StampedPose;
 use cognitive_map::{Agent, AgentId, CognitiveMap};
 use tokio::sync::Mutex;
 
 use super::space::{Space, TrajectoryError, Unavailable};
-use crate::encode::stamped;
+use super::trajectory::TrajectoryPage;
 
 /// How long the later pages of a trajectory are those of the relaxation that its first page came from.
 const PAGES_LAST: Duration = Duration::from_secs(60);
@@ -55,7 +55,10 @@ pub fn refined_trajectories(map: &CognitiveMap) -> BTreeMap<String, Vec<StampedP
         // Those of removed agents are among them.
         let poses = refined.next().filter(|refined| refined.is_in_map);
         let poses = poses.map(|refined| refined.poses).unwrap_or_default();
-        let rows = poses.iter().map(|row| stamped(row.stamp_ns, &row.pose));
+        let rows = poses.iter().map(|row| StampedPose {
+            stamp_ns: row.stamp_ns,
+            pose: row.pose,
+        });
         let name = agent
             .is_enrolled()
             .then(|| agent.name().as_str().to_owned())?;
@@ -79,8 +82,8 @@ impl Space {
         from_ns: Option<i64>,
         to_ns: Option<i64>,
         limit: usize,
-    ) -> Result<Trajectory, TrajectoryError> {
-        let desk = self.agent(agent).ok_or_else(|| self.no_agent(agent))?;
+    ) -> Result<TrajectoryPage, TrajectoryError> {
+        let view = self.agent(agent).ok_or_else(|| self.no_agent(agent))?;
         let refinement = self.refinement(from_ns.is_some()).await?;
         let rows = refinement.agents.get(agent).map_or(&[][..], Vec::as_slice);
         let start = from_ns.map_or(0, |from| rows.partition_point(|row| row.stamp_ns < from));
@@ -89,12 +92,9 @@ impl Space {
         });
         let asked = &rows[start..end.max(start)];
         let poses = asked[..limit.min(asked.len())].to_vec();
-        Ok(Trajectory {
-            agent: agent.to_owned(),
-            session: desk.watermark().session,
-            frame: "map".to_owned(),
-            kind: "refined".to_owned(),
-            map_revision: Some(refinement.revision),
+        Ok(TrajectoryPage {
+            session: view.watermark().session,
+            revision: Some(refinement.revision),
             poses,
             next_from_ns: asked.get(limit).map(|row| row.stamp_ns),
         })

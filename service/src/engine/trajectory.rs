@@ -7,12 +7,13 @@
 
 use std::sync::Arc;
 
-use cogmap_proto::{StampedPose, Trajectory};
+use ::trajectory::StampedPose;
 use cognitive_map::{Agent, AgentId, CognitiveMap, Record, SampleBody};
 
-use super::desk::AgentDesk;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+
+use super::agent_view::AgentView;
 use super::space::{Space, TrajectoryError};
-use crate::encode::stamped;
 use crate::store::{DerivedError, SpaceNumber, Store};
 
 /// Rows of a full chunk.
@@ -42,6 +43,19 @@ pub struct Chunk {
     pub session: u64,
     /// Rows; at least one.
     pub rows: Vec<StampedPose>,
+}
+
+/// Rows of an agent's trajectory, oldest first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrajectoryPage {
+    /// Session of a causal trajectory; the current one where it is refined.
+    pub session: u64,
+    /// Revision of the relaxed map that a refined trajectory is of; none of a causal one.
+    pub revision: Option<u64>,
+    /// The rows.
+    pub poses: Vec<StampedPose>,
+    /// Stamp of the first row of the next page, if there is one \[ns\].
+    pub next_from_ns: Option<i64>,
 }
 
 /// Chunk bytes that cannot be read.
@@ -80,7 +94,10 @@ impl Recorder {
         if !agent.placed() {
             return complete;
         }
-        let row = stamped(sample.stamp_ns, agent.pose());
+        let row = StampedPose {
+            stamp_ns: sample.stamp_ns,
+            pose: *agent.pose(),
+        };
         match self.latest_ns {
             Some(latest) if jumped && latest == sample.stamp_ns => match self.rows.last_mut() {
                 Some(last) => *last = row,
@@ -125,7 +142,7 @@ impl Recorder {
     pub(crate) fn write_all(recorders: &[Self]) -> Vec<u8> {
         let plain: Vec<_> = recorders
             .iter()
-            .map(|r| (r.session, r.latest_ns, encode(&r.rows)))
+            .map(|r| (r.session, r.latest_ns, chunk_bytes(&r.rows)))
             .collect();
         postcard::to_stdvec(&plain).expect("plain data encodes")
     }
@@ -139,7 +156,7 @@ impl Recorder {
             .map(|(session, latest_ns, rows)| {
                 Ok(Self {
                     session,
-                    rows: decode(&rows)?,
+                    rows: chunk_rows(&rows)?,
                     latest_ns,
                 })
             })
@@ -169,12 +186,13 @@ pub(crate) fn note_all(
 }
 
 /// Bytes of a chunk.
-pub(crate) fn encode(rows: &[StampedPose]) -> Vec<u8> {
+pub(crate) fn chunk_bytes(rows: &[StampedPose]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(1 + rows.len() * ROW_BYTES);
     bytes.push(VERSION);
     for row in rows {
         bytes.extend_from_slice(&row.stamp_ns.to_le_bytes());
-        for number in row.translation_m.iter().chain(&row.rotation_xyzw) {
+        let (position, rotation) = (&row.pose.translation.vector, &row.pose.rotation.coords);
+        for number in position.iter().chain(rotation) {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
     }
@@ -182,7 +200,7 @@ pub(crate) fn encode(rows: &[StampedPose]) -> Vec<u8> {
 }
 
 /// Rows of a chunk.
-pub(crate) fn decode(bytes: &[u8]) -> Result<Vec<StampedPose>, CorruptChunk> {
+fn chunk_rows(bytes: &[u8]) -> Result<Vec<StampedPose>, CorruptChunk> {
     let (&version, rows) = bytes.split_first().ok_or(CorruptChunk)?;
     if version != VERSION || rows.len() % ROW_BYTES != 0 {
         return Err(CorruptChunk);
@@ -192,10 +210,16 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Vec<StampedPose>, CorruptChunk> {
     };
     Ok(rows
         .chunks_exact(ROW_BYTES)
-        .map(|row| StampedPose {
-            stamp_ns: i64::from_le_bytes(eight(row, 0)),
-            translation_m: [1, 2, 3].map(|at| f64::from_le_bytes(eight(row, at))),
-            rotation_xyzw: [4, 5, 6, 7].map(|at| f64::from_le_bytes(eight(row, at))),
+        .map(|row| {
+            let number = |at| f64::from_le_bytes(eight(row, at));
+            let [i, j, k, w] = [4, 5, 6, 7].map(number);
+            // It was one when it was written, and is to be the same to the last bit.
+            let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
+            let translation = Translation3::from([1, 2, 3].map(number));
+            StampedPose {
+                stamp_ns: i64::from_le_bytes(eight(row, 0)),
+                pose: Isometry3::from_parts(translation, rotation),
+            }
         })
         .collect())
 }
@@ -213,9 +237,9 @@ impl Space {
         from_ns: Option<i64>,
         to_ns: Option<i64>,
         limit: usize,
-    ) -> Result<Trajectory, TrajectoryError> {
-        let desk = self.agent(agent);
-        let present = desk.as_deref().map(Part::of_desk);
+    ) -> Result<TrajectoryPage, TrajectoryError> {
+        let view = self.agent(agent);
+        let present = view.as_deref().map(Part::of_view);
         let former = self.shared().former(agent);
         let session = match (&present, session) {
             (Some(present), session) => session.unwrap_or(present.session),
@@ -227,7 +251,7 @@ impl Space {
         let parts: Vec<Part> = { present.into_iter() }
             .chain(former.map(Part::of_former))
             .collect();
-        let (shared, name) = (Arc::clone(self.shared()), agent.to_owned());
+        let shared = Arc::clone(self.shared());
         let work = move || {
             let window = Window {
                 session,
@@ -235,7 +259,7 @@ impl Space {
                 to_ns,
                 limit,
             };
-            read(&*shared.store, shared.number, &name, &parts, &window)
+            read(&*shared.store, shared.number, &parts, &window)
         };
         tokio::task::spawn_blocking(work)
             .await
@@ -252,11 +276,11 @@ impl Space {
     }
 }
 
-/// Where an agent's rows are: in the store, and the latest of them at its desk.
+/// Where an agent's rows are: in the store, and the latest of them at its view.
 #[derive(Debug)]
 pub(crate) struct Part {
     agent: u32,
-    /// Session of the rows at the desk.
+    /// Session of the rows at the view.
     pub(crate) session: u64,
     fresh: Vec<StampedPose>,
 }
@@ -271,12 +295,12 @@ pub(crate) struct Window {
 }
 
 impl Part {
-    /// Of an agent of the space. The rows at the desk are to be taken first and those in the store
+    /// Of an agent of the space. The rows at the view are to be taken first and those in the store
     /// afterwards: a chunk that moves from one to the other in between is then found twice and never missed.
-    pub(crate) fn of_desk(desk: &AgentDesk) -> Self {
-        let recorder = desk.recorder();
+    pub(crate) fn of_view(view: &AgentView) -> Self {
+        let recorder = view.recorder();
         Self {
-            agent: desk.id().0,
+            agent: view.id().0,
             session: recorder.session(),
             fresh: recorder.rows().to_vec(),
         }
@@ -312,10 +336,9 @@ impl Part {
 pub(crate) fn read(
     store: &dyn Store,
     space: SpaceNumber,
-    name: &str,
     parts: &[Part],
     window: &Window,
-) -> Result<Trajectory, TrajectoryError> {
+) -> Result<TrajectoryPage, TrajectoryError> {
     let mut poses = Vec::new();
     for (at, part) in parts.iter().enumerate() {
         let is_last = at + 1 == parts.len();
@@ -326,12 +349,9 @@ pub(crate) fn read(
     }
     let next_from_ns = poses.get(window.limit).map(|row| row.stamp_ns);
     poses.truncate(window.limit);
-    Ok(Trajectory {
-        agent: name.to_owned(),
+    Ok(TrajectoryPage {
         session: window.session,
-        frame: "map".to_owned(),
-        kind: "causal".to_owned(),
-        map_revision: None,
+        revision: None,
         poses,
         next_from_ns,
     })
@@ -358,7 +378,7 @@ fn rows(
         )?;
         let last = chunks.len() < CHUNKS_AT_ONCE;
         for (_, bytes) in chunks {
-            let rows = decode(&bytes).map_err(|error| DerivedError(error.to_string()))?;
+            let rows = chunk_rows(&bytes).map_err(|error| DerivedError(error.to_string()))?;
             poses.extend(rows.into_iter().filter(|row| row.stamp_ns >= next_from_ns));
             let Some(latest) = poses.last() else { continue };
             if poses.len() > window.limit || latest.stamp_ns >= to_ns {

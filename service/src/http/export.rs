@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::io;
 use std::sync::Arc;
 
+use ::trajectory::write_tum;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::Response;
@@ -22,7 +23,7 @@ use super::long::LongAnswers;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
-use super::trajectory::{TUM, tum};
+use super::trajectory::TUM;
 use crate::answer::agent_once_named;
 use crate::encode;
 use crate::engine::Space;
@@ -166,12 +167,12 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
                 .collect()
         }),
     ];
-    let desks = space.agents_after(None, usize::MAX);
-    let agents: Arc<[_]> = desks
+    let views = space.agents_after(None, usize::MAX);
+    let agents: Arc<[_]> = views
         .iter()
-        .map(|desk| AgentSummary {
-            name: desk.name().to_owned(),
-            estimate: desk.estimate(),
+        .map(|view| AgentSummary {
+            name: view.name().to_owned(),
+            estimate: view.estimate(),
         })
         .collect();
     let lists = sections.into_iter().flat_map(move |(name, section)| {
@@ -254,7 +255,7 @@ async fn trajectory(
                         .map_err(io::Error::other)?,
                 ),
             };
-            let text = long.make(move || tum(&page.poses)).await;
+            let text = long.make(move || write_tum(&page.poses)).await;
             let text = text.map_err(|_| io::ErrorKind::Interrupted)?;
             Ok::<_, io::Error>(Some((Bytes::from(text), next)))
         }

@@ -175,15 +175,15 @@ pub(crate) async fn identify(
         (status = 404, description = "There is no such space or agent")))]
 pub(crate) async fn of_agent(
     State(service): State<Service>,
-    AgentOfPath(space, desk): AgentOfPath,
+    AgentOfPath(space, view): AgentOfPath,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
     // After the map: an episode that ends in between is told twice and never missed.
-    let last = desk.ended_episode().as_deref().cloned();
+    let last = view.ended_episode().as_deref().cloned();
     // All contacts of the episode may be judged anew.
     let answered = service.long.make(move || {
-        let answer = answer::agent_object(space.name(), &map, desk.id(), desk.name(), last);
+        let answer = answer::agent_object(space.name(), &map, view.id(), view.name(), last);
         reply::json(&answer)
     });
     answered.await

@@ -20,14 +20,14 @@ use crate::decode::InvalidPrediction;
         (status = 409, description = "It is not known where the agent stands in the map"),
         (status = 422, description = "The query makes no sense")))]
 pub(crate) async fn post(
-    AgentOfPath(space, desk): AgentOfPath,
+    AgentOfPath(space, view): AgentOfPath,
     _: NoQuery,
     Json(query): Json<PredictQuery>,
 ) -> Result<Response<Body>, Problem> {
-    if let Some(other) = query.agent.as_ref().filter(|name| *name != desk.name()) {
+    if let Some(other) = query.agent.as_ref().filter(|name| *name != view.name()) {
         return Err(InvalidPrediction::OtherAgent(other.clone()).into());
     }
     let map = space.snapshot().await?;
-    let answer = answer::predict(space.name(), &map, desk.id(), &query)?;
+    let answer = answer::predict(space.name(), &map, view.id(), &query)?;
     Ok(reply::json(&answer))
 }

@@ -7,19 +7,19 @@ use cogmap_proto::{Codec, EventRecord};
 use zenoh::Session;
 
 use super::board::Board;
-use super::publisher::Publisher;
+use super::publishing::PublishingThread;
 use super::session::TransportError;
-use crate::engine::{AgentDesk, Messages, Outlet};
+use crate::engine::{AgentView, Messages, Publisher};
 
 /// Publishes over Zenoh, on a thread of its own. What a congested link cannot take is dropped: the
 /// next estimate supersedes it, and a client that misses a watermark asks for it.
 #[derive(Debug)]
-pub struct ZenohOutlet {
+pub struct ZenohPublisher {
     board: Arc<Board>,
     thread: Mutex<Option<JoinHandle<()>>>,
 }
 
-impl ZenohOutlet {
+impl ZenohPublisher {
     /// Publishes in `codec`.
     ///
     /// # Errors
@@ -28,7 +28,7 @@ impl ZenohOutlet {
     /// # Panics
     /// The system cannot start a thread.
     pub async fn declare(session: Session, codec: Codec) -> Result<Self, TransportError> {
-        let publisher = Publisher::declare(session, codec).await?;
+        let publisher = PublishingThread::declare(session, codec).await?;
         let board = Arc::new(Board::default());
         let thread = {
             let board = Arc::clone(&board);
@@ -54,18 +54,18 @@ impl ZenohOutlet {
     }
 }
 
-impl Drop for ZenohOutlet {
+impl Drop for ZenohPublisher {
     fn drop(&mut self) {
         self.board.close();
     }
 }
 
-impl Outlet for ZenohOutlet {
-    fn estimate(&self, space: &Arc<str>, agent: &Arc<AgentDesk>) {
+impl Publisher for ZenohPublisher {
+    fn estimate(&self, space: &Arc<str>, agent: &Arc<AgentView>) {
         self.board.agent(space, agent, Messages::ESTIMATE);
     }
 
-    fn watermark(&self, space: &Arc<str>, agent: &Arc<AgentDesk>) {
+    fn watermark(&self, space: &Arc<str>, agent: &Arc<AgentView>) {
         self.board.agent(space, agent, Messages::WATERMARK);
     }
 

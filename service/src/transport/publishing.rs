@@ -10,7 +10,7 @@ use zenoh::{Session, Wait};
 
 use super::board::{Board, Notice};
 use super::session::TransportError;
-use crate::engine::{AgentDesk, Messages};
+use crate::engine::{AgentView, Messages};
 
 /// Nobody else's messages have this priority, so what others send never stands before these in the
 /// queue of a link. One for all three: a link keeps the order of messages of one priority, and
@@ -19,7 +19,7 @@ const PRIORITY: Priority = Priority::InteractiveHigh;
 
 /// The thread's state.
 #[derive(Debug)]
-pub(super) struct Publisher {
+pub(super) struct PublishingThread {
     session: Session,
     codec: Codec,
     estimates: JsonListeners,
@@ -57,7 +57,7 @@ impl JsonListeners {
     }
 }
 
-impl Publisher {
+impl PublishingThread {
     /// Publishes in `codec`.
     pub(super) async fn declare(session: Session, codec: Codec) -> Result<Self, TransportError> {
         Ok(Self {
@@ -89,7 +89,7 @@ impl Publisher {
 
     /// Publishes what is due of an agent, the estimate first. The watermark is read before the
     /// estimate, which therefore covers at least the same samples.
-    fn agent(&self, space: &str, agent: &AgentDesk) {
+    fn agent(&self, space: &str, agent: &AgentView) {
         let due = agent.take_due(Messages::BOTH);
         let watermark = due.contain(Messages::WATERMARK).then(|| agent.watermark());
         // One that became due since may cover samples of this watermark.

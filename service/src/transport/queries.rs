@@ -133,9 +133,9 @@ async fn answer(
         Verb::Predict => {
             let body: PredictQuery = body(query, codec)?;
             let name = body.agent.as_deref().ok_or(InvalidPrediction::NoAgent)?;
-            let desk = answer::agent_named(&space, name)?;
+            let view = answer::agent_named(&space, name)?;
             let map = space.snapshot().await?;
-            let predicted = answer::predict(space.name(), &map, desk.id(), &body)?;
+            let predicted = answer::predict(space.name(), &map, view.id(), &body)?;
             Ok(codec.encode(&predicted))
         }
         Verb::Identify => {

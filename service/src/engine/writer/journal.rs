@@ -13,7 +13,7 @@ use crate::journal::Entry;
 impl Writer {
     /// Journals samples that are in order now, refusing those that make no sense.
     pub(super) fn accept(&mut self, slot: usize, session: u64, accepted: Vec<(u64, Sample)>) {
-        let agent = self.agents[slot].desk.id();
+        let agent = self.agents[slot].view.id();
         let mut run = SampleBatch {
             session,
             first_seq: 0,
@@ -91,7 +91,7 @@ impl Writer {
             range,
             reason: published,
         };
-        slot.desk.marks().rejected(session, rejection);
+        slot.view.marks().rejected(session, rejection);
     }
 
     /// Gives up samples that have been missing for too long.
@@ -114,8 +114,8 @@ impl Writer {
             );
             self.waiting.recount(before, sequencer.waiting());
             if let Some(range) = lost {
-                let agent = self.agents[slot].desk.id();
-                tracing::warn!(space = %self.shared.name, agent = self.agents[slot].desk.name(),
+                let agent = self.agents[slot].view.id();
+                tracing::warn!(space = %self.shared.name, agent = self.agents[slot].view.name(),
                     session, from = range.from, to = range.to, "samples lost");
                 self.skip(agent, session, range, SkipReason::Lost);
                 self.accept(slot, session, accepted);
