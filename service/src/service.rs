@@ -85,12 +85,7 @@ impl Service {
     pub async fn start(config: &Config, prometheus: PrometheusHandle) -> Result<Self, StartError> {
         // What may fail comes in the order of what it leaves behind: settings nothing, a port or a
         // session nothing that outlives the process, the store files.
-        for (name, settings) in &config.spaces {
-            core_settings(settings).map_err(|source| StartError::Space {
-                name: name.to_string(),
-                source: source.into(),
-            })?;
-        }
+        check_spaces(config)?;
         let (http_settings, shares) = share_descriptors(config);
         let address = config.http.listen;
         let of_http = |source| StartError::Http { address, source };
@@ -99,59 +94,15 @@ impl Service {
             tracing::warn!(%address, "anyone who reaches this address can read and write: set http.token");
         }
         let address = listener.local_addr().map_err(of_http)?;
-
-        let session = match transport_settings(config, shares) {
-            Some(settings) => Some(transport::open(&settings).await?),
-            None => None,
-        };
-        let zenoh_publisher = match &session {
-            Some(session) => {
-                let codec = config.zenoh.encoding.codec();
-                let publisher = ZenohPublisher::declare(session.clone(), codec).await?;
-                Some(Arc::new(publisher))
-            }
-            None => None,
-        };
-        let publisher: Arc<dyn Publisher> = match &zenoh_publisher {
-            Some(publisher) => Arc::clone(publisher) as Arc<dyn Publisher>,
-            None => Arc::new(Silent),
-        };
-        let directory = &config.store.directory;
-        let of_store = |source| StartError::Store {
-            directory: directory.display().to_string(),
-            source,
-        };
-        let store = Arc::new(open_store(directory).map_err(of_store)?);
-        let stored = store.spaces().map_err(of_store)?;
-        let name_lost = stored.iter().any(|space| space.settings.is_none());
-        let engine = Engine::open(store, config.engine.settings(), publisher).map_err(of_store)?;
-        for (name, settings) in &config.spaces {
-            if let Some(space) = engine.space(name.as_str()) {
-                if space.settings() != settings {
-                    tracing::warn!(space = %name,
-                        "the settings given for the space are without effect: they were fixed when it was created");
-                }
-                continue;
-            }
-            if name_lost {
-                // A robot must not find an empty map where its own may be.
-                tracing::error!(space = %name,
-                    "the space is not created: it may be one whose name is lost, see /v1/spaces");
-                continue;
-            }
-            engine
-                .create_space(name, settings)
-                .map_err(|source| StartError::Space {
-                    name: name.to_string(),
-                    source,
-                })?;
-        }
+        let (session, publisher) = open_zenoh(config, shares).await?;
+        let engine = open_engine(config, publisher.as_ref())?;
         let intake = match &session {
             Some(session) => Some(Intake::start(session, &engine).await?),
             None => None,
         };
+        let directory = config.store.directory.clone();
         let upkeep = [
-            tokio::spawn(metrics::upkeep(prometheus.clone(), directory.clone())),
+            tokio::spawn(metrics::upkeep(prometheus.clone(), directory)),
             tokio::spawn(transport::forbid_lingering()),
         ];
         let (stop_http, stopped) = oneshot::channel();
@@ -169,7 +120,7 @@ impl Service {
             engine,
             address,
             session,
-            publisher: zenoh_publisher,
+            publisher,
             intake,
             stop_http,
             http,
@@ -220,6 +171,79 @@ impl Service {
             tracing::warn!("the zenoh session did not close in time");
         }
     }
+}
+
+/// Checks the settings of the spaces that are to be there.
+fn check_spaces(config: &Config) -> Result<(), StartError> {
+    for (name, settings) in &config.spaces {
+        core_settings(settings).map_err(|source| StartError::Space {
+            name: name.to_string(),
+            source: source.into(),
+        })?;
+    }
+    Ok(())
+}
+
+/// The Zenoh session and what publishes over it; neither where the settings ask for none.
+async fn open_zenoh(
+    config: &Config,
+    shares: Shares,
+) -> Result<(Option<Session>, Option<Arc<ZenohPublisher>>), StartError> {
+    let Some(settings) = transport_settings(config, shares) else {
+        return Ok((None, None));
+    };
+    let session = transport::open(&settings).await?;
+    let codec = config.zenoh.encoding.codec();
+    let publisher = ZenohPublisher::declare(session.clone(), codec).await?;
+    Ok((Some(session), Some(Arc::new(publisher))))
+}
+
+/// The engine over the store, with the spaces of the settings.
+fn open_engine(
+    config: &Config,
+    publisher: Option<&Arc<ZenohPublisher>>,
+) -> Result<Engine, StartError> {
+    let publisher: Arc<dyn Publisher> = match publisher {
+        Some(publisher) => Arc::clone(publisher) as Arc<dyn Publisher>,
+        None => Arc::new(Silent),
+    };
+    let directory = &config.store.directory;
+    let of_store = |source| StartError::Store {
+        directory: directory.display().to_string(),
+        source,
+    };
+    let store = Arc::new(open_store(directory).map_err(of_store)?);
+    let stored = store.spaces().map_err(of_store)?;
+    let name_lost = stored.iter().any(|space| space.settings.is_none());
+    let engine = Engine::open(store, config.engine.settings(), publisher).map_err(of_store)?;
+    create_spaces(config, &engine, name_lost)?;
+    Ok(engine)
+}
+
+/// Creates the spaces of the settings that the store does not hold.
+fn create_spaces(config: &Config, engine: &Engine, name_lost: bool) -> Result<(), StartError> {
+    for (name, settings) in &config.spaces {
+        if let Some(space) = engine.space(name.as_str()) {
+            if space.settings() != settings {
+                tracing::warn!(space = %name,
+                    "the settings given for the space are without effect: they were fixed when it was created");
+            }
+            continue;
+        }
+        if name_lost {
+            // A robot must not find an empty map where its own may be.
+            tracing::error!(space = %name,
+                "the space is not created: it may be one whose name is lost, see /v1/spaces");
+            continue;
+        }
+        engine
+            .create_space(name, settings)
+            .map_err(|source| StartError::Space {
+                name: name.to_string(),
+                source,
+            })?;
+    }
+    Ok(())
 }
 
 /// Opens the store in `directory`, made anew in the present format where it has an older one.

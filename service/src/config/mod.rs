@@ -9,7 +9,7 @@ mod engine;
 mod error;
 mod http;
 mod log;
-mod rule;
+mod setting;
 mod store;
 mod token;
 mod zenoh;
@@ -132,5 +132,7 @@ impl Config {
     }
 }
 
+#[cfg(test)]
+mod document;
 #[cfg(test)]
 mod tests;

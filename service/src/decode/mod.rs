@@ -3,6 +3,7 @@
 //!
 //! [`encode`](crate::encode) is the other way.
 
+mod bounds;
 mod channel;
 mod contact;
 mod cue;
@@ -19,6 +20,7 @@ mod settings;
 mod sighting;
 mod trajectory;
 
+pub use bounds::{Bound, SPACE_BOUNDS, TRAJECTORY_INTERVAL_S};
 pub use channel::InvalidChannel;
 pub use cue::{InvalidQuery, cue, unknown_agent};
 pub use journal::records_of;
