@@ -79,7 +79,11 @@ fn page() -> String {
             "recruitment" => {
                 "`{ novelty = {} }`, or `{ bernoulli = { probability = 0.1 } }`".to_owned()
             }
-            _ => words(bounds[&*name]),
+            _ => words(
+                *bounds
+                    .get(&*name)
+                    .unwrap_or_else(|| panic!("decode/bounds.rs says nothing of {name}")),
+            ),
         };
         let default = &defaults[&name];
         let above = if name == "lost_sd_m" {

@@ -4,9 +4,9 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::ConfigError;
 use super::setting::{COUNT, INTERVAL_S, Rule, any, section};
-use super::{ConfigError, Token};
-use crate::http::{HostRule, HttpSettings};
+use crate::http::{HostRule, HttpSettings, Token};
 
 /// What a header can carry.
 const TOKEN: Rule<Option<Token>> = Rule {

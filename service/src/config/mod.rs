@@ -11,7 +11,6 @@ mod http;
 mod log;
 mod setting;
 mod store;
-mod token;
 mod zenoh;
 
 use std::collections::BTreeMap;
@@ -21,6 +20,7 @@ use cogmap_proto::{Name, SpaceSettings};
 use serde::{Deserialize, Serialize};
 
 use crate::decode::core_settings;
+pub use crate::http::Token;
 
 pub use assignment::Assignment;
 pub use engine::EngineConfig;
@@ -28,7 +28,6 @@ pub use error::ConfigError;
 pub use http::HttpConfig;
 pub use log::{LogConfig, LogFormat};
 pub use store::StoreConfig;
-pub use token::Token;
 pub use zenoh::{ZenohConfig, ZenohEncoding, ZenohMode};
 
 /// All settings of the service.

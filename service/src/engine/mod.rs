@@ -30,6 +30,7 @@ mod session_bound;
 mod settings;
 mod space;
 mod trajectory;
+mod unavailable;
 mod writer;
 
 #[cfg(test)]
@@ -55,8 +56,9 @@ pub use question::QuestionError;
 pub use refinement::{SharedText, refined_trajectories};
 pub use repair::{AgentLoss, LostBlocks, MissingSamples, RepairReport, repair};
 pub use settings::EngineSettings;
-pub use space::{Space, TrajectoryError, Unavailable};
+pub use space::Space;
 pub use trajectory::{Chunk, Recorder, TrajectoryPage};
+pub use unavailable::{TrajectoryError, Unavailable};
 
 use crate::decode::{core_settings, trajectory_interval_ns};
 use crate::metrics::SPACE_STOPPED;

@@ -1,6 +1,9 @@
 //! A space, as everyone but its writer sees it.
 
 mod loading;
+mod questions;
+mod refined;
+mod trajectories;
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -26,8 +29,9 @@ use super::queue::{NotQueued, Queue, queue};
 use super::refinement::Refinements;
 use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
+use super::unavailable::Unavailable;
 use crate::metrics::SPACE_STOPPED;
-use crate::store::{DerivedError, SpaceNumber, Store};
+use crate::store::{SpaceNumber, Store};
 
 /// A space: its readers' and senders' side.
 #[derive(Debug)]
@@ -74,48 +78,6 @@ pub(crate) struct Shared {
 
 /// Someone who waits for a snapshot.
 type SnapshotRequest = oneshot::Sender<Arc<CognitiveMap>>;
-
-/// Why a space cannot be read now.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Unavailable {
-    /// It is still loading.
-    #[error("the space is recovering")]
-    Recovering,
-    /// It is closing.
-    #[error("the space is closing")]
-    Closing,
-    /// The work on it ended with a panic.
-    #[error("the work was interrupted")]
-    Interrupted,
-    /// It could not be loaded: its journal is damaged.
-    #[error("{0}")]
-    Stopped(String),
-    /// Its writer has failed.
-    #[error("{0}")]
-    Failed(String),
-}
-
-/// Why a trajectory cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum TrajectoryError {
-    /// There is no such agent.
-    #[error("unknown agent")]
-    UnknownAgent,
-    /// It has been removed.
-    #[error(
-        "the agent has been removed; causal trajectories of its sessions can be read by their number"
-    )]
-    RemovedAgent,
-    /// The stored part cannot be read.
-    #[error(transparent)]
-    Derived(#[from] DerivedError),
-    /// The reading was interrupted.
-    #[error("the reading was interrupted")]
-    Interrupted,
-    /// The map cannot be read.
-    #[error(transparent)]
-    Unavailable(#[from] Unavailable),
-}
 
 /// What a space needs of the engine.
 #[derive(Clone, Debug)]

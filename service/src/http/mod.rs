@@ -33,6 +33,7 @@ mod samples;
 mod settings;
 mod spaces;
 mod state;
+mod token;
 mod trajectory;
 mod trips;
 
@@ -50,6 +51,7 @@ use utoipa_axum::routes;
 pub use hosts::HostRule;
 pub use problem::{Kind, Problem};
 pub use settings::HttpSettings;
+pub use token::Token;
 
 use crate::engine::Engine;
 use activity::Noting;

@@ -9,7 +9,7 @@ use zenoh::Session;
 use zenoh::key_expr::KeyExpr;
 use zenoh::query::{Query, Queryable};
 
-use super::queries::{busy, codec_of, refuse, send};
+use super::reply::{busy, codec_of, refuse, send};
 use super::session::TransportError;
 use crate::answer::{agent_named, space_named};
 use crate::engine::{AgentView, Engine};

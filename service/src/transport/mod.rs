@@ -7,6 +7,7 @@ mod linger;
 mod publisher;
 mod publishing;
 mod queries;
+mod reply;
 mod session;
 
 pub use intake::Intake;

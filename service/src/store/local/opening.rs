@@ -119,7 +119,7 @@ pub(in crate::store) fn lock(directory: &Path) -> Result<File, StoreError> {
 pub(in crate::store) fn refuse_foreign(directory: &Path) -> Result<(), StoreError> {
     let on_disk = |error: io::Error| files::fault(&error, directory);
     let names = files::names(directory).map_err(on_disk)?;
-    if super::super::format1::is_store(directory) {
+    if super::super::format1::marker::is_store(directory) {
         return Err(StoreError::OlderFormat);
     }
     for name in names {
