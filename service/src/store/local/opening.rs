@@ -8,9 +8,8 @@ use std::sync::{Arc, Mutex, OnceLock, RwLock};
 
 use super::super::{SpaceNumber, StoreError};
 use super::record::{self, Found, SpaceRecord};
-use super::{
-    DELETED, FORMAT_VERSION, LocalJournal, MarkSync, SET_ASIDE, SPACES, UNFINISHED, files, numbers,
-};
+use super::syncing::MarkSync;
+use super::{DELETED, FORMAT_VERSION, LocalJournal, SET_ASIDE, SPACES, UNFINISHED, files, numbers};
 
 /// File that is locked while a process has the directory open.
 pub(in crate::store) const LOCK: &str = "lock";
