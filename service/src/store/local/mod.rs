@@ -19,13 +19,12 @@
 //! is not finished, and opening the store removes it.
 
 pub(super) mod files;
-mod mark_sync;
 mod opening;
 pub(super) mod record;
 mod replacement;
 mod store;
 mod survey;
-mod sync;
+mod syncing;
 
 #[cfg(test)]
 mod damage_tests;
@@ -49,9 +48,8 @@ use super::log::{Item, LogReader, Pending, SpaceLog, Survey, create_mark, read_m
 use super::{
     Blocks, DamagedJournal, Extent, Journal, OpenJournal, SpaceNumber, StoreError, StoredSpace,
 };
-use mark_sync::{Logs, MarkSync};
 use record::{Found, SpaceRecord};
-use sync::sync_all;
+use syncing::{Logs, MarkSync, sync_all};
 
 pub(super) use opening::{is_store as is_local_store, lock, refuse_foreign};
 pub use replacement::Replacement;
@@ -453,7 +451,7 @@ pub(super) fn numbers(directory: &Path) -> io::Result<Vec<u32>> {
 impl Drop for LocalJournal {
     fn drop(&mut self) {
         if let Some(marks) = self.marks.take() {
-            marks.stop();
+            marks.end();
         }
     }
 }

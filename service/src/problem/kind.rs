@@ -188,7 +188,7 @@ mod tests {
     }
     #[test]
     fn the_page_of_problems_has_the_same_table() {
-        let page = include_str!("../../../../docs/problems.md");
+        let page = include_str!("../../../docs/problems.md");
         let rows: Vec<_> = { page.lines() }
             .filter(|line| line.starts_with("| `/problems/"))
             .collect();

@@ -1,11 +1,10 @@
 //! Trips and their legs.
 
 use cogmap_proto as wire;
-use cognitive_map::{CognitiveMap, Leg, Trip, TripId};
+use cognitive_map::{CognitiveMap, Leg, Trip, TripEnd, TripId};
 use geometry::upper_triangle;
 
 use super::place::agent_name;
-use crate::engine::trip_end;
 
 /// A trip as the wire has it in a list.
 pub fn trip(map: &CognitiveMap, id: TripId, trip: &Trip) -> wire::Trip {
@@ -43,5 +42,17 @@ pub fn leg(map: &CognitiveMap, leg: &Leg) -> wire::Leg {
         octant: leg.octant(),
         duration_s: leg.duration_s(),
         length_m: leg.length_m(),
+    }
+}
+
+/// Why a trip ended, as the wire has it.
+pub(super) fn trip_end(reason: TripEnd) -> wire::TripEnd {
+    match reason {
+        TripEnd::Stillness => wire::TripEnd::Stillness,
+        TripEnd::Gap => wire::TripEnd::Gap,
+        TripEnd::SessionEnd => wire::TripEnd::SessionEnd,
+        TripEnd::Marker => wire::TripEnd::Marker,
+        TripEnd::Full => wire::TripEnd::Full,
+        TripEnd::StartPose => wire::TripEnd::StartPose,
     }
 }

@@ -1,75 +1,31 @@
-//! From the map's agent and events to what is published of them.
+//! Events.
 
 use cogmap_proto as wire;
 use cognitive_map::{
-    Agent, AgentId, ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, Label, SkipReason,
-    Status, TripEnd,
+    ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, Label, SkipReason,
 };
 
-use super::desk::Readout;
 use super::surprise::is_surprising;
-use super::trajectory::stamped;
+use super::trip::trip_end;
 
-/// What is published of an agent; nothing before its first sample.
-pub(crate) fn readout(space: &str, map: &CognitiveMap, id: AgentId) -> Option<Readout> {
-    let agent = map.agent(id)?;
-    let stamp_ns = agent.stamp_ns()?;
-    let pose = stamped(stamp_ns, agent.pose());
-    let covariance = { map.covariance(id)? }.in_map_axes(&agent.pose().rotation);
-    let (place, confidence) = match agent.place() {
-        Some((place, confidence)) => (Some(place.0.into()), confidence),
-        None => (None, 0.0),
-    };
-    let estimate = wire::Estimate {
-        space: space.to_owned(),
-        agent: agent.name().as_str().to_owned(),
-        session: agent.session(),
-        seq: agent.next_seq().saturating_sub(1),
-        stamp_ns,
-        frame: "map".to_owned(),
-        map_revision: map.revision(),
-        status: status(map.status(id)?),
-        translation_m: pose.translation_m,
-        rotation_xyzw: pose.rotation_xyzw,
-        covariance: geometry::upper_triangle(&covariance),
-        place,
-        confidence,
-    };
-    let odometry = stamped(stamp_ns, agent.odometry());
-    let evidence = evidence(agent);
-    Some(Readout::new(
-        estimate,
-        odometry,
-        evidence,
-        agent.travelled_m(),
-        agent.forgotten_matches(),
-    ))
-}
-
-/// What became of an agent's sightings, as the wire has it.
-pub fn evidence(agent: &Agent) -> wire::Evidence {
-    let evidence = agent.evidence();
-    let components = evidence.components as f64;
-    wire::Evidence {
-        accepted: evidence.accepted,
-        refused: evidence.refused,
-        refused_in_a_row: evidence.refused_in_a_row.into(),
-        nis_mean: (components > 0.0).then(|| evidence.nis / components),
-    }
-}
-
-/// How an agent is localised, as the wire has it.
-pub(crate) fn status(status: Status) -> wire::Status {
-    match status {
-        Status::Localized => wire::Status::Localized,
-        Status::Uncertain => wire::Status::Uncertain,
-        Status::Lost => wire::Status::Lost,
-    }
+/// What is published of what the latest record of a map has brought about. Told by the map as it is
+/// then, so that a replay tells the same.
+pub(crate) fn event_records(
+    space: &str,
+    map: &CognitiveMap,
+    events: &[Event],
+) -> impl Iterator<Item = wire::EventRecord> {
+    let revision = map.revision();
+    let published = { events.iter() }.filter_map(move |one| event(space, map, one));
+    (0..).zip(published).map(move |(index, event)| {
+        let id = wire::EventId { revision, index };
+        wire::EventRecord { id, event }
+    })
 }
 
 /// The published form of an event; cell crossings stay inside, there are too many, and so do
-/// percepts that are as expected and the ends of episodes, which the agent's desk tells.
-pub(crate) fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wire::Event> {
+/// percepts that are as expected and the ends of episodes, which are answered on request.
+fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wire::Event> {
     let kind = match &event.kind {
         EventKind::CellEntered { .. } | EventKind::EpisodeEnded { .. } => return None,
         EventKind::AgentEnrolled => wire::EventKind::AgentEnrolled {},
@@ -194,18 +150,6 @@ fn object_event(kind: &EventKind) -> Option<wire::EventKind> {
     })
 }
 
-/// Why a trip ended, as the wire has it.
-pub(crate) fn trip_end(reason: TripEnd) -> wire::TripEnd {
-    match reason {
-        TripEnd::Stillness => wire::TripEnd::Stillness,
-        TripEnd::Gap => wire::TripEnd::Gap,
-        TripEnd::SessionEnd => wire::TripEnd::SessionEnd,
-        TripEnd::Marker => wire::TripEnd::Marker,
-        TripEnd::Full => wire::TripEnd::Full,
-        TripEnd::StartPose => wire::TripEnd::StartPose,
-    }
-}
-
 /// Why samples are skipped, as the wire has it.
 pub(crate) fn skip_reason(reason: SkipReason) -> wire::SkipReason {
     match reason {
@@ -222,27 +166,11 @@ pub(crate) fn skip_reason(reason: SkipReason) -> wire::SkipReason {
     }
 }
 
-/// Why samples are skipped, from the journal.
-pub(crate) fn skip_reason_of_wire(reason: wire::SkipReason) -> SkipReason {
-    let invalid = match reason {
-        // A leap is refused before the journal, and so never in it.
-        wire::SkipReason::Lost | wire::SkipReason::SequenceLeap => return SkipReason::Lost,
-        wire::SkipReason::TimeBackwards => return SkipReason::TimeBackwards,
-        wire::SkipReason::NumberOutOfRange => InvalidSample::NumberOutOfRange,
-        wire::SkipReason::NonUnitQuaternion => InvalidSample::NonUnitQuaternion,
-        wire::SkipReason::NegativeNoise => InvalidSample::NegativeNoise,
-        wire::SkipReason::InvalidDescriptor => InvalidSample::InvalidDescriptor,
-        wire::SkipReason::InvalidLabel => InvalidSample::InvalidLabel,
-        wire::SkipReason::InvalidNormal => InvalidSample::InvalidNormal,
-    };
-    SkipReason::Invalid(invalid)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use cognitive_map::{
-        Label, Level, Motion, Record, Sample, SampleBody, Settings, SettingsValues,
+        AgentId, Label, Level, Motion, Record, Sample, SampleBody, Settings, SettingsValues,
     };
 
     /// An agent that stands still and feels these values.

@@ -6,7 +6,9 @@ mod kind;
 use cogmap_proto::DecodeError;
 pub use kind::Kind;
 
-use super::{InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence};
+use crate::decode::{
+    InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence,
+};
 use crate::engine::{IngestError, QuestionError, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
 

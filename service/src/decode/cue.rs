@@ -1,6 +1,5 @@
-//! Recall: from the query to the cue, and from the places found to the answer.
+//! Cues that places are recalled by.
 
-use cogmap_proto as wire;
 use cogmap_proto::limits::{METRES_MAX, PAGE_ITEMS_MAX};
 use cogmap_proto::{Name, NameError, RecallQuery};
 use cognitive_map::{AgentId, CognitiveMap, InvalidSample, RecallCue};
@@ -8,8 +7,7 @@ use grid::{InvalidCode, PartialCode, Phase};
 use nalgebra::{Point3, Vector3};
 
 use super::channel::{InvalidChannel, check_cue};
-use super::{FRAME, place};
-use crate::decode::{self, fault};
+use super::{fault, percept};
 
 /// Places of an answer when the query names no limit.
 const LIMIT_DEFAULT: u32 = 10;
@@ -70,7 +68,7 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<RecallCue, Invalid
         .map(|phases| code(map, phases))
         .transpose()?;
     let percept = query.percept.as_ref().map(|cue| {
-        let read = decode::percept(cue);
+        let read = percept::percept(cue);
         read.map_err(|error| InvalidQuery::Percept(fault::in_percept(cue), error))
     });
     let percept = percept.transpose()?;
@@ -92,43 +90,6 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<RecallCue, Invalid
         since_ns: query.since_ns,
         until_ns: query.until_ns,
         limit,
-    })
-}
-
-/// The places of a space that answer a query.
-///
-/// # Errors
-/// As [`cue`].
-pub fn recall(
-    space: &str,
-    map: &CognitiveMap,
-    query: &RecallQuery,
-) -> Result<wire::RecallAnswer, InvalidQuery> {
-    let cue = cue(map, query)?;
-    let recalled = map.recall(&cue);
-    let rivals = { recalled.first() }
-        .and_then(|best| map.rivals(&cue, best))
-        .map(|rivals| wire::Rivals {
-            count: rivals.count as u64,
-            place: rivals.place.0.into(),
-            cosine: rivals.cosine,
-            distance_m: rivals.distance_m,
-        });
-    let places = recalled.into_iter().filter_map(|recalled| {
-        Some(wire::RecalledPlace {
-            place: place(map, recalled.place, map.place(recalled.place)?),
-            cosine: recalled.cosine,
-            confidence: recalled.confidence,
-            distance_m: recalled.distance_m,
-            percept_match: recalled.percept_match,
-        })
-    });
-    Ok(wire::RecallAnswer {
-        space: space.to_owned(),
-        frame: FRAME.to_owned(),
-        map_revision: map.revision(),
-        places: places.collect(),
-        rivals,
     })
 }
 

@@ -1,4 +1,4 @@
-//! The desk of an agent: what others may know of it without asking the writer.
+//! The view of an agent: what others may know of it without asking the writer.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -8,17 +8,18 @@ use cogmap_proto::limits::WATERMARK_REJECTIONS_MAX;
 use cogmap_proto::{
     AgentDetail, EndedEpisode, Estimate, Evidence, Rejection, SeqRange, StampedPose, Watermark,
 };
-use cognitive_map::AgentId;
+use cognitive_map::{AgentId, CognitiveMap};
 use serde::Serialize;
 
 use super::counters::Standing;
 use super::due::{Due, Messages};
 use super::trajectory::Recorder;
+use crate::encode;
 
 /// What is known of an agent outside its space's writer. Readers never hold the writer up: the
 /// readout is swapped whole, and the two locks guard a few words each.
 #[derive(Debug)]
-pub struct AgentDesk {
+pub struct AgentView {
     id: AgentId,
     name: String,
     readout: ArcSwapOption<Readout>,
@@ -69,8 +70,8 @@ pub(crate) struct Marks {
     rejected: VecDeque<Rejection>,
 }
 
-impl AgentDesk {
-    /// A desk for an agent whose samples below `next` are durable.
+impl AgentView {
+    /// A view for an agent whose samples below `next` are durable.
     pub(crate) fn new(
         id: AgentId,
         name: &str,
@@ -133,7 +134,7 @@ impl AgentDesk {
         self.ended_episode.load_full()
     }
 
-    /// Puts another ended episode on the desk, or none.
+    /// Puts another ended episode on the view, or none.
     pub(crate) fn put_ended_episode(&self, episode: Option<Arc<EndedEpisode>>) {
         self.ended_episode.store(episode);
     }
@@ -212,7 +213,7 @@ impl AgentDesk {
         }
     }
 
-    /// Puts a new readout on the desk.
+    /// Puts a new readout on the view.
     pub(crate) fn publish(&self, readout: Readout) {
         self.readout.store(Some(Arc::new(readout)));
     }
@@ -227,10 +228,10 @@ impl AgentDesk {
     }
 }
 
-/// A desk of an agent that has done nothing.
+/// A view of an agent that has done nothing.
 #[cfg(test)]
-pub(crate) fn desk_of(name: &str) -> AgentDesk {
-    AgentDesk::new(AgentId(0), name, 0, 0, Recorder::default())
+pub(crate) fn view_of(name: &str) -> AgentView {
+    AgentView::new(AgentId(0), name, 0, 0, Recorder::default())
 }
 
 /// What became of an agent's sightings; of none before its first sample.
@@ -239,21 +240,17 @@ fn evidence(readout: Option<&Readout>) -> Evidence {
 }
 
 impl Readout {
-    pub(crate) fn new(
-        estimate: Estimate,
-        odometry: StampedPose,
-        evidence: Evidence,
-        travelled_m: f64,
-        forgotten_matches: u64,
-    ) -> Self {
-        Self {
-            estimate,
-            odometry,
-            evidence,
-            travelled_m,
-            forgotten_matches,
+    /// What is published of an agent; nothing before its first sample.
+    pub(crate) fn of(space: &str, map: &CognitiveMap, id: AgentId) -> Option<Self> {
+        let agent = map.agent(id)?;
+        Some(Self {
+            estimate: encode::estimate(space, map, id)?,
+            odometry: encode::odometry(agent)?,
+            evidence: encode::evidence(agent),
+            travelled_m: agent.travelled_m(),
+            forgotten_matches: agent.forgotten_matches(),
             json: OnceLock::new(),
-        }
+        })
     }
 }
 

@@ -21,22 +21,22 @@ use super::listener::BoundedListener;
 
 /// The connections that wait, the one that has waited longest first.
 #[derive(Debug, Default)]
-pub(crate) struct Seats(Mutex<Waiting>);
+pub(crate) struct IdleConnections(Mutex<Waiting>);
 
 #[derive(Debug, Default)]
 struct Waiting {
     next: u64,
-    seats: BTreeMap<u64, Arc<Seat>>,
+    idle: BTreeMap<u64, Arc<Activity>>,
 }
 
 /// What is known of a connection beside its bytes.
 #[derive(Debug)]
-pub(crate) struct Seat {
-    seats: Arc<Seats>,
+pub(crate) struct Activity {
+    idle: Arc<IdleConnections>,
     /// Its key among those that wait; none while a request is under way. Changes under their lock.
     key: AtomicU64,
     requests: AtomicU64,
-    sent_away: AtomicBool,
+    is_to_close: AtomicBool,
     gone: AtomicBool,
     waker: AtomicWaker,
 }
@@ -44,27 +44,27 @@ pub(crate) struct Seat {
 /// A key that no connection has.
 const NONE: u64 = u64::MAX;
 
-impl Seats {
-    /// A seat for a new connection.
-    pub(crate) fn seat(self: &Arc<Self>) -> Arc<Seat> {
-        let seat = Arc::new(Seat {
-            seats: Arc::clone(self),
+impl IdleConnections {
+    /// The activity of a new connection.
+    pub(crate) fn activity(self: &Arc<Self>) -> Arc<Activity> {
+        let activity = Arc::new(Activity {
+            idle: Arc::clone(self),
             key: AtomicU64::new(NONE),
             requests: AtomicU64::new(0),
-            sent_away: AtomicBool::new(false),
+            is_to_close: AtomicBool::new(false),
             gone: AtomicBool::new(false),
             waker: AtomicWaker::new(),
         });
-        self.lock().insert(&seat);
-        seat
+        self.lock().insert(&activity);
+        activity
     }
 
-    /// Sends the connection away that has waited longest, if one waits.
-    pub(crate) fn send_away(&self) {
-        let longest = self.lock().seats.pop_first();
-        if let Some((_, seat)) = longest {
-            seat.sent_away.store(true, Ordering::Release);
-            seat.waker.wake();
+    /// Closes the connection that has waited longest, if one waits.
+    pub(crate) fn close_idlest(&self) {
+        let longest = self.lock().idle.pop_first();
+        if let Some((_, activity)) = longest {
+            activity.is_to_close.store(true, Ordering::Release);
+            activity.waker.wake();
         }
     }
 
@@ -75,18 +75,18 @@ impl Seats {
 }
 
 impl Waiting {
-    fn insert(&mut self, seat: &Arc<Seat>) {
-        seat.key.store(self.next, Ordering::Release);
-        self.seats.insert(self.next, Arc::clone(seat));
+    fn insert(&mut self, activity: &Arc<Activity>) {
+        activity.key.store(self.next, Ordering::Release);
+        self.idle.insert(self.next, Arc::clone(activity));
         self.next += 1;
     }
 
-    fn remove(&mut self, seat: &Seat) {
-        self.seats.remove(&seat.key.swap(NONE, Ordering::AcqRel));
+    fn remove(&mut self, activity: &Activity) {
+        self.idle.remove(&activity.key.swap(NONE, Ordering::AcqRel));
     }
 }
 
-impl Seat {
+impl Activity {
     /// Whether a request is under way.
     pub(crate) fn has_request(&self) -> bool {
         self.key.load(Ordering::Acquire) == NONE
@@ -98,20 +98,20 @@ impl Seat {
     }
 
     /// Whether the connection is to end; wakes the task when it is.
-    pub(crate) fn is_sent_away(&self, context: &Context<'_>) -> bool {
+    pub(crate) fn is_to_close(&self, context: &Context<'_>) -> bool {
         self.waker.register(context.waker());
-        self.sent_away.load(Ordering::Acquire)
+        self.is_to_close.load(Ordering::Acquire)
     }
 
     /// The connection has ended.
     pub(crate) fn leave(&self) {
-        let mut waiting = self.seats.lock();
+        let mut waiting = self.idle.lock();
         self.gone.store(true, Ordering::Release);
         waiting.remove(self);
     }
 
     fn begin(self: &Arc<Self>) -> UnderWay {
-        self.seats.lock().remove(self);
+        self.idle.lock().remove(self);
         self.requests.fetch_add(1, Ordering::AcqRel);
         UnderWay(Arc::clone(self))
     }
@@ -119,11 +119,11 @@ impl Seat {
 
 /// A request under way, from its head until its answer has been sent.
 #[derive(Debug)]
-struct UnderWay(Arc<Seat>);
+struct UnderWay(Arc<Activity>);
 
 impl Drop for UnderWay {
     fn drop(&mut self) {
-        let mut waiting = self.0.seats.lock();
+        let mut waiting = self.0.idle.lock();
         if !self.0.gone.load(Ordering::Acquire) {
             waiting.insert(&self.0);
         }
@@ -138,7 +138,7 @@ pub(crate) struct Noting(pub(crate) Router);
 #[derive(Clone, Debug)]
 pub(crate) struct Noted {
     router: Router,
-    seat: Arc<Seat>,
+    activity: Arc<Activity>,
 }
 
 impl Service<IncomingStream<'_, BoundedListener>> for Noting {
@@ -153,7 +153,7 @@ impl Service<IncomingStream<'_, BoundedListener>> for Noting {
     fn call(&mut self, stream: IncomingStream<'_, BoundedListener>) -> Self::Future {
         std::future::ready(Ok(Noted {
             router: self.0.clone(),
-            seat: Arc::clone(stream.io().seat()),
+            activity: Arc::clone(stream.io().activity()),
         }))
     }
 }
@@ -168,7 +168,7 @@ impl Service<Request> for Noted {
     }
 
     fn call(&mut self, request: Request) -> Self::Future {
-        let under_way = self.seat.begin();
+        let under_way = self.activity.begin();
         let answer = self.router.call(request);
         Box::pin(async move {
             let response = answer.await?;

@@ -1,14 +1,11 @@
-//! Localisation: from the question to samples, and from what is found to the answer.
+//! Samples that are to be localised.
 
 use cogmap_proto as wire;
 use cogmap_proto::limits::LOCALIZE_SAMPLES_MAX;
-use cognitive_map::{CognitiveMap, Guess, InvalidSample, Localization, Sample};
-use geometry::{PoseCovariance, upper_triangle};
-use nalgebra::Isometry3;
+use cognitive_map::{InvalidSample, Sample};
 
-use super::FRAME;
-use crate::decode::{self, fault};
-use crate::engine::status;
+use super::fault;
+use super::sample::sample as read_sample;
 
 /// Why samples cannot be localised.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -47,47 +44,10 @@ pub fn samples_to_localize(query: &wire::LocalizeQuery) -> Result<Vec<Sample>, I
             _ if sample.stamp_ns < latest_ns => return Err(InvalidSequence::TimeBackwards(at)),
             _ => latest_ns = sample.stamp_ns,
         }
-        decode::sample(sample).map_err(|error| {
+        read_sample(sample).map_err(|error| {
             let field = fault::in_sample(sample);
             InvalidSequence::Sample(at, field, error)
         })
     });
     samples.collect()
-}
-
-/// Where samples were taken, as the wire has it.
-pub fn localization(space: &str, map: &CognitiveMap, found: &Localization) -> wire::Localization {
-    let Localization {
-        status: known,
-        pose: found_pose,
-        since,
-        guesses,
-    } = found;
-    wire::Localization {
-        space: space.to_owned(),
-        frame: FRAME.to_owned(),
-        map_revision: map.revision(),
-        status: status(*known),
-        pose: found_pose
-            .as_ref()
-            .map(|(found, covariance)| pose(found, covariance)),
-        found_after: since.map(|since| since as u64),
-        hypotheses: guesses.iter().map(hypothesis).collect(),
-    }
-}
-
-fn hypothesis(guess: &Guess) -> wire::LocalizationHypothesis {
-    wire::LocalizationHypothesis {
-        pose: pose(&guess.pose, &guess.covariance),
-        probability: guess.probability,
-        looks: guess.looks.into(),
-    }
-}
-
-fn pose(pose: &Isometry3<f64>, covariance: &PoseCovariance) -> wire::LocalizedPose {
-    wire::LocalizedPose {
-        translation_m: pose.translation.vector.into(),
-        rotation_xyzw: pose.rotation.coords.into(),
-        covariance: upper_triangle(&covariance.in_map_axes(&pose.rotation)),
-    }
 }

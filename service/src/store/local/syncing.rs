@@ -1,4 +1,4 @@
-//! Marks of how far spaces are durable, synced beside the committer.
+//! Syncs of journals and of their marks.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -8,14 +8,44 @@ use std::sync::{Arc, PoisonError, RwLock};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
-use crate::store::SpaceNumber;
-use crate::store::log::SpaceLog;
+use super::super::SpaceNumber;
+use super::super::log::{Pending, SpaceLog};
+
+/// Time between syncs of the marks, which bounds what a power cut takes from them.
+const MARK_SYNC_INTERVAL: Duration = Duration::from_secs(1);
+/// Most files that are synced at once.
+const SYNCS_AT_ONCE: usize = 8;
 
 /// The journals that are open for writing.
 pub(super) type Logs = RwLock<BTreeMap<SpaceNumber, Arc<SpaceLog>>>;
 
-/// Time between syncs of the marks, which bounds what a power cut takes from them.
-const MARK_SYNC_INTERVAL: Duration = Duration::from_secs(1);
+/// Syncs several journals: side by side, for the disk can join what comes at the same time.
+pub(super) fn sync_all(pending: &[(Arc<SpaceLog>, Pending)]) -> io::Result<()> {
+    let sync_some = |some: &[(Arc<SpaceLog>, Pending)]| {
+        some.iter().try_for_each(|(log, pending)| log.sync(pending))
+    };
+    if pending.len() <= 1 {
+        return sync_some(pending);
+    }
+    std::thread::scope(|scope| {
+        let some = pending.chunks(pending.len().div_ceil(SYNCS_AT_ONCE));
+        let threads: Vec<_> = some
+            .map(|some| {
+                let thread = Builder::new().name("sync".into());
+                // Where the system has no thread to spare, one after the other.
+                let spawned = thread.spawn_scoped(scope, move || sync_some(some));
+                spawned.map_err(|_| sync_some(some))
+            })
+            .collect();
+        let interrupted = |_| Err(io::Error::other("a sync ended with a panic"));
+        let results = threads.into_iter().map(|thread| match thread {
+            Ok(thread) => thread.join().unwrap_or_else(interrupted),
+            Err(synced) => synced,
+        });
+        // All have ended before the first error is told.
+        results.collect::<Vec<_>>().into_iter().collect()
+    })
+}
 
 /// The thread that syncs the marks beside the committer.
 #[derive(Debug)]
@@ -26,7 +56,6 @@ pub(super) struct MarkSync {
 }
 
 impl MarkSync {
-    /// Starts the thread.
     pub(super) fn start(logs: Arc<Logs>) -> io::Result<Self> {
         let (stop, stopped) = channel::<()>();
         let due = Arc::new(AtomicBool::new(false));
@@ -52,15 +81,13 @@ impl MarkSync {
         Ok(Self { stop, thread, due })
     }
 
-    /// Has the marks synced soon, if any was written.
     pub(super) fn wake(&self, written: bool) {
         if written {
             self.due.store(true, Ordering::Release);
         }
     }
-
-    /// Ends the thread after a last sync.
-    pub(super) fn stop(self) {
+    /// Ends the thread, after a last sync of what is due.
+    pub(super) fn end(self) {
         drop(self.stop);
         if self.thread.join().is_err() {
             tracing::error!("the thread that syncs marks ended with a panic");

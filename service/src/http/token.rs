@@ -23,7 +23,7 @@ impl Token {
 
     /// Whether the text can stand in an `Authorization` header: visible ASCII, at least one
     /// character.
-    pub(super) fn is_presentable(&self) -> bool {
+    pub(crate) fn is_presentable(&self) -> bool {
         !self.0.is_empty() && self.0.bytes().all(|byte| byte.is_ascii_graphic())
     }
 }
