@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector6};
 
-use super::alias::Aliases;
-use super::frame::{Frame, MEMBERS_MAX, Mark};
-use super::meeting::{Meeting, Pending};
-use super::mover::Mover;
-use super::outcome::{Evidence, Merged, Settled, Step, Taken};
+use super::agent_filter::AgentFilter;
+use super::agent_sighting::{CrossFrameSighting, PendingSighting};
+use super::agent_slot::{AgentSlot, AgentState, Detached};
+use super::associations::Associations;
+use super::frame::{Frame, LandmarkState, MEMBERS_MAX};
+use super::frame_registration::FrameMatch;
+use super::measurement_update::{Measurement, Verdict};
+use super::outcome::{Evidence, LandmarkOutcome, Merged, Settled, Step};
 use super::parameters::{ANY_TURN_SD_RAD, Parameters};
-use super::resemblance::Resemblance;
-use super::seat::{Apart, Seat, Traveller};
-use super::sight::{Glance, Verdict};
 use crate::input::{Label, Motion, Relation, StartPose};
 use ::state::PagedVec;
 use geometry::PoseCovariance;
@@ -38,15 +38,15 @@ pub struct Estimator {
     pub(super) parameters: Parameters,
     /// The map's frame, then one for each agent; empty ones were merged into earlier ones.
     pub(super) frames: PagedVec<Frame, 8>,
-    pub(super) seats: PagedVec<Seat, 16>,
-    pub(super) pending: Vec<Pending>,
-    pub(super) meetings: Vec<Meeting>,
+    pub(super) slots: PagedVec<AgentSlot, 16>,
+    pub(super) pending: Vec<PendingSighting>,
+    pub(super) cross_sightings: Vec<CrossFrameSighting>,
     /// The frame from which on others are compared next.
     pub(super) turn: usize,
     /// How frames seem to lie in one another by their landmarks, whatever these are called.
-    pub(super) resemblances: Vec<Resemblance>,
+    pub(super) frame_matches: Vec<FrameMatch>,
     /// Landmarks that have more than one name.
-    pub(super) aliases: Aliases,
+    pub(super) associations: Associations,
     /// What the latest call settled and merged.
     pub(super) settled: Vec<Settled>,
     pub(super) merged: Vec<Merged>,
@@ -67,12 +67,12 @@ impl Estimator {
         Self {
             parameters,
             frames,
-            seats: PagedVec::default(),
+            slots: PagedVec::default(),
             pending: Vec::new(),
-            meetings: Vec::new(),
+            cross_sightings: Vec::new(),
             turn: 0,
-            resemblances: Vec::new(),
-            aliases: Aliases::default(),
+            frame_matches: Vec::new(),
+            associations: Associations::default(),
             settled: Vec::new(),
             merged: Vec::new(),
             same: Vec::new(),
@@ -93,14 +93,15 @@ impl Estimator {
 
     /// Number of agents.
     pub fn agent_count(&self) -> usize {
-        self.seats.len()
+        self.slots.len()
     }
 
     /// A new agent, at the identity of a frame of its own; answers its number, counted from 0.
     pub fn enrol(&mut self) -> u32 {
-        let agent = u32::try_from(self.seats.len()).unwrap_or(u32::MAX);
-        let mover = Mover::new(Isometry3::identity(), &Matrix6::zeros(), &self.parameters);
-        self.seats.push(Seat::new(self.frames.len(), mover), 0);
+        let agent = u32::try_from(self.slots.len()).unwrap_or(u32::MAX);
+        let filter = AgentFilter::new(Isometry3::identity(), &Matrix6::zeros(), &self.parameters);
+        self.slots
+            .push(AgentSlot::new(self.frames.len(), filter), 0);
         let frame = Frame {
             population: 1,
             ..Frame::default()
@@ -119,11 +120,15 @@ impl Estimator {
         }
         let frame = std::mem::take(self.frame_mut(from));
         *self.frame_mut(MAP) = frame;
-        self.move_seats(from, MAP);
-        self.resemblances
-            .retain(|resemblance| !resemblance.frames.contains(&from));
-        for meeting in &mut self.meetings {
-            for frame in meeting.frames.iter_mut().filter(|frame| **frame == from) {
+        self.move_slots(from, MAP);
+        self.frame_matches
+            .retain(|frame_match| !frame_match.frames.contains(&from));
+        for cross_sighting in &mut self.cross_sightings {
+            for frame in cross_sighting
+                .frames
+                .iter_mut()
+                .filter(|frame| **frame == from)
+            {
                 *frame = MAP;
             }
         }
@@ -144,7 +149,7 @@ impl Estimator {
         });
         let covariance = PoseCovariance::from_sd(&sd);
         self.put(agent, start.pose(), covariance.matrix());
-        if self.mover(agent).is_some_and(Mover::is_nowhere) {
+        if self.filter(agent).is_some_and(AgentFilter::is_nowhere) {
             self.set_aside(agent);
         }
     }
@@ -152,26 +157,26 @@ impl Estimator {
     /// Puts an agent somewhere in the map, by itself.
     pub(super) fn put(&mut self, agent: u32, pose: &Isometry3<f64>, covariance: &Matrix6<f64>) {
         let doubt = self.doubt_of_return(agent);
-        let Some((from, traveller)) = self.leave(agent) else {
+        let Some((from, state)) = self.leave(agent) else {
             return;
         };
         self.depart(from);
         self.frame_mut(MAP).population += 1;
-        let Traveller {
-            mover, mut sensor, ..
-        } = Arc::unwrap_or_clone(traveller);
+        let AgentState {
+            filter, mut sensor, ..
+        } = Arc::unwrap_or_clone(state);
         // Numbers of landmarks change.
         sensor.latest.clear();
-        let traveller = Traveller {
-            mover: mover.placed(*pose, covariance),
+        let state = AgentState {
+            filter: filter.placed(*pose, covariance),
             sensor,
             refused: 0,
             // Who was doubted stays so until what it sees fits.
             doubt,
         };
-        let seat = self.seat_mut(agent);
-        seat.frame = MAP;
-        seat.apart = Some(Apart::new(Arc::new(traveller)));
+        let slot = self.slot_mut(agent);
+        slot.frame = MAP;
+        slot.detached = Some(Detached::new(Arc::new(state)));
     }
 
     /// A new session of an agent: its odometry begins anew, and it may have been moved by about `sd`
@@ -180,25 +185,25 @@ impl Estimator {
         let Some(frame) = self.frame_of(agent) else {
             return;
         };
-        let seat = self.seat_mut(agent);
-        seat.in_odom = Isometry3::identity();
-        seat.stamp_ns = None;
-        let widen = |traveller: &mut Traveller| {
-            traveller.mover.history.clear();
-            let covariance = traveller.mover.covariance_mut();
+        let slot = self.slot_mut(agent);
+        slot.in_odom = Isometry3::identity();
+        slot.stamp_ns = None;
+        let widen = |state: &mut AgentState| {
+            state.filter.history.clear();
+            let covariance = state.filter.covariance_mut();
             for k in 0..6 {
                 covariance[(k, k)] += sd[k] * sd[k];
             }
         };
-        if let Some(apart) = &mut seat.apart {
-            widen(Arc::make_mut(&mut apart.traveller));
+        if let Some(detached) = &mut slot.detached {
+            widen(Arc::make_mut(&mut detached.state));
         } else {
             let frame = self.frame_mut(frame);
             frame.flush();
             if let Some(index) = frame.member(agent) {
                 let member = &mut frame.members[index];
-                widen(member.traveller_mut());
-                let own = member.traveller.mover.covariance();
+                widen(member.state_mut());
+                let own = member.state.filter.covariance();
                 frame.covariance.set_diagonal(member.offset, own);
             }
         }
@@ -210,33 +215,33 @@ impl Estimator {
     /// Costs the same however much is known.
     pub fn motion(&mut self, agent: u32, stamp_ns: i64, motion: &Motion) -> Step {
         self.begin();
-        let Some(seat) = self.seats.get_mut(agent as usize, 0) else {
+        let Some(slot) = self.slots.get_mut(agent as usize, 0) else {
             return Step::none();
         };
-        let traveller = if let Some(apart) = &mut seat.apart {
-            Arc::make_mut(&mut apart.traveller)
-        } else if let Some(frame) = self.frames.get_mut(seat.frame, 0)
+        let state = if let Some(detached) = &mut slot.detached {
+            Arc::make_mut(&mut detached.state)
+        } else if let Some(frame) = self.frames.get_mut(slot.frame, 0)
             && let Some(index) = frame.member(agent)
         {
-            frame.members[index].traveller_mut()
+            frame.members[index].state_mut()
         } else {
             return Step::none();
         };
-        let before_ns = seat.stamp_ns.replace(stamp_ns);
+        let before_ns = slot.stamp_ns.replace(stamp_ns);
         let duration_s = before_ns.map_or(0.0, |before| {
             let interval_s = stamp_ns.saturating_sub(before) as f64 * 1e-9;
             interval_s.clamp(0.0, DURATION_S_MAX)
         });
-        let mover = &mut traveller.mover;
-        let step = mover.step(motion, duration_s, &self.parameters);
-        seat.in_odom *= motion.increment();
-        seat.in_odom.rotation.renormalize_fast();
-        mover.history.note(stamp_ns, &seat.in_odom);
-        if mover.is_nowhere() {
+        let filter = &mut state.filter;
+        let step = filter.step(motion, duration_s, &self.parameters);
+        slot.in_odom *= motion.increment();
+        slot.in_odom.rotation.renormalize_fast();
+        filter.history.note(stamp_ns, &slot.in_odom);
+        if filter.is_nowhere() {
             self.set_aside(agent);
         }
         if !self.pending.is_empty() {
-            self.settle();
+            self.take_in_pending();
         }
         step
     }
@@ -248,43 +253,43 @@ impl Estimator {
         stamp_ns: i64,
         label: &Label,
         relation: &Relation,
-    ) -> Taken {
+    ) -> LandmarkOutcome {
         self.begin();
-        let Some((number, observer)) = self.admit(agent) else {
-            return Taken::nothing();
+        let Some((number, observer)) = self.join_estimate(agent) else {
+            return LandmarkOutcome::nothing();
         };
         let called = label;
-        let label = &self.aliases.name_of(called).clone();
+        let label = &self.associations.name_of(called).clone();
         let is_aside = self.is_aside_for(agent, number, label);
         let Some(frame) = self.frames.get_mut(number, 0) else {
-            return Taken::nothing();
+            return LandmarkOutcome::nothing();
         };
         if is_aside {
             frame.forget(label);
         }
-        let glance = Glance {
+        let measurement = Measurement {
             observer,
             back: &Isometry3::identity(),
             stamp_ns,
             relation,
             parameters: &self.parameters,
         };
-        let weighed = frame.see_mark(&glance, label);
-        let refused = frame.members[observer].traveller.refused;
-        self.count(agent, weighed.verdict, refused);
-        self.aliases.weigh(called, weighed.verdict, refused);
+        let outcome = frame.update_by_landmark(&measurement, label);
+        let refused = frame.members[observer].state.refused;
+        self.count(agent, outcome.verdict, refused);
+        self.associations.weigh(called, outcome.verdict, refused);
         self.sweep(number);
-        self.judge(agent);
+        self.judge_evidence(agent);
         if self.frame_of(agent) == Some(number) {
             self.merge_with(agent, Some(label));
         }
         if self.frame_of(agent) == Some(number) {
-            self.look_at_names(number, agent);
+            self.associate_landmarks(number, agent);
         }
-        Taken {
-            is_new: weighed.verdict == Verdict::Learned,
-            accepted: weighed.verdict != Verdict::Refused,
-            variance: weighed.variance.fixed_rows::<3>(0).into_owned(),
+        LandmarkOutcome {
+            is_new: outcome.verdict == Verdict::Learned,
+            accepted: outcome.verdict != Verdict::Refused,
+            variance: outcome.variance.fixed_rows::<3>(0).into_owned(),
         }
     }
 
@@ -298,14 +303,14 @@ impl Estimator {
 
     /// Lets an agent take part in the joint estimate of its frame, as one that was just seen or saw;
     /// answers where it is.
-    pub(super) fn admit(&mut self, agent: u32) -> Option<(usize, usize)> {
+    pub(super) fn join_estimate(&mut self, agent: u32) -> Option<(usize, usize)> {
         let number = self.frame_of(agent)?;
-        if self.seat(agent)?.apart.is_some() {
+        if self.slot(agent)?.detached.is_some() {
             if self.frame(number).members.len() >= MEMBERS_MAX {
-                self.dismiss(number);
+                self.detach_idlest(number);
             }
-            if let Some(apart) = self.seat_mut(agent).apart.take() {
-                self.frame_mut(number).join(agent, apart.independent());
+            if let Some(detached) = self.slot_mut(agent).detached.take() {
+                self.frame_mut(number).join(agent, detached.independent());
             }
         }
         let frame = self.frame_mut(number);
@@ -315,42 +320,42 @@ impl Estimator {
     }
 
     /// Lets the agent go on by itself that saw and was seen longest ago.
-    pub(super) fn dismiss(&mut self, frame: usize) {
+    pub(super) fn detach_idlest(&mut self, frame: usize) {
         let frame = self.frame_mut(frame);
         if let Some(agent) = frame.idlest()
-            && let Some(traveller) = frame.leave(agent)
+            && let Some(state) = frame.leave(agent)
         {
-            self.seat_mut(agent).apart = Some(Apart {
-                traveller,
+            self.slot_mut(agent).detached = Some(Detached {
+                state,
                 was_joint: true,
             });
         }
     }
 
     /// Takes an agent out of its frame's joint estimate, without a place of its own for now.
-    pub(super) fn leave(&mut self, agent: u32) -> Option<(usize, Arc<Traveller>)> {
+    pub(super) fn leave(&mut self, agent: u32) -> Option<(usize, Arc<AgentState>)> {
         let number = self.frame_of(agent)?;
-        let traveller = match self.seat_mut(agent).apart.take() {
-            Some(apart) => apart.traveller,
+        let state = match self.slot_mut(agent).detached.take() {
+            Some(detached) => detached.state,
             None => self.frame_mut(number).leave(agent)?,
         };
-        Some((number, traveller))
+        Some((number, state))
     }
 
     /// The agents of one frame are in another one now; answers their numbers.
-    pub(super) fn move_seats(&mut self, from: usize, to: usize) -> Vec<u32> {
-        let seats = self.seats.iter().zip(0..);
-        let moved = seats.filter(|(seat, _)| seat.frame == from);
+    pub(super) fn move_slots(&mut self, from: usize, to: usize) -> Vec<u32> {
+        let slots = self.slots.iter().zip(0..);
+        let moved = slots.filter(|(slot, _)| slot.frame == from);
         let moved: Vec<u32> = moved.map(|(_, agent)| agent).collect();
         for &agent in &moved {
-            self.seat_mut(agent).frame = to;
+            self.slot_mut(agent).frame = to;
         }
         moved
     }
 
     /// Counts what became of a sighting.
     pub(super) fn count(&mut self, agent: u32, verdict: Verdict, refused: u32) {
-        let evidence = &mut self.seat_mut(agent).evidence;
+        let evidence = &mut self.slot_mut(agent).evidence;
         evidence.refused_in_a_row = refused;
         match verdict {
             Verdict::Learned => {}
@@ -363,57 +368,57 @@ impl Estimator {
         }
     }
 
-    /// An agent's seat.
-    pub(super) fn seat(&self, agent: u32) -> Option<&Seat> {
-        self.seats.get(agent as usize)
+    /// An agent's slot.
+    pub(super) fn slot(&self, agent: u32) -> Option<&AgentSlot> {
+        self.slots.get(agent as usize)
     }
 
-    /// The seat of an agent that is known to have one, to be changed.
-    pub(super) fn seat_mut(&mut self, agent: u32) -> &mut Seat {
-        let seat = self.seats.get_mut(agent as usize, 0);
-        seat.expect("an agent has a seat")
+    /// The slot of an agent that is known to have one, to be changed.
+    pub(super) fn slot_mut(&mut self, agent: u32) -> &mut AgentSlot {
+        let slot = self.slots.get_mut(agent as usize, 0);
+        slot.expect("an agent has a slot")
     }
 
     /// A frame that is known to be there.
     pub(super) fn frame(&self, number: usize) -> &Frame {
-        self.frames.get(number).expect("a seat's frame is there")
+        self.frames.get(number).expect("a slot's frame is there")
     }
 
     /// A frame that is known to be there, to be changed.
     pub(super) fn frame_mut(&mut self, number: usize) -> &mut Frame {
         let frame = self.frames.get_mut(number, 0);
-        frame.expect("a seat's frame is there")
+        frame.expect("a slot's frame is there")
     }
 
     /// What is known of an agent itself.
-    pub(super) fn traveller(&self, agent: u32) -> Option<&Traveller> {
-        let seat = self.seat(agent)?;
-        if let Some(apart) = &seat.apart {
-            return Some(&apart.traveller);
+    pub(super) fn agent_state(&self, agent: u32) -> Option<&AgentState> {
+        let slot = self.slot(agent)?;
+        if let Some(detached) = &slot.detached {
+            return Some(&detached.state);
         }
-        let frame = self.frame(seat.frame);
-        Some(&frame.members[frame.member(agent)?].traveller)
+        let frame = self.frame(slot.frame);
+        Some(&frame.members[frame.member(agent)?].state)
     }
 
     /// The same, to be changed.
-    pub(super) fn traveller_mut(&mut self, agent: u32) -> Option<&mut Traveller> {
-        let seat = self.seats.get_mut(agent as usize, 0)?;
-        if let Some(apart) = &mut seat.apart {
-            return Some(Arc::make_mut(&mut apart.traveller));
+    pub(super) fn agent_state_mut(&mut self, agent: u32) -> Option<&mut AgentState> {
+        let slot = self.slots.get_mut(agent as usize, 0)?;
+        if let Some(detached) = &mut slot.detached {
+            return Some(Arc::make_mut(&mut detached.state));
         }
-        let frame = self.frames.get_mut(seat.frame, 0)?;
+        let frame = self.frames.get_mut(slot.frame, 0)?;
         let index = frame.member(agent)?;
-        Some(frame.members[index].traveller_mut())
+        Some(frame.members[index].state_mut())
     }
 
     /// The body of an agent.
-    pub(super) fn mover(&self, agent: u32) -> Option<&Mover> {
-        Some(&self.traveller(agent)?.mover)
+    pub(super) fn filter(&self, agent: u32) -> Option<&AgentFilter> {
+        Some(&self.agent_state(agent)?.filter)
     }
 
     /// Number of the frame that an agent is in; the map's is 0.
     pub fn frame_of(&self, agent: u32) -> Option<usize> {
-        Some(self.seat(agent)?.frame)
+        Some(self.slot(agent)?.frame)
     }
 
     /// Whether it is known where an agent stands in the map.
@@ -423,28 +428,28 @@ impl Estimator {
 
     /// Pose of an agent in its frame, with its covariance.
     pub fn pose(&self, agent: u32) -> Option<(Isometry3<f64>, PoseCovariance)> {
-        let mover = self.mover(agent)?;
-        Some((mover.pose, mover.pose_covariance()))
+        let filter = self.filter(agent)?;
+        Some((filter.pose, filter.pose_covariance()))
     }
 
     /// Covariance of the pose of an agent.
     pub fn covariance(&self, agent: u32) -> Option<PoseCovariance> {
-        Some(self.mover(agent)?.pose_covariance())
+        Some(self.filter(agent)?.pose_covariance())
     }
 
     /// Pose of an agent in its frame.
     pub fn in_frame(&self, agent: u32) -> Option<&Isometry3<f64>> {
-        Some(&self.mover(agent)?.pose)
+        Some(&self.filter(agent)?.pose)
     }
 
     /// Pose of an agent by motion alone since its session began.
     pub fn in_odom(&self, agent: u32) -> Option<&Isometry3<f64>> {
-        Some(&self.seat(agent)?.in_odom)
+        Some(&self.slot(agent)?.in_odom)
     }
 
     /// What became of an agent's sightings.
     pub fn evidence(&self, agent: u32) -> Option<&Evidence> {
-        Some(&self.seat(agent)?.evidence)
+        Some(&self.slot(agent)?.evidence)
     }
 
     /// Takes what the latest call settled: sightings of agents, in the order in which they count.
@@ -467,20 +472,30 @@ impl Estimator {
 
     /// The one name of a landmark that may have several.
     pub fn name_of<'a>(&'a self, label: &'a Label) -> &'a Label {
-        self.aliases.name_of(label)
+        self.associations.name_of(label)
     }
 
     /// The names of landmarks that go by another one.
     pub fn other_names(&self) -> impl Iterator<Item = &Label> {
-        self.aliases.names.keys()
+        self.associations.names.keys()
     }
 
     /// The landmarks of the map that are estimated jointly now, by label: position \[m\] and covariance
     /// \[m²\]. Those are left out that only agents have seen which are set aside.
     pub fn landmarks(&self) -> impl Iterator<Item = (&Label, Point3<f64>, Matrix3<f64>)> {
         let frame = self.frame(MAP);
-        let is_aside = |mark: &Mark| mark.observers.are_all(|agent| self.is_aside(agent));
-        let marks = frame.marks.iter().filter(move |(_, mark)| !is_aside(mark));
-        marks.map(|(label, mark)| (label, mark.position, frame.mark_covariance(mark)))
+        let is_aside =
+            |landmark: &LandmarkState| landmark.observers.are_all(|agent| self.is_aside(agent));
+        let landmarks = frame
+            .landmarks
+            .iter()
+            .filter(move |(_, landmark)| !is_aside(landmark));
+        landmarks.map(|(label, landmark)| {
+            (
+                label,
+                landmark.position,
+                frame.landmark_covariance(landmark),
+            )
+        })
     }
 }

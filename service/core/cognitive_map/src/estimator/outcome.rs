@@ -49,7 +49,7 @@ impl Step {
 
 /// What became of a sighting of a landmark.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Taken {
+pub struct LandmarkOutcome {
     /// Whether the landmark is new in the agent's frame.
     pub is_new: bool,
     /// Whether the sighting counts. That of a new landmark does.
@@ -60,7 +60,7 @@ pub struct Taken {
     pub variance: Vector3<f64>,
 }
 
-impl Taken {
+impl LandmarkOutcome {
     /// Of an agent that is not known.
     pub(super) fn nothing() -> Self {
         Self {
@@ -84,7 +84,7 @@ pub struct Settled {
     pub relation: Relation,
     /// Whether it counts.
     pub accepted: bool,
-    /// Variances of its components as in [`Taken`]; of a pose all six, of a point the first three.
+    /// Variances of its components as in [`LandmarkOutcome`]; of a pose all six, of a point the first three.
     pub variance: Vector6<f64>,
 }
 

@@ -23,9 +23,9 @@ pub(super) const TARGETS_MAX: usize = 128;
 
 /// What is seen.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Seen {
+pub(super) enum SightingTarget {
     /// A landmark, by its number within the frame.
-    Mark(u64),
+    Landmark(u64),
     /// An agent, by its number.
     Agent(u32),
 }
@@ -42,7 +42,7 @@ pub(super) struct Sensor {
     /// Sum of their squares.
     pub(super) square: f64,
     /// Stamp \[ns\] and normalised error of distance of each target's latest sighting.
-    pub(super) latest: BTreeMap<Seen, (i64, f64)>,
+    pub(super) latest: BTreeMap<SightingTarget, (i64, f64)>,
 }
 
 impl Default for Sensor {
@@ -98,7 +98,7 @@ impl Sensor {
     /// from the sensor (`variance`).
     pub(super) fn note(
         &mut self,
-        seen: Seen,
+        seen: SightingTarget,
         stamp_ns: i64,
         innovation: &PointInnovation,
         spread: &Vector3<f64>,
@@ -155,7 +155,7 @@ mod tests {
             let seen = innovation(4.0 + error(k));
             let variance = sensor.variance(&seen, &parameters);
             sensor.note(
-                Seen::Mark(0),
+                SightingTarget::Landmark(0),
                 i64::from(k) * 1_000_000_000,
                 &seen,
                 &Vector3::zeros(),

@@ -360,7 +360,7 @@ fn more_landmarks_than_are_held_jointly_are_kept() {
         }
     }
     assert_eq!(estimator.landmarks().count(), 96);
-    assert_eq!(estimator.frame(0).dormant.len(), 150 - 96);
+    assert_eq!(estimator.frame(0).archive.len(), 150 - 96);
     for (_, position, covariance) in estimator.landmarks() {
         assert!(covariance.iter().all(|entry| entry.is_finite()));
         let nearest = (0..150).map(|number| (place(number) - position).norm());
@@ -450,7 +450,7 @@ fn frames_are_told_and_emptied() {
     assert!(taken.is_new && taken.accepted && taken.variance.min() > 0.0);
     estimator.start_pose(second, &start(&Isometry3::identity(), 0.1));
     assert_eq!(estimator.frame_of(second), Some(0));
-    assert!(estimator.frame(2).marks.is_empty() && estimator.frame(2).covariance.dim() == 0);
+    assert!(estimator.frame(2).landmarks.is_empty() && estimator.frame(2).covariance.dim() == 0);
     assert_eq!(estimator.frame(0).population, 2);
 }
 

@@ -114,7 +114,9 @@ impl Fold<'_> {
         // be read in two ways, is put anew.
         let is_refused = was_placed
             && !found.is_first
-            && !self.estimator.fix(number, &found.pose, &found.covariance);
+            && !self
+                .estimator
+                .fuse_pose(number, &found.pose, &found.covariance);
         let is_elsewhere = is_refused || (was_placed && found.is_first && self.is_elsewhere(found));
         if is_elsewhere || !was_placed {
             self.estimator
@@ -122,7 +124,8 @@ impl Fold<'_> {
             self.remember_what_was_settled();
         }
         if found.is_first {
-            self.estimator.fix(number, &found.pose, &found.covariance);
+            self.estimator
+                .fuse_pose(number, &found.pose, &found.covariance);
         }
         if found.is_first || found.is_last || is_elsewhere {
             let moment = self.moment();

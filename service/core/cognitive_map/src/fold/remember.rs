@@ -75,7 +75,7 @@ impl Fold<'_> {
         for correction in self.chronicle.relax() {
             if let Some(covariance) = correction.covariance {
                 self.estimator
-                    .fix(correction.agent, &correction.pose, &covariance);
+                    .fuse_pose(correction.agent, &correction.pose, &covariance);
                 self.remember_who_was_set_aside();
             }
         }

@@ -5,6 +5,6 @@
     reason = "clippy knows test functions, but not what they call"
 )]
 
-mod fix; // poses told by another estimate
+mod external_pose; // poses told by another estimate
 mod hall; // robots that drive and see
 mod trouble; // liars, slips, moved and mistaken landmarks, silence, walls

@@ -109,16 +109,16 @@ proptest! {
         estimator.take_settled();
         estimator.take_merged();
         let written = bytes(&estimator);
-        let mut twin = read(&written).unwrap();
-        prop_assert!(bytes(&twin) == written, "it is read back as it was written");
+        let mut copy = read(&written).unwrap();
+        prop_assert!(bytes(&copy) == written, "it is read back as it was written");
         let snapshot = estimator.clone();
         for (step, call) in (before.len()..).zip(&after) {
             apply(&mut estimator, step, call);
-            apply(&mut twin, step, call);
-            prop_assert_eq!(estimator.take_settled(), twin.take_settled());
-            prop_assert_eq!(estimator.take_merged(), twin.take_merged());
+            apply(&mut copy, step, call);
+            prop_assert_eq!(estimator.take_settled(), copy.take_settled());
+            prop_assert_eq!(estimator.take_merged(), copy.take_merged());
         }
-        prop_assert!(bytes(&twin) == bytes(&estimator), "they go on alike");
+        prop_assert!(bytes(&copy) == bytes(&estimator), "they go on alike");
         prop_assert!(bytes(&snapshot) == written, "a snapshot stays");
     }
 
@@ -157,7 +157,7 @@ proptest! {
     }
 }
 
-/// The first member's offset, a mark's, a seat's frame, and counts, each made wrong.
+/// The first member's offset, a landmark's, a slot's frame, and counts, each made wrong.
 #[test]
 fn what_does_not_belong_together_is_refused() {
     let broken = |break_it: fn(&mut Estimator)| {
@@ -179,9 +179,9 @@ fn what_does_not_belong_together_is_refused() {
     );
     assert_eq!(
         broken(|estimator| {
-            let marks = Arc::make_mut(&mut estimator.frame_mut(1).marks);
-            for mark in marks.values_mut() {
-                mark.offset = 12;
+            let landmarks = Arc::make_mut(&mut estimator.frame_mut(1).landmarks);
+            for landmark in landmarks.values_mut() {
+                landmark.offset = 12;
             }
         }),
         invalid
@@ -194,15 +194,15 @@ fn what_does_not_belong_together_is_refused() {
         broken(|estimator| estimator.frame_mut(2).population = 0),
         invalid
     );
-    assert_eq!(broken(|estimator| estimator.seat_mut(0).frame = 9), invalid);
+    assert_eq!(broken(|estimator| estimator.slot_mut(0).frame = 9), invalid);
     assert_eq!(
-        broken(|estimator| estimator.seat_mut(2).apart = None),
+        broken(|estimator| estimator.slot_mut(2).detached = None),
         invalid
     );
     assert_eq!(
         broken(|estimator| {
             let relation = relation(0, [0.5; 3]);
-            estimator.pending.push(Pending {
+            estimator.pending.push(PendingSighting {
                 observer: 0,
                 target: 3,
                 stamp_ns: 0,

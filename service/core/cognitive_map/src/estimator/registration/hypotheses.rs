@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
-use super::{GATE, Star};
+use super::{GATE, UncertainPoint};
 use geometry::align;
 
 /// Landmarks of the newer frame from which motions are drawn, in a plane and in space.
 const SEEDS_MAX: (usize, usize) = (10, 8);
-/// Most motions; of more, a constellation says nothing that could be found out at a bounded cost.
+/// Most motions; with more, a registration would not be of bounded cost.
 const HYPOTHESES_MAX: usize = 1 << 13;
 /// Least distance of two landmarks that say how a frame is turned, in its own deviations.
 const DISTANCE_MIN: f64 = 5.0;
@@ -47,8 +47,8 @@ struct Span {
 
 /// All motions; none if there are too many.
 pub(super) fn hypotheses(
-    older: &[Star],
-    newer: &[Star],
+    older: &[UncertainPoint],
+    newer: &[UncertainPoint],
     is_planar: bool,
 ) -> Option<Vec<Hypothesis>> {
     let seeds = if is_planar { SEEDS_MAX.0 } else { SEEDS_MAX.1 };
@@ -82,10 +82,10 @@ pub(super) fn hypotheses(
 }
 
 /// The pairs of landmarks that lie far enough from one another.
-fn spans(stars: &[Star]) -> Vec<Span> {
+fn spans(points: &[UncertainPoint]) -> Vec<Span> {
     let mut spans = Vec::new();
-    for (second, b) in stars.iter().enumerate() {
-        for (first, a) in stars[..second].iter().enumerate() {
+    for (second, b) in points.iter().enumerate() {
+        for (first, a) in points[..second].iter().enumerate() {
             let length_m = (b.position - a.position).norm();
             let variance = a.variance + b.variance;
             if length_m >= DISTANCE_MIN * variance.sqrt() && length_m > 0.0 {
@@ -101,7 +101,12 @@ fn spans(stars: &[Star]) -> Vec<Span> {
 }
 
 /// The motion in the plane that lays a pair over another one.
-fn by_two(older: &[Star], newer: &[Star], [p, q]: [usize; 2], span: Span) -> Option<Hypothesis> {
+fn by_two(
+    older: &[UncertainPoint],
+    newer: &[UncertainPoint],
+    [p, q]: [usize; 2],
+    span: Span,
+) -> Option<Hypothesis> {
     let [i, j] = span.ends;
     let (from, to) = (newer[i].position, newer[j].position);
     let (at, toward) = (older[p].position, older[q].position);
@@ -126,8 +131,8 @@ fn by_two(older: &[Star], newer: &[Star], [p, q]: [usize; 2], span: Span) -> Opt
 
 /// The motions in space that lay a pair over another one, and a third landmark over one that lies alike.
 fn by_three(
-    older: &[Star],
-    newer: &[Star],
+    older: &[UncertainPoint],
+    newer: &[UncertainPoint],
     [p, q]: [usize; 2],
     span: Span,
     found: &mut Vec<Hypothesis>,

@@ -2,20 +2,24 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::{SURE_MARGIN, Star};
+use super::{SURE_MARGIN, UncertainPoint};
 
 /// The landmarks of two frames, as a motion lays those of the newer one into the older one.
 #[derive(Debug)]
 pub(super) struct Laid<'a> {
-    older: &'a [Star],
-    newer: &'a [Star],
+    older: &'a [UncertainPoint],
+    newer: &'a [UncertainPoint],
     /// Positions of the newer ones in the older frame.
     positions: Vec<Point3<f64>>,
 }
 
 impl<'a> Laid<'a> {
-    pub(super) fn new(pose: &Isometry3<f64>, older: &'a [Star], newer: &'a [Star]) -> Self {
-        let positions = newer.iter().map(|star| pose * star.position).collect();
+    pub(super) fn new(
+        pose: &Isometry3<f64>,
+        older: &'a [UncertainPoint],
+        newer: &'a [UncertainPoint],
+    ) -> Self {
+        let positions = newer.iter().map(|point| pose * point.position).collect();
         Self {
             older,
             newer,
@@ -66,8 +70,8 @@ impl<'a> Laid<'a> {
 mod tests {
     use super::*;
 
-    fn star(x: f64) -> Star {
-        Star {
+    fn point(x: f64) -> UncertainPoint {
+        UncertainPoint {
             position: Point3::new(x, 0.0, 0.0),
             variance: 0.01,
         }
@@ -77,8 +81,8 @@ mod tests {
     fn who_has_a_rival_is_left_out() {
         // The second and third lie 0.4 m apart: 0.16 m² are 8 of their variance, where 12 would be
         // sure.
-        let stars = [star(0.0), star(5.0), star(5.4), star(10.0)];
-        let laid = Laid::new(&Isometry3::identity(), &stars, &stars);
+        let points = [point(0.0), point(5.0), point(5.4), point(10.0)];
+        let laid = Laid::new(&Isometry3::identity(), &points, &points);
         let all = [(0, 0), (1, 1), (2, 2), (3, 3)];
         let ends = [(0, 0), (3, 3)];
         assert_eq!(laid.unambiguous(&all), ends);
@@ -87,7 +91,7 @@ mod tests {
         // One of them is in none, in either frame.
         assert_eq!(laid.unrivalled(&[(0, 0), (1, 2), (3, 3)]), ends);
         // The newer frame has seen only one of them.
-        let laid = Laid::new(&Isometry3::identity(), &stars, &stars[..2]);
+        let laid = Laid::new(&Isometry3::identity(), &points, &points[..2]);
         assert_eq!(laid.unrivalled(&[(0, 0), (1, 1)]), [(0, 0)]);
     }
 }

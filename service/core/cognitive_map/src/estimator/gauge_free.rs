@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, SMatrix};
 
-use super::frame::{Frame, Mark};
+use super::frame::{Frame, LandmarkState};
 
 /// Least variance that a landmark is weighed with \[m²\].
 const VARIANCE_MIN_M2: f64 = 1e-6;
@@ -18,7 +18,11 @@ impl Frame {
     /// ```
     ///
     /// Of planar frames only motions in the plane, and errors along it. Landmarks in a line have their whole variances.
-    pub(super) fn shape_variances(&self, marks: &[&Mark], is_planar: bool) -> Vec<f64> {
+    pub(super) fn gauge_free_variances(
+        &self,
+        landmarks: &[&LandmarkState],
+        is_planar: bool,
+    ) -> Vec<f64> {
         let along = |own: &Matrix3<f64>| {
             if is_planar {
                 f64::midpoint(own[(0, 0)], own[(1, 1)])
@@ -26,13 +30,15 @@ impl Frame {
                 own.trace() / 3.0
             }
         };
-        let own: Vec<Matrix3<f64>> = marks
+        let own: Vec<Matrix3<f64>> = landmarks
             .iter()
-            .map(|mark| self.mark_covariance(mark))
+            .map(|landmark| self.landmark_covariance(landmark))
             .collect();
         let weight = |own: &Matrix3<f64>| 1.0 / along(own).max(VARIANCE_MIN_M2);
-        let modes: Vec<SMatrix<f64, 3, 6>> =
-            marks.iter().map(|mark| rigid(mark, is_planar)).collect();
+        let modes: Vec<SMatrix<f64, 3, 6>> = landmarks
+            .iter()
+            .map(|landmark| rigid(landmark, is_planar))
+            .collect();
         let mut normal = Matrix6::zeros();
         if is_planar {
             // Along what is not sought there is no motion.
@@ -51,15 +57,15 @@ impl Frame {
         let gain: Vec<SMatrix<f64, 6, 3>> = gain
             .map(|(own, mode)| inverse * mode.transpose() * weight(own))
             .collect();
-        let product = |one: &&Mark| {
+        let product = |one: &&LandmarkState| {
             let mut product = SMatrix::<f64, 3, 6>::zeros();
-            for (other, gain) in marks.iter().zip(&gain) {
+            for (other, gain) in landmarks.iter().zip(&gain) {
                 let block: Matrix3<f64> = self.covariance.block(one.offset, other.offset);
                 product += block * gain.transpose();
             }
             product
         };
-        let products: Vec<SMatrix<f64, 3, 6>> = marks.iter().map(product).collect();
+        let products: Vec<SMatrix<f64, 3, 6>> = landmarks.iter().map(product).collect();
         let mut motion = Matrix6::zeros();
         for (gain, product) in gain.iter().zip(&products) {
             motion += gain * product;
@@ -75,9 +81,9 @@ impl Frame {
 }
 
 /// How a rigid motion of all moves a landmark: | I  −l× |, of the plane's motions where there are no others.
-fn rigid(mark: &Mark, is_planar: bool) -> SMatrix<f64, 3, 6> {
+fn rigid(landmark: &LandmarkState, is_planar: bool) -> SMatrix<f64, 3, 6> {
     let mut mode = SMatrix::<f64, 3, 6>::identity();
-    let lever = -mark.position.coords.cross_matrix();
+    let lever = -landmark.position.coords.cross_matrix();
     mode.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
     if is_planar {
         mode.fixed_view_mut::<3, 3>(0, 2).fill(0.0);

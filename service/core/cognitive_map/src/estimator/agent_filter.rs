@@ -5,10 +5,10 @@ use std::ops::SubAssign;
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::calibration::{Calibrated, Calibration};
-use super::history::History;
+use super::frame_alignment::{FrameAlignment, pose_by_alignment};
+use super::odometry_history::OdometryHistory;
 use super::outcome::Step;
 use super::parameters::Parameters;
-use super::tie::{Tie, body_by_tie};
 use crate::input::Motion;
 use geometry::{MotionSum, PoseCovariance, is_somewhere, positive, se3};
 
@@ -36,12 +36,12 @@ const ROUNDING: f64 = 1e-14;
 
 /// A body that moves.
 #[derive(Clone, Debug)]
-pub(super) struct Mover {
+pub(super) struct AgentFilter {
     /// Pose in the frame of the estimate.
     pub(super) pose: Isometry3<f64>,
     pub(super) calibration: Calibration,
     /// Covariance of the body's error where the run under way began.
-    pub(super) settled: BodyCovariance,
+    pub(super) at_run_start: BodyCovariance,
     /// How the error of the pose there depends on that of the calibration at the last flush.
     pub(super) tail: Tail,
     /// Motion from the last flush until there, as corrected.
@@ -50,7 +50,7 @@ pub(super) struct Mover {
     pub(super) is_stale: bool,
     pub(super) run: Run,
     /// Where odometry was lately.
-    pub(super) history: History,
+    pub(super) history: OdometryHistory,
     /// Whether all motion so far was in the body's x-y plane.
     pub(super) is_planar: bool,
 }
@@ -69,63 +69,64 @@ pub(super) struct Run {
     pub(super) steps: u32,
 }
 
-impl Mover {
+impl AgentFilter {
     /// A body at a pose whose error has this covariance.
     pub(super) fn new(
         pose: Isometry3<f64>,
         covariance: &Matrix6<f64>,
         parameters: &Parameters,
     ) -> Self {
-        let mut mover = Self {
+        let mut filter = Self {
             pose,
             calibration: Calibration::default(),
-            settled: BodyCovariance::zeros(),
+            at_run_start: BodyCovariance::zeros(),
             tail: Tail::zeros(),
             since_flush: Isometry3::identity(),
             is_stale: false,
             run: Run::default(),
-            history: History::default(),
+            history: OdometryHistory::default(),
             is_planar: true,
         };
-        mover
-            .settled
+        filter
+            .at_run_start
             .fixed_view_mut::<6, 6>(0, 0)
             .copy_from(covariance);
         let sd = parameters.calibration_sd();
         for (k, sd) in sd.iter().enumerate() {
-            mover.settled[(POSE + k, POSE + k)] = sd * sd;
+            filter.at_run_start[(POSE + k, POSE + k)] = sd * sd;
         }
-        mover
+        filter
     }
 
     /// The same body at another pose, whose error is correlated with nothing.
     pub(super) fn placed(mut self, pose: Isometry3<f64>, covariance: &Matrix6<f64>) -> Self {
         self.flush();
         self.pose = pose;
-        let calibration: SMatrix<f64, 5, 5> = self.settled.fixed_view::<5, 5>(6, 6).into_owned();
-        self.settled = BodyCovariance::zeros();
-        self.settled
+        let calibration: SMatrix<f64, 5, 5> =
+            self.at_run_start.fixed_view::<5, 5>(6, 6).into_owned();
+        self.at_run_start = BodyCovariance::zeros();
+        self.at_run_start
             .fixed_view_mut::<6, 6>(0, 0)
             .copy_from(covariance);
-        self.settled
+        self.at_run_start
             .fixed_view_mut::<5, 5>(6, 6)
             .copy_from(&calibration);
         self
     }
 
     /// The body's frame was laid into another one.
-    pub(super) fn carry_over(&mut self, tie: &Tie) {
-        let by_tie = body_by_tie(&self.pose);
-        let spread = by_tie * tie.covariance * by_tie.transpose();
+    pub(super) fn transform_by(&mut self, alignment: &FrameAlignment) {
+        let by_alignment = pose_by_alignment(&self.pose);
+        let spread = by_alignment * alignment.covariance * by_alignment.transpose();
         let mut pose = self.covariance_mut().fixed_view_mut::<6, 6>(0, 0);
         pose += (spread + spread.transpose()) * 0.5;
-        self.pose = tie.pose * self.pose;
+        self.pose = alignment.pose * self.pose;
     }
 
     /// Covariance of the pose.
     pub(super) fn pose_covariance(&self) -> PoseCovariance {
         let covariance = if self.run.steps == 0 {
-            self.settled
+            self.at_run_start
         } else {
             self.moved().0
         };
@@ -135,13 +136,13 @@ impl Mover {
     /// Covariance of the body's error, which nothing waits to be added to.
     pub(super) fn covariance(&self) -> &BodyCovariance {
         debug_assert!(self.run.steps == 0, "the run must be settled before");
-        &self.settled
+        &self.at_run_start
     }
 
     /// The same, up to date and to be changed.
     pub(super) fn covariance_mut(&mut self) -> &mut BodyCovariance {
-        self.settle();
-        &mut self.settled
+        self.carry_over_run();
+        &mut self.at_run_start
     }
 
     /// Whether there was any motion since the last flush.
@@ -218,7 +219,7 @@ impl Mover {
         let mut wander = wander.component_mul(&learns);
         let most = parameters.calibration_variance_max();
         for k in 0..CALIBRATION {
-            let left = most[k] - self.settled[(POSE + k, POSE + k)] - self.run.wander[k];
+            let left = most[k] - self.at_run_start[(POSE + k, POSE + k)] - self.run.wander[k];
             wander[k] = wander[k].min(left.max(0.0));
         }
         self.run.wander += wander;
@@ -226,7 +227,7 @@ impl Mover {
         if self.run.steps >= RUN_STEPS_MAX
             || lever.norm_squared() > RUN_LENGTH_MAX_M * RUN_LENGTH_MAX_M
         {
-            self.settle();
+            self.carry_over_run();
         }
         let displacement = self.pose.rotation * increment.translation.vector;
         self.pose.translation.vector += displacement;
@@ -238,7 +239,7 @@ impl Mover {
             variance,
             calibrated: Calibrated {
                 calibration: self.calibration,
-                variance: SVector::from_fn(|k, _| self.settled[(POSE + k, POSE + k)]),
+                variance: SVector::from_fn(|k, _| self.at_run_start[(POSE + k, POSE + k)]),
                 wander,
                 moving_s: if is_rest { 0.0 } else { duration_s },
             },
@@ -249,9 +250,9 @@ impl Mover {
     /// calibration where the run began.
     fn moved(&self) -> (BodyCovariance, Tail) {
         let run = &self.run;
-        let pose: Matrix6<f64> = self.settled.fixed_view::<6, 6>(0, 0).into_owned();
-        let cross: Tail = self.settled.fixed_view::<6, 5>(0, 6).into_owned();
-        let own: SMatrix<f64, 5, 5> = self.settled.fixed_view::<5, 5>(6, 6).into_owned();
+        let pose: Matrix6<f64> = self.at_run_start.fixed_view::<6, 6>(0, 0).into_owned();
+        let cross: Tail = self.at_run_start.fixed_view::<6, 5>(0, 6).into_owned();
+        let own: SMatrix<f64, 5, 5> = self.at_run_start.fixed_view::<5, 5>(6, 6).into_owned();
         let back = Shift::of_inverse(run.motion.motion());
         let spread = run.tail * own;
         let mixed = cross * run.tail.transpose();
@@ -263,7 +264,7 @@ impl Mover {
         let mut pose = back.times(&back.times(&gathered).transpose());
         back.make_up_for_rounding(&gathered, &mut pose);
         let cross = back.times(&(cross + spread));
-        let mut covariance = self.settled;
+        let mut covariance = self.at_run_start;
         for row in 0..POSE {
             for column in row..POSE {
                 let entry = pose[(row, column)];
@@ -283,13 +284,13 @@ impl Mover {
     }
 
     /// Carries the run under way over to the covariance, and begins another one.
-    pub(super) fn settle(&mut self) {
+    pub(super) fn carry_over_run(&mut self) {
         if self.run.steps == 0 {
             return;
         }
         let (covariance, tail) = self.moved();
         let run = std::mem::take(&mut self.run);
-        self.settled = covariance;
+        self.at_run_start = covariance;
         self.tail = Shift::of_inverse(run.motion.motion()).times(&self.tail) + tail;
         self.since_flush *= run.motion.motion();
         self.since_flush.rotation.renormalize_fast();
@@ -298,7 +299,7 @@ impl Mover {
 
     /// The transition of the error since the last flush, which forgets it.
     pub(super) fn flush(&mut self) -> BodyCovariance {
-        self.settle();
+        self.carry_over_run();
         let mut transition = BodyCovariance::identity();
         let back = se3::adjoint(&self.since_flush.inverse());
         transition.fixed_view_mut::<6, 6>(0, 0).copy_from(&back);
@@ -330,8 +331,8 @@ impl Mover {
     /// Cheap, for every motion asks: what the lasting errors of odometry add in the run under way
     /// does not count yet.
     pub(super) fn is_nowhere(&self) -> bool {
-        let settled: f64 = (0..3).map(|k| self.settled[(k, k)]).sum();
-        let variance = settled + self.run.motion.position_variance();
+        let before_run: f64 = (0..3).map(|k| self.at_run_start[(k, k)]).sum();
+        let variance = before_run + self.run.motion.position_variance();
         // A number that is none fails all comparisons.
         !(is_somewhere(&self.pose.translation.vector) && variance <= POSITION_SD_MAX_M.powi(2))
     }

@@ -29,22 +29,22 @@ fn world(numbers: &mut Numbers, n: usize, half_m: [f64; 3]) -> Vec<Point3<f64>> 
 }
 
 /// What a frame knows of points: each off by about a tenth of a metre, in a frame at a pose.
-fn stars(
+fn seen_points(
     numbers: &mut Numbers,
     frame: &Isometry3<f64>,
     points: &[Point3<f64>],
     is_planar: bool,
-) -> Vec<Star> {
-    let star = |point: &Point3<f64>| {
+) -> Vec<UncertainPoint> {
+    let point = |point: &Point3<f64>| {
         // Uniform numbers within √3 deviations.
         let reach = 3.0_f64.sqrt() * SD_M;
         let off = numbers.point([reach, reach, if is_planar { 0.0 } else { reach }]);
-        Star {
+        UncertainPoint {
             position: frame.inverse_transform_point(&(point + off.coords)),
             variance: SD_M * SD_M,
         }
     };
-    points.iter().map(star).collect()
+    points.iter().map(point).collect()
 }
 
 fn motion(shift: [f64; 3], turn: Vector3<f64>) -> Isometry3<f64> {
@@ -64,15 +64,18 @@ fn shuffled<T: Clone>(numbers: &mut Numbers, items: &[T]) -> (Vec<usize>, Vec<T>
 }
 
 /// How far a motion lays points from where they are, at most \[m\].
-fn off_m(found: &Likeness, frame: &Isometry3<f64>, points: &[Point3<f64>]) -> f64 {
+fn off_m(found: &Registration, frame: &Isometry3<f64>, points: &[Point3<f64>]) -> f64 {
     let off = |point: &Point3<f64>| (found.pose * (frame.inverse() * point) - point).norm();
     points.iter().map(off).fold(0.0, f64::max)
 }
 
-/// Whether the twins are the same points, or points so close to one another that it is open which is which.
-fn are_right(found: &Likeness, order: &[usize], points: &[Point3<f64>]) -> bool {
+/// Whether the correspondences are the same points, or points so close to one another that it is open which is which.
+fn are_right(found: &Registration, order: &[usize], points: &[Point3<f64>]) -> bool {
     let off = |&(one, other): &(usize, usize)| (points[one] - points[order[other]]).norm();
-    found.twins.iter().all(|twin| off(twin) < 8.0 * SD_M)
+    found
+        .correspondences
+        .iter()
+        .all(|correspondence| off(correspondence) < 8.0 * SD_M)
 }
 
 proptest! {
@@ -85,14 +88,14 @@ proptest! {
         let numbers = &mut Numbers(seed);
         let points = world(numbers, 15, FLOOR);
         let frame = motion([x, y, 0.0], Vector3::z() * heading);
-        let older = stars(numbers, &Isometry3::identity(), &points, true);
+        let older = seen_points(numbers, &Isometry3::identity(), &points, true);
         let (order, seen) = shuffled(numbers, &points);
-        let newer = stars(numbers, &frame, &seen, true);
+        let newer = seen_points(numbers, &frame, &seen, true);
         // A world may happen to be ambiguous; then nothing is claimed.
-        if let Some(found) = likeness(&older, &newer, true) {
+        if let Some(found) = register(&older, &newer, true) {
             prop_assert!(off_m(&found, &frame, &points) < 0.5);
             prop_assert!(found.pose.translation.z.abs() < 1e-12);
-            prop_assert!(found.twins.len() >= 5);
+            prop_assert!(found.correspondences.len() >= 5);
             prop_assert!(are_right(&found, &order, &points));
         }
     }
@@ -102,25 +105,25 @@ proptest! {
         let numbers = &mut Numbers(seed);
         let half_m = if is_planar { FLOOR } else { HALL };
         let (one, other) = (world(numbers, n, half_m), world(numbers, 20, half_m));
-        let older = stars(numbers, &Isometry3::identity(), &one, is_planar);
-        let newer = stars(numbers, &Isometry3::identity(), &other, is_planar);
-        prop_assert_eq!(likeness(&older, &newer, is_planar), None);
+        let older = seen_points(numbers, &Isometry3::identity(), &one, is_planar);
+        let newer = seen_points(numbers, &Isometry3::identity(), &other, is_planar);
+        prop_assert_eq!(register(&older, &newer, is_planar), None);
     }
 
     #[test]
     fn a_mirrored_constellation_is_another_one(seed in any::<u64>(), heading in -3.1..3.1_f64) {
         let numbers = &mut Numbers(seed);
         let points = world(numbers, 15, FLOOR);
-        let older = stars(numbers, &Isometry3::identity(), &points, true);
+        let older = seen_points(numbers, &Isometry3::identity(), &points, true);
         let mirrored: Vec<_> = points.iter().map(|point| Point3::new(-point.x, point.y, point.z)).collect();
-        let newer = stars(numbers, &motion([1.0, 2.0, 0.0], Vector3::z() * heading), &mirrored, true);
-        prop_assert_eq!(likeness(&older, &newer, true), None);
+        let newer = seen_points(numbers, &motion([1.0, 2.0, 0.0], Vector3::z() * heading), &mirrored, true);
+        prop_assert_eq!(register(&older, &newer, true), None);
         // As high as wide, for a flat world is much like its mirror image turned upside down.
         let points = world(numbers, 15, [6.0; 3]);
-        let older = stars(numbers, &Isometry3::identity(), &points, false);
+        let older = seen_points(numbers, &Isometry3::identity(), &points, false);
         let mirrored: Vec<_> = points.iter().map(|point| Point3::new(-point.x, point.y, point.z)).collect();
-        let newer = stars(numbers, &motion([1.0, 2.0, -1.0], Vector3::y() * heading), &mirrored, false);
-        prop_assert_eq!(likeness(&older, &newer, false), None);
+        let newer = seen_points(numbers, &motion([1.0, 2.0, -1.0], Vector3::y() * heading), &mirrored, false);
+        prop_assert_eq!(register(&older, &newer, false), None);
     }
 
     #[test]
@@ -130,10 +133,10 @@ proptest! {
         let numbers = &mut Numbers(seed);
         let points = world(numbers, 15, HALL);
         let frame = motion(shift, turn.into());
-        let older = stars(numbers, &Isometry3::identity(), &points, false);
+        let older = seen_points(numbers, &Isometry3::identity(), &points, false);
         let (order, seen) = shuffled(numbers, &points);
-        let newer = stars(numbers, &frame, &seen, false);
-        if let Some(found) = likeness(&older, &newer, false) {
+        let newer = seen_points(numbers, &frame, &seen, false);
+        if let Some(found) = register(&older, &newer, false) {
             prop_assert!(off_m(&found, &frame, &points) < 0.5);
             prop_assert!(are_right(&found, &order, &points));
         }
@@ -155,10 +158,10 @@ proptest! {
                     .map(|[x, y]| middle + Vector3::new(x, y, 0.0))
             });
             let corners: Vec<_> = corners.collect();
-            stars(numbers, &Isometry3::identity(), &corners, is_planar)
+            seen_points(numbers, &Isometry3::identity(), &corners, is_planar)
         };
         let (older, newer) = (boards(), boards());
-        prop_assert_eq!(likeness(&older, &newer, is_planar), None);
+        prop_assert_eq!(register(&older, &newer, is_planar), None);
     }
 }
 
@@ -169,10 +172,10 @@ fn n_found(n_common: usize, n_own: usize, is_planar: bool) -> usize {
         let numbers = &mut Numbers(seed);
         let common = world(numbers, n_common, half_m);
         let [one, other] = [0, 1].map(|_| [common.clone(), world(numbers, n_own, half_m)].concat());
-        let older = stars(numbers, &Isometry3::identity(), &one, is_planar);
+        let older = seen_points(numbers, &Isometry3::identity(), &one, is_planar);
         let frame = motion([3.0, -7.0, 0.0], Vector3::z() * -2.9);
-        let newer = stars(numbers, &frame, &other, is_planar);
-        likeness(&older, &newer, is_planar).is_some()
+        let newer = seen_points(numbers, &frame, &other, is_planar);
+        register(&older, &newer, is_planar).is_some()
     });
     found.count()
 }
@@ -203,13 +206,17 @@ fn landmarks_that_may_be_others_are_no_twins() {
         let numbers = &mut Numbers(0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(seed));
         let points = world(numbers, 15, if is_planar { FLOOR } else { HALL });
         let frame = motion([3.0, -7.0, 0.0], Vector3::z() * -2.9);
-        let older = stars(numbers, &Isometry3::identity(), &points, is_planar);
+        let older = seen_points(numbers, &Isometry3::identity(), &points, is_planar);
         let (order, seen) = shuffled(numbers, &points);
-        let newer = stars(numbers, &frame, &seen, is_planar);
-        let found = likeness(&older, &newer, is_planar).expect("it is alike");
+        let newer = seen_points(numbers, &frame, &seen, is_planar);
+        let found = register(&older, &newer, is_planar).expect("it is alike");
         assert!(off_m(&found, &frame, &points) < 0.5, "world {seed}");
         assert!(are_right(&found, &order, &points), "world {seed}");
-        assert!(found.twins.len() >= 8, "world {seed}: {:?}", found.twins);
+        assert!(
+            found.correspondences.len() >= 8,
+            "world {seed}: {:?}",
+            found.correspondences
+        );
     }
 }
 
@@ -250,15 +257,15 @@ fn regular_worlds_are_not_claimed() {
             motion([4.0, -2.0, 0.0], Vector3::z() * 2.0),
             Isometry3::identity(),
         ] {
-            let older = stars(numbers, &Isometry3::identity(), points, true);
+            let older = seen_points(numbers, &Isometry3::identity(), points, true);
             // What was seen of the world by the newer frame may be all of it or a part.
             for seen in [points.len(), points.len() / 2] {
                 if number == 5 && seen == points.len() {
                     continue; // both places together are only in one place
                 }
-                let newer = stars(numbers, &frame, &points[..seen], true);
+                let newer = seen_points(numbers, &frame, &points[..seen], true);
                 assert_eq!(
-                    likeness(&older, &newer, true),
+                    register(&older, &newer, true),
                     None,
                     "world {number}, {seen} seen"
                 );
@@ -269,30 +276,30 @@ fn regular_worlds_are_not_claimed() {
 
 #[test]
 fn numbers_beyond_all_bounds_are_no_likeness() {
-    let star = |x: f64, y: f64, variance: f64| Star {
+    let point = |x: f64, y: f64, variance: f64| UncertainPoint {
         position: Point3::new(x, y, 0.0),
         variance,
     };
-    for stars in [
-        vec![star(0.0, 0.0, 0.01); 20],
+    for points in [
+        vec![point(0.0, 0.0, 0.01); 20],
         (0..20)
-            .map(|k| star(f64::from(k), f64::NAN, 0.01))
+            .map(|k| point(f64::from(k), f64::NAN, 0.01))
             .collect(),
         (0..20)
-            .map(|k| star(1e300 * f64::from(k), 1e300, 1e200))
+            .map(|k| point(1e300 * f64::from(k), 1e300, 1e200))
             .collect(),
         (0..20)
-            .map(|k| star(f64::from(k * k), f64::from(k), f64::INFINITY))
+            .map(|k| point(f64::from(k * k), f64::from(k), f64::INFINITY))
             .collect(),
         (0..20)
-            .map(|k| star(f64::from(k * k), 0.0, 0.0))
-            .collect::<Vec<Star>>(),
+            .map(|k| point(f64::from(k * k), 0.0, 0.0))
+            .collect::<Vec<UncertainPoint>>(),
     ] {
         for is_planar in [true, false] {
-            let found = likeness(&stars, &stars, is_planar);
-            let is_exact = stars[0].variance == 0.0;
+            let found = register(&points, &points, is_planar);
+            let is_exact = points[0].variance == 0.0;
             assert!(found.is_none() || (is_exact && is_planar), "{found:?}");
         }
     }
-    assert_eq!(likeness(&[], &[], true), None);
+    assert_eq!(register(&[], &[], true), None);
 }

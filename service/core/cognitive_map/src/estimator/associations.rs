@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::sight::Verdict;
+use super::measurement_update::Verdict;
 use crate::input::Label;
 
 /// Most names that stand for others. Beyond that no landmarks are found to be the same.
-pub(super) const ALIASES_MAX: usize = 4096;
+pub(super) const ASSOCIATIONS_MAX: usize = 4096;
 /// A name whose sightings were refused this often in a row, by agents that are where they should be, is not that of the
 /// landmark that it was taken for. Less often than a landmark is forgotten for.
 const REFUSED_TO_PART: u32 = 6;
 
 /// What a name stands for.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Alias {
+pub(super) struct Association {
     /// The landmark's name.
     pub(super) name: Label,
     /// Sightings under the other name refused one after the other.
@@ -23,19 +23,25 @@ pub(super) struct Alias {
 
 /// The names that stand for others. A clone shares them.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Aliases {
-    pub(super) names: Arc<BTreeMap<Label, Alias>>,
+pub(super) struct Associations {
+    pub(super) names: Arc<BTreeMap<Label, Association>>,
 }
 
-impl Aliases {
+impl Associations {
     /// The landmark's name, of a name that may stand for another.
     pub(super) fn name_of<'a>(&'a self, label: &'a Label) -> &'a Label {
-        self.names.get(label).map_or(label, |alias| &alias.name)
+        self.names
+            .get(label)
+            .map_or(label, |association| &association.name)
     }
 
     /// The names that others stand for, in order.
     pub(super) fn names_of_others(&self) -> Vec<&Label> {
-        let mut names: Vec<&Label> = self.names.values().map(|alias| &alias.name).collect();
+        let mut names: Vec<&Label> = self
+            .names
+            .values()
+            .map(|association| &association.name)
+            .collect();
         names.sort_unstable();
         names.dedup();
         names
@@ -43,20 +49,23 @@ impl Aliases {
 
     /// Whether there is room for more.
     pub(super) fn has_room(&self, n: usize) -> bool {
-        self.names.len() + n <= ALIASES_MAX
+        self.names.len() + n <= ASSOCIATIONS_MAX
     }
 
     /// A name stands for another one from now on, and so does what stood for it.
     pub(super) fn insert(&mut self, label: &Label, name: &Label) {
         let names = Arc::make_mut(&mut self.names);
-        for alias in names.values_mut().filter(|alias| alias.name == *label) {
-            alias.name = name.clone();
+        for association in names
+            .values_mut()
+            .filter(|association| association.name == *label)
+        {
+            association.name = name.clone();
         }
-        let alias = Alias {
+        let association = Association {
             name: name.clone(),
             refused: 0,
         };
-        names.insert(label.clone(), alias);
+        names.insert(label.clone(), association);
         names.remove(name);
     }
 
@@ -65,21 +74,21 @@ impl Aliases {
     /// `observer_refused` counts the observer's sightings refused one after the other: of an agent that contradicts everything, the
     /// name is not to blame.
     pub(super) fn weigh(&mut self, label: &Label, verdict: Verdict, observer_refused: u32) {
-        let Some(alias) = self.names.get(label) else {
+        let Some(association) = self.names.get(label) else {
             return;
         };
         let refused = match verdict {
-            Verdict::Refused => alias.refused + 1,
+            Verdict::Refused => association.refused + 1,
             _ => 0,
         };
-        if refused == alias.refused {
+        if refused == association.refused {
             return; // as most often: nothing is copied
         }
         let names = Arc::make_mut(&mut self.names);
         if refused >= REFUSED_TO_PART && observer_refused < REFUSED_TO_PART / 2 {
             names.remove(label);
-        } else if let Some(alias) = names.get_mut(label) {
-            alias.refused = refused;
+        } else if let Some(association) = names.get_mut(label) {
+            association.refused = refused;
         }
     }
 }
@@ -94,34 +103,34 @@ mod tests {
 
     #[test]
     fn a_name_of_a_name_is_that_of_the_landmark() {
-        let mut aliases = Aliases::default();
-        aliases.insert(&label("c"), &label("b"));
-        aliases.insert(&label("b"), &label("a"));
+        let mut associations = Associations::default();
+        associations.insert(&label("c"), &label("b"));
+        associations.insert(&label("b"), &label("a"));
         for name in ["a", "b", "c"] {
-            assert_eq!(aliases.name_of(&label(name)), &label("a"));
+            assert_eq!(associations.name_of(&label(name)), &label("a"));
         }
-        assert_eq!(aliases.name_of(&label("d")), &label("d"));
+        assert_eq!(associations.name_of(&label("d")), &label("d"));
     }
 
     #[test]
     fn a_name_parts_from_what_it_contradicts_unless_the_observer_is_to_blame() {
-        let mut aliases = Aliases::default();
-        let (name, alias) = (label("a"), label("b"));
-        aliases.insert(&alias, &name);
+        let mut associations = Associations::default();
+        let (name, association) = (label("a"), label("b"));
+        associations.insert(&association, &name);
         for _ in 0..20 {
-            aliases.weigh(&alias, Verdict::Refused, 7);
+            associations.weigh(&association, Verdict::Refused, 7);
         }
-        assert_eq!(aliases.name_of(&alias), &name);
+        assert_eq!(associations.name_of(&association), &name);
         let accepted = Verdict::Accepted {
             nis: 1.0,
             components: 2,
         };
-        aliases.weigh(&alias, accepted, 0);
+        associations.weigh(&association, accepted, 0);
         for _ in 0..5 {
-            aliases.weigh(&alias, Verdict::Refused, 1);
+            associations.weigh(&association, Verdict::Refused, 1);
         }
-        assert_eq!(aliases.name_of(&alias), &name);
-        aliases.weigh(&alias, Verdict::Refused, 1);
-        assert_eq!(aliases.name_of(&alias), &alias);
+        assert_eq!(associations.name_of(&association), &name);
+        associations.weigh(&association, Verdict::Refused, 1);
+        assert_eq!(associations.name_of(&association), &association);
     }
 }

@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 
 use super::hypotheses::Hypothesis;
-use super::sky::{Sky, one_to_one};
-use super::{GATE, Star, apart_m, mean_variance};
+use super::point_index::{PointIndex, one_to_one};
+use super::{GATE, UncertainPoint, apart_m, mean_variance};
 
 /// Rough motions that are looked at closely.
 const CANDIDATES_MAX: usize = 16;
@@ -13,41 +13,44 @@ const CANDIDATES_MAX: usize = 16;
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     pose: Isometry3<f64>,
-    n_twins: usize,
+    n_correspondences: usize,
     /// Sum of their normalised squares.
     squares: f64,
 }
 
 impl Candidate {
     fn is_better_than(&self, other: &Self) -> bool {
-        (self.n_twins, -self.squares) > (other.n_twins, -other.squares)
+        (self.n_correspondences, -self.squares) > (other.n_correspondences, -other.squares)
     }
 }
 
 /// The best of the motions, no two nearly the same, best first.
 pub(super) fn candidates(
     hypotheses: &[Hypothesis],
-    sky: &Sky<'_>,
-    newer: &[Star],
-    twins_min: usize,
+    index: &PointIndex<'_>,
+    newer: &[UncertainPoint],
+    correspondences_min: usize,
 ) -> Vec<Isometry3<f64>> {
     let corners = corners(newer);
     let near_m = 2.0 * GATE * mean_variance(newer).sqrt();
     let mut candidates = Vec::new();
-    let mut twins = Vec::new();
+    let mut correspondences = Vec::new();
     for hypothesis in hypotheses {
-        sky.pairs(
+        index.pairs(
             &hypothesis.pose,
             newer,
             &|at| hypothesis.spread(at),
-            &mut twins,
+            &mut correspondences,
         );
-        one_to_one(&mut twins);
-        if twins.len() >= twins_min {
+        one_to_one(&mut correspondences);
+        if correspondences.len() >= correspondences_min {
             let candidate = Candidate {
                 pose: hypothesis.pose,
-                n_twins: twins.len(),
-                squares: twins.iter().map(|twin| twin.square).sum(),
+                n_correspondences: correspondences.len(),
+                squares: correspondences
+                    .iter()
+                    .map(|correspondence| correspondence.square)
+                    .sum(),
             };
             let is_same =
                 |other: &Candidate| apart_m(&other.pose, &candidate.pose, &corners) < near_m;
@@ -75,16 +78,16 @@ fn propose(candidates: &mut Vec<Candidate>, new: Candidate, is_same: impl Fn(&Ca
 }
 
 /// Three landmarks far from one another: two motions that lay these alike are one.
-fn corners(stars: &[Star]) -> Vec<Star> {
-    let mut corners: Vec<Star> = Vec::new();
-    while corners.len() < stars.len().min(3) {
-        let far = |star: &Star| {
+fn corners(points: &[UncertainPoint]) -> Vec<UncertainPoint> {
+    let mut corners: Vec<UncertainPoint> = Vec::new();
+    while corners.len() < points.len().min(3) {
+        let far = |point: &UncertainPoint| {
             let distances = corners
                 .iter()
-                .map(|corner| (star.position - corner.position).norm());
+                .map(|corner| (point.position - corner.position).norm());
             distances.fold(f64::INFINITY, f64::min)
         };
-        let farthest = stars.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
+        let farthest = points.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
         corners.extend(farthest);
     }
     corners

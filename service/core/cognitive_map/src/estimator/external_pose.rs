@@ -1,4 +1,4 @@
-//! A pose that is told from outside, by an estimate that may know the same samples.
+//! Fusion of an external pose: one stated by another estimate, which may rest on the same samples.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ const WEIGHT_STEPS: u32 = 16;
 const GAIN_MIN: f64 = 0.02;
 /// Most that it gains.
 const GAIN_MAX: f64 = 1e9;
-/// Least variance of a told component, as a part of what is known of it.
+/// Least variance of an external component, as a part of the estimate's own variance.
 const VARIANCE_MIN: f64 = 1e-9;
 
 impl Estimator {
@@ -26,7 +26,12 @@ impl Estimator {
     /// How its error is correlated with that of the present estimate is not known: both may rest upon the
     /// same samples. The pose becomes the covariance intersection (Julier & Uhlmann 1997) of the two, and
     /// everything correlated with it follows; to say the same twice adds nothing.
-    pub fn fix(&mut self, agent: u32, pose: &Isometry3<f64>, covariance: &PoseCovariance) -> bool {
+    pub fn fuse_pose(
+        &mut self,
+        agent: u32,
+        pose: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+    ) -> bool {
         self.begin();
         let Some(number) = self.frame_of(agent) else {
             return false;
@@ -34,19 +39,19 @@ impl Estimator {
         if !is_somewhere(&pose.translation.vector) {
             return false;
         }
-        let told = Told { pose, covariance };
-        if let Some(apart) = &mut self.seat_mut(agent).apart {
-            let traveller = Arc::clone(&apart.traveller);
+        let external = ExternalPose { pose, covariance };
+        if let Some(detached) = &mut self.slot_mut(agent).detached {
+            let state = Arc::clone(&detached.state);
             let mut alone = Frame::default();
-            alone.join(agent, traveller);
-            let is_taken = alone.fix(0, &told, &self.parameters);
-            if let Some(traveller) = alone.leave(agent)
+            alone.join(agent, state);
+            let is_taken = alone.fuse_pose(0, &external, &self.parameters);
+            if let Some(state) = alone.leave(agent)
                 && is_taken
-                && let Some(apart) = &mut self.seat_mut(agent).apart
+                && let Some(detached) = &mut self.slot_mut(agent).detached
             {
-                apart.traveller = traveller;
+                detached.state = state;
                 // The outside estimate may rest upon what the others saw.
-                apart.was_joint = true;
+                detached.was_joint = true;
             }
             return is_taken;
         }
@@ -55,33 +60,38 @@ impl Estimator {
         };
         let is_taken = frame
             .member(agent)
-            .is_some_and(|index| frame.fix(index, &told, &self.parameters));
+            .is_some_and(|index| frame.fuse_pose(index, &external, &self.parameters));
         self.sweep(number);
         is_taken
     }
 }
 
-/// What is told of a pose.
-struct Told<'a> {
+/// A pose that another estimate states.
+struct ExternalPose<'a> {
     pose: &'a Isometry3<f64>,
     covariance: &'a PoseCovariance,
 }
 
 impl Frame {
-    /// Takes in a told pose of a member; answers whether it counts.
+    /// Fuses an external pose of a member; answers whether it was accepted.
     ///
-    /// With the member's own P and the told Σ, in units of the own deviations, and the innovation ν:
+    /// With the member's own P and the external Σ, in units of the own deviations, and the innovation ν:
     ///
     /// ```text
     /// ω of the largest det(ω P⁻¹ + (1 − ω) Σ⁻¹)      G = (1 − ω) (Σ⁻¹ − P⁻¹) = V Λ Vᵀ
     /// a measurement Vᵀ ξ = Λ⁻¹ Vᵀ (1 − ω) Σ⁻¹ ν of covariance Λ⁻¹, where Λ is large enough
     /// ```
-    fn fix(&mut self, index: usize, told: &Told<'_>, parameters: &Parameters) -> bool {
+    fn fuse_pose(
+        &mut self,
+        index: usize,
+        external: &ExternalPose<'_>,
+        parameters: &Parameters,
+    ) -> bool {
         self.flush();
         let member = &self.members[index];
-        let mover = member.mover();
-        let own: Matrix6<f64> = mover.covariance().fixed_view::<6, 6>(0, 0).into_owned();
-        let (linear, angular) = se3::log(&mover.pose.inv_mul(told.pose));
+        let filter = member.filter();
+        let own: Matrix6<f64> = filter.covariance().fixed_view::<6, 6>(0, 0).into_owned();
+        let (linear, angular) = se3::log(&filter.pose.inv_mul(external.pose));
         let innovation = Vector6::from_fn(|k, _| if k < 3 { linear[k] } else { angular[k - 3] });
         // What is known without error is left alone, e.g. the height of a robot on a floor.
         let scale = own.diagonal().map(|variance| {
@@ -104,7 +114,7 @@ impl Frame {
         };
         let (own, others) = (
             unit(&own, VARIANCE_MIN),
-            unit(told.covariance.matrix(), VARIANCE_MIN),
+            unit(external.covariance.matrix(), VARIANCE_MIN),
         );
         let innovation = innovation.component_mul(&scale);
         // Of two errors that may be correlated in any way, the variances' sum counts twice.

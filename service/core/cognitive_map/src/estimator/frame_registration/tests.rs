@@ -79,7 +79,10 @@ fn landmarks_under_other_names_tie_frames_and_become_one() {
                 let [a, b] = ["a", "b"].map(|name| Label::new(&format!("{name}-{post}")).unwrap());
                 assert_eq!(estimator.name_of(&b), estimator.name_of(&a));
                 let name = estimator.name_of(&a);
-                let (_, found, _) = estimator.landmarks().find(|mark| mark.0 == name).unwrap();
+                let (_, found, _) = estimator
+                    .landmarks()
+                    .find(|landmark| landmark.0 == name)
+                    .unwrap();
                 assert!((found - position).norm() < 0.3, "{a:?}");
             }
         }

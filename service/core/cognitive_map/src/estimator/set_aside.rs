@@ -16,12 +16,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6};
 
-use super::frame::{Frame, Mark};
+use super::agent_filter::{AgentFilter, POSITION_SD_MAX_M};
+use super::agent_slot::{AgentState, Detached};
+use super::frame::{Frame, LandmarkState};
 use super::joint::{Estimator, MAP};
-use super::mover::{Mover, POSITION_SD_MAX_M};
+use super::measurement_update::REFUSED_TO_WIDEN;
 use super::observers::Observers;
-use super::seat::{Apart, Traveller};
-use super::sight::REFUSED_TO_WIDEN;
 use crate::input::Label;
 use geometry::is_somewhere;
 
@@ -35,7 +35,7 @@ const ABSURD: u32 = 64;
 /// do not, before it corrects others again.
 const PROBATION: u32 = 2 * DOUBTED;
 
-impl Traveller {
+impl AgentState {
     /// Whether its sightings contradict the estimate so much that they correct nobody but itself.
     pub(super) fn is_doubted(&self) -> bool {
         self.doubt >= DOUBTED
@@ -56,7 +56,7 @@ impl Traveller {
 impl Frame {
     /// The components that a sighting of a landmark corrects.
     pub(super) fn corrected_by(&self, observer: usize) -> Range<usize> {
-        if self.members[observer].traveller.is_doubted() {
+        if self.members[observer].state.is_doubted() {
             self.members[observer].components()
         } else {
             self.covariance.all()
@@ -66,7 +66,7 @@ impl Frame {
     /// The components that a sighting of another member corrects, and whether it speaks for or
     /// against the observer.
     pub(super) fn corrected_between(&self, observer: usize, target: usize) -> (Range<usize>, bool) {
-        let is_doubted = |index: usize| self.members[index].traveller.is_doubted();
+        let is_doubted = |index: usize| self.members[index].state.is_doubted();
         match (is_doubted(observer), is_doubted(target)) {
             (false, false) => (self.covariance.all(), true),
             (false, true) => (self.members[target].components(), false),
@@ -75,10 +75,10 @@ impl Frame {
     }
 
     /// Whether a landmark is where nothing is, or may be anywhere.
-    fn is_nowhere(&self, mark: &Mark) -> bool {
-        let axes = mark.offset..mark.offset + 3;
+    fn is_nowhere(&self, landmark: &LandmarkState) -> bool {
+        let axes = landmark.offset..landmark.offset + 3;
         let variance: f64 = axes.map(|k| self.covariance.variance(k)).sum();
-        !(is_somewhere(&mark.position.coords) && variance <= POSITION_SD_MAX_M.powi(2))
+        !(is_somewhere(&landmark.position.coords) && variance <= POSITION_SD_MAX_M.powi(2))
     }
 }
 
@@ -91,18 +91,18 @@ impl Estimator {
     /// Whether an agent was set aside because what it said was absurd, and has said nothing since
     /// that fits.
     pub fn is_aside(&self, agent: u32) -> bool {
-        self.seat(agent).is_some_and(|seat| seat.is_aside)
+        self.slot(agent).is_some_and(|slot| slot.is_aside)
     }
 
     /// Whether an agent's sightings contradict the estimate, or did before it was set aside and
     /// have not fitted since it is back.
     pub fn is_doubted(&self, agent: u32) -> bool {
-        self.traveller(agent).is_some_and(Traveller::is_doubted)
+        self.agent_state(agent).is_some_and(AgentState::is_doubted)
     }
 
     /// The agents that have seen a landmark of the map that is estimated jointly now.
     pub(crate) fn observers_of(&self, label: &Label) -> Option<&Observers> {
-        Some(&self.frame(MAP).marks.get(label)?.observers)
+        Some(&self.frame(MAP).landmarks.get(label)?.observers)
     }
 
     /// Takes which agents the latest call set aside. What is not taken is dropped by the next
@@ -116,20 +116,20 @@ impl Estimator {
     pub(super) fn is_aside_for(&self, agent: u32, number: usize, label: &Label) -> bool {
         let frame = self.frame(number);
         let is_other = |other: u32| other != agent && self.is_aside(other);
-        match frame.marks.get(label) {
-            Some(mark) => mark.observers.are_all(is_other),
+        match frame.landmarks.get(label) {
+            Some(landmark) => landmark.observers.are_all(is_other),
             None => frame
-                .dormant
+                .archive
                 .get(label)
-                .and_then(|mark| mark.only)
+                .and_then(|landmark| landmark.only)
                 .is_some_and(is_other),
         }
     }
 
     /// Whether an agent was set aside that had been contradicted, and not only nowhere.
     pub(super) fn was_contradicted(&self, agent: u32) -> bool {
-        let seat = self.seat(agent);
-        seat.is_some_and(|seat| seat.is_aside && seat.evidence.refused > 0)
+        let slot = self.slot(agent);
+        slot.is_some_and(|slot| slot.is_aside && slot.evidence.refused > 0)
     }
 
     /// The doubt with which an agent comes back to the map.
@@ -137,19 +137,19 @@ impl Estimator {
         if self.was_contradicted(agent) {
             return PROBATION;
         }
-        let doubt = self.traveller(agent).map_or(0, |known| known.doubt);
+        let doubt = self.agent_state(agent).map_or(0, |known| known.doubt);
         doubt.min(DOUBTED)
     }
 
     /// Sets an agent aside if its evidence is absurd, and lets one be again whose evidence fits.
-    pub(super) fn judge(&mut self, agent: u32) {
-        let Some((seat, traveller)) = self.seat(agent).zip(self.traveller(agent)) else {
+    pub(super) fn judge_evidence(&mut self, agent: u32) {
+        let Some((slot, state)) = self.slot(agent).zip(self.agent_state(agent)) else {
             return;
         };
-        if traveller.doubt >= ABSURD {
+        if state.doubt >= ABSURD {
             self.set_aside(agent);
-        } else if seat.is_aside && seat.frame == MAP && traveller.doubt == 0 {
-            self.seat_mut(agent).is_aside = false;
+        } else if slot.is_aside && slot.frame == MAP && state.doubt == 0 {
+            self.slot_mut(agent).is_aside = false;
         }
     }
 
@@ -157,10 +157,10 @@ impl Estimator {
     pub(super) fn sweep(&mut self, number: usize) {
         let frame = self.frame(number);
         let members = frame.members.iter();
-        let lost = members.filter(|member| member.mover().is_nowhere());
+        let lost = members.filter(|member| member.filter().is_nowhere());
         let lost: Vec<u32> = lost.map(|member| member.agent).collect();
-        let marks = frame.marks.iter();
-        let nowhere = marks.filter(|(_, mark)| frame.is_nowhere(mark));
+        let landmarks = frame.landmarks.iter();
+        let nowhere = landmarks.filter(|(_, landmark)| frame.is_nowhere(landmark));
         let nowhere: Vec<Label> = nowhere.map(|(label, _)| label.clone()).collect();
         for label in nowhere {
             self.frame_mut(number).forget(&label);
@@ -172,7 +172,7 @@ impl Estimator {
 
     /// Lets an agent begin anew, in a frame of its own.
     pub(super) fn set_aside(&mut self, agent: u32) {
-        let Some((from, traveller)) = self.leave(agent) else {
+        let Some((from, state)) = self.leave(agent) else {
             return;
         };
         self.depart(from);
@@ -188,25 +188,25 @@ impl Estimator {
             population: 1,
             ..Frame::default()
         };
-        let Traveller {
-            mover, mut sensor, ..
-        } = Arc::unwrap_or_clone(traveller);
+        let AgentState {
+            filter, mut sensor, ..
+        } = Arc::unwrap_or_clone(state);
         // Numbers of landmarks change.
         sensor.latest.clear();
-        let mut anew = Mover::new(Isometry3::identity(), &Matrix6::zeros(), &self.parameters);
-        anew.history = mover.history;
-        anew.is_planar = mover.is_planar;
-        let traveller = Traveller {
-            mover: anew,
+        let mut anew = AgentFilter::new(Isometry3::identity(), &Matrix6::zeros(), &self.parameters);
+        anew.history = filter.history;
+        anew.is_planar = filter.is_planar;
+        let state = AgentState {
+            filter: anew,
             sensor,
             refused: 0,
             doubt: 0,
         };
-        let seat = self.seat_mut(agent);
-        seat.frame = number;
-        seat.apart = Some(Apart::new(Arc::new(traveller)));
-        seat.evidence.refused_in_a_row = 0;
-        seat.is_aside |= from == MAP;
+        let slot = self.slot_mut(agent);
+        slot.frame = number;
+        slot.detached = Some(Detached::new(Arc::new(state)));
+        slot.evidence.refused_in_a_row = 0;
+        slot.is_aside |= from == MAP;
         self.forget_pending(agent);
         self.set_aside.push(agent);
     }
@@ -217,7 +217,7 @@ impl Estimator {
         if from != MAP && self.frame(from).population == 0 {
             // Nobody will ever tell where that frame lay.
             *self.frame_mut(from) = Frame::default();
-            self.forget_meetings(from);
+            self.forget_cross_sightings(from);
         }
     }
 }
@@ -269,13 +269,13 @@ mod tests {
         let (mut estimator, honest, liar) = two(100);
         lie(&mut estimator, liar, 50, DOUBTED);
         assert!(estimator.is_doubted(liar) && !estimator.is_doubted(honest));
-        let slept = *estimator.frame(MAP).dormant.get(&label(0)).unwrap();
+        let slept = *estimator.frame(MAP).archive.get(&label(0)).unwrap();
         let beside = post(0) + nalgebra::Vector3::new(0.7, 0.0, 0.0);
         see(&mut estimator, liar, 0, &beside);
         let frame = estimator.frame(MAP);
-        let awake = &frame.marks[&label(0)];
+        let awake = &frame.landmarks[&label(0)];
         assert!((awake.position - slept.position).norm() < 1e-9);
-        let lost = slept.covariance - frame.mark_covariance(awake);
+        let lost = slept.covariance - frame.landmark_covariance(awake);
         assert!(lost.amax() < 1e-6 * slept.covariance.amax(), "{lost}");
         let pose = estimator.in_frame(honest).unwrap();
         assert!(pose.translation.vector.norm() < 1e-9);
@@ -317,17 +317,17 @@ mod tests {
         }
         let frame = estimator.frame_of(one).unwrap();
         assert_eq!(
-            estimator.frame(frame).dormant.get(&label(0)).unwrap().only,
+            estimator.frame(frame).archive.get(&label(0)).unwrap().only,
             Some(one)
         );
         // The other one stays in the frame when the number goes.
         let own = estimator.frame_of(other).unwrap();
         estimator.frame_mut(own).population = 0;
-        estimator.seat_mut(other).frame = frame;
+        estimator.slot_mut(other).frame = frame;
         estimator.frame_mut(frame).population += 1;
         estimator.clear(one);
         assert_eq!(
-            estimator.frame(frame).dormant.get(&label(0)).unwrap().only,
+            estimator.frame(frame).archive.get(&label(0)).unwrap().only,
             None
         );
     }

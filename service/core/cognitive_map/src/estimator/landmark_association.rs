@@ -7,11 +7,11 @@
 
 use nalgebra::Matrix3;
 
-use super::constellation::{GATE, Sky, Star, log10_at_least};
-use super::frame::{Frame, MARK_DIM, Mark};
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState};
+use super::frame_registration::{SAME_VARIANCE_M2, WIDENING};
 use super::joint::Estimator;
 use super::parameters::Parameters;
-use super::resemblance::{SAME_VARIANCE_M2, WIDENING};
+use super::registration::{GATE, PointIndex, UncertainPoint, log10_at_least};
 use crate::input::Label;
 
 /// Log₁₀ of the probability that as many landmarks agree by chance, for them to be believed.
@@ -22,61 +22,67 @@ const CHANCE_MAX: f64 = 0.25;
 
 impl Estimator {
     /// Looks whether an agent has names of its own for landmarks of its frame that others know.
-    pub(super) fn look_for_synonyms(&mut self, number: usize, agent: u32) {
-        let found = self.synonyms(self.frame(number), agent);
-        if !self.aliases.has_room(found.len()) {
+    pub(super) fn associate_within_frame(&mut self, number: usize, agent: u32) {
+        let found = self.find_associations(self.frame(number), agent);
+        if !self.associations.has_room(found.len()) {
             return;
         }
         let parameters = self.parameters.clone();
         for (label, name) in found {
             self.frame_mut(number).unite(&label, &name, &parameters);
-            self.aliases.insert(&label, &name);
-            self.rename_elsewhere(&label, &name);
+            self.associations.insert(&label, &name);
+            self.rename_landmark(&label, &name);
             self.same.push((label, name));
         }
     }
 
     /// The landmarks that an agent calls otherwise than others do: the younger name, and the older one.
-    fn synonyms(&self, frame: &Frame, agent: u32) -> Vec<(Label, Label)> {
+    fn find_associations(&self, frame: &Frame, agent: u32) -> Vec<(Label, Label)> {
         let is_planar = frame.is_planar();
-        let marks = || frame.marks.iter();
-        let is_own = |mark: &Mark| mark.observers.contains(agent);
+        let landmarks = || frame.landmarks.iter();
+        let is_own = |landmark: &LandmarkState| landmark.observers.contains(agent);
         // Most often all landmarks are everybody's.
-        let others: Vec<(&Label, &Mark)> = marks().filter(|(_, mark)| !is_own(mark)).collect();
+        let others: Vec<(&Label, &LandmarkState)> = landmarks()
+            .filter(|(_, landmark)| !is_own(landmark))
+            .collect();
         if others.is_empty() {
             return Vec::new();
         }
-        let star = |mark: &Mark| Star {
-            position: mark.position,
+        let point = |landmark: &LandmarkState| UncertainPoint {
+            position: landmark.position,
             variance: 0.0,
         };
-        let stars: Vec<Star> = marks().map(|(_, mark)| star(mark)).collect();
-        let sky = Sky::new(&stars, is_planar);
-        let proven = self.aliases.names_of_others();
+        let points: Vec<UncertainPoint> =
+            landmarks().map(|(_, landmark)| point(landmark)).collect();
+        let index = PointIndex::new(&points, is_planar);
+        let proven = self.associations.names_of_others();
         let is_proven = |label: &Label| proven.binary_search(&label).is_ok();
         let (mut chances, mut found) = (Vec::new(), Vec::new());
         let (mut n_sought, mut n_proven) = (0, 0);
-        for (label, mark) in marks().filter(|(_, mark)| is_own(mark)) {
+        for (label, landmark) in landmarks().filter(|(_, landmark)| is_own(landmark)) {
             n_proven += usize::from(is_proven(label));
             let near = others.iter().filter_map(|(name, other)| {
-                let is_apart = mark.observers.is_apart_from(&other.observers);
-                is_apart.then(|| (*name, *other, frame.apart(mark, other, is_planar)))
+                let is_apart = landmark.observers.is_apart_from(&other.observers);
+                is_apart.then(|| (*name, *other, frame.separation(landmark, other, is_planar)))
             });
             // Where the others know nothing there is nothing to be found.
-            let near = near.filter(|(_, _, apart)| sky.chance_within(apart.distance_m) < 1.0);
+            let near =
+                near.filter(|(_, _, separation)| index.chance_within(separation.distance_m) < 1.0);
             let near: Vec<_> = near.collect();
-            let mut within = near.iter().filter(|(_, _, apart)| apart.is_within_gate);
+            let mut within = near
+                .iter()
+                .filter(|(_, _, separation)| separation.is_within_gate);
             let (nearest, second) = (within.next(), within.next());
-            let Some((name, other, apart)) = nearest.filter(|_| second.is_none()) else {
+            let Some((name, other, separation)) = nearest.filter(|_| second.is_none()) else {
                 n_sought += usize::from(!near.is_empty() && second.is_none() && !is_proven(label));
                 continue;
             };
-            if sky.chance_within(GATE * apart.sd_m) > CHANCE_MAX {
+            if index.chance_within(GATE * separation.sd_m) > CHANCE_MAX {
                 continue;
             }
             n_sought += 1;
-            chances.push(sky.chance_within(apart.distance_m.max(apart.sd_m)));
-            found.push(if mark.number < other.number {
+            chances.push(index.chance_within(separation.distance_m.max(separation.sd_m)));
+            found.push(if landmark.number < other.number {
                 ((*name).clone(), label.clone())
             } else {
                 (label.clone(), (*name).clone())
@@ -101,7 +107,7 @@ impl Estimator {
 
 /// How far two landmarks are estimated to be from one another.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Apart {
+pub(super) struct Separation {
     distance_m: f64,
     /// Deviation of it along an axis \[m\].
     pub(super) sd_m: f64,
@@ -110,10 +116,16 @@ pub(super) struct Apart {
 }
 
 impl Frame {
-    pub(super) fn apart(&self, one: &Mark, other: &Mark, is_planar: bool) -> Apart {
+    pub(super) fn separation(
+        &self,
+        one: &LandmarkState,
+        other: &LandmarkState,
+        is_planar: bool,
+    ) -> Separation {
         let mixed: Matrix3<f64> = self.covariance.block(one.offset, other.offset);
-        let spread =
-            self.mark_covariance(one) + self.mark_covariance(other) - mixed - mixed.transpose();
+        let spread = self.landmark_covariance(one) + self.landmark_covariance(other)
+            - mixed
+            - mixed.transpose();
         let variance = if is_planar {
             f64::midpoint(spread[(0, 0)], spread[(1, 1)])
         } else {
@@ -121,7 +133,7 @@ impl Frame {
         };
         let variance = WIDENING * variance.max(0.0) + 2.0 * SAME_VARIANCE_M2;
         let distance_m = (one.position - other.position).norm();
-        Apart {
+        Separation {
             distance_m,
             sd_m: variance.sqrt(),
             is_within_gate: distance_m * distance_m <= GATE * GATE * variance,
@@ -131,12 +143,12 @@ impl Frame {
     /// A landmark is one that has another name.
     fn unite(&mut self, label: &Label, name: &Label, parameters: &Parameters) {
         self.flush();
-        let Some(mark) = self.take_out(label) else {
+        let Some(landmark) = self.take_out(label) else {
             return;
         };
-        let mut twins = [(name.clone(), mark)];
-        self.equate(&mut twins, 0, parameters);
-        let [(_, twin)] = twins;
-        self.drop_components(twin.offset, MARK_DIM);
+        let mut duplicates = [(name.clone(), landmark)];
+        self.equate(&mut duplicates, 0, parameters);
+        let [(_, duplicate)] = duplicates;
+        self.drop_components(duplicate.offset, LANDMARK_DIM);
     }
 }

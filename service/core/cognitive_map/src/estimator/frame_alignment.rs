@@ -1,10 +1,10 @@
-//! How one frame lies in another: the rigid motion that best lays points known in both over each other.
+//! Alignment of two frames: the rigid motion that best lays points known in both over each other.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 
 use geometry::{align, centre, se3};
 
-/// Fewest points that tie two planar frames, and two frames in space.
+/// Fewest points that align two planar frames, and two frames in space.
 const POINTS_MIN: (usize, usize) = (3, 4);
 /// Part of the points that must agree.
 const AGREEING_MIN: f64 = 0.7;
@@ -19,7 +19,7 @@ const WIDENING: f64 = 5.0;
 
 /// A point known in two frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Pair {
+pub(super) struct PointPair {
     /// In the frame that stays \[m\].
     pub(super) older: Point3<f64>,
     /// In the frame that is laid into it \[m\].
@@ -30,7 +30,7 @@ pub(super) struct Pair {
 
 /// A rigid motion with the covariance of its error (right perturbation).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Tie {
+pub(super) struct FrameAlignment {
     /// Pose of the newer frame in the older one.
     pub(super) pose: Isometry3<f64>,
     pub(super) covariance: Matrix6<f64>,
@@ -38,7 +38,7 @@ pub(super) struct Tie {
 
 /// Finds the motion, if enough points agree on one (weighted least squares after Horn 1987, weights
 /// after Cauchy). Between planar frames only a motion in the plane is sought.
-pub(super) fn tie(pairs: &[Pair], is_planar: bool) -> Option<Tie> {
+pub(super) fn align_frames(pairs: &[PointPair], is_planar: bool) -> Option<FrameAlignment> {
     let points_min = if is_planar {
         POINTS_MIN.0
     } else {
@@ -57,7 +57,7 @@ pub(super) fn tie(pairs: &[Pair], is_planar: bool) -> Option<Tie> {
         }
         pose = align(&points, &weights, is_planar)?;
     }
-    let agrees = |pair: &&Pair| {
+    let agrees = |pair: &&PointPair| {
         let squared = (pose * pair.newer - pair.older).norm_squared() / pair.variance;
         squared <= (2.0 * SOFT) * (2.0 * SOFT)
     };
@@ -99,23 +99,24 @@ pub(super) fn tie(pairs: &[Pair], is_planar: bool) -> Option<Tie> {
         .copy_from(&mixed.transpose());
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
     let covariance = (covariance + covariance.transpose()) * (0.5 * WIDENING * WIDENING);
-    Some(Tie { pose, covariance })
+    Some(FrameAlignment { pose, covariance })
 }
 
-/// How the error τ of a tie adds to that of a point of the newer frame, in three rows: | I  −l× |.
-pub(super) fn point_by_tie(point: &Point3<f64>) -> Matrix6<f64> {
-    let mut by_tie = Matrix6::zeros();
-    by_tie
+/// Jacobian of the error of a point of the newer frame with respect to the error τ of the alignment, in three
+/// rows: | I  −l× |.
+pub(super) fn point_by_alignment(point: &Point3<f64>) -> Matrix6<f64> {
+    let mut by_alignment = Matrix6::zeros();
+    by_alignment
         .fixed_view_mut::<3, 3>(0, 0)
         .copy_from(&Matrix3::identity());
-    by_tie
+    by_alignment
         .fixed_view_mut::<3, 3>(0, 3)
         .copy_from(&-point.coords.cross_matrix());
-    by_tie
+    by_alignment
 }
 
-/// How it adds to that of a body of the newer frame: `Ad(T_b⁻¹)`.
-pub(super) fn body_by_tie(pose: &Isometry3<f64>) -> Matrix6<f64> {
+/// Jacobian of the error of a pose of the newer frame with respect to τ: `Ad(T_b⁻¹)`.
+pub(super) fn pose_by_alignment(pose: &Isometry3<f64>) -> Matrix6<f64> {
     se3::adjoint(&pose.inverse())
 }
 
@@ -124,8 +125,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn pairs(pose: &Isometry3<f64>, points: &[[f64; 3]]) -> Vec<Pair> {
-        let pair = |point: &[f64; 3]| Pair {
+    fn pairs(pose: &Isometry3<f64>, points: &[[f64; 3]]) -> Vec<PointPair> {
+        let pair = |point: &[f64; 3]| PointPair {
             older: pose * Point3::from(*point),
             newer: Point3::from(*point),
             variance: 0.01,
@@ -149,7 +150,7 @@ mod tests {
             let pose = Isometry3::new(shift.into(), turn.into());
             let mut points = FLOOR.to_vec();
             points.push([0.5, 0.5, 2.0]);
-            let found = tie(&pairs(&pose, &points), false).unwrap();
+            let found = align_frames(&pairs(&pose, &points), false).unwrap();
             prop_assert!((found.pose.to_homogeneous() - pose.to_homogeneous()).amax() < 1e-9);
         }
 
@@ -160,7 +161,7 @@ mod tests {
             let pose = Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * heading);
             let mut pairs = pairs(&pose, &FLOOR);
             pairs[wrong].older.x += 2.0;
-            let found = tie(&pairs, true).unwrap();
+            let found = align_frames(&pairs, true).unwrap();
             let rest = found.pose.inv_mul(&pose);
             prop_assert!(rest.translation.vector.norm() < 0.1 && rest.rotation.angle() < 0.05);
         }
@@ -169,20 +170,20 @@ mod tests {
     #[test]
     fn too_little_ties_nothing() {
         let pose = Isometry3::translation(1.0, 2.0, 0.0);
-        assert_eq!(tie(&pairs(&pose, &FLOOR[..2]), true), None);
+        assert_eq!(align_frames(&pairs(&pose, &FLOOR[..2]), true), None);
         let line = [0.0, 1.0, 2.0, 3.0, 4.0].map(|x| [x, 2.0 * x, -x]);
         assert_eq!(
-            tie(&pairs(&pose, &line), false),
+            align_frames(&pairs(&pose, &line), false),
             None,
             "it may turn about itself"
         );
         let close: Vec<_> = FLOOR.iter().map(|point| point.map(|x| 0.02 * x)).collect();
-        assert_eq!(tie(&pairs(&pose, &close), true), None);
+        assert_eq!(align_frames(&pairs(&pose, &close), true), None);
         let mut contradictory = pairs(&pose, &FLOOR);
         for (k, pair) in contradictory.iter_mut().enumerate() {
             pair.older.y += 3.0 * (k % 2) as f64;
             pair.older.x -= 3.0 * (k % 3) as f64;
         }
-        assert_eq!(tie(&contradictory, true), None);
+        assert_eq!(align_frames(&contradictory, true), None);
     }
 }

@@ -1,6 +1,6 @@
 //! How often a motion would be as good by chance.
 
-use super::sky::{Sky, Twin};
+use super::point_index::{Correspondence, PointIndex};
 
 /// What was tried to find a motion.
 #[derive(Clone, Copy, Debug)]
@@ -13,23 +13,27 @@ pub(super) struct Tried {
 }
 
 /// Log₁₀ of the expected number of motions that lay as many landmarks as near to others where nothing is the same, for the
-/// number of the nearest twins that makes it least. Nobody is nearer than both are known.
-pub(super) fn log10_by_chance(twins: &[Twin], sky: &Sky<'_>, tried: &Tried) -> f64 {
+/// number of the nearest correspondences that makes it least. Nobody is nearer than both are known.
+pub(super) fn log10_by_chance(
+    correspondences: &[Correspondence],
+    index: &PointIndex<'_>,
+    tried: &Tried,
+) -> f64 {
     let Tried {
         n_hypotheses,
         n_sought,
         is_planar,
     } = *tried;
     let free = if is_planar { 2 } else { 3 };
-    // The motion was fitted to the twins, which takes half of its degrees of freedom off their distances.
-    let n = twins.len() as f64;
+    // The motion was fitted to the correspondences, which takes half of its degrees of freedom off their distances.
+    let n = correspondences.len() as f64;
     let (freedom, dimensions) = if is_planar { (3.0, 2.0) } else { (6.0, 3.0) };
     let fitted = dimensions * n / (dimensions * n - freedom).max(1.0);
-    let chance = |twin: &Twin| {
-        let squared = (twin.distance_m.powi(2) * fitted).max(twin.variance);
-        sky.chance_within(squared.sqrt())
+    let chance = |correspondence: &Correspondence| {
+        let squared = (correspondence.distance_m.powi(2) * fitted).max(correspondence.variance);
+        index.chance_within(squared.sqrt())
     };
-    let mut chances: Vec<f64> = twins.iter().map(chance).collect();
+    let mut chances: Vec<f64> = correspondences.iter().map(chance).collect();
     chances.sort_by(f64::total_cmp);
     let tried = (n_hypotheses.max(1) * n_sought.max(1)) as f64;
     let trials = n_sought.saturating_sub(free);

@@ -16,7 +16,7 @@ pub(super) const PART_MAX: usize = 64;
 
 /// A landmark that left the joint estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Dormant {
+pub(super) struct ArchivedLandmark {
     pub(super) position: Point3<f64>,
     /// The covariance that it had. With what else it is correlated is not known any more.
     pub(super) covariance: Matrix3<f64>,
@@ -27,18 +27,18 @@ pub(super) struct Dormant {
 }
 
 /// One part.
-pub(super) type Part = BTreeMap<Label, Dormant>;
+pub(super) type Part = BTreeMap<Label, ArchivedLandmark>;
 
 /// The landmarks that left a joint estimate, a bounded number. A clone shares them.
 #[derive(Clone, Debug, Default)]
-pub(super) struct DormantMarks {
+pub(super) struct LandmarkArchive {
     /// None, or as many as there are.
     parts: PagedVec<Arc<Part>, 32>,
 }
 
-impl DormantMarks {
+impl LandmarkArchive {
     /// Puts a landmark to sleep.
-    pub(super) fn insert(&mut self, label: Label, mark: Dormant) {
+    pub(super) fn insert(&mut self, label: Label, landmark: ArchivedLandmark) {
         while self.parts.len() < PARTS {
             self.parts.push(Arc::default(), 0);
         }
@@ -47,17 +47,17 @@ impl DormantMarks {
         };
         let part = Arc::make_mut(part);
         if part.len() >= PART_MAX && !part.contains_key(&label) {
-            let oldest = part.iter().min_by_key(|(_, mark)| mark.left);
+            let oldest = part.iter().min_by_key(|(_, landmark)| landmark.left);
             if let Some(oldest) = oldest.map(|(label, _)| label.clone()) {
                 part.remove(&oldest);
             }
         }
-        part.insert(label, mark);
+        part.insert(label, landmark);
     }
 
     /// Puts one to sleep that comes after all others in their order; answers whether it does, and whether
     /// there was room.
-    pub(super) fn append(&mut self, label: Label, mark: Dormant) -> bool {
+    pub(super) fn append(&mut self, label: Label, landmark: ArchivedLandmark) -> bool {
         let number = part_of(&label);
         let later = self.parts.iter_from(number + 1).all(|part| part.is_empty());
         let fits = self.parts.get(number).is_none_or(|part| {
@@ -65,30 +65,30 @@ impl DormantMarks {
         });
         let is_next = later && fits;
         if is_next {
-            self.insert(label, mark);
+            self.insert(label, landmark);
         }
         is_next
     }
 
     /// Forgets that an agent was the one that had seen landmarks. Walks them all.
     pub(super) fn forget_observer(&mut self, agent: u32) {
-        let is_its = |mark: &Dormant| mark.only == Some(agent);
+        let is_its = |landmark: &ArchivedLandmark| landmark.only == Some(agent);
         for number in 0..self.parts.len() {
             let part = self.parts.get(number);
             if !part.is_some_and(|part| part.values().any(is_its)) {
                 continue;
             }
             if let Some(part) = self.parts.get_mut(number, 0) {
-                let marks = Arc::make_mut(part).values_mut();
-                marks
-                    .filter(|mark| is_its(mark))
-                    .for_each(|mark| mark.only = None);
+                let landmarks = Arc::make_mut(part).values_mut();
+                landmarks
+                    .filter(|landmark| is_its(landmark))
+                    .for_each(|landmark| landmark.only = None);
             }
         }
     }
 
     /// A landmark that sleeps here.
-    pub(super) fn get(&self, label: &Label) -> Option<&Dormant> {
+    pub(super) fn get(&self, label: &Label) -> Option<&ArchivedLandmark> {
         self.parts.get(part_of(label))?.get(label)
     }
 
@@ -99,7 +99,7 @@ impl DormantMarks {
     }
 
     /// Takes a landmark out.
-    pub(super) fn remove(&mut self, label: &Label) -> Option<Dormant> {
+    pub(super) fn remove(&mut self, label: &Label) -> Option<ArchivedLandmark> {
         if !self.contains(label) {
             return None;
         }
@@ -107,7 +107,7 @@ impl DormantMarks {
     }
 
     /// All, in an order of their own.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (&Label, &Dormant)> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = (&Label, &ArchivedLandmark)> {
         self.parts.iter().flat_map(|part| part.iter())
     }
 
@@ -133,8 +133,8 @@ fn part_of(label: &Label) -> usize {
 mod tests {
     use super::*;
 
-    fn mark(left: u64) -> Dormant {
-        Dormant {
+    fn landmark(left: u64) -> ArchivedLandmark {
+        ArchivedLandmark {
             position: Point3::new(left as f64, 0.0, 0.0),
             covariance: Matrix3::identity(),
             left,
@@ -148,28 +148,28 @@ mod tests {
 
     #[test]
     fn a_bounded_number_is_kept_and_the_latest_ones_are() {
-        let mut marks = DormantMarks::default();
+        let mut landmarks = LandmarkArchive::default();
         for number in 0..100_000 {
-            marks.insert(label(number), mark(number));
+            landmarks.insert(label(number), landmark(number));
         }
-        assert!(marks.len() <= PARTS * PART_MAX && marks.len() > PARTS * PART_MAX * 9 / 10);
-        let latest = (60_000..100_000).filter(|&number| marks.contains(&label(number)));
+        assert!(landmarks.len() <= PARTS * PART_MAX && landmarks.len() > PARTS * PART_MAX * 9 / 10);
+        let latest = (60_000..100_000).filter(|&number| landmarks.contains(&label(number)));
         assert!(latest.count() > 39_000);
-        let earliest = (0..20_000).filter(|&number| marks.contains(&label(number)));
+        let earliest = (0..20_000).filter(|&number| landmarks.contains(&label(number)));
         assert!(earliest.count() < 1000);
     }
 
     #[test]
     fn a_snapshot_stays_as_it_was() {
-        let mut marks = DormantMarks::default();
+        let mut landmarks = LandmarkArchive::default();
         for number in 0..500 {
-            marks.insert(label(number), mark(number));
+            landmarks.insert(label(number), landmark(number));
         }
-        let snapshot = marks.clone();
-        assert_eq!(marks.remove(&label(7)), Some(mark(7)));
-        assert_eq!(marks.remove(&label(7)), None);
-        marks.insert(label(900), mark(900));
+        let snapshot = landmarks.clone();
+        assert_eq!(landmarks.remove(&label(7)), Some(landmark(7)));
+        assert_eq!(landmarks.remove(&label(7)), None);
+        landmarks.insert(label(900), landmark(900));
         assert!(snapshot.contains(&label(7)) && !snapshot.contains(&label(900)));
-        assert_eq!((snapshot.len(), marks.len()), (500, 500));
+        assert_eq!((snapshot.len(), landmarks.len()), (500, 500));
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
-use super::mover::Mover;
+use super::agent_filter::AgentFilter;
 use super::outcome::Evidence;
 use super::sensor::Sensor;
 
@@ -18,18 +18,18 @@ const RETURN_WIDENING: f64 = 3.0;
 
 /// What is known of an agent itself. A clone shares it.
 #[derive(Clone, Debug)]
-pub(super) struct Traveller {
-    pub(super) mover: Mover,
+pub(super) struct AgentState {
+    pub(super) filter: AgentFilter,
     pub(super) sensor: Sensor,
     /// Sightings refused one after the other.
     pub(super) refused: u32,
-    /// How much its sightings contradict the estimate lately ([`aside`](super::aside)).
+    /// How much its recent sightings contradict the estimate ([`set_aside`](super::set_aside)).
     pub(super) doubt: u32,
 }
 
 /// An agent, in whatever frame.
 #[derive(Clone, Debug)]
-pub(super) struct Seat {
+pub(super) struct AgentSlot {
     /// Its frame.
     pub(super) frame: usize,
     pub(super) in_odom: Isometry3<f64>,
@@ -39,28 +39,28 @@ pub(super) struct Seat {
     /// Whether it was set aside, and its evidence has not fitted since.
     pub(super) is_aside: bool,
     /// The agent itself, while it does not take part in its frame's joint estimate.
-    pub(super) apart: Option<Apart>,
+    pub(super) detached: Option<Detached>,
 }
 
 /// An agent that does not take part in its frame's joint estimate.
 #[derive(Clone, Debug)]
-pub(super) struct Apart {
-    pub(super) traveller: Arc<Traveller>,
+pub(super) struct Detached {
+    pub(super) state: Arc<AgentState>,
     /// Whether it did, so that its errors are correlated with the others' in a way that is forgotten.
     pub(super) was_joint: bool,
 }
 
-impl Seat {
+impl AgentSlot {
     /// Of an agent that begins at a frame's identity.
-    pub(super) fn new(frame: usize, mover: Mover) -> Self {
+    pub(super) fn new(frame: usize, filter: AgentFilter) -> Self {
         Self {
             frame,
             in_odom: Isometry3::identity(),
             stamp_ns: None,
             evidence: Evidence::default(),
             is_aside: false,
-            apart: Some(Apart::new(Arc::new(Traveller {
-                mover,
+            detached: Some(Detached::new(Arc::new(AgentState {
+                filter,
                 sensor: Sensor::default(),
                 refused: 0,
                 doubt: 0,
@@ -69,23 +69,23 @@ impl Seat {
     }
 }
 
-impl Apart {
+impl Detached {
     /// Of an agent that nothing ties to the others.
-    pub(super) fn new(traveller: Arc<Traveller>) -> Self {
+    pub(super) fn new(state: Arc<AgentState>) -> Self {
         Self {
-            traveller,
+            state,
             was_joint: false,
         }
     }
 
     /// The agent as it may take part: its errors count as independent of all others'.
-    pub(super) fn independent(mut self) -> Arc<Traveller> {
-        let mover = &mut Arc::make_mut(&mut self.traveller).mover;
+    pub(super) fn independent(mut self) -> Arc<AgentState> {
+        let filter = &mut Arc::make_mut(&mut self.state).filter;
         // Nothing waits for what happened to the errors.
-        mover.flush();
+        filter.flush();
         if self.was_joint {
-            *mover.covariance_mut() *= RETURN_WIDENING * RETURN_WIDENING;
+            *filter.covariance_mut() *= RETURN_WIDENING * RETURN_WIDENING;
         }
-        self.traveller
+        self.state
     }
 }

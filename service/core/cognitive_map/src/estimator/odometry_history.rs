@@ -13,13 +13,13 @@ const INTERVAL_NS: i64 = 50_000_000;
 
 /// Odometry's poses at the latest instants, oldest first.
 #[derive(Clone, Debug, Default)]
-pub(super) struct History {
+pub(super) struct OdometryHistory {
     pub(super) instants: VecDeque<(i64, Isometry3<f64>)>,
     /// The latest instant of all, which need not be kept.
     pub(super) latest: Option<(i64, Isometry3<f64>)>,
 }
 
-impl History {
+impl OdometryHistory {
     /// Odometry came to a pose.
     pub(super) fn note(&mut self, stamp_ns: i64, in_odom: &Isometry3<f64>) {
         self.latest = Some((stamp_ns, *in_odom));

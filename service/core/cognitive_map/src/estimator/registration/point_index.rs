@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use super::{GATE, Star};
+use super::{GATE, UncertainPoint};
 
 /// The landmarks of the older frame in the order of x, with how densely they lie.
 #[derive(Clone, Debug)]
-pub(in super::super) struct Sky<'a> {
-    stars: &'a [Star],
+pub(in super::super) struct PointIndex<'a> {
+    points: &'a [UncertainPoint],
     /// Numbers in the order of x.
     order: Vec<usize>,
     /// The largest variance of one \[m²\].
@@ -19,7 +19,7 @@ pub(in super::super) struct Sky<'a> {
 
 /// Two landmarks that a motion lays over each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Twin {
+pub(super) struct Correspondence {
     pub(super) older: usize,
     pub(super) newer: usize,
     /// Their distance \[m\].
@@ -30,23 +30,23 @@ pub(super) struct Twin {
     pub(super) square: f64,
 }
 
-impl Twin {
+impl Correspondence {
     /// Whether one of the landmarks is in both pairs.
     fn shares_with(&self, other: &Self) -> bool {
         self.older == other.older || self.newer == other.newer
     }
 }
 
-impl<'a> Sky<'a> {
-    pub(in super::super) fn new(stars: &'a [Star], is_planar: bool) -> Self {
-        let mut order: Vec<usize> = (0..stars.len()).collect();
-        order.sort_by(|&a, &b| stars[a].position.x.total_cmp(&stars[b].position.x));
-        let variances = stars.iter().map(|star| star.variance);
+impl<'a> PointIndex<'a> {
+    pub(in super::super) fn new(points: &'a [UncertainPoint], is_planar: bool) -> Self {
+        let mut order: Vec<usize> = (0..points.len()).collect();
+        order.sort_by(|&a, &b| points[a].position.x.total_cmp(&points[b].position.x));
+        let variances = points.iter().map(|point| point.variance);
         Self {
-            stars,
+            points,
             order,
             variance_max: variances.fold(0.0, f64::max),
-            density: density(stars, is_planar),
+            density: density(points, is_planar),
             is_planar,
         }
     }
@@ -56,24 +56,24 @@ impl<'a> Sky<'a> {
     pub(super) fn pairs(
         &self,
         pose: &Isometry3<f64>,
-        newer: &[Star],
+        newer: &[UncertainPoint],
         spread: &dyn Fn(&Point3<f64>) -> f64,
-        twins: &mut Vec<Twin>,
+        correspondences: &mut Vec<Correspondence>,
     ) {
-        twins.clear();
-        for (number, star) in newer.iter().enumerate() {
-            let here = pose * star.position;
-            let own = star.variance + spread(&here);
+        correspondences.clear();
+        for (number, point) in newer.iter().enumerate() {
+            let here = pose * point.position;
+            let own = point.variance + spread(&here);
             let reach = GATE * (own + self.variance_max).sqrt();
-            let x_of = |at: &usize| self.stars[*at].position.x;
+            let x_of = |at: &usize| self.points[*at].position.x;
             let first = self.order.partition_point(|at| x_of(at) < here.x - reach);
             let near = self.order[first..].iter();
             for &older in near.take_while(|at| x_of(at) <= here.x + reach) {
-                let other = &self.stars[older];
+                let other = &self.points[older];
                 let squared = (other.position - here).norm_squared();
                 let variance = own + other.variance;
                 if squared <= GATE * GATE * variance {
-                    twins.push(Twin {
+                    correspondences.push(Correspondence {
                         older,
                         newer: number,
                         distance_m: squared.sqrt(),
@@ -83,7 +83,7 @@ impl<'a> Sky<'a> {
                 }
             }
         }
-        twins.sort_by(|a, b| {
+        correspondences.sort_by(|a, b| {
             let order = a.square.total_cmp(&b.square);
             order.then((a.newer, a.older).cmp(&(b.newer, b.older)))
         });
@@ -112,28 +112,31 @@ impl<'a> Sky<'a> {
 }
 
 /// Leaves the nearest pairs, each landmark in one.
-pub(super) fn one_to_one(twins: &mut Vec<Twin>) {
+pub(super) fn one_to_one(correspondences: &mut Vec<Correspondence>) {
     let mut taken = 0;
-    for at in 0..twins.len() {
-        let twin = twins[at];
-        if !twins[..taken].iter().any(|other| other.shares_with(&twin)) {
-            twins[taken] = twin;
+    for at in 0..correspondences.len() {
+        let correspondence = correspondences[at];
+        if !correspondences[..taken]
+            .iter()
+            .any(|other| other.shares_with(&correspondence))
+        {
+            correspondences[taken] = correspondence;
             taken += 1;
         }
     }
-    twins.truncate(taken);
+    correspondences.truncate(taken);
 }
 
 /// How many landmarks there are by area or volume, that of the ellipse or ellipsoid with their spread:
 /// 4π √det Σ, (4/3)π 5^{3/2} √det Σ. What is known of each is part of its thickness.
-fn density(stars: &[Star], is_planar: bool) -> f64 {
-    let n = stars.len().max(1) as f64;
-    let sum: Vector3<f64> = stars.iter().map(|star| star.position.coords).sum();
+fn density(points: &[UncertainPoint], is_planar: bool) -> f64 {
+    let n = points.len().max(1) as f64;
+    let sum: Vector3<f64> = points.iter().map(|point| point.position.coords).sum();
     let centre = sum / n;
     let mut spread = Matrix3::zeros();
-    for star in stars {
-        let off = star.position.coords - centre;
-        spread += (off * off.transpose() + Matrix3::from_diagonal_element(star.variance)) / n;
+    for point in points {
+        let off = point.position.coords - centre;
+        spread += (off * off.transpose() + Matrix3::from_diagonal_element(point.variance)) / n;
     }
     let extent = if is_planar {
         let plane = spread.fixed_view::<2, 2>(0, 0).determinant();

@@ -1,14 +1,14 @@
 //! Landmarks that lie so close together that they agree together.
 
-use super::Star;
+use super::UncertainPoint;
 use super::hypotheses::Hypothesis;
-use super::sky::Twin;
+use super::point_index::Correspondence;
 
 /// Groups of landmarks: each is in that of the first one that is so near \[m\].
-pub(super) fn groups(stars: &[Star], near_m: f64) -> Vec<usize> {
-    let mut groups: Vec<usize> = Vec::with_capacity(stars.len());
-    for (at, star) in stars.iter().enumerate() {
-        let is_near = |&first: &usize| (stars[first].position - star.position).norm() <= near_m;
+pub(super) fn groups(points: &[UncertainPoint], near_m: f64) -> Vec<usize> {
+    let mut groups: Vec<usize> = Vec::with_capacity(points.len());
+    for (at, point) in points.iter().enumerate() {
+        let is_near = |&first: &usize| (points[first].position - point.position).norm() <= near_m;
         let founders = (0..at).filter(|&first| groups[first] == first);
         groups.push(founders.into_iter().find(is_near).unwrap_or(at));
     }
@@ -39,16 +39,19 @@ pub(super) fn n_hypotheses(hypotheses: &[Hypothesis], groups: &[Vec<usize>; 2]) 
     different.len()
 }
 
-/// The nearest twin of each group.
-pub(super) fn one_by_group(twins: &[Twin], groups: &[Vec<usize>; 2]) -> Vec<Twin> {
-    let mut alone: Vec<Twin> = Vec::new();
-    for twin in twins {
-        let shares = |other: &Twin| {
-            groups[0][other.older] == groups[0][twin.older]
-                || groups[1][other.newer] == groups[1][twin.newer]
+/// The nearest correspondence of each group.
+pub(super) fn one_by_group(
+    correspondences: &[Correspondence],
+    groups: &[Vec<usize>; 2],
+) -> Vec<Correspondence> {
+    let mut alone: Vec<Correspondence> = Vec::new();
+    for correspondence in correspondences {
+        let shares = |other: &Correspondence| {
+            groups[0][other.older] == groups[0][correspondence.older]
+                || groups[1][other.newer] == groups[1][correspondence.newer]
         };
         if !alone.iter().any(shares) {
-            alone.push(*twin);
+            alone.push(*correspondence);
         }
     }
     alone

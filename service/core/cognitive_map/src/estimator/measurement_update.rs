@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
 
+use super::agent_slot::AgentState;
 use super::covariance::Block;
-use super::dormant::Dormant;
-use super::frame::{Frame, MARK_DIM, Mark, Member, point_by_pose, symmetric};
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member, point_by_pose, symmetric};
 use super::innovation::{PointInnovation, pose_innovation, seen_at};
+use super::landmark_archive::ArchivedLandmark;
 use super::observers::Observers;
 use super::parameters::Parameters;
-use super::seat::Traveller;
-use super::sensor::Seen;
+use super::sensor::SightingTarget;
 use crate::input::{Label, Relation, RelativePose};
 use geometry::se3;
 
@@ -23,7 +23,7 @@ const WIDENED: (f64, f64) = (1.0, 0.5);
 /// A landmark whose sightings were refused this often in a row, by agents that are where they should
 /// be, was moved or was never there.
 const REFUSED_TO_FORGET: u32 = 8;
-/// Least variance of a component that a dormant landmark gains \[m²\].
+/// Least variance of a component that an archived landmark gains \[m²\].
 const GAIN_MIN_M2: f64 = 1e-9;
 
 /// What became of a sighting.
@@ -42,15 +42,15 @@ pub(super) enum Verdict {
     Refused,
 }
 
-/// A sighting's verdict, and what it was weighed with.
+/// A sighting's verdict, and the variances it was weighed with.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Weighed {
+pub(super) struct Outcome {
     pub(super) verdict: Verdict,
     /// Variances of its components, before those far from what is expected lose weight.
     pub(super) variance: Vector6<f64>,
 }
 
-impl Weighed {
+impl Outcome {
     /// Of a sighting that says nothing.
     fn nothing() -> Self {
         Self {
@@ -62,7 +62,7 @@ impl Weighed {
 
 /// A sighting of a frame's member: who, how it moved since, when, and what it saw.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Glance<'a> {
+pub(super) struct Measurement<'a> {
     /// Index of the observer among the members.
     pub(super) observer: usize,
     /// The observer's motion since then.
@@ -74,161 +74,165 @@ pub(super) struct Glance<'a> {
 
 impl Frame {
     /// A landmark was seen.
-    pub(super) fn see_mark(&mut self, glance: &Glance<'_>, label: &Label) -> Weighed {
+    pub(super) fn update_by_landmark(
+        &mut self,
+        measurement: &Measurement<'_>,
+        label: &Label,
+    ) -> Outcome {
         self.flush();
-        let side = Side::new(&self.members[glance.observer], glance.back);
-        let Some(mark) = self.marks.get(label) else {
-            return self.learn(glance, label);
+        let past = PastPose::new(&self.members[measurement.observer], measurement.back);
+        let Some(landmark) = self.landmarks.get(label) else {
+            return self.initialise_landmark(measurement, label);
         };
-        let expected = side.pose.inverse_transform_point(&mark.position).coords;
-        let Some(innovation) = PointInnovation::new(glance.relation, &expected) else {
-            return Weighed::nothing();
+        let expected = past.pose.inverse_transform_point(&landmark.position).coords;
+        let Some(innovation) = PointInnovation::new(measurement.relation, &expected) else {
+            return Outcome::nothing();
         };
-        let to_body = side
+        let to_body = past
             .pose
             .rotation
             .to_rotation_matrix()
             .into_inner()
             .transpose();
         let blocks = [
-            side.block(&(innovation.by_point * point_by_pose(&expected))),
-            point_block(mark.offset, &(innovation.by_point * to_body)),
+            past.block(&(innovation.by_point * point_by_pose(&expected))),
+            point_block(landmark.offset, &(innovation.by_point * to_body)),
         ];
-        let seen = Seen::Mark(mark.number);
-        let scope = Scope {
-            corrected: self.corrected_by(glance.observer),
+        let seen = SightingTarget::Landmark(landmark.number);
+        let scope = CorrectionScope {
+            corrected: self.corrected_by(measurement.observer),
             counts: true,
         };
-        let weighed = self.take_in(glance, &blocks, &innovation, seen, &scope);
-        let observer_refused = self.members[glance.observer].traveller.refused;
+        let outcome = self.update_by_point(measurement, &blocks, &innovation, seen, &scope);
+        let observer_refused = self.members[measurement.observer].state.refused;
         let sightings = self.sightings;
-        let agent = self.members[glance.observer].agent;
-        let is_doubted = self.members[glance.observer].traveller.is_doubted();
-        if let Some(mark) = Arc::make_mut(&mut self.marks).get_mut(label) {
-            mark.used = sightings;
+        let agent = self.members[measurement.observer].agent;
+        let is_doubted = self.members[measurement.observer].state.is_doubted();
+        if let Some(landmark) = Arc::make_mut(&mut self.landmarks).get_mut(label) {
+            landmark.used = sightings;
             // Who is doubted speaks neither against a landmark nor for it.
-            if weighed.verdict != Verdict::Refused {
-                mark.observers.note(agent);
+            if outcome.verdict != Verdict::Refused {
+                landmark.observers.note(agent);
             }
             if !is_doubted {
-                let is_refused = weighed.verdict == Verdict::Refused;
-                mark.refused = if is_refused { mark.refused + 1 } else { 0 };
+                let is_refused = outcome.verdict == Verdict::Refused;
+                landmark.refused = if is_refused { landmark.refused + 1 } else { 0 };
             }
             // Of an agent that contradicts everything, the landmark is not to blame.
-            if mark.refused >= REFUSED_TO_FORGET && observer_refused < REFUSED_TO_WIDEN / 2 {
+            if landmark.refused >= REFUSED_TO_FORGET && observer_refused < REFUSED_TO_WIDEN / 2 {
                 self.forget(label);
             }
         }
-        self.recover(glance.observer);
-        weighed
+        self.widen_if_refused(measurement.observer);
+        outcome
     }
 
     /// Another member was seen, which has moved by `back` since.
-    pub(super) fn see_member(
+    pub(super) fn update_by_member(
         &mut self,
-        glance: &Glance<'_>,
+        measurement: &Measurement<'_>,
         target: usize,
         back: &Isometry3<f64>,
-    ) -> Weighed {
+    ) -> Outcome {
         self.flush();
-        let side = Side::new(&self.members[glance.observer], glance.back);
-        let other = Side::new(&self.members[target], back);
-        let (corrected, counts) = self.corrected_between(glance.observer, target);
-        let scope = Scope { corrected, counts };
-        let weighed = if let Relation::Pose(seen) = glance.relation {
-            self.see_pose(glance, [&side, &other], seen, &scope)
+        let past = PastPose::new(&self.members[measurement.observer], measurement.back);
+        let other = PastPose::new(&self.members[target], back);
+        let (corrected, counts) = self.corrected_between(measurement.observer, target);
+        let scope = CorrectionScope { corrected, counts };
+        let outcome = if let Relation::Pose(seen) = measurement.relation {
+            self.update_by_pose(measurement, [&past, &other], seen, &scope)
         } else {
-            let expected = side.pose.inv_mul(&other.pose).translation.vector;
-            let Some(innovation) = PointInnovation::new(glance.relation, &expected) else {
-                return Weighed::nothing();
+            let expected = past.pose.inv_mul(&other.pose).translation.vector;
+            let Some(innovation) = PointInnovation::new(measurement.relation, &expected) else {
+                return Outcome::nothing();
             };
-            let relative = side.pose.rotation.inverse() * other.pose.rotation;
+            let relative = past.pose.rotation.inverse() * other.pose.rotation;
             let turn = relative.to_rotation_matrix().into_inner();
             let mut by_target = SMatrix::<f64, 3, 6>::zeros();
             by_target
                 .fixed_view_mut::<3, 3>(0, 0)
                 .copy_from(&(innovation.by_point * turn));
             let blocks = [
-                side.block(&(innovation.by_point * point_by_pose(&expected))),
+                past.block(&(innovation.by_point * point_by_pose(&expected))),
                 other.block(&by_target),
             ];
-            let seen = Seen::Agent(self.members[target].agent);
-            self.take_in(glance, &blocks, &innovation, seen, &scope)
+            let seen = SightingTarget::Agent(self.members[target].agent);
+            self.update_by_point(measurement, &blocks, &innovation, seen, &scope)
         };
-        self.recover(glance.observer);
-        weighed
+        self.widen_if_refused(measurement.observer);
+        outcome
     }
 
     /// A landmark that is not among those estimated jointly.
-    fn learn(&mut self, glance: &Glance<'_>, label: &Label) -> Weighed {
+    fn initialise_landmark(&mut self, measurement: &Measurement<'_>, label: &Label) -> Outcome {
         self.make_room();
-        if self.members[glance.observer].traveller.is_doubted()
-            && let Some(dormant) = self.dormant.remove(label)
+        if self.members[measurement.observer].state.is_doubted()
+            && let Some(archived) = self.archive.remove(label)
         {
             // It corrects itself by it, as by one that is awake.
-            self.wake(label, &dormant);
-            return self.see_mark(glance, label);
+            self.restore(label, &archived);
+            return self.update_by_landmark(measurement, label);
         }
-        let member = &self.members[glance.observer];
-        let side = Side::new(member, glance.back);
-        let (point, stated) = seen_at(glance.relation);
+        let member = &self.members[measurement.observer];
+        let past = PastPose::new(member, measurement.back);
+        let (point, stated) = seen_at(measurement.relation);
         let mut variance = Vector6::zeros();
-        let noise = PointInnovation::new(glance.relation, &point).and_then(|innovation| {
-            let sensor = &member.traveller.sensor;
-            let components = sensor.variance(&innovation, glance.parameters);
+        let noise = PointInnovation::new(measurement.relation, &point).and_then(|innovation| {
+            let sensor = &member.state.sensor;
+            let components = sensor.variance(&innovation, measurement.parameters);
             variance.fixed_rows_mut::<3>(0).copy_from(&components);
             let inverse = innovation.by_point.try_inverse()?;
             Some(inverse * Matrix3::from_diagonal(&components) * inverse.transpose())
         });
-        let world = side.pose.rotation.to_rotation_matrix().into_inner();
+        let world = past.pose.rotation.to_rotation_matrix().into_inner();
         let noise = world * noise.unwrap_or(stated) * world.transpose();
         let by_pose = -(world * point_by_pose(&point));
         let offset = self
             .covariance
-            .append(&[side.block(&by_pose)], &symmetric(&noise));
+            .append(&[past.block(&by_pose)], &symmetric(&noise));
         // Who saw one that was asleep is forgotten.
-        let mut observers = if self.dormant.contains(label) {
+        let mut observers = if self.archive.contains(label) {
             Observers::unknown()
         } else {
             Observers::default()
         };
-        observers.note(self.members[glance.observer].agent);
-        let mark = Mark {
+        observers.note(self.members[measurement.observer].agent);
+        let landmark = LandmarkState {
             number: self.numbered,
-            position: side.pose * Point3::from(point),
+            position: past.pose * Point3::from(point),
             offset,
             used: self.sightings,
             refused: 0,
             observers,
         };
         self.numbered += 1;
-        Arc::make_mut(&mut self.marks).insert(label.clone(), mark);
-        let verdict = match self.dormant.remove(label) {
+        Arc::make_mut(&mut self.landmarks).insert(label.clone(), landmark);
+        let verdict = match self.archive.remove(label) {
             None => Verdict::Learned,
-            Some(dormant) => self.recall(glance, offset, &dormant),
+            Some(archived) => self.fuse_archived(measurement, offset, &archived),
         };
-        Weighed { verdict, variance }
+        Outcome { verdict, variance }
     }
 
     /// A landmark wakes up as it was, and correlated with nothing.
-    fn wake(&mut self, label: &Label, dormant: &Dormant) {
-        let offset = self.covariance.grow(MARK_DIM);
-        self.covariance.set_diagonal(offset, &dormant.covariance);
+    fn restore(&mut self, label: &Label, archived: &ArchivedLandmark) {
+        let offset = self.covariance.grow(LANDMARK_DIM);
+        self.covariance.set_diagonal(offset, &archived.covariance);
         let mut observers = Observers::default();
-        match dormant.only {
+        match archived.only {
             Some(agent) => observers.note(agent),
             None => observers = Observers::unknown(),
         }
-        let mark = Mark {
+        let landmark = LandmarkState {
             number: self.numbered,
-            position: dormant.position,
+            position: archived.position,
             offset,
             used: self.sightings,
             refused: 0,
             observers,
         };
         self.numbered += 1;
-        Arc::make_mut(&mut self.marks).insert(label.clone(), mark);
+        Arc::make_mut(&mut self.landmarks).insert(label.clone(), landmark);
     }
 
     /// A landmark came back whose earlier estimate may be correlated with everything.
@@ -239,13 +243,18 @@ impl Frame {
     /// ```text
     /// R⁻¹ = ½ (Σ_old⁻¹ − Σ_new⁻¹), as far as that is positive
     /// ```
-    fn recall(&mut self, glance: &Glance<'_>, offset: usize, dormant: &Dormant) -> Verdict {
+    fn fuse_archived(
+        &mut self,
+        measurement: &Measurement<'_>,
+        offset: usize,
+        archived: &ArchivedLandmark,
+    ) -> Verdict {
         let accepted = Verdict::Accepted {
             nis: 0.0,
             components: 0,
         };
         let own: Matrix3<f64> = self.covariance.block(offset, offset);
-        let inverses = own.try_inverse().zip(dormant.covariance.try_inverse());
+        let inverses = own.try_inverse().zip(archived.covariance.try_inverse());
         let Some((own_information, old_information)) = inverses else {
             return accepted;
         };
@@ -260,14 +269,17 @@ impl Frame {
         let axes = gain.eigenvectors;
         let block = point_block(offset, &axes.transpose());
         let projection = self.covariance.project(&[block]);
-        let here = self.marks.values().find(|mark| mark.offset == offset);
-        let Some(here) = here.map(|mark| mark.position) else {
+        let here = self
+            .landmarks
+            .values()
+            .find(|landmark| landmark.offset == offset);
+        let Some(here) = here.map(|landmark| landmark.position) else {
             return accepted;
         };
-        let innovation = axes.transpose() * (dormant.position - here);
+        let innovation = axes.transpose() * (archived.position - here);
         let spread = projection.spread;
         let far = (0..3).any(|k| {
-            let expected = spread[(k, k)] + 2.0 * dormant.covariance.trace();
+            let expected = spread[(k, k)] + 2.0 * archived.covariance.trace();
             innovation[k] * innovation[k] > 36.0 * expected
         });
         if far {
@@ -276,26 +288,26 @@ impl Frame {
         let s = spread + Matrix3::from_diagonal(&variances);
         let all = self.covariance.all();
         if let Some(correction) = self.covariance.update(projection, &innovation, &s, &all) {
-            self.correct(glance.observer, &correction, glance.parameters);
+            self.correct(measurement.observer, &correction, measurement.parameters);
         }
         accepted
     }
 
     /// Weighs an innovation and takes it in.
-    fn take_in(
+    fn update_by_point(
         &mut self,
-        glance: &Glance<'_>,
+        measurement: &Measurement<'_>,
         blocks: &[Block<3>],
         innovation: &PointInnovation,
-        seen: Seen,
-        scope: &Scope,
-    ) -> Weighed {
-        let parameters = glance.parameters;
+        seen: SightingTarget,
+        scope: &CorrectionScope,
+    ) -> Outcome {
+        let parameters = measurement.parameters;
         let projection = self.covariance.project(blocks);
-        let member = self.members[glance.observer].traveller_mut();
+        let member = self.members[measurement.observer].state_mut();
         let mut variance = member.sensor.variance(innovation, parameters);
-        let mut weighed = Weighed::nothing();
-        weighed.variance.fixed_rows_mut::<3>(0).copy_from(&variance);
+        let mut outcome = Outcome::nothing();
+        outcome.variance.fixed_rows_mut::<3>(0).copy_from(&variance);
         let spread = projection.spread.diagonal();
         let squares = innovation
             .residual
@@ -307,7 +319,7 @@ impl Frame {
             .all(|square| square.sqrt() <= parameters.gate)
         {
             scope.weigh(member, true, false);
-            return weighed;
+            return outcome;
         }
         let fits = squares
             .iter()
@@ -315,10 +327,10 @@ impl Frame {
         scope.weigh(member, false, fits);
         member
             .sensor
-            .note(seen, glance.stamp_ns, innovation, &spread, &variance);
+            .note(seen, measurement.stamp_ns, innovation, &spread, &variance);
         // A planar robot's elevations are no measurements.
         let is_flat =
-            member.mover.is_planar && innovation.is_polar && innovation.residual[2] == 0.0;
+            member.filter.is_planar && innovation.is_polar && innovation.residual[2] == 0.0;
         let components: usize = if is_flat { 2 } else { 3 };
         let nis = squares.iter().take(components).sum();
         for (variance, square) in variance.iter_mut().zip(squares.iter()) {
@@ -328,32 +340,32 @@ impl Frame {
         let (joint, corrected) = (&mut self.covariance, &scope.corrected);
         let update = joint.update(projection, &innovation.residual, &s, corrected);
         if let Some(correction) = update {
-            self.correct(glance.observer, &correction, parameters);
+            self.correct(measurement.observer, &correction, parameters);
         }
         let components = if is_flat { 2 } else { 3 };
-        weighed.verdict = Verdict::Accepted { nis, components };
-        weighed
+        outcome.verdict = Verdict::Accepted { nis, components };
+        outcome
     }
 
     /// A full pose of another member was seen.
-    fn see_pose(
+    fn update_by_pose(
         &mut self,
-        glance: &Glance<'_>,
-        [side, other]: [&Side; 2],
+        measurement: &Measurement<'_>,
+        [past, other]: [&PastPose; 2],
         seen: &RelativePose,
-        scope: &Scope,
-    ) -> Weighed {
+        scope: &CorrectionScope,
+    ) -> Outcome {
         let (residual, by_observer, by_target, variance) =
-            pose_innovation(seen, &side.pose, &other.pose);
-        let blocks = [side.block(&by_observer), other.block(&by_target)];
+            pose_innovation(seen, &past.pose, &other.pose);
+        let blocks = [past.block(&by_observer), other.block(&by_target)];
         let projection = self.covariance.project(&blocks);
         let spread: SVector<f64, 6> = projection.spread.diagonal();
         let squares = residual
             .component_mul(&residual)
             .component_div(&(spread + variance));
-        let parameters = glance.parameters;
-        let member = self.members[glance.observer].traveller_mut();
-        let mut weighed = Weighed {
+        let parameters = measurement.parameters;
+        let member = self.members[measurement.observer].state_mut();
+        let mut outcome = Outcome {
             verdict: Verdict::Refused,
             variance,
         };
@@ -362,7 +374,7 @@ impl Frame {
             .all(|square| square.sqrt() <= parameters.gate)
         {
             scope.weigh(member, true, false);
-            return weighed;
+            return outcome;
         }
         let fits = squares
             .iter()
@@ -374,19 +386,19 @@ impl Frame {
         let (joint, corrected) = (&mut self.covariance, &scope.corrected);
         let update = joint.update(projection, &residual, &s, corrected);
         if let Some(correction) = update {
-            self.correct(glance.observer, &correction, parameters);
+            self.correct(measurement.observer, &correction, parameters);
         }
-        weighed.verdict = Verdict::Accepted {
+        outcome.verdict = Verdict::Accepted {
             nis: squares.sum(),
             components: 6,
         };
-        weighed
+        outcome
     }
 
     /// Lets an agent whose sightings contradict the estimate search farther around.
-    fn recover(&mut self, observer: usize) {
-        if self.members[observer].traveller.refused >= REFUSED_TO_WIDEN {
-            self.members[observer].traveller_mut().refused = 0;
+    fn widen_if_refused(&mut self, observer: usize) {
+        if self.members[observer].state.refused >= REFUSED_TO_WIDEN {
+            self.members[observer].state_mut().refused = 0;
             self.widen(observer, WIDENED.0, WIDENED.1);
         }
     }
@@ -394,15 +406,15 @@ impl Frame {
 
 /// What a sighting may do.
 #[derive(Clone, Debug)]
-struct Scope {
+struct CorrectionScope {
     /// The components that it corrects.
     corrected: Range<usize>,
     /// Whether it speaks for or against its observer.
     counts: bool,
 }
 
-impl Scope {
-    fn weigh(&self, observer: &mut Traveller, is_refused: bool, fits: bool) {
+impl CorrectionScope {
+    fn weigh(&self, observer: &mut AgentState, is_refused: bool, fits: bool) {
         if self.counts {
             observer.weigh(is_refused, fits);
         }
@@ -411,17 +423,17 @@ impl Scope {
 
 /// A member at an instant.
 #[derive(Clone, Debug)]
-struct Side {
+struct PastPose {
     pose: Isometry3<f64>,
-    /// The pose's error now by that then.
+    /// Jacobian of the pose error then with respect to the pose error now.
     by_now: Matrix6<f64>,
     offset: usize,
 }
 
-impl Side {
+impl PastPose {
     fn new(member: &Member, back: &Isometry3<f64>) -> Self {
         Self {
-            pose: member.mover().pose * back.inverse(),
+            pose: member.filter().pose * back.inverse(),
             by_now: se3::adjoint(back),
             offset: member.offset,
         }
@@ -442,7 +454,7 @@ pub(super) fn point_block(offset: usize, jacobian: &Matrix3<f64>) -> Block<3> {
     wide.fixed_view_mut::<3, 3>(0, 0).copy_from(jacobian);
     Block {
         offset,
-        width: MARK_DIM,
+        width: LANDMARK_DIM,
         jacobian: wide,
     }
 }
