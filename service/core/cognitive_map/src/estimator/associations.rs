@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::measurement_update::Verdict;
+use super::verdict::Verdict;
 use crate::input::Label;
 
 /// Most names that stand for others. Beyond that no landmarks are found to be the same.

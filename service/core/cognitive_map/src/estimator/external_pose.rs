@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix6, SMatrix, Vector6};
 
 use super::covariance::Block;
+use super::effect::Effect;
 use super::frame::Frame;
 use super::joint::Estimator;
 use super::parameters::Parameters;
@@ -31,8 +32,8 @@ impl Estimator {
         agent: u32,
         pose: &Isometry3<f64>,
         covariance: &PoseCovariance,
+        effects: &mut Vec<Effect>,
     ) -> bool {
-        self.begin();
         let Some(number) = self.frame_of(agent) else {
             return false;
         };
@@ -61,7 +62,7 @@ impl Estimator {
         let is_taken = frame
             .member(agent)
             .is_some_and(|index| frame.fuse_pose(index, &external, &self.parameters));
-        self.sweep(number);
+        self.sweep(number, effects);
         is_taken
     }
 }

@@ -2,10 +2,10 @@
 
 use std::cmp::Reverse;
 
-use nalgebra::Isometry3;
-
+use super::effect::Effect;
 use super::frame::{Frame, LandmarkState};
 use super::frame_alignment::{PointPair, align_frames};
+use super::frame_match::{FRAME_MATCHES_MAX, FrameMatch};
 use super::joint::{Estimator, MAP};
 use super::registration::{
     GATE, Registration, SOUGHT_MAX, SURE_MARGIN, UncertainPoint, apart_m, mean_variance, register,
@@ -22,8 +22,6 @@ const FOUND_MIN: u32 = 3;
 const CROSSED_ROUNDS: usize = 3;
 /// Landmarks of the older frame among which others are sought, in the plane and in space, where it takes three to a motion.
 const KNOWN_MAX: (usize, usize) = (64, 32);
-/// Most pairs of frames of which it is remembered what was found.
-pub(super) const FRAME_MATCHES_MAX: usize = 64;
 /// Frames among which the next one to compare is sought.
 const TURNED_MAX: usize = 16;
 /// By how much the landmarks' variances are widened: sensors err alike for a while, which the estimate takes for more
@@ -31,17 +29,6 @@ const TURNED_MAX: usize = 16;
 pub(super) const WIDENING: f64 = 4.0;
 /// Variance of the distance between two estimates of one landmark, beside their own \[m²\].
 pub(super) const SAME_VARIANCE_M2: f64 = 1e-4;
-
-/// How a frame seems to lie in another one.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct FrameMatch {
-    /// The older one and the newer one.
-    pub(super) frames: [usize; 2],
-    /// Pose of the newer one in the older one, as found last.
-    pub(super) pose: Isometry3<f64>,
-    /// Attempts in a row that found it.
-    pub(super) n_found: u32,
-}
 
 /// Landmarks of a frame that the other frame has no name for.
 #[derive(Clone, Debug)]
@@ -53,7 +40,12 @@ struct UnsharedLandmarks {
 impl Estimator {
     /// Looks now and then whether landmarks have other names, too: in an agent's frame for the agent itself, and, if that is not the
     /// map's, for another frame. When that is depends on the sightings alone.
-    pub(super) fn associate_landmarks(&mut self, own: usize, agent: u32) {
+    pub(super) fn associate_landmarks(
+        &mut self,
+        own: usize,
+        agent: u32,
+        effects: &mut Vec<Effect>,
+    ) {
         let sightings = self.frame(own).sightings;
         if !sightings.is_multiple_of(ASSOCIATE_EVERY) {
             return;
@@ -61,14 +53,14 @@ impl Estimator {
         if own != MAP
             && let Some(other) = self.next_to_register(own, sightings / ASSOCIATE_EVERY)
         {
-            self.register_frames(own, other);
+            self.register_frames(own, other, effects);
         } else {
-            self.associate_within_frame(own, agent);
+            self.associate_within_frame(own, agent, effects);
         }
     }
 
     /// Looks whether the landmarks of a frame lie like those of another one.
-    fn register_frames(&mut self, own: usize, other: usize) {
+    fn register_frames(&mut self, own: usize, other: usize, effects: &mut Vec<Effect>) {
         let (older, newer) = (own.min(other), own.max(other));
         let is_planar = self.frame(older).is_planar() && self.frame(newer).is_planar();
         let known_max = if is_planar { KNOWN_MAX.0 } else { KNOWN_MAX.1 };
@@ -77,7 +69,7 @@ impl Estimator {
         match register(&known.points, &sought.points, is_planar) {
             Some(register) => {
                 if self.note_match(older, newer, &register, &sought.points) >= FOUND_MIN {
-                    self.accept(older, newer, &register, &known, &sought);
+                    self.accept([older, newer], &register, &known, &sought, effects);
                 }
             }
             None => self
@@ -129,11 +121,11 @@ impl Estimator {
     /// Lays a frame into an older one by landmarks that are the same, which go by the older one's names from now on.
     fn accept(
         &mut self,
-        older: usize,
-        newer: usize,
+        [older, newer]: [usize; 2],
         found: &Registration,
         known: &UnsharedLandmarks,
         sought: &UnsharedLandmarks,
+        effects: &mut Vec<Effect>,
     ) {
         let pair = |&(one, other): &(usize, usize)| PointPair {
             older: known.points[one].position,
@@ -156,8 +148,10 @@ impl Estimator {
             self.associations.insert(label, name);
             self.rename_landmark(label, name);
         }
-        self.merge(older, newer, &alignment);
-        self.same = same;
+        self.merge(older, newer, &alignment, effects);
+        if !same.is_empty() {
+            effects.push(Effect::LandmarksAssociated(same));
+        }
     }
 
     /// The correspondences of which it is sure which is which.

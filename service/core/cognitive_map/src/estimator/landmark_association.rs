@@ -7,6 +7,7 @@
 
 use nalgebra::Matrix3;
 
+use super::effect::Effect;
 use super::frame::{Frame, LANDMARK_DIM, LandmarkState};
 use super::frame_registration::{SAME_VARIANCE_M2, WIDENING};
 use super::joint::Estimator;
@@ -22,17 +23,24 @@ const CHANCE_MAX: f64 = 0.25;
 
 impl Estimator {
     /// Looks whether an agent has names of its own for landmarks of its frame that others know.
-    pub(super) fn associate_within_frame(&mut self, number: usize, agent: u32) {
+    pub(super) fn associate_within_frame(
+        &mut self,
+        number: usize,
+        agent: u32,
+        effects: &mut Vec<Effect>,
+    ) {
         let found = self.find_associations(self.frame(number), agent);
         if !self.associations.has_room(found.len()) {
             return;
         }
         let parameters = self.parameters.clone();
-        for (label, name) in found {
-            self.frame_mut(number).unite(&label, &name, &parameters);
-            self.associations.insert(&label, &name);
-            self.rename_landmark(&label, &name);
-            self.same.push((label, name));
+        for (label, name) in &found {
+            self.frame_mut(number).unite(label, name, &parameters);
+            self.associations.insert(label, name);
+            self.rename_landmark(label, name);
+        }
+        if !found.is_empty() {
+            effects.push(Effect::LandmarksAssociated(found));
         }
     }
 

@@ -13,6 +13,7 @@ use super::landmark_archive::ArchivedLandmark;
 use super::observers::Observers;
 use super::parameters::Parameters;
 use super::sensor::SightingTarget;
+use super::verdict::{Outcome, Verdict};
 use crate::input::{Label, Relation, RelativePose};
 use geometry::se3;
 
@@ -25,40 +26,6 @@ const WIDENED: (f64, f64) = (1.0, 0.5);
 const REFUSED_TO_FORGET: u32 = 8;
 /// Least variance of a component that an archived landmark gains \[m²\].
 const GAIN_MIN_M2: f64 = 1e-9;
-
-/// What became of a sighting.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Verdict {
-    /// The target is new.
-    Learned,
-    /// It counted: normalised innovation squared, before any weighting, and number of components.
-    Accepted {
-        /// Normalised innovation squared.
-        nis: f64,
-        /// Number of components.
-        components: u32,
-    },
-    /// It did not.
-    Refused,
-}
-
-/// A sighting's verdict, and the variances it was weighed with.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Outcome {
-    pub(super) verdict: Verdict,
-    /// Variances of its components, before those far from what is expected lose weight.
-    pub(super) variance: Vector6<f64>,
-}
-
-impl Outcome {
-    /// Of a sighting that says nothing.
-    fn nothing() -> Self {
-        Self {
-            verdict: Verdict::Refused,
-            variance: Vector6::zeros(),
-        }
-    }
-}
 
 /// A sighting of a frame's member: who, how it moved since, when, and what it saw.
 #[derive(Clone, Copy, Debug)]

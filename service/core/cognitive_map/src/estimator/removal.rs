@@ -10,7 +10,6 @@ use super::joint::{Estimator, MAP};
 impl Estimator {
     /// An agent of the map is gone: it stays where it was, and takes part in no joint estimate any more.
     pub fn retire(&mut self, agent: u32) {
-        self.begin();
         self.forget_pending(agent);
         let Some(number) = self.frame_of(agent) else {
             return;
@@ -29,7 +28,6 @@ impl Estimator {
     /// # Panics
     /// Never: beside the map's there is one frame for each agent, and this one is in none.
     pub fn clear(&mut self, agent: u32) {
-        self.begin();
         self.forget_pending(agent);
         let Some(from) = self.frame_of(agent).filter(|&frame| frame != MAP) else {
             return;

@@ -18,6 +18,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::agent_filter::{AgentFilter, POSITION_SD_MAX_M};
 use super::agent_slot::{AgentState, Detached};
+use super::effect::Effect;
 use super::frame::{Frame, LandmarkState};
 use super::joint::{Estimator, MAP};
 use super::measurement_update::REFUSED_TO_WIDEN;
@@ -105,12 +106,6 @@ impl Estimator {
         Some(&self.frame(MAP).landmarks.get(label)?.observers)
     }
 
-    /// Takes which agents the latest call set aside. What is not taken is dropped by the next
-    /// motion or sighting.
-    pub fn take_set_aside(&mut self) -> Vec<u32> {
-        std::mem::take(&mut self.set_aside)
-    }
-
     /// Whether a landmark of a frame was seen only by others that are set aside: then it is not
     /// there for this agent.
     pub(super) fn is_aside_for(&self, agent: u32, number: usize, label: &Label) -> bool {
@@ -142,19 +137,19 @@ impl Estimator {
     }
 
     /// Sets an agent aside if its evidence is absurd, and lets one be again whose evidence fits.
-    pub(super) fn judge_evidence(&mut self, agent: u32) {
+    pub(super) fn judge_evidence(&mut self, agent: u32, effects: &mut Vec<Effect>) {
         let Some((slot, state)) = self.slot(agent).zip(self.agent_state(agent)) else {
             return;
         };
         if state.doubt >= ABSURD {
-            self.set_aside(agent);
+            self.set_aside(agent, effects);
         } else if slot.is_aside && slot.frame == MAP && state.doubt == 0 {
             self.slot_mut(agent).is_aside = false;
         }
     }
 
     /// Sets those members of a frame aside whose poses say nothing, and forgets such landmarks.
-    pub(super) fn sweep(&mut self, number: usize) {
+    pub(super) fn sweep(&mut self, number: usize, effects: &mut Vec<Effect>) {
         let frame = self.frame(number);
         let members = frame.members.iter();
         let lost = members.filter(|member| member.filter().is_nowhere());
@@ -166,12 +161,12 @@ impl Estimator {
             self.frame_mut(number).forget(&label);
         }
         for agent in lost {
-            self.set_aside(agent);
+            self.set_aside(agent, effects);
         }
     }
 
     /// Lets an agent begin anew, in a frame of its own.
-    pub(super) fn set_aside(&mut self, agent: u32) {
+    pub(super) fn set_aside(&mut self, agent: u32, effects: &mut Vec<Effect>) {
         let Some((from, state)) = self.leave(agent) else {
             return;
         };
@@ -208,7 +203,7 @@ impl Estimator {
         slot.evidence.refused_in_a_row = 0;
         slot.is_aside |= from == MAP;
         self.forget_pending(agent);
-        self.set_aside.push(agent);
+        effects.push(Effect::SetAside { agent });
     }
 
     /// One agent fewer is in a frame.
@@ -247,14 +242,14 @@ mod tests {
         for number in 0..posts {
             see(&mut estimator, honest, number, &post(number));
         }
-        estimator.start_pose(liar, &start(&Isometry3::identity(), 0.1));
+        estimator.start_pose(liar, &start(&Isometry3::identity(), 0.1), &mut Vec::new());
         (estimator, honest, liar)
     }
 
     /// An agent at the identity sees a post where it is or is not.
     fn see(estimator: &mut Estimator, agent: u32, number: usize, at: &Point3<f64>) {
         let relation = polar(&Isometry3::identity(), at);
-        estimator.landmark(agent, 0, &label(number), &relation);
+        estimator.landmark(agent, 0, &label(number), &relation, &mut Vec::new());
     }
 
     /// An agent sees a post where it cannot be, again and again.
@@ -304,7 +299,7 @@ mod tests {
         // Told where it stands, it is doubted no less.
         lie(&mut estimator, liar, 5, 2 * ABSURD);
         assert!(estimator.is_aside(liar));
-        estimator.start_pose(liar, &start(&Isometry3::identity(), 0.1));
+        estimator.start_pose(liar, &start(&Isometry3::identity(), 0.1), &mut Vec::new());
         assert!(estimator.is_in_map(liar) && estimator.is_doubted(liar));
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Vector6};
 
 use crate::agent::Agent;
-use crate::estimator::Estimator;
+use crate::estimator::{Effect, Estimator};
 use crate::event::{Event, EventKind};
 use crate::input::{AgentId, SkipReason};
 use crate::input::{Label, Marker, Sample, SampleBody, StartPose};
@@ -36,6 +36,8 @@ pub(super) struct Fold<'a> {
     pub(super) percepts: &'a mut PerceptMap,
     pub(super) objects: &'a mut ObjectMemory,
     pub(super) estimator: &'a mut Estimator,
+    /// What the latest call of the estimator brought about, until it is applied.
+    pub(super) effects: Vec<Effect>,
     pub(super) chronicle: &'a mut KeyframeGraph,
     pub(super) names: &'a BTreeMap<Label, AgentId>,
     pub(super) agent_id: AgentId,
@@ -130,10 +132,11 @@ impl Fold<'_> {
     /// The agent was told where it stands.
     fn start_pose(&mut self, start: &StartPose) {
         self.end_trip(TripEnd::StartPose);
-        self.estimator.start_pose(self.agent_id.0, start);
+        self.estimator
+            .start_pose(self.agent_id.0, start, &mut self.effects);
+        self.apply_effects();
         if !self.estimator.is_in_map(self.agent_id.0) {
-            // One that says that it may be anywhere has said nothing.
-            self.remember_who_was_set_aside();
+            // A start pose whose noise admits any place says nothing.
             return;
         }
         self.chronicle.start_pose(&self.moment(), start);

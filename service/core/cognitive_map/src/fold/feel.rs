@@ -112,20 +112,16 @@ impl Fold<'_> {
         let was_placed = self.agent.placed;
         // One that only drifted is where it may have drifted to: its way leads there. One that was put astray, by looks that could
         // be read in two ways, is put anew.
-        let is_refused = was_placed
-            && !found.is_first
-            && !self
-                .estimator
-                .fuse_pose(number, &found.pose, &found.covariance);
+        let is_refused = was_placed && !found.is_first && !self.fuse(found);
         let is_elsewhere = is_refused || (was_placed && found.is_first && self.is_elsewhere(found));
         if is_elsewhere || !was_placed {
+            let (pose, covariance) = (&found.pose, &found.covariance);
             self.estimator
-                .recognised(number, &found.pose, &found.covariance);
-            self.remember_what_was_settled();
+                .recognised(number, pose, covariance, &mut self.effects);
+            self.apply_effects();
         }
         if found.is_first {
-            self.estimator
-                .fuse_pose(number, &found.pose, &found.covariance);
+            self.fuse(found);
         }
         if found.is_first || found.is_last || is_elsewhere {
             let moment = self.moment();
@@ -143,6 +139,16 @@ impl Fold<'_> {
         } else {
             self.follow();
         }
+    }
+
+    /// Fuses the pose at which the agent recognised itself; answers whether it was accepted.
+    fn fuse(&mut self, found: &Relocalised) -> bool {
+        let (agent, pose, covariance) = (self.agent_id.0, &found.pose, &found.covariance);
+        let is_accepted = self
+            .estimator
+            .fuse_pose(agent, pose, covariance, &mut self.effects);
+        self.apply_effects();
+        is_accepted
     }
 
     /// Whether an agent of the map was recognised where it cannot have come to.

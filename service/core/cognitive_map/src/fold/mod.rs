@@ -191,6 +191,7 @@ impl CognitiveMap {
             trips: &mut self.trips,
             landmarks: &mut self.landmarks,
             estimator: Arc::make_mut(&mut self.estimator),
+            effects: Vec::new(),
             chronicle,
             names: &self.names,
             percepts: &mut self.percepts,

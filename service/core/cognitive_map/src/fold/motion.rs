@@ -21,15 +21,10 @@ impl Fold<'_> {
         self.define_frame();
         let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
         let increment = motion.increment();
-        let step = self.estimator.motion(agent.0, stamp_ns, motion);
-        self.remember_who_was_set_aside();
-        self.chronicle.motion(
-            &self.moment(),
-            &step.increment,
-            &step.variance,
-            &step.calibrated,
-        );
-        self.remember_what_was_settled();
+        let step = self
+            .estimator
+            .motion(agent.0, stamp_ns, motion, &mut self.effects);
+        self.apply_effects();
         if let Some(episode) = &mut self.agent.episode {
             episode.go(&step.increment, &step.variance);
         }

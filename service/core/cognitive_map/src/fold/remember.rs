@@ -2,6 +2,7 @@
 
 use super::CognitiveMap;
 use super::apply::Fold;
+use crate::estimator::{AgentSighted, Effect, FramesMerged};
 use crate::keyframes::{Moment, Refined};
 use crate::memory::place::PlaceId;
 use pose_graph::PoseGraph;
@@ -22,42 +23,61 @@ impl Fold<'_> {
         }
     }
 
-    /// Remembers who was set aside with the latest call of the estimate.
-    pub(super) fn remember_who_was_set_aside(&mut self) {
-        for agent in self.estimator.take_set_aside() {
-            self.chronicle.set_aside(agent);
+    /// Tells the keyframe graph, the landmark map and the agent's body what the latest call of the
+    /// estimator brought about.
+    pub(super) fn apply_effects(&mut self) {
+        let mut effects = std::mem::take(&mut self.effects);
+        effects.sort_by_key(Effect::order);
+        for effect in effects.drain(..) {
+            match effect {
+                Effect::SetAside { agent } => self.chronicle.set_aside(agent),
+                Effect::Moved { step, .. } => self.chronicle.motion(
+                    &self.moment(),
+                    &step.increment,
+                    &step.variance,
+                    &step.calibrated,
+                ),
+                Effect::LandmarkSighted {
+                    label,
+                    relation,
+                    variance,
+                    ..
+                } => self
+                    .chronicle
+                    .landmark(&self.moment(), &label, &relation, &variance),
+                Effect::AgentSighted(sighted) => self.agent_sighted(&sighted),
+                Effect::LandmarksAssociated(names) => {
+                    self.chronicle.same(&names);
+                    for (label, name) in &names {
+                        self.landmarks.unite(label, name, self.revision);
+                    }
+                }
+                Effect::FramesMerged(merged) => self.frames_merged(&merged),
+            }
+        }
+        self.effects = effects;
+    }
+
+    /// Remembers a sighting of an agent that was accepted.
+    fn agent_sighted(&mut self, sighted: &AgentSighted) {
+        if sighted.accepted {
+            self.chronicle.sighted(
+                sighted.observer,
+                sighted.target,
+                sighted.stamp_ns,
+                &sighted.relation,
+                &sighted.variance.fixed_rows::<3>(0).into_owned(),
+            );
         }
     }
 
-    /// Remembers the sightings of agents that counted with the latest call of the estimate, the landmarks that turned out to be one,
-    /// and the frames that it laid into others.
-    pub(super) fn remember_what_was_settled(&mut self) {
-        self.remember_who_was_set_aside();
-        for settled in self.estimator.take_settled() {
-            if settled.accepted {
-                self.chronicle.sighted(
-                    settled.observer,
-                    settled.target,
-                    settled.stamp_ns,
-                    &settled.relation,
-                    &settled.variance.fixed_rows::<3>(0).into_owned(),
-                );
-            }
-        }
-        let same = self.estimator.take_same();
-        if !same.is_empty() {
-            self.chronicle.same(&same);
-            for (label, name) in &same {
-                self.landmarks.unite(label, name, self.revision);
-            }
-        }
-        for merged in self.estimator.take_merged() {
-            for &agent in &merged.agents {
-                if merged.into == MAP {
-                    self.chronicle.placed(agent, &merged.pose);
-                } else {
-                    self.chronicle.carried(agent, &merged.pose);
-                }
+    /// Remembers where the frame of some agents lies.
+    fn frames_merged(&mut self, merged: &FramesMerged) {
+        for &agent in &merged.agents {
+            if merged.into == MAP {
+                self.chronicle.placed(agent, &merged.pose);
+            } else {
+                self.chronicle.carried(agent, &merged.pose);
             }
         }
     }
@@ -74,9 +94,13 @@ impl Fold<'_> {
         }
         for correction in self.chronicle.relax() {
             if let Some(covariance) = correction.covariance {
-                self.estimator
-                    .fuse_pose(correction.agent, &correction.pose, &covariance);
-                self.remember_who_was_set_aside();
+                self.estimator.fuse_pose(
+                    correction.agent,
+                    &correction.pose,
+                    &covariance,
+                    &mut self.effects,
+                );
+                self.apply_effects();
             }
         }
     }

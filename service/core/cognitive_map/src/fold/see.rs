@@ -32,19 +32,14 @@ impl Fold<'_> {
     /// A landmark was seen.
     fn landmark(&mut self, label: &Label, relation: &Relation) {
         let agent = self.agent_id.0;
-        let taken = self
+        let (stamp_ns, effects) = (self.stamp_ns, &mut self.effects);
+        let outcome = self
             .estimator
-            .landmark(agent, self.stamp_ns, label, relation);
-        self.remember_who_was_set_aside();
-        // It may just have turned out to be another one's.
-        let name = self.estimator.name_of(label).clone();
-        if taken.accepted {
-            let moment = self.moment();
-            self.chronicle
-                .landmark(&moment, &name, relation, &taken.variance);
-        }
-        self.remember_what_was_settled();
-        if taken.accepted
+            .landmark(agent, stamp_ns, label, relation, effects);
+        self.apply_effects();
+        // The label may just have turned out to be another name of a landmark.
+        let name = self.estimator.name_of(label);
+        if outcome.accepted
             && self.agent.placed
             && let Some(landmark) = self.landmarks.by_label(name.as_str())
         {
@@ -57,8 +52,10 @@ impl Fold<'_> {
     fn other_agent(&mut self, name: &Label, relation: &Relation) {
         if let Some(target) = self.names.get(name) {
             let (agent, stamp_ns) = (self.agent_id.0, self.stamp_ns);
-            self.estimator.sighting(agent, stamp_ns, target.0, relation);
-            self.remember_what_was_settled();
+            let effects = &mut self.effects;
+            self.estimator
+                .sighting(agent, stamp_ns, target.0, relation, effects);
+            self.apply_effects();
         }
     }
 

@@ -10,11 +10,11 @@ fn driven(looks: bool) -> Estimator {
     let mut estimator = Estimator::new(Parameters::default());
     let agent = estimator.enrol();
     let start = StartPose::new([0.0; 3], [0.0, 0.0, 0.0, 1.0], PoseNoise::none()).unwrap();
-    estimator.start_pose(agent, &start);
+    estimator.start_pose(agent, &start, &mut Vec::new());
     for step in 1..=50 {
         let noise = PoseNoise::new([0.02, 0.02, 0.0], [0.0, 0.0, 0.01]).unwrap();
         let motion = Motion::from_increment([0.1, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], Some(noise));
-        estimator.motion(agent, step * 100_000_000, &motion.unwrap());
+        estimator.motion(agent, step * 100_000_000, &motion.unwrap(), &mut Vec::new());
     }
     if looks {
         let seen = RangeBearing::new(2.0, 0.0, 0.0, 0.05, 0.01).unwrap();
@@ -23,6 +23,7 @@ fn driven(looks: bool) -> Estimator {
             5_000_000_000,
             &label(0),
             &Relation::RangeBearing(seen),
+            &mut Vec::new(),
         );
     }
     estimator
@@ -46,7 +47,7 @@ fn a_better_pose_prevails_and_what_was_seen_follows() {
             .landmarks()
             .next()
             .map(|(_, position, _)| position);
-        assert!(estimator.fuse_pose(0, &place, &told(0.01, 0.002)));
+        assert!(estimator.fuse_pose(0, &place, &told(0.01, 0.002), &mut Vec::new()));
         assert!(distance_m(&estimator, &place) < 0.01);
         let (pose, covariance) = estimator.pose(0).unwrap();
         assert!((pose.rotation.angle() - 0.05).abs() < 0.005);
@@ -74,11 +75,11 @@ fn the_same_pose_twice_adds_nothing() {
         let mut estimator = driven(looks);
         let place = planar(5.05, 0.1, 0.02);
         for _ in 0..2 {
-            assert!(estimator.fuse_pose(0, &place, &told(0.05, 0.02)));
+            assert!(estimator.fuse_pose(0, &place, &told(0.05, 0.02), &mut Vec::new()));
         }
         let (pose, once) = estimator.pose(0).unwrap();
         for _ in 0..20 {
-            assert!(estimator.fuse_pose(0, &place, &told(0.05, 0.02)));
+            assert!(estimator.fuse_pose(0, &place, &told(0.05, 0.02), &mut Vec::new()));
         }
         let (again, twenty) = estimator.pose(0).unwrap();
         assert!((pose.translation.vector - again.translation.vector).norm() < 0.01);
@@ -94,7 +95,7 @@ fn the_same_pose_twice_adds_nothing() {
 fn its_own_estimate_told_back_changes_nothing() {
     let mut estimator = driven(true);
     let (pose, covariance) = estimator.pose(0).unwrap();
-    assert!(estimator.fuse_pose(0, &pose, &covariance));
+    assert!(estimator.fuse_pose(0, &pose, &covariance, &mut Vec::new()));
     let (after, spread) = estimator.pose(0).unwrap();
     assert!((after.to_homogeneous() - pose.to_homogeneous()).amax() < 1e-9);
     assert!((spread.matrix() - covariance.matrix()).amax() < 1e-9);
@@ -104,10 +105,23 @@ fn its_own_estimate_told_back_changes_nothing() {
 fn a_pose_too_far_off_and_a_vague_one_change_nothing() {
     let mut estimator = driven(true);
     let (before, covariance) = estimator.pose(0).unwrap();
-    assert!(!estimator.fuse_pose(0, &planar(12.0, 4.0, 0.0), &told(0.01, 0.01)));
-    assert!(!estimator.fuse_pose(0, &planar(5.0, 0.0, 3.0), &told(0.01, 0.01)));
-    assert!(estimator.fuse_pose(0, &planar(5.3, 0.2, 0.1), &told(50.0, 3.0)));
-    assert!(!estimator.fuse_pose(7, &before, &covariance), "nobody");
+    assert!(!estimator.fuse_pose(
+        0,
+        &planar(12.0, 4.0, 0.0),
+        &told(0.01, 0.01),
+        &mut Vec::new()
+    ));
+    assert!(!estimator.fuse_pose(
+        0,
+        &planar(5.0, 0.0, 3.0),
+        &told(0.01, 0.01),
+        &mut Vec::new()
+    ));
+    assert!(estimator.fuse_pose(0, &planar(5.3, 0.2, 0.1), &told(50.0, 3.0), &mut Vec::new()));
+    assert!(
+        !estimator.fuse_pose(7, &before, &covariance, &mut Vec::new()),
+        "nobody"
+    );
     let (after, spread) = estimator.pose(0).unwrap();
     assert!((after.to_homogeneous() - before.to_homogeneous()).amax() < 1e-9);
     assert!((spread.matrix() - covariance.matrix()).amax() < 1e-9);

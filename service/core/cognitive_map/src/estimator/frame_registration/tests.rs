@@ -39,10 +39,16 @@ fn drive(
         let moved = Motion::from_velocity([0.4, 0.0, 0.0], turn, 1.0, Some(noise)).unwrap();
         truth *= moved.increment();
         let stamp_ns = i64::try_from(step + 1).unwrap() * SECOND_NS;
-        estimator.motion(agent, stamp_ns, &moved);
+        estimator.motion(agent, stamp_ns, &moved, &mut Vec::new());
         let post = step % posts.len();
         let label = Label::new(&format!("{name}-{post}")).unwrap();
-        estimator.landmark(agent, stamp_ns, &label, &polar(&truth, &posts[post]));
+        estimator.landmark(
+            agent,
+            stamp_ns,
+            &label,
+            &polar(&truth, &posts[post]),
+            &mut Vec::new(),
+        );
     }
     truth
 }
@@ -130,8 +136,8 @@ fn in_one_frame_an_agent_s_own_names_are_told_from_landmarks_of_its_own() {
         let mut estimator = Estimator::new(Parameters::default());
         let [one, other] = [0, 1].map(|_| estimator.enrol());
         let from = Isometry3::new(Vector3::new(1.0, -2.0, 0.0), Vector3::z() * 0.4);
-        estimator.start_pose(one, &start(&Isometry3::identity(), 0.02));
-        estimator.start_pose(other, &start(&from, 0.02));
+        estimator.start_pose(one, &start(&Isometry3::identity(), 0.02), &mut Vec::new());
+        estimator.start_pose(other, &start(&from, 0.02), &mut Vec::new());
         drive(
             &mut estimator,
             one,

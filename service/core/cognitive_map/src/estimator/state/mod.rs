@@ -1,7 +1,6 @@
 //! The bytes of the estimate. What is read back goes on to the last bit as what was written.
 //!
-//! The parameters are constant and not written. Neither is what the latest call settled and merged: it
-//! does not influence the future.
+//! The parameters are constant and not written.
 
 mod lists;
 
@@ -10,14 +9,11 @@ use std::sync::Arc;
 use lists::{read_all, read_count, read_map, write_all, write_count, write_map, write_pairs};
 
 use super::agent_filter::{AgentFilter, BODY_DIM, Run};
-use super::agent_sighting::{
-    CROSS_SIGHTINGS_MAX, CrossFrameSighting, PENDING_MAX, PendingSighting,
-};
 use super::agent_slot::{AgentSlot, AgentState, Detached};
 use super::associations::{ASSOCIATIONS_MAX, Association, Associations};
 use super::covariance::JointCovariance;
 use super::frame::{Frame, LANDMARK_DIM, LANDMARKS_MAX, LandmarkState, MEMBERS_MAX, Member};
-use super::frame_registration::{FRAME_MATCHES_MAX, FrameMatch};
+use super::frame_match::{FRAME_MATCHES_MAX, FrameMatch};
 use super::joint::Estimator;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive, PART_MAX, PARTS};
 use super::observers::{OBSERVERS_MAX, Observers};
@@ -25,6 +21,7 @@ use super::odometry_history::{KEPT, OdometryHistory};
 use super::outcome::Evidence;
 use super::parameters::Parameters;
 use super::sensor::{Sensor, SightingTarget, TARGETS_MAX};
+use super::sightings::{CROSS_SIGHTINGS_MAX, CrossFrameSighting, PENDING_MAX, PendingSighting};
 use ::state::PagedVec;
 use ::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
@@ -393,10 +390,6 @@ impl State for Estimator {
             associations: Associations {
                 names: Arc::new(read_map(input, ASSOCIATIONS_MAX)?),
             },
-            settled: Vec::new(),
-            merged: Vec::new(),
-            same: Vec::new(),
-            set_aside: Vec::new(),
         };
         if estimator.is_sound() {
             Ok(estimator)

@@ -1,0 +1,55 @@
+//! Motion of an agent.
+
+use std::sync::Arc;
+
+use super::effect::Effect;
+use super::joint::Estimator;
+use super::outcome::Step;
+use crate::input::Motion;
+
+/// Longest interval between two motions over which a bias counts \[s\].
+const DURATION_S_MAX: f64 = 10.0;
+
+impl Estimator {
+    /// An agent moved.
+    ///
+    /// Costs the same however much is known.
+    pub fn motion(
+        &mut self,
+        agent: u32,
+        stamp_ns: i64,
+        motion: &Motion,
+        effects: &mut Vec<Effect>,
+    ) -> Step {
+        let Some(slot) = self.slots.get_mut(agent as usize, 0) else {
+            return Step::none();
+        };
+        let state = if let Some(detached) = &mut slot.detached {
+            Arc::make_mut(&mut detached.state)
+        } else if let Some(frame) = self.frames.get_mut(slot.frame, 0)
+            && let Some(index) = frame.member(agent)
+        {
+            frame.members[index].state_mut()
+        } else {
+            return Step::none();
+        };
+        let before_ns = slot.stamp_ns.replace(stamp_ns);
+        let duration_s = before_ns.map_or(0.0, |before| {
+            let interval_s = stamp_ns.saturating_sub(before) as f64 * 1e-9;
+            interval_s.clamp(0.0, DURATION_S_MAX)
+        });
+        let filter = &mut state.filter;
+        let step = filter.step(motion, duration_s, &self.parameters);
+        slot.in_odom *= motion.increment();
+        slot.in_odom.rotation.renormalize_fast();
+        filter.history.note(stamp_ns, &slot.in_odom);
+        effects.push(Effect::Moved { agent, step });
+        if filter.is_nowhere() {
+            self.set_aside(agent, effects);
+        }
+        if !self.pending.is_empty() {
+            self.take_in_pending(effects);
+        }
+        step
+    }
+}
