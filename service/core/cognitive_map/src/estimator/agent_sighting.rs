@@ -45,7 +45,7 @@ impl Estimator {
 
     /// Takes in the pending sightings whose time has come.
     pub(super) fn take_in_pending(&mut self, effects: &mut Vec<Effect>) {
-        let stamp_of = |this: &Self, agent: u32| this.slot(agent).and_then(|slot| slot.stamp_ns);
+        let stamp_of = |this: &Self, agent: u32| this.filter(agent)?.history.stamp_ns();
         let has_come = |this: &Self, pending: &PendingSighting| {
             stamp_of(this, pending.target).is_some_and(|stamp| stamp >= pending.stamp_ns)
         };

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
-
 use super::agent_filter::AgentFilter;
 use super::outcome::Evidence;
 use super::sensor::Sensor;
@@ -32,9 +30,6 @@ pub(super) struct AgentState {
 pub(super) struct AgentSlot {
     /// Its frame.
     pub(super) frame: usize,
-    pub(super) in_odom: Isometry3<f64>,
-    /// Stamp of its latest motion \[ns\].
-    pub(super) stamp_ns: Option<i64>,
     pub(super) evidence: Evidence,
     /// Whether it was set aside, and its evidence has not fitted since.
     pub(super) is_aside: bool,
@@ -55,8 +50,6 @@ impl AgentSlot {
     pub(super) fn new(frame: usize, filter: AgentFilter) -> Self {
         Self {
             frame,
-            in_odom: Isometry3::identity(),
-            stamp_ns: None,
             evidence: Evidence::default(),
             is_aside: false,
             detached: Some(Detached::new(Arc::new(AgentState {

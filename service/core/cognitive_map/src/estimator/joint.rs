@@ -222,8 +222,8 @@ impl Estimator {
     }
 
     /// Pose of an agent by motion alone since its session began.
-    pub fn in_odom(&self, agent: u32) -> Option<&Isometry3<f64>> {
-        Some(&self.slot(agent)?.in_odom)
+    pub fn in_odom(&self, agent: u32) -> Option<Isometry3<f64>> {
+        Some(self.filter(agent)?.history.pose())
     }
 
     /// What became of an agent's sightings.

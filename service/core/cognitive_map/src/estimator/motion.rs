@@ -33,16 +33,13 @@ impl Estimator {
         } else {
             return Step::none();
         };
-        let before_ns = slot.stamp_ns.replace(stamp_ns);
-        let duration_s = before_ns.map_or(0.0, |before| {
+        let filter = &mut state.filter;
+        let duration_s = filter.history.stamp_ns().map_or(0.0, |before| {
             let interval_s = stamp_ns.saturating_sub(before) as f64 * 1e-9;
             interval_s.clamp(0.0, DURATION_S_MAX)
         });
-        let filter = &mut state.filter;
         let step = filter.step(motion, duration_s, &self.parameters);
-        slot.in_odom *= motion.increment();
-        slot.in_odom.rotation.renormalize_fast();
-        filter.history.note(stamp_ns, &slot.in_odom);
+        filter.history.advance(stamp_ns, motion.increment());
         effects.push(Effect::Moved { agent, step });
         if filter.is_nowhere() {
             self.set_aside(agent, effects);

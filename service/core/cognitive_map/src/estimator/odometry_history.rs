@@ -1,4 +1,7 @@
-//! Where odometry was lately: other agents look back, and streams of agents interleave.
+//! Integrated odometry of the last few seconds.
+//!
+//! A sighting may arrive after later motions of the agents in it; the history says how far each has
+//! moved since its stamp.
 
 use std::collections::VecDeque;
 
@@ -11,24 +14,42 @@ pub(super) const KEPT: usize = 64;
 /// Least interval between two instants \[ns\]: 64 of them last three seconds.
 const INTERVAL_NS: i64 = 50_000_000;
 
-/// Odometry's poses at the latest instants, oldest first.
+/// Integrated odometry of an agent's session: its latest pose, and those of the last few seconds.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OdometryHistory {
+    /// Stamps \[ns\] and poses, oldest first.
     pub(super) instants: VecDeque<(i64, Isometry3<f64>)>,
-    /// The latest instant of all, which need not be kept.
+    /// The latest of all, which need not be among them; `None` before the session's first motion.
     pub(super) latest: Option<(i64, Isometry3<f64>)>,
 }
 
 impl OdometryHistory {
-    /// Odometry came to a pose.
-    pub(super) fn note(&mut self, stamp_ns: i64, in_odom: &Isometry3<f64>) {
-        self.latest = Some((stamp_ns, *in_odom));
+    /// Pose by motion alone since the session began.
+    #[inline]
+    pub(super) fn pose(&self) -> Isometry3<f64> {
+        self.latest
+            .map_or_else(Isometry3::identity, |(_, pose)| pose)
+    }
+
+    /// Stamp of the session's latest motion \[ns\].
+    #[inline]
+    pub(super) fn stamp_ns(&self) -> Option<i64> {
+        self.latest.map(|(stamp_ns, _)| stamp_ns)
+    }
+
+    /// Integrates a motion.
+    pub(super) fn advance(&mut self, stamp_ns: i64, increment: &Isometry3<f64>) {
+        let mut pose = self.pose();
+        pose *= increment;
+        // One Newton step: products of unit quaternions leave the unit sphere by rounding alone.
+        pose.rotation.renormalize_fast();
+        self.latest = Some((stamp_ns, pose));
         let is_due = |&(last, _): &(i64, _)| stamp_ns.saturating_sub(last) >= INTERVAL_NS;
         if self.instants.back().is_none_or(is_due) {
             if self.instants.len() == KEPT {
                 self.instants.pop_front();
             }
-            self.instants.push_back((stamp_ns, *in_odom));
+            self.instants.push_back((stamp_ns, pose));
         }
     }
 

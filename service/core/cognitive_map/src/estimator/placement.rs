@@ -114,8 +114,6 @@ impl Estimator {
             return;
         };
         let slot = self.slot_mut(agent);
-        slot.in_odom = Isometry3::identity();
-        slot.stamp_ns = None;
         let widen = |state: &mut AgentState| {
             state.filter.history.clear();
             let covariance = state.filter.covariance_mut();

@@ -394,7 +394,7 @@ fn a_new_session_starts_less_certain() {
     estimator.restart(agent, &Vector6::repeat(1.0));
     let after = estimator.pose(agent).unwrap().1.position_sd_m();
     assert!((after * after - before * before - 3.0).abs() < 1e-9);
-    assert_eq!(estimator.in_odom(agent), Some(&Isometry3::identity()));
+    assert_eq!(estimator.in_odom(agent), Some(Isometry3::identity()));
 }
 
 /// More agents than are estimated jointly come and go; those at rest or far from all others cost nothing.

@@ -61,7 +61,7 @@ impl Fold<'_> {
         };
         let viewed = Viewed {
             descriptor,
-            in_odom: *in_odom,
+            in_odom,
             covariance,
         };
         let moment = self.moment();

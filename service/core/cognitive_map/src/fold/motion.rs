@@ -32,9 +32,12 @@ impl Fold<'_> {
         let entered = |module, reference| {
             events.extend(cell_entered(placed, agent, stamp_ns, module, reference));
         };
+        let in_odom = self.estimator.in_odom(agent.0).unwrap_or_default();
+        let path_m = increment.translation.vector.norm();
+        let displacement = &step.displacement;
         self.agent
             .body
-            .step(increment, &step.displacement, self.modules, entered);
+            .step(&in_odom, path_m, displacement, self.modules, entered);
         self.follow();
         if !self.agent.placed {
             return;

@@ -6,6 +6,8 @@ mod lists;
 
 use std::sync::Arc;
 
+use nalgebra::Isometry3;
+
 use lists::{read_all, read_count, read_map, write_all, write_count, write_map, write_pairs};
 
 use super::agent_filter::{AgentFilter, BODY_DIM, Run};
@@ -129,28 +131,6 @@ impl State for Detached {
         Ok(Self {
             was_joint: State::read(input)?,
             state: Arc::new(State::read(input)?),
-        })
-    }
-}
-
-impl State for AgentSlot {
-    fn write(&self, out: &mut StateWriter) {
-        write_count(self.frame, out);
-        self.in_odom.write(out);
-        self.stamp_ns.write(out);
-        self.evidence.write(out);
-        self.is_aside.write(out);
-        self.detached.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            frame: read_count(input, AGENTS_MAX)?,
-            in_odom: State::read(input)?,
-            stamp_ns: State::read(input)?,
-            evidence: State::read(input)?,
-            is_aside: State::read(input)?,
-            detached: State::read(input)?,
         })
     }
 }
@@ -361,7 +341,10 @@ state_of_struct!(Association { name, refused });
 
 impl State for Estimator {
     fn write(&self, out: &mut StateWriter) {
-        write_all(self.slots.len(), self.slots.iter(), out);
+        write_count(self.slots.len(), out);
+        for (slot, agent) in self.slots.iter().zip(0..) {
+            self.write_slot(agent, slot, out);
+        }
         write_all(self.frames.len(), self.frames.iter(), out);
         write_all(self.pending.len(), &self.pending, out);
         write_all(self.cross_sightings.len(), &self.cross_sightings, out);
@@ -373,7 +356,7 @@ impl State for Estimator {
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         let mut slots = PagedVec::default();
         for _ in 0..read_count(input, AGENTS_MAX)? {
-            slots.push(AgentSlot::read(input)?, 0);
+            slots.push(read_slot(input)?, 0);
         }
         let mut frames = PagedVec::default();
         for _ in 0..read_count(input, AGENTS_MAX + 1)? {
@@ -399,7 +382,32 @@ impl State for Estimator {
     }
 }
 
+/// Reads a slot. The odometry in it repeats the history of the agent's filter, which is read with
+/// that; a checkpoint where the two differ has another digest.
+fn read_slot(input: &mut StateReader<'_>) -> Result<AgentSlot, CorruptState> {
+    let frame = read_count(input, AGENTS_MAX)?;
+    let _: (Isometry3<f64>, Option<i64>) = State::read(input)?;
+    Ok(AgentSlot {
+        frame,
+        evidence: State::read(input)?,
+        is_aside: State::read(input)?,
+        detached: State::read(input)?,
+    })
+}
+
 impl Estimator {
+    /// Writes a slot, with the pose and the stamp of the agent's latest odometry.
+    fn write_slot(&self, agent: u32, slot: &AgentSlot, out: &mut StateWriter) {
+        let history = self.filter(agent).map(|filter| &filter.history);
+        let pose = history.map_or_else(Isometry3::identity, OdometryHistory::pose);
+        write_count(slot.frame, out);
+        pose.write(out);
+        history.and_then(OdometryHistory::stamp_ns).write(out);
+        slot.evidence.write(out);
+        slot.is_aside.write(out);
+        slot.detached.write(out);
+    }
+
     /// Whether slots, frames and what waits belong together.
     fn is_sound(&self) -> bool {
         let (slots, frames) = (self.slots.len(), self.frames.len());
