@@ -9,8 +9,9 @@ use super::frame_alignment::{FrameAlignment, pose_by_alignment};
 use super::odometry_history::OdometryHistory;
 use super::outcome::Step;
 use super::parameters::Parameters;
+use super::tuning::{POSITION_SD_MAX_M, ROUNDING, RUN_LENGTH_MAX_M, RUN_STEPS_MAX};
 use crate::input::Motion;
-use geometry::{MotionSum, PoseCovariance, is_somewhere, positive, se3};
+use geometry::{MotionSum, PoseCovariance, is_somewhere, positive, se3, symmetric};
 
 /// Components of a body's error: translation and rotation of the pose (right perturbation), then
 /// relative errors of odometry's lengths and angles, then its bias about the body axes \[rad/s\].
@@ -22,17 +23,6 @@ const CALIBRATION: usize = BODY_DIM - POSE;
 
 type BodyCovariance = SMatrix<f64, BODY_DIM, BODY_DIM>;
 type Tail = SMatrix<f64, POSE, CALIBRATION>;
-
-/// Steps after which what a run added is carried over to the covariance.
-const RUN_STEPS_MAX: u32 = 64;
-/// Length of a run after which it is \[m\]: far from where it began, digits are lost.
-const RUN_LENGTH_MAX_M: f64 = 10.0;
-
-/// Deviation of a position from which on it says nothing \[m\]: the largest that settings may call
-/// lost.
-pub(super) const POSITION_SD_MAX_M: f64 = 1e6;
-/// Most that rounding takes away of a variance, as a part of those that it is made of.
-const ROUNDING: f64 = 1e-14;
 
 /// A body that moves.
 #[derive(Clone, Debug)]
@@ -119,7 +109,7 @@ impl AgentFilter {
         let by_alignment = pose_by_alignment(&self.pose);
         let spread = by_alignment * alignment.covariance * by_alignment.transpose();
         let mut pose = self.covariance_mut().fixed_view_mut::<6, 6>(0, 0);
-        pose += (spread + spread.transpose()) * 0.5;
+        pose += symmetric(&spread);
         self.pose = alignment.pose * self.pose;
     }
 

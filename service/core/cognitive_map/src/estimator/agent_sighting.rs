@@ -6,14 +6,10 @@ use super::effect::{AgentSighted, Effect};
 use super::innovation::seen_at;
 use super::joint::Estimator;
 use super::measurement_update::Measurement;
-use super::sightings::{CROSS_SIGHTINGS_MAX, CrossFrameSighting, PENDING_MAX, PendingSighting};
+use super::sightings::{CrossFrameSighting, PendingSighting};
+use super::tuning::{CROSS_SIGHTINGS_APART_M, CROSS_SIGHTINGS_MAX, PENDING_MAX, PENDING_NS_MAX};
 use super::verdict::Verdict;
 use crate::input::Relation;
-
-/// How long they wait, by the observer's clock \[ns\].
-const PATIENCE_NS: i64 = 2_000_000_000;
-/// Least distance of the places where an agent was seen, for two sightings to count as two \[m\].
-const CROSS_SIGHTINGS_APART_M: f64 = 0.2;
 
 impl Estimator {
     /// An agent saw another one.
@@ -51,7 +47,7 @@ impl Estimator {
         };
         let waits = |this: &Self, pending: &PendingSighting| {
             stamp_of(this, pending.observer)
-                .is_none_or(|stamp| stamp.saturating_sub(pending.stamp_ns) < PATIENCE_NS)
+                .is_none_or(|stamp| stamp.saturating_sub(pending.stamp_ns) < PENDING_NS_MAX)
         };
         if self
             .pending

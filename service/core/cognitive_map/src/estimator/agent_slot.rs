@@ -5,14 +5,7 @@ use std::sync::Arc;
 use super::agent_filter::AgentFilter;
 use super::outcome::Evidence;
 use super::sensor::Sensor;
-
-/// By how much the deviations of an agent grow that comes back to a joint estimate: three times.
-///
-/// Errors A and B whose correlation is not known any more have at most the covariance A/w beside
-/// B/(1 − w), for any w in (0, 1). With w = 1/9 the agent's own estimate counts for a ninth, and the
-/// others' variances would have to grow by an eighth each time. They stay as they are: what they miss is
-/// small, and a growth with every return would not end.
-const RETURN_WIDENING: f64 = 3.0;
+use super::tuning::RETURN_WIDENING;
 
 /// What is known of an agent itself. A clone shares it.
 #[derive(Clone, Debug)]

@@ -3,14 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::tuning::{ASSOCIATIONS_MAX, REFUSED_TO_DISSOCIATE};
 use super::verdict::Verdict;
 use crate::input::Label;
-
-/// Most names that stand for others. Beyond that no landmarks are found to be the same.
-pub(super) const ASSOCIATIONS_MAX: usize = 4096;
-/// A name whose sightings were refused this often in a row, by agents that are where they should be, is not that of the
-/// landmark that it was taken for. Less often than a landmark is forgotten for.
-const REFUSED_TO_PART: u32 = 6;
 
 /// What a name stands for.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,7 +80,7 @@ impl Associations {
             return; // as most often: nothing is copied
         }
         let names = Arc::make_mut(&mut self.names);
-        if refused >= REFUSED_TO_PART && observer_refused < REFUSED_TO_PART / 2 {
+        if refused >= REFUSED_TO_DISSOCIATE && observer_refused < REFUSED_TO_DISSOCIATE / 2 {
             names.remove(label);
         } else if let Some(association) = names.get_mut(label) {
             association.refused = refused;

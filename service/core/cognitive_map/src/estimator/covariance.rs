@@ -6,13 +6,8 @@ use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
 
-/// Least variance of a component of a measurement that the estimate expects, as a part of the
-/// variances of whose differences it is made: below that it is rounding. A measurement then says at
-/// most so much more than was known.
-const CONDITION: f64 = 1e-8;
-/// By how much variances grow with each update, as a part of what they were: more than what
-/// rounding takes away.
-const ROUNDING: f64 = 1e-10;
+use super::tuning::{CONDITION_MIN, COVARIANCE_ROUNDING};
+use geometry::symmetric;
 
 /// A covariance of any dimension, exactly symmetric, row by row. A clone shares the entries.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -192,13 +187,13 @@ impl JointCovariance {
                 }
             }
         }
-        let mut spread = (spread + spread.transpose()) * 0.5;
+        let mut spread = symmetric(&spread);
         for block in blocks {
             for column in 0..block.width {
                 let variance = self.variance(block.offset + column);
                 for k in 0..M {
                     let factor = block.jacobian[(k, column)];
-                    spread[(k, k)] += CONDITION * factor * factor * variance;
+                    spread[(k, k)] += CONDITION_MIN * factor * factor * variance;
                 }
             }
         }
@@ -275,7 +270,7 @@ impl JointCovariance {
                     }
                 }
             }
-            target[index] += ROUNDING * variance;
+            target[index] += COVARIANCE_ROUNDING * variance;
         }
         Some(correction)
     }
@@ -312,7 +307,7 @@ impl JointCovariance {
                 }
             }
             for (lever, variance) in levers.iter().zip(variances) {
-                target[index] += ROUNDING * lever[index] * lever[index] * variance;
+                target[index] += COVARIANCE_ROUNDING * lever[index] * lever[index] * variance;
             }
         }
     }

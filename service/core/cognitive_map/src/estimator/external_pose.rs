@@ -9,16 +9,10 @@ use super::effect::Effect;
 use super::frame::Frame;
 use super::joint::Estimator;
 use super::parameters::Parameters;
-use geometry::{PoseCovariance, is_somewhere, se3};
-
-/// Steps of the search for the weight.
-const WEIGHT_STEPS: u32 = 16;
-/// Least information that a direction gains, as a part of what is known of it.
-const GAIN_MIN: f64 = 0.02;
-/// Most that it gains.
-const GAIN_MAX: f64 = 1e9;
-/// Least variance of an external component, as a part of the estimate's own variance.
-const VARIANCE_MIN: f64 = 1e-9;
+use super::tuning::{
+    INTERSECTION_GAIN_MAX, INTERSECTION_GAIN_MIN, INTERSECTION_STEPS, INTERSECTION_VARIANCE_MIN,
+};
+use geometry::{PoseCovariance, is_somewhere, se3, symmetric};
 
 impl Estimator {
     /// Takes in what an outside estimate says of an agent's pose in its frame, with the covariance of its
@@ -114,8 +108,8 @@ impl Frame {
             })
         };
         let (own, others) = (
-            unit(&own, VARIANCE_MIN),
-            unit(external.covariance.matrix(), VARIANCE_MIN),
+            unit(&own, INTERSECTION_VARIANCE_MIN),
+            unit(external.covariance.matrix(), INTERSECTION_VARIANCE_MIN),
         );
         let innovation = innovation.component_mul(&scale);
         // Of two errors that may be correlated in any way, the variances' sum counts twice.
@@ -128,13 +122,14 @@ impl Frame {
         else {
             return false;
         };
-        let weights = (0..=WEIGHT_STEPS).map(|step| f64::from(step) / f64::from(WEIGHT_STEPS));
+        let weights =
+            (0..=INTERSECTION_STEPS).map(|step| f64::from(step) / f64::from(INTERSECTION_STEPS));
         let known = |weight: f64| (own * weight + others * (1.0 - weight)).determinant();
         // Of equal ones the last, so that what adds nothing moves nothing.
         let weight = weights.max_by(|a, b| known(*a).total_cmp(&known(*b)));
         let share = 1.0 - weight.unwrap_or(1.0);
         let gain = (others - own) * share;
-        let gain = (gain + gain.transpose()) * 0.5;
+        let gain = symmetric(&gain);
         if !is_near || !gain.iter().all(|entry| entry.is_finite()) {
             return false;
         }
@@ -145,11 +140,11 @@ impl Frame {
         let mut residual = Vector6::zeros();
         let mut variance = Vector6::repeat(1.0);
         for (k, &information) in gain.eigenvalues.iter().enumerate() {
-            if information < GAIN_MIN {
+            if information < INTERSECTION_GAIN_MIN {
                 jacobian.row_mut(k).fill(0.0);
             } else {
                 residual[k] = pull[k] / information;
-                variance[k] = 1.0 / information.min(GAIN_MAX);
+                variance[k] = 1.0 / information.min(INTERSECTION_GAIN_MAX);
             }
         }
         let block = Block {

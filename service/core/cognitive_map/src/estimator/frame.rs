@@ -11,15 +11,11 @@ use super::agent_slot::AgentState;
 use super::covariance::{Block, JointCovariance};
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
 use super::observers::Observers;
-use super::parameters::{ANY_TURN_SD_RAD, Parameters};
+use super::parameters::Parameters;
+use super::tuning::{ANY_TURN_SD_RAD, ANY_TURN_SLACK, LANDMARKS_MAX};
 use crate::input::Label;
-use geometry::{positive, se3};
+use geometry::{OUT_OF_PLANE, positive, se3};
 
-/// Agents whose errors are estimated jointly; of more, those that saw and were seen longest ago leave.
-pub(super) const MEMBERS_MAX: usize = 32;
-
-/// Landmarks that are estimated jointly; of more, those seen longest ago leave.
-pub(super) const LANDMARKS_MAX: usize = 96;
 /// Components of a landmark.
 pub(super) const LANDMARK_DIM: usize = 3;
 
@@ -221,7 +217,7 @@ impl Frame {
         let mut has_changed = false;
         for component in turns {
             let variance = self.covariance.variance(component);
-            if variance > 1.001 * most {
+            if variance > ANY_TURN_SLACK * most {
                 let mut jacobian = SMatrix::<f64, 1, 6>::zeros();
                 jacobian[0] = 1.0;
                 let block = Block {
@@ -257,8 +253,7 @@ impl Frame {
         let member = &mut self.members[index];
         let filter = &mut member.state_mut().filter;
         for k in 0..6 {
-            let out_of_plane = matches!(k, 2..=4);
-            if !(filter.is_planar && out_of_plane) {
+            if !(filter.is_planar && OUT_OF_PLANE.contains(&k)) {
                 let sd = if k < 3 { sd_m } else { sd_rad };
                 filter.covariance_mut()[(k, k)] += sd * sd;
             }
@@ -355,9 +350,4 @@ pub(super) fn point_by_pose(point: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
         .fixed_view_mut::<3, 3>(0, 3)
         .copy_from(&point.cross_matrix());
     jacobian
-}
-
-/// Without the asymmetry of rounding.
-pub(super) fn symmetric(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    (matrix + matrix.transpose()) * 0.5
 }

@@ -2,20 +2,11 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 
+use super::tuning::{
+    ALIGNMENT_AGREEING_MIN, ALIGNMENT_POINTS_MIN, ALIGNMENT_ROTATION_SD_MAX_RAD, ALIGNMENT_ROUNDS,
+    ALIGNMENT_SOFT, ALIGNMENT_WIDENING,
+};
 use geometry::{align, centre, se3};
-
-/// Fewest points that align two planar frames, and two frames in space.
-const POINTS_MIN: (usize, usize) = (3, 4);
-/// Part of the points that must agree.
-const AGREEING_MIN: f64 = 0.7;
-/// Largest uncertainty of the rotation that is good enough to go on from \[rad\].
-const ROTATION_SD_MAX_RAD: f64 = 0.12;
-/// Rounds of weighing the points anew.
-const ROUNDS: usize = 8;
-/// Normalised distance from which a point loses weight.
-const SOFT: f64 = 2.0;
-/// By how much the deviations of the found motion are widened: the points' errors are correlated.
-const WIDENING: f64 = 5.0;
 
 /// A point known in two frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,9 +31,9 @@ pub(super) struct FrameAlignment {
 /// after Cauchy). Between planar frames only a motion in the plane is sought.
 pub(super) fn align_frames(pairs: &[PointPair], is_planar: bool) -> Option<FrameAlignment> {
     let points_min = if is_planar {
-        POINTS_MIN.0
+        ALIGNMENT_POINTS_MIN.0
     } else {
-        POINTS_MIN.1
+        ALIGNMENT_POINTS_MIN.1
     };
     if pairs.len() < points_min {
         return None;
@@ -50,19 +41,19 @@ pub(super) fn align_frames(pairs: &[PointPair], is_planar: bool) -> Option<Frame
     let mut weights: Vec<f64> = pairs.iter().map(|pair| 1.0 / pair.variance).collect();
     let points: Vec<_> = pairs.iter().map(|pair| (pair.older, pair.newer)).collect();
     let mut pose = align(&points, &weights, is_planar)?;
-    for _ in 0..ROUNDS {
+    for _ in 0..ALIGNMENT_ROUNDS {
         for (weight, pair) in weights.iter_mut().zip(pairs) {
             let squared = (pose * pair.newer - pair.older).norm_squared() / pair.variance;
-            *weight = 1.0 / (pair.variance * (1.0 + squared / (SOFT * SOFT)));
+            *weight = 1.0 / (pair.variance * (1.0 + squared / (ALIGNMENT_SOFT * ALIGNMENT_SOFT)));
         }
         pose = align(&points, &weights, is_planar)?;
     }
     let agrees = |pair: &&PointPair| {
         let squared = (pose * pair.newer - pair.older).norm_squared() / pair.variance;
-        squared <= (2.0 * SOFT) * (2.0 * SOFT)
+        squared <= (2.0 * ALIGNMENT_SOFT) * (2.0 * ALIGNMENT_SOFT)
     };
     let agreeing = pairs.iter().filter(agrees).count();
-    if agreeing < points_min || (agreeing as f64) < AGREEING_MIN * pairs.len() as f64 {
+    if agreeing < points_min || (agreeing as f64) < ALIGNMENT_AGREEING_MIN * pairs.len() as f64 {
         return None;
     }
     let total: f64 = weights.iter().sum();
@@ -80,7 +71,7 @@ pub(super) fn align_frames(pairs: &[PointPair], is_planar: bool) -> Option<Frame
         information.try_inverse()?
     };
     let sd = rotation.diagonal().amax().sqrt();
-    if sd.is_nan() || sd > ROTATION_SD_MAX_RAD {
+    if sd.is_nan() || sd > ALIGNMENT_ROTATION_SD_MAX_RAD {
         return None;
     }
     // The error is stated at the origin, not at the centre: ρ₀ = ρ + c × φ.
@@ -98,7 +89,8 @@ pub(super) fn align_frames(pairs: &[PointPair], is_planar: bool) -> Option<Frame
         .fixed_view_mut::<3, 3>(3, 0)
         .copy_from(&mixed.transpose());
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
-    let covariance = (covariance + covariance.transpose()) * (0.5 * WIDENING * WIDENING);
+    let covariance =
+        (covariance + covariance.transpose()) * (0.5 * ALIGNMENT_WIDENING * ALIGNMENT_WIDENING);
     Some(FrameAlignment { pose, covariance })
 }
 

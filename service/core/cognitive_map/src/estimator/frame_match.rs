@@ -2,9 +2,6 @@
 
 use nalgebra::Isometry3;
 
-/// Most pairs of frames of which it is remembered what was found.
-pub(super) const FRAME_MATCHES_MAX: usize = 64;
-
 /// How a frame seems to lie in another one.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FrameMatch {

@@ -6,15 +6,14 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::covariance::Block;
-use super::frame::{Frame, LANDMARK_DIM, LandmarkState, symmetric};
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState};
 use super::frame_alignment::{FrameAlignment, PointPair, point_by_alignment, pose_by_alignment};
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
 use super::measurement_update::point_block;
 use super::parameters::Parameters;
+use super::tuning::SAME_LANDMARK_VARIANCE_M2;
 use crate::input::Label;
-
-/// Variance of the distance between the two estimates of one landmark, beside their own \[m²\].
-const SAME_VARIANCE_M2: f64 = 1e-4;
+use geometry::symmetric;
 
 impl Frame {
     /// The landmarks known in both frames.
@@ -23,7 +22,7 @@ impl Frame {
             let other = newer.landmarks.get(label)?;
             let spread = self.landmark_covariance(landmark).trace()
                 + newer.landmark_covariance(other).trace();
-            let variance = spread / 3.0 + SAME_VARIANCE_M2;
+            let variance = spread / 3.0 + SAME_LANDMARK_VARIANCE_M2;
             Some(PointPair {
                 older: landmark.position,
                 newer: other.position,
@@ -104,7 +103,7 @@ impl Frame {
                 .covariance
                 .block::<3, 3>(landmark.offset, landmark.offset);
             let turned = rotation * own * rotation.transpose();
-            let turned = (turned + turned.transpose()) * 0.5;
+            let turned = symmetric(&turned);
             self.covariance
                 .transform::<3>(landmark.offset, &rotation, &turned);
             landmark.position = alignment.pose * landmark.position;
@@ -183,7 +182,7 @@ impl Frame {
         ];
         let innovation = other.position - one.position;
         let projection = self.covariance.project(&blocks);
-        let mut variance = SMatrix::<f64, 3, 1>::repeat(SAME_VARIANCE_M2);
+        let mut variance = SMatrix::<f64, 3, 1>::repeat(SAME_LANDMARK_VARIANCE_M2);
         for k in 0..3 {
             let expected = projection.spread[(k, k)] + variance[k];
             let square = innovation[k] * innovation[k] / expected;

@@ -5,30 +5,16 @@ use std::cmp::Reverse;
 use super::effect::Effect;
 use super::frame::{Frame, LandmarkState};
 use super::frame_alignment::{PointPair, align_frames};
-use super::frame_match::{FRAME_MATCHES_MAX, FrameMatch};
+use super::frame_match::FrameMatch;
 use super::joint::{Estimator, MAP};
 use super::registration::{
     GATE, Registration, SOUGHT_MAX, SURE_MARGIN, UncertainPoint, apart_m, mean_variance, register,
 };
+use super::tuning::{
+    ASSOCIATE_EVERY, FRAME_MATCH_FOUND_MIN, FRAME_MATCHES_MAX, FRAMES_SCANNED_MAX,
+    LANDMARK_WIDENING, REGISTERED_MAX, SAME_LANDMARK_VARIANCE_M2, SWAP_ROUNDS,
+};
 use crate::input::Label;
-
-/// Sightings of a frame between two attempts to associate its landmarks with others.
-///
-/// A prime, so that it is not always the same agent's turn where agents see in turn.
-const ASSOCIATE_EVERY: u64 = 31;
-/// Attempts in a row that must find the same motion before it is accepted.
-const FOUND_MIN: u32 = 3;
-/// Rounds of testing whether two correspondences fit better with their points swapped.
-const CROSSED_ROUNDS: usize = 3;
-/// Landmarks of the older frame among which others are sought, in the plane and in space, where it takes three to a motion.
-const KNOWN_MAX: (usize, usize) = (64, 32);
-/// Frames among which the next one to compare is sought.
-const TURNED_MAX: usize = 16;
-/// By how much the landmarks' variances are widened: sensors err alike for a while, which the estimate takes for more
-/// independent than it is, so that it is too sure of itself.
-pub(super) const WIDENING: f64 = 4.0;
-/// Variance of the distance between two estimates of one landmark, beside their own \[m²\].
-pub(super) const SAME_VARIANCE_M2: f64 = 1e-4;
 
 /// Landmarks of a frame that the other frame has no name for.
 #[derive(Clone, Debug)]
@@ -63,12 +49,17 @@ impl Estimator {
     fn register_frames(&mut self, own: usize, other: usize, effects: &mut Vec<Effect>) {
         let (older, newer) = (own.min(other), own.max(other));
         let is_planar = self.frame(older).is_planar() && self.frame(newer).is_planar();
-        let known_max = if is_planar { KNOWN_MAX.0 } else { KNOWN_MAX.1 };
+        let known_max = if is_planar {
+            REGISTERED_MAX.0
+        } else {
+            REGISTERED_MAX.1
+        };
         let [known, sought] = [(older, newer, known_max), (newer, older, SOUGHT_MAX)]
             .map(|(one, other, most)| self.frame(one).unshared(self.frame(other), most, is_planar));
         match register(&known.points, &sought.points, is_planar) {
             Some(register) => {
-                if self.note_match(older, newer, &register, &sought.points) >= FOUND_MIN {
+                if self.note_match(older, newer, &register, &sought.points) >= FRAME_MATCH_FOUND_MIN
+                {
                     self.accept([older, newer], &register, &known, &sought, effects);
                 }
             }
@@ -85,7 +76,7 @@ impl Estimator {
             return (self.frame(MAP).population > 0).then_some(MAP);
         }
         let start = usize::try_from(turn / 2 % count as u64).ok()?;
-        let turn = (0..count.min(TURNED_MAX)).map(|k| (start + k) % count);
+        let turn = (0..count.min(FRAMES_SCANNED_MAX)).map(|k| (start + k) % count);
         let is_other = |&other: &usize| other != own && !self.frame(other).landmarks.is_empty();
         turn.filter(|&other| other != MAP).find(is_other)
     }
@@ -178,7 +169,7 @@ impl Estimator {
             4.0 * there.dot(&(lies_at(i) - lies_at(j)))
         };
         let mut correspondences = found.correspondences.clone();
-        for _ in 0..CROSSED_ROUNDS {
+        for _ in 0..SWAP_ROUNDS {
             for one in 0..correspondences.len() {
                 for other in 0..one {
                     if margin(&correspondences[one], &correspondences[other]) < 0.0 {
@@ -258,7 +249,7 @@ impl Frame {
         known.sort_by(|a, b| a.0.total_cmp(&b.0));
         let point = |&(variance, (_, landmark)): &(f64, (&Label, &LandmarkState))| UncertainPoint {
             position: landmark.position,
-            variance: WIDENING * variance + SAME_VARIANCE_M2,
+            variance: LANDMARK_WIDENING * variance + SAME_LANDMARK_VARIANCE_M2,
         };
         UnsharedLandmarks {
             points: known.iter().map(point).collect(),

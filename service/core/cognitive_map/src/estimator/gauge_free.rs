@@ -3,9 +3,7 @@
 use nalgebra::{Matrix3, Matrix6, SMatrix};
 
 use super::frame::{Frame, LandmarkState};
-
-/// Least variance that a landmark is weighed with \[m²\].
-const VARIANCE_MIN_M2: f64 = 1e-6;
+use super::tuning::LANDMARK_VARIANCE_MIN_M2;
 
 impl Frame {
     /// Variance of each landmark along an axis, but for what a rigid motion of them all would explain \[m²\].
@@ -34,7 +32,7 @@ impl Frame {
             .iter()
             .map(|landmark| self.landmark_covariance(landmark))
             .collect();
-        let weight = |own: &Matrix3<f64>| 1.0 / along(own).max(VARIANCE_MIN_M2);
+        let weight = |own: &Matrix3<f64>| 1.0 / along(own).max(LANDMARK_VARIANCE_MIN_M2);
         let modes: Vec<SMatrix<f64, 3, 6>> = landmarks
             .iter()
             .map(|landmark| rigid(landmark, is_planar))

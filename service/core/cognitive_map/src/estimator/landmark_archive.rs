@@ -5,14 +5,9 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
 
+use super::tuning::{ARCHIVE_PART_MAX, ARCHIVE_PARTS};
 use crate::input::Label;
 use ::state::PagedVec;
-
-/// Parts by which the landmarks are kept, so that a change after a snapshot copies one part only.
-pub(super) const PARTS: usize = 1024;
-/// Landmarks of a part: 65,536 in all. Labels are spread evenly, so that parts fill up alike; of a full
-/// one the landmark that left longest ago goes.
-pub(super) const PART_MAX: usize = 64;
 
 /// A landmark that left the joint estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,14 +34,14 @@ pub(super) struct LandmarkArchive {
 impl LandmarkArchive {
     /// Puts a landmark to sleep.
     pub(super) fn insert(&mut self, label: Label, landmark: ArchivedLandmark) {
-        while self.parts.len() < PARTS {
+        while self.parts.len() < ARCHIVE_PARTS {
             self.parts.push(Arc::default(), 0);
         }
         let Some(part) = self.parts.get_mut(part_of(&label), 0) else {
             return;
         };
         let part = Arc::make_mut(part);
-        if part.len() >= PART_MAX && !part.contains_key(&label) {
+        if part.len() >= ARCHIVE_PART_MAX && !part.contains_key(&label) {
             let oldest = part.iter().min_by_key(|(_, landmark)| landmark.left);
             if let Some(oldest) = oldest.map(|(label, _)| label.clone()) {
                 part.remove(&oldest);
@@ -61,7 +56,8 @@ impl LandmarkArchive {
         let number = part_of(&label);
         let later = self.parts.iter_from(number + 1).all(|part| part.is_empty());
         let fits = self.parts.get(number).is_none_or(|part| {
-            part.len() < PART_MAX && part.last_key_value().is_none_or(|(last, _)| *last < label)
+            part.len() < ARCHIVE_PART_MAX
+                && part.last_key_value().is_none_or(|(last, _)| *last < label)
         });
         let is_next = later && fits;
         if is_next {
@@ -126,7 +122,7 @@ fn part_of(label: &Label) -> usize {
             (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3_u64)
         });
     // The high bits depend on every byte, too.
-    usize::try_from((hash ^ (hash >> 32)) % PARTS as u64).expect("fewer than 1024")
+    usize::try_from((hash ^ (hash >> 32)) % ARCHIVE_PARTS as u64).expect("fewer than 1024")
 }
 
 #[cfg(test)]
@@ -152,7 +148,10 @@ mod tests {
         for number in 0..100_000 {
             landmarks.insert(label(number), landmark(number));
         }
-        assert!(landmarks.len() <= PARTS * PART_MAX && landmarks.len() > PARTS * PART_MAX * 9 / 10);
+        assert!(
+            landmarks.len() <= ARCHIVE_PARTS * ARCHIVE_PART_MAX
+                && landmarks.len() > ARCHIVE_PARTS * ARCHIVE_PART_MAX * 9 / 10
+        );
         let latest = (60_000..100_000).filter(|&number| landmarks.contains(&label(number)));
         assert!(latest.count() > 39_000);
         let earliest = (0..20_000).filter(|&number| landmarks.contains(&label(number)));

@@ -9,17 +9,14 @@ use nalgebra::Matrix3;
 
 use super::effect::Effect;
 use super::frame::{Frame, LANDMARK_DIM, LandmarkState};
-use super::frame_registration::{SAME_VARIANCE_M2, WIDENING};
 use super::joint::Estimator;
 use super::parameters::Parameters;
 use super::registration::{GATE, PointIndex, UncertainPoint, log10_at_least};
+use super::tuning::{
+    ASSOCIATION_CHANCE_MAX, ASSOCIATION_LOG10_CHANCE_MAX, LANDMARK_WIDENING,
+    SAME_LANDMARK_VARIANCE_M2,
+};
 use crate::input::Label;
-
-/// Log₁₀ of the probability that as many landmarks agree by chance, for them to be believed.
-const LOG10_CHANCE_MAX: f64 = -4.0;
-/// Largest probability that something lies by chance where a landmark would be taken for another. One that is known less well says
-/// nothing yet.
-const CHANCE_MAX: f64 = 0.25;
 
 impl Estimator {
     /// Looks whether an agent has names of its own for landmarks of its frame that others know.
@@ -85,7 +82,7 @@ impl Estimator {
                 n_sought += usize::from(!near.is_empty() && second.is_none() && !is_proven(label));
                 continue;
             };
-            if index.chance_within(GATE * separation.sd_m) > CHANCE_MAX {
+            if index.chance_within(GATE * separation.sd_m) > ASSOCIATION_CHANCE_MAX {
                 continue;
             }
             n_sought += 1;
@@ -98,7 +95,8 @@ impl Estimator {
         }
         let largest = chances.iter().copied().fold(0.0, f64::max);
         let agreeing = found.len() + n_proven;
-        let is_proven = log10_at_least(agreeing, n_sought + n_proven, largest) < LOG10_CHANCE_MAX;
+        let is_proven =
+            log10_at_least(agreeing, n_sought + n_proven, largest) < ASSOCIATION_LOG10_CHANCE_MAX;
         let mut names: Vec<&Label> = found
             .iter()
             .flat_map(|(label, name)| [label, name])
@@ -139,7 +137,7 @@ impl Frame {
         } else {
             spread.trace() / 3.0
         };
-        let variance = WIDENING * variance.max(0.0) + 2.0 * SAME_VARIANCE_M2;
+        let variance = LANDMARK_WIDENING * variance.max(0.0) + 2.0 * SAME_LANDMARK_VARIANCE_M2;
         let distance_m = (one.position - other.position).norm();
         Separation {
             distance_m,

@@ -7,25 +7,18 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
 
 use super::agent_slot::AgentState;
 use super::covariance::Block;
-use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member, point_by_pose, symmetric};
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member, point_by_pose};
 use super::innovation::{PointInnovation, pose_innovation, seen_at};
 use super::landmark_archive::ArchivedLandmark;
 use super::observers::Observers;
 use super::parameters::Parameters;
 use super::sensor::SightingTarget;
+use super::tuning::{
+    ARCHIVE_GAIN_MIN_M2, ARCHIVE_GATE, REFUSED_TO_FORGET, REFUSED_TO_WIDEN, WIDENED_SD,
+};
 use super::verdict::{Outcome, Verdict};
 use crate::input::{Label, Relation, RelativePose};
-use geometry::se3;
-
-/// An agent whose sightings were refused this often in a row is not where it should be.
-pub(super) const REFUSED_TO_WIDEN: u32 = 8;
-/// By how much its pose then becomes less certain \[m, rad\].
-const WIDENED: (f64, f64) = (1.0, 0.5);
-/// A landmark whose sightings were refused this often in a row, by agents that are where they should
-/// be, was moved or was never there.
-const REFUSED_TO_FORGET: u32 = 8;
-/// Least variance of a component that an archived landmark gains \[m²\].
-const GAIN_MIN_M2: f64 = 1e-9;
+use geometry::{se3, symmetric};
 
 /// A sighting of a frame's member: who, how it moved since, when, and what it saw.
 #[derive(Clone, Copy, Debug)]
@@ -230,9 +223,9 @@ impl Frame {
             return accepted; // of such a matrix the search for eigenvalues need not end
         }
         let gain = gain.symmetric_eigen();
-        let variances = gain
-            .eigenvalues
-            .map(|information| 1.0 / information.clamp(GAIN_MIN_M2, 1.0 / GAIN_MIN_M2));
+        let variances = gain.eigenvalues.map(|information| {
+            1.0 / information.clamp(ARCHIVE_GAIN_MIN_M2, 1.0 / ARCHIVE_GAIN_MIN_M2)
+        });
         let axes = gain.eigenvectors;
         let block = point_block(offset, &axes.transpose());
         let projection = self.covariance.project(&[block]);
@@ -247,7 +240,7 @@ impl Frame {
         let spread = projection.spread;
         let far = (0..3).any(|k| {
             let expected = spread[(k, k)] + 2.0 * archived.covariance.trace();
-            innovation[k] * innovation[k] > 36.0 * expected
+            innovation[k] * innovation[k] > ARCHIVE_GATE * ARCHIVE_GATE * expected
         });
         if far {
             return Verdict::Refused;
@@ -366,7 +359,7 @@ impl Frame {
     fn widen_if_refused(&mut self, observer: usize) {
         if self.members[observer].state.refused >= REFUSED_TO_WIDEN {
             self.members[observer].state_mut().refused = 0;
-            self.widen(observer, WIDENED.0, WIDENED.1);
+            self.widen(observer, WIDENED_SD.0, WIDENED_SD.1);
         }
     }
 }

@@ -4,13 +4,11 @@ use std::sync::Arc;
 
 use super::agent_filter::AgentFilter;
 use super::effect::{Effect, FramesMerged};
-use super::frame::{Frame, MEMBERS_MAX};
+use super::frame::Frame;
 use super::frame_alignment::{FrameAlignment, PointPair, align_frames};
 use super::joint::{Estimator, MAP};
+use super::tuning::{FRAMES_COMPARED_MAX, MEMBERS_MAX};
 use crate::input::Label;
-
-/// Frames that are compared with an agent's own after one of its sightings. Of more, others come next.
-const COMPARED_MAX: usize = 16;
 
 impl Estimator {
     /// Looks whether an agent's frame and another one can be laid into each other, after a sighting of
@@ -24,13 +22,17 @@ impl Estimator {
         let (Some(own), count) = (self.frame_of(agent), self.frames.len()) else {
             return;
         };
-        let start = if count <= COMPARED_MAX { 0 } else { self.turn };
-        let others = (0..count.min(COMPARED_MAX)).map(|k| (start + k) % count);
+        let start = if count <= FRAMES_COMPARED_MAX {
+            0
+        } else {
+            self.turn
+        };
+        let others = (0..count.min(FRAMES_COMPARED_MAX)).map(|k| (start + k) % count);
         // The map's frame is always among them.
         let others: Vec<usize> = std::iter::once(MAP)
             .chain(others.filter(|&other| other != MAP))
             .collect();
-        self.turn = (start + COMPARED_MAX) % count;
+        self.turn = (start + FRAMES_COMPARED_MAX) % count;
         for other in others {
             let frame = self.frame(other);
             let knows =

@@ -63,6 +63,7 @@ mod sensor;
 mod set_aside;
 mod sightings;
 mod state;
+mod tuning;
 mod verdict;
 
 pub use calibration::{Calibrated, Calibration};

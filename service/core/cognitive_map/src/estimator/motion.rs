@@ -5,10 +5,8 @@ use std::sync::Arc;
 use super::effect::Effect;
 use super::joint::Estimator;
 use super::outcome::Step;
+use super::tuning::MOTION_INTERVAL_S_MAX;
 use crate::input::Motion;
-
-/// Longest interval between two motions over which a bias counts \[s\].
-const DURATION_S_MAX: f64 = 10.0;
 
 impl Estimator {
     /// An agent moved.
@@ -36,7 +34,7 @@ impl Estimator {
         let filter = &mut state.filter;
         let duration_s = filter.history.stamp_ns().map_or(0.0, |before| {
             let interval_s = stamp_ns.saturating_sub(before) as f64 * 1e-9;
-            interval_s.clamp(0.0, DURATION_S_MAX)
+            interval_s.clamp(0.0, MOTION_INTERVAL_S_MAX)
         });
         let step = filter.step(motion, duration_s, &self.parameters);
         filter.history.advance(stamp_ns, motion.increment());

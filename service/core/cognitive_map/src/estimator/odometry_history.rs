@@ -7,12 +7,8 @@ use std::collections::VecDeque;
 
 use nalgebra::Isometry3;
 
+use super::tuning::{HISTORY_INTERVAL_NS, HISTORY_LEN};
 use geometry::se3;
-
-/// Instants kept.
-pub(super) const KEPT: usize = 64;
-/// Least interval between two instants \[ns\]: 64 of them last three seconds.
-const INTERVAL_NS: i64 = 50_000_000;
 
 /// Integrated odometry of an agent's session: its latest pose, and those of the last few seconds.
 #[derive(Clone, Debug, Default)]
@@ -44,9 +40,9 @@ impl OdometryHistory {
         // One Newton step: products of unit quaternions leave the unit sphere by rounding alone.
         pose.rotation.renormalize_fast();
         self.latest = Some((stamp_ns, pose));
-        let is_due = |&(last, _): &(i64, _)| stamp_ns.saturating_sub(last) >= INTERVAL_NS;
+        let is_due = |&(last, _): &(i64, _)| stamp_ns.saturating_sub(last) >= HISTORY_INTERVAL_NS;
         if self.instants.back().is_none_or(is_due) {
-            if self.instants.len() == KEPT {
+            if self.instants.len() == HISTORY_LEN {
                 self.instants.pop_front();
             }
             self.instants.push_back((stamp_ns, pose));

@@ -2,21 +2,9 @@
 
 use nalgebra::{SVector, Vector6};
 
+use super::tuning::{ANY_TURN_SD_RAD, LASTING_DEVIATIONS_MAX, LASTING_RATIO_MAX, WANDERED_MAX};
 use crate::input::Motion;
 use crate::settings::Settings;
-
-/// Deviation of a turn of which nothing is known \[rad\]: no rotation is off by more than half a
-/// turn.
-pub(crate) const ANY_TURN_SD_RAD: f64 = 3.0;
-/// Farthest that a lasting error of odometry is believed to be from none, in the deviations that
-/// the settings state.
-const LASTING_DEVIATIONS_MAX: f64 = 8.0;
-/// Largest lasting error of lengths and of angles: with more, readings would say next to nothing,
-/// or the contrary.
-const LASTING_RATIO_MAX: f64 = 0.9;
-/// Largest deviation of a lasting error, in those that the settings state: it may wander, but not
-/// for ever.
-const WANDERED_MAX: f64 = 2.0;
 
 /// Physical parameters of the estimation, the same for every robot and every sensor.
 ///

@@ -9,7 +9,7 @@ use super::agent_slot::{AgentState, Detached};
 use super::effect::Effect;
 use super::frame_alignment::FrameAlignment;
 use super::joint::{Estimator, MAP};
-use super::parameters::ANY_TURN_SD_RAD;
+use super::tuning::ANY_TURN_SD_RAD;
 use crate::input::StartPose;
 use geometry::{OUT_OF_PLANE, PoseCovariance, is_somewhere, positive, se3};
 

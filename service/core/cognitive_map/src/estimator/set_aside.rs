@@ -8,7 +8,7 @@
 //!
 //! It comes back as a newcomer does, when enough of what it sees lies as the map has it, or it is
 //! told where it stands. It stays doubted until more of its sightings fit than do not, by
-//! [`PROBATION`]; then its landmarks in the map, which have been kept for that, are everybody's
+//! [`DOUBT_ON_RETURN`]; then its landmarks in the map, which have been kept for that, are everybody's
 //! again.
 
 use std::ops::Range;
@@ -16,37 +16,27 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6};
 
-use super::agent_filter::{AgentFilter, POSITION_SD_MAX_M};
+use super::agent_filter::AgentFilter;
 use super::agent_slot::{AgentState, Detached};
 use super::effect::Effect;
 use super::frame::{Frame, LandmarkState};
 use super::joint::{Estimator, MAP};
-use super::measurement_update::REFUSED_TO_WIDEN;
 use super::observers::Observers;
+use super::tuning::{DOUBT_MAX, DOUBT_MIN, DOUBT_ON_RETURN, POSITION_SD_MAX_M};
 use crate::input::Label;
 use geometry::is_somewhere;
-
-/// Doubt from which on an agent corrects nobody but itself: what it takes to search farther around
-/// once.
-const DOUBTED: u32 = REFUSED_TO_WIDEN;
-/// Doubt at which an agent is set aside: an agent that slipped or was carried off a few metres has
-/// found its way back before, by searching farther around once for each [`REFUSED_TO_WIDEN`].
-const ABSURD: u32 = 64;
-/// Doubt of one that was set aside and is back in the map: so many sightings have to fit, more than
-/// do not, before it corrects others again.
-const PROBATION: u32 = 2 * DOUBTED;
 
 impl AgentState {
     /// Whether its sightings contradict the estimate so much that they correct nobody but itself.
     pub(super) fn is_doubted(&self) -> bool {
-        self.doubt >= DOUBTED
+        self.doubt >= DOUBT_MIN
     }
 
     /// A sighting was refused, or taken in; `fits` says whether none of its components lost weight.
     pub(super) fn weigh(&mut self, is_refused: bool, fits: bool) {
         if is_refused {
             self.refused += 1;
-            self.doubt = (self.doubt + 1).min(ABSURD);
+            self.doubt = (self.doubt + 1).min(DOUBT_MAX);
         } else {
             self.refused = 0;
             self.doubt = self.doubt.saturating_sub(u32::from(fits));
@@ -130,10 +120,10 @@ impl Estimator {
     /// The doubt with which an agent comes back to the map.
     pub(super) fn doubt_of_return(&self, agent: u32) -> u32 {
         if self.was_contradicted(agent) {
-            return PROBATION;
+            return DOUBT_ON_RETURN;
         }
         let doubt = self.agent_state(agent).map_or(0, |known| known.doubt);
-        doubt.min(DOUBTED)
+        doubt.min(DOUBT_MIN)
     }
 
     /// Sets an agent aside if its evidence is absurd, and lets one be again whose evidence fits.
@@ -141,7 +131,7 @@ impl Estimator {
         let Some((slot, state)) = self.slot(agent).zip(self.agent_state(agent)) else {
             return;
         };
-        if state.doubt >= ABSURD {
+        if state.doubt >= DOUBT_MAX {
             self.set_aside(agent, effects);
         } else if slot.is_aside && slot.frame == MAP && state.doubt == 0 {
             self.slot_mut(agent).is_aside = false;
@@ -262,7 +252,7 @@ mod tests {
     #[test]
     fn what_slept_is_not_moved_by_who_is_doubted() {
         let (mut estimator, honest, liar) = two(100);
-        lie(&mut estimator, liar, 50, DOUBTED);
+        lie(&mut estimator, liar, 50, DOUBT_MIN);
         assert!(estimator.is_doubted(liar) && !estimator.is_doubted(honest));
         let slept = *estimator.frame(MAP).archive.get(&label(0)).unwrap();
         let beside = post(0) + nalgebra::Vector3::new(0.7, 0.0, 0.0);
@@ -279,7 +269,7 @@ mod tests {
     #[test]
     fn who_was_set_aside_comes_back_on_probation() {
         let (mut estimator, _, liar) = two(10);
-        lie(&mut estimator, liar, 5, ABSURD);
+        lie(&mut estimator, liar, 5, DOUBT_MAX);
         assert!(estimator.is_aside(liar) && !estimator.is_in_map(liar));
         let known: Vec<_> = estimator.landmarks().map(|(_, at, _)| at).collect();
         let mut sightings = 0;
@@ -291,13 +281,13 @@ mod tests {
         assert!(estimator.is_doubted(liar) && estimator.is_aside(liar));
         let after: Vec<_> = estimator.landmarks().map(|(_, at, _)| at).collect();
         assert_eq!(known, after, "it corrects itself alone");
-        for number in 0..PROBATION as usize {
+        for number in 0..DOUBT_ON_RETURN as usize {
             assert!(estimator.is_aside(liar), "{number}");
             see(&mut estimator, liar, number % 10, &post(number % 10));
         }
         assert!(!estimator.is_doubted(liar) && !estimator.is_aside(liar));
         // Told where it stands, it is doubted no less.
-        lie(&mut estimator, liar, 5, 2 * ABSURD);
+        lie(&mut estimator, liar, 5, 2 * DOUBT_MAX);
         assert!(estimator.is_aside(liar));
         estimator.start_pose(liar, &start(&Isometry3::identity(), 0.1), &mut Vec::new());
         assert!(estimator.is_in_map(liar) && estimator.is_doubted(liar));

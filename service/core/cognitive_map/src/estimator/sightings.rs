@@ -4,11 +4,6 @@ use nalgebra::Point3;
 
 use crate::input::Relation;
 
-/// Sightings of agents that wait for the other agent's motion to come up to them.
-pub(super) const PENDING_MAX: usize = 64;
-/// Sightings between agents of different frames that are remembered.
-pub(super) const CROSS_SIGHTINGS_MAX: usize = 64;
-
 /// A sighting of an agent that has not moved up to it yet.
 #[derive(Clone, Debug)]
 pub(super) struct PendingSighting {

@@ -4,10 +4,8 @@ use nalgebra::Isometry3;
 
 use super::hypotheses::Hypothesis;
 use super::point_index::{PointIndex, one_to_one};
+use super::tuning::CANDIDATES_MAX;
 use super::{GATE, UncertainPoint, apart_m, mean_variance};
-
-/// Rough motions that are looked at closely.
-const CANDIDATES_MAX: usize = 16;
 
 /// A motion that is to be looked at closely.
 #[derive(Clone, Copy, Debug)]

@@ -2,15 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
+use super::tuning::{DISTANCE_MIN, HYPOTHESES_MAX, SEEDS_MAX};
 use super::{GATE, UncertainPoint};
 use geometry::align;
-
-/// Landmarks of the newer frame from which motions are drawn, in a plane and in space.
-const SEEDS_MAX: (usize, usize) = (10, 8);
-/// Most motions; with more, a registration would not be of bounded cost.
-const HYPOTHESES_MAX: usize = 1 << 13;
-/// Least distance of two landmarks that say how a frame is turned, in its own deviations.
-const DISTANCE_MIN: f64 = 5.0;
 
 /// A motion that lays two landmarks (three in space) over others.
 #[derive(Clone, Copy, Debug)]

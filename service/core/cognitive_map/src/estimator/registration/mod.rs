@@ -21,6 +21,7 @@ mod chance;
 mod groups;
 mod hypotheses;
 mod point_index;
+mod tuning;
 
 use nalgebra::{Isometry3, Point3};
 
@@ -31,33 +32,14 @@ use geometry::align;
 use groups::{groups, n_different, n_hypotheses, one_by_group};
 use hypotheses::hypotheses;
 use point_index::{Correspondence, one_to_one};
+use tuning::{
+    AGREEING_MIN, AMONG, CORRESPONDENCES_MIN, LOG10_FALSE_ALARMS_MAX, MIRRORED_MAX, RIVAL_MAX,
+    ROUNDS, TOGETHER,
+};
 
 pub(super) use chance::log10_at_least;
 pub(super) use point_index::PointIndex;
-
-/// Landmarks of the newer frame that are sought in the older one.
-pub(super) const SOUGHT_MAX: usize = 24;
-/// Deviations within which two landmarks, or two distances, may be the same.
-pub(super) const GATE: f64 = 3.0;
-/// Difference of squared distances over the variance from which it is sure which of two landmarks
-/// is meant: 400 to 1.
-pub(super) const SURE_MARGIN: f64 = 12.0;
-/// Fewest correspondences between planar frames, and between frames in space.
-const CORRESPONDENCES_MIN: (usize, usize) = (5, 6);
-/// Log₁₀ of the expected number of motions that are as good by chance, for one to be believed.
-const LOG10_CHANCE_MAX: f64 = -4.0;
-/// Part of its logarithm that another motion may have.
-const RIVAL_MAX: f64 = 0.5;
-/// By how much the logarithm of the mirror image may be better.
-const MIRRORED_MAX: f64 = 1.0;
-/// Distance up to which landmarks hang together, in their mean distance.
-const TOGETHER: f64 = 0.5;
-/// Part of the landmarks among the correspondences, of the frame that has fewer there, that must be correspondences.
-const AGREEING_MIN: f64 = 0.7;
-/// Distance from a correspondence up to which others are among the correspondences, in the landmarks' mean distance.
-const AMONG: f64 = 1.5;
-/// Rounds of fitting a motion and seeking the correspondences again.
-const ROUNDS: usize = 4;
+pub(super) use tuning::{GATE, SOUGHT_MAX, SURE_MARGIN};
 
 /// Where a landmark is in its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,7 +95,7 @@ pub(super) fn register(
     let rival = found.iter().find(is_another);
     let is_rivalled =
         rival.is_some_and(|rival| rival.log10_false_alarms < RIVAL_MAX * best.log10_false_alarms);
-    if best.log10_false_alarms > LOG10_CHANCE_MAX || is_rivalled {
+    if best.log10_false_alarms > LOG10_FALSE_ALARMS_MAX || is_rivalled {
         return None;
     }
     // What the mirror image explains better is a part of it that happens to look like its mirror image.

@@ -12,18 +12,22 @@ use lists::{read_all, read_count, read_map, write_all, write_count, write_map, w
 
 use super::agent_filter::{AgentFilter, BODY_DIM, Run};
 use super::agent_slot::{AgentSlot, AgentState, Detached};
-use super::associations::{ASSOCIATIONS_MAX, Association, Associations};
+use super::associations::{Association, Associations};
 use super::covariance::JointCovariance;
-use super::frame::{Frame, LANDMARK_DIM, LANDMARKS_MAX, LandmarkState, MEMBERS_MAX, Member};
-use super::frame_match::{FRAME_MATCHES_MAX, FrameMatch};
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
+use super::frame_match::FrameMatch;
 use super::joint::Estimator;
-use super::landmark_archive::{ArchivedLandmark, LandmarkArchive, PART_MAX, PARTS};
-use super::observers::{OBSERVERS_MAX, Observers};
-use super::odometry_history::{KEPT, OdometryHistory};
+use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::observers::Observers;
+use super::odometry_history::OdometryHistory;
 use super::outcome::Evidence;
 use super::parameters::Parameters;
-use super::sensor::{Sensor, SightingTarget, TARGETS_MAX};
-use super::sightings::{CROSS_SIGHTINGS_MAX, CrossFrameSighting, PENDING_MAX, PendingSighting};
+use super::sensor::{Sensor, SightingTarget};
+use super::sightings::{CrossFrameSighting, PendingSighting};
+use super::tuning::{
+    ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
+    HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, OBSERVERS_MAX, PENDING_MAX, SENSOR_TARGETS_MAX,
+};
 use ::state::PagedVec;
 use ::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
@@ -76,7 +80,7 @@ impl State for OdometryHistory {
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let instants = read_all(input, KEPT)?.into();
+        let instants = read_all(input, HISTORY_LEN)?.into();
         let latest = State::read(input)?;
         Ok(Self { instants, latest })
     }
@@ -116,7 +120,7 @@ impl State for Sensor {
             counts: State::read(input)?,
             product: State::read(input)?,
             square: State::read(input)?,
-            latest: read_map(input, TARGETS_MAX)?,
+            latest: read_map(input, SENSOR_TARGETS_MAX)?,
         })
     }
 }
@@ -198,7 +202,7 @@ impl State for LandmarkArchive {
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         let mut landmarks = Self::default();
-        for _ in 0..read_count(input, PARTS * PART_MAX)? {
+        for _ in 0..read_count(input, ARCHIVE_PARTS * ARCHIVE_PART_MAX)? {
             let (label, landmark) = State::read(input)?;
             // In their own order, none twice, and none that drives out another.
             if !landmarks.append(label, landmark) {
