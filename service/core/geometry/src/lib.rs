@@ -10,7 +10,7 @@ pub mod se3;
 mod se3_jacobian;
 
 pub use alignment::{align, centre};
-pub use bounds::is_somewhere;
+pub use bounds::{is_somewhere, is_within};
 pub use covariance::{PoseCovariance, upper_triangle};
 pub use motion_sum::MotionSum;
 pub use planar::{

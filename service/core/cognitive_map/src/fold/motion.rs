@@ -23,7 +23,7 @@ impl Fold<'_> {
         let increment = motion.increment();
         let step = self.estimator.motion(agent.0, stamp_ns, motion);
         self.remember_who_was_set_aside();
-        self.chronicle.motion(
+        self.chronicle.graph.motion(
             &self.moment(),
             &step.increment,
             &step.variance,
@@ -152,7 +152,7 @@ impl Fold<'_> {
             self.now,
         );
         let place = self.places.recruit(place, self.revision)?;
-        if let Some(mooring) = self.chronicle.moor(self.agent_id.0, place.0) {
+        if let Some(mooring) = self.chronicle.graph.moor(self.agent_id.0, place.0) {
             self.places.set_mooring(place, mooring, self.revision);
         }
         self.emit(EventKind::PlaceRecruited {

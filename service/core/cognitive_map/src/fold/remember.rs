@@ -35,7 +35,7 @@ impl Fold<'_> {
         self.remember_who_was_set_aside();
         for settled in self.estimator.take_settled() {
             if settled.accepted {
-                self.chronicle.sighted(
+                self.chronicle.graph.sighted(
                     settled.observer,
                     settled.target,
                     settled.stamp_ns,
@@ -46,7 +46,7 @@ impl Fold<'_> {
         }
         let same = self.estimator.take_same();
         if !same.is_empty() {
-            self.chronicle.same(&same);
+            self.chronicle.graph.same(&same);
             for (label, name) in &same {
                 self.landmarks.unite(label, name, self.revision);
             }
@@ -54,9 +54,9 @@ impl Fold<'_> {
         for merged in self.estimator.take_merged() {
             for &agent in &merged.agents {
                 if merged.into == MAP {
-                    self.chronicle.placed(agent, &merged.pose);
+                    self.chronicle.graph.placed(agent, &merged.pose);
                 } else {
-                    self.chronicle.carried(agent, &merged.pose);
+                    self.chronicle.graph.carried(agent, &merged.pose);
                 }
             }
         }
@@ -69,10 +69,10 @@ impl Fold<'_> {
     ///
     /// When that is depends on the records alone.
     pub(super) fn believe_matches(&mut self) {
-        if !self.chronicle.is_due() {
+        if !self.chronicle.graph.is_due() {
             return;
         }
-        for correction in self.chronicle.relax() {
+        for correction in self.chronicle.graph.relax() {
             if let Some(covariance) = correction.covariance {
                 self.estimator
                     .fix(correction.agent, &correction.pose, &covariance);
@@ -85,7 +85,7 @@ impl Fold<'_> {
 impl Fold<'_> {
     /// Moves some of the places that turned out to lie elsewhere.
     pub(super) fn move_places(&mut self) {
-        for (place, at) in self.chronicle.drift() {
+        for (place, at) in self.chronicle.graph.drift() {
             self.places.put(PlaceId(place), &at, self.revision);
         }
     }
@@ -95,17 +95,17 @@ impl CognitiveMap {
     /// Where all agents were and all landmarks are, by everything that was seen until now: the whole map
     /// relaxed. A function of the map alone; takes time in proportion to what is remembered.
     pub fn refined(&self) -> Refined {
-        self.chronicle.refine()
+        self.chronicle.graph.refine()
     }
 
     /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in the making as
     /// [`refined`](Self::refined).
     pub fn experience_map(&self) -> PoseGraph {
-        self.chronicle.experience_map()
+        self.chronicle.graph.experience_map()
     }
 
     /// Number of matches and revisits that are believed.
     pub fn closure_count(&self) -> usize {
-        self.chronicle.n_matches_believed()
+        self.chronicle.graph.n_matches_believed()
     }
 }

@@ -18,7 +18,6 @@ impl KeyframeGraph {
         life.is_cut = true;
         life.pose = Isometry3::identity();
         let is_fresh = life.is_fresh;
-        self.revisits.cut(agent, revision);
         self.waiting
             .retain(|waiting| waiting.observer != agent && waiting.target != agent);
         if !is_fresh {

@@ -4,9 +4,9 @@ use nalgebra::Isometry3;
 
 use super::anchor::Anchor;
 use super::graph::{KeyframeGraph, REST, SIGHTINGS_PER_ANCHOR_MAX};
-use super::life::is_within;
 use super::sighting::{Shown, Sighting};
 use super::tie::{Standing, Tie};
+use geometry::is_within;
 use geometry::{MotionSum, PoseCovariance};
 use state::NONE;
 

@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 
 use super::graph::KeyframeGraph;
-use super::life::is_within;
 use super::tie::Standing;
+use geometry::is_within;
 use state::{NONE, Slab};
 
 /// Motion between the anchors of the coarse past \[m, rad\]. Over so short a way the noise of odometry is less than what

@@ -4,17 +4,15 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 
 use super::anchor::Anchor;
 use super::landmarks::Landmarks;
-use super::life::{Life, is_within};
+use super::life::Life;
 use super::milestones::Milestones;
 use super::mooring::Mooring;
-use super::relocalisation::{Doubts, Searches};
-use super::revisit::Revisits;
 use super::settings::KeyframeSettings;
 use super::sighting::{SeenPoint, Shown, Sighting};
 use super::tie::{Standing, Tie};
 use crate::estimator::Calibrated;
 use crate::input::{Label, Relation, StartPose};
-use geometry::{PoseCovariance, se3};
+use geometry::{PoseCovariance, is_within, se3};
 use state::PagedVec;
 use state::state_of_struct;
 use state::{NONE, Slab};
@@ -95,12 +93,6 @@ pub struct KeyframeGraph {
     pub(super) fresh_matches: u32,
     /// Matches believed since then without waiting.
     pub(super) agreed: u32,
-    /// What was seen, for who comes there again.
-    pub(super) revisits: Revisits,
-    /// Who does not know where it is, and what it has seen since.
-    pub(super) searches: Searches,
-    /// Whether what agents of the map see contradicts where they are believed to be.
-    pub(super) doubts: Doubts,
     pub(super) milestones: Milestones,
 }
 
@@ -130,9 +122,6 @@ impl KeyframeGraph {
             told: 0,
             fresh_matches: 0,
             agreed: 0,
-            revisits: Revisits::default(),
-            searches: Searches::default(),
-            doubts: Doubts::default(),
             milestones: Milestones::default(),
         }
     }
@@ -230,7 +219,6 @@ impl KeyframeGraph {
         life.is_planar &= is_level(start.pose());
         let anchor = self.anchor_anew(moment.agent);
         let covariance = PoseCovariance::from_sd(start.noise().sd());
-        self.revisits.cut(moment.agent, self.revision);
         self.tie_to_map(anchor, *start.pose(), &covariance, Standing::Stated);
     }
 

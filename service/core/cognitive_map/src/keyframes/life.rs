@@ -102,9 +102,3 @@ impl Life {
         self.calibrated = self.calibrated.then(calibrated);
     }
 }
-
-/// Whether a motion is shorter than these \[m, rad\].
-pub(super) fn is_within(motion: &Isometry3<f64>, length_m: f64, angle_rad: f64) -> bool {
-    motion.translation.vector.norm_squared() <= length_m * length_m
-        && motion.rotation.angle() <= angle_rad
-}

@@ -88,7 +88,7 @@ impl KeyframeGraph {
     }
 
     /// Ties two places beside anchors by a match; answers whether there is room for it.
-    pub(super) fn tie_beside(
+    fn tie_beside(
         &mut self,
         now: &Beside,
         then: &Beside,
@@ -120,6 +120,19 @@ impl KeyframeGraph {
             oldest.map(|at| self.untie(at));
         }
         self.tie(tie) != NONE
+    }
+
+    /// Adds a match that is believed at once.
+    pub(super) fn accept(
+        &mut self,
+        now: &Beside,
+        then: &Beside,
+        seen: &Isometry3<f64>,
+        noise: &PoseCovariance,
+    ) {
+        let is_kept = self.tie_beside(now, then, seen, noise, Standing::Accepted);
+        self.fresh_matches += u32::from(is_kept);
+        self.agreed += u32::from(is_kept);
     }
 
     /// Number of matches that are believed.

@@ -7,9 +7,6 @@ use state::NONE;
 impl KeyframeGraph {
     /// An agent of the map is gone. What it did stays part of the past.
     pub fn retire(&mut self, agent: u32) {
-        self.end_search(agent);
-        let latest = self.lives.get(agent as usize).map(|life| life.seq);
-        self.dispel_doubt(agent, latest.unwrap_or(0));
         self.waiting
             .retain(|waiting| waiting.observer != agent && waiting.target != agent);
     }
