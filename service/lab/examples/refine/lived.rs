@@ -1,4 +1,4 @@
-//! A team's samples through the joint estimate and the chronicle.
+//! A team's samples through the joint estimate and the graph.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -11,24 +11,24 @@ use trajectory::{Alignment, Span, StampedPose, Trajectory, ate_rmse_m};
 /// A team as it lives.
 pub(crate) struct Lived {
     pub(crate) estimator: Estimator,
-    pub(crate) chronicle: KeyframeGraph,
+    pub(crate) graph: KeyframeGraph,
     agents: BTreeMap<u32, u32>,
     names: BTreeMap<String, u32>,
     seqs: BTreeMap<u32, u64>,
     pub(crate) causal: BTreeMap<u32, Vec<StampedPose>>,
-    /// Seconds that the chronicle took for each sample.
+    /// Seconds that the graph took for each sample.
     pub(crate) times_s: Vec<f64>,
 }
 
 impl Lived {
-    pub(crate) fn new(anchors_max: Option<u32>) -> Self {
+    pub(crate) fn new(keyframes_max: Option<u32>) -> Self {
         let mut settings = KeyframeSettings::default();
-        if let Some(anchors_max) = anchors_max {
-            settings.anchors_max = anchors_max;
+        if let Some(keyframes_max) = keyframes_max {
+            settings.keyframes_max = keyframes_max;
         }
         Self {
             estimator: Estimator::new(Parameters::default()),
-            chronicle: KeyframeGraph::new(settings),
+            graph: KeyframeGraph::new(settings),
             agents: BTreeMap::new(),
             names: BTreeMap::new(),
             seqs: BTreeMap::new(),
@@ -40,7 +40,7 @@ impl Lived {
     /// A robot of the team.
     pub(crate) fn enrol(&mut self, robot: u32, name: String) {
         let agent = self.estimator.enrol();
-        self.chronicle.enrol();
+        self.graph.enrol();
         self.agents.insert(robot, agent);
         self.names.insert(name, agent);
     }
@@ -85,14 +85,14 @@ impl Lived {
         let begin = Instant::now();
         match (&sample.body, step, taken) {
             (SampleBody::Motion(_), Some(step), _) => {
-                self.chronicle
+                self.graph
                     .motion(&moment, &step.increment, &step.variance, &step.calibrated);
             }
-            (SampleBody::StartPose(start), ..) => self.chronicle.start_pose(&moment, start),
+            (SampleBody::StartPose(start), ..) => self.graph.start_pose(&moment, start),
             (SampleBody::Sighting(sighting), _, Some(taken)) if taken.accepted => {
                 if let Target::Landmark(label) = &sighting.target {
                     let (relation, variance) = (&sighting.relation, &taken.variance);
-                    self.chronicle.landmark(&moment, label, relation, variance);
+                    self.graph.landmark(&moment, label, relation, variance);
                 }
             }
             _ => {}
@@ -100,15 +100,15 @@ impl Lived {
         for merged in merged {
             for agent in merged.agents {
                 if merged.into == 0 {
-                    self.chronicle.placed(agent, &merged.pose);
+                    self.graph.placed(agent, &merged.pose);
                 } else {
-                    self.chronicle.carried(agent, &merged.pose);
+                    self.graph.transformed(agent, &merged.pose);
                 }
             }
         }
         for seen in settled.iter().filter(|seen| seen.accepted) {
             let variance = seen.variance.fixed_rows::<3>(0).into_owned();
-            self.chronicle.sighted(
+            self.graph.sighted(
                 seen.observer,
                 seen.target,
                 seen.stamp_ns,

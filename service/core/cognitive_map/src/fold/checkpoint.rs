@@ -361,14 +361,14 @@ impl CognitiveMap {
                     .trip
                     .is_none_or(|trip| (trip.0 as usize) < recorded)
         });
-        let is_moored = |id: PlaceId, mooring| self.chronicle.graph.is_moored(mooring, id.0);
+        let is_moored = |id: PlaceId, mooring| self.chronicle.graph.is_attached(mooring, id.0);
         let places = self.places().all(|(id, place)| {
             is_agent(place.founder())
                 && place.trip.is_none_or(|trip| (trip.0 as usize) < recorded)
                 && place.mooring.is_none_or(|mooring| is_moored(id, mooring))
         });
         let moored = self.places().filter(|(_, place)| place.mooring.is_some());
-        let places = places && moored.count() == self.chronicle.graph.n_moorings();
+        let places = places && moored.count() == self.chronicle.graph.n_attachments();
         let trips = self.trips().all(|(_, trip)| {
             is_agent(trip.agent())
                 && trip

@@ -46,7 +46,7 @@ impl Fold<'_> {
         }
         let same = self.estimator.take_same();
         if !same.is_empty() {
-            self.chronicle.graph.same(&same);
+            self.chronicle.graph.merge_landmarks(&same);
             for (label, name) in &same {
                 self.landmarks.unite(label, name, self.revision);
             }
@@ -56,7 +56,7 @@ impl Fold<'_> {
                 if merged.into == MAP {
                     self.chronicle.graph.placed(agent, &merged.pose);
                 } else {
-                    self.chronicle.graph.carried(agent, &merged.pose);
+                    self.chronicle.graph.transformed(agent, &merged.pose);
                 }
             }
         }
@@ -85,7 +85,7 @@ impl Fold<'_> {
 impl Fold<'_> {
     /// Moves some of the places that turned out to lie elsewhere.
     pub(super) fn move_places(&mut self) {
-        for (place, at) in self.chronicle.graph.drift() {
+        for (place, at) in self.chronicle.graph.moved_places() {
             self.places.put(PlaceId(place), &at, self.revision);
         }
     }

@@ -1,23 +1,23 @@
-//! A chronicle as pages of bytes, and back.
+//! A keyframe graph as pages of bytes, and back.
 //!
 //! ```text
 //! part  index  bytes
 //! 0     0      what is waiting, where the search for what may go goes on, vacant numbers
 //! 1     page   up to 4 agents
-//! 2     page   up to 32 anchors
+//! 2     page   up to 32 keyframes
 //! 3     page   up to 64 sightings
-//! 4     page   up to 32 ties
+//! 4     page   up to 32 constraints
 //! 5     page   up to 64 landmarks
 //! 6     page   up to 16 views
 //! 7     page   what an agent saw lately
 //! 8     page   what an agent has seen that does not know where it is
-//! 9     page   up to 32 things that lie beside anchors
+//! 9     page   up to 32 things that lie beside keyframes
 //! 10    page   what an agent has seen that contradicts where it is believed to be
 //! ```
 
 use std::collections::BTreeMap;
 
-use super::graph::Waiting;
+use super::graph::PendingSighting;
 use super::map::KeyframeMap;
 use super::settings::KeyframeSettings;
 use place_recognition::Part;
@@ -26,18 +26,18 @@ use state::{CorruptState, State, StateReader, StateWriter};
 use state::{PagedVec, write_page};
 
 const HEAD: u8 = 0;
-const LIVES: u8 = 1;
-const ANCHORS: u8 = 2;
+const TRACKS_OF_AGENTS: u8 = 1;
+const KEYFRAMES: u8 = 2;
 const SIGHTINGS: u8 = 3;
-const TIES: u8 = 4;
+const CONSTRAINTS: u8 = 4;
 const LANDMARKS: u8 = 5;
 const VIEWS: u8 = 6;
 const TRACKS: u8 = 7;
 const SEARCHES: u8 = 8;
-const MOORINGS: u8 = 9;
+const ATTACHMENTS: u8 = 9;
 const KIDNAP_TESTS: u8 = 10;
 
-/// One page of a chronicle's checkpoint. A later page of the same part and index replaces an earlier one.
+/// One page of a keyframe graph's checkpoint. A later page of the same part and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeyframePage {
     /// What the page holds.
@@ -48,9 +48,9 @@ pub struct KeyframePage {
     pub bytes: Vec<u8>,
 }
 
-/// Pages that are no chronicle: some are missing, damaged, left over or of another time.
+/// Pages that are no keyframe graph: some are missing, damaged, left over or of another time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the pages are no chronicle")]
+#[error("the pages are no map")]
 pub struct CorruptKeyframes;
 
 impl KeyframeMap {
@@ -59,15 +59,15 @@ impl KeyframeMap {
         let since = since_revision;
         let (graph, seen) = (&self.graph, &self.recognition);
         std::iter::once(self.head())
-            .chain(pages_of(LIVES, &graph.lives, since))
-            .chain(pages_of(ANCHORS, &graph.anchors.pages, since))
+            .chain(pages_of(TRACKS_OF_AGENTS, &graph.tracks, since))
+            .chain(pages_of(KEYFRAMES, &graph.keyframes.pages, since))
             .chain(pages_of(SIGHTINGS, &graph.sightings.pages, since))
-            .chain(pages_of(TIES, &graph.ties.pages, since))
+            .chain(pages_of(CONSTRAINTS, &graph.constraints.pages, since))
             .chain(pages_of(LANDMARKS, &graph.landmarks.slots.pages, since))
             .chain(seen_pages(VIEWS, seen.pages(Part::Views, since)))
             .chain(seen_pages(TRACKS, seen.pages(Part::Tracks, since)))
             .chain(seen_pages(SEARCHES, seen.pages(Part::Searches, since)))
-            .chain(pages_of(MOORINGS, &graph.moorings.pages, since))
+            .chain(pages_of(ATTACHMENTS, &graph.attachments.slab.pages, since))
             .chain(seen_pages(
                 KIDNAP_TESTS,
                 seen.pages(Part::KidnapTests, since),
@@ -102,10 +102,10 @@ impl KeyframeMap {
         }
         map.read_head(&head).map_err(|_| CorruptKeyframes)?;
         let (graph, seen) = (&mut map.graph, &map.recognition);
-        if !graph.landmarks.sort() || !graph.is_sound() || !seen.is_sound(graph.lives.len()) {
+        if !graph.landmarks.sort() || !graph.is_sound() || !seen.is_sound(graph.tracks.len()) {
             return Err(CorruptKeyframes);
         }
-        graph.set_milestones();
+        graph.rebuild_index();
         Ok(map)
     }
 
@@ -113,15 +113,15 @@ impl KeyframeMap {
         let (graph, seen) = (&mut self.graph, &mut self.recognition);
         let revision = graph.revision;
         match part {
-            LIVES => graph.lives.push_page(bytes, revision),
-            ANCHORS => graph.anchors.pages.push_page(bytes, revision),
+            TRACKS_OF_AGENTS => graph.tracks.push_page(bytes, revision),
+            KEYFRAMES => graph.keyframes.pages.push_page(bytes, revision),
             SIGHTINGS => graph.sightings.pages.push_page(bytes, revision),
-            TIES => graph.ties.pages.push_page(bytes, revision),
+            CONSTRAINTS => graph.constraints.pages.push_page(bytes, revision),
             LANDMARKS => graph.landmarks.slots.pages.push_page(bytes, revision),
             VIEWS => seen.push_page(Part::Views, bytes),
             TRACKS => seen.push_page(Part::Tracks, bytes),
             SEARCHES => seen.push_page(Part::Searches, bytes),
-            MOORINGS => graph.moorings.pages.push_page(bytes, revision),
+            ATTACHMENTS => graph.attachments.slab.pages.push_page(bytes, revision),
             KIDNAP_TESTS => seen.push_page(Part::KidnapTests, bytes),
             _ => Err(CorruptState::Invalid),
         }
@@ -132,15 +132,15 @@ impl KeyframeMap {
         let mut out = StateWriter::default();
         let (graph, seen) = (&self.graph, &self.recognition);
         self.write_head(&mut out);
-        graph.lives.write_digests(&mut out);
-        graph.anchors.pages.write_digests(&mut out);
+        graph.tracks.write_digests(&mut out);
+        graph.keyframes.pages.write_digests(&mut out);
         graph.sightings.pages.write_digests(&mut out);
-        graph.ties.pages.write_digests(&mut out);
+        graph.constraints.pages.write_digests(&mut out);
         graph.landmarks.slots.pages.write_digests(&mut out);
         seen.write_digests(Part::Views, &mut out);
         seen.write_digests(Part::Tracks, &mut out);
         seen.write_digests(Part::Searches, &mut out);
-        graph.moorings.pages.write_digests(&mut out);
+        graph.attachments.slab.pages.write_digests(&mut out);
         seen.write_digests(Part::KidnapTests, &mut out);
         out.digest()
     }
@@ -148,12 +148,12 @@ impl KeyframeMap {
     /// Bytes of memory that it takes, without labels.
     pub fn bytes(&self) -> usize {
         let graph = &self.graph;
-        graph.lives.bytes()
-            + graph.anchors.pages.bytes()
+        graph.tracks.bytes()
+            + graph.keyframes.pages.bytes()
             + graph.sightings.pages.bytes()
-            + graph.ties.pages.bytes()
+            + graph.constraints.pages.bytes()
             + graph.landmarks.slots.pages.bytes()
-            + graph.moorings.pages.bytes()
+            + graph.attachments.slab.pages.bytes()
             + self.recognition.bytes()
     }
 
@@ -169,37 +169,37 @@ impl KeyframeMap {
 
     fn write_head(&self, out: &mut StateWriter) {
         let graph = &self.graph;
-        graph.hand.write(out);
-        (graph.told, graph.fresh_matches).write(out);
-        graph.agreed.write(out);
+        graph.sweep.write(out);
+        (graph.schedule.records, graph.schedule.new_closures).write(out);
+        graph.schedule.accepted.write(out);
         self.recognition.write_head(out);
-        graph.anchors.vacancy().write(out);
+        graph.keyframes.vacancy().write(out);
         graph.sightings.vacancy().write(out);
-        graph.ties.vacancy().write(out);
+        graph.constraints.vacancy().write(out);
         graph.landmarks.slots.vacancy().write(out);
-        graph.moorings.vacancy().write(out);
-        (graph.swung, graph.adrift).write(out);
-        (graph.waiting.len() as u64).write(out);
-        for waiting in &graph.waiting {
-            waiting.write(out);
+        graph.attachments.slab.vacancy().write(out);
+        (graph.attachments.cursor, graph.attachments.n_unchecked).write(out);
+        (graph.pending.len() as u64).write(out);
+        for pending in &graph.pending {
+            pending.write(out);
         }
     }
 
     fn read_head(&mut self, bytes: &[u8]) -> Result<(), CorruptState> {
         let mut input = StateReader::new(bytes);
         let graph = &mut self.graph;
-        graph.hand = State::read(&mut input)?;
-        (graph.told, graph.fresh_matches) = State::read(&mut input)?;
-        graph.agreed = State::read(&mut input)?;
+        graph.sweep = State::read(&mut input)?;
+        (graph.schedule.records, graph.schedule.new_closures) = State::read(&mut input)?;
+        graph.schedule.accepted = State::read(&mut input)?;
         self.recognition.read_head(&mut input)?;
-        graph.anchors.set_vacancy(State::read(&mut input)?);
+        graph.keyframes.set_vacancy(State::read(&mut input)?);
         graph.sightings.set_vacancy(State::read(&mut input)?);
-        graph.ties.set_vacancy(State::read(&mut input)?);
+        graph.constraints.set_vacancy(State::read(&mut input)?);
         graph.landmarks.slots.set_vacancy(State::read(&mut input)?);
-        graph.moorings.set_vacancy(State::read(&mut input)?);
-        (graph.swung, graph.adrift) = State::read(&mut input)?;
+        graph.attachments.slab.set_vacancy(State::read(&mut input)?);
+        (graph.attachments.cursor, graph.attachments.n_unchecked) = State::read(&mut input)?;
         for _ in 0..u64::read(&mut input)? {
-            graph.waiting.push(Waiting::read(&mut input)?);
+            graph.pending.push(PendingSighting::read(&mut input)?);
         }
         input.end()
     }

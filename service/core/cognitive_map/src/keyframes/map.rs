@@ -148,7 +148,7 @@ impl KeyframeMap {
         if found.is_last {
             self.recognition.end_search(agent);
         }
-        self.graph.tie_to_recognised(agent, similar, found);
+        self.graph.close_to_recognised(agent, similar, found);
     }
 
     /// An agent knows where it is, or begins anew: its search is over.

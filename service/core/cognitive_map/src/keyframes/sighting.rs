@@ -1,4 +1,4 @@
-//! What was seen from an anchor.
+//! What was seen from a keyframe.
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
 
@@ -13,26 +13,26 @@ const DISTANCE_MIN_M: f64 = 0.02;
 
 /// What was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Shown {
+pub(super) enum Seen {
     /// A landmark, by number.
     Landmark(u32),
-    /// An agent, at this place in the frame of one of its anchors.
+    /// An agent, at this place in the frame of one of its keyframes.
     Agent(u32, Vector3<f64>),
 }
 
-/// A position seen from an anchor.
+/// A position seen from a keyframe.
 #[derive(Clone, Debug)]
 pub(super) struct Sighting {
-    /// The anchor from which, and the next sighting made there.
-    pub(super) anchor: u32,
+    /// The keyframe from which, and the next sighting made there.
+    pub(super) keyframe: u32,
     pub(super) next: u32,
-    pub(super) shown: Shown,
-    /// The next sighting that shows the same anchor.
+    pub(super) shown: Seen,
+    /// The next sighting that shows the same keyframe.
     pub(super) next_shown: u32,
     pub(super) point: SeenPoint,
 }
 
-/// A position in the frame of an anchor \[m\], with the covariance of its error \[m²\].
+/// A position in the frame of a keyframe \[m\], with the covariance of its error \[m²\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SeenPoint {
     pub(super) position: Vector3<f64>,
@@ -48,23 +48,23 @@ state_of_struct!(SeenPoint {
     lasting
 });
 state_of_struct!(Sighting {
-    anchor,
+    keyframe,
     next,
     shown,
     next_shown,
     point
 });
 
-impl State for Shown {
+impl State for Seen {
     fn write(&self, out: &mut StateWriter) {
         match self {
             Self::Landmark(landmark) => {
                 0_u8.write(out);
                 landmark.write(out);
             }
-            Self::Agent(anchor, lever) => {
+            Self::Agent(keyframe, lever) => {
                 1_u8.write(out);
-                anchor.write(out);
+                keyframe.write(out);
                 lever.write(out);
             }
         }
@@ -131,11 +131,11 @@ impl SeenPoint {
         self.fresh + self.lasting
     }
 
-    /// The point in the frame of an anchor from which a motion with this covariance led to where it was seen:
+    /// The point in the frame of a keyframe from which a motion with this covariance led to where it was seen:
     /// Δ exp(ξ) p.
     pub(super) fn before(&self, motion: &Isometry3<f64>, covariance: &PoseCovariance) -> Self {
         let turn = motion.rotation.to_rotation_matrix().into_inner();
-        let fresh = self.fresh + swing(&self.position, covariance);
+        let fresh = self.fresh + lever_covariance(&self.position, covariance);
         Self {
             position: turn * self.position + motion.translation.vector,
             fresh: symmetric(&(turn * fresh * turn.transpose())),
@@ -143,7 +143,7 @@ impl SeenPoint {
         }
     }
 
-    /// The point in the frame of the anchor to which a motion led from where it was seen: exp(−ξ) Δ⁻¹ p.
+    /// The point in the frame of the keyframe to which a motion led from where it was seen: exp(−ξ) Δ⁻¹ p.
     pub(super) fn after(&self, motion: &Isometry3<f64>, covariance: &PoseCovariance) -> Self {
         let back = motion
             .rotation
@@ -151,7 +151,7 @@ impl SeenPoint {
             .into_inner()
             .transpose();
         let position = back * (self.position - motion.translation.vector);
-        let fresh = back * self.fresh * back.transpose() + swing(&position, covariance);
+        let fresh = back * self.fresh * back.transpose() + lever_covariance(&position, covariance);
         Self {
             position,
             fresh: symmetric(&fresh),
@@ -193,7 +193,7 @@ pub(super) fn stated_variance(relation: &Relation) -> Vector3<f64> {
 }
 
 /// What an error ξ of a pose does to a point p in its frame, ρ + φ×p: the covariance of that.
-pub(super) fn swing(point: &Vector3<f64>, covariance: &PoseCovariance) -> Matrix3<f64> {
+pub(super) fn lever_covariance(point: &Vector3<f64>, covariance: &PoseCovariance) -> Matrix3<f64> {
     let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
     let lever = -point.cross_matrix();

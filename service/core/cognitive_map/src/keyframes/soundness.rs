@@ -1,62 +1,65 @@
 //! Whether a graph that was read from a checkpoint is sound: damaged bytes must not pass for one.
 
 use super::graph::KeyframeGraph;
-use super::sighting::{Shown, Sighting};
+use super::sighting::{Seen, Sighting};
 use state::NONE;
 
 impl KeyframeGraph {
     /// Whether all numbers lead somewhere, and all lists come to an end.
     pub(super) fn is_sound(&self) -> bool {
-        let slots = self.anchors.is_sound()
+        let slots = self.keyframes.is_sound()
             && self.sightings.is_sound()
-            && self.ties.is_sound()
+            && self.constraints.is_sound()
             && self.landmarks.slots.is_sound()
-            && self.moorings.is_sound();
-        let is_agent = |agent: u32| (agent as usize) < self.lives.len();
-        let waiting = self
-            .waiting
+            && self.attachments.slab.is_sound();
+        let is_agent = |agent: u32| (agent as usize) < self.tracks.len();
+        let pending = self
+            .pending
             .iter()
-            .all(|waiting| is_agent(waiting.observer) && is_agent(waiting.target));
+            .all(|pending| is_agent(pending.observer) && is_agent(pending.target));
         slots
-            && waiting
-            && self.hand <= self.anchors.numbers()
+            && pending
+            && self.sweep <= self.keyframes.numbers()
             && self.chains_are_sound()
             && self.sightings_are_sound()
-            && self.ties_are_sound()
-            && self.moorings_are_sound()
+            && self.constraints_are_sound()
+            && self.attachments_are_sound()
     }
 
     fn chains_are_sound(&self) -> bool {
         let mut visited = 0;
-        for (agent, life) in (0..).zip(self.lives.iter()) {
-            let (mut number, mut next) = (life.newest, NONE);
+        for (agent, track) in (0..).zip(self.tracks.iter()) {
+            let (mut number, mut next) = (track.newest, NONE);
             while number != NONE {
-                let Some(anchor) = self.anchors.get(number) else {
+                let Some(keyframe) = self.keyframes.get(number) else {
                     return false;
                 };
                 visited += 1;
-                if anchor.next != next || anchor.agent != agent || visited > self.anchors.len() {
+                if keyframe.next != next
+                    || keyframe.agent != agent
+                    || visited > self.keyframes.len()
+                {
                     return false;
                 }
-                (next, number) = (number, anchor.previous);
+                (next, number) = (number, keyframe.previous);
             }
         }
-        visited == self.anchors.len()
+        visited == self.keyframes.len()
     }
 
     fn sightings_are_sound(&self) -> bool {
         let (mut made, mut shown, mut agents_shown) = (0, 0, 0);
         let mut of_landmark = vec![0; self.landmarks.slots.numbers() as usize];
-        for (number, anchor) in self.anchors.iter() {
-            let mut at = anchor.sightings;
+        for (number, keyframe) in self.keyframes.iter() {
+            let mut at = keyframe.sightings;
             while at != NONE {
                 let sighting = self.sightings.get(at);
-                let Some(sighting) = sighting.filter(|sighting| sighting.anchor == number) else {
+                let Some(sighting) = sighting.filter(|sighting| sighting.keyframe == number) else {
                     return false;
                 };
                 match sighting.shown {
-                    Shown::Agent(..) => agents_shown += 1,
-                    Shown::Landmark(landmark) => match of_landmark.get_mut(landmark as usize) {
+                    Seen::Agent(..) => agents_shown += 1,
+                    Seen::Landmark(landmark) => match of_landmark.get_mut(landmark as usize) {
                         Some(count) => *count += 1,
                         None => return false,
                     },
@@ -67,9 +70,9 @@ impl KeyframeGraph {
                 }
                 at = sighting.next;
             }
-            let mut at = anchor.shown;
+            let mut at = keyframe.shown;
             while at != NONE {
-                let shows = |sighting: &&Sighting| matches!(sighting.shown, Shown::Agent(target, _) if target == number);
+                let shows = |sighting: &&Sighting| matches!(sighting.shown, Seen::Agent(target, _) if target == number);
                 let Some(sighting) = self.sightings.get(at).filter(shows) else {
                     return false;
                 };
@@ -85,25 +88,27 @@ impl KeyframeGraph {
             .all(|(number, landmark)| of_landmark[number as usize] == landmark.sightings)
     }
 
-    fn ties_are_sound(&self) -> bool {
+    fn constraints_are_sound(&self) -> bool {
         let mut ends = 0;
-        for (number, anchor) in self.anchors.iter() {
-            let mut at = anchor.ties;
+        for (number, keyframe) in self.keyframes.iter() {
+            let mut at = keyframe.constraints;
             while at != NONE {
-                let Some(tie) = self.ties.get(at) else {
+                let Some(constraint) = self.constraints.get(at) else {
                     return false;
                 };
                 ends += 1;
-                if (tie.from != number && tie.to != number) || ends > 2 * self.ties.len() {
+                if (constraint.from != number && constraint.to != number)
+                    || ends > 2 * self.constraints.len()
+                {
                     return false;
                 }
-                at = self.next_tie(at, number);
+                at = self.next_constraint(at, number);
             }
         }
         let expected: usize = self
-            .ties
+            .constraints
             .iter()
-            .map(|(_, tie)| if tie.from == NONE { 1 } else { 2 })
+            .map(|(_, constraint)| if constraint.from == NONE { 1 } else { 2 })
             .sum();
         ends == expected
     }

@@ -15,9 +15,9 @@ const BIAS_RAD_S: f64 = 0.01;
 
 /// A walk whose errors are known from one sample on; answers the largest distances between refined poses and truth, before
 /// that sample and after.
-fn largest_errors(known_from: u64, anchors_max: u32, sense: f64) -> [f64; 2] {
+fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
     let mut chronicle = KeyframeMap::new(KeyframeSettings {
-        anchors_max,
+        keyframes_max,
         ..KeyframeSettings::default()
     });
     let agent = chronicle.graph.enrol();
@@ -87,10 +87,10 @@ fn largest_errors(known_from: u64, anchors_max: u32, sense: f64) -> [f64; 2] {
 #[test]
 fn what_is_learned_of_odometry_corrects_the_past() {
     for sense in [1.0, -1.0] {
-        for anchors_max in [4096, 96] {
-            let [unknown, _] = largest_errors(601, anchors_max, sense);
+        for keyframes_max in [4096, 96] {
+            let [unknown, _] = largest_errors(601, keyframes_max, sense);
             assert!(unknown > 1.0, "the walk tells nothing: {unknown} m");
-            let [before, after] = largest_errors(500, anchors_max, sense);
+            let [before, after] = largest_errors(500, keyframes_max, sense);
             assert!(before < 0.03 * unknown, "{before} m of {unknown} m");
             assert!(after < 0.03 * unknown, "{after} m of {unknown} m");
         }

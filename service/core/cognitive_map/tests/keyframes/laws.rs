@@ -180,7 +180,7 @@ fn roomy() -> KeyframeSettings {
 
 fn tight() -> KeyframeSettings {
     KeyframeSettings {
-        anchors_max: 150,
+        keyframes_max: 150,
         sightings_max: 1500,
         ..KeyframeSettings::default()
     }
@@ -301,8 +301,8 @@ fn moving_the_starts_moves_everything() {
 fn thinning_keeps_the_loops() {
     let whole = walked(2, 1500, roomy());
     let thinned = walked(2, 1500, tight());
-    assert!(whole.chronicle.graph.n_anchors() > 2500);
-    assert!(thinned.chronicle.graph.n_anchors() <= 150);
+    assert!(whole.chronicle.graph.n_keyframes() > 2500);
+    assert!(thinned.chronicle.graph.n_keyframes() <= 150);
     let rows_at_anchors = |walk: &Walk| walk.error_m(&walk.chronicle.graph.refine());
     let (whole_m, thinned_m) = (rows_at_anchors(&whole), rows_at_anchors(&thinned));
     let motion = whole.told[0].translation.vector - whole.truth[0].translation.vector;
@@ -336,7 +336,7 @@ fn memory_stays_flat() {
         walk.step();
     }
     assert!(walk.chronicle.bytes() <= bytes + bytes / 4);
-    assert!(walk.chronicle.graph.n_anchors() <= 150);
+    assert!(walk.chronicle.graph.n_keyframes() <= 150);
 }
 
 #[test]

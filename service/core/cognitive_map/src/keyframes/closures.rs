@@ -3,11 +3,11 @@
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
 
-use super::graph::{Beside, KeyframeGraph, Moment};
-use super::refine::{Among, Graph};
+use super::constraint::{ClosureState, Constraint};
+use super::graph::{KeyframeGraph, KeyframeOffset, Moment};
+use super::refined::{Among, Graph};
 use super::sighting::{SeenPoint, stated_variance};
-use super::thinning::composed;
-use super::tie::{Standing, Tie};
+use super::sparsification::composed;
 use crate::input::Relation;
 use geometry::{PoseCovariance, is_somewhere, se3, upper_triangle};
 use pose_graph::{Graduation, Marginals, RelaxationSettings, Relaxed};
@@ -31,8 +31,8 @@ const COMPARED: usize = 24;
 const ANY_ANGLE_RAD: f64 = 3.0;
 /// Least deviation of a match \[m, rad\].
 const DEVIATION_MIN: f64 = 1e-3;
-/// A relaxation waits for one record for so many anchors: then it costs each record about as much as so many anchors.
-const ANCHORS_PER_RECORD: usize = 8;
+/// A relaxation waits for one record for so many keyframes: then it costs each record about as much as so many keyframes.
+const KEYFRAMES_PER_RECORD: usize = 8;
 /// Rounds of relaxation and doubt at most.
 const ROUNDS_MAX: usize = 3;
 
@@ -49,7 +49,7 @@ pub struct Correction {
 
 /// A match that waits, with what it is compared by.
 struct Candidate {
-    tie: u32,
+    constraint: u32,
     agent: u32,
     stamp_ns: i64,
     transform: Isometry3<f64>,
@@ -74,102 +74,107 @@ impl KeyframeGraph {
         let Some(then) = self.at_seq(moment.agent, session, earlier_seq) else {
             return false;
         };
-        let place = |beside: &Beside| {
-            let anchor = self.anchors.get(beside.anchor);
-            anchor.map(|anchor| anchor.pose * beside.motion)
+        let place = |offset: &KeyframeOffset| {
+            let keyframe = self.keyframes.get(offset.keyframe);
+            keyframe.map(|keyframe| keyframe.pose * offset.motion)
         };
         let (Some(pose_now), Some(pose_then)) = (place(&now), place(&then)) else {
             return false;
         };
         let (seen, noise) = seen_pose(relation, &pose_now.inv_mul(&pose_then));
-        let is_kept = self.tie_beside(&now, &then, &seen, &noise, Standing::Pending);
-        self.fresh_matches += u32::from(is_kept);
+        let is_kept = self.add_closure(&now, &then, &seen, &noise, ClosureState::Pending);
+        self.schedule.new_closures += u32::from(is_kept);
         is_kept
     }
 
-    /// Ties two places beside anchors by a match; answers whether there is room for it.
-    fn tie_beside(
+    /// Constraints two places beside keyframes by a match; answers whether there is room for it.
+    fn add_closure(
         &mut self,
-        now: &Beside,
-        then: &Beside,
+        now: &KeyframeOffset,
+        then: &KeyframeOffset,
         seen: &Isometry3<f64>,
         noise: &PoseCovariance,
-        standing: Standing,
+        state: ClosureState,
     ) -> bool {
         let from_now = composed(&now.covariance, seen, noise);
         let both = PoseCovariance::from_matrix(&(from_now.matrix() + then.covariance.matrix()));
         let back = then.motion.inverse();
-        let tie = Tie {
-            from: now.anchor,
-            to: then.anchor,
+        let constraint = Constraint {
+            from: now.keyframe,
+            to: then.keyframe,
             next_from: NONE,
             next_to: NONE,
             transform: now.motion * seen * back,
             covariance: both.after_motion(&back, &Vector6::zeros()),
-            standing,
+            state,
         };
-        if self.ties.len() >= self.settings.ties_max as usize {
-            let doubtful = |tie: &&(u32, &Tie)| {
-                matches!(tie.1.standing, Standing::Pending | Standing::Refuted)
+        if self.constraints.len() >= self.settings.constraints_max as usize {
+            let doubtful = |constraint: &&(u32, &Constraint)| {
+                matches!(
+                    constraint.1.state,
+                    ClosureState::Pending | ClosureState::Refuted
+                )
             };
             let oldest = self
-                .ties
+                .constraints
                 .iter()
-                .find(|tie| doubtful(&tie))
+                .find(|constraint| doubtful(&constraint))
                 .map(|(at, _)| at);
-            oldest.map(|at| self.untie(at));
+            oldest.map(|at| self.remove_constraint(at));
         }
-        self.tie(tie) != NONE
+        self.add_constraint(constraint) != NONE
     }
 
     /// Adds a match that is believed at once.
     pub(super) fn accept(
         &mut self,
-        now: &Beside,
-        then: &Beside,
+        now: &KeyframeOffset,
+        then: &KeyframeOffset,
         seen: &Isometry3<f64>,
         noise: &PoseCovariance,
     ) {
-        let is_kept = self.tie_beside(now, then, seen, noise, Standing::Accepted);
-        self.fresh_matches += u32::from(is_kept);
-        self.agreed += u32::from(is_kept);
+        let is_kept = self.add_closure(now, then, seen, noise, ClosureState::Accepted);
+        self.schedule.new_closures += u32::from(is_kept);
+        self.schedule.accepted += u32::from(is_kept);
     }
 
     /// Number of matches that are believed.
     pub fn n_matches_believed(&self) -> usize {
-        let ties = self.ties.iter();
-        ties.filter(|(_, tie)| tie.standing == Standing::Accepted)
+        let constraints = self.constraints.iter();
+        constraints
+            .filter(|(_, constraint)| constraint.state == ClosureState::Accepted)
             .count()
     }
 
     /// Whether matches wait, and enough has been told since the last relaxation to pay for another one.
     pub fn is_due(&self) -> bool {
-        self.fresh_matches > 0 && self.told as usize >= self.anchors.len() / ANCHORS_PER_RECORD
+        self.schedule.new_closures > 0
+            && self.schedule.records as usize >= self.keyframes.len() / KEYFRAMES_PER_RECORD
     }
 
-    /// Moves the anchors to where they most likely are, with the matches that agree, and answers where the agents in the
+    /// Moves the keyframes to where they most likely are, with the matches that agree, and answers where the agents in the
     /// map are then; nothing if no match came to be believed or ceased to be.
     ///
     /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then the same records give the
     /// same map.
     pub fn relax(&mut self) -> Vec<Correction> {
-        self.told = 0;
-        self.fresh_matches = 0;
-        let agreed = std::mem::take(&mut self.agreed) as usize;
+        self.schedule.records = 0;
+        self.schedule.new_closures = 0;
+        let agreed = std::mem::take(&mut self.schedule.accepted) as usize;
         let mut coarse = self.coarse();
-        let judged = coarse.judge();
+        let judged = coarse.accept_consistent();
         let (graph, _, refuted) = coarse.relaxed();
         if agreed + judged + refuted == 0 {
             return Vec::new();
         }
         let marginals = graph.map.marginals();
         let corrections = coarse.corrections(&graph, &marginals);
-        coarse.move_anchors(&graph);
-        self.take_over(&coarse);
+        coarse.move_keyframes(&graph);
+        self.adopt(&coarse);
         corrections
     }
 
-    /// The relaxed graph, after matches that do not fit into it have ceased to be believed; their number. Moves the anchors on
+    /// The relaxed graph, after matches that do not fit into it have ceased to be believed; their number. Moves the keyframes on
     /// the way: for a copy.
     pub(super) fn relaxed(&mut self) -> (Graph, Relaxed, usize) {
         let mut refuted = 0;
@@ -184,38 +189,42 @@ impl KeyframeGraph {
             }
             let relaxed = graph.map.relax(&settings);
             let before = refuted;
-            for number in 0..self.ties.numbers() {
-                let link = graph.ties.get(number as usize).copied().flatten();
+            for number in 0..self.constraints.numbers() {
+                let link = graph.constraints.get(number as usize).copied().flatten();
                 let squared = link.map_or(0.0, |link| graph.map.squared_error(link));
                 if squared > CONTRADICTS
-                    && let Some(tie) = self.ties.get(number)
-                    && tie.standing == Standing::Accepted
-                    && let Some(tie) = self.ties.get_mut(number, revision)
+                    && let Some(constraint) = self.constraints.get(number)
+                    && constraint.state == ClosureState::Accepted
+                    && let Some(constraint) = self.constraints.get_mut(number, revision)
                 {
-                    tie.standing = Standing::Refuted;
+                    constraint.state = ClosureState::Refuted;
                     refuted += 1;
                 }
             }
             if refuted == before || rounds >= ROUNDS_MAX {
                 return (graph, relaxed, refuted);
             }
-            self.move_anchors(&graph);
+            self.move_keyframes(&graph);
         }
     }
 
     /// Whether a graph is near enough to where the matches that it believes have it for their kernels to pull.
     fn fits(&self, graph: &Graph) -> bool {
-        let links = graph.ties.iter().zip(0..);
+        let links = graph.constraints.iter().zip(0..);
         links
-            .filter_map(|(link, number)| Some(((*link)?, self.ties.get(number)?)))
-            .filter(|(_, tie)| tie.standing == Standing::Accepted)
+            .filter_map(|(link, number)| Some(((*link)?, self.constraints.get(number)?)))
+            .filter(|(_, constraint)| constraint.state == ClosureState::Accepted)
             .all(|(link, _)| graph.map.squared_error(link) <= CONTRADICTS)
     }
 
     /// Finds waiting matches that agree with the map or with one another, and believes them; answers their number. Moves the
-    /// anchors to where all that are believed have them: for a copy.
-    pub(super) fn judge(&mut self) -> usize {
-        if !self.ties.iter().any(|(_, tie)| waits(tie)) {
+    /// keyframes to where all that are believed have them: for a copy.
+    pub(super) fn accept_consistent(&mut self) -> usize {
+        if !self
+            .constraints
+            .iter()
+            .any(|(_, constraint)| waits(constraint))
+        {
             return 0;
         }
         let believed = self.graph(Among::Believed);
@@ -223,20 +232,25 @@ impl KeyframeGraph {
         // With kernels that begin wide, all matches together find the map that most of them agree with.
         let mut all = self.graph(Among::All);
         all.map.relax(&settings());
-        let ways = self.ways();
+        let path_variances = self.path_variances();
         let mut accepted = Vec::new();
         let mut candidates = Vec::new();
-        for (number, tie) in self.ties.iter().filter(|(_, tie)| tie.is_match()) {
-            let Some(link) = all.ties.get(number as usize).copied().flatten() else {
+        for (number, constraint) in self
+            .constraints
+            .iter()
+            .filter(|(_, constraint)| constraint.is_match())
+        {
+            let Some(link) = all.constraints.get(number as usize).copied().flatten() else {
                 continue;
             };
-            if waits(tie) && agrees_with(tie, &believed, &marginals) {
+            if waits(constraint) && agrees_with(constraint, &believed, &marginals) {
                 accepted.push(number);
             } else if all.map.squared_error(link) <= AGREES {
-                candidates.extend(self.candidate(number, tie, &all, &ways));
+                candidates.extend(self.candidate(number, constraint, &all, &path_variances));
             }
         }
-        candidates.sort_by_key(|candidate| (candidate.agent, candidate.stamp_ns, candidate.tie));
+        candidates
+            .sort_by_key(|candidate| (candidate.agent, candidate.stamp_ns, candidate.constraint));
         let mut partners = vec![0; candidates.len()];
         for later in 0..candidates.len() {
             for earlier in later.saturating_sub(COMPARED)..later {
@@ -250,17 +264,21 @@ impl KeyframeGraph {
             .iter()
             .zip(partners)
             .filter(|(candidate, partners)| {
-                *partners >= PARTNERS && self.ties.get(candidate.tie).is_some_and(waits)
+                *partners >= PARTNERS
+                    && self
+                        .constraints
+                        .get(candidate.constraint)
+                        .is_some_and(waits)
             });
-        accepted.extend(supported.map(|(candidate, _)| candidate.tie));
+        accepted.extend(supported.map(|(candidate, _)| candidate.constraint));
         let revision = self.revision;
         for &number in &accepted {
-            if let Some(tie) = self.ties.get_mut(number, revision) {
-                tie.standing = Standing::Accepted;
+            if let Some(constraint) = self.constraints.get_mut(number, revision) {
+                constraint.state = ClosureState::Accepted;
             }
         }
         if self.fits(&all) {
-            self.move_anchors(&all);
+            self.move_keyframes(&all);
         }
         accepted.len()
     }
@@ -269,88 +287,94 @@ impl KeyframeGraph {
     fn candidate(
         &self,
         number: u32,
-        tie: &Tie,
+        constraint: &Constraint,
         graph: &Graph,
-        ways: &[[f64; 2]],
+        path_variances: &[[f64; 2]],
     ) -> Option<Candidate> {
         let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
-        let from = self.anchors.get(tie.from)?;
-        let diagonal = tie.covariance.matrix().diagonal();
+        let from = self.keyframes.get(constraint.from)?;
+        let diagonal = constraint.covariance.matrix().diagonal();
         Some(Candidate {
-            tie: number,
+            constraint: number,
             agent: from.agent,
             stamp_ns: from.stamp_ns,
-            transform: tie.transform,
+            transform: constraint.transform,
             ends: [
-                *graph.map.pose(node(tie.from)?),
-                *graph.map.pose(node(tie.to)?),
+                *graph.map.pose(node(constraint.from)?),
+                *graph.map.pose(node(constraint.to)?),
             ],
-            variances: [*ways.get(tie.from as usize)?, *ways.get(tie.to as usize)?],
+            variances: [
+                *path_variances.get(constraint.from as usize)?,
+                *path_variances.get(constraint.to as usize)?,
+            ],
             own: [diagonal.rows(0, 3).max(), diagonal.rows(3, 3).max()],
         })
     }
 
-    /// For each anchor the variances of the way since its agent's chain began \[m², rad²\].
-    fn ways(&self) -> Vec<[f64; 2]> {
-        let mut ways = vec![[0.0; 2]; self.anchors.numbers() as usize];
-        for (agent, _) in (0..).zip(self.lives.iter()) {
-            let mut number = self.first_of(agent);
+    /// For each keyframe the variances of the way since its agent's chain began \[m², rad²\].
+    fn path_variances(&self) -> Vec<[f64; 2]> {
+        let mut path_variances = vec![[0.0; 2]; self.keyframes.numbers() as usize];
+        for (agent, _) in (0..).zip(self.tracks.iter()) {
+            let mut number = self.first_keyframe(agent);
             let mut way = [0.0; 2];
-            while let Some(anchor) = self.anchors.get(number) {
-                let diagonal = anchor.covariance.matrix().diagonal();
+            while let Some(keyframe) = self.keyframes.get(number) {
+                let diagonal = keyframe.covariance.matrix().diagonal();
                 way[0] += diagonal.rows(0, 3).max();
                 way[1] += diagonal.rows(3, 3).max();
                 // Nothing is known of the way between two stretches.
-                if anchor.begins {
+                if keyframe.begins {
                     way[0] += 1e12;
                 }
-                ways[number as usize] = way;
-                number = anchor.next;
+                path_variances[number as usize] = way;
+                number = keyframe.next;
             }
         }
-        ways
+        path_variances
     }
 
     /// Where the agents in the map are in a relaxed graph.
     fn corrections(&self, graph: &Graph, marginals: &Marginals<'_>) -> Vec<Correction> {
         let mut corrections = Vec::new();
-        for (agent, life) in (0..).zip(self.lives.iter()) {
-            let node = graph.poses.get(life.newest as usize).copied().flatten();
-            let Some(node) = node.filter(|_| !life.is_fresh) else {
+        for (agent, track) in (0..).zip(self.tracks.iter()) {
+            let node = graph.poses.get(track.newest as usize).copied().flatten();
+            let Some(node) = node.filter(|_| !track.needs_keyframe) else {
                 continue;
             };
             let covariance = marginals.pose(node).map(|covariance| {
-                composed(&covariance, life.since.motion(), &life.since.covariance())
+                composed(&covariance, track.since.motion(), &track.since.covariance())
             });
             corrections.push(Correction {
                 agent,
-                pose: graph.map.pose(node) * life.since.motion(),
+                pose: graph.map.pose(node) * track.since.motion(),
                 covariance,
             });
         }
         corrections
     }
 
-    /// Puts the anchors where a relaxed graph has them.
-    fn move_anchors(&mut self, graph: &Graph) {
+    /// Puts the keyframes where a relaxed graph has them.
+    fn move_keyframes(&mut self, graph: &Graph) {
         let revision = self.revision;
-        for number in 0..self.anchors.numbers() {
+        for number in 0..self.keyframes.numbers() {
             let node = graph.poses.get(number as usize).copied().flatten();
             let pose = node.map(|node| graph.map.pose(node));
             let Some(pose) = pose.filter(|pose| is_somewhere(&pose.translation.vector)) else {
                 continue;
             };
-            if let Some(anchor) = self.anchors.get_mut(number, revision) {
-                anchor.pose = *pose;
-                anchor.is_in_map = true;
+            if let Some(keyframe) = self.keyframes.get_mut(number, revision) {
+                keyframe.pose = *pose;
+                keyframe.is_in_map = true;
             }
         }
     }
 }
 
 /// Whether a match waits to be believed, for the first time or again.
-fn waits(tie: &Tie) -> bool {
-    matches!(tie.standing, Standing::Pending | Standing::Refuted)
+fn waits(constraint: &Constraint) -> bool {
+    matches!(
+        constraint.state,
+        ClosureState::Pending | ClosureState::Refuted
+    )
 }
 
 /// How a graph with matches is relaxed.
@@ -362,20 +386,20 @@ fn settings() -> RelaxationSettings {
 }
 
 /// Whether the map knows the relative pose about as well as a match says it, and agrees.
-fn agrees_with(tie: &Tie, graph: &Graph, marginals: &Marginals<'_>) -> bool {
+fn agrees_with(constraint: &Constraint, graph: &Graph, marginals: &Marginals<'_>) -> bool {
     let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
-    let (Some(from), Some(to)) = (node(tie.from), node(tie.to)) else {
+    let (Some(from), Some(to)) = (node(constraint.from), node(constraint.to)) else {
         return false;
     };
-    let own = tie.covariance.matrix();
+    let own = constraint.covariance.matrix();
     let least = DEVIATION_MIN * DEVIATION_MIN;
     let expected = graph.map.pose(from).inv_mul(graph.map.pose(to));
-    let (linear, angular) = se3::log(&expected.inv_mul(&tie.transform));
+    let (linear, angular) = se3::log(&expected.inv_mul(&constraint.transform));
     let off = Vector6::from_iterator(linear.iter().chain(angular.iter()).copied());
     // One that is too far off in one direction is so for every map that is sure enough: its covariance, which takes
     // long to find, need not be known.
-    let vaguest = VAGUER_MAX * VAGUER_MAX + 1.0;
-    if (0..6).any(|k| off[k] * off[k] > AGREES * vaguest * (own[(k, k)] + least)) {
+    let least_certain = VAGUER_MAX * VAGUER_MAX + 1.0;
+    if (0..6).any(|k| off[k] * off[k] > AGREES * least_certain * (own[(k, k)] + least)) {
         return false;
     }
     let Some(spread) = marginals.relative_pose(from, to) else {

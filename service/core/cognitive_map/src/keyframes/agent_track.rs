@@ -1,4 +1,4 @@
-//! An agent, as far as the chronicle knows it.
+//! An agent, as far as the keyframe graph knows it.
 
 use nalgebra::{Isometry3, Vector6};
 
@@ -13,32 +13,32 @@ use state::state_of_struct;
     clippy::struct_excessive_bools,
     reason = "each is a state of its own, in any combination"
 )]
-pub(super) struct Life {
+pub(super) struct AgentTrack {
     /// Whether its poses are those of the map.
     pub(super) is_in_map: bool,
     /// Where its own frame turned out to lie in the map.
     pub(super) own_frame: Option<Isometry3<f64>>,
     /// Whether all motion so far was in the body's x-y plane.
     pub(super) is_planar: bool,
-    /// Whether the next anchor begins anew, without a motion from the one before.
-    pub(super) is_cut: bool,
-    /// Whether there is to be an anchor before the agent moves on: it has none in its session.
-    pub(super) is_fresh: bool,
-    /// Whether its next anchor is the origin of the map.
-    pub(super) founds: bool,
-    /// Its latest anchor.
+    /// Whether the next keyframe begins anew, without a motion from the one before.
+    pub(super) begins_anew: bool,
+    /// Whether there is to be a keyframe before the agent moves on: it has none in its session.
+    pub(super) needs_keyframe: bool,
+    /// Whether its next keyframe is the origin of the map.
+    pub(super) is_origin: bool,
+    /// Its latest keyframe.
     pub(super) newest: u32,
     pub(super) session: u32,
     pub(super) seq: u64,
     pub(super) stamp_ns: i64,
-    /// Until when it was at the latest anchor.
+    /// Until when it was at the latest keyframe.
     pub(super) until_seq: u64,
     pub(super) until_ns: i64,
-    /// Motion since the latest anchor, with the covariance of its error.
+    /// Motion since the latest keyframe, with the covariance of its error.
     pub(super) since: MotionSum,
     /// How that motion was corrected.
     pub(super) calibrated: Calibrated,
-    /// Where it came to rest lately, by the motion since the latest anchor, and when.
+    /// Where it came to rest lately, by the motion since the latest keyframe, and when.
     pub(super) rest: Isometry3<f64>,
     pub(super) rest_seq: u64,
     pub(super) rest_ns: i64,
@@ -46,13 +46,13 @@ pub(super) struct Life {
     pub(super) pose: Isometry3<f64>,
 }
 
-state_of_struct!(Life {
+state_of_struct!(AgentTrack {
     is_in_map,
     own_frame,
     is_planar,
-    is_cut,
-    is_fresh,
-    founds,
+    begins_anew,
+    needs_keyframe,
+    is_origin,
     newest,
     session,
     seq,
@@ -67,15 +67,15 @@ state_of_struct!(Life {
     pose
 });
 
-impl Life {
+impl AgentTrack {
     pub(super) fn new() -> Self {
         Self {
             is_in_map: false,
             own_frame: None,
             is_planar: true,
-            is_cut: true,
-            is_fresh: true,
-            founds: false,
+            begins_anew: true,
+            needs_keyframe: true,
+            is_origin: false,
             newest: NONE,
             session: 0,
             seq: 0,

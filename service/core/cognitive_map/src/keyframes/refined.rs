@@ -2,10 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
 
-use super::anchor::Anchor;
+use super::constraint::{ClosureState, Constraint};
 use super::graph::KeyframeGraph;
-use super::sighting::Shown;
-use super::tie::Standing;
+use super::keyframe::Keyframe;
+use super::sighting::{Seen, Sighting};
 use crate::input::Label;
 use geometry::{PoseCovariance, from_planar_part, is_somewhere, planar_part, positive};
 use pose_graph::{
@@ -71,16 +71,16 @@ pub(super) enum Among {
     All,
 }
 
-/// The chronicle as an experience map.
+/// The keyframe graph as an experience map.
 #[derive(Debug)]
 pub(super) struct Graph {
     pub(super) map: PoseGraph,
-    /// The node of each anchor.
+    /// The node of each keyframe.
     pub(super) poses: Vec<Option<PoseId>>,
     /// The node of each landmark.
     pub(super) points: Vec<Option<PointId>>,
-    /// The link of each tie.
-    pub(super) ties: Vec<Option<LinkId>>,
+    /// The link of each constraint.
+    pub(super) constraints: Vec<Option<LinkId>>,
 }
 
 impl KeyframeGraph {
@@ -88,7 +88,7 @@ impl KeyframeGraph {
     pub fn refine(&self) -> Refined {
         // Matches are judged on the way, in a copy that shares all that they do not change.
         let mut copy = self.clone();
-        copy.judge();
+        copy.accept_consistent();
         let (graph, relaxed, _) = copy.relaxed();
         let marginals = graph.map.marginals();
         let mut landmarks: Vec<RefinedLandmark> = Vec::new();
@@ -109,7 +109,7 @@ impl KeyframeGraph {
             }
         }
         landmarks.sort_by(|a, b| a.label.cmp(&b.label));
-        let agents = (0..self.lives.len()).map(|agent| self.refined_agent(agent, &graph));
+        let agents = (0..self.tracks.len()).map(|agent| self.refined_agent(agent, &graph));
         Refined {
             agents: agents.collect(),
             landmarks,
@@ -120,52 +120,52 @@ impl KeyframeGraph {
     /// What is remembered, relaxed, as nodes and links: for other programs.
     pub fn experience_map(&self) -> PoseGraph {
         let mut copy = self.clone();
-        copy.judge();
+        copy.accept_consistent();
         copy.relaxed().0.map
     }
 
     /// The poses of an agent.
     fn refined_agent(&self, agent: usize, graph: &Graph) -> RefinedAgent {
-        let Some(life) = self.lives.get(agent) else {
+        let Some(track) = self.tracks.get(agent) else {
             return RefinedAgent::default();
         };
         let mut poses = Vec::new();
-        let mut number = life.newest;
+        let mut number = track.newest;
         let mut later = RefinedPose {
-            stamp_ns: life.stamp_ns,
-            pose: self.now(life.newest, life.since.motion(), graph),
+            stamp_ns: track.stamp_ns,
+            pose: self.now(track.newest, track.since.motion(), graph),
         };
-        if life.newest != NONE {
+        if track.newest != NONE {
             poses.push(later);
         }
-        let mut until_ns = life.until_ns;
-        while let Some(anchor) = self.anchors.get(number) {
+        let mut until_ns = track.until_ns;
+        while let Some(keyframe) = self.keyframes.get(number) {
             let pose = self.now(number, &Isometry3::identity(), graph);
-            for stamp_ns in [until_ns, anchor.stamp_ns] {
+            for stamp_ns in [until_ns, keyframe.stamp_ns] {
                 if stamp_ns < later.stamp_ns {
                     later = RefinedPose { stamp_ns, pose };
                     poses.push(later);
                 }
             }
-            number = anchor.previous;
+            number = keyframe.previous;
             until_ns = self
-                .anchors
+                .keyframes
                 .get(number)
                 .map_or(0, |previous| previous.until_ns);
         }
         poses.retain(|refined| is_somewhere(&refined.pose.translation.vector));
         poses.reverse();
         RefinedAgent {
-            is_in_map: life.is_in_map,
+            is_in_map: track.is_in_map,
             poses,
         }
     }
 
-    /// Where a place beside an anchor lies.
-    fn now(&self, anchor: u32, motion: &Isometry3<f64>, graph: &Graph) -> Isometry3<f64> {
-        let refined = graph.poses.get(anchor as usize).copied().flatten();
+    /// Where a place beside a keyframe lies.
+    fn now(&self, keyframe: u32, motion: &Isometry3<f64>, graph: &Graph) -> Isometry3<f64> {
+        let refined = graph.poses.get(keyframe as usize).copied().flatten();
         let pose = refined.map(|node| *graph.map.pose(node));
-        let stored = || self.anchors.get(anchor).map(|anchor| anchor.pose);
+        let stored = || self.keyframes.get(keyframe).map(|keyframe| keyframe.pose);
         pose.or_else(stored).unwrap_or_default() * motion
     }
 
@@ -173,60 +173,62 @@ impl KeyframeGraph {
     pub(super) fn graph(&self, among: Among) -> Graph {
         let mut graph = Graph {
             map: PoseGraph::new(),
-            poses: vec![None; self.anchors.numbers() as usize],
+            poses: vec![None; self.keyframes.numbers() as usize],
             points: vec![None; self.landmarks.slots.numbers() as usize],
-            ties: vec![None; self.ties.numbers() as usize],
+            constraints: vec![None; self.constraints.numbers() as usize],
         };
-        for (number, anchor) in self.anchors.iter() {
-            graph.poses[number as usize] = self.add_pose(number, anchor, &mut graph.map);
+        for (number, keyframe) in self.keyframes.iter() {
+            graph.poses[number as usize] = self.pose_node(number, keyframe, &mut graph.map);
         }
         let motions = self.recalibrated();
-        for (number, anchor) in self.anchors.iter() {
-            self.add_motion(number, anchor, motions[number as usize], &mut graph);
+        for (number, keyframe) in self.keyframes.iter() {
+            self.motion_link(number, keyframe, motions[number as usize], &mut graph);
         }
-        for (number, tie) in self.ties.iter() {
-            graph.ties[number as usize] = self.add_tie(tie, among, &mut graph);
+        for (number, constraint) in self.constraints.iter() {
+            graph.constraints[number as usize] =
+                self.constraint_link(constraint, among, &mut graph);
         }
         for (_, sighting) in self.sightings.iter() {
-            Self::add_sighting(sighting, &mut graph);
+            Self::sighting_link(sighting, &mut graph);
         }
         graph
     }
 
-    /// A node for an anchor in the map.
-    fn add_pose(&self, number: u32, anchor: &Anchor, map: &mut PoseGraph) -> Option<PoseId> {
-        let life = self.lives.get(anchor.agent as usize)?;
-        if !life.is_in_map {
+    /// A node for a keyframe in the map.
+    fn pose_node(&self, number: u32, keyframe: &Keyframe, map: &mut PoseGraph) -> Option<PoseId> {
+        let track = self.tracks.get(keyframe.agent as usize)?;
+        if !track.is_in_map {
             return None;
         }
         let pose = self.in_map(number)?;
-        let mut tie = anchor.ties;
-        let mut freedom = if life.is_planar {
+        let mut constraint = keyframe.constraints;
+        let mut freedom = if track.is_planar {
             Freedom::Planar
         } else {
             Freedom::Full
         };
-        while let Some(at) = self.ties.get(tie) {
-            if at.standing == Standing::Origin {
+        while let Some(at) = self.constraints.get(constraint) {
+            if at.state == ClosureState::Origin {
                 freedom = Freedom::Held;
             }
-            tie = self.next_tie(tie, number);
+            constraint = self.next_constraint(constraint, number);
         }
         Some(map.add_pose(pose, freedom))
     }
 
-    fn add_motion(
+    fn motion_link(
         &self,
         number: u32,
-        anchor: &Anchor,
+        keyframe: &Keyframe,
         transform: Isometry3<f64>,
         graph: &mut Graph,
     ) {
-        let Some(life) = self.lives.get(anchor.agent as usize) else {
+        let Some(track) = self.tracks.get(keyframe.agent as usize) else {
             return;
         };
         let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
-        let (Some(from), Some(to), false) = (node(anchor.previous), node(number), anchor.begins)
+        let (Some(from), Some(to), false) =
+            (node(keyframe.previous), node(number), keyframe.begins)
         else {
             return;
         };
@@ -234,33 +236,40 @@ impl KeyframeGraph {
             from,
             to,
             transform,
-            information: information(&anchor.covariance, life.is_planar),
+            information: information(&keyframe.covariance, track.is_planar),
         };
         graph.map.add_link(link, Kernel::Gaussian).ok();
     }
 
-    fn add_tie(&self, tie: &super::tie::Tie, among: Among, graph: &mut Graph) -> Option<LinkId> {
+    fn constraint_link(
+        &self,
+        constraint: &Constraint,
+        among: Among,
+        graph: &mut Graph,
+    ) -> Option<LinkId> {
         let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
-        let to = node(tie.to)?;
-        let agent = self.anchors.get(tie.to)?.agent;
-        let is_planar = self.lives.get(agent as usize)?.is_planar;
-        let information = information(&tie.covariance, is_planar);
-        let link = match tie.standing {
-            Standing::Origin => return None,
-            Standing::Pending | Standing::Refuted if among == Among::Believed => return None,
-            _ if tie.from == NONE => Link::PosePrior {
+        let to = node(constraint.to)?;
+        let agent = self.keyframes.get(constraint.to)?.agent;
+        let is_planar = self.tracks.get(agent as usize)?.is_planar;
+        let information = information(&constraint.covariance, is_planar);
+        let link = match constraint.state {
+            ClosureState::Origin => return None,
+            ClosureState::Pending | ClosureState::Refuted if among == Among::Believed => {
+                return None;
+            }
+            _ if constraint.from == NONE => Link::PosePrior {
                 pose: to,
-                at: tie.transform,
+                at: constraint.transform,
                 information,
             },
             _ => Link::Between {
-                from: node(tie.from)?,
+                from: node(constraint.from)?,
                 to,
-                transform: tie.transform,
+                transform: constraint.transform,
                 information,
             },
         };
-        let kernel = if tie.is_match() {
+        let kernel = if constraint.is_match() {
             Kernel::GemanMcClure(Scale::new(MATCH_SCALE).expect("a positive constant"))
         } else {
             Kernel::Gaussian
@@ -268,13 +277,13 @@ impl KeyframeGraph {
         graph.map.add_link(link, kernel).ok()
     }
 
-    fn add_sighting(sighting: &super::sighting::Sighting, graph: &mut Graph) -> Option<LinkId> {
+    fn sighting_link(sighting: &Sighting, graph: &mut Graph) -> Option<LinkId> {
         let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
-        let from = node(sighting.anchor)?;
+        let from = node(sighting.keyframe)?;
         let position = sighting.point.position;
         let target = match sighting.shown {
-            Shown::Agent(target, lever) => SightingTarget::PointOf(node(target)?, lever),
-            Shown::Landmark(number) => {
+            Seen::Agent(target, lever) => SightingTarget::PointOf(node(target)?, lever),
+            Seen::Landmark(number) => {
                 let point = &mut graph.points[number as usize];
                 let at = graph.map.pose(from) * Point3::from(position);
                 let add = || graph.map.add_point(at, Freedom::Full);

@@ -8,17 +8,17 @@ use state::state_of_struct;
 
 /// Where an agent was at a moment, and how it came there from the moment before.
 #[derive(Clone, Debug)]
-pub(super) struct Anchor {
+pub(super) struct Keyframe {
     pub(super) agent: u32,
-    /// The agent's anchors before and after.
+    /// The agent's keyframes before and after.
     pub(super) previous: u32,
     pub(super) next: u32,
-    /// The first sighting made here, the first that shows the agent here, the first tie that ends here.
+    /// The first sighting made here, the first that shows the agent here, the first constraint that ends here.
     pub(super) sightings: u32,
     pub(super) shown: u32,
-    pub(super) ties: u32,
+    pub(super) constraints: u32,
     /// The first thing that lies beside it.
-    pub(super) moorings: u32,
+    pub(super) attachments: u32,
     /// The run of the agent.
     pub(super) session: u32,
     /// The samples from which and up to which the agent was here.
@@ -31,25 +31,25 @@ pub(super) struct Anchor {
     pub(super) is_in_map: bool,
     /// Where the agent was thought to be.
     pub(super) pose: Isometry3<f64>,
-    /// The motion from the anchor before, with the covariance of its error.
+    /// The motion from the keyframe before, with the covariance of its error.
     pub(super) motion: Isometry3<f64>,
     pub(super) covariance: PoseCovariance,
     /// How the motion was corrected.
     pub(super) calibrated: Calibrated,
-    /// Whether it begins a stretch: no motion leads there from the anchor before.
+    /// Whether it begins a stretch: no motion leads there from the keyframe before.
     pub(super) begins: bool,
     /// How far the way there deviates from an even motion, from what was thinned out of it \[m\].
     pub(super) unevenness_m: f64,
 }
 
-state_of_struct!(Anchor {
+state_of_struct!(Keyframe {
     agent,
     previous,
     next,
     sightings,
     shown,
-    ties,
-    moorings,
+    constraints,
+    attachments,
     session,
     seq,
     until_seq,

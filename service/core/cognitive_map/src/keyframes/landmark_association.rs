@@ -1,16 +1,16 @@
 //! Landmarks that turn out to be known by two names.
 
 use super::KeyframeGraph;
-use super::sighting::Shown;
+use super::sighting::Seen;
 use crate::input::Label;
 
 impl KeyframeGraph {
     /// Landmarks turned out to be known by two names: each time the one that is given up, and the one that stays. Walks all
     /// sightings.
-    pub fn same(&mut self, names: &[(Label, Label)]) {
+    pub fn merge_landmarks(&mut self, names: &[(Label, Label)]) {
         let revision = self.revision;
-        let renamed = |shown: &Shown| {
-            let Shown::Landmark(number) = shown else {
+        let renamed = |shown: &Seen| {
+            let Seen::Landmark(number) = shown else {
                 return None;
             };
             let label = &self.landmarks.slots.get(*number)?.label;
@@ -25,7 +25,7 @@ impl KeyframeGraph {
                 return;
             };
             if let Some(sighting) = self.sightings.get_mut(at, revision) {
-                sighting.shown = Shown::Landmark(after);
+                sighting.shown = Seen::Landmark(after);
             }
             self.landmarks.release(before, revision);
         }

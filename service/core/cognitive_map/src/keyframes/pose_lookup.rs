@@ -4,7 +4,7 @@ use geometry::{PoseCovariance, se3};
 use nalgebra::Isometry3;
 use place_recognition::{Keyframes, Relocalised, Revisit, SampleKey};
 
-use super::graph::{Beside, KeyframeGraph, beside};
+use super::graph::{KeyframeGraph, KeyframeOffset, offset};
 
 impl Keyframes for KeyframeGraph {
     fn pose_at(&self, sample: SampleKey) -> Option<Isometry3<f64>> {
@@ -13,19 +13,19 @@ impl Keyframes for KeyframeGraph {
 
     fn motion_between(&self, from: SampleKey, to: SampleKey) -> Option<Isometry3<f64>> {
         let pose = |sample: SampleKey| {
-            let beside = self.at_sample(sample)?;
-            Some(self.anchors.get(beside.anchor)?.pose * beside.motion)
+            let offset = self.at_sample(sample)?;
+            Some(self.keyframes.get(offset.keyframe)?.pose * offset.motion)
         };
         Some(pose(from)?.inv_mul(&pose(to)?))
     }
 
     fn is_planar(&self, agent: u32) -> bool {
-        let own = self.lives.get(agent as usize);
-        own.is_some_and(|life| life.is_planar)
+        let own = self.tracks.get(agent as usize);
+        own.is_some_and(|track| track.is_planar)
             && self
-                .lives
+                .tracks
                 .iter()
-                .all(|life| life.is_planar || !life.is_in_map)
+                .all(|track| track.is_planar || !track.is_in_map)
     }
 }
 
@@ -42,15 +42,15 @@ impl KeyframeGraph {
 
     /// A new stretch of an agent, there if a pose is given: no motion leads to it.
     pub(super) fn begin_stretch(&mut self, agent: u32, at: Option<&Isometry3<f64>>) {
-        if let Some(life) = self.lives.get_mut(agent as usize, self.revision) {
-            life.is_cut = true;
-            life.pose = at.copied().unwrap_or(life.pose);
+        if let Some(track) = self.tracks.get_mut(agent as usize, self.revision) {
+            track.begins_anew = true;
+            track.pose = at.copied().unwrap_or(track.pose);
         }
-        self.anchor_anew(agent);
+        self.add_keyframe(agent);
     }
 
     /// Adds a loop closure from where an agent was found to a remembered sample, accepted at once.
-    pub(super) fn tie_to_recognised(
+    pub(super) fn close_to_recognised(
         &mut self,
         agent: u32,
         similar: Option<SampleKey>,
@@ -73,71 +73,74 @@ impl KeyframeGraph {
 
     /// Whether an agent in the map has a keyframe in its session.
     pub(super) fn has_keyframe_in_map(&self, agent: u32) -> bool {
-        let life = self.lives.get(agent as usize);
-        life.is_some_and(|life| life.is_in_map && !life.is_fresh)
+        let track = self.tracks.get(agent as usize);
+        track.is_some_and(|track| track.is_in_map && !track.needs_keyframe)
     }
 
     /// Number of the latest sample of an agent.
     pub(super) fn latest_seq(&self, agent: u32) -> u64 {
-        self.lives.get(agent as usize).map_or(0, |life| life.seq)
+        self.tracks.get(agent as usize).map_or(0, |track| track.seq)
     }
 
     /// The session that an agent is in.
     pub(super) fn session(&self, agent: u32) -> u32 {
-        self.lives
+        self.tracks
             .get(agent as usize)
-            .map_or(0, |life| life.session)
+            .map_or(0, |track| track.session)
     }
 
     /// Pose in the map of a place beside a keyframe; `None` if it lies in no map.
-    pub(super) fn pose_of(&self, beside: &Beside) -> Option<Isometry3<f64>> {
-        let anchor = self.anchors.get(beside.anchor)?;
-        let life = self.lives.get(anchor.agent as usize)?;
-        let pose = anchor.pose * beside.motion;
-        if anchor.is_in_map {
+    pub(super) fn pose_of(&self, offset: &KeyframeOffset) -> Option<Isometry3<f64>> {
+        let keyframe = self.keyframes.get(offset.keyframe)?;
+        let track = self.tracks.get(keyframe.agent as usize)?;
+        let pose = keyframe.pose * offset.motion;
+        if keyframe.is_in_map {
             Some(pose)
         } else {
-            Some(life.own_frame? * pose)
+            Some(track.own_frame? * pose)
         }
     }
 
-    fn at_sample(&self, sample: SampleKey) -> Option<Beside> {
+    fn at_sample(&self, sample: SampleKey) -> Option<KeyframeOffset> {
         self.at_seq(sample.agent, sample.session, sample.seq)
     }
 
-    /// Where an agent was at a sample of a session. Walks back to it from the next milestone.
-    pub(super) fn at_seq(&self, agent: u32, session: u32, seq: u64) -> Option<Beside> {
-        let life = self.lives.get(agent as usize)?;
-        if session > life.session || (session == life.session && seq > life.seq) {
+    /// Where an agent was at a sample of a session. Walks back to it from the next index entry.
+    pub(super) fn at_seq(&self, agent: u32, session: u32, seq: u64) -> Option<KeyframeOffset> {
+        let track = self.tracks.get(agent as usize)?;
+        if session > track.session || (session == track.session && seq > track.seq) {
             return None;
         }
-        let mut later = (life.seq, *life.since.motion(), life.since.covariance());
-        let (mut number, mut until_seq) = (life.newest, life.until_seq);
-        if let Some(milestone) = self.anchors.get(self.milestone_after(agent, session, seq)) {
-            if milestone.begins && milestone.session == session {
+        let mut later = (track.seq, *track.since.motion(), track.since.covariance());
+        let (mut number, mut until_seq) = (track.newest, track.until_seq);
+        if let Some(entry) = self
+            .keyframes
+            .get(self.first_indexed_after(agent, session, seq))
+        {
+            if entry.begins && entry.session == session {
                 return None;
             }
-            later = (milestone.seq, milestone.motion, milestone.covariance);
-            number = milestone.previous;
-            until_seq = self.anchors.get(number)?.until_seq;
+            later = (entry.seq, entry.motion, entry.covariance);
+            number = entry.previous;
+            until_seq = self.keyframes.get(number)?.until_seq;
         }
         loop {
-            let anchor = self.anchors.get(number)?;
-            if anchor.session < session {
+            let keyframe = self.keyframes.get(number)?;
+            if keyframe.session < session {
                 return None;
             }
-            if anchor.session == session && anchor.seq <= seq {
+            if keyframe.session == session && keyframe.seq <= seq {
                 let (end, motion, covariance) = later;
                 let way = end.saturating_sub(until_seq).max(1) as f64;
                 let share = seq.saturating_sub(until_seq) as f64 / way;
-                return Some(beside(number, &motion, &covariance, share));
+                return Some(offset(number, &motion, &covariance, share));
             }
-            if anchor.begins && anchor.session == session {
+            if keyframe.begins && keyframe.session == session {
                 return None;
             }
-            later = (anchor.seq, anchor.motion, anchor.covariance);
-            number = anchor.previous;
-            until_seq = self.anchors.get(number)?.until_seq;
+            later = (keyframe.seq, keyframe.motion, keyframe.covariance);
+            number = keyframe.previous;
+            until_seq = self.keyframes.get(number)?.until_seq;
         }
     }
 }

@@ -1,14 +1,14 @@
-//! What ties an anchor to the map or to another anchor.
+//! What constraints a keyframe to the map or to another keyframe.
 
 use nalgebra::Isometry3;
 
 use geometry::PoseCovariance;
 use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
-/// How a tie counts.
+/// How a constraint counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Standing {
-    /// It is the frame: the anchor does not move.
+pub(super) enum ClosureState {
+    /// It is the frame: the keyframe does not move.
     Origin,
     /// It was stated and is believed.
     Stated,
@@ -20,42 +20,42 @@ pub(super) enum Standing {
     Refuted,
 }
 
-/// A relative pose between two anchors, or between the map and an anchor.
+/// A relative pose between two keyframes, or between the map and a keyframe.
 #[derive(Clone, Debug)]
-pub(super) struct Tie {
-    /// The anchor in whose frame the other one lies; [`NONE`](state::NONE) for the map.
+pub(super) struct Constraint {
+    /// The keyframe in whose frame the other one lies; [`NONE`](state::NONE) for the map.
     pub(super) from: u32,
     pub(super) to: u32,
-    /// The next ties that end at these anchors.
+    /// The next constraints that end at these keyframes.
     pub(super) next_from: u32,
     pub(super) next_to: u32,
     pub(super) transform: Isometry3<f64>,
     /// Of the error on the right of the transform.
     pub(super) covariance: PoseCovariance,
-    pub(super) standing: Standing,
+    pub(super) state: ClosureState,
 }
 
-impl Tie {
+impl Constraint {
     /// Whether it is a match.
     pub(super) fn is_match(&self) -> bool {
         matches!(
-            self.standing,
-            Standing::Pending | Standing::Accepted | Standing::Refuted
+            self.state,
+            ClosureState::Pending | ClosureState::Accepted | ClosureState::Refuted
         )
     }
 }
 
-state_of_struct!(Tie {
+state_of_struct!(Constraint {
     from,
     to,
     next_from,
     next_to,
     transform,
     covariance,
-    standing
+    state
 });
 
-impl State for Standing {
+impl State for ClosureState {
     fn write(&self, out: &mut StateWriter) {
         (*self as u8).write(out);
     }

@@ -1,0 +1,57 @@
+//! What odometry got wrong in the past, by what is known of it now.
+
+use nalgebra::{Isometry3, SVector};
+
+use super::graph::KeyframeGraph;
+use super::keyframe::Keyframe;
+use crate::estimator::Calibration;
+
+impl KeyframeGraph {
+    /// The motions to all keyframes, by number, corrected by what is known now of their odometry's lasting errors.
+    ///
+    /// When a robot set out, little was known of them, so its first motions are the most wrong, all in one direction, and
+    /// the whole map turns with them. The errors are smoothed backward along each chain, each for itself (Rauch, Tung &
+    /// Striebel 1965), with variance P as it was known at a keyframe and wander Q from there to the next one:
+    ///
+    /// ```text
+    /// ĉ_k = c_k + P / (P + Q) · (ĉ_{k+1} − c_k)
+    /// ```
+    pub(super) fn recalibrated(&self) -> Vec<Isometry3<f64>> {
+        let mut motions = vec![Isometry3::identity(); self.keyframes.numbers() as usize];
+        for track in self.tracks.iter() {
+            let mut later = track.calibrated.calibration.components();
+            let mut wander = track.calibrated.wander;
+            let mut number = track.newest;
+            while let Some(keyframe) = self.keyframes.get(number) {
+                later = smoothed(keyframe, &later, &wander);
+                let calibration = Calibration::of_components(&later);
+                motions[number as usize] = keyframe
+                    .calibrated
+                    .corrected_by(&keyframe.motion, &calibration);
+                wander = keyframe.calibrated.wander;
+                number = keyframe.previous;
+            }
+        }
+        motions
+    }
+}
+
+/// The errors at a keyframe, from those later.
+fn smoothed(
+    keyframe: &Keyframe,
+    later: &SVector<f64, 5>,
+    wander: &SVector<f64, 5>,
+) -> SVector<f64, 5> {
+    let then = keyframe.calibrated.calibration.components();
+    let gain = keyframe
+        .calibrated
+        .variance
+        .zip_map(wander, |known, wander| {
+            if known > 0.0 {
+                known / (known + wander)
+            } else {
+                0.0
+            }
+        });
+    then + gain.component_mul(&(later - then))
+}
