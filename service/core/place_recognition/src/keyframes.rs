@@ -18,7 +18,8 @@ pub trait Keyframes {
     /// Pose in the map at a sample; `None` if it is forgotten, or lies in no map.
     fn pose_at(&self, sample: SampleKey) -> Option<Isometry3<f64>>;
 
-    /// Pose at one sample in the frame of the body at another one; `None` if one of them is forgotten.
+    /// Pose at one sample in the frame of the body at another one; `None` if one of them is
+    /// forgotten.
     fn motion_between(&self, from: SampleKey, to: SampleKey) -> Option<Isometry3<f64>>;
 
     /// Whether an agent, and all agents of the map, move in one horizontal plane.

@@ -1,4 +1,4 @@
-//! An agent, as far as the keyframe graph knows it.
+//! An agent's present state in the keyframe graph.
 
 use nalgebra::{Isometry3, Vector6};
 
@@ -7,7 +7,7 @@ use geometry::MotionSum;
 use state::NONE;
 use state::state_of_struct;
 
-/// An agent with its latest moment.
+/// The end of an agent's chain of keyframes, and the motion since.
 #[derive(Clone, Debug)]
 #[allow(
     clippy::struct_excessive_bools,
@@ -16,13 +16,13 @@ use state::state_of_struct;
 pub(super) struct AgentTrack {
     /// Whether its poses are those of the map.
     pub(super) is_in_map: bool,
-    /// Where its own frame turned out to lie in the map.
+    /// Pose of its own frame in the map, once known.
     pub(super) own_frame: Option<Isometry3<f64>>,
     /// Whether all motion so far was in the body's x-y plane.
     pub(super) is_planar: bool,
-    /// Whether the next keyframe begins anew, without a motion from the one before.
+    /// Whether the next keyframe begins a stretch: no motion leads there from the one before.
     pub(super) begins_anew: bool,
-    /// Whether there is to be a keyframe before the agent moves on: it has none in its session.
+    /// Whether it has no keyframe in its session yet.
     pub(super) needs_keyframe: bool,
     /// Whether its next keyframe is the origin of the map.
     pub(super) is_origin: bool,
@@ -31,18 +31,18 @@ pub(super) struct AgentTrack {
     pub(super) session: u32,
     pub(super) seq: u64,
     pub(super) stamp_ns: i64,
-    /// Until when it was at the latest keyframe.
+    /// The latest sample at the latest keyframe, and its stamp \[ns\].
     pub(super) until_seq: u64,
     pub(super) until_ns: i64,
     /// Motion since the latest keyframe, with the covariance of its error.
     pub(super) since: MotionSum,
-    /// How that motion was corrected.
+    /// Calibration with which that motion was corrected.
     pub(super) calibrated: Calibrated,
-    /// Where it came to rest lately, by the motion since the latest keyframe, and when.
+    /// The motion since the latest keyframe when it came to rest, with sample and stamp \[ns\].
     pub(super) rest: Isometry3<f64>,
     pub(super) rest_seq: u64,
     pub(super) rest_ns: i64,
-    /// Where it is thought to be.
+    /// Pose by the estimator.
     pub(super) pose: Isometry3<f64>,
 }
 
@@ -91,7 +91,7 @@ impl AgentTrack {
         }
     }
 
-    /// The agent moved on from where it was.
+    /// Appends a motion.
     pub(super) fn go(
         &mut self,
         increment: &Isometry3<f64>,

@@ -1,12 +1,12 @@
-//! Agents that are set aside: their past counts no longer.
+//! Detached agents: what they did in the map no longer counts.
 
 use nalgebra::Isometry3;
 
 use super::graph::KeyframeGraph;
 
 impl KeyframeGraph {
-    /// An agent was set aside: it begins anew in a frame of its own, and what it did and saw in the
-    /// map no longer counts there.
+    /// Detaches an agent: it begins anew in a frame of its own, and what it did in the map no
+    /// longer counts there.
     pub fn set_aside(&mut self, agent: u32) {
         let revision = self.revision;
         let Some(track) = self.tracks.get_mut(agent as usize, revision) else {

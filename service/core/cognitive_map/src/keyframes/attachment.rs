@@ -1,4 +1,4 @@
-//! What lies where an agent was: when the past turns out to lie elsewhere, it goes with it.
+//! Attachments: places that keep their pose relative to a keyframe when a relaxation moves it.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector4};
 
@@ -6,19 +6,19 @@ use super::graph::KeyframeGraph;
 use geometry::is_somewhere;
 use state::{CorruptState, NONE, Slab, State, StateReader, StateWriter};
 
-/// Moorings that are looked at after a motion while something is to be moved: what a relaxation has to move is
-/// so much at most that no single record pays for all of it.
+/// Most attachments that are checked with one record. The work after a relaxation is spread, so
+/// that no record pays for all of it.
 const LOOKED_AT: u32 = 16;
 
-/// A place that lies beside a keyframe.
+/// A place with its pose relative to a keyframe.
 #[derive(Clone, Debug)]
 pub(super) struct Attachment {
     pub(super) keyframe: u32,
-    /// The next one of the same keyframe.
+    /// The next attachment of the same keyframe.
     pub(super) next: u32,
-    /// Whose it is, by a number of who moored it.
+    /// Number of the place.
     pub(super) place: u32,
-    /// Its pose as seen from the keyframe: a few metres, for which these floats do.
+    /// Its pose relative to the keyframe: for a few metres single precision suffices.
     offset: Isometry3<f32>,
 }
 
@@ -33,8 +33,9 @@ pub(super) struct Attachments {
 }
 
 impl KeyframeGraph {
-    /// Moors a place where an agent of the map is now, so that [`drift`](Self::drift) tells when it lies elsewhere; answers
-    /// the number of the attachment. `None` if nothing is remembered of the agent, or as much as there may be.
+    /// Attaches a place at the pose of an agent of the map; answers the number of the attachment.
+    /// [`moved_places`](Self::moved_places) then tells when it moves. `None` if the agent has no
+    /// keyframe yet, or memory is full.
     pub fn attach_place(&mut self, agent: u32, place: u32) -> Option<u32> {
         let track = self.tracks.get(agent as usize)?;
         let (number, since) = (track.newest, *track.since.motion());
@@ -43,7 +44,7 @@ impl KeyframeGraph {
         }
         let (revision, at) = (self.revision, track.pose * since.inverse());
         let keyframe = self.keyframes.get_mut(number, revision)?;
-        // What has been seen since then has corrected the pose.
+        // The estimator has corrected the pose since.
         (keyframe.pose, keyframe.is_in_map) = (at, true);
         let attachment = Attachment {
             keyframe: number,
@@ -59,7 +60,7 @@ impl KeyframeGraph {
         Some(attached)
     }
 
-    /// Forgets a attachment.
+    /// Removes an attachment.
     pub fn detach_place(&mut self, number: u32) {
         let revision = self.revision;
         let Some(gone) = self.attachments.slab.remove(number, revision) else {
@@ -89,7 +90,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// Keyframes have been moved, and all that is moored has to be looked at.
+    /// Marks all attachments to be checked, since keyframes were moved.
     pub(super) fn check_attachments(&mut self) {
         self.attachments.n_unchecked = self.attachments.slab.numbers();
     }
@@ -99,14 +100,14 @@ impl KeyframeGraph {
         self.attachments.slab.len()
     }
 
-    /// Whether a attachment is that of a place.
+    /// Whether an attachment is that of a place.
     pub(crate) fn is_attached(&self, number: u32, place: u32) -> bool {
         let attachment = self.attachments.slab.get(number);
         attachment.is_some_and(|attachment| attachment.place == place)
     }
 
-    /// Where some of what is moored lies by now, with its numbers: each call tells of the next few, until all have been
-    /// told of since keyframes were moved.
+    /// The poses of the next few attached places, by number, as long as some are to be checked
+    /// since keyframes were moved.
     pub fn moved_places(&mut self) -> Vec<(u32, Isometry3<f64>)> {
         let mut moved = Vec::new();
         for _ in 0..LOOKED_AT.min(self.attachments.n_unchecked) {
@@ -129,7 +130,7 @@ impl KeyframeGraph {
         moved
     }
 
-    /// Moors beside another keyframe what was moored beside one, all where it was.
+    /// Moves all attachments of a keyframe to another one. The places stay where they are.
     pub(super) fn move_attachments(&mut self, was: u32, to: u32) {
         let revision = self.revision;
         let (Some(keyframe), Some(other)) = (self.keyframes.get(was), self.keyframes.get(to))

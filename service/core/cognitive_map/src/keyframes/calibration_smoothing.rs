@@ -1,4 +1,4 @@
-//! What odometry got wrong in the past, by what is known of it now.
+//! Smoothing of odometry's calibration over the past.
 
 use nalgebra::{Isometry3, SVector};
 
@@ -7,11 +7,13 @@ use super::keyframe::Keyframe;
 use crate::estimator::Calibration;
 
 impl KeyframeGraph {
-    /// The motions to all keyframes, by number, corrected by what is known now of their odometry's lasting errors.
+    /// The motions to all keyframes, by number, corrected by odometry's lasting errors as they are
+    /// known now.
     ///
-    /// When a robot set out, little was known of them, so its first motions are the most wrong, all in one direction, and
-    /// the whole map turns with them. The errors are smoothed backward along each chain, each for itself (Rauch, Tung &
-    /// Striebel 1965), with variance P as it was known at a keyframe and wander Q from there to the next one:
+    /// When a robot set out, these errors were hardly known, so its first motions are the most
+    /// wrong, all in one direction, and the whole map turns with them. The errors are smoothed
+    /// backward along each chain, component by component (Rauch, Tung & Striebel 1965), with their
+    /// variance P at a keyframe and process noise Q from there to the next one:
     ///
     /// ```text
     /// ĉ_k = c_k + P / (P + Q) · (ĉ_{k+1} − c_k)
@@ -36,7 +38,7 @@ impl KeyframeGraph {
     }
 }
 
-/// The errors at a keyframe, from those later.
+/// The smoothed errors at a keyframe, from those at the next one.
 fn smoothed(
     keyframe: &Keyframe,
     later: &SVector<f64, 5>,

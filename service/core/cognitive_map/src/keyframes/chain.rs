@@ -1,4 +1,4 @@
-//! Keyframes one after the other, and what hangs on them.
+//! Chains of keyframes, and the lists of sightings and constraints of a keyframe.
 
 use nalgebra::Isometry3;
 
@@ -11,7 +11,8 @@ use geometry::{MotionSum, PoseCovariance};
 use state::NONE;
 
 impl KeyframeGraph {
-    /// A new keyframe where an agent is; its latest one if there is no room for another.
+    /// Adds a keyframe where an agent is; answers its number, or that of the latest one if memory
+    /// is full.
     pub(super) fn add_keyframe(&mut self, agent: u32) -> u32 {
         if self.keyframes.len() >= self.settings.keyframes_max as usize {
             self.sparsify();
@@ -26,7 +27,7 @@ impl KeyframeGraph {
         }
         let is_first = newest == NONE || track.begins_anew;
         let is_origin = track.is_origin;
-        // An agent that rests came here before now.
+        // An agent at rest came here earlier.
         let rests = !track.needs_keyframe
             && is_within(&track.rest.inv_mul(track.since.motion()), REST.0, REST.1);
         let (seq, stamp_ns) = if rests {
@@ -102,7 +103,7 @@ impl KeyframeGraph {
         number
     }
 
-    /// The pose in the map of a keyframe of an agent that is in it.
+    /// Pose of a keyframe in the map, if its agent is in it.
     pub(super) fn in_map(&self, number: u32) -> Option<Isometry3<f64>> {
         let keyframe = self.keyframes.get(number)?;
         if keyframe.is_in_map {
@@ -112,7 +113,7 @@ impl KeyframeGraph {
         Some(track.own_frame.unwrap_or_default() * keyframe.pose)
     }
 
-    /// Constraints a keyframe to the map.
+    /// Constrains a keyframe to the map.
     pub(super) fn constrain_to_map(
         &mut self,
         keyframe: u32,
@@ -132,7 +133,7 @@ impl KeyframeGraph {
         self.add_constraint(constraint);
     }
 
-    /// Remembers a constraint; answers its number, or [`NONE`] if there is no room or an end is no more.
+    /// Adds a constraint; answers its number, or [`NONE`] if memory is full or an end is gone.
     pub(super) fn add_constraint(&mut self, mut constraint: Constraint) -> u32 {
         let revision = self.revision;
         let (from, to) = (constraint.from, constraint.to);
@@ -161,8 +162,9 @@ impl KeyframeGraph {
         number
     }
 
-    /// Hangs a sighting on its keyframe, and on the one that it shows. One of the same landmark there is joined with it;
-    /// where there are many, the vaguest goes. Answers whether the sighting is one more.
+    /// Adds a sighting to the lists of its keyframe and of the one that it shows. It is merged with
+    /// one of the same landmark; in a full list it replaces the least certain one. Answers whether
+    /// there is one more.
     pub(super) fn add_sighting(&mut self, mut sighting: Sighting) -> bool {
         let revision = self.revision;
         let Some(keyframe) = self.keyframes.get(sighting.keyframe) else {
@@ -225,7 +227,7 @@ impl KeyframeGraph {
         true
     }
 
-    /// Takes a sighting off its keyframes and forgets it; answers it.
+    /// Removes a sighting; answers it.
     pub(super) fn remove_sighting(&mut self, number: u32) -> Option<Sighting> {
         let sighting = self.sightings.get(number)?.clone();
         self.unlink_sighting(sighting.keyframe, number, sighting.next);
@@ -281,7 +283,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// Takes a constraint off its keyframes and forgets it; answers it.
+    /// Removes a constraint; answers it.
     pub(super) fn remove_constraint(&mut self, number: u32) -> Option<Constraint> {
         let revision = self.revision;
         let constraint = self.constraints.get(number)?.clone();
@@ -313,7 +315,7 @@ impl KeyframeGraph {
         self.constraints.remove(number, revision)
     }
 
-    /// The number of the constraint after one of a keyframe's constraints.
+    /// The number of the constraint after another one in the list of a keyframe.
     pub(super) fn next_constraint(&self, number: u32, keyframe: u32) -> u32 {
         self.constraints.get(number).map_or(NONE, |constraint| {
             if constraint.from == keyframe {

@@ -37,7 +37,7 @@ const SEARCHES: u8 = 8;
 const ATTACHMENTS: u8 = 9;
 const KIDNAP_TESTS: u8 = 10;
 
-/// One page of a keyframe graph's checkpoint. A later page of the same part and index replaces an earlier one.
+/// One page of a checkpoint. A later page of the same part and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeyframePage {
     /// What the page holds.
@@ -48,7 +48,7 @@ pub struct KeyframePage {
     pub bytes: Vec<u8>,
 }
 
-/// Pages that are no keyframe graph: some are missing, damaged, left over or of another time.
+/// Pages that are no keyframe map: some are missing, damaged, left over or of another time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the pages are no map")]
 pub struct CorruptKeyframes;
@@ -74,8 +74,8 @@ impl KeyframeMap {
             ))
     }
 
-    /// The map of a checkpoint, which goes on like the one that wrote it. Its pages count as changed at
-    /// `revision`.
+    /// The map of a checkpoint, which goes on like the one that wrote it. Its pages count as
+    /// changed at `revision`.
     ///
     /// # Errors
     /// The pages are no such map.

@@ -1,5 +1,5 @@
-//! Matches: an agent says that it has been here before. They are believed when they agree with the map or with one another,
-//! and no longer than that.
+//! Loop closures: constraints between keyframes of one place. A closure is accepted while it agrees
+//! with the map or with other closures.
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
 
@@ -13,58 +13,61 @@ use geometry::{PoseCovariance, is_somewhere, se3, upper_triangle};
 use pose_graph::{Graduation, Marginals, RelaxationSettings, Relaxed};
 use state::NONE;
 
-/// Squared deviation up to which a match agrees with the map or with another match: a true one is farther off once in a
-/// hundred times, in the plane.
+/// Squared Mahalanobis distance up to which a closure agrees with the map or with another closure:
+/// a true one exceeds it once in a hundred times (χ², 3 degrees of freedom).
 const AGREES: f64 = 11.3;
-/// Squared deviation from which a match is no longer believed, after the relaxation with it.
+/// Squared Mahalanobis distance after a relaxation from which a closure is rejected.
 const CONTRADICTS: f64 = 25.0;
-/// How much less sure than the match the map may be for their agreement alone to be telling.
+/// Factor by which the map may be less certain than a closure for their agreement alone to count.
 const VAGUER_MAX: f64 = 2.0;
-/// Deviation within which agreement is telling, however sure the matches are of themselves: by chance few places
-/// lie so close \[m\].
+/// Standard deviation up to which agreement counts, however certain the closures are: by chance few
+/// places lie so close \[m\].
 const TELLING_M: f64 = 0.5;
-/// Other matches that have to agree with one that the map cannot tell from a false one.
+/// Fewest other closures that must agree with one that the map cannot tell from a false one.
 const PARTNERS: usize = 2;
-/// Matches before it, in the order of time, with which a match is compared.
+/// Earlier closures, in the order of time, with which a closure is compared.
 const COMPARED: usize = 24;
-/// Deviation of an angle of which nothing is known \[rad\].
+/// Standard deviation of an unknown angle \[rad\].
 const ANY_ANGLE_RAD: f64 = 3.0;
-/// Least deviation of a match \[m, rad\].
+/// Least standard deviation of a closure \[m, rad\].
 const DEVIATION_MIN: f64 = 1e-3;
-/// A relaxation waits for one record for so many keyframes: then it costs each record about as much as so many keyframes.
+/// Keyframes for each record between two relaxations: so the amortised cost of a relaxation is that
+/// of so many keyframes a record.
 const KEYFRAMES_PER_RECORD: usize = 8;
-/// Rounds of relaxation and doubt at most.
+/// Most rounds of relaxation and rejection.
 const ROUNDS_MAX: usize = 3;
 
-/// Where an agent is after a relaxation.
+/// The pose of an agent after a relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correction {
     /// Number of the agent.
     pub agent: u32,
     /// Its pose now, in the map.
     pub pose: Isometry3<f64>,
-    /// Covariance of that pose, given all that is remembered; `None` where that leaves it free.
+    /// Covariance of that pose; `None` where nothing determines it.
     pub covariance: Option<PoseCovariance>,
 }
 
-/// A match that waits, with what it is compared by.
+/// A pending closure, with what it is compared by.
 struct Candidate {
     constraint: u32,
     agent: u32,
     stamp_ns: i64,
     transform: Isometry3<f64>,
-    /// The poses of its ends, and the variances up to them since their chains began \[m², rad²\].
+    /// Poses of its ends, and variances of odometry up to them since their chains began \[m²,
+    /// rad²\].
     ends: [Isometry3<f64>; 2],
     variances: [[f64; 2]; 2],
-    /// Its own variances, the largest of each kind \[m², rad²\].
+    /// Its largest variances of shift and rotation \[m², rad²\].
     own: [f64; 2],
 }
 
 impl KeyframeGraph {
-    /// An agent took the place where it is for one where it was at an earlier sample of its session; the relation is that
-    /// of the earlier body as seen from the one now. Answers whether that sample is remembered.
+    /// Adds a loop closure that an agent states: it is where it was at an earlier sample of its
+    /// session. The relation is the pose of the body then as seen from now. Answers whether that
+    /// sample is remembered.
     ///
-    /// The match waits until [`relax`](Self::relax) finds it in agreement.
+    /// The closure is pending until [`relax`](Self::relax) finds it in agreement.
     pub fn closure(&mut self, moment: &Moment, earlier_seq: u64, relation: &Relation) -> bool {
         self.note(moment);
         let Some(now) = self.here(moment.agent) else {
@@ -87,7 +90,7 @@ impl KeyframeGraph {
         is_kept
     }
 
-    /// Constraints two places beside keyframes by a match; answers whether there is room for it.
+    /// Adds a closure between two instants; answers whether there is room for it.
     fn add_closure(
         &mut self,
         now: &KeyframeOffset,
@@ -125,7 +128,7 @@ impl KeyframeGraph {
         self.add_constraint(constraint) != NONE
     }
 
-    /// Adds a match that is believed at once.
+    /// Adds a closure that is accepted at once.
     pub(super) fn accept(
         &mut self,
         now: &KeyframeOffset,
@@ -138,7 +141,7 @@ impl KeyframeGraph {
         self.schedule.accepted += u32::from(is_kept);
     }
 
-    /// Number of matches that are believed.
+    /// Number of accepted closures.
     pub fn n_matches_believed(&self) -> usize {
         let constraints = self.constraints.iter();
         constraints
@@ -146,17 +149,18 @@ impl KeyframeGraph {
             .count()
     }
 
-    /// Whether matches wait, and enough has been told since the last relaxation to pay for another one.
+    /// Whether closures are new, and enough records have come in since the last relaxation to pay
+    /// for another one.
     pub fn is_due(&self) -> bool {
         self.schedule.new_closures > 0
             && self.schedule.records as usize >= self.keyframes.len() / KEYFRAMES_PER_RECORD
     }
 
-    /// Moves the keyframes to where they most likely are, with the matches that agree, and answers where the agents in the
-    /// map are then; nothing if no match came to be believed or ceased to be.
+    /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses
+    /// of the agents in the map; nothing if no closure was accepted or rejected.
     ///
-    /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then the same records give the
-    /// same map.
+    /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then
+    /// the same records give the same map.
     pub fn relax(&mut self) -> Vec<Correction> {
         self.schedule.records = 0;
         self.schedule.new_closures = 0;
@@ -174,8 +178,8 @@ impl KeyframeGraph {
         corrections
     }
 
-    /// The relaxed graph, after matches that do not fit into it have ceased to be believed; their number. Moves the keyframes on
-    /// the way: for a copy.
+    /// The relaxed graph, after closures that do not fit into it were rejected; and their number.
+    /// Moves the keyframes: for a copy.
     pub(super) fn relaxed(&mut self) -> (Graph, Relaxed, usize) {
         let mut refuted = 0;
         let revision = self.revision;
@@ -208,7 +212,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// Whether a graph is near enough to where the matches that it believes have it for their kernels to pull.
+    /// Whether all accepted closures are within the range of their kernels.
     fn fits(&self, graph: &Graph) -> bool {
         let links = graph.constraints.iter().zip(0..);
         links
@@ -217,8 +221,8 @@ impl KeyframeGraph {
             .all(|(link, _)| graph.map.squared_error(link) <= CONTRADICTS)
     }
 
-    /// Finds waiting matches that agree with the map or with one another, and believes them; answers their number. Moves the
-    /// keyframes to where all that are believed have them: for a copy.
+    /// Accepts pending closures that agree with the map or with one another; answers their number.
+    /// Moves the keyframes to where all accepted closures have them: for a copy.
     pub(super) fn accept_consistent(&mut self) -> usize {
         if !self
             .constraints
@@ -229,7 +233,8 @@ impl KeyframeGraph {
         }
         let believed = self.graph(Among::Believed);
         let marginals = believed.map.marginals();
-        // With kernels that begin wide, all matches together find the map that most of them agree with.
+        // With kernels that begin wide, all closures together find the map that most of them agree
+        // with.
         let mut all = self.graph(Among::All);
         all.map.relax(&settings());
         let path_variances = self.path_variances();
@@ -283,7 +288,7 @@ impl KeyframeGraph {
         accepted.len()
     }
 
-    /// What a match is compared by, with its ends where a graph has them.
+    /// The data by which a closure is compared, with its ends as a graph has them.
     fn candidate(
         &self,
         number: u32,
@@ -311,7 +316,7 @@ impl KeyframeGraph {
         })
     }
 
-    /// For each keyframe the variances of the way since its agent's chain began \[m², rad²\].
+    /// Variances of odometry up to each keyframe since its agent's chain began \[m², rad²\].
     fn path_variances(&self) -> Vec<[f64; 2]> {
         let mut path_variances = vec![[0.0; 2]; self.keyframes.numbers() as usize];
         for (agent, _) in (0..).zip(self.tracks.iter()) {
@@ -321,7 +326,7 @@ impl KeyframeGraph {
                 let diagonal = keyframe.covariance.matrix().diagonal();
                 way[0] += diagonal.rows(0, 3).max();
                 way[1] += diagonal.rows(3, 3).max();
-                // Nothing is known of the way between two stretches.
+                // No motion is known between two stretches.
                 if keyframe.begins {
                     way[0] += 1e12;
                 }
@@ -332,7 +337,7 @@ impl KeyframeGraph {
         path_variances
     }
 
-    /// Where the agents in the map are in a relaxed graph.
+    /// The poses of the agents in the map in a relaxed graph.
     fn corrections(&self, graph: &Graph, marginals: &Marginals<'_>) -> Vec<Correction> {
         let mut corrections = Vec::new();
         for (agent, track) in (0..).zip(self.tracks.iter()) {
@@ -352,7 +357,7 @@ impl KeyframeGraph {
         corrections
     }
 
-    /// Puts the keyframes where a relaxed graph has them.
+    /// Moves the keyframes to their poses in a relaxed graph.
     fn move_keyframes(&mut self, graph: &Graph) {
         let revision = self.revision;
         for number in 0..self.keyframes.numbers() {
@@ -369,7 +374,7 @@ impl KeyframeGraph {
     }
 }
 
-/// Whether a match waits to be believed, for the first time or again.
+/// Whether a closure is pending, or was rejected and may be accepted again.
 fn waits(constraint: &Constraint) -> bool {
     matches!(
         constraint.state,
@@ -377,7 +382,7 @@ fn waits(constraint: &Constraint) -> bool {
     )
 }
 
-/// How a graph with matches is relaxed.
+/// Settings of a relaxation with closures.
 fn settings() -> RelaxationSettings {
     RelaxationSettings {
         graduation: Graduation::FromWide,
@@ -385,7 +390,7 @@ fn settings() -> RelaxationSettings {
     }
 }
 
-/// Whether the map knows the relative pose about as well as a match says it, and agrees.
+/// Whether the map is about as certain of the relative pose as a closure, and agrees.
 fn agrees_with(constraint: &Constraint, graph: &Graph, marginals: &Marginals<'_>) -> bool {
     let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
     let (Some(from), Some(to)) = (node(constraint.from), node(constraint.to)) else {
@@ -396,8 +401,8 @@ fn agrees_with(constraint: &Constraint, graph: &Graph, marginals: &Marginals<'_>
     let expected = graph.map.pose(from).inv_mul(graph.map.pose(to));
     let (linear, angular) = se3::log(&expected.inv_mul(&constraint.transform));
     let off = Vector6::from_iterator(linear.iter().chain(angular.iter()).copied());
-    // One that is too far off in one direction is so for every map that is sure enough: its covariance, which takes
-    // long to find, need not be known.
+    // One that is too far off in one direction is so for every map that is sure enough: its
+    // covariance, which takes long to find, need not be known.
     let least_certain = VAGUER_MAX * VAGUER_MAX + 1.0;
     if (0..6).any(|k| off[k] * off[k] > AGREES * least_certain * (own[(k, k)] + least)) {
         return false;
@@ -435,21 +440,22 @@ impl Candidate {
         let error = by_other.inv_mul(&self.transform);
         let [mut shift, mut turn] =
             [0, 1].map(|k| self.own[k] + other.own[k] + now_variance[k] + then_variance[k]);
-        // What turns on the ways and in the matches moves the ends.
+        // Rotation errors of odometry and of the closures move the ends.
         let lever = now.translation.vector.norm() + then.translation.vector.norm();
         shift += turn * lever * lever;
         shift += DEVIATION_MIN * DEVIATION_MIN;
         turn += DEVIATION_MIN * DEVIATION_MIN;
         let squared =
             error.translation.vector.norm_squared() / shift + error.rotation.angle().powi(2) / turn;
-        // Two that would agree wherever they were say nothing about each other.
+        // Two closures that would agree wherever they were are no evidence for each other.
         let own = self.own[0] + other.own[0] + DEVIATION_MIN * DEVIATION_MIN;
         let telling = (4.0 * VAGUER_MAX * VAGUER_MAX * own).max(TELLING_M * TELLING_M);
         squared <= AGREES && shift <= telling
     }
 }
 
-/// The earlier pose as a relation puts it, and its covariance. Of a turn that it does not tell, `expected` is taken.
+/// The earlier pose by a relation, and its covariance. A rotation that the relation lacks is taken
+/// from `expected`.
 fn seen_pose(relation: &Relation, expected: &Isometry3<f64>) -> (Isometry3<f64>, PoseCovariance) {
     if let Relation::Pose(seen) = relation {
         return (*seen.pose(), PoseCovariance::from_sd(seen.noise().sd()));

@@ -1,4 +1,4 @@
-//! The past with few keyframes: what is relaxed while samples come in.
+//! The coarse graph: few keyframes, relaxed while samples come in.
 
 use nalgebra::Isometry3;
 
@@ -7,20 +7,20 @@ use super::graph::KeyframeGraph;
 use geometry::is_within;
 use state::{NONE, Slab};
 
-/// Motion between the keyframes of the coarse past \[m, rad\]. Over so short a way the noise of odometry is less than what
-/// matches state, and what hangs on the keyframes in between goes to a neighbour with it.
+/// Motion between keyframes of the coarse graph \[m, rad\]. Over so short a way the noise of
+/// odometry is below that of closures, and is added to what moves to a neighbour.
 const STEP: (f64, f64) = (1.0, 0.5);
 
-/// Matches that wait and are looked at again: the latest ones. Earlier ones have been looked at many times; once the whole
-/// past is refined they are again.
+/// Most pending closures of the coarse graph, the latest ones. Earlier ones have been judged many
+/// times; a refinement of the whole past judges them again.
 const WAITING_MAX: usize = 512;
 
 impl KeyframeGraph {
-    /// A copy with a keyframe a step only, and where something was seen, where an agent began anew, and where it is now.
-    /// Keyframes and constraints keep their numbers.
+    /// A copy with one keyframe a step, and those with sightings, at the begin of a stretch, and
+    /// the latest ones. Keyframes and constraints keep their numbers.
     pub(super) fn coarse(&self) -> Self {
         let mut coarse = self.clone();
-        // What is moored goes with the keyframes afterwards.
+        // Attachments move with the keyframes afterwards.
         coarse.attachments.slab = Slab::default();
         for agent in 0..self.tracks.len() {
             let newest = self.tracks.get(agent).map_or(NONE, |track| track.newest);
@@ -28,7 +28,7 @@ impl KeyframeGraph {
             let mut number = newest;
             while let Some(keyframe) = coarse.keyframes.get(number) {
                 let (motion, previous) = (keyframe.motion, keyframe.previous);
-                // Which neighbours a keyframe has decides where the way goes on; the chain is walked from its end.
+                // The chain is walked from its end, since removals change the neighbours.
                 if number == newest || coarse.must_stay(number) || !is_within(&way, STEP.0, STEP.1)
                 {
                     way = motion;
@@ -43,7 +43,7 @@ impl KeyframeGraph {
         coarse
     }
 
-    /// Leaves out matches that wait, but for the latest ones.
+    /// Removes pending closures but the latest ones.
     fn drop_old_candidates(&mut self) {
         let mut pending: Vec<(i64, u32)> = self
             .constraints
@@ -65,7 +65,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// Whether a keyframe has to stay in a coarse past.
+    /// Whether a keyframe must stay in the coarse graph.
     fn must_stay(&self, number: u32) -> bool {
         let Some(keyframe) = self.keyframes.get(number) else {
             return true;
@@ -90,8 +90,8 @@ impl KeyframeGraph {
         false
     }
 
-    /// Takes over where the keyframes of a relaxed coarse copy are, and which matches it believes. What is between two of
-    /// its keyframes moves with the earlier one.
+    /// Moves the keyframes as in a relaxed coarse copy, and adopts the states of its closures.
+    /// Keyframes between two of the copy move with the earlier one.
     pub(super) fn adopt(&mut self, coarse: &Self) {
         let revision = self.revision;
         for number in 0..self.constraints.numbers() {
@@ -114,7 +114,7 @@ impl KeyframeGraph {
             if !track.is_in_map {
                 continue;
             }
-            // The latest keyframes of the coarse past that have been met on the way back, and how they have moved.
+            // Keyframes since the last one of the coarse graph, on the way back.
             let mut behind: Vec<u32> = Vec::new();
             let mut number = track.newest;
             while let Some(keyframe) = self.keyframes.get(number) {

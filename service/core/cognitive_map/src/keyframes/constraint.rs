@@ -1,4 +1,4 @@
-//! What constraints a keyframe to the map or to another keyframe.
+//! Constraints of a keyframe's pose, by the map or by another keyframe.
 
 use nalgebra::Isometry3;
 
@@ -8,15 +8,15 @@ use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 /// How a constraint counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ClosureState {
-    /// It is the frame: the keyframe does not move.
+    /// Origin of the map: the keyframe does not move.
     Origin,
-    /// It was stated and is believed.
+    /// A stated pose.
     Stated,
-    /// It is a match that waits for others that agree with it.
+    /// A loop closure that waits for others that agree with it.
     Pending,
-    /// It is a match that agrees with the map or with other matches.
+    /// A loop closure that agrees with the map or with other closures.
     Accepted,
-    /// It is a match that was accepted and then contradicted.
+    /// A loop closure that was accepted and then rejected.
     Refuted,
 }
 
@@ -30,13 +30,13 @@ pub(super) struct Constraint {
     pub(super) next_from: u32,
     pub(super) next_to: u32,
     pub(super) transform: Isometry3<f64>,
-    /// Of the error on the right of the transform.
+    /// Covariance of the error on the right of the transform.
     pub(super) covariance: PoseCovariance,
     pub(super) state: ClosureState,
 }
 
 impl Constraint {
-    /// Whether it is a match.
+    /// Whether it is a loop closure.
     pub(super) fn is_match(&self) -> bool {
         matches!(
             self.state,

@@ -1,4 +1,4 @@
-//! The record itself, and what is told to it.
+//! The keyframe graph, and what is added to it.
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
@@ -17,21 +17,22 @@ use state::PagedVec;
 use state::state_of_struct;
 use state::{NONE, Slab};
 
-/// Motion after which there is a new keyframe in any case \[m, rad\]: between two, a pose is interpolated.
+/// Motion after which a keyframe is added in any case \[m, rad\]: poses between two are
+/// interpolated.
 const STEP: (f64, f64) = (0.1, 0.1);
-/// Motion since a keyframe up to which sightings are still attached to it \[m, rad\].
+/// Motion since a keyframe up to which sightings are attached to it \[m, rad\].
 const NEAR: (f64, f64) = (0.02, 0.02);
 /// Motion that counts as rest \[m, rad\].
 pub(super) const REST: (f64, f64) = (0.005, 0.005);
-/// Rest after which there is a new keyframe where the agent rests \[ns\].
+/// Rest after which a keyframe is added \[ns\].
 const REST_NS: i64 = 1_000_000_000;
-/// Sightings of agents that wait for the other agent's motion to come up to them.
+/// Most sightings that wait for the motion of the agent that was seen.
 const WAITING_MAX: usize = 64;
-/// How long they wait, by the observer's clock \[ns\].
+/// Longest time that they wait, by the observer's clock \[ns\].
 const PATIENCE_NS: i64 = 2_000_000_000;
-/// How many keyframes back a sighting may show an agent.
+/// Keyframes searched back for the instant of a sighting.
 const LOOK_BACK_MAX: usize = 256;
-/// Sightings made at one keyframe.
+/// Most sightings of a keyframe.
 pub(super) const SIGHTINGS_PER_KEYFRAME_MAX: usize = 32;
 
 /// A moment of an agent.
@@ -43,12 +44,12 @@ pub struct Moment {
     pub seq: u64,
     /// Its stamp \[ns\].
     pub stamp_ns: i64,
-    /// Where the agent is thought to be after it, in the frame in which the agent is estimated. Only the start of a
-    /// relaxation depends on it.
+    /// Pose of the agent after it, in the frame in which it is estimated: the initial value of
+    /// relaxations.
     pub pose: Isometry3<f64>,
 }
 
-/// A sighting of an agent that has not moved up to it yet.
+/// A sighting of an agent whose motion has not come up to it yet.
 #[derive(Clone, Debug)]
 pub(super) struct PendingSighting {
     pub(super) keyframe: u32,
@@ -66,14 +67,14 @@ state_of_struct!(PendingSighting {
     point
 });
 
-/// What agents did and saw, as a graph that can be relaxed: the past, to be smoothed.
+/// The keyframe graph: the past motions and sightings of all agents, to be smoothed.
 ///
-/// It is told every motion and sighting, and answers with [`refine`](Self::refine), a pure function of what it was told.
-/// A clone is a snapshot that shares all pages.
+/// [`refine`](Self::refine) is a pure function of what was added. A clone is a snapshot that shares
+/// all pages.
 #[derive(Clone, Debug)]
 pub struct KeyframeGraph {
     pub(super) settings: KeyframeSettings,
-    /// Of the changes that are made now; for checkpoints only.
+    /// The revision under which changes are noted; for checkpoints only.
     pub(super) revision: u64,
     pub(super) tracks: PagedVec<AgentTrack, 4>,
     pub(super) keyframes: Slab<Keyframe, 32>,
@@ -102,7 +103,8 @@ pub(super) struct Schedule {
     pub(super) accepted: u32,
 }
 
-/// An instant between keyframes: a keyframe, the motion from there, and the covariance of its error.
+/// An instant between keyframes: a keyframe, the motion from there, and the covariance of its
+/// error.
 pub(super) struct KeyframeOffset {
     pub(super) keyframe: u32,
     pub(super) motion: Isometry3<f64>,
@@ -128,7 +130,8 @@ impl KeyframeGraph {
         }
     }
 
-    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds the later ones.
+    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds
+    /// the later ones.
     pub fn set_revision(&mut self, revision: u64) {
         self.revision = revision;
     }
@@ -143,14 +146,14 @@ impl KeyframeGraph {
         self.sightings.len()
     }
 
-    /// A new agent, in a frame of its own; answers its number, counted from 0.
+    /// Adds an agent in a frame of its own; answers its number, counted from 0.
     pub fn enrol(&mut self) -> u32 {
         let agent = u32::try_from(self.tracks.len()).unwrap_or(NONE);
         self.tracks.push(AgentTrack::new(), self.revision);
         agent
     }
 
-    /// The frame of an agent is that of the map: its first keyframe stays where it is.
+    /// The frame of an agent becomes that of the map: its first keyframe is the origin.
     pub fn found(&mut self, agent: u32) {
         let Some(track) = self.tracks.get(agent as usize) else {
             return;
@@ -168,7 +171,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// The frame in which an agent was estimated turned out to lie in the map, there. All its keyframes move with it.
+    /// Aligns the frame of an agent with the map. All its keyframes move with it.
     pub fn placed(&mut self, agent: u32, frame: &Isometry3<f64>) {
         let revision = self.revision;
         let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
@@ -181,8 +184,8 @@ impl KeyframeGraph {
         }
     }
 
-    /// The frame in which an agent was estimated turned out to lie in another one that is not the map's, there. Walks the
-    /// whole chain of the agent; keyframes from before it was set aside stay in the map.
+    /// Transforms the poses of an agent from its own frame to another one that is not the map's.
+    /// Walks the whole chain of the agent; keyframes from before it was detached stay in the map.
     pub fn transformed(&mut self, agent: u32, frame: &Isometry3<f64>) {
         let revision = self.revision;
         let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
@@ -201,8 +204,8 @@ impl KeyframeGraph {
         }
     }
 
-    /// An agent was told where it stands in the map. If it was in the map already, it has been put there: what it did
-    /// before does not lead there.
+    /// Sets the pose of an agent in the map. If it was in the map already, no motion leads there
+    /// from what it did before.
     pub fn start_pose(&mut self, moment: &Moment, start: &StartPose) {
         let Some(track) = self.tracks.get(moment.agent as usize) else {
             return;
@@ -224,7 +227,8 @@ impl KeyframeGraph {
         self.constrain_to_map(keyframe, *start.pose(), &covariance, ClosureState::Stated);
     }
 
-    /// A new session of an agent: it may have been moved by about `sd` \[m, m, m, rad, rad, rad\] since its latest sample.
+    /// Begins a session of an agent, which may have been moved by about `sd` \[m, m, m, rad, rad,
+    /// rad\] since its latest sample.
     pub fn restart(&mut self, agent: u32, sd: &Vector6<f64>) {
         let revision = self.revision;
         let Some(track) = self.tracks.get(agent as usize) else {
@@ -243,8 +247,8 @@ impl KeyframeGraph {
             .retain(|pending| pending.observer != agent && pending.target != agent);
     }
 
-    /// An agent moved by an increment in its own frame before, with these variances of the error on its right \[m², m²,
-    /// m², rad², rad², rad²\]; `calibrated` says how the increment was corrected.
+    /// Adds a motion of an agent, in its frame before, with the variances of the error on its right
+    /// \[m², m², m², rad², rad², rad²\]; `calibrated` says how the motion was corrected.
     pub fn motion(
         &mut self,
         moment: &Moment,
@@ -293,8 +297,9 @@ impl KeyframeGraph {
         }
     }
 
-    /// An agent saw a landmark. `variance` is that of the relation's components: along the axes, or of distance, azimuth
-    /// and elevation; the angles are those by which the seen direction is off.
+    /// Adds a sighting of a landmark. `variance` is that of the relation's components: along the
+    /// axes, or of distance, azimuth and elevation; the angles are those by which the seen
+    /// direction is off.
     pub fn landmark(
         &mut self,
         moment: &Moment,
@@ -312,7 +317,8 @@ impl KeyframeGraph {
         }
     }
 
-    /// An agent saw another one at an instant that may be over. It is taken in as soon as both have moved up to it.
+    /// Adds a sighting of another agent, perhaps at an instant that is over. It takes effect once
+    /// both have moved up to it.
     pub fn sighted(
         &mut self,
         observer: u32,
@@ -340,7 +346,7 @@ impl KeyframeGraph {
         self.resolve_pending();
     }
 
-    /// Takes in the waiting sightings whose time has come.
+    /// Resolves the pending sightings whose time has come.
     fn resolve_pending(&mut self) {
         for pending in std::mem::take(&mut self.pending) {
             let stamp_ns = |agent: u32| {
@@ -359,7 +365,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// Takes in a sighting of an agent.
+    /// Resolves a sighting of an agent.
     fn resolve(&mut self, pending: &PendingSighting) {
         let Some(there) = self.at_stamp(pending.target, pending.stamp_ns) else {
             return; // too long ago
@@ -370,7 +376,7 @@ impl KeyframeGraph {
         ) else {
             return;
         };
-        // What the way from the keyframe adds to the error, in the frame of the observer.
+        // Noise of the motion from the keyframe, in the frame of the observer.
         let turn = observer.pose.rotation.inverse() * target.pose.rotation * there.motion.rotation;
         let turn = turn.to_rotation_matrix().into_inner();
         let spread = there
@@ -386,7 +392,7 @@ impl KeyframeGraph {
         self.remember_sighting(pending.keyframe, Seen::Agent(there.keyframe, lever), point);
     }
 
-    /// Remembers a sighting; where memory is full, another one makes room for it.
+    /// Adds a sighting; where memory is full, another one makes room for it.
     fn remember_sighting(&mut self, keyframe: u32, shown: Seen, point: SeenPoint) {
         let is_full = |this: &Self| this.sightings.len() >= this.settings.sightings_max as usize;
         if is_full(self) {
@@ -409,7 +415,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// The agent is at a moment, without having moved.
+    /// Notes the present sample and pose of an agent that has not moved.
     pub(super) fn note(&mut self, moment: &Moment) {
         let revision = self.revision;
         let Some(track) = self.tracks.get_mut(moment.agent as usize, revision) else {
@@ -423,7 +429,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// Where an agent is: at its latest keyframe, if that is near, or at a new one.
+    /// The present instant of an agent: at its latest keyframe if that is near, or at a new one.
     pub(super) fn here(&mut self, agent: u32) -> Option<KeyframeOffset> {
         let track = self.tracks.get(agent as usize)?;
         if track.needs_keyframe || !is_within(track.since.motion(), NEAR.0, NEAR.1) {
@@ -438,13 +444,13 @@ impl KeyframeGraph {
             motion: *track.since.motion(),
             covariance: track.since.covariance(),
         };
-        // What is seen now has corrected the pose.
+        // The estimator has corrected the pose since.
         let keyframe = self.keyframes.get_mut(newest, revision)?;
         (keyframe.pose, keyframe.is_in_map) = (at, is_in_map);
         Some(here)
     }
 
-    /// Where an agent was at an instant that is over, if that was not long ago.
+    /// An instant of an agent, if it was not long ago.
     fn at_stamp(&mut self, agent: u32, stamp_ns: i64) -> Option<KeyframeOffset> {
         let track = self.tracks.get(agent as usize)?;
         if stamp_ns >= track.stamp_ns {
@@ -472,7 +478,7 @@ impl KeyframeGraph {
     }
 }
 
-/// A place on the way that begins at a keyframe, after a share of it.
+/// The instant after a share of the motion that begins at a keyframe.
 pub(super) fn offset(
     keyframe: u32,
     motion: &Isometry3<f64>,

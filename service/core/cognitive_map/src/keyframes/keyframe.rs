@@ -1,4 +1,4 @@
-//! A moment that is remembered.
+//! A keyframe.
 
 use nalgebra::Isometry3;
 
@@ -6,39 +6,40 @@ use crate::estimator::Calibrated;
 use geometry::PoseCovariance;
 use state::state_of_struct;
 
-/// Where an agent was at a moment, and how it came there from the moment before.
+/// A remembered pose of an agent, and the motion that led there.
 #[derive(Clone, Debug)]
 pub(super) struct Keyframe {
     pub(super) agent: u32,
     /// The agent's keyframes before and after.
     pub(super) previous: u32,
     pub(super) next: u32,
-    /// The first sighting made here, the first that shows the agent here, the first constraint that ends here.
+    /// The heads of its lists: sightings made here, sightings that show the agent here, constraints
+    /// that end here.
     pub(super) sightings: u32,
     pub(super) shown: u32,
     pub(super) constraints: u32,
-    /// The first thing that lies beside it.
+    /// The head of the list of its attachments.
     pub(super) attachments: u32,
-    /// The run of the agent.
+    /// The session of the agent.
     pub(super) session: u32,
-    /// The samples from which and up to which the agent was here.
+    /// The first and the last sample here.
     pub(super) seq: u64,
     pub(super) until_seq: u64,
-    /// The instants of these \[ns\].
+    /// Their stamps \[ns\].
     pub(super) stamp_ns: i64,
     pub(super) until_ns: i64,
-    /// Whether the pose is one in the map, and not in a frame of the agent's own.
+    /// Whether the pose is in the map, and not in a frame of the agent's own.
     pub(super) is_in_map: bool,
-    /// Where the agent was thought to be.
+    /// Pose, by the estimator or by the latest relaxation.
     pub(super) pose: Isometry3<f64>,
-    /// The motion from the keyframe before, with the covariance of its error.
+    /// Motion from the keyframe before, with the covariance of its error.
     pub(super) motion: Isometry3<f64>,
     pub(super) covariance: PoseCovariance,
-    /// How the motion was corrected.
+    /// Calibration with which the motion was corrected.
     pub(super) calibrated: Calibrated,
     /// Whether it begins a stretch: no motion leads there from the keyframe before.
     pub(super) begins: bool,
-    /// How far the way there deviates from an even motion, from what was thinned out of it \[m\].
+    /// Deviation of the way there from an even motion, by keyframes that were removed \[m\].
     pub(super) unevenness_m: f64,
 }
 

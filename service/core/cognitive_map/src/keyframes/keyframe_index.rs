@@ -6,7 +6,8 @@ use state::NONE;
 /// Keyframes of an agent from one index entry to the next.
 const SPACING: u32 = 64;
 
-/// A keyframe with its sample when it was added. It may be gone since, and its number another one's.
+/// A keyframe with its sample when it was added. It may be gone since, and its number another
+/// one's.
 #[derive(Clone, Copy, Debug)]
 struct IndexEntry {
     session: u32,
@@ -14,8 +15,8 @@ struct IndexEntry {
     keyframe: u32,
 }
 
-/// For each agent every 64th of its keyframes, in the order of time. It follows from the chains, is not
-/// part of a checkpoint, and changes no answer.
+/// For each agent every 64th of its keyframes, in the order of time. It follows from the chains, is
+/// not part of a checkpoint, and changes no answer.
 #[derive(Clone, Debug, Default)]
 pub(super) struct KeyframeIndex {
     of_agents: Vec<AgentIndex>,

@@ -1,12 +1,11 @@
-//! Landmarks that turn out to be known by two names.
+//! Association of landmarks that are known by two names.
 
 use super::KeyframeGraph;
 use super::sighting::Seen;
 use crate::input::Label;
 
 impl KeyframeGraph {
-    /// Landmarks turned out to be known by two names: each time the one that is given up, and the one that stays. Walks all
-    /// sightings.
+    /// Merges landmarks: of each pair of names the first is given up. Walks all sightings.
     pub fn merge_landmarks(&mut self, names: &[(Label, Label)]) {
         let revision = self.revision;
         let renamed = |shown: &Seen| {

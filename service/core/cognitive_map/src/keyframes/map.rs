@@ -8,8 +8,8 @@ use super::graph::{KeyframeGraph, Moment};
 use super::settings::KeyframeSettings;
 use crate::input::{Descriptor, StartPose};
 
-/// The past: a keyframe graph, and place recognition, which asks the graph where views were taken and
-/// gives it loop closures.
+/// The past: a keyframe graph, and place recognition, which asks the graph where views were taken
+/// and gives it loop closures.
 ///
 /// What concerns both is a method of this type. A clone is a snapshot that shares all pages.
 #[derive(Clone, Debug)]
@@ -28,22 +28,22 @@ impl KeyframeMap {
         }
     }
 
-    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds the
-    /// later ones.
+    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds
+    /// the later ones.
     pub fn set_revision(&mut self, revision: u64) {
         self.graph.set_revision(revision);
         self.recognition.set_revision(revision);
     }
 
-    /// An agent was told where it stands in the map. If it was in the map already, it has been put there:
-    /// no motion leads there from what it did before.
+    /// An agent was told where it stands in the map. If it was in the map already, it has been put
+    /// there: no motion leads there from what it did before.
     pub fn start_pose(&mut self, moment: &Moment, start: &StartPose) {
         self.graph.start_pose(moment, start);
         self.recognition.cut(moment.agent);
     }
 
-    /// An agent was detached: it begins anew in a frame of its own, and what it did and saw in the map no
-    /// longer counts there.
+    /// An agent was detached: it begins anew in a frame of its own, and what it did and saw in the
+    /// map no longer counts there.
     pub fn set_aside(&mut self, agent: u32) {
         self.graph.set_aside(agent);
         self.recognition.cut(agent);
@@ -55,8 +55,8 @@ impl KeyframeMap {
         self.graph.retire(agent);
     }
 
-    /// Forgets an agent that was never in the map: its number is as it was when it enrolled. Walks the
-    /// whole chain of the agent.
+    /// Forgets an agent that was never in the map: its number is as it was when it enrolled. Walks
+    /// the whole chain of the agent.
     pub fn clear(&mut self, agent: u32) {
         self.forget_searches(agent);
         self.graph.clear(agent);
@@ -98,15 +98,15 @@ impl KeyframeMap {
         }
     }
 
-    /// Whether what an agent of the map saw lately contradicts where it is believed to be. `accepted` is
-    /// the number of its sightings so far that agree with that.
+    /// Whether what an agent of the map saw lately contradicts where it is believed to be.
+    /// `accepted` is the number of its sightings so far that agree with that.
     pub fn is_contradicted(&mut self, view: &View<'_>, accepted: u64) -> bool {
         let (recognition, graph) = (&mut self.recognition, &self.graph);
         recognition.is_contradicted(view, accepted, graph)
     }
 
-    /// An agent may be anywhere. What it saw since that is contradicted is forgotten where it was believed
-    /// to be, and a search begins with it.
+    /// An agent may be anywhere. What it saw since that is contradicted is forgotten where it was
+    /// believed to be, and a search begins with it.
     pub fn declare_kidnapped(&mut self, moment: &Moment) {
         self.recognition.declare_kidnapped(self.sample(moment));
         self.graph.begin_stretch(moment.agent, None);
@@ -122,8 +122,8 @@ impl KeyframeMap {
         self.recognition.confirm_pose(agent, seq);
     }
 
-    /// An agent that does not know where it is sees something. Answers where it is, once that is known to
-    /// better than `sd_max_m`.
+    /// An agent that does not know where it is sees something. Answers where it is, once that is
+    /// known to better than `sd_max_m`.
     pub fn seek(&mut self, view: &View<'_>, sd_max_m: f64) -> Option<Relocalised> {
         self.recognition.seek(view, sd_max_m, &self.graph)
     }
@@ -134,8 +134,8 @@ impl KeyframeMap {
         self.recognition.is_seeking(agent, session)
     }
 
-    /// An agent was found. `is_elsewhere` says that it was believed to be in the map, but somewhere else.
-    /// A loop closure ties it to what was recognised.
+    /// An agent was found. `is_elsewhere` says that it was believed to be in the map, but somewhere
+    /// else. A loop closure ties it to what was recognised.
     pub fn relocalised(&mut self, moment: &Moment, found: &Relocalised, is_elsewhere: bool) {
         let agent = moment.agent;
         let Some(similar) = self.recognition.most_similar(agent) else {

@@ -1,11 +1,16 @@
-//! The keyframe graph: what agents did and saw, kept so that the past can be smoothed.
+//! The keyframe graph: past motions and sightings of all agents, kept so that the past can be
+//! smoothed.
 //!
-//! A chain of *keyframes* for each agent, moments that are remembered with the motion from one to the next; on them hang
-//! *sightings*, of landmarks and of other agents, and *constraints*, to the map (start poses) or between keyframes (matches). From
-//! these alone follows the refined map: the graph of [`experience`](pose_graph), relaxed.
+//! Each agent has a chain of *keyframes*: remembered poses, with the motion from one to the next. A
+//! keyframe has *sightings*, of landmarks and of other agents, and *constraints*, to the map (start
+//! poses) or to another keyframe (loop closures). Together they are a pose graph; the refined map
+//! is its relaxation ([`pose_graph`]).
 //!
-//! Memory is bounded. When it is full, keyframes from which next to nothing is lost are taken out of their chains: the motions
-//! to and from them are composed, and what hangs on them goes to a neighbour with the noise of the way there.
+//! Memory is bounded. When it is full, sparsification removes keyframes from which next to nothing
+//! is lost: the motions to and from them are composed, and their sightings and constraints move to
+//! a neighbour with the noise of the motion there.
+//!
+//! [`KeyframeMap`] is the graph with place recognition, which closes loops by what was seen.
 
 mod agent_track;
 mod aside;

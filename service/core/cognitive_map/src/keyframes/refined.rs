@@ -1,4 +1,4 @@
-//! The refined map: where everything most likely was, given all that is remembered.
+//! The refined map: the most likely poses and landmarks, given all that is remembered.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
 
@@ -14,11 +14,11 @@ use pose_graph::{
 };
 use state::NONE;
 
-/// Least deviation of a motion, so that one that states none has an inverse \[m, rad\].
+/// Least standard deviation of a motion, so that its covariance has an inverse \[m, rad\].
 const MOTION_DEVIATION_MIN: f64 = 1e-4;
-/// Deviations beyond which a sighting pulls less the farther it is off.
+/// Scale of the Cauchy kernel of sightings, in standard deviations.
 const SIGHTING_SCALE: f64 = 3.0;
-/// Deviations far beyond which a match does not pull.
+/// Scale of the Geman–McClure kernel of loop closures, in standard deviations.
 const MATCH_SCALE: f64 = 3.0;
 
 /// The past after relaxation.
@@ -28,15 +28,15 @@ pub struct Refined {
     pub agents: Vec<RefinedAgent>,
     /// The landmarks of the map, by label.
     pub landmarks: Vec<RefinedLandmark>,
-    /// What the relaxation did.
+    /// Statistics of the relaxation.
     pub relaxed: Relaxed,
 }
 
-/// Where an agent was.
+/// The refined track of an agent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RefinedAgent {
-    /// Whether the poses are those of the map. Those of an agent's own frame are as they were estimated when they were
-    /// lived.
+    /// Whether the poses are those of the map. Those in a frame of the agent's own are as the
+    /// estimator had them.
     pub is_in_map: bool,
     /// Its poses, by stamp; between two of them it moved evenly.
     pub poses: Vec<RefinedPose>,
@@ -51,27 +51,28 @@ pub struct RefinedPose {
     pub pose: Isometry3<f64>,
 }
 
-/// Where a landmark is.
+/// A refined landmark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RefinedLandmark {
     /// Its label.
     pub label: Label,
     /// Position \[m\].
     pub position: Point3<f64>,
-    /// Covariance of the position along the axes of the map \[m²\], as far as the sightings determine it.
+    /// Covariance of the position along the axes of the map \[m²\], as far as the sightings
+    /// determine it.
     pub covariance: Option<Matrix3<f64>>,
 }
 
-/// Which matches count.
+/// The loop closures that count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Among {
-    /// Those that are believed.
+    /// The accepted ones.
     Believed,
-    /// All of them, as far as they agree.
+    /// All, as far as they agree.
     All,
 }
 
-/// The keyframe graph as an experience map.
+/// The keyframe graph as a pose graph.
 #[derive(Debug)]
 pub(super) struct Graph {
     pub(super) map: PoseGraph,
@@ -84,9 +85,9 @@ pub(super) struct Graph {
 }
 
 impl KeyframeGraph {
-    /// Where everything most likely was. Depends on nothing but what was told.
+    /// Relaxes the whole past. A pure function of what was added.
     pub fn refine(&self) -> Refined {
-        // Matches are judged on the way, in a copy that shares all that they do not change.
+        // Closures are judged in a copy, which shares all pages that do not change.
         let mut copy = self.clone();
         copy.accept_consistent();
         let (graph, relaxed, _) = copy.relaxed();
@@ -117,7 +118,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// What is remembered, relaxed, as nodes and links: for other programs.
+    /// The relaxed pose graph: for other programs.
     pub fn experience_map(&self) -> PoseGraph {
         let mut copy = self.clone();
         copy.accept_consistent();
@@ -161,7 +162,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// Where a place beside a keyframe lies.
+    /// The pose of an instant after a keyframe.
     fn now(&self, keyframe: u32, motion: &Isometry3<f64>, graph: &Graph) -> Isometry3<f64> {
         let refined = graph.poses.get(keyframe as usize).copied().flatten();
         let pose = refined.map(|node| *graph.map.pose(node));
@@ -302,7 +303,7 @@ impl KeyframeGraph {
     }
 }
 
-/// The inverse of a covariance, of its planar part where the rest says nothing.
+/// The information of a covariance, of its planar part for planar motion.
 fn information(covariance: &PoseCovariance, is_planar: bool) -> PoseInformation {
     let floor = MOTION_DEVIATION_MIN * MOTION_DEVIATION_MIN;
     let mut matrix = *covariance.matrix();
@@ -317,7 +318,7 @@ fn information(covariance: &PoseCovariance, is_planar: bool) -> PoseInformation 
     } else if let Some(whole) = matrix.try_inverse() {
         inverse = whole;
     }
-    // What is too far from positive to be a covariance says nothing.
+    // A matrix too far from positive definite gives no information.
     PoseInformation::new(&inverse).unwrap_or_else(|_| {
         PoseInformation::new(&Matrix6::zeros()).expect("no information is no less than none")
     })

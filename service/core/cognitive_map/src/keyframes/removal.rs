@@ -5,14 +5,14 @@ use super::graph::KeyframeGraph;
 use state::NONE;
 
 impl KeyframeGraph {
-    /// An agent of the map is gone. What it did stays part of the past.
+    /// An agent of the map has left. What it did stays part of the past.
     pub fn retire(&mut self, agent: u32) {
         self.pending
             .retain(|pending| pending.observer != agent && pending.target != agent);
     }
 
-    /// Forgets an agent that was never in the map: its number is as it was when it enrolled. Walks the
-    /// whole chain of the agent.
+    /// Forgets an agent that was never in the map: its number is as it was when it enrolled. Walks
+    /// the whole chain of the agent.
     pub fn clear(&mut self, agent: u32) {
         self.retire(agent);
         let Some(track) = self.tracks.get(agent as usize) else {
@@ -26,7 +26,8 @@ impl KeyframeGraph {
             number = previous;
         }
         if let Some(track) = self.tracks.get_mut(agent as usize, self.revision) {
-            // Runs are counted on: index entries and searches of earlier ones must not pass for the next agent's.
+            // The session numbers go on: index entries and searches of earlier ones must not pass
+            // for the next agent's.
             *track = AgentTrack {
                 session,
                 ..AgentTrack::new()
@@ -34,7 +35,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// Takes off a keyframe all that hangs on it.
+    /// Removes all sightings and constraints of a keyframe.
     fn strip(&mut self, number: u32) {
         let first = |this: &Self| {
             let keyframe = this.keyframes.get(number)?;

@@ -1,4 +1,4 @@
-//! How much of the past is kept.
+//! Limits of the keyframe graph.
 
 use crate::settings::Settings;
 
@@ -9,12 +9,12 @@ pub struct KeyframeSettings {
     pub keyframes_max: u32,
     /// Sightings at most. One takes about 220 bytes.
     pub sightings_max: u32,
-    /// Constraints at most: start poses and matches. One takes about 250 bytes.
+    /// Constraints at most: start poses and loop closures. One takes about 250 bytes.
     pub constraints_max: u32,
 }
 
 impl KeyframeSettings {
-    /// Those of a space: for each keyframe two sightings and half a constraint.
+    /// The limits of a space: for each keyframe two sightings and half a constraint.
     pub(crate) fn of(settings: &Settings) -> Self {
         let keyframes_max = settings.anchors_max;
         Self {

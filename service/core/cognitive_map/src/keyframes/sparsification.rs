@@ -1,4 +1,4 @@
-//! What is forgotten first: keyframes from which next to nothing is lost.
+//! Sparsification: keyframes are removed from which next to nothing is lost.
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
@@ -9,16 +9,16 @@ use super::sighting::{Seen, Sighting, lever_covariance, symmetric};
 use geometry::{PoseCovariance, se3};
 use state::NONE;
 
-/// Keyframes among which the one with least to say goes.
+/// Keyframes that are compared; the one whose loss is least is removed.
 const COMPARED: u32 = 16;
-/// Keyframes looked at until there is one that may go.
+/// Most keyframes examined until one may be removed.
 const LOOKED_AT_MAX: u32 = 1024;
-/// Unevenness of a way that counts as much as a sighting whose variance doubles \[m\].
+/// Unevenness that counts as much as doubling the variance of a sighting \[m\].
 const UNEVENNESS_M: f64 = 0.05;
-/// Lever of a turn, in that respect \[m\].
+/// Lever by which a rotation counts as unevenness \[m\].
 const LEVER_M: f64 = 0.5;
 
-/// Where what hangs on a keyframe goes when the keyframe goes.
+/// The neighbour to which the lists of a removed keyframe move.
 #[derive(Clone, Copy)]
 enum Neighbour {
     Previous(u32),
@@ -26,10 +26,11 @@ enum Neighbour {
 }
 
 impl KeyframeGraph {
-    /// Removes a keyframe if that loses little: of the next few, the one with least to say.
+    /// Removes a keyframe if that loses little: of the next few, the one whose loss is least.
     ///
-    /// The motions to and from it are composed, and what hangs on it goes to the neighbour that is nearer, with the
-    /// noise of the way there: so no loop is lost, and nothing becomes surer than it was.
+    /// The motions to and from it are composed, and its sightings and constraints move to the
+    /// neighbour that is nearer, with the noise of the motion there: so no loop is lost, and
+    /// nothing becomes more certain than it was.
     pub(super) fn sparsify(&mut self) {
         let numbers = self.keyframes.numbers();
         let mut least = (f64::INFINITY, NONE);
@@ -48,10 +49,11 @@ impl KeyframeGraph {
         self.dissolve(least.1);
     }
 
-    /// Forgets a sighting: of the next few keyframes from which something was seen, the vaguest one of that from which most was.
+    /// Removes a sighting: of the next few keyframes with sightings, the least certain one of that
+    /// with most.
     ///
-    /// Keyframes may go without a sighting less, and then what is seen anew would find no room, and the way on from there would
-    /// be known by its motion alone.
+    /// Without it, when all keyframes have few sightings, a new one would find no room, and later
+    /// poses would be known by motion alone.
     pub(super) fn forget_least_certain(&mut self) {
         let numbers = self.keyframes.numbers();
         let (mut most, mut compared) = ((1, NONE), 0);
@@ -70,7 +72,7 @@ impl KeyframeGraph {
         self.remove_sighting(most.1);
     }
 
-    /// How many sightings hang on a keyframe, and which is the vaguest.
+    /// Number of sightings of a keyframe, and the least certain one.
     fn seen_from(&self, keyframe: u32) -> (u32, u32) {
         let (mut count, mut least_certain) = (0, (0.0, NONE));
         let mut at = self
@@ -88,7 +90,7 @@ impl KeyframeGraph {
         (count, least_certain.1)
     }
 
-    /// How much is lost with a keyframe; `None` if it must stay.
+    /// The loss of removing a keyframe; `None` if it must stay.
     fn loss(&self, number: u32) -> Option<f64> {
         let keyframe = self.keyframes.get(number)?;
         let neighbour = self.neighbour(keyframe)?;
@@ -130,7 +132,8 @@ impl KeyframeGraph {
         Some(loss)
     }
 
-    /// The neighbour to which the way is surer, of the same stretch. `None` for an agent's latest keyframe.
+    /// The neighbour in the same stretch to which the motion is more certain. `None` for an agent's
+    /// latest keyframe.
     fn neighbour(&self, keyframe: &Keyframe) -> Option<Neighbour> {
         let next = self.keyframes.get(keyframe.next)?;
         let (before, after) = (keyframe.covariance.matrix(), next.covariance.matrix());
@@ -144,7 +147,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// How far the way past a keyframe would deviate from an even motion if the keyframe were not there \[m\].
+    /// Deviation of the way past a keyframe from an even motion if the keyframe were removed \[m\].
     fn unevenness_without(&self, keyframe: &Keyframe) -> f64 {
         let Some(next) = self.keyframes.get(keyframe.next) else {
             return 0.0;
@@ -158,7 +161,7 @@ impl KeyframeGraph {
         let way_ns = next.stamp_ns.saturating_sub(previous.until_ns).max(1) as f64;
         let off = |stamp_ns: i64| {
             let share = stamp_ns.saturating_sub(previous.until_ns) as f64 / way_ns;
-            // As whoever reads a trajectory interpolates, and much quicker than along a screw.
+            // Interpolated as readers of trajectories do, which is much quicker than along a screw.
             let shift = whole.translation.vector * share - keyframe.motion.translation.vector;
             let even = UnitQuaternion::identity().nlerp(&whole.rotation, share);
             shift.norm() + LEVER_M * even.angle_to(&keyframe.motion.rotation)
@@ -166,7 +169,7 @@ impl KeyframeGraph {
         known + off(keyframe.stamp_ns).max(off(keyframe.until_ns))
     }
 
-    /// Takes a keyframe out of its chain.
+    /// Removes a keyframe from its chain.
     pub(super) fn dissolve(&mut self, number: u32) {
         let revision = self.revision;
         let Some(keyframe) = self.keyframes.get(number).cloned() else {
@@ -206,7 +209,8 @@ impl KeyframeGraph {
                         to,
                         pending.point.before(&keyframe.motion, &keyframe.covariance),
                     ),
-                    // An agent's latest keyframes are its nearest ones: what waits here waits for long.
+                    // The latest keyframes of an agent are its nearest ones: a sighting that waits
+                    // here has waited for long.
                     Neighbour::Next(to) => (to, pending.point),
                 };
                 (pending.keyframe, pending.point) = (to, point);
@@ -215,7 +219,7 @@ impl KeyframeGraph {
         self.keyframes.remove(number, revision);
     }
 
-    /// Hangs on a neighbour what hung on a keyframe.
+    /// Moves the lists of a keyframe to a neighbour.
     fn move_to_neighbour(&mut self, number: u32, keyframe: &Keyframe, neighbour: Neighbour) {
         let (to, way, spread) = match neighbour {
             Neighbour::Previous(to) => (to, keyframe.motion, keyframe.covariance),
@@ -239,7 +243,7 @@ impl KeyframeGraph {
                 Seen::Landmark(landmark) => landmark,
                 Seen::Agent(..) => NONE,
             };
-            // An agent that was seen where it was seen from has left nothing to say.
+            // A sighting of an agent from its own keyframe says nothing.
             let sees_itself = matches!(sighting.shown, Seen::Agent(target, _) if target == to);
             if sees_itself || !self.add_sighting(sighting) {
                 self.landmarks.release(landmark, self.revision);
@@ -248,7 +252,8 @@ impl KeyframeGraph {
         while let Some(sighting) = self.take_shown(number) {
             self.show_beside(sighting, to, &way, &spread, is_previous);
         }
-        // The first motion leads from the neighbour to the keyframe, or from the keyframe to the neighbour.
+        // The first motion leads from the neighbour to the keyframe, or from the keyframe to the
+        // neighbour.
         loop {
             let at = self
                 .keyframes
@@ -262,7 +267,7 @@ impl KeyframeGraph {
             } else {
                 (way.inverse(), way)
             };
-            // T_anchor = T_neighbour · there, both ways with the error of the way.
+            // T_keyframe = T_neighbour · there, both ways with the error of the motion.
             let moved = se3::adjoint(&way);
             let on_its_other_side =
                 PoseCovariance::from_matrix(&(moved * spread.matrix() * moved.transpose()));
@@ -292,7 +297,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// A sighting that showed a keyframe shows a place beside another one from now on.
+    /// Moves a sighting that shows a keyframe to a neighbour of that.
     fn show_beside(
         &mut self,
         mut sighting: Sighting,
@@ -312,7 +317,8 @@ impl KeyframeGraph {
         };
         let turn = observer.pose.rotation.inverse() * target.pose.rotation;
         let turn = turn.to_rotation_matrix().into_inner();
-        // The noise of the way moves the place in the frame of the keyframe that goes, or of the one that comes.
+        // The noise of the motion moves the point in the frame of the removed keyframe, or of its
+        // neighbour.
         let (place, noise) = if is_previous {
             let noise = turn * lever_covariance(&lever, spread) * turn.transpose();
             (way * nalgebra::Point3::from(lever), noise)
@@ -331,7 +337,7 @@ impl KeyframeGraph {
 
     fn take_sighting(&mut self, keyframe: u32) -> Option<Sighting> {
         let number = self.keyframes.get(keyframe)?.sightings;
-        // The landmark stays in memory while its sighting is on the way.
+        // The landmark stays in memory while its sighting moves.
         if let Seen::Landmark(landmark) = self.sightings.get(number)?.shown {
             self.landmarks.count(landmark, self.revision);
         }

@@ -1,17 +1,19 @@
-//! A way laid to rest among all the views about it, all its looks at once.
+//! Batch alignment: a pose by all queries at once.
 //!
-//! Looks that follow one another are wrong for the same reasons: where the views about them leave something open, and where
-//! motion has them. How far they are, the Gaussian process itself says. With looks Y (rows) from points x along the way, views U
-//! from points p, and the kernel K between views, k between views and looks, κ between looks:
+//! Consecutive queries have correlated errors: the views about them leave the same part open, and
+//! odometry errs alike. The correlations follow from the Gaussian process. With queries Y (rows)
+//! from points x along the way, views U from points p, and the kernel K between views, k between
+//! views and queries, κ between queries:
 //!
 //! ```text
-//! off  R = Y − kᵀK⁻¹U      left open  C = κ − kᵀK⁻¹k + D      cost = ½ n (ln |C| + tr C⁻¹RRᵀ)
+//! R = Y − kᵀK⁻¹U      C = κ − kᵀK⁻¹k + D      cost = ½ n (ln |C| + tr C⁻¹RRᵀ)
 //! ```
 //!
-//! (Rasmussen & Williams 2006, Eq. 2.24 and 5.8), with n independent numbers of a view. D is what motion leaves open of where the
-//! looks were made: |d|²/ℓ² of a random walk back from the newest look. A look that the others do not bear out (left out, it is off
-//! by (C⁻¹RRᵀC⁻¹)ᵢᵢ / (C⁻¹)ᵢᵢ, 1 on average; Sundararajan & Keerthi 2001) shows something that is not there, and may be anything.
-//! Where all looks together are farther off than they should be, the covariance is so much wider.
+//! (Rasmussen & Williams 2006, Eq. 2.24 and 5.8), with effective dimension n. D is the odometry
+//! error of the points: |d|²/ℓ² of a random walk back from the newest query. A query is an outlier
+//! if its leave-one-out residual (C⁻¹RRᵀC⁻¹)ᵢᵢ / (C⁻¹)ᵢᵢ, 1 on average (Sundararajan & Keerthi
+//! 2001), is large: it may be anything. Where all residuals are larger than expected, the
+//! covariance grows by the same factor.
 
 use nalgebra::{DMatrix, Isometry3, Matrix3x6, Matrix6, Point3, Vector6};
 
@@ -21,21 +23,20 @@ use crate::descriptor::dot;
 use crate::twist::{moved, twist};
 use crate::views::Kernel;
 
-/// Views about the way that count, those nearest to a look first.
+/// Most views about the way, those nearest to a query first.
 const VIEWS_MAX: usize = 64;
-/// Times that a step is halved that leads to nothing better.
+/// Most halvings of a step that does not lower the cost.
 const HALVED_MAX: usize = 4;
 /// A step shorter than this is the last one \[m, rad\].
 const AT_REST: f64 = 1e-3;
-/// Square of how far a look may be off from what the others make of it, 1 on average; one beyond that shows something that is
-/// not there.
+/// Squared leave-one-out residual, 1 on average, beyond which a query is an outlier.
 const OFF_MAX: f64 = 3.0;
-/// Share of the looks of which that may be so.
+/// Largest share of outliers.
 const STRAY_MAX: f64 = 0.3;
-/// What is left open of such a look: more than of one of somewhere unknown.
+/// Variance of an outlier: larger than that of an unknown place.
 const ANYTHING: f64 = 4.0;
 
-/// The looks of a channel, and the views about them.
+/// The queries of a channel, and the views about them.
 struct ChannelBatch<'a> {
     kernel: Kernel,
     queries: Vec<LocalQuery<'a>>,
@@ -50,13 +51,13 @@ struct ChannelBatch<'a> {
     own: DMatrix<f64>,
 }
 
-/// A way among the views about it.
+/// All queries, by channel.
 pub(crate) struct BatchAlignment<'a> {
     batches: Vec<ChannelBatch<'a>>,
     is_planar: bool,
 }
 
-/// What a pose makes of a patch.
+/// Residuals of a channel at a pose.
 struct Fit {
     /// K⁻¹k.
     weights: DMatrix<f64>,
@@ -67,20 +68,21 @@ struct Fit {
     cost: f64,
 }
 
-/// A pose with what all looks at once say of it.
+/// An aligned pose with its cost.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BatchPose {
     pub(crate) pose: Isometry3<f64>,
-    /// Of the error on its right.
+    /// Covariance of the error on its right.
     pub(crate) covariance: Matrix6<f64>,
-    /// Minus the logarithm of how likely the looks are there, up to a constant that is the same for all poses about there \[nats\].
+    /// Negative log likelihood of the queries up to a constant that is common to near poses
+    /// \[nats\].
     pub(crate) cost: f64,
-    /// How much farther off the looks are there than they should be, in squares; 1 at least.
+    /// Factor of the covariance by which residuals are larger than expected; at least 1.
     pub(crate) wider: f64,
 }
 
 impl<'a> ChannelBatch<'a> {
-    /// The looks of a channel, as a pose has them, with the views about them; `None` where there are none.
+    /// The queries of a channel and the views about them at a pose; `None` if there are none.
     fn of(
         channel: u8,
         queries: &[LocalQuery<'a>],
@@ -138,7 +140,7 @@ impl<'a> ChannelBatch<'a> {
         })
     }
 
-    /// What a pose makes of it, where so much more is left open of each look.
+    /// Residuals at a pose, where each query has an additional variance.
     fn fit(&self, pose: &Isometry3<f64>, outlier: &[f64]) -> Option<Fit> {
         let way: Vec<Point3<f64>> = self.queries.iter().map(|query| pose * query.at).collect();
         let count = way.len();
@@ -154,7 +156,7 @@ impl<'a> ChannelBatch<'a> {
             } else {
                 self.kernel.at((way[row] - way[column]).norm_squared())
             };
-            // From the newest look to the later one of the two motion was wrong for both of them.
+            // Odometry between the newest query and the later one of the two errs for both.
             let drift_m = self.queries[row].drift_m.min(self.queries[column].drift_m);
             between - known[(row, column)] + (drift_m / self.kernel.length_m).powi(2)
         });
@@ -179,12 +181,12 @@ impl<'a> ChannelBatch<'a> {
         })
     }
 
-    /// What moves a pose, and how firmly it is held (Gauss–Newton, right perturbation).
+    /// Gradient and Hessian of the cost (Gauss–Newton, right perturbation).
     fn normal_equations(&self, pose: &Isometry3<f64>, fit: &Fit) -> (Vector6<f64>, Matrix6<f64>) {
         let rotation = pose.rotation.to_rotation_matrix().into_inner();
         let (views, queries) = (self.points.len(), self.queries.len());
         let length_squared = self.kernel.length_m.powi(2);
-        // ∂k/∂(ρ, φ) of each look: columns 6i to 6i + 5.
+        // ∂k/∂(ρ, φ) of each query: columns 6i to 6i + 5.
         let mut slopes = DMatrix::zeros(views, 6 * queries);
         for (number, query) in self.queries.iter().enumerate() {
             let at = pose * query.at;
@@ -218,7 +220,7 @@ impl<'a> ChannelBatch<'a> {
         (gradient, (hessian + hessian.transpose()) * 0.5)
     }
 
-    /// What is left open of each look beside what is expected, where a pose has it: of those that the others do not bear out.
+    /// Additional variance of each query at a pose: that of outliers.
     fn outlier(&self, pose: &Isometry3<f64>) -> Option<Vec<f64>> {
         let count = self.queries.len();
         let mut outlier = vec![0.0; count];
@@ -242,7 +244,7 @@ impl<'a> ChannelBatch<'a> {
 }
 
 impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, About> {
-    /// The way about where a pose has it; `None` where nothing is known.
+    /// The batch of all queries, with the views about a pose; `None` if there are none.
     pub(crate) fn whole(&self, pose: &Isometry3<f64>) -> Option<BatchAlignment<'a>> {
         let way: Vec<Point3<f64>> = self.queries.iter().map(|each| pose * each.at).collect();
         let views = (self.views)(&way);
@@ -261,7 +263,7 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
 }
 
 impl BatchAlignment<'_> {
-    /// Lays a pose to rest in so many steps at most.
+    /// Minimises the cost from a pose in so many steps at most.
     pub(crate) fn align(
         &self,
         start: &Isometry3<f64>,
@@ -292,7 +294,7 @@ impl BatchAlignment<'_> {
         self.laid(pose, &fits, prior)
     }
 
-    /// What moves a pose, and how firmly it is held; out of the plane nothing moves.
+    /// Gradient and Hessian with the prior; out of the plane nothing moves.
     fn normal_equations(
         &self,
         pose: &Isometry3<f64>,
@@ -313,7 +315,7 @@ impl BatchAlignment<'_> {
         (gradient, hessian)
     }
 
-    /// The answer, at rest.
+    /// The pose with its covariance and cost.
     fn laid(&self, pose: Isometry3<f64>, fits: &[Fit], prior: &Prior) -> Option<BatchPose> {
         let mut hessian = Matrix6::zeros();
         let (mut off, mut count) = (0.0, 0.0);
@@ -405,7 +407,7 @@ mod tests {
         Isometry3::new(Vector3::new(0.4, -0.3, 0.1), Vector3::new(0.2, -0.4, 0.7))
     }
 
-    /// Lays the way to rest from beside the truth; some of its looks show something else.
+    /// Aligns the way from beside the truth; some of its queries show something else.
     fn laid(outliers: &[usize]) -> BatchPose {
         let points: Vec<Point3<f64>> = (0..120)
             .map(|k| Point3::from(Vector3::from_fn(|axis, _| 1.8 * hash(5000 + 3 * k + axis))))

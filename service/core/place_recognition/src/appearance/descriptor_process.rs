@@ -1,31 +1,33 @@
-//! What is expected to be seen at a point, by what was seen about it.
+//! Descriptor Gaussian process: the descriptor that is expected at a point, by views about it.
 //!
-//! Views of a channel are taken for a Gaussian process over the points from which they were seen, whose kernel the channel's own
-//! views have taught. With the views U (rows) from the points about a point x, their kernel matrix K and the kernel k to x:
+//! Views of a channel are samples of a Gaussian process over position with the kernel of the
+//! channel. With views U (rows) from points about a point x, their kernel matrix K and the kernel k
+//! to x:
 //!
 //! ```text
-//! expected  v̂(x) = Uᵀ K⁻¹ k        left open  e(x) = 1 − kᵀ K⁻¹ k        off  q = |v − v̂|² / e
+//! mean v̂(x) = Uᵀ K⁻¹ k        variance e(x) = 1 − kᵀ K⁻¹ k        residual q = |v − v̂|² / e
 //! ```
 //!
-//! (Rasmussen & Williams 2006, §2.2). As all views are unit vectors, G = U Uᵀ and b = U v are all that is needed of them:
-//! |v − v̂|² = 1 − 2 kᵀK⁻¹b + kᵀK⁻¹GK⁻¹k. Leaving one out at a time says how well the views about x expect one another (Sundararajan &
-//! Keerthi 2001); where they do so badly, q counts by so much less.
+//! (Rasmussen & Williams 2006, §2.2). All views are unit vectors, so G = U Uᵀ and b = U v suffice:
+//! |v − v̂|² = 1 − 2 kᵀK⁻¹b + kᵀK⁻¹GK⁻¹k. Leave-one-out residuals say how well the views about x
+//! predict one another (Sundararajan & Keerthi 2001); where they do so badly, e grows by the same
+//! factor.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
 
 use crate::descriptor::dot;
 use crate::views::Kernel;
 
-/// Views about a point that count, the nearest first.
+/// Most views about a point, the nearest first.
 const NEAR_MAX: usize = 12;
-/// Part that is always left open: positions and kernel are not exact.
+/// Least variance: positions and kernel are not exact.
 pub(super) const OPEN_MIN: f64 = 0.02;
-/// A point is known when no more than this is left open of what is seen there.
+/// A point is known when the variance there is at most this.
 const OPEN_MAX: f64 = 0.8;
-/// A point is well known when no more than this is.
+/// A point is well known when the variance there is at most this.
 const KNOWN_MAX: f64 = 0.5;
 
-/// A view with the point from which it was seen.
+/// A view with its position.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReferenceView<'a> {
     pub(crate) at: Point3<f64>,
@@ -35,7 +37,7 @@ pub(crate) struct ReferenceView<'a> {
 /// Reference views with the numbers of their channels.
 pub(crate) type ReferenceViews<'a> = Vec<(u8, ReferenceView<'a>)>;
 
-/// The views about a point, ready for what was seen near it.
+/// The process about a point, conditioned on a query.
 #[derive(Clone, Debug)]
 pub(crate) struct DescriptorProcess {
     kernel: Kernel,
@@ -46,33 +48,34 @@ pub(crate) struct DescriptorProcess {
     gram: DMatrix<f64>,
     /// K⁻¹ b.
     likeness: DVector<f64>,
-    /// How far the views are from what they expect of one another; 1 if they are what they should be.
+    /// Mean squared leave-one-out residual of the views; at least 1.
     misfit: f64,
 }
 
-/// What a look says of the point from which it was made.
+/// The residual of a query at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Expectation {
-    /// Part of what is seen that the views about the point leave open.
+    /// Variance of the prediction.
     pub(super) open: f64,
-    /// Square of how far off it is, 1 on average.
+    /// Squared residual, 1 on average.
     pub(super) off: f64,
-    /// Derivative of half the square by the point \[1/m\], and the Gauss–Newton part of the second one \[1/m²\].
+    /// Gradient of half the squared residual by the point \[1/m\], and its Gauss–Newton Hessian
+    /// \[1/m²\].
     pub(super) gradient: Vector3<f64>,
     pub(super) hessian: Matrix3<f64>,
 }
 
-/// How a look is expected where somebody is believed to be.
+/// The residual of a query at an uncertain point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Prediction {
-    /// Part of what is seen that is left open.
+    /// Variance of the prediction, that of the point included.
     pub(crate) open: f64,
-    /// Square of how far off it is, 1 on average.
+    /// Squared residual, 1 on average.
     pub(crate) off: f64,
 }
 
 impl DescriptorProcess {
-    /// The views about a point, for a look; `None` where there are none.
+    /// The process of the views about a point, for a query; `None` if there are none.
     pub(crate) fn of(
         query: &[f32],
         about: &Point3<f64>,
@@ -116,11 +119,11 @@ impl DescriptorProcess {
         })
     }
 
-    /// How a look is expected at a point that is known with a covariance \[m²\]; `None` where little is known. The expectation is the mean
-    /// over where the point may be, which is one with another kernel:
+    /// The residual at a point that is known with a covariance \[m²\]; `None` where little is
+    /// known. The mean over the point is a prediction with another kernel:
     ///
     /// ```text
-    /// k̃ = E k = c |I + Σ/ℓ²|^−½ exp(−½ dᵀ (ℓ²I + Σ)⁻¹ d)        open  1 − k̃ᵀ K⁻¹ k̃
+    /// k̃ = E k = c |I + Σ/ℓ²|^−½ exp(−½ dᵀ (ℓ²I + Σ)⁻¹ d)        variance  1 − k̃ᵀ K⁻¹ k̃
     /// ```
     pub(crate) fn predict(
         &self,
@@ -151,7 +154,7 @@ impl DescriptorProcess {
         Some(Prediction { open, off })
     }
 
-    /// What the look says of a point; `None` where nothing is known. The point itself is known to `spread_m`.
+    /// The residual at a point that is known to `spread_m`; `None` where nothing is known.
     pub(super) fn expect(&self, at: &Point3<f64>, spread_m: f64) -> Option<Expectation> {
         let count = self.points.len();
         let length_squared = self.kernel.length_m.powi(2);

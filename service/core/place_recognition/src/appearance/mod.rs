@@ -1,5 +1,5 @@
-//! What is expected to be seen where, by the views that were taken about there; and the pose of an agent
-//! by what it sees.
+//! What is expected to be seen where, by the views that were taken about there; and the pose of an
+//! agent by what it sees.
 
 mod batch_alignment;
 mod descriptor_process;

@@ -1,14 +1,16 @@
-//! Looks along a way, laid to rest among what was seen about it.
+//! View alignment: the pose that explains queries along a way best, by the views about it.
 //!
-//! A look of which the views about it leave e open and which is off by q says, against "somewhere that nobody has seen",
+//! A query with residual q where the variance is e has, against a place that nobody has seen, the
+//! log odds
 //!
 //! ```text
 //! s = ln((1 − ε) exp(min(½ n τ (1 − q − ln e), G)) + ε)        where something is known; 0 elsewhere
 //! ```
 //!
-//! with n independent numbers of a view, of which a part τ counts: looks that follow one another within the kernel's length are wrong for
-//! the same reasons. There is a probability ε of a look that has nothing to do with where it was made. No look says more than G. Where the map is thin nothing
-//! is said, so that a pose does not gain by how well its surroundings are known.
+//! with effective dimension n, of which the part τ counts, since queries within the kernel's length
+//! have correlated errors. ε is the probability of an outlier, and G bounds the evidence of one
+//! query. Where the map is thin the log odds are 0, so a pose does not gain by how well its
+//! surroundings are known.
 
 use nalgebra::{Isometry3, Matrix3x6, Matrix6, Point3, Vector6};
 
@@ -16,68 +18,70 @@ use super::descriptor_process::{DescriptorProcess, ReferenceView, ReferenceViews
 use crate::twist::{moved, twist};
 use crate::views::Kernel;
 
-/// Probability of a look that has nothing to do with where it was made.
+/// ε: probability of an outlier.
 const WRONG: f64 = 0.05;
-/// Most that a look says.
+/// G: largest evidence of a query \[nats\].
 const TELLS_MAX: f64 = 3.0;
-/// Part of a view's numbers that count at most.
+/// Largest part τ of the effective dimension.
 const COUNTED_MAX: f64 = 0.5;
-/// How much a look may say for a pose against one that leaves it open.
+/// Largest evidence of a query for a pose against another one at which it cannot be judged
+/// \[nats\].
 const OPEN: f64 = 0.1;
-/// Square of how far off a look is from which on it loses weight.
+/// Residual from which on a query loses weight.
 const SOFT: f64 = 2.0;
-/// Rounds of finding the views about a pose anew, and steps of each.
+/// Rounds of looking up the views about a pose, and steps of each.
 const ROUNDS: (usize, usize) = (3, 4);
 /// A round that moves a pose by less is the last one \[m, rad\].
 const AT_REST: f64 = 1e-3;
 
-/// Something seen along the way.
+/// A query along a way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalQuery<'a> {
-    /// From where, in the frame of the body whose pose is sought.
+    /// Position in the frame of the body whose pose is sought.
     pub(crate) at: Point3<f64>,
-    /// Deviation of that \[m\].
+    /// Standard deviation of the position \[m\].
     pub(crate) drift_m: f64,
     pub(crate) channel: u8,
     pub(crate) kernel: Option<Kernel>,
     pub(crate) vector: &'a [f32],
 }
 
-/// A way, and how to find the views about it, with their channels.
+/// The queries along a way, and how to find the views about them.
 pub(crate) struct ViewAlignment<'a, About> {
     pub(crate) queries: Vec<LocalQuery<'a>>,
     pub(crate) views: About,
     pub(crate) is_planar: bool,
 }
 
-/// What is known of a pose beside what is seen.
+/// What is known of a pose besides the views.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Prior {
-    /// Where it is expected; where it is begun if nowhere in particular.
+    /// The expected pose, if any.
     pub(crate) pose: Option<Isometry3<f64>>,
     /// Information about the error on its right \[m⁻², rad⁻²\].
     pub(crate) information: Matrix6<f64>,
-    /// The same of a pose of which nothing is known: a settled pose's covariance counts that and what is seen, and nothing else.
+    /// Information of an unknown pose. The covariance of an aligned pose counts this and the views
+    /// only.
     pub(crate) open: Matrix6<f64>,
 }
 
-/// A pose at rest.
+/// An aligned pose.
 #[derive(Clone, Debug)]
 pub(crate) struct AlignedPose {
     pub(crate) pose: Isometry3<f64>,
-    /// Of the error on its right.
+    /// Covariance of the error on its right.
     pub(crate) covariance: Matrix6<f64>,
     pub(crate) evidence: Evidence,
 }
 
-/// What each look says for a pose; nothing where nothing is known.
+/// Log odds of each query at a pose; `None` where nothing is known.
 #[derive(Clone, Debug)]
 pub(crate) struct Evidence {
     pub(crate) queries: Vec<Option<f64>>,
 }
 
 impl LocalQuery<'_> {
-    /// Independent numbers of it that count beside others made so far from one another.
+    /// Effective dimension of the query beside others at this distance.
     pub(crate) fn numbers(&self, spacing_m: f64) -> f64 {
         self.kernel.map_or(0.0, |kernel| {
             kernel.numbers * (0.5 * spacing_m / kernel.length_m).min(COUNTED_MAX)
@@ -86,7 +90,7 @@ impl LocalQuery<'_> {
 }
 
 impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, About> {
-    /// The views about each look, where a pose has it.
+    /// The process about each query at a pose.
     fn about(&self, pose: &Isometry3<f64>) -> Vec<Option<DescriptorProcess>> {
         let way: Vec<Point3<f64>> = self.queries.iter().map(|each| pose * each.at).collect();
         let views = (self.views)(&way);
@@ -101,7 +105,7 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
         .collect()
     }
 
-    /// Mean distance between looks that follow one another \[m\].
+    /// Mean distance between consecutive queries \[m\].
     fn spacing_m(&self) -> f64 {
         let ways = self
             .queries
@@ -110,7 +114,7 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
         ways.sum::<f64>() / (self.queries.len().max(2) - 1) as f64
     }
 
-    /// Lays a pose to rest.
+    /// Aligns from a pose (Gauss–Newton).
     pub(crate) fn align(&self, start: &Isometry3<f64>, prior: &Prior) -> Option<AlignedPose> {
         let mut pose = *start;
         let mut about = self.about(&pose);
@@ -141,7 +145,7 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
         })
     }
 
-    /// What moves a pose, and how firmly it is held (right perturbation).
+    /// Gradient and Hessian of the cost (right perturbation).
     fn normal_equations(
         &self,
         pose: &Isometry3<f64>,
@@ -190,21 +194,21 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
     }
 }
 
-/// What a look says for a point, against somewhere that nobody has seen \[nats\]: of so many numbers that count, where so much of it is
-/// left open and it is off by that square.
+/// Log odds of a query at a point against a place that nobody has seen \[nats\], by its effective
+/// dimension, the variance, and the squared residual.
 pub(crate) fn log_odds(numbers: f64, open: f64, off: f64) -> f64 {
     let tells = 0.5 * numbers * (1.0 - off - open.ln());
     ((1.0 - WRONG) * tells.min(TELLS_MAX).exp() + WRONG).ln()
 }
 
 impl Evidence {
-    /// What all looks say for the pose, against somewhere that nobody has seen \[nats\].
+    /// Log odds of the pose against a place that nobody has seen \[nats\].
     pub(crate) fn total(&self) -> f64 {
         self.queries.iter().flatten().sum()
     }
 
-    /// What they say for it against another pose. What only one of the two can be judged by counts little: a room that looks
-    /// the same may be known less well.
+    /// Log odds against another pose. A query that can be judged at one of the two only counts
+    /// little: a room that looks the same may be known less well.
     pub(crate) fn against(&self, other: &Self) -> f64 {
         let say = |(own, other): (&Option<f64>, &Option<f64>)| match (own, other) {
             (Some(own), Some(other)) => own - other,
@@ -216,14 +220,14 @@ impl Evidence {
     }
 }
 
-/// Poses that settled, with their covariances and weights.
+/// Aligned poses with their covariances and weights.
 pub(crate) fn weighted(poses: &[(AlignedPose, f64)]) -> Vec<(Isometry3<f64>, Matrix6<f64>, f64)> {
     let each = poses.iter();
     each.map(|(aligned, weight)| (aligned.pose, aligned.covariance, *weight))
         .collect()
 }
 
-/// Mean and covariance of poses by their covariances and weights.
+/// Mean and covariance of a mixture of poses with covariances and weights.
 pub(crate) fn mixture(
     poses: &[(Isometry3<f64>, Matrix6<f64>, f64)],
 ) -> (Isometry3<f64>, Matrix6<f64>) {

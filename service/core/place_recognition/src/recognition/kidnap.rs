@@ -1,9 +1,9 @@
 //! Kidnap detection: an agent of the map sees what contradicts where it is believed to be.
 //!
-//! Each query says how much better it is expected where the agent is believed to be, by the covariance
-//! of that, than anywhere. The sum since nothing spoke against the pose (Page 1954) decides whether all
-//! queries together are aligned: only if they contradict every pose where the agent may be does it count
-//! as kidnapped.
+//! Each query says how much better it is expected where the agent is believed to be, by the
+//! covariance of that, than anywhere. The sum since nothing spoke against the pose (Page 1954)
+//! decides whether all queries together are aligned: only if they contradict every pose where the
+//! agent may be does it count as kidnapped.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
 
@@ -16,24 +16,27 @@ use crate::twist::twist;
 use crate::view::View;
 use crate::views::Kernel;
 
-/// Odds at which an agent counts as astray: one false alarm in a thousand, where one look in a thousand is the first one after
-/// it was carried off \[nats\].
+/// Threshold of the cumulative sum \[nats\]: one false alarm in a thousand, if one query in a
+/// thousand is the first one after a kidnapping.
 const SURE: f64 = 6.9 + 6.9;
-/// Distance between looks that are weighed, in lengths of the channel's kernel: nearer ones err alike.
+/// Least distance between weighed queries, in lengths of the channel's kernel: nearer ones have
+/// correlated errors.
 const SPACING: f64 = 0.25;
-/// How much larger the errors of a pose may be than its covariance says.
+/// Factor by which the errors of a pose may exceed their standard deviations.
 const WIDER: f64 = 2.0;
-/// A view nearer than this to the one before must be like it, in reaches: else one of them shows something that is not there.
+/// A view nearer than this to the one before must be similar to it, in reaches: else one of them is
+/// an outlier.
 const BESIDE: f64 = 0.6;
-/// Remembered views near the agent that are looked up.
+/// Most remembered views near the agent that are looked up.
 const NEAR_MAX: usize = 24;
-/// A look counts whose heading is that of one of the views about it, or not farther from one than these are from one another: a
-/// channel may see something else in another direction \[rad\].
+/// A query counts if its heading differs from one of the views about it by no more than this, or
+/// than these differ from one another: a channel may see something else in another direction
+/// \[rad\].
 const TURNED_RAD: f64 = 0.5;
 
 impl PlaceRecognition {
-    /// An agent in the map saw something. Answers whether what it saw lately contradicts where it is believed to be.
-    /// `accepted` is the number of its sightings so far that agree with that.
+    /// Whether what an agent of the map saw lately contradicts its believed pose. `accepted` is the
+    /// number of its sightings so far that agree with that pose.
     pub fn is_contradicted(
         &mut self,
         view: &View<'_>,
@@ -76,10 +79,10 @@ impl PlaceRecognition {
             return false;
         };
         test.latest = Some(query.clone());
-        // One that was lost and is not any more was brought back by what it sighted.
+        // An agent that is not lost any more was brought back by its sightings.
         test.is_kidnapped = false;
         if test.accepted != accepted {
-            // What the agent sighted is where it should be.
+            // An accepted sighting confirms the pose.
             test.accepted = accepted;
             test.reset(view.sample.seq);
             return false;
@@ -103,7 +106,7 @@ impl PlaceRecognition {
         self.is_nowhere_about(test, view, kernel, keyframes)
     }
 
-    /// Whether the view before is like a look, unless it was too far away to be.
+    /// Whether a query is similar to the view before, if that was near enough.
     fn is_borne_out(&self, test: &KidnapTest, query: &QueryView) -> bool {
         let before = test.latest.as_ref();
         let Some(before) = before.filter(|before| before.channel == query.channel) else {
@@ -117,7 +120,8 @@ impl PlaceRecognition {
                 .is_alike(query.channel, &before.vector, &query.vector)
     }
 
-    /// What a look says for where its agent is believed to be, against anywhere else \[nats\]; nothing where little is known.
+    /// Log odds of the believed pose by a query, against anywhere else \[nats\]; `None` where
+    /// little is known.
     fn says(
         &self,
         test: &KidnapTest,
@@ -159,7 +163,7 @@ impl PlaceRecognition {
         }
         let seen: Vec<ReferenceView<'_>> = near.iter().map(|(seen, _)| *seen).collect();
         let covariance = view.covariance.in_map_axes(&view.pose.rotation);
-        // Where these views were taken is known no better than their agents knew it then.
+        // The views' positions are no more certain than their agents were then.
         let unsure_m2 = unsure_m2 / (3.0 * near.len() as f64);
         let own: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
         let covariance = (own + Matrix3::identity() * unsure_m2) * WIDER.powi(2);
@@ -176,7 +180,7 @@ impl PlaceRecognition {
         Some(says)
     }
 
-    /// Whether the looks of a run, all together, contradict every pose where the agent may be.
+    /// Whether the queries of a run, all together, contradict every pose where the agent may be.
     fn is_nowhere_about(
         &self,
         test: &KidnapTest,
@@ -188,7 +192,7 @@ impl PlaceRecognition {
             queries: Vec::new(),
             ..test.run.clone()
         };
-        // Back from the newest, where the agent is.
+        // From the newest back.
         for query in test.run.queries.iter().rev() {
             let is_apart = spaced.queries.last().is_none_or(|later| {
                 let apart = later.in_odom.translation.vector - query.in_odom.translation.vector;
@@ -205,7 +209,8 @@ impl PlaceRecognition {
         };
         let open = problem.prior().open;
         let stated = view.covariance.matrix() * WIDER.powi(2);
-        // What is known without error, as the height of a robot on a floor, stays as it is.
+        // A floor, so that a component without error, such as the height of a robot on a floor, is
+        // held.
         let floor = Matrix6::identity() * 1e-6;
         let Some(information) = (stated + floor).try_inverse() else {
             return false;
@@ -223,8 +228,8 @@ impl PlaceRecognition {
         best.is_some_and(|best| best <= -SURE)
     }
 
-    /// An agent may be anywhere, from a sample on. What it saw since that is contradicted is forgotten
-    /// where it was believed to be, and a search begins with it.
+    /// Declares an agent kidnapped. The contradicting views are forgotten at the believed pose, and
+    /// a search begins with them.
     pub fn declare_kidnapped(&mut self, sample: SampleKey) {
         let revision = self.revision;
         let number = self.test_of(sample);
@@ -243,13 +248,13 @@ impl PlaceRecognition {
         }
     }
 
-    /// Whether an agent of the map may be anywhere, by what it has seen.
+    /// Whether an agent of the map counts as kidnapped.
     pub fn is_kidnapped(&self, agent: u32) -> bool {
         let mut kidnap_tests = self.kidnap_tests.iter();
         kidnap_tests.any(|test| test.agent == agent && test.is_kidnapped)
     }
 
-    /// An agent is where it is believed to be, from a sample on: it was told, or found.
+    /// The believed pose of an agent holds, from a sample on: it was stated, or found.
     pub fn confirm_pose(&mut self, agent: u32, seq: u64) {
         let revision = self.revision;
         let number = self
@@ -262,7 +267,8 @@ impl PlaceRecognition {
         }
     }
 
-    /// The number of the kidnap test of an agent in its present session; a new one if there is none.
+    /// The number of the kidnap test of an agent in its present session; a new one if there is
+    /// none.
     fn test_of(&mut self, sample: SampleKey) -> usize {
         let revision = self.revision;
         let is_own = |test: &KidnapTest| test.agent == sample.agent;

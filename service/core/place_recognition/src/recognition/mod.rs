@@ -27,8 +27,8 @@ pub struct PlaceRecognition {
 }
 
 impl PlaceRecognition {
-    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds the
-    /// later ones.
+    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds
+    /// the later ones.
     pub fn set_revision(&mut self, revision: u64) {
         self.revision = revision;
     }

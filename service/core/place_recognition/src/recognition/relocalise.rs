@@ -1,4 +1,4 @@
-//! An agent that does not know where it is sees something.
+//! Relocalisation of an agent that does not know where it is.
 
 use geometry::PoseCovariance;
 use nalgebra::Isometry3;
@@ -8,59 +8,62 @@ use crate::keyframes::{Keyframes, SampleKey};
 use crate::relocalisation::{Candidate, Search, candidates, turn_sd_rad};
 use crate::view::View;
 
-/// Motion between two looks \[m, rad\].
+/// Least motion between two queries \[m, rad\].
 pub(super) const MOVED: (f64, f64) = (0.05, 0.2);
-/// Looks after which poses are sought anew, before and after the agent was found.
+/// Queries between two attempts, before and after the agent was found.
 const FRESH: (u32, u32) = (2, 3);
-/// One that is not found for long asks more rarely: after so many looks it waits for one more each time.
+/// An agent that is not found for long makes attempts more rarely: one query more for so many
+/// queries.
 const PATIENCE: usize = 12;
-/// Looks that there must be.
+/// Fewest queries of an attempt.
 const LOOKS_MIN: usize = 6;
-/// Odds at which a pose is believed: one wrong claim in a thousand [nats].
+/// Log odds at which a pose is accepted: one wrong answer in a thousand \[nats\].
 const SURE: f64 = 6.9;
-/// Deviation of the heading from which on an agent is not put anywhere \[rad\].
+/// Largest standard deviation of the heading of an answer \[rad\].
 const HEADING_SD_MAX_RAD: f64 = 0.3;
-/// Deviation of the heading up to which the agent goes on looking around after it was found, so that its way does not lead it
-/// astray \[rad\].
+/// Standard deviation of the heading up to which the search goes on after the agent was found: an
+/// error of the heading becomes one of the position \[rad\].
 const HEADING_SD_RAD: f64 = 0.02;
-/// Way after which it stops that in any case \[m\].
+/// Way after which it ends in any case \[m\].
 const ON_M: f64 = 5.0;
-/// How much less surely look by look than by all looks at once a place may be known: where that is little, the map is thin, and
-/// what all looks at once say rests upon what the map leaves open.
+/// Factor by which a candidate may be less certain query by query than by all queries at once:
+/// where they differ by more, the map is thin, and the batch rests on what the map leaves open.
 const ROUGHLY: f64 = 2.0;
-/// How far all looks at once may be off what is expected, in squares, 1 on average: beyond that the map contradicts them, or itself.
+/// Largest factor of the covariance: beyond it the map contradicts the queries, or itself.
 const WIDER_MAX: f64 = 2.0;
-/// Guesses that are told.
+/// Most guesses.
 const GUESSES_MAX: usize = 8;
 
-/// Where an agent turned out to be.
+/// The pose of an agent that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relocalised {
-    /// Of the body in the map.
+    /// Pose of the body in the map.
     pub pose: Isometry3<f64>,
-    /// Of the error on its right.
+    /// Covariance of the error on its right.
     pub covariance: PoseCovariance,
-    /// Whether it was not known before.
+    /// Whether the agent had not been found before.
     pub is_first: bool,
-    /// Whether that is all: the agent goes on by itself.
+    /// Whether the search ends with this.
     pub is_last: bool,
 }
 
-/// Where an agent may be that does not know where it is.
+/// A pose where an agent may be that does not know where it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guess {
-    /// Of the body in the map, at its latest look.
+    /// Pose of the body in the map at its latest query.
     pub pose: Isometry3<f64>,
-    /// Of the error on its right.
+    /// Covariance of the error on its right.
     pub covariance: PoseCovariance,
-    /// Its share of the evidence, all other guesses and "somewhere that nobody has seen" included.
+    /// Posterior probability, with all other guesses and "a place that nobody has seen" as
+    /// alternatives.
     pub probability: f64,
-    /// Looks that can be judged by what is remembered there.
+    /// Number of queries that can be judged there.
     pub queries: u32,
 }
 
 impl PlaceRecognition {
-    /// An agent that does not know where it is saw something. Answers where it is, once that is known to better than `sd_max_m`.
+    /// A view of an agent that does not know where it is. Answers its pose, once that is known to
+    /// better than `sd_max_m`.
     pub fn seek(
         &mut self,
         view: &View<'_>,
@@ -105,7 +108,7 @@ impl PlaceRecognition {
                 .all(|other| best.evidence.against(&other.evidence) >= SURE);
         let covariance = PoseCovariance::from_matrix(&best.covariance);
         let turn_sd_rad = turn_sd_rad(&best.covariance);
-        // To one that was found, an answer from where the map is thin still says something.
+        // After the agent was found, an answer where the map is thin is still useful.
         let is_rough = search.found_m.is_none()
             && (best.rough_sd_m > ROUGHLY * sd_max_m || turn_sd_rad > HEADING_SD_MAX_RAD);
         let is_known =
@@ -126,7 +129,7 @@ impl PlaceRecognition {
         })
     }
 
-    /// Whether an agent still looks around to find out how it is turned.
+    /// Whether an agent was found and still searches for its heading.
     pub fn is_seeking(&self, agent: u32, session: u32) -> bool {
         let number = self.search_number(agent);
         let search = number.and_then(|number| self.searches.get(number));
@@ -136,15 +139,15 @@ impl PlaceRecognition {
         })
     }
 
-    /// The remembered sample that the latest queries of an agent are most like, if any; `None` for an
-    /// agent without a search.
+    /// The remembered sample that the latest queries of an agent are most like, if any; `None` for
+    /// an agent without a search.
     pub fn most_similar(&self, agent: u32) -> Option<Option<SampleKey>> {
         let search = self.searches.get(self.search_number(agent)?)?;
         let mut newest = search.queries.iter().rev().flat_map(|query| &query.alike);
         Some(newest.next().map(|similar| similar.sample))
     }
 
-    /// An agent knows where it is, or begins anew: what it has looked for is over.
+    /// Ends the search of an agent: it knows where it is, or begins anew.
     pub fn end_search(&mut self, agent: u32) {
         let revision = self.revision;
         if let Some(number) = self.search_number(agent)
@@ -157,7 +160,7 @@ impl PlaceRecognition {
         }
     }
 
-    /// Where an agent may be that searches, the most probable first.
+    /// The guesses of an agent that searches, the most probable first.
     pub fn guesses(&self, agent: u32, keyframes: &dyn Keyframes) -> Vec<Guess> {
         let search = self
             .search_number(agent)
@@ -171,7 +174,7 @@ impl PlaceRecognition {
         };
         let views = (self.views.stored.len() as f64).max(1.0);
         let weight = |place: &Candidate| (-best.evidence.against(&place.evidence)).exp();
-        // Against somewhere that nobody has seen, as likely as any place before something was seen.
+        // A place that nobody has seen has the prior of any other place.
         let nowhere = (views.ln() - best.evidence.total()).exp();
         let whole: f64 = places.iter().map(weight).sum::<f64>() + nowhere;
         places

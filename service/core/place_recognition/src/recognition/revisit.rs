@@ -34,8 +34,8 @@ pub struct Revisit {
 }
 
 impl PlaceRecognition {
-    /// Remembers what an agent in the map sees. Answers the revisits that end with this view: an earlier
-    /// stretch was seen along the present one, and many views agree.
+    /// Remembers what an agent in the map sees. Answers the revisits that end with this view: an
+    /// earlier stretch was seen along the present one, and many views agree.
     pub fn view(&mut self, view: &View<'_>, keyframes: &dyn Keyframes) -> Vec<Revisit> {
         let ended = self.views.add(view, self.revision);
         let revisits = ended.iter();
@@ -54,7 +54,8 @@ impl PlaceRecognition {
         let (now, then) = (matched.now.sample, matched.then.sample);
         let expected = keyframes.motion_between(now, then)?;
         let either = [0, 1].map(|k| matched.now.spread[k].hypot(matched.then.spread[k]));
-        // A place far away that only looks alike is dismissed before the alignment, which costs more.
+        // A place far away that only looks alike is dismissed before the alignment, which costs
+        // more.
         let reach_m = self.views.reach_m(matched.channel()).unwrap_or(0.0);
         if expected.translation.vector.norm() > AWAY * either[0] + 2.0 * reach_m {
             return None;
@@ -72,9 +73,9 @@ impl PlaceRecognition {
         })
     }
 
-    /// Aligns the present stretch of a sequence match with the views of the earlier one; answers the
-    /// earlier frame in the present one, with the covariance of the error on the right. `spread` is the
-    /// deviation of that before \[m, rad\].
+    /// Aligns the present stretch of a sequence match with the views of the earlier one; answers
+    /// the earlier frame in the present one, with the covariance of the error on the right.
+    /// `spread` is the deviation of that before \[m, rad\].
     fn align(
         &self,
         matched: &SequenceMatch,

@@ -1,4 +1,4 @@
-//! A search among what was seen.
+//! The view alignment of a search: its queries among all remembered views.
 
 use nalgebra::{Point3, Vector3};
 
@@ -8,10 +8,11 @@ use super::search::Search;
 use crate::appearance::{LocalQuery, ReferenceView, ReferenceViews, ViewAlignment};
 use crate::sequences::ViewMemory;
 
-/// How far relaxation may have moved a view since it was seen, for it to be found quickly \[m\].
+/// Farthest that relaxation may have moved a view since it was stored, for the prefilter by the
+/// stored position to keep it \[m\].
 const DISPLACED_M: f64 = 5.0;
 
-/// The looks of a search among everything that the team has seen.
+/// The queries of a search, with all remembered views as references.
 pub(crate) fn alignment<'a>(
     problem: &Problem,
     search: &'a Search,
@@ -38,7 +39,7 @@ pub(crate) fn alignment<'a>(
     }
 }
 
-/// The views near a way, with their channels.
+/// The remembered views near a way, with their channels.
 fn views<'a>(
     way: &[Point3<f64>],
     about_m: f64,

@@ -1,4 +1,4 @@
-//! The places where an agent may be that does not know it.
+//! Candidates: the places where an agent may be that does not know it.
 
 use nalgebra::{Isometry3, Matrix6, Point3};
 
@@ -14,30 +14,31 @@ use crate::keyframes::Keyframes;
 use crate::sequences::ViewMemory;
 use geometry::PoseCovariance;
 
-/// Poses nearer than this are the same place, in reaches.
+/// Poses nearer than this are of one candidate, in reaches.
 const PLACE: f64 = 0.5;
-/// Poses of a place that are laid to rest by all looks at once.
+/// Most poses of a candidate that are refined by batch alignment.
 const WHOLE_MAX: usize = 4;
-/// Steps of that: of all of them, and of those that make the looks about as likely as the best one.
+/// Steps of batch alignment: of all poses, and of those about as likely as the best one.
 const WHOLE_STEPS: [usize; 2] = [2, 6];
-/// Such a pose is as good as none when it makes the looks less likely by that [nats].
+/// A pose is dropped when its cost exceeds the best one by this \[nats\].
 const RIVAL: f64 = 12.0;
-/// Deviation of a turn from which on other turns about the way are tried \[rad\].
+/// Standard deviation of a rotation beyond which other turns about the way are tried \[rad\].
 const TURN_OPEN_RAD: f64 = 0.5;
 
 /// A place where the agent may be: poses that differ by little.
 pub(crate) struct Candidate {
     pub(crate) evidence: Evidence,
-    /// By all looks at once, for the best place.
+    /// Mean pose, by batch alignment for the best candidate.
     pub(crate) mean: Isometry3<f64>,
     pub(crate) covariance: Matrix6<f64>,
-    /// How well it is known look by look \[m\].
+    /// Standard deviation of the position, query by query \[m\].
     pub(crate) rough_sd_m: f64,
-    /// How much farther off all looks at once are than they should be, in squares; 1 at least.
+    /// Factor of the covariance by which all queries at once are farther off than expected; at
+    /// least 1.
     pub(crate) wider: f64,
 }
 
-/// The places where an agent may be, the best first.
+/// The candidates of a search, the best first.
 pub(crate) fn candidates(
     search: &Search,
     memory: &ViewMemory,
@@ -73,7 +74,7 @@ pub(crate) fn candidates(
     places.sort_by(|a, b| b[0].0.evidence.total().total_cmp(&a[0].0.evidence.total()));
     let places = places.into_iter().enumerate().map(|(rank, poses)| {
         let rough = mixture(&weighted(&poses));
-        // One that was found knows how it is turned.
+        // An agent that was found knows its heading.
         let is_turn_open = search.found_m.is_none() && turn_sd_rad(&rough.1) > TURN_OPEN_RAD;
         let fine = (rank == 0)
             .then(|| whole(&problem, &alignment, &poses, is_turn_open))
@@ -94,7 +95,7 @@ pub(crate) fn candidates(
     places.collect()
 }
 
-/// A place by all looks at once: its poses, each as likely as it makes the looks.
+/// A candidate by all queries at once: the mixture of its poses, weighted by likelihood.
 fn whole<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>>(
     problem: &Problem,
     alignment: &ViewAlignment<'a, About>,
@@ -139,7 +140,7 @@ fn whole<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>>(
     Some((mean, covariance, best.wider))
 }
 
-/// Largest deviation of a turn in a covariance \[rad\].
+/// Largest standard deviation of the rotation in a covariance \[rad\].
 pub(crate) fn turn_sd_rad(covariance: &Matrix6<f64>) -> f64 {
     covariance.diagonal().rows(3, 3).max().max(0.0).sqrt()
 }

@@ -1,4 +1,4 @@
-//! Whether what an agent sees contradicts where it is believed to be.
+//! The test whether an agent of the map was kidnapped.
 
 use nalgebra::Isometry3;
 
@@ -7,27 +7,27 @@ use crate::keyframes::SampleKey;
 use state::PagedVec;
 use state::state_of_struct;
 
-/// What the views of an agent in the map have said lately of where it is believed to be.
+/// The cumulative sum of what the views of an agent say against its believed pose (Page 1954).
 #[derive(Clone, Debug)]
 pub(crate) struct KidnapTest {
     pub(crate) agent: u32,
     pub(crate) session: u32,
-    /// Sightings that were taken in until the latest look.
+    /// Number of accepted sightings at the latest view.
     pub(crate) accepted: u64,
-    /// What the looks of the run say against where it is believed to be \[nats\]; never less than nothing (Page 1954).
+    /// Sum of the log odds against the believed pose \[nats\], never negative.
     pub(crate) against: f64,
-    /// Whether so much was said against it that it may be anywhere.
+    /// Whether the agent counts as kidnapped.
     pub(crate) is_kidnapped: bool,
-    /// Its latest look, whether it was weighed or not.
+    /// The latest view, weighed or not.
     pub(crate) latest: Option<QueryView>,
-    /// Where a look was weighed last, by motion alone.
+    /// Pose by motion alone at the latest view that was weighed.
     pub(crate) weighed_at: Option<Isometry3<f64>>,
-    /// The looks since the first of those that contradict; what the agent saw since the latest look before them says nothing of
-    /// where it is, since that is remembered where it is believed to be.
+    /// The queries since the sum was last zero. Views of the agent since then are remembered at the
+    /// believed pose, so they say nothing about it and are left out.
     pub(crate) run: Search,
 }
 
-/// The doubts, at most one of an agent.
+/// The tests, at most one of an agent.
 pub(crate) type KidnapTests = PagedVec<KidnapTest, 1>;
 
 impl KidnapTest {
@@ -44,7 +44,7 @@ impl KidnapTest {
         }
     }
 
-    /// Nothing speaks against where the agent is believed to be at a sample.
+    /// Sets the sum to zero: nothing contradicts the believed pose at a sample.
     pub(crate) fn reset(&mut self, seq: u64) {
         self.against = 0.0;
         self.run = Search::new(SampleKey {
@@ -54,7 +54,7 @@ impl KidnapTest {
         });
     }
 
-    /// Whether it may have come from a checkpoint that this program wrote.
+    /// Whether the state is one that this program may have written to a checkpoint.
     pub(crate) fn is_sound(&self, agents: usize, is_channel: impl Fn(u8, usize) -> bool) -> bool {
         let is_known = |query: &QueryView| is_channel(query.channel, query.vector.len());
         (self.agent as usize) < agents

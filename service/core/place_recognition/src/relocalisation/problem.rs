@@ -1,4 +1,4 @@
-//! A search, as points and distances.
+//! A search as points and ranges.
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
@@ -9,36 +9,36 @@ use crate::keyframes::Keyframes;
 use crate::sequences::{OPEN_DISTANCES, OPEN_RAD, ViewMemory};
 use crate::views::SimilarView;
 
-/// Error of odometry's lengths, as a share of the way: that of a modest robot.
+/// Standard deviation of odometry's lengths as a share of the way: that of a modest robot.
 const ODOMETRY_SHARE: f64 = 0.05;
 
-/// Where the agent looked, in the frame of its body at the newest look.
+/// The position of a query in the frame of the body at the newest query.
 #[derive(Clone, Debug)]
 pub(super) struct QueryPoint {
-    /// Number of the look.
+    /// Number of the query.
     pub(super) query: usize,
     pub(super) at: Point3<f64>,
-    /// Deviation of that by the way from there to the newest look \[m\].
+    /// Standard deviation of that, from odometry between the query and the newest one \[m\].
     pub(super) drift_m: f64,
-    /// How far it is from what it is like.
+    /// Ranges to similar views.
     pub(super) cues: Vec<RangeCue>,
 }
 
-/// A view of the map that a look is like.
+/// The range from a query to a remembered view, by their likeness.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RangeCue {
-    /// Where it was taken, in the map.
+    /// Position of the remembered view in the map.
     pub(super) target: Point3<f64>,
-    /// How far from the look, by their similar \[m\].
+    /// Mean range \[m\].
     pub(super) mean_m: f64,
     pub(super) sd_m: f64,
 }
 
-/// What is known of where an agent is.
+/// All that is known of the pose of an agent.
 #[derive(Clone, Debug)]
 pub(crate) struct Problem {
     pub(super) points: Vec<QueryPoint>,
-    /// Whether agent and map move in one plane.
+    /// Whether the agent and the map move in one plane.
     pub(super) is_planar: bool,
     /// Distance from which on two views are no more alike than any \[m\].
     pub(super) reach_m: f64,
@@ -75,7 +75,7 @@ impl Problem {
         })
     }
 
-    /// Information that is always there \[m⁻², rad⁻²\]: a pose lies within some reaches of where it is begun.
+    /// A weak prior \[m⁻², rad⁻²\]: a pose lies within some reaches of its seed.
     pub(crate) fn prior(&self) -> Prior {
         let shift = 1.0 / (OPEN_DISTANCES * self.reach_m).powi(2);
         let turn = 1.0 / (OPEN_RAD * OPEN_RAD);
@@ -87,7 +87,7 @@ impl Problem {
         }
     }
 
-    /// The spots as a pose of the body in the map has them.
+    /// The positions of the queries for a pose of the body in the map.
     pub(super) fn way(&self, pose: &Isometry3<f64>) -> Vec<Point3<f64>> {
         self.points.iter().map(|point| pose * point.at).collect()
     }

@@ -1,4 +1,4 @@
-//! What an agent has seen since it does not know where it is.
+//! A search: what an agent has seen since it does not know where it is.
 
 use nalgebra::Isometry3;
 
@@ -8,24 +8,26 @@ use crate::views::{SimilarView, StoredView, read_all, read_vector, write_all, wr
 use state::PagedVec;
 use state::{CorruptState, State, StateReader, StateWriter};
 
-/// Looks that are kept, and the way over which they lie: beyond some metres odometry adds errors of its own \[m\].
+/// Most queries of a search, and longest way over which they lie \[m\]: beyond some metres odometry
+/// adds errors of its own.
 const LOOKS_MAX: usize = 48;
 const WAY_M_MAX: f64 = 5.0;
-/// Numbers in them: a quarter of a MiB.
+/// Most numbers in their descriptors: a quarter of a MiB.
 const NUMBERS_MAX: usize = 1 << 16;
 
-/// What was seen at a moment, and which remembered views it is like.
+/// A query: a view of an agent that does not know where it is, with the remembered views that are
+/// similar.
 #[derive(Clone, Debug)]
 pub(crate) struct QueryView {
-    /// Where the agent was by motion alone.
+    /// Pose by motion alone.
     pub(crate) in_odom: Isometry3<f64>,
-    /// The way there since the search began \[m\].
+    /// Length of the way there since the search began \[m\].
     pub(crate) travelled_m: f64,
     /// Number of the channel.
     pub(crate) channel: u8,
-    /// A unit vector.
+    /// The descriptor, a unit vector.
     pub(crate) vector: Box<[f32]>,
-    /// The remembered views that it is like, the most alike first.
+    /// The remembered views that are similar, the most similar first.
     pub(crate) alike: Vec<SimilarView>,
 }
 
@@ -33,15 +35,16 @@ pub(crate) struct QueryView {
 #[derive(Clone, Debug)]
 pub(crate) struct Search {
     pub(crate) agent: u32,
-    /// The sample of the agent's session from which on it does not know where it is.
+    /// The sample of the session from which on the agent does not know where it is.
     pub(crate) since_seq: u64,
     pub(crate) session: u32,
-    /// Views, and times that views were thinned, up to which the looks have been compared with them.
+    /// Number of views and of thinnings up to which the queries have been compared.
     pub(crate) compared: u64,
     pub(crate) thinnings: u64,
-    /// The way after which it was found \[m\]; it goes on until the heading is sure, too.
+    /// Length of the way after which the agent was found \[m\]. The search goes on until its
+    /// heading is certain.
     pub(crate) found_m: Option<f64>,
-    /// Looks since the poses were sought.
+    /// Queries since the last attempt.
     pub(crate) fresh: u32,
     pub(crate) queries: Vec<QueryView>,
 }
@@ -63,7 +66,8 @@ impl Search {
         }
     }
 
-    /// Adds a look. When there is no room the oldest goes, or of a short way the one that lies nearest to its neighbours.
+    /// Adds a query. When there is no room, the oldest is dropped if the way is long, else the one
+    /// nearest to its neighbours.
     pub(crate) fn push(
         &mut self,
         in_odom: Isometry3<f64>,
@@ -88,7 +92,7 @@ impl Search {
         self.fresh += 1;
     }
 
-    /// The look that says least beside the others.
+    /// The number of the query with the least information beside the others.
     fn dispensable(&self) -> usize {
         let way_m = |from: &QueryView, to: &QueryView| to.travelled_m - from.travelled_m;
         if let [first, .., last] = &self.queries[..]
@@ -101,20 +105,21 @@ impl Search {
         least.map_or(0, |(before, _)| before + 1)
     }
 
-    /// Whether the agent has gone so far since it was found, whether it knew again where it was or not \[m\].
+    /// Whether the agent has gone so far \[m\] since it was found.
     pub(crate) fn is_over(&self, on_m: f64) -> bool {
         let way_m = self.queries.last().map(|query| query.travelled_m);
         let since = way_m.zip(self.found_m);
         since.is_some_and(|(way_m, found_m)| way_m - found_m >= on_m)
     }
 
-    /// Its looks have been compared with nothing that is remembered now, and poses are to be sought with the next one.
+    /// Makes the next query start an attempt. The queries have been compared with nothing that is
+    /// remembered now.
     pub(crate) fn await_comparison(&mut self, memory: &ViewMemory) {
         (self.compared, self.thinnings) = (0, memory.thinnings);
         self.fresh = u32::try_from(self.queries.len()).unwrap_or(u32::MAX);
     }
 
-    /// Compares the looks with what others have seen since they were made.
+    /// Compares the queries with what has been remembered since they were made.
     pub(crate) fn catch_up(&mut self, memory: &ViewMemory) {
         let views = memory.stored.len() as u64;
         let from = if self.thinnings == memory.thinnings {
@@ -148,12 +153,12 @@ impl Search {
         }
     }
 
-    /// Whether the agent itself saw that, since it does not know where it is.
+    /// Whether the agent itself took a view during the search.
     pub(crate) fn is_own(&self, view: &StoredView) -> bool {
         view.is_since(self.since())
     }
 
-    /// Whether it may have come from a checkpoint that this program wrote.
+    /// Whether the state is one that this program may have written to a checkpoint.
     pub(crate) fn is_sound(&self, agents: usize, is_channel: impl Fn(u8, usize) -> bool) -> bool {
         (self.agent as usize) < agents
             && self.queries.len() <= LOOKS_MAX

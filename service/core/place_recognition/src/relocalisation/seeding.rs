@@ -1,4 +1,4 @@
-//! Poses that are begun where several looks point to.
+//! Pose seeding: poses where the ranges of several queries meet.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -12,32 +12,32 @@ use crate::sequences::{Range, equations};
 use crate::twist::moved;
 use geometry::align;
 
-/// Places that one look may point to.
+/// Most nodes of a query.
 const NODES_PER_SPOT_MAX: usize = 4;
-/// Places from which poses are begun.
+/// Most nodes from which poses are seeded.
 const SEEDS_MAX: usize = 16;
-/// Looks that must point to places as far from one another as the looks are.
+/// Fewest queries whose nodes must be as far from one another as the queries are.
 const SPOTS_MIN: usize = 4;
 /// Deviations between two distances up to which they agree.
 const AGREE: f64 = 2.5;
-/// Rounds of weighing places anew.
+/// Rounds of reweighting.
 const ROUNDS: usize = 5;
-/// Turns about the way that are tried: a straight way does not say.
+/// Turns about the way that are tried: a straight way leaves the turn about it open.
 const TURNS: u32 = 6;
-/// Steps of a decomposition, which needs some ten.
+/// Most steps of an eigendecomposition, which needs some ten.
 const EIGEN_STEPS_MAX: usize = 200;
-/// Steps from a start, and to the end.
+/// Steps of a first descent, and of a final one.
 const STEPS: (usize, usize) = (6, 20);
-/// Poses that go on to the end.
+/// Most poses of the final descent.
 const POSES_MAX: usize = 12;
-/// Poses closer than this are one, in reaches and \[rad\].
+/// Poses closer than this are the same, in reaches of the channel and \[rad\].
 const SAME: (f64, f64) = (0.15, 0.25);
-/// A distance counts that is off by no more than this, in reaches.
+/// Gate: largest residual of a range that counts, in reaches.
 const GATE: f64 = 1.0;
-/// Distances per look that count.
+/// Most ranges of a query that count.
 const CUES_PER_SPOT: usize = 8;
 
-/// A place that a look points to.
+/// A cluster of remembered views that are similar to one query.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     point: usize,
@@ -45,15 +45,15 @@ struct Node {
     variance: f64,
 }
 
-/// A pose that explains distances.
+/// A minimum of the cost of the ranges.
 #[derive(Clone, Copy, Debug)]
 struct Minimum {
-    /// Of the body in the map.
+    /// Pose of the body in the map.
     pose: Isometry3<f64>,
     cost: f64,
 }
 
-/// The poses that several looks point to, in no particular order.
+/// Poses that the ranges of several queries agree on, in no particular order.
 pub(super) fn minima(problem: &Problem) -> Vec<Isometry3<f64>> {
     let nodes = nodes(problem);
     let mut starts: Vec<Isometry3<f64>> = Vec::new();
@@ -84,13 +84,13 @@ pub(super) fn minima(problem: &Problem) -> Vec<Isometry3<f64>> {
     minima.into_iter().map(|minimum| minimum.pose).collect()
 }
 
-/// The places that the looks point to: views near one another are one place.
+/// The nodes of all queries: similar views near one another form one.
 fn nodes(problem: &Problem) -> Vec<Node> {
     let mut nodes = Vec::new();
     for (point, each) in problem.points.iter().enumerate() {
         let mut left: Vec<&RangeCue> = each.cues.iter().collect();
         for _ in 0..NODES_PER_SPOT_MAX {
-            // The most alike come first.
+            // The most similar come first.
             let Some(seed) = left.first().map(|cue| cue.target) else {
                 break;
             };
@@ -107,7 +107,7 @@ fn nodes(problem: &Problem) -> Vec<Node> {
             nodes.push(Node {
                 point,
                 at: (at / weights).into(),
-                // Of a mean of points that lie about it at these distances, along each axis.
+                // Variance along an axis of the mean of points at these distances.
                 variance: variance / weights / 3.0,
             });
             left = others;
@@ -116,7 +116,7 @@ fn nodes(problem: &Problem) -> Vec<Node> {
     nodes
 }
 
-/// Nodes to begin from: the surest ones, of different looks or places.
+/// Nodes to seed from: the most certain ones, of different queries or places.
 fn seeds(nodes: &[Node], problem: &Problem) -> Vec<Node> {
     let mut sorted: Vec<Node> = nodes.to_vec();
     sorted.sort_by(|a, b| a.variance.total_cmp(&b.variance));
@@ -137,7 +137,8 @@ fn seeds(nodes: &[Node], problem: &Problem) -> Vec<Node> {
     seeds
 }
 
-/// A pose that lays the looks over places as far from a node as the looks are from its look.
+/// The pose that puts the queries onto nodes which are as far from a node as the queries are from
+/// its query.
 fn begin(problem: &Problem, nodes: &[Node], seed: &Node) -> Option<Isometry3<f64>> {
     let origin = &problem.points[seed.point];
     let mut best: Vec<Option<(f64, Node)>> = vec![None; problem.points.len()];
@@ -174,7 +175,7 @@ fn begin(problem: &Problem, nodes: &[Node], seed: &Node) -> Option<Isometry3<f64
     Some(pose)
 }
 
-/// A pose, turned about the way where the way may leave that open.
+/// A pose, turned about the way if the way may leave that turn open.
 pub(super) fn turns(problem: &Problem, pose: &Isometry3<f64>) -> Vec<Isometry3<f64>> {
     if problem.is_planar {
         return vec![*pose];
@@ -204,9 +205,9 @@ pub(super) fn turns(problem: &Problem, pose: &Isometry3<f64>) -> Vec<Isometry3<f
     (0..TURNS).map(turn).collect()
 }
 
-/// Goes down to the next minimum (Levenberg–Marquardt) of the distances that may be meant there.
+/// Descends to the next minimum of the ranges within the gate (Levenberg–Marquardt).
 fn descend(problem: &Problem, start: &Isometry3<f64>, steps: usize) -> Option<Minimum> {
-    // Far from the map's origin a turn about it is a shift as well: the start is the origin.
+    // The start is the origin: far from the map's origin a turn about it would be a shift as well.
     let origin = start.translation;
     let ranges = ranges(problem, start);
     if ranges.len() < SPOTS_MIN {
@@ -217,13 +218,13 @@ fn descend(problem: &Problem, start: &Isometry3<f64>, steps: usize) -> Option<Mi
             geometry::hold_in_plane(gradient, hessian, |_| 1.0);
         }
     };
-    // Distances are from the map's points: a point of the map is at rest, the body moves.
+    // Ranges are from points of the map, which are at rest while the body moves.
     let mut inverse = Isometry3::from_parts(Translation3::identity(), start.rotation.inverse());
     let mut here = equations(&ranges, &inverse);
     let mut damping = 1e-3;
     for _ in 0..steps {
         let (mut gradient, mut hessian) = (here.gradient, here.hessian);
-        // Along the body's axes: T⁻¹ exp(ξ) moves the map; out of the plane nothing moves.
+        // Perturbation along the axes of the body: T⁻¹ exp(ξ). Out of the plane nothing moves.
         free(&mut gradient, &mut hessian);
         for k in 0..6 {
             hessian[(k, k)] = hessian[(k, k)] * (1.0 + damping) + 1e-9;
@@ -248,12 +249,12 @@ fn descend(problem: &Problem, start: &Isometry3<f64>, steps: usize) -> Option<Mi
     let is_sound = pose.translation.vector.iter().all(|x| x.is_finite());
     is_sound.then_some(Minimum {
         pose,
-        // Of two poses the one that explains more distances comes first.
+        // Of two poses the one that explains more ranges costs less.
         cost: here.cost - ranges.len() as f64,
     })
 }
 
-/// The distances that may be meant where a pose has the looks.
+/// The ranges within the gate at a pose.
 fn ranges(problem: &Problem, pose: &Isometry3<f64>) -> Vec<Range> {
     let gate_m = GATE * problem.reach_m;
     let mut ranges = Vec::new();
@@ -273,7 +274,7 @@ fn ranges(problem: &Problem, pose: &Isometry3<f64>) -> Vec<Range> {
     ranges
 }
 
-/// Takes a pose in, unless there is one like it; then the better one stays.
+/// Keeps a minimum, or the better of two that are the same.
 fn keep(problem: &Problem, known: &mut Vec<Minimum>, found: &Minimum) {
     let same = known
         .iter_mut()

@@ -1,4 +1,4 @@
-//! What agents saw, and where they see it again.
+//! The memory of views, and the sequence matches among them.
 
 use nalgebra::Isometry3;
 
@@ -11,38 +11,40 @@ use crate::views::{ChannelModel, Distance, Kernel, SimilarView, StoredView, read
 use state::PagedVec;
 use state::{CorruptState, State, StateReader, StateWriter};
 
-/// Channels whose views are remembered.
+/// Most channels.
 const CHANNELS_MAX: usize = 64;
-/// Views that are remembered.
+/// Most views.
 const VIEWS_MAX: usize = 16_384;
-/// Numbers in them, all of which a view that is news is compared with: 8 MiB.
+/// Most numbers in their descriptors, all of which a new view is compared with: 8 MiB.
 const NUMBERS_MAX: usize = 1 << 21;
-/// Motion between two views that are compared \[m, rad\].
+/// Least motion between two views that are compared \[m, rad\].
 const MOVED: (f64, f64) = (0.05, 0.1);
-/// Motion after which a view may be news \[m, rad\]: an anchor's.
+/// Least motion after which a view may be new \[m, rad\]: that between keyframes.
 const STEP: (f64, f64) = (0.1, 0.1);
-/// A view that is like none of those so near, in reaches, shows something that is not there: somebody who passes by.
+/// A view that is similar to none of those nearer than this, in reaches, is an outlier: somebody
+/// passes by.
 const BESIDE: f64 = 0.6;
-/// Of an agent's own views those count as earlier that lie so many before the present one.
+/// Ordinals by which an agent's own views must be earlier to count as revisited.
 const EARLIER: u32 = 16;
-/// Two views are of one place if they are nearer than so many deviations of where they were seen.
+/// Two views may be of one place if they are nearer than so many standard deviations of their
+/// positions.
 const APART_SD: f64 = 3.0;
-/// Ordinals left out where an agent was put somewhere else.
+/// Ordinals skipped where an agent was put somewhere else.
 const APART: u32 = 64;
-/// Views that a new one is taken to be like at most, the most alike first.
+/// Most similar views of a view, the most similar first.
 pub(crate) const SIMILAR_MAX: usize = 32;
-/// Passages of an agent under way.
+/// Most incomplete sequence matches of an agent on a channel.
 const MATCHES_MAX: usize = 4;
 
-/// What agents saw lately and long ago.
+/// The remembered views of all agents.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ViewMemory {
     channels: Vec<ChannelModel>,
     pub(crate) tracks: PagedVec<ViewTrack, 1>,
     pub(crate) stored: PagedVec<StoredView, 16>,
-    /// Numbers in all views.
+    /// Numbers in all descriptors.
     numbers: u64,
-    /// Times that every second view was forgotten.
+    /// Times that views were renumbered.
     pub(crate) thinnings: u64,
 }
 
@@ -104,7 +106,7 @@ impl ViewMemory {
         over
     }
 
-    /// An agent has been put somewhere else: what it sees from now on is not beside what it saw.
+    /// An agent was put somewhere else: what it sees from now on is not beside what it saw.
     pub(crate) fn cut(&mut self, agent: u32, revision: u64) {
         for number in 0..self.tracks.len() {
             if self
@@ -122,7 +124,8 @@ impl ViewMemory {
         }
     }
 
-    /// The earlier views that one is like, by number, with their distances; and whether one of them is as good as the same.
+    /// The similar earlier views, by number, with their distances; and whether one of them makes
+    /// the view redundant.
     fn alike(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
         let model = &mut self.channels[usize::from(view.channel)];
         let mut alike = Vec::new();
@@ -137,7 +140,7 @@ impl ViewMemory {
             let angle_rad = angle_rad(&other.vector, &view.vector);
             model.learn_unrelated(angle_rad);
             if let Some(distance) = model.distance(angle_rad) {
-                // What looks the same somewhere else is not known here.
+                // A similar view somewhere else does not make it redundant.
                 let apart_m = (other.in_map - view.in_map).norm();
                 let unsure_m = APART_SD * other.spread[0].hypot(view.spread[0]);
                 is_known |= angle_rad < model.news_rad() && apart_m <= distance.mean_m + unsure_m;
@@ -152,7 +155,8 @@ impl ViewMemory {
         (alike, is_known)
     }
 
-    /// Takes a view and those that it is like into the passages under way; answers those that are over.
+    /// Adds a view and its similar views to the sequence matches of a track; answers those that are
+    /// complete.
     fn extend_matches(
         &mut self,
         track: usize,
@@ -224,7 +228,7 @@ impl ViewMemory {
             if !view.ordinal.is_multiple_of(2) {
                 continue;
             }
-            // So that neighbours are still told by their ordinals.
+            // Neighbours still have consecutive ordinals.
             view.ordinal /= 2;
             self.numbers += view.vector.len() as u64;
             if let Some(slot) = self.stored.get_mut(kept, revision) {
@@ -249,7 +253,7 @@ impl ViewMemory {
         let Some(first) = self.stored.iter().position(is_gone) else {
             return;
         };
-        // Others are at other numbers from now on.
+        // Later views change their numbers.
         self.thinnings += 1;
         let mut kept = first;
         for number in first..self.stored.len() {
@@ -332,7 +336,7 @@ impl ViewMemory {
         Ok(())
     }
 
-    /// The remembered views from a number on that something seen on a channel is like, the most alike first.
+    /// The similar views from a number on, the most similar first.
     pub(crate) fn likes(
         &self,
         channel: u8,
@@ -355,22 +359,22 @@ impl ViewMemory {
         likes
     }
 
-    /// Whether two views of a channel are more alike than unrelated ones.
+    /// Whether two views of a channel are more similar than unrelated ones.
     pub(crate) fn is_alike(&self, channel: u8, one: &[f32], other: &[f32]) -> bool {
         self.distance(channel, angle_rad(one, other)).is_some()
     }
 
-    /// How far apart two views of a channel were taken, if they are alike.
+    /// The distance between two views of a channel, if they are similar.
     pub(crate) fn distance(&self, channel: u8, angle_rad: f64) -> Option<Distance> {
         self.channels.get(usize::from(channel))?.distance(angle_rad)
     }
 
-    /// How the likeness of views of a channel falls with distance, if that is known.
+    /// The kernel of a channel, once it is known.
     pub(crate) fn kernel(&self, channel: u8) -> Option<Kernel> {
         self.channels.get(usize::from(channel))?.kernel()
     }
 
-    /// Distance from which on two views of a channel are no more alike than any \[m\].
+    /// Reach of a channel \[m\], once it is known.
     pub(crate) fn reach_m(&self, channel: u8) -> Option<f64> {
         self.channels.get(usize::from(channel))?.reach_m()
     }

@@ -1,37 +1,39 @@
-//! The relative pose of two stretches, from the distances between them.
+//! The relative pose of two stretches, from ranges between their views.
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
 use super::sequence_match::SequenceMatch;
 use crate::twist::{moved, twist};
 
-/// Part of the pairs that count as independent: neighbouring views resemble their neighbours for the same reasons.
+/// Share of the pairs that count as independent: neighbouring views are similar for the same
+/// reasons.
 const INDEPENDENT: f64 = 0.5;
-/// Deviations beyond which a distance pulls with the same force however far off it is (Huber).
+/// Residual beyond which the cost grows linearly (Huber), in standard deviations.
 const BOUNDED: f64 = 2.0;
-/// Mean squared deviation of the distances up to which they agree with one another.
+/// Largest mean squared residual of ranges that agree.
 const AGREE: f64 = 4.0;
-/// Squared deviation from where the map has it up to which a revisit is believed: one in 10⁵ is farther off in six directions.
+/// Largest squared Mahalanobis distance of a revisit from the expected pose: 1 in 10⁵ exceeds it
+/// (χ², 6 degrees of freedom).
 pub(crate) const NEAR: f64 = 33.0;
-/// Solutions count that cost by so much more than the best one.
+/// Solutions count that cost by no more than this above the best one.
 const RIVAL: f64 = 12.0;
-/// Solutions closer than this share of the distances are one.
+/// Solutions closer than this share of the mean range are one.
 const SAME: f64 = 0.2;
-/// Steps of a solution at most.
+/// Most steps of a descent.
 const STEPS_MAX: usize = 25;
-/// Deviation of a turn that the distances leave open \[rad\].
+/// Standard deviation of an unknown rotation \[rad\].
 pub(crate) const OPEN_RAD: f64 = 3.0;
-/// The same of a shift, in mean distances.
+/// Standard deviation of an unknown shift, in mean ranges.
 pub(crate) const OPEN_DISTANCES: f64 = 10.0;
 
-/// What is expected before the distances are looked at.
+/// The expected pose.
 struct Prior {
     pose: Isometry3<f64>,
     /// Inverse variances \[m⁻², rad⁻²\].
     information: Vector6<f64>,
 }
 
-/// A distance between a point of the present stretch and one of the earlier stretch.
+/// A range between a point of the present stretch and one of the earlier stretch.
 pub(crate) struct Range {
     pub(crate) now: Vector3<f64>,
     pub(crate) then: Point3<f64>,
@@ -43,20 +45,20 @@ pub(crate) struct Range {
 struct Solution {
     pose: Isometry3<f64>,
     cost: f64,
-    /// Of the distances alone.
+    /// Cost of the ranges alone.
     ranges_cost: f64,
 }
 
-/// The normal equations of the distances at a pose.
+/// Normal equations of the ranges at a pose.
 pub(crate) struct Equations {
     pub(crate) hessian: Matrix6<f64>,
     pub(crate) gradient: Vector6<f64>,
     pub(crate) cost: f64,
 }
 
-/// The poses of the earlier reference in the frame of the present one that explain the distances of a passage about as well as the
-/// best one, which comes first. `expected` is where the map has it, with its deviations \[m, rad\]. None if the distances contradict
-/// one another or the map.
+/// The poses of the earlier frame in the present one that explain the ranges of a sequence match
+/// about as well as the best one, which comes first. `expected` is the pose by the map, with its
+/// standard deviations \[m, rad\]. Empty if the ranges contradict one another or the map.
 pub(crate) fn align_roughly(
     matched: &SequenceMatch,
     expected: &Isometry3<f64>,
@@ -99,7 +101,7 @@ pub(crate) fn align_roughly(
     rivals.map(|solution| solution.pose).collect()
 }
 
-/// The minima that are found from where the map has the earlier stretch, and from all its sides.
+/// Minima of the descents from the expected pose, and from its six sides.
 fn solutions(ranges: &[Range], prior: &Prior, mean_m: f64) -> Vec<Solution> {
     let count = ranges.len() as f64;
     let now = ranges.iter().map(|range| range.now).sum::<Vector3<f64>>() / count;
@@ -128,7 +130,7 @@ fn solutions(ranges: &[Range], prior: &Prior, mean_m: f64) -> Vec<Solution> {
     solutions
 }
 
-/// Goes down to the next minimum (Levenberg–Marquardt).
+/// Descends to the next minimum (Levenberg–Marquardt).
 fn descend(ranges: &[Range], prior: &Prior, start: &Isometry3<f64>) -> Solution {
     let mut pose = *start;
     let mut damping = 1e-3;
@@ -172,7 +174,8 @@ impl Prior {
     }
 }
 
-/// Σ of the squared deviations of |now − T then| from the distances, bounded, and its derivatives by ξ of T exp(ξ).
+/// Σ of the squared deviations of |now − T then| from the distances, bounded, and its derivatives
+/// by ξ of T exp(ξ).
 ///
 /// ```text
 /// e = now − T then    v = Rᵀ e / |e|    ∂|e|/∂(ρ, φ) = (−v, −then × v)
@@ -185,7 +188,7 @@ pub(crate) fn equations(ranges: &[Range], pose: &Isometry3<f64>) -> Equations {
     };
     for range in ranges {
         let error = range.now - (pose * range.then).coords;
-        // Where the points meet the distance has no direction.
+        // The direction is regularised where the points meet.
         let length = (error.norm_squared() + 0.25 * range.sd_m * range.sd_m).sqrt();
         let along = pose.rotation.inverse() * error / length;
         let lever = range.then.coords.cross(&along);
@@ -231,7 +234,8 @@ mod tests {
         }
     }
 
-    /// Two stretches of seven views each. Motion has the earlier one where `apart` takes it from where it is.
+    /// Two stretches of seven views each. Motion has the earlier one where `apart` takes it from
+    /// where it is.
     fn matched(
         now: impl Fn(f64) -> Vector3<f64>,
         then: impl Fn(f64) -> Vector3<f64>,

@@ -1,4 +1,4 @@
-//! A stretch of an agent's way along which it saw what was seen on an earlier stretch.
+//! A sequence match: pairs of similar views of two stretches of way.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -6,25 +6,26 @@ use crate::keyframes::SampleKey;
 use crate::views::{Distance, RecentView, StoredView, read_all, write_all};
 use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
-/// Ordinals between the views of a stretch at most.
+/// Largest difference of ordinals between views of a stretch.
 const GAP_MAX: u32 = 4;
-/// Views of the present stretch that are like none of the earlier one, after which the passage is over.
+/// Consecutive views of the present stretch without a pair that complete a match.
 const MISSES_MAX: u32 = 2;
-/// Views of the present stretch after which another passage begins: beyond, odometry adds errors of its own.
+/// Most views of the present stretch in a match: beyond, odometry adds errors of its own.
 const VIEWS_MAX: usize = 8;
-/// Different views of each stretch that have to agree. By chance one view in tens of thousands is as like another one.
+/// Fewest different views of each stretch. By chance one view in tens of thousands is as similar to
+/// another one.
 const VIEWS_MIN: usize = 2;
-/// Pairs of views that have to agree.
+/// Fewest pairs of a match that counts.
 const PAIRS_MIN: usize = 5;
-/// Pairs that are kept.
+/// Most pairs.
 const PAIRS_MAX: usize = 96;
 
-/// A view of the present stretch and one of the earlier stretch, and how far apart they are by their likeness.
+/// A view of the present stretch and a similar one of the earlier stretch, with their distance.
 #[derive(Clone, Debug)]
 pub(super) struct ViewPair {
     now_ordinal: u32,
     then_ordinal: u32,
-    /// Where the agents were by motion alone \[m\].
+    /// Positions by motion alone \[m\].
     pub(super) now: Point3<f64>,
     pub(super) then: Point3<f64>,
     pub(super) mean_m: f64,
@@ -40,13 +41,13 @@ state_of_struct!(ViewPair {
     sd_m
 });
 
-/// A moment in whose frame a stretch is described.
+/// The sample in whose frame a stretch is described.
 #[derive(Clone, Debug)]
 pub(crate) struct SequenceFrame {
     pub(crate) sample: SampleKey,
-    /// Where the agent was by motion alone.
+    /// Pose by motion alone.
     pub(crate) in_odom: Isometry3<f64>,
-    /// How sure it was then \[m, rad\].
+    /// Uncertainty then \[m, rad\].
     pub(crate) spread: [f64; 2],
 }
 
@@ -56,19 +57,19 @@ state_of_struct!(SequenceFrame {
     spread
 });
 
-/// Pairs of views of two stretches.
+/// Pairs of similar views of a present and an earlier stretch.
 #[derive(Clone, Debug)]
 pub(crate) struct SequenceMatch {
     pub(crate) now: SequenceFrame,
     pub(crate) then: SequenceFrame,
-    /// The ordinals of the earlier stretch.
+    /// Lowest and highest ordinal of the earlier stretch.
     low: u32,
     high: u32,
     /// Views since the latest pair.
     misses: u32,
     channel: u8,
     pub(super) pairs: Vec<ViewPair>,
-    /// What was seen along the present stretch, once the passage is over; nothing before.
+    /// Views of the present stretch, once the match is complete.
     pub(crate) queries: Vec<RecentView>,
 }
 
@@ -83,7 +84,7 @@ impl SequenceFrame {
 }
 
 impl SequenceMatch {
-    /// A passage that begins with a pair.
+    /// A match with its first pair.
     pub(super) fn new(now: &StoredView, then: &StoredView, distance: Distance) -> Self {
         let mut matched = Self {
             now: SequenceFrame::of(now),
@@ -99,7 +100,7 @@ impl SequenceMatch {
         matched
     }
 
-    /// Whether an earlier view belongs to the earlier stretch, or goes on with it.
+    /// Whether an earlier view belongs to the earlier stretch, or continues it.
     pub(super) fn leads_to(&self, then: &StoredView) -> bool {
         self.then.sample.agent == then.sample.agent
             && self.then.sample.session == then.sample.session
@@ -125,7 +126,7 @@ impl SequenceMatch {
         }
     }
 
-    /// A view of the present stretch is like none of the earlier one.
+    /// Counts a view of the present stretch without a pair.
     pub(super) fn miss(&mut self) {
         self.misses += 1;
     }
@@ -140,12 +141,12 @@ impl SequenceMatch {
         self.pairs.first().map_or(0, |pair| pair.now_ordinal)
     }
 
-    /// Whether an earlier view was seen on the earlier stretch, or beside it.
+    /// Whether a view was taken on the earlier stretch, or beside it.
     pub(crate) fn is_beside(&self, then: &StoredView) -> bool {
         then.channel == self.channel && self.leads_to(then)
     }
 
-    /// Whether it is over.
+    /// Whether it is complete.
     pub(super) fn is_over(&self) -> bool {
         self.misses >= MISSES_MAX || self.count(|pair| pair.now_ordinal) >= VIEWS_MAX
     }

@@ -1,4 +1,4 @@
-//! What an agent saw lately.
+//! The latest new views, the newest last.
 
 use nalgebra::Isometry3;
 
@@ -6,7 +6,7 @@ use super::sequence_match::SequenceMatch;
 use crate::views::{RecentView, read_all, write_all};
 use state::{CorruptState, State, StateReader, StateWriter};
 
-/// Views that a new one is compared with to learn how far the channel reaches.
+/// Latest views with which a new one is compared to learn the statistics of its channel.
 pub(super) const RECENT_MAX: usize = 12;
 
 /// An agent's latest views of a channel.
@@ -17,11 +17,11 @@ pub(crate) struct ViewTrack {
     pub(super) session: u32,
     /// The ordinal of the next view.
     pub(super) next: u32,
-    /// Where the agent last saw something, by motion alone.
+    /// Pose by motion alone at the latest view.
     pub(super) last: Option<Isometry3<f64>>,
     /// The latest views that were news, the newest last.
     pub(super) recent: Vec<RecentView>,
-    /// The passages under way.
+    /// Sequence matches that are not complete.
     pub(super) matches: Vec<SequenceMatch>,
 }
 
@@ -38,7 +38,7 @@ impl ViewTrack {
         }
     }
 
-    /// A view that was news.
+    /// Adds a new view.
     pub(super) fn note(&mut self, in_odom: &Isometry3<f64>, vector: &[f32]) {
         if self.recent.len() >= RECENT_MAX {
             self.recent.remove(0);

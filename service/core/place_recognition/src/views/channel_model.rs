@@ -1,4 +1,4 @@
-//! How far apart two views are, by how much they are alike.
+//! What the likeness of two views says of the distance between them.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -6,53 +6,54 @@ use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_str
 
 /// Classes of angles between two views, from 0 to a right angle.
 const CLASSES: usize = 32;
-/// Pairs of views that a class needs to say something.
+/// Fewest pairs of views for a class to be used.
 const PAIRS_MIN: u64 = 8;
-/// Pairs over which a class takes its mean, about.
+/// Pairs over which the mean of a class fades.
 const PAIRS: f64 = 1000.0;
-/// The same of unrelated views.
+/// Pairs over which the mean of unrelated views fades.
 const UNRELATED: f64 = 4096.0;
-/// Unrelated pairs before chance is known.
+/// Fewest unrelated pairs before views are compared with chance.
 const UNRELATED_MIN: u64 = 64;
-/// Views are alike when their angle is so many deviations smaller than that of unrelated ones.
+/// Views are similar when their angle is so many standard deviations below that of unrelated ones.
 const ALIKE: f64 = 4.0;
-/// An unrelated pair whose angle is so many deviations too small is taken for a related one.
+/// A pair whose angle is so many standard deviations below the mean is not counted as unrelated.
 const RELATED: f64 = 3.0;
-/// Least deviation of a distance, as a share of it.
+/// Least standard deviation of a distance, as a share of it.
 const SHARE_MIN: f64 = 0.1;
-/// … and at all \[m\]: motion over a few metres is no surer.
+/// Least standard deviation of a distance \[m\]: odometry over a few metres is no better.
 const SD_M_MIN: f64 = 0.02;
-/// Share of the angle between unrelated views from which on one is worth remembering beside another.
+/// Share of the mean angle between unrelated views beyond which a view is new beside another.
 const NEWS: f64 = 0.25;
 
-/// Least cosine that says how it falls with the distance: views farther apart may be as alike by chance.
+/// Least cosine of a class from which the kernel is fitted: views farther apart may be as alike by
+/// chance.
 const KERNEL_LIKENESS_MIN: f64 = 0.5;
-/// Cosine of two views of one place at most: views have some noise.
+/// Largest cosine of two views of one place: views are noisy.
 const LIKENESS_MAX: f64 = 0.999;
 
-/// How the cosine of two views of a channel falls with the distance between them: c exp(−d² / 2ℓ²).
+/// Kernel of a channel: the expected cosine of two views at a distance d is c exp(−d² / 2ℓ²).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Kernel {
-    /// c: of two views from one place.
+    /// c: cosine of two views of one place.
     pub(crate) likeness: f64,
-    /// ℓ \[m\].
+    /// ℓ: length scale \[m\].
     pub(crate) length_m: f64,
-    /// Independent numbers of a view: unrelated ones have cosines of deviation 1/√n.
+    /// Effective dimension n: the cosines of unrelated views have standard deviation 1/√n.
     pub(crate) numbers: f64,
 }
 
-/// What the likeness of two views of a channel says of the distance between them.
+/// The statistics of a channel: distance by angle, and the angle of unrelated views.
 #[derive(Clone, Debug)]
 pub(crate) struct ChannelModel {
     pub(crate) name: Box<str>,
     pub(crate) dimension: u16,
-    /// The distances of the pairs of each class \[m\].
+    /// Distances of the pairs of each class \[m\].
     distances_m: Vec<Moments>,
-    /// The angles between views far from one another along the way \[rad\].
+    /// Angles between unrelated views \[rad\].
     unrelated: Moments,
 }
 
-/// A distance with its deviation \[m\].
+/// A distance with its standard deviation \[m\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Distance {
     pub(crate) mean_m: f64,
@@ -60,7 +61,7 @@ pub(crate) struct Distance {
 }
 
 impl ChannelModel {
-    /// Of a channel of which nothing is known.
+    /// A channel without statistics.
     pub(crate) fn new(name: Box<str>, dimension: u16) -> Self {
         Self {
             name,
@@ -70,7 +71,7 @@ impl ChannelModel {
         }
     }
 
-    /// Two views were taken so far apart, as motion has it.
+    /// Learns from two views whose distance is known from motion.
     pub(crate) fn learn(&mut self, angle_rad: f64, distance_m: f64) {
         if let Some(class) = self.distances_m.get_mut(class_of(angle_rad)) {
             class.fade(1.0 - 1.0 / PAIRS);
@@ -78,7 +79,7 @@ impl ChannelModel {
         }
     }
 
-    /// Two views that are far from one another along the way.
+    /// Learns from two views that are far from one another along the way.
     pub(crate) fn learn_unrelated(&mut self, angle_rad: f64) {
         let unrelated = &mut self.unrelated;
         let is_known = unrelated.count() >= UNRELATED_MIN;
@@ -89,7 +90,7 @@ impl ChannelModel {
         unrelated.add(angle_rad, 1.0);
     }
 
-    /// Angle from which on two views are too unlike for one of them to stand for the other \[rad\].
+    /// Angle beyond which a view is new beside another \[rad\].
     pub(crate) fn news_rad(&self) -> f64 {
         if self.unrelated.count() >= UNRELATED_MIN {
             NEWS * self.unrelated.mean()
@@ -98,7 +99,7 @@ impl ChannelModel {
         }
     }
 
-    /// How the likeness of two views falls with the distance between them; nothing before that is known.
+    /// The kernel, once the statistics determine it.
     pub(crate) fn kernel(&self) -> Option<Kernel> {
         let sd = self.unrelated.sd();
         if self.unrelated.count() < UNRELATED_MIN || sd <= 0.0 {
@@ -131,7 +132,8 @@ impl ChannelModel {
         })
     }
 
-    /// Distance from which on two views are no more alike than unrelated ones may be \[m\]; nothing before that is known.
+    /// Reach: distance beyond which views are no more similar than unrelated ones \[m\], once that
+    /// is known.
     pub(crate) fn reach_m(&self) -> Option<f64> {
         let unrelated = &self.unrelated;
         if unrelated.count() < UNRELATED_MIN {
@@ -149,7 +151,7 @@ impl ChannelModel {
             .filter(|reach_m| *reach_m > 0.0)
     }
 
-    /// How far apart two views were taken; nothing where they are no more alike than unrelated ones may be.
+    /// The distance between two views; `None` if they are no more similar than unrelated ones.
     pub(crate) fn distance(&self, angle_rad: f64) -> Option<Distance> {
         let unrelated = &self.unrelated;
         let is_known = unrelated.count() >= UNRELATED_MIN;
@@ -162,13 +164,13 @@ impl ChannelModel {
         };
         let class = class_of(angle_rad);
         let Some(own) = known(class) else {
-            // Nearer than any that were compared: the distance falls evenly to nothing.
+            // Nearer than all pairs so far: the distance is interpolated down to zero.
             let (nearest, (mean_m, sd_m)) =
                 (class..CLASSES).find_map(|at| Some((at, known(at)?)))?;
             let share = angle_rad / ((nearest as f64 + 0.5) * WIDTH_RAD);
             return Some(Distance::new(share * mean_m, sd_m));
         };
-        // Between the middles of two classes the distance changes evenly.
+        // Linear interpolation between the centres of two classes.
         let within = angle_rad / WIDTH_RAD - class as f64 - 0.5;
         let other = if within < 0.0 {
             class.checked_sub(1).and_then(known)
@@ -200,7 +202,7 @@ impl Distance {
 /// Width of a class \[rad\].
 const WIDTH_RAD: f64 = FRAC_PI_2 / CLASSES as f64;
 
-/// The class of an angle; beyond the last one for an obtuse one.
+/// The class of an angle; obtuse angles lie beyond the last one.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

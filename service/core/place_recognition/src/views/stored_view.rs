@@ -1,4 +1,4 @@
-//! A view that is remembered.
+//! A remembered view.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -6,26 +6,27 @@ use super::channel_model::Distance;
 use crate::keyframes::SampleKey;
 use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
-/// What was seen at a moment of an agent's way.
+/// A view as it is remembered.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredView {
     /// Number of the channel.
     pub(crate) channel: u8,
     pub(crate) sample: SampleKey,
-    /// Its place among the agent's views of the channel.
+    /// Its number among the agent's views of the channel.
     pub(crate) ordinal: u32,
-    /// Where the agent was by motion alone, since its session began.
+    /// Pose by motion alone since the session began.
     pub(crate) in_odom: Isometry3<f64>,
-    /// Where the agent was thought to be in the map.
+    /// Position in the map when it was stored.
     pub(crate) in_map: Point3<f64>,
-    /// How sure it was of its place and heading then: roots of the traces of their covariances \[m, rad\].
+    /// Uncertainty then: roots of the traces of the covariances of position and rotation \[m,
+    /// rad\].
     pub(crate) spread: [f64; 2],
-    /// What it saw, a unit vector.
+    /// The descriptor, a unit vector.
     pub(crate) vector: Box<[f32]>,
 }
 
 impl StoredView {
-    /// Whether an agent saw it in a session, from a sample on.
+    /// Whether it is of the same agent and session as a sample, and not earlier.
     pub(crate) fn is_since(&self, since: SampleKey) -> bool {
         let own = self.sample;
         (own.agent, own.session) == (since.agent, since.session) && own.seq >= since.seq
@@ -76,7 +77,7 @@ pub(crate) fn read_vector(input: &mut StateReader<'_>) -> Result<Box<[f32]>, Cor
     (0..u16::read(input)?).map(|_| f32::read(input)).collect()
 }
 
-/// A remembered view, by the sample at which it was seen, and how far from there something like it was seen.
+/// A remembered view that is similar to a query, and their distance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SimilarView {
     pub(crate) sample: SampleKey,
@@ -85,7 +86,7 @@ pub(crate) struct SimilarView {
 
 state_of_struct!(SimilarView { sample, distance });
 
-/// One of the latest views.
+/// One of an agent's latest views.
 #[derive(Clone, Debug)]
 pub(crate) struct RecentView {
     pub(crate) in_odom: Isometry3<f64>,
