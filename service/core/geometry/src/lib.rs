@@ -11,7 +11,7 @@ mod se3_jacobian;
 mod symmetric;
 
 pub use alignment::{align, centre};
-pub use bounds::is_somewhere;
+pub use bounds::{is_somewhere, is_within};
 pub use covariance::{PoseCovariance, upper_triangle};
 pub use motion_sum::MotionSum;
 pub use planar::{

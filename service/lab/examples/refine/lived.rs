@@ -1,4 +1,4 @@
-//! A team's samples through the joint estimate and the chronicle.
+//! A team's samples through the joint estimate and the graph.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -11,24 +11,24 @@ use trajectory::{Alignment, Span, StampedPose, Trajectory, ate_rmse_m};
 /// A team as it lives.
 pub(crate) struct Lived {
     pub(crate) estimator: Estimator,
-    pub(crate) chronicle: KeyframeGraph,
+    pub(crate) graph: KeyframeGraph,
     agents: BTreeMap<u32, u32>,
     names: BTreeMap<String, u32>,
     seqs: BTreeMap<u32, u64>,
     pub(crate) causal: BTreeMap<u32, Vec<StampedPose>>,
-    /// Seconds that the chronicle took for each sample.
+    /// Seconds that the graph took for each sample.
     pub(crate) times_s: Vec<f64>,
 }
 
 impl Lived {
-    pub(crate) fn new(anchors_max: Option<u32>) -> Self {
+    pub(crate) fn new(keyframes_max: Option<u32>) -> Self {
         let mut settings = KeyframeSettings::default();
-        if let Some(anchors_max) = anchors_max {
-            settings.anchors_max = anchors_max;
+        if let Some(keyframes_max) = keyframes_max {
+            settings.keyframes_max = keyframes_max;
         }
         Self {
             estimator: Estimator::new(Parameters::default()),
-            chronicle: KeyframeGraph::new(settings),
+            graph: KeyframeGraph::new(settings),
             agents: BTreeMap::new(),
             names: BTreeMap::new(),
             seqs: BTreeMap::new(),
@@ -40,7 +40,7 @@ impl Lived {
     /// A robot of the team.
     pub(crate) fn enrol(&mut self, robot: u32, name: String) {
         let agent = self.estimator.enrol();
-        self.chronicle.enrol();
+        self.graph.enrol();
         self.agents.insert(robot, agent);
         self.names.insert(name, agent);
     }
@@ -88,7 +88,7 @@ impl Lived {
         };
         let begin = Instant::now();
         if let SampleBody::StartPose(start) = &sample.body {
-            self.chronicle.start_pose(&moment, start);
+            self.graph.start_pose(&moment, start);
         }
         effects.sort_by_key(Effect::order);
         for effect in &effects {
@@ -104,7 +104,7 @@ impl Lived {
     fn apply(&mut self, moment: &Moment, effect: &Effect) {
         match effect {
             Effect::Moved { step, .. } => {
-                self.chronicle
+                self.graph
                     .motion(moment, &step.increment, &step.variance, &step.calibrated);
             }
             Effect::LandmarkSighted {
@@ -112,10 +112,10 @@ impl Lived {
                 relation,
                 variance,
                 ..
-            } => self.chronicle.landmark(moment, label, relation, variance),
+            } => self.graph.landmark(moment, label, relation, variance),
             Effect::AgentSighted(seen) if seen.accepted => {
                 let variance = seen.variance.fixed_rows::<3>(0).into_owned();
-                self.chronicle.sighted(
+                self.graph.sighted(
                     seen.observer,
                     seen.target,
                     seen.stamp_ns,
@@ -126,9 +126,9 @@ impl Lived {
             Effect::FramesMerged(merged) => {
                 for &agent in &merged.agents {
                     if merged.into == 0 {
-                        self.chronicle.placed(agent, &merged.pose);
+                        self.graph.placed(agent, &merged.pose);
                     } else {
-                        self.chronicle.carried(agent, &merged.pose);
+                        self.graph.transformed(agent, &merged.pose);
                     }
                 }
             }

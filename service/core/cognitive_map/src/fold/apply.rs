@@ -9,7 +9,7 @@ use crate::estimator::{Effect, Estimator};
 use crate::event::{Event, EventKind};
 use crate::input::{AgentId, SkipReason};
 use crate::input::{Label, Marker, Sample, SampleBody, StartPose};
-use crate::keyframes::KeyframeGraph;
+use crate::keyframes::KeyframeMap;
 use crate::memory::landmark::LandmarkMap;
 use crate::memory::object::ObjectMemory;
 use crate::memory::percept::PerceptMap;
@@ -38,7 +38,7 @@ pub(super) struct Fold<'a> {
     pub(super) estimator: &'a mut Estimator,
     /// What the latest call of the estimator brought about, until it is applied.
     pub(super) effects: Vec<Effect>,
-    pub(super) chronicle: &'a mut KeyframeGraph,
+    pub(super) chronicle: &'a mut KeyframeMap,
     pub(super) names: &'a BTreeMap<Label, AgentId>,
     pub(super) agent_id: AgentId,
     pub(super) agent: &'a mut Agent,
@@ -83,7 +83,7 @@ impl Fold<'_> {
         if before.is_some() {
             let sd = Vector6::from(RESTART_SD);
             self.estimator.restart(self.agent_id.0, &sd);
-            self.chronicle.restart(self.agent_id.0, &sd);
+            self.chronicle.graph.restart(self.agent_id.0, &sd);
         }
         self.emit(EventKind::SessionStarted { session });
     }
@@ -142,7 +142,7 @@ impl Fold<'_> {
         self.chronicle.start_pose(&self.moment(), start);
         self.chronicle.end_search(self.agent_id.0);
         let seq = self.agent.next_seq.saturating_sub(1);
-        self.chronicle.dispel_doubt(self.agent_id.0, seq);
+        self.chronicle.confirm_pose(self.agent_id.0, seq);
         *self.framed = true;
         self.stand();
     }
@@ -163,7 +163,7 @@ impl Fold<'_> {
         if !*self.framed {
             *self.framed = true;
             self.estimator.found(self.agent_id.0);
-            self.chronicle.found(self.agent_id.0);
+            self.chronicle.graph.found(self.agent_id.0);
             self.agent.placed = true;
         }
     }

@@ -31,7 +31,7 @@ use super::header::{Header, digest_of};
 use crate::agent::Agent;
 use crate::estimator::{Estimator, Parameters};
 use crate::input::AgentId;
-use crate::keyframes::{KeyframeGraph, KeyframePage, KeyframeSettings};
+use crate::keyframes::{KeyframeMap, KeyframePage, KeyframeSettings};
 use crate::memory::percept::CHANNEL_PAGES_MAX;
 use crate::memory::place::PlaceId;
 use crate::memory::trip::LEG_PAGES_MAX;
@@ -262,7 +262,7 @@ impl CognitiveMap {
                 bytes,
             });
         let settings = KeyframeSettings::of(&self.settings);
-        let chronicle = KeyframeGraph::restore(settings, self.revision, pages)
+        let chronicle = KeyframeMap::restore(settings, self.revision, pages)
             .map_err(|_| CorruptCheckpoint::DamagedPage { kind, index })?;
         self.chronicle = Arc::new(chronicle);
         Ok(())
@@ -361,14 +361,14 @@ impl CognitiveMap {
                     .trip
                     .is_none_or(|trip| (trip.0 as usize) < recorded)
         });
-        let is_moored = |id: PlaceId, mooring| self.chronicle.is_moored(mooring, id.0);
+        let is_moored = |id: PlaceId, mooring| self.chronicle.graph.is_attached(mooring, id.0);
         let places = self.places().all(|(id, place)| {
             is_agent(place.founder())
                 && place.trip.is_none_or(|trip| (trip.0 as usize) < recorded)
                 && place.mooring.is_none_or(|mooring| is_moored(id, mooring))
         });
         let moored = self.places().filter(|(_, place)| place.mooring.is_some());
-        let places = places && moored.count() == self.chronicle.n_moorings();
+        let places = places && moored.count() == self.chronicle.graph.n_attachments();
         let trips = self.trips().all(|(_, trip)| {
             is_agent(trip.agent())
                 && trip

@@ -26,7 +26,7 @@ impl CognitiveMap {
             Arc::make_mut(&mut self.estimator).enrol();
             let chronicle = Arc::make_mut(&mut self.chronicle);
             chronicle.set_revision(self.revision);
-            chronicle.enrol();
+            chronicle.graph.enrol();
         } else if let Some(vacant) = self.agents.get_mut(index, self.revision) {
             // The estimate and the chronicle have held a new agent under this number since it is vacant.
             *vacant = agent;

@@ -7,7 +7,7 @@ use super::motion::ANSWER_MIN;
 use crate::agent::Status;
 use crate::event::EventKind;
 use crate::input::{Descriptor, Level};
-use crate::keyframes::{Relocalised, Viewed};
+use crate::keyframes::Relocalised;
 use crate::memory::percept::Compared;
 use crate::memory::place::{PlaceId, confidence};
 use crate::memory::trip::TripEnd;
@@ -59,31 +59,29 @@ impl Fold<'_> {
         let Some(in_odom) = self.estimator.in_odom(number) else {
             return;
         };
-        let viewed = Viewed {
-            descriptor,
-            in_odom,
-            covariance,
-        };
         let moment = self.moment();
-        let is_lost = self.is_lost(&viewed.covariance);
+        let view = self
+            .chronicle
+            .observe(&moment, descriptor, in_odom, covariance);
+        let is_lost = self.is_lost(&covariance);
         if self.agent.placed && !is_lost {
             let accepted = self.agent.evidence.accepted;
-            if self.chronicle.is_contradicted(&moment, &viewed, accepted) {
+            if self.chronicle.is_contradicted(&view, accepted) {
                 return self.go_astray();
             }
         }
         let is_sought = self.chronicle.is_seeking(number);
         if self.agent.placed && !is_sought {
             // Nobody knows where that is seen.
-            if !(is_lost && self.chronicle.is_astray(number)) {
-                self.chronicle.viewed(&moment, &viewed);
+            if !(is_lost && self.chronicle.is_kidnapped(number)) {
+                self.chronicle.view(&view);
             }
             if !is_lost {
                 return;
             }
         }
         let sd_max_m = self.settings.field_radius_m;
-        if let Some(found) = self.chronicle.seek(&moment, &viewed, sd_max_m) {
+        if let Some(found) = self.chronicle.seek(&view, sd_max_m) {
             self.relocalised(&found);
         }
     }
@@ -102,7 +100,7 @@ impl Fold<'_> {
         self.end_episode();
         let sd_m = ANYWHERE * self.settings.lost_sd_m;
         self.estimator.lose(self.agent_id.0, sd_m);
-        self.chronicle.go_astray(&moment);
+        self.chronicle.declare_kidnapped(&moment);
         self.stand();
     }
 
@@ -129,7 +127,7 @@ impl Fold<'_> {
         }
         if found.is_first || is_elsewhere {
             let seq = self.moment().seq;
-            self.chronicle.dispel_doubt(number, seq);
+            self.chronicle.confirm_pose(number, seq);
         }
         if is_elsewhere {
             self.end_trip(TripEnd::StartPose);
@@ -157,7 +155,7 @@ impl Fold<'_> {
         let Some((pose, covariance)) = self.estimator.pose(number) else {
             return true;
         };
-        if self.chronicle.is_astray(number) {
+        if self.chronicle.is_kidnapped(number) {
             return true;
         }
         let apart_m = (pose.translation.vector - found.pose.translation.vector).norm();

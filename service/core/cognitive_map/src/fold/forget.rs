@@ -25,7 +25,7 @@ impl Fold<'_> {
         };
         self.percepts.forget(place, self.revision);
         if let Some(mooring) = forgotten.mooring {
-            self.chronicle.unmoor(mooring);
+            self.chronicle.graph.detach_place(mooring);
         }
         let position = *forgotten.position();
         self.emit(EventKind::PlaceForgotten { place, position });

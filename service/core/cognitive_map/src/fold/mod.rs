@@ -26,7 +26,7 @@ use crate::estimator::{Estimator, Parameters};
 use crate::event::Event;
 use crate::input::Label;
 use crate::input::{AgentId, Record, SkipReason};
-use crate::keyframes::{KeyframeGraph, KeyframeSettings};
+use crate::keyframes::{KeyframeMap, KeyframeSettings};
 use crate::memory::landmark::LandmarkMap;
 use crate::memory::object::ObjectMemory;
 use crate::memory::percept::PerceptMap;
@@ -61,7 +61,7 @@ pub struct CognitiveMap {
     /// Where agents and the landmarks seen lately are, jointly.
     estimator: Arc<Estimator>,
     /// What they did and saw, so that the past can be smoothed.
-    chronicle: Arc<KeyframeGraph>,
+    chronicle: Arc<KeyframeMap>,
     places: PlaceMap,
     trips: TripMap,
     landmarks: LandmarkMap,
@@ -76,7 +76,7 @@ impl CognitiveMap {
             modules: Arc::new(GridModules::new(&settings.grid())),
             places: PlaceMap::new(&settings),
             estimator: Arc::new(Estimator::new(Parameters::of(&settings))),
-            chronicle: Arc::new(KeyframeGraph::new(KeyframeSettings::of(&settings))),
+            chronicle: Arc::new(KeyframeMap::new(KeyframeSettings::of(&settings))),
             names: Arc::default(),
             settings: Arc::new(settings),
             revision: 0,

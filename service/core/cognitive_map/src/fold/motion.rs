@@ -150,7 +150,7 @@ impl Fold<'_> {
             self.now,
         );
         let place = self.places.recruit(place, self.revision)?;
-        if let Some(mooring) = self.chronicle.moor(self.agent_id.0, place.0) {
+        if let Some(mooring) = self.chronicle.graph.attach_place(self.agent_id.0, place.0) {
             self.places.set_mooring(place, mooring, self.revision);
         }
         self.emit(EventKind::PlaceRecruited {

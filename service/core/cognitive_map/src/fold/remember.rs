@@ -31,7 +31,7 @@ impl Fold<'_> {
         for effect in effects.drain(..) {
             match effect {
                 Effect::SetAside { agent } => self.chronicle.set_aside(agent),
-                Effect::Moved { step, .. } => self.chronicle.motion(
+                Effect::Moved { step, .. } => self.chronicle.graph.motion(
                     &self.moment(),
                     &step.increment,
                     &step.variance,
@@ -44,10 +44,11 @@ impl Fold<'_> {
                     ..
                 } => self
                     .chronicle
+                    .graph
                     .landmark(&self.moment(), &label, &relation, &variance),
                 Effect::AgentSighted(sighted) => self.agent_sighted(&sighted),
                 Effect::LandmarksAssociated(names) => {
-                    self.chronicle.same(&names);
+                    self.chronicle.graph.merge_landmarks(&names);
                     for (label, name) in &names {
                         self.landmarks.unite(label, name, self.revision);
                     }
@@ -61,7 +62,7 @@ impl Fold<'_> {
     /// Remembers a sighting of an agent that was accepted.
     fn agent_sighted(&mut self, sighted: &AgentSighted) {
         if sighted.accepted {
-            self.chronicle.sighted(
+            self.chronicle.graph.sighted(
                 sighted.observer,
                 sighted.target,
                 sighted.stamp_ns,
@@ -75,9 +76,9 @@ impl Fold<'_> {
     fn frames_merged(&mut self, merged: &FramesMerged) {
         for &agent in &merged.agents {
             if merged.into == MAP {
-                self.chronicle.placed(agent, &merged.pose);
+                self.chronicle.graph.placed(agent, &merged.pose);
             } else {
-                self.chronicle.carried(agent, &merged.pose);
+                self.chronicle.graph.transformed(agent, &merged.pose);
             }
         }
     }
@@ -89,10 +90,10 @@ impl Fold<'_> {
     ///
     /// When that is depends on the records alone.
     pub(super) fn believe_matches(&mut self) {
-        if !self.chronicle.is_due() {
+        if !self.chronicle.graph.is_due() {
             return;
         }
-        for correction in self.chronicle.relax() {
+        for correction in self.chronicle.graph.relax() {
             if let Some(covariance) = correction.covariance {
                 self.estimator.fuse_pose(
                     correction.agent,
@@ -109,7 +110,7 @@ impl Fold<'_> {
 impl Fold<'_> {
     /// Moves some of the places that turned out to lie elsewhere.
     pub(super) fn move_places(&mut self) {
-        for (place, at) in self.chronicle.drift() {
+        for (place, at) in self.chronicle.graph.moved_places() {
             self.places.put(PlaceId(place), &at, self.revision);
         }
     }
@@ -119,17 +120,17 @@ impl CognitiveMap {
     /// Where all agents were and all landmarks are, by everything that was seen until now: the whole map
     /// relaxed. A function of the map alone; takes time in proportion to what is remembered.
     pub fn refined(&self) -> Refined {
-        self.chronicle.refine()
+        self.chronicle.graph.refine()
     }
 
     /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in the making as
     /// [`refined`](Self::refined).
     pub fn experience_map(&self) -> PoseGraph {
-        self.chronicle.experience_map()
+        self.chronicle.graph.experience_map()
     }
 
     /// Number of matches and revisits that are believed.
     pub fn closure_count(&self) -> usize {
-        self.chronicle.n_matches_believed()
+        self.chronicle.graph.n_matches_believed()
     }
 }

@@ -18,7 +18,10 @@ impl Fold<'_> {
             Target::OwnSample(seq) => {
                 // It waits until it is found in agreement with the map.
                 let moment = self.moment();
-                let is_remembered = self.chronicle.closure(&moment, *seq, &sighting.relation);
+                let is_remembered = self
+                    .chronicle
+                    .graph
+                    .closure(&moment, *seq, &sighting.relation);
                 self.agent.forgotten_matches += u64::from(!is_remembered);
                 return;
             }
