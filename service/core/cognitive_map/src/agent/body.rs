@@ -57,8 +57,8 @@ impl Body {
     }
 
     /// Moves the body to where odometry has it now, after a path of `path_m` by odometry and a
-    /// displacement along the axes of its frame by the estimate. Calls `entered` with each grid module
-    /// that came into a new lattice cell.
+    /// displacement along the axes of its frame by the estimate. Calls `entered` with each grid
+    /// module that came into a new lattice cell.
     ///
     /// The cost depends neither on the path so far nor on the places known.
     pub(crate) fn step(
@@ -80,8 +80,8 @@ impl Body {
         }
     }
 
-    /// Goes to where the estimate has the body now, and the grid with it. Without a correction since the
-    /// latest step the position is the same to the last bit.
+    /// Goes to where the estimate has the body now, and the grid with it. Without a correction
+    /// since the latest step the position is the same to the last bit.
     pub(crate) fn follow(
         &mut self,
         pose: &Isometry3<f64>,

@@ -21,9 +21,9 @@ use state::state_of_struct;
 /// An agent of a space.
 ///
 /// The first agent that moves or sees a landmark in an empty map defines the `map` frame: it starts
-/// at identity. Any later agent is *unplaced* until a start pose tells where it stands, or until enough
-/// landmarks and sightings of agents tie it to the map: its pose still counts from identity, and nothing
-/// that it does changes what places, trips and landmarks the map knows.
+/// at identity. Any later agent is *unplaced* until a start pose tells where it stands, or until
+/// enough landmarks and sightings of agents tie it to the map: its pose still counts from identity,
+/// and nothing that it does changes what places, trips and landmarks the map knows.
 #[derive(Clone, Debug)]
 pub struct Agent {
     pub(crate) name: Label,
@@ -204,13 +204,14 @@ impl Agent {
         self.sightings
     }
 
-    /// Levels and descriptors so far, of all sessions. Those felt where a place answers teach it; the
-    /// others are counted and stay in the journal.
+    /// Levels and descriptors so far, of all sessions. Those felt where a place answers teach it;
+    /// the others are counted and stay in the journal.
     pub fn percepts(&self) -> u64 {
         self.percepts
     }
 
-    /// Matches so far whose earlier sample was not, or no longer, remembered, of all sessions. They are dropped.
+    /// Matches so far whose earlier sample was not, or no longer, remembered, of all sessions. They
+    /// are dropped.
     pub fn forgotten_matches(&self) -> u64 {
         self.forgotten_matches
     }

@@ -47,14 +47,15 @@ pub(super) struct AgentFilter {
 
 /// Motion that has not been carried over to the covariance yet, about the axes of where it began.
 ///
-/// To carry a covariance along with every step would be most of a step's work, and hardly any step is
-/// asked for it.
+/// To carry a covariance along with every step would be most of a step's work, and hardly any step
+/// is asked for it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Run {
     pub(super) motion: MotionSum,
     /// How its error depends on that of the calibration.
     pub(super) tail: Tail,
-    /// Variances that the calibration gained. They count from the next run on: in one run, next to nothing.
+    /// Variances that the calibration gained. They count from the next run on: in one run, next to
+    /// nothing.
     pub(super) wander: SVector<f64, CALIBRATION>,
     pub(super) steps: u32,
 }
@@ -236,8 +237,8 @@ impl AgentFilter {
         }
     }
 
-    /// The covariance after the run under way, and how the error of the pose then depends on that of the
-    /// calibration where the run began.
+    /// The covariance after the run under way, and how the error of the pose then depends on that
+    /// of the calibration where the run began.
     fn moved(&self) -> (BodyCovariance, Tail) {
         let run = &self.run;
         let pose: Matrix6<f64> = self.at_run_start.fixed_view::<6, 6>(0, 0).into_owned();

@@ -14,8 +14,8 @@ use crate::input::Relation;
 impl Estimator {
     /// An agent saw another one.
     ///
-    /// The sighting is taken in as soon as both have moved up to its stamp, whichever comes first; then
-    /// follows [`Effect::AgentSighted`].
+    /// The sighting is taken in as soon as both have moved up to its stamp, whichever comes first;
+    /// then follows [`Effect::AgentSighted`].
     pub fn sighting(
         &mut self,
         agent: u32,
@@ -126,7 +126,8 @@ impl Estimator {
             ],
             variance: noise.trace() / 3.0 + lasting * lasting / 2.0,
         };
-        // Sightings from one place share their error, and say nothing about how the frames are turned.
+        // Sightings from one place share their error, and say nothing about how the frames are
+        // turned.
         let is_elsewhere = |other: &CrossFrameSighting| {
             other.frames != cross_sighting.frames
                 || (other.points[1] - cross_sighting.points[1]).norm() >= CROSS_SIGHTINGS_APART_M

@@ -34,7 +34,8 @@ pub(super) struct AgentSlot {
 #[derive(Clone, Debug)]
 pub(super) struct Detached {
     pub(super) state: Arc<AgentState>,
-    /// Whether it did, so that its errors are correlated with the others' in a way that is forgotten.
+    /// Whether it did, so that its errors are correlated with the others' in a way that is
+    /// forgotten.
     pub(super) was_joint: bool,
 }
 

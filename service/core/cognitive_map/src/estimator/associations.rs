@@ -64,10 +64,11 @@ impl Associations {
         names.remove(name);
     }
 
-    /// A landmark was seen under a name. One that contradicts the landmark it stands for is its own again.
+    /// A landmark was seen under a name. One that contradicts the landmark it stands for is its own
+    /// again.
     ///
-    /// `observer_refused` counts the observer's sightings refused one after the other: of an agent that contradicts everything, the
-    /// name is not to blame.
+    /// `observer_refused` counts the observer's sightings refused one after the other: of an agent
+    /// that contradicts everything, the name is not to blame.
     pub(super) fn weigh(&mut self, label: &Label, verdict: Verdict, observer_refused: u32) {
         let Some(association) = self.names.get(label) else {
             return;

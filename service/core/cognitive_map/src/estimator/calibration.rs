@@ -63,8 +63,8 @@ impl Calibrated {
 
     /// A motion that was corrected so, as it would have been corrected by another calibration.
     ///
-    /// As if the motion had been an even one, of this twist over the time T that the body moved, with the
-    /// calibration c by which it was corrected and the new one c′:
+    /// As if the motion had been an even one, of this twist over the time T that the body moved,
+    /// with the calibration c by which it was corrected and the new one c′:
     ///
     /// ```text
     /// v′ = v (1 − c′_l) / (1 − c_l)      ω′ = (ω + b T) (1 − c′_a) / (1 − c_a) − b′ T

@@ -106,7 +106,8 @@ impl JointCovariance {
         old
     }
 
-    /// Appends y = J x + n, where x are `width` components from `offset` on; answers where y begins.
+    /// Appends y = J x + n, where x are `width` components from `offset` on; answers where y
+    /// begins.
     pub(super) fn append<const K: usize>(
         &mut self,
         blocks: &[Block<K>],
@@ -139,8 +140,8 @@ impl JointCovariance {
         self.dim = new;
     }
 
-    /// Replaces components by a linear function of themselves, x ← F x, in all cross terms; the block
-    /// on the diagonal becomes `own`.
+    /// Replaces components by a linear function of themselves, x ← F x, in all cross terms; the
+    /// block on the diagonal becomes `own`.
     pub(super) fn transform<const N: usize>(
         &mut self,
         offset: usize,
@@ -200,8 +201,8 @@ impl JointCovariance {
         Projection { rows, spread }
     }
 
-    /// Takes in a measurement with this innovation, whose covariance is S; answers the correction of
-    /// the state, or `None` when S is not positive definite.
+    /// Takes in a measurement with this innovation, whose covariance is S; answers the correction
+    /// of the state, or `None` when S is not positive definite.
     ///
     /// ```text
     /// S = L Lᵀ      W = P Hᵀ L⁻ᵀ      δ = W L⁻¹ ν      P ← P − W Wᵀ + ε diag P
@@ -275,8 +276,8 @@ impl JointCovariance {
         Some(correction)
     }
 
-    /// Lets three components from `source` on act on all others: P ← (I + E) P (I + E)ᵀ, where column k
-    /// of E at `source` is `levers[k]`, which is zero at the three components themselves.
+    /// Lets three components from `source` on act on all others: P ← (I + E) P (I + E)ᵀ, where
+    /// column k of E at `source` is `levers[k]`, which is zero at the three components themselves.
     ///
     /// ```text
     /// P ← P + V W + Wᵀ Vᵀ      W = U + ½ P_ss Vᵀ

@@ -31,15 +31,15 @@ pub enum Effect {
         label: Label,
         /// Where.
         relation: Relation,
-        /// Variances of its components: distance, azimuth and elevation \[m², rad²\], or three lengths
-        /// \[m²\]. They hold what the agent's sensor was learned to get wrong, and not the loss of
-        /// weight of an outlying component.
+        /// Variances of its components: distance, azimuth and elevation \[m², rad²\], or three
+        /// lengths \[m²\]. They hold what the agent's sensor was learned to get wrong, and not the
+        /// loss of weight of an outlying component.
         variance: Vector3<f64>,
     },
     /// A sighting of an agent was accepted or refused, once both had moved up to it.
     AgentSighted(AgentSighted),
-    /// Labels turned out to be names of one landmark: of each pair the name that is given up, and the
-    /// one that stays.
+    /// Labels turned out to be names of one landmark: of each pair the name that is given up, and
+    /// the one that stays.
     LandmarksAssociated(Vec<(Label, Label)>),
     /// A frame was merged into another one.
     FramesMerged(FramesMerged),

@@ -15,12 +15,13 @@ use super::tuning::{
 use geometry::{PoseCovariance, is_somewhere, se3, symmetric};
 
 impl Estimator {
-    /// Takes in what an outside estimate says of an agent's pose in its frame, with the covariance of its
-    /// error (right perturbation); answers whether it counts. One that lies too far off does not.
+    /// Takes in what an outside estimate says of an agent's pose in its frame, with the covariance
+    /// of its error (right perturbation); answers whether it counts. One that lies too far off does
+    /// not.
     ///
-    /// How its error is correlated with that of the present estimate is not known: both may rest upon the
-    /// same samples. The pose becomes the covariance intersection (Julier & Uhlmann 1997) of the two, and
-    /// everything correlated with it follows; to say the same twice adds nothing.
+    /// How its error is correlated with that of the present estimate is not known: both may rest
+    /// upon the same samples. The pose becomes the covariance intersection (Julier & Uhlmann 1997)
+    /// of the two, and everything correlated with it follows; to say the same twice adds nothing.
     pub fn fuse_pose(
         &mut self,
         agent: u32,
@@ -70,7 +71,8 @@ struct ExternalPose<'a> {
 impl Frame {
     /// Fuses an external pose of a member; answers whether it was accepted.
     ///
-    /// With the member's own P and the external Σ, in units of the own deviations, and the innovation ν:
+    /// With the member's own P and the external Σ, in units of the own deviations, and the
+    /// innovation ν:
     ///
     /// ```text
     /// ω of the largest det(ω P⁻¹ + (1 − ω) Σ⁻¹)      G = (1 − ω) (Σ⁻¹ − P⁻¹) = V Λ Vᵀ

@@ -182,7 +182,8 @@ impl Frame {
         }
     }
 
-    /// Forgets that an agent saw landmarks, whose number will be another one's: it may have been anybody.
+    /// Forgets that an agent saw landmarks, whose number will be another one's: it may have been
+    /// anybody.
     pub(super) fn forget_observer(&mut self, agent: u32) {
         for landmark in Arc::make_mut(&mut self.landmarks).values_mut() {
             landmark.observers.forget(agent);
@@ -192,8 +193,8 @@ impl Frame {
 
     /// Brings all cross terms up to date.
     ///
-    /// Between sightings a moving body keeps only its own covariance and its transition; what ties it to
-    /// the others waits until it is needed.
+    /// Between sightings a moving body keeps only its own covariance and its transition; what ties
+    /// it to the others waits until it is needed.
     pub(super) fn flush(&mut self) {
         for member in &mut self.members {
             if member.filter().is_stale() {
@@ -265,11 +266,12 @@ impl Frame {
     /// Corrects everything by what an observer's sighting tells, and carries the errors over to the
     /// corrected estimate.
     ///
-    /// What nobody can know is where the whole map lies: an error θ of the observer's rotation goes with
-    /// errors θ × (x − x̂₀) of all positions. Errors are therefore counted relative to the observer's
-    /// rotation (the right-invariant error of Barrau & Bonnabel 2015), which makes them independent of
-    /// the estimate: a correction Δ of a position changes its error by θ × Δ. Without this, corrections
-    /// would feign knowledge of the whole map's direction (Huang, Mourikis & Roumeliotis 2010).
+    /// What nobody can know is where the whole map lies: an error θ of the observer's rotation goes
+    /// with errors θ × (x − x̂₀) of all positions. Errors are therefore counted relative to the
+    /// observer's rotation (the right-invariant error of Barrau & Bonnabel 2015), which makes them
+    /// independent of the estimate: a correction Δ of a position changes its error by θ × Δ.
+    /// Without this, corrections would feign knowledge of the whole map's direction (Huang,
+    /// Mourikis & Roumeliotis 2010).
     ///
     /// Landmarks go along the arcs on which that rotation takes them, as they do in the group of
     /// that filter, and not along tangents: or else each large correction of a rotation would

@@ -94,8 +94,8 @@ pub(super) fn align_frames(pairs: &[PointPair], is_planar: bool) -> Option<Frame
     Some(FrameAlignment { pose, covariance })
 }
 
-/// Jacobian of the error of a point of the newer frame with respect to the error τ of the alignment, in three
-/// rows: | I  −l× |.
+/// Jacobian of the error of a point of the newer frame with respect to the error τ of the
+/// alignment, in three rows: | I  −l× |.
 pub(super) fn point_by_alignment(point: &Point3<f64>) -> Matrix6<f64> {
     let mut by_alignment = Matrix6::zeros();
     by_alignment

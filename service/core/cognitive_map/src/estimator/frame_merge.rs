@@ -47,9 +47,9 @@ impl Frame {
 
     /// Lays a newer frame into this one. Landmarks known in both become one.
     ///
-    /// With the newer frame's pose T in this one, whose error is τ, a body's error gains `Ad(T_b⁻¹) τ` and
-    /// a landmark's error δ becomes R (δ + ρ − l × φ). The landmarks known in both then say how T really
-    /// lies, so that its covariance need only be wide.
+    /// With the newer frame's pose T in this one, whose error is τ, a body's error gains
+    /// `Ad(T_b⁻¹) τ` and a landmark's error δ becomes R (δ + ρ − l × φ). The landmarks known in both then say
+    /// how T really lies, so that its covariance need only be wide.
     pub(super) fn merge(
         &mut self,
         newer: Self,
@@ -186,7 +186,8 @@ impl Frame {
         for k in 0..3 {
             let expected = projection.spread[(k, k)] + variance[k];
             let square = innovation[k] * innovation[k] / expected;
-            // A contradiction counts little: the points do not agree, or the label is not one landmark's.
+            // A contradiction counts little: the points do not agree, or the label is not one
+            // landmark's.
             variance[k] += expected * (square / parameters.soft.powi(2) - 1.0).max(0.0);
         }
         let s = projection.spread + Matrix3::from_diagonal(&variance);

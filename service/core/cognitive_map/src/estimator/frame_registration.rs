@@ -24,8 +24,9 @@ struct UnsharedLandmarks {
 }
 
 impl Estimator {
-    /// Looks now and then whether landmarks have other names, too: in an agent's frame for the agent itself, and, if that is not the
-    /// map's, for another frame. When that is depends on the sightings alone.
+    /// Looks now and then whether landmarks have other names, too: in an agent's frame for the
+    /// agent itself, and, if that is not the map's, for another frame. When that is depends on the
+    /// sightings alone.
     pub(super) fn associate_landmarks(
         &mut self,
         own: usize,
@@ -69,7 +70,8 @@ impl Estimator {
         }
     }
 
-    /// The frame that one is compared with at a turn: every second time that of the map, and the others in turn.
+    /// The frame that one is compared with at a turn: every second time that of the map, and the
+    /// others in turn.
     fn next_to_register(&self, own: usize, turn: u64) -> Option<usize> {
         let count = self.frames.len();
         if turn.is_multiple_of(2) {
@@ -109,7 +111,8 @@ impl Estimator {
         n_found
     }
 
-    /// Lays a frame into an older one by landmarks that are the same, which go by the older one's names from now on.
+    /// Lays a frame into an older one by landmarks that are the same, which go by the older one's
+    /// names from now on.
     fn accept(
         &mut self,
         [older, newer]: [usize; 2],
@@ -147,9 +150,10 @@ impl Estimator {
 
     /// The correspondences of which it is sure which is which.
     ///
-    /// How two landmarks close together lie to one another is known far better than where they are: two pairs are taken crosswise if
-    /// that fits better, and neither counts unless the other way fits much worse. The same holds of landmarks that are no
-    /// correspondences, of which only the positions can be compared.
+    /// How two landmarks close together lie to one another is known far better than where they are:
+    /// two pairs are taken crosswise if that fits better, and neither counts unless the other way
+    /// fits much worse. The same holds of landmarks that are no correspondences, of which only the
+    /// positions can be compared.
     fn sure_correspondences(
         &self,
         older: usize,
@@ -234,7 +238,8 @@ impl Frame {
         self.landmarks.contains_key(label) || self.archive.contains(label)
     }
 
-    /// The landmarks that another frame has no name for, the `most` seen last of them, the best known first.
+    /// The landmarks that another frame has no name for, the `most` seen last of them, the best
+    /// known first.
     fn unshared(&self, other: &Self, most: usize, is_planar: bool) -> UnsharedLandmarks {
         let landmarks = self.landmarks.iter();
         let mut landmarks: Vec<(&Label, &LandmarkState)> = landmarks

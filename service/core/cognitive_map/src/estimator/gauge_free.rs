@@ -6,16 +6,19 @@ use super::frame::{Frame, LandmarkState};
 use super::tuning::LANDMARK_VARIANCE_MIN_M2;
 
 impl Frame {
-    /// Variance of each landmark along an axis, but for what a rigid motion of them all would explain \[m²\].
+    /// Variance of each landmark along an axis, but for what a rigid motion of them all would
+    /// explain \[m²\].
     ///
-    /// A frame begins with a robot, so that what lies far from there shares the error of how the robot was turned: seen from the
-    /// landmarks themselves that is none. With the errors e, of covariance C, the rigid motions J, and weights W:
+    /// A frame begins with a robot, so that what lies far from there shares the error of how the
+    /// robot was turned: seen from the landmarks themselves that is none. With the errors e, of
+    /// covariance C, the rigid motions J, and weights W:
     ///
     /// ```text
     /// e' = e − J G e      G = (Jᵀ W J)⁻¹ Jᵀ W      C'ᵢᵢ = Cᵢᵢ − Kᵢ Jᵢᵀ − Jᵢ Kᵢᵀ + Jᵢ G K Jᵢᵀ      K = C Gᵀ
     /// ```
     ///
-    /// Of planar frames only motions in the plane, and errors along it. Landmarks in a line have their whole variances.
+    /// Of planar frames only motions in the plane, and errors along it. Landmarks in a line have
+    /// their whole variances.
     pub(super) fn gauge_free_variances(
         &self,
         landmarks: &[&LandmarkState],
@@ -78,7 +81,8 @@ impl Frame {
     }
 }
 
-/// How a rigid motion of all moves a landmark: | I  −l× |, of the plane's motions where there are no others.
+/// How a rigid motion of all moves a landmark: | I  −l× |, of the plane's motions where there are
+/// no others.
 fn rigid(landmark: &LandmarkState, is_planar: bool) -> SMatrix<f64, 3, 6> {
     let mut mode = SMatrix::<f64, 3, 6>::identity();
     let lever = -landmark.position.coords.cross_matrix();

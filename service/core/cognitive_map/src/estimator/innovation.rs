@@ -54,8 +54,8 @@ impl PointInnovation {
         }
     }
 
-    /// By distance and direction. The angles are taken about the seen direction, along growing azimuth
-    /// and elevation, where they are linear also above and below the observer:
+    /// By distance and direction. The angles are taken about the seen direction, along growing
+    /// azimuth and elevation, where they are linear also above and below the observer:
     ///
     /// ```text
     /// α = atan2(e_α·d, e_r·d)      ε = atan2(e_ε·d, h)      h = hypot(e_r·d, e_α·d)
@@ -111,8 +111,8 @@ pub(super) fn seen_at(relation: &Relation) -> (Vector3<f64>, Matrix3<f64>) {
     (point, covariance.unwrap_or_else(Matrix3::identity))
 }
 
-/// A sighting of a full pose, linearised: residual of the target's pose, derivatives by the errors of
-/// the observer's and of the target's pose, and variances.
+/// A sighting of a full pose, linearised: residual of the target's pose, derivatives by the errors
+/// of the observer's and of the target's pose, and variances.
 pub(super) fn pose_innovation(
     seen: &crate::input::RelativePose,
     observer: &Isometry3<f64>,

@@ -19,15 +19,15 @@ use geometry::PoseCovariance;
 
 /// The joint estimate of all agents and landmarks of a space.
 ///
-/// Every agent begins in a frame of its own. The first frame is that of the map: an agent enters it by
-/// [`Estimator::found`] or by a start pose. Frames are laid into one another as soon as enough points
-/// are known in both: landmarks, and places where one agent saw the other, or when the landmarks of both lie alike under
-/// other names. The older frame prevails.
+/// Every agent begins in a frame of its own. The first frame is that of the map: an agent enters it
+/// by [`Estimator::found`] or by a start pose. Frames are laid into one another as soon as enough
+/// points are known in both: landmarks, and places where one agent saw the other, or when the
+/// landmarks of both lie alike under other names. The older frame prevails.
 ///
-/// An agent takes part in the joint estimate of its frame from its first sighting on, or from when it is
-/// first seen; of more than 32, the one whose latest sighting is longest ago goes on by itself and comes
-/// back with its next one. There are as many frames as there have been agents, and one more; an empty
-/// one holds nothing.
+/// An agent takes part in the joint estimate of its frame from its first sighting on, or from when
+/// it is first seen; of more than 32, the one whose latest sighting is longest ago goes on by
+/// itself and comes back with its next one. There are as many frames as there have been agents, and
+/// one more; an empty one holds nothing.
 ///
 /// A clone is a snapshot: it shares everything, and only what changes afterwards is copied.
 #[derive(Clone, Debug)]
@@ -96,8 +96,8 @@ impl Estimator {
         agent
     }
 
-    /// Lets an agent take part in the joint estimate of its frame, as one that was just seen or saw;
-    /// answers where it is.
+    /// Lets an agent take part in the joint estimate of its frame, as one that was just seen or
+    /// saw; answers where it is.
     pub(super) fn join_estimate(&mut self, agent: u32) -> Option<(usize, usize)> {
         let number = self.frame_of(agent)?;
         if self.slot(agent)?.detached.is_some() {
@@ -242,8 +242,8 @@ impl Estimator {
         self.associations.names.keys()
     }
 
-    /// The landmarks of the map that are estimated jointly now, by label: position \[m\] and covariance
-    /// \[m²\]. Those are left out that only agents have seen which are set aside.
+    /// The landmarks of the map that are estimated jointly now, by label: position \[m\] and
+    /// covariance \[m²\]. Those are left out that only agents have seen which are set aside.
     pub fn landmarks(&self) -> impl Iterator<Item = (&Label, Point3<f64>, Matrix3<f64>)> {
         let frame = self.frame(MAP);
         let is_aside =

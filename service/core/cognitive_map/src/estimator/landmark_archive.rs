@@ -50,8 +50,8 @@ impl LandmarkArchive {
         part.insert(label, landmark);
     }
 
-    /// Puts one to sleep that comes after all others in their order; answers whether it does, and whether
-    /// there was room.
+    /// Puts one to sleep that comes after all others in their order; answers whether it does, and
+    /// whether there was room.
     pub(super) fn append(&mut self, label: Label, landmark: ArchivedLandmark) -> bool {
         let number = part_of(&label);
         let later = self.parts.iter_from(number + 1).all(|part| part.is_empty());

@@ -1,9 +1,10 @@
 //! Landmarks of one frame that have another name for some of its agents.
 //!
-//! What one agent calls by names of its own lies, landmark by landmark, where others know something. One such pair is no
-//! proof: as many must agree as chance would bring together once in ten thousand times, by how densely landmarks lie. Those
-//! that were found to be the same before count with them, so that what the agent comes to see later follows one by one. Two
-//! landmarks that one agent has told apart are never one.
+//! What one agent calls by names of its own lies, landmark by landmark, where others know
+//! something. One such pair is no proof: as many must agree as chance would bring together once in
+//! ten thousand times, by how densely landmarks lie. Those that were found to be the same before
+//! count with them, so that what the agent comes to see later follows one by one. Two landmarks
+//! that one agent has told apart are never one.
 
 use nalgebra::Matrix3;
 
@@ -41,7 +42,8 @@ impl Estimator {
         }
     }
 
-    /// The landmarks that an agent calls otherwise than others do: the younger name, and the older one.
+    /// The landmarks that an agent calls otherwise than others do: the younger name, and the older
+    /// one.
     fn find_associations(&self, frame: &Frame, agent: u32) -> Vec<(Label, Label)> {
         let is_planar = frame.is_planar();
         let landmarks = || frame.landmarks.iter();

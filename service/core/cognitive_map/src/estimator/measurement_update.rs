@@ -197,8 +197,8 @@ impl Frame {
 
     /// A landmark came back whose earlier estimate may be correlated with everything.
     ///
-    /// Its own estimate becomes the covariance intersection (Julier & Uhlmann 1997) of the new and the
-    /// old one, with the weight ½; what it gains by that is passed on to the rest:
+    /// Its own estimate becomes the covariance intersection (Julier & Uhlmann 1997) of the new and
+    /// the old one, with the weight ½; what it gains by that is passed on to the rest:
     ///
     /// ```text
     /// R⁻¹ = ½ (Σ_old⁻¹ − Σ_new⁻¹), as far as that is positive

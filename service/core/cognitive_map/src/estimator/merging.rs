@@ -11,8 +11,8 @@ use super::tuning::{FRAMES_COMPARED_MAX, MEMBERS_MAX};
 use crate::input::Label;
 
 impl Estimator {
-    /// Looks whether an agent's frame and another one can be laid into each other, after a sighting of
-    /// a landmark, or of another agent.
+    /// Looks whether an agent's frame and another one can be laid into each other, after a sighting
+    /// of a landmark, or of another agent.
     pub(super) fn merge_with(
         &mut self,
         agent: u32,

@@ -27,8 +27,8 @@ pub struct Step {
     pub displacement: Vector3<f64>,
     /// What odometry read, corrected by what it is known to get wrong all the time.
     pub increment: Isometry3<f64>,
-    /// Variances of the increment's noise along and about the body axes at its end \[m², rad²\]. The
-    /// lasting errors of odometry come on top.
+    /// Variances of the increment's noise along and about the body axes at its end \[m², rad²\].
+    /// The lasting errors of odometry come on top.
     pub variance: Vector6<f64>,
     /// How the increment was corrected.
     pub calibrated: Calibrated,

@@ -26,8 +26,8 @@ pub struct Parameters {
     pub rotation_sd_per_sqrt_m: f64,
     /// Rotation noise of motion that states none, by rotation \[rad/√rad\].
     pub rotation_sd_per_sqrt_rad: f64,
-    /// Part of a distance by which a seen distance is off, again and again, as long as the sightings do
-    /// not show that their errors change from one to the next.
+    /// Part of a distance by which a seen distance is off, again and again, as long as the
+    /// sightings do not show that their errors change from one to the next.
     pub lasting_range_error: f64,
     /// Normalised innovation from which a component of a sighting loses weight (Huber 1964).
     pub soft: f64,

@@ -1,4 +1,5 @@
-//! Where agents begin: the map's founder, start poses, recognised poses, restarts, kidnapped agents.
+//! Where agents begin: the map's founder, start poses, recognised poses, restarts, kidnapped
+//! agents.
 
 use std::sync::Arc;
 
@@ -57,8 +58,9 @@ impl Estimator {
         }
     }
 
-    /// An agent turned out to be at a pose in the map, of which the error on its right has this covariance. Its frame is laid
-    /// into the map's, with all that is in it; one that was in the map is put there.
+    /// An agent turned out to be at a pose in the map, of which the error on its right has this
+    /// covariance. Its frame is laid into the map's, with all that is in it; one that was in the
+    /// map is put there.
     pub fn recognised(
         &mut self,
         agent: u32,
@@ -89,8 +91,8 @@ impl Estimator {
         self.merge(MAP, own, &alignment, effects);
     }
 
-    /// An agent of the map may be anywhere, about `sd_m` from where it was believed to be along each axis and turned in any way. One that
-    /// moves in a plane stays there.
+    /// An agent of the map may be anywhere, about `sd_m` from where it was believed to be along
+    /// each axis and turned in any way. One that moves in a plane stays there.
     pub fn lose(&mut self, agent: u32, sd_m: f64) {
         let Some(filter) = self.filter(agent).filter(|_| self.is_in_map(agent)) else {
             return;
@@ -107,8 +109,8 @@ impl Estimator {
         self.put(agent, &pose, PoseCovariance::from_sd(&sd).matrix());
     }
 
-    /// A new session of an agent: its odometry begins anew, and it may have been moved by about `sd`
-    /// \[m, m, m, rad, rad, rad\] since.
+    /// A new session of an agent: its odometry begins anew, and it may have been moved by about
+    /// `sd` \[m, m, m, rad, rad, rad\] since.
     pub fn restart(&mut self, agent: u32, sd: &Vector6<f64>) {
         let Some(frame) = self.frame_of(agent) else {
             return;

@@ -8,7 +8,8 @@ use super::frame::Frame;
 use super::joint::{Estimator, MAP};
 
 impl Estimator {
-    /// An agent of the map is gone: it stays where it was, and takes part in no joint estimate any more.
+    /// An agent of the map is gone: it stays where it was, and takes part in no joint estimate any
+    /// more.
     pub fn retire(&mut self, agent: u32) {
         self.forget_pending(agent);
         let Some(number) = self.frame_of(agent) else {
@@ -23,7 +24,8 @@ impl Estimator {
     }
 
     /// Forgets an agent that was never in the map: its number is as it was when it enrolled, at the
-    /// identity of a frame of its own. Landmarks of the frame that it leaves stay as long as others are in it.
+    /// identity of a frame of its own. Landmarks of the frame that it leaves stay as long as others
+    /// are in it.
     ///
     /// # Panics
     /// Never: beside the map's there is one frame for each agent, and this one is in none.

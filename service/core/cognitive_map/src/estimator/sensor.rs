@@ -49,9 +49,9 @@ impl Default for Sensor {
 impl Sensor {
     /// Variances of a sighting's components.
     ///
-    /// Errors of distance that last (a marker seen at a slant, a lens) cannot be averaged away; they grow
-    /// with the distance d. How much of such an error is assumed goes by the correlation ρ of successive
-    /// errors of one target, which is learned, from 1 on:
+    /// Errors of distance that last (a marker seen at a slant, a lens) cannot be averaged away;
+    /// they grow with the distance d. How much of such an error is assumed goes by the correlation
+    /// ρ of successive errors of one target, which is learned, from 1 on:
     ///
     /// ```text
     /// σ_r² = s_r (σ² + ρ min(e d, 3 σ)²)      σ_b² = s_b σ²
@@ -83,8 +83,8 @@ impl Sensor {
         (self.product / self.square.max(CORRELATION_SQUARE_MIN)).clamp(0.0, 1.0)
     }
 
-    /// A sighting of a target was expected with these variances from the estimate alone (`spread`) and
-    /// from the sensor (`variance`).
+    /// A sighting of a target was expected with these variances from the estimate alone (`spread`)
+    /// and from the sensor (`variance`).
     pub(super) fn note(
         &mut self,
         seen: SightingTarget,

@@ -8,8 +8,8 @@
 //!
 //! It comes back as a newcomer does, when enough of what it sees lies as the map has it, or it is
 //! told where it stands. It stays doubted until more of its sightings fit than do not, by
-//! [`DOUBT_ON_RETURN`]; then its landmarks in the map, which have been kept for that, are everybody's
-//! again.
+//! [`DOUBT_ON_RETURN`]; then its landmarks in the map, which have been kept for that, are
+//! everybody's again.
 
 use std::ops::Range;
 use std::sync::Arc;

@@ -83,7 +83,8 @@ fn a_linear_problem_has_the_solution_of_least_squares() {
     let told = StartPose::new([0.0; 3], [0.0, 0.0, 0.0, 1.0], known).unwrap();
     estimator.start_pose(agent, &told, &mut Vec::new());
 
-    // Unknowns along x: four positions of the agent, then two landmarks. Rows: A x = b, each of its sd.
+    // Unknowns along x: four positions of the agent, then two landmarks. Rows: A x = b, each of its
+    // sd.
     let mut rows: Vec<Row> = vec![(vec![(0, 1.0)], 0.0, 0.5)];
     let sightings = [
         (0, 0, 2.01),
@@ -130,8 +131,8 @@ fn a_linear_problem_has_the_solution_of_least_squares() {
     assert!((spread.matrix()[(0, 0)] - covariance[(3, 3)]).abs() < 1e-9);
     for (k, (_, position, spread)) in estimator.landmarks().enumerate() {
         assert!((position.x - solution[4 + k]).abs() < 1e-9);
-        // Sightings count as vaguer by a hundred-millionth of the variances that they compare, against
-        // rounding; these are below 1 m².
+        // Sightings count as vaguer by a hundred-millionth of the variances that they compare,
+        // against rounding; these are below 1 m².
         assert!((spread[(0, 0)] - covariance[(4 + k, 4 + k)]).abs() < 1e-8);
     }
 }
@@ -397,7 +398,8 @@ fn a_new_session_starts_less_certain() {
     assert_eq!(estimator.in_odom(agent), Some(Isometry3::identity()));
 }
 
-/// More agents than are estimated jointly come and go; those at rest or far from all others cost nothing.
+/// More agents than are estimated jointly come and go; those at rest or far from all others cost
+/// nothing.
 #[test]
 fn of_a_crowd_those_that_see_take_part() {
     let mut estimator = Estimator::new(Parameters::default());
@@ -476,7 +478,8 @@ fn frames_are_told_and_emptied() {
     assert_eq!(estimator.frame(0).population, 2);
 }
 
-/// A step tells what was corrected, and an effect tells of a sighting once both agents have moved up to it.
+/// A step tells what was corrected, and an effect tells of a sighting once both agents have moved
+/// up to it.
 #[test]
 fn the_outcome_of_a_sample_is_told() {
     let mut estimator = Estimator::new(Parameters::default());

@@ -1,7 +1,7 @@
 //! Constants of the estimator: unit, meaning and source of each.
 //!
-//! What a space sets is in [`Parameters`](super::Parameters). A source is an equation, a physical reason,
-//! or what measures the constant:
+//! What a space sets is in [`Parameters`](super::Parameters). A source is an equation, a physical
+//! reason, or what measures the constant:
 //!
 //! - *team*: `cogmap-lab replay mrclam DIR`, also with `--unknown-starts` and `--anonymous 3`
 //! - *liars*: `make drills DRILLS="liars"`
@@ -42,8 +42,8 @@ pub(super) const SENSOR_TARGETS_MAX: usize = 128;
 
 /// Longest interval between two motions over which a bias counts \[s\].
 pub(super) const MOTION_INTERVAL_S_MAX: f64 = 10.0;
-/// Motions that are gathered before they are carried over to the covariance. Source: carrying it with
-/// each would be most of a motion's work (`docs/decisions/0028-motion-noise-is-gathered.md`).
+/// Motions that are gathered before they are carried over to the covariance. Source: carrying it
+/// with each would be most of a motion's work (`docs/decisions/0028-motion-noise-is-gathered.md`).
 pub(super) const RUN_STEPS_MAX: u32 = 64;
 /// Length of gathered motion \[m\]. Source: digits are lost with the lever from where it began.
 pub(super) const RUN_LENGTH_MAX_M: f64 = 10.0;
@@ -52,10 +52,11 @@ pub(super) const HISTORY_LEN: usize = 64;
 /// Least interval between two kept poses \[ns\]: 64 of them span three seconds, more than
 /// [`PENDING_NS_MAX`].
 pub(super) const HISTORY_INTERVAL_NS: i64 = 50_000_000;
-/// Standard deviation of a rotation of which nothing is known \[rad\]. Source: no rotation is off by
-/// more than half a turn.
+/// Standard deviation of a rotation of which nothing is known \[rad\]. Source: no rotation is off
+/// by more than half a turn.
 pub(super) const ANY_TURN_SD_RAD: f64 = 3.0;
-/// Factor by which a variance of a rotation may exceed that of [`ANY_TURN_SD_RAD`] until it is reduced.
+/// Factor by which a variance of a rotation may exceed that of [`ANY_TURN_SD_RAD`] until it is
+/// reduced.
 pub(super) const ANY_TURN_SLACK: f64 = 1.001;
 /// Standard deviation of a position from which on it says nothing \[m\]. Source: the largest
 /// `lost_sd_m` that settings may state.
@@ -63,11 +64,11 @@ pub(super) const POSITION_SD_MAX_M: f64 = 1e6;
 /// Largest lasting error of odometry that is believed, in the deviations that the settings state.
 /// Source: *liars* (`docs/decisions/0027-covariances-stay-positive.md`).
 pub(super) const LASTING_DEVIATIONS_MAX: f64 = 8.0;
-/// Largest lasting error of lengths and of angles, as a ratio. Source: with more, readings would say
-/// next to nothing, or the contrary.
+/// Largest lasting error of lengths and of angles, as a ratio. Source: with more, readings would
+/// say next to nothing, or the contrary.
 pub(super) const LASTING_RATIO_MAX: f64 = 0.9;
-/// Largest deviation of a lasting error, in those that the settings state: it may wander, but not for
-/// ever.
+/// Largest deviation of a lasting error, in those that the settings state: it may wander, but not
+/// for ever.
 pub(super) const WANDERED_MAX: f64 = 2.0;
 /// Least factor 1 − c by which a reading may have been corrected, where a motion is corrected anew.
 /// Source: 1 − [`LASTING_RATIO_MAX`].
@@ -98,35 +99,36 @@ pub(super) const CORRELATION_SQUARE_MIN: f64 = 1e-12;
 
 // --- Outliers and contradictions -----------------------------------------------------------------
 
-/// Refused sightings in a row after which an agent's pose becomes less certain. Source: *hall*, an agent
-/// that slipped finds its way back.
+/// Refused sightings in a row after which an agent's pose becomes less certain. Source: *hall*, an
+/// agent that slipped finds its way back.
 pub(super) const REFUSED_TO_WIDEN: u32 = 8;
 /// Deviations that are added to the pose then \[m, rad\]. Source: *hall*.
 pub(super) const WIDENED_SD: (f64, f64) = (1.0, 0.5);
 /// Refused sightings in a row after which a landmark is forgotten: it was moved or was never there.
 /// Source: *hall*, a post that is moved.
 pub(super) const REFUSED_TO_FORGET: u32 = 8;
-/// Refused sightings in a row after which a label stands for a landmark of its own again. Source: less
-/// than [`REFUSED_TO_FORGET`], so that the landmark itself stays.
+/// Refused sightings in a row after which a label stands for a landmark of its own again. Source:
+/// less than [`REFUSED_TO_FORGET`], so that the landmark itself stays.
 pub(super) const REFUSED_TO_DISSOCIATE: u32 = 6;
 /// Doubt from which on an agent corrects nobody but itself. Source: what it takes to search farther
 /// around once; *liars*.
 pub(super) const DOUBT_MIN: u32 = REFUSED_TO_WIDEN;
-/// Doubt at which an agent is set aside. Source: an agent that slipped or was carried off a few metres
-/// has found its way back before, by searching farther around eight times; *liars*.
+/// Doubt at which an agent is set aside. Source: an agent that slipped or was carried off a few
+/// metres has found its way back before, by searching farther around eight times; *liars*.
 pub(super) const DOUBT_MAX: u32 = 64;
 /// Doubt of an agent that was set aside and is back in the map: so many sightings have to fit, more
 /// than do not, before it corrects others again.
 pub(super) const DOUBT_ON_RETURN: u32 = 2 * DOUBT_MIN;
 
-// --- Agents and landmarks that come back -----------------------------------------------------------
+// --- Agents and landmarks that come back
+// -----------------------------------------------------------
 
 /// Factor of the deviations of an agent that comes back to a joint estimate.
 ///
-/// Errors A and B of unknown correlation have at most the covariance A/w beside B/(1 − w), for any w in
-/// (0, 1) (Julier & Uhlmann 1997). With w = 1/9 the agent's own estimate counts for a ninth, and the
-/// others' variances would have to grow by an eighth each time. They stay as they are: what they miss
-/// is small, and a growth with every return would not end.
+/// Errors A and B of unknown correlation have at most the covariance A/w beside B/(1 − w), for any
+/// w in (0, 1) (Julier & Uhlmann 1997). With w = 1/9 the agent's own estimate counts for a ninth,
+/// and the others' variances would have to grow by an eighth each time. They stay as they are: what
+/// they miss is small, and a growth with every return would not end.
 pub(super) const RETURN_WIDENING: f64 = 3.0;
 /// Least variance and information of a component that an archived landmark gains \[m², 1/m²\].
 pub(super) const ARCHIVE_GAIN_MIN_M2: f64 = 1e-9;
@@ -142,10 +144,11 @@ pub(super) const INTERSECTION_GAIN_MAX: f64 = 1e9;
 /// Least variance of a component of an external pose, as a part of the estimate's own.
 pub(super) const INTERSECTION_VARIANCE_MIN: f64 = 1e-9;
 
-// --- Alignment of frames ---------------------------------------------------------------------------
+// --- Alignment of frames
+// ---------------------------------------------------------------------------
 
-/// Fewest points that align two planar frames, and two frames in space. Source: one more than a rigid
-/// motion needs.
+/// Fewest points that align two planar frames, and two frames in space. Source: one more than a
+/// rigid motion needs.
 pub(super) const ALIGNMENT_POINTS_MIN: (usize, usize) = (3, 4);
 /// Part of the points that must agree. Source: *team*, unknown starts.
 pub(super) const ALIGNMENT_AGREEING_MIN: f64 = 0.7;
@@ -162,21 +165,22 @@ pub(super) const ALIGNMENT_WIDENING: f64 = 5.0;
 /// Source: sightings from one place share their error.
 pub(super) const CROSS_SIGHTINGS_APART_M: f64 = 0.2;
 
-// --- Landmarks under other names -------------------------------------------------------------------
+// --- Landmarks under other names
+// -------------------------------------------------------------------
 
-/// Sightings of a frame between two attempts to associate its landmarks. A prime: where agents see in
-/// turn, each has its turn.
+/// Sightings of a frame between two attempts to associate its landmarks. A prime: where agents see
+/// in turn, each has its turn.
 pub(super) const ASSOCIATE_EVERY: u64 = 31;
 /// Attempts in a row that must find one motion. Source: *team*, anonymous
 /// (`docs/decisions/0030-landmark-names-are-checked.md`).
 pub(super) const FRAME_MATCH_FOUND_MIN: u32 = 3;
 /// Rounds of testing whether two correspondences fit better with their points swapped.
 pub(super) const SWAP_ROUNDS: usize = 3;
-/// Landmarks of the older frame that are registered, in the plane and in space, where a motion takes
-/// three. Source: work.
+/// Landmarks of the older frame that are registered, in the plane and in space, where a motion
+/// takes three. Source: work.
 pub(super) const REGISTERED_MAX: (usize, usize) = (64, 32);
-/// Factor of the landmarks' variances. Source: sensors err alike for a while, so that the estimate is
-/// too sure of itself.
+/// Factor of the landmarks' variances. Source: sensors err alike for a while, so that the estimate
+/// is too sure of itself.
 pub(super) const LANDMARK_WIDENING: f64 = 4.0;
 /// Variance of the distance between two estimates of one landmark, beside their own \[m²\]: 1 cm.
 pub(super) const SAME_LANDMARK_VARIANCE_M2: f64 = 1e-4;
@@ -185,17 +189,19 @@ pub(super) const LANDMARK_VARIANCE_MIN_M2: f64 = 1e-6;
 /// Log₁₀ of the probability by chance of as many associations, for them to be accepted. Source:
 /// `docs/decisions/0030-landmark-names-are-checked.md`.
 pub(super) const ASSOCIATION_LOG10_CHANCE_MAX: f64 = -4.0;
-/// Largest probability that something lies by chance where a landmark would be associated with another.
+/// Largest probability that something lies by chance where a landmark would be associated with
+/// another.
 pub(super) const ASSOCIATION_CHANCE_MAX: f64 = 0.25;
 
-// --- Numbers ---------------------------------------------------------------------------------------
+// --- Numbers
+// ---------------------------------------------------------------------------------------
 
 /// Most that rounding takes away of a variance, as a part of those that it is made of.
 pub(super) const ROUNDING: f64 = 1e-14;
 /// Growth of variances with each update, as a part of what they were: more than what rounding takes
 /// away.
 pub(super) const COVARIANCE_ROUNDING: f64 = 1e-10;
-/// Least variance of a component of a measurement that the estimate expects, as a part of the variances
-/// of whose differences it is made. Source: below that it is rounding; a measurement then adds at most
-/// 10⁴ times what was known (`docs/decisions/0027-covariances-stay-positive.md`).
+/// Least variance of a component of a measurement that the estimate expects, as a part of the
+/// variances of whose differences it is made. Source: below that it is rounding; a measurement then
+/// adds at most 10⁴ times what was known (`docs/decisions/0027-covariances-stay-positive.md`).
 pub(super) const CONDITION_MIN: f64 = 1e-8;

@@ -3,17 +3,12 @@
 use nalgebra::Point3;
 
 use super::apply::{Fold, cell_entered};
+use super::tuning::{ANSWER_MIN, ASK_PER_FIELD_RADIUS};
 use crate::event::EventKind;
 use crate::input::Motion;
 use crate::memory::place::{Place, PlaceId, confidence};
 use crate::memory::trip::{Leg, LegUnderWay, Trip, TripEnd, TripId, interval_s};
 use crate::settings::Recruitment;
-
-/// The places are asked again when the agent has moved by this part of a field radius. Confidence
-/// changes by at most a tenth over that distance, and a robot at rest asks nothing.
-const ASK_PER_FIELD_RADIUS: f64 = 0.125;
-/// A place answers from this confidence on.
-pub(super) const ANSWER_MIN: f64 = 0.5;
 
 impl Fold<'_> {
     /// The body moved.
@@ -38,7 +33,7 @@ impl Fold<'_> {
         self.agent
             .body
             .step(&in_odom, path_m, displacement, self.modules, entered);
-        self.follow();
+        self.update_pose();
         if !self.agent.placed {
             return;
         }
@@ -60,7 +55,7 @@ impl Fold<'_> {
             .asked_at
             .is_none_or(|at| self.is_step_away(&at, &position));
         if drawn || (moved && !rests) {
-            self.ask(&position, drawn);
+            self.ask_places(&position, drawn);
         }
     }
 
@@ -87,7 +82,7 @@ impl Fold<'_> {
     }
 
     /// Asks which place answers here; recruits one, enters one, closes the leg under way.
-    fn ask(&mut self, position: &Point3<f64>, drawn: bool) {
+    fn ask_places(&mut self, position: &Point3<f64>, drawn: bool) {
         self.agent.asked_at = Some(*position);
         let winner = self.places.winner(position);
         let novel = match self.settings.recruitment {
@@ -118,18 +113,18 @@ impl Fold<'_> {
                 self.arrive(place);
             }
             Some(_) => {}
-            // An agent that hovers at the rim of a field does not enter it again and again; one that
-            // has left the reach of all places enters the next one afresh.
+            // An agent that hovers at the rim of a field does not enter it again and again; one
+            // that has left the reach of all places enters the next one afresh.
             None => self.agent.entered = None,
         }
     }
 
-    /// Recruits a place cell where the agent stands. None when there is no room for it: other agents
-    /// hold all places, or there are no more identifiers.
+    /// Recruits a place cell where the agent stands. None when there is no room for it: other
+    /// agents hold all places, or there are no more identifiers.
     fn recruit(&mut self, position: &Point3<f64>) -> Option<PlaceId> {
         // The place that answers too weakly is not held any more.
         self.agent.place = None;
-        self.hold();
+        self.hold_places();
         if !self.make_room_for_place() {
             return None;
         }
@@ -150,7 +145,7 @@ impl Fold<'_> {
             self.now,
         );
         let place = self.places.recruit(place, self.revision)?;
-        if let Some(mooring) = self.chronicle.graph.attach_place(self.agent_id.0, place.0) {
+        if let Some(mooring) = self.keyframes.graph.attach_place(self.agent_id.0, place.0) {
             self.places.set_mooring(place, mooring, self.revision);
         }
         self.emit(EventKind::PlaceRecruited {
@@ -199,7 +194,8 @@ impl Fold<'_> {
         }
     }
 
-    /// A leg between two places that the same earlier trip leads through is that trip's, travelled again.
+    /// A leg between two places that the same earlier trip leads through is that trip's, travelled
+    /// again.
     fn travel_again(&mut self, [from, to]: [PlaceId; 2]) {
         let earlier = self.trip_through(from);
         if let Some(trip) = earlier

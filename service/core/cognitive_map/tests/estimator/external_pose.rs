@@ -5,7 +5,8 @@ use nalgebra::{Isometry3, Vector6};
 
 use crate::hall::{label, planar};
 
-/// A robot that has driven 5 m along x from a known start, on a floor; with a post behind it if it looks.
+/// A robot that has driven 5 m along x from a known start, on a floor; with a post behind it if it
+/// looks.
 fn driven(looks: bool) -> Estimator {
     let mut estimator = Estimator::new(Parameters::default());
     let agent = estimator.enrol();

@@ -1,4 +1,5 @@
-//! The joint estimate from outside: teams in a simulated hall, and everything that may go wrong there.
+//! The joint estimate from outside: teams in a simulated hall, and everything that may go wrong
+//! there.
 
 #![expect(
     clippy::unwrap_used,

@@ -12,8 +12,9 @@ pub(super) struct Tried {
     pub(super) is_planar: bool,
 }
 
-/// Log₁₀ of the expected number of motions that lay as many landmarks as near to others where nothing is the same, for the
-/// number of the nearest correspondences that makes it least. Nobody is nearer than both are known.
+/// Log₁₀ of the expected number of motions that lay as many landmarks as near to others where
+/// nothing is the same, for the number of the nearest correspondences that makes it least. Nobody
+/// is nearer than both are known.
 pub(super) fn log10_by_chance(
     correspondences: &[Correspondence],
     index: &PointIndex<'_>,
@@ -25,7 +26,8 @@ pub(super) fn log10_by_chance(
         is_planar,
     } = *tried;
     let free = if is_planar { 2 } else { 3 };
-    // The motion was fitted to the correspondences, which takes half of its degrees of freedom off their distances.
+    // The motion was fitted to the correspondences, which takes half of its degrees of freedom off
+    // their distances.
     let n = correspondences.len() as f64;
     let (freedom, dimensions) = if is_planar { (3.0, 2.0) } else { (6.0, 3.0) };
     let fitted = dimensions * n / (dimensions * n - freedom).max(1.0);

@@ -22,8 +22,9 @@ pub(super) struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// Variance that the error of the motion adds at a point of the older frame \[m²\]: that of its middle, and more the farther
-    /// out it is. No point counts as farther out than twice what was seen.
+    /// Variance that the error of the motion adds at a point of the older frame \[m²\]: that of its
+    /// middle, and more the farther out it is. No point counts as farther out than twice what was
+    /// seen.
     pub(super) fn spread(&self, at: &Point3<f64>) -> f64 {
         let lever = ((at - self.middle).norm() / self.radius_m).min(2.0);
         0.5 * self.variance * (1.0 + lever * lever)
@@ -123,7 +124,8 @@ fn by_two(
         })
 }
 
-/// The motions in space that lay a pair over another one, and a third landmark over one that lies alike.
+/// The motions in space that lay a pair over another one, and a third landmark over one that lies
+/// alike.
 fn by_three(
     older: &[UncertainPoint],
     newer: &[UncertainPoint],

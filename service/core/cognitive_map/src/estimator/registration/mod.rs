@@ -1,4 +1,5 @@
-//! Constellations: two frames that know the same landmarks by other names, told by how these lie to one another.
+//! Constellations: two frames that know the same landmarks by other names, told by how these lie to
+//! one another.
 //!
 //! ```text
 //! hypotheses   rigid motions that lay two landmarks of one frame (three in space) over two of the other which are as
@@ -8,12 +9,13 @@
 //! chance       H · m · P(at least k − 2 of m − 2 are so near by chance), the least over k; in space k − 3 of m − 3
 //! ```
 //!
-//! H is the number of hypotheses, m that of the landmarks that are sought, and how near something lies by chance
-//! follows from the density of the other frame's landmarks. Landmarks close together agree together: a group of them counts
-//! once, among the hypotheses, too. That is the expected number of motions which are as good
-//! where nothing is the same (the number of false alarms of Desolneux, Moisan & Morel 2000; Moisan & Stival 2004 for
-//! such hypotheses). Landmarks in a regular order are no matter of chance: so no other motion may explain nearly as much.
-//! A mirrored constellation is another one: a motion is refused if the mirror image explains more.
+//! H is the number of hypotheses, m that of the landmarks that are sought, and how near something
+//! lies by chance follows from the density of the other frame's landmarks. Landmarks close together
+//! agree together: a group of them counts once, among the hypotheses, too. That is the expected
+//! number of motions which are as good where nothing is the same (the number of false alarms of
+//! Desolneux, Moisan & Morel 2000; Moisan & Stival 2004 for such hypotheses). Landmarks in a
+//! regular order are no matter of chance: so no other motion may explain nearly as much. A mirrored
+//! constellation is another one: a motion is refused if the mirror image explains more.
 
 mod ambiguity;
 mod candidates;
@@ -63,12 +65,12 @@ pub(super) struct Registration {
     pub(super) log10_false_alarms: f64,
 }
 
-/// Finds how the landmarks of a newer frame lie among those of an older one, if that is beyond chance and no other way
-/// explains nearly as much.
+/// Finds how the landmarks of a newer frame lie among those of an older one, if that is beyond
+/// chance and no other way explains nearly as much.
 ///
-/// Of the newer ones the first [`SOUGHT_MAX`] count, so they come with the most telling first. Landmarks that are known less
-/// well than they are dense say nothing and are left out. Work is bounded: where too many pairs are equally far from one
-/// another, there is no answer.
+/// Of the newer ones the first [`SOUGHT_MAX`] count, so they come with the most telling first.
+/// Landmarks that are known less well than they are dense say nothing and are left out. Work is
+/// bounded: where too many pairs are equally far from one another, there is no answer.
 pub(super) fn register(
     older: &[UncertainPoint],
     newer: &[UncertainPoint],
@@ -98,7 +100,8 @@ pub(super) fn register(
     if best.log10_false_alarms > LOG10_FALSE_ALARMS_MAX || is_rivalled {
         return None;
     }
-    // What the mirror image explains better is a part of it that happens to look like its mirror image.
+    // What the mirror image explains better is a part of it that happens to look like its mirror
+    // image.
     let mirrored: Vec<UncertainPoint> = newer.iter().map(mirrored).collect();
     let rival = motions(&older, &mirrored, is_planar).into_iter().next();
     if rival.is_some_and(|rival| rival.log10_false_alarms < best.log10_false_alarms - MIRRORED_MAX)
@@ -184,8 +187,8 @@ pub(super) fn mean_variance(points: &[UncertainPoint]) -> f64 {
     points.iter().map(|point| point.variance).sum::<f64>() / points.len().max(1) as f64
 }
 
-/// Whether most landmarks that lie among the correspondences are correspondences: where one frame knows many that the other does not, the rest is alike
-/// by chance.
+/// Whether most landmarks that lie among the correspondences are correspondences: where one frame
+/// knows many that the other does not, the rest is alike by chance.
 fn is_agreed(
     pose: &Isometry3<f64>,
     correspondences: &[Correspondence],
@@ -221,9 +224,9 @@ pub(super) fn apart_m(
     points.iter().map(apart).fold(0.0, f64::max)
 }
 
-/// Fits a motion to its correspondences and seeks them again, until nothing changes. Those in which another
-/// landmark may be meant are left out of the fit as long as the others alone are enough for a
-/// motion to be believed.
+/// Fits a motion to its correspondences and seeks them again, until nothing changes. Those in which
+/// another landmark may be meant are left out of the fit as long as the others alone are enough for
+/// a motion to be believed.
 fn refine(
     mut pose: Isometry3<f64>,
     index: &PointIndex<'_>,

@@ -51,8 +51,9 @@ impl<'a> PointIndex<'a> {
         }
     }
 
-    /// The landmarks that a motion lays over some of these, the nearest first; where landmarks lie close to one another, more than one.
-    /// `spread` is the variance that the motion's own error adds at a point \[m²\].
+    /// The landmarks that a motion lays over some of these, the nearest first; where landmarks lie
+    /// close to one another, more than one. `spread` is the variance that the motion's own error
+    /// adds at a point \[m²\].
     pub(super) fn pairs(
         &self,
         pose: &Isometry3<f64>,
@@ -100,7 +101,8 @@ impl<'a> PointIndex<'a> {
         }
     }
 
-    /// Probability that something that lies anywhere among these is within a distance of one of them.
+    /// Probability that something that lies anywhere among these is within a distance of one of
+    /// them.
     pub(in super::super) fn chance_within(&self, distance_m: f64) -> f64 {
         let within = if self.is_planar {
             std::f64::consts::PI * distance_m.powi(2)
@@ -127,8 +129,8 @@ pub(super) fn one_to_one(correspondences: &mut Vec<Correspondence>) {
     correspondences.truncate(taken);
 }
 
-/// How many landmarks there are by area or volume, that of the ellipse or ellipsoid with their spread:
-/// 4π √det Σ, (4/3)π 5^{3/2} √det Σ. What is known of each is part of its thickness.
+/// How many landmarks there are by area or volume, that of the ellipse or ellipsoid with their
+/// spread: 4π √det Σ, (4/3)π 5^{3/2} √det Σ. What is known of each is part of its thickness.
 fn density(points: &[UncertainPoint], is_planar: bool) -> f64 {
     let n = points.len().max(1) as f64;
     let sum: Vector3<f64> = points.iter().map(|point| point.position.coords).sum();

@@ -69,7 +69,8 @@ fn off_m(found: &Registration, frame: &Isometry3<f64>, points: &[Point3<f64>]) -
     points.iter().map(off).fold(0.0, f64::max)
 }
 
-/// Whether the correspondences are the same points, or points so close to one another that it is open which is which.
+/// Whether the correspondences are the same points, or points so close to one another that it is
+/// open which is which.
 fn are_right(found: &Registration, order: &[usize], points: &[Point3<f64>]) -> bool {
     let off = |&(one, other): &(usize, usize)| (points[one] - points[order[other]]).norm();
     found

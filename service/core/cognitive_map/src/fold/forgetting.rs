@@ -5,10 +5,10 @@ use crate::event::EventKind;
 use crate::memory::trip::TripEnd;
 
 impl Fold<'_> {
-    /// Makes room for one more place, if there are as many as there may be: forgets the weakest that no
-    /// agent holds, and where all are held, the weakest that this agent does not. Agents may have gone
-    /// for good without a word, and must not take the memory with them. False when this agent holds all,
-    /// or there are no more identifiers.
+    /// Makes room for one more place, if there are as many as there may be: forgets the weakest
+    /// that no agent holds, and where all are held, the weakest that this agent does not. Agents
+    /// may have gone for good without a word, and must not take the memory with them. False when
+    /// this agent holds all, or there are no more identifiers.
     pub(super) fn make_room_for_place(&mut self) -> bool {
         if !self.places.has_identifiers() {
             return false;
@@ -25,16 +25,17 @@ impl Fold<'_> {
         };
         self.percepts.forget(place, self.revision);
         if let Some(mooring) = forgotten.mooring {
-            self.chronicle.graph.detach_place(mooring);
+            self.keyframes.graph.detach_place(mooring);
         }
         let position = *forgotten.position();
         self.emit(EventKind::PlaceForgotten { place, position });
         true
     }
 
-    /// Makes room for one more leg, if there are as many as there may be: forgets the weakest trip that
-    /// has ended, and where none has, the one under way that began first. That is this agent's own, which
-    /// ends then, or that of an agent that may have gone for good without a word. False without any trip.
+    /// Makes room for one more leg, if there are as many as there may be: forgets the weakest trip
+    /// that has ended, and where none has, the one under way that began first. That is this agent's
+    /// own, which ends then, or that of an agent that may have gone for good without a word. False
+    /// without any trip.
     pub(super) fn make_room_for_leg(&mut self) -> bool {
         if self.trips.legs() < self.settings.legs_max as usize {
             return true;

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::CognitiveMap;
-use super::motion::ANSWER_MIN;
+use super::tuning::ANSWER_MIN;
 use crate::input::AgentId;
 use crate::input::{Label, Motion};
 use crate::memory::percept::{ChannelKind, Remembered};
@@ -26,8 +26,8 @@ pub struct Prediction {
 pub struct Predicted {
     /// What the place remembers that answers where the percept will be felt.
     pub remembered: Remembered,
-    /// That place's confidence, in \[0, 1\]: the mean over the positions to which the motion may have
-    /// led. How well the agent is localised when it starts is not in it; its status says that.
+    /// That place's confidence, in \[0, 1\]: the mean over the positions to which the motion may
+    /// have led. How well the agent is localised when it starts is not in it; its status says that.
     pub confidence: f64,
 }
 
@@ -40,7 +40,8 @@ struct Point {
 
 impl CognitiveMap {
     /// What an agent would feel if it moved so: the motion is integrated from its pose, as
-    /// [`CognitiveMap::apply`] would do it, the place asked that answers there, and its memory read.
+    /// [`CognitiveMap::apply`] would do it, the place asked that answers there, and its memory
+    /// read.
     ///
     /// Levels are those of a sensor at `offset_m` in the body frame, descriptors those at the body.
     /// With a `channel` only what is felt on that one. None for an agent that is not there or not

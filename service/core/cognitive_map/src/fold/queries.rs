@@ -1,4 +1,4 @@
-//! What can be read from a map.
+//! Questions to a map that need no computation.
 
 use nalgebra::Point3;
 
@@ -49,7 +49,7 @@ impl CognitiveMap {
         self.landmarks.landmarks().write_digests(&mut out);
         self.percepts.write_digests(&mut out);
         self.estimator.write(&mut out);
-        self.chronicle.digest().0.write(&mut out);
+        self.keyframes.digest().0.write(&mut out);
         self.objects.write_digests(&mut out);
         out.digest()
     }
@@ -113,10 +113,10 @@ impl CognitiveMap {
         self.places.bytes()
     }
 
-    /// Bytes of memory that places, trips, what is remembered of percepts and what can be smoothed take,
-    /// reserved ones included: all that budgets bound.
+    /// Bytes of memory that places, trips, what is remembered of percepts and what can be smoothed
+    /// take, reserved ones included: all that budgets bound.
     pub fn memory_bytes(&self) -> usize {
-        self.places.bytes() + self.trips.bytes() + self.percepts.bytes() + self.chronicle.bytes()
+        self.places.bytes() + self.trips.bytes() + self.percepts.bytes() + self.keyframes.bytes()
     }
 
     /// Number of places ever recruited, forgotten ones included: the identifier of the next one.
@@ -129,8 +129,8 @@ impl CognitiveMap {
         self.places.is_forgotten(place)
     }
 
-    /// Strength of a place: its founding and each visit count one when they happen, and half as much
-    /// after every half-life. 0 for a place that is not there.
+    /// Strength of a place: its founding and each visit count one when they happen, and half as
+    /// much after every half-life. 0 for a place that is not there.
     pub fn place_strength(&self, place: PlaceId) -> f64 {
         let place = self.places.get(place);
         place.map_or(0.0, |place| place.strength.now(self.clock()))
@@ -160,9 +160,10 @@ impl CognitiveMap {
     /// The places that answer a cue, best first, equally good ones by identifier. Exact where
     /// [`RecallCue`] says so.
     ///
-    /// By position the nearest come first, by code the most alike, by a percept the places whose memory
-    /// it fits best, and no others answer. By several of them the confidences are multiplied. Without
-    /// a cue the place visited last comes first. The cost is said at [`RecallCue`].
+    /// By position the nearest come first, by code the most alike, by a percept the places whose
+    /// memory it fits best, and no others answer. By several of them the confidences are
+    /// multiplied. Without a cue the place visited last comes first. The cost is said at
+    /// [`RecallCue`].
     pub fn recall(&self, cue: &RecallCue) -> Vec<Recalled> {
         recall::recall(
             cue,
@@ -188,10 +189,11 @@ impl CognitiveMap {
         self.percepts.of_place(place)
     }
 
-    /// The places elsewhere that answer a cue nearly as well as `best` does, the first of its answers.
+    /// The places elsewhere that answer a cue nearly as well as `best` does, the first of its
+    /// answers.
     ///
-    /// `None` when the answer is unambiguous, and for cues that hold no code, or a position or a percept
-    /// as well.
+    /// `None` when the answer is unambiguous, and for cues that hold no code, or a position or a
+    /// percept as well.
     pub fn rivals(&self, cue: &RecallCue, best: &Recalled) -> Option<Rivals> {
         recall::rivals(cue, best, &self.places, &self.modules, &self.settings)
     }
@@ -231,9 +233,9 @@ impl CognitiveMap {
         self.trips.is_forgotten(trip)
     }
 
-    /// Strength of a trip: its recording counts one when it begins, and so does travelling all of it
-    /// again, part by part; and each half as much after every half-life. 0 for a trip that is not
-    /// there.
+    /// Strength of a trip: its recording counts one when it begins, and so does travelling all of
+    /// it again, part by part; and each half as much after every half-life. 0 for a trip that is
+    /// not there.
     pub fn trip_strength(&self, trip: TripId) -> f64 {
         let trip = self.trips.get(trip);
         trip.map_or(0.0, |trip| trip.strength.now(self.clock()))

@@ -1,4 +1,4 @@
-//! What is kept of the past, so that it can be smoothed.
+//! What the estimator brings about: kept in the keyframe graph, and applied to landmarks and places.
 
 use super::CognitiveMap;
 use super::apply::Fold;
@@ -30,8 +30,8 @@ impl Fold<'_> {
         effects.sort_by_key(Effect::order);
         for effect in effects.drain(..) {
             match effect {
-                Effect::SetAside { agent } => self.chronicle.set_aside(agent),
-                Effect::Moved { step, .. } => self.chronicle.graph.motion(
+                Effect::SetAside { agent } => self.keyframes.set_aside(agent),
+                Effect::Moved { step, .. } => self.keyframes.graph.motion(
                     &self.moment(),
                     &step.increment,
                     &step.variance,
@@ -43,12 +43,12 @@ impl Fold<'_> {
                     variance,
                     ..
                 } => self
-                    .chronicle
+                    .keyframes
                     .graph
                     .landmark(&self.moment(), &label, &relation, &variance),
                 Effect::AgentSighted(sighted) => self.agent_sighted(&sighted),
                 Effect::LandmarksAssociated(names) => {
-                    self.chronicle.graph.merge_landmarks(&names);
+                    self.keyframes.graph.merge_landmarks(&names);
                     for (label, name) in &names {
                         self.landmarks.unite(label, name, self.revision);
                     }
@@ -62,7 +62,7 @@ impl Fold<'_> {
     /// Remembers a sighting of an agent that was accepted.
     fn agent_sighted(&mut self, sighted: &AgentSighted) {
         if sighted.accepted {
-            self.chronicle.graph.sighted(
+            self.keyframes.graph.sighted(
                 sighted.observer,
                 sighted.target,
                 sighted.stamp_ns,
@@ -76,24 +76,24 @@ impl Fold<'_> {
     fn frames_merged(&mut self, merged: &FramesMerged) {
         for &agent in &merged.agents {
             if merged.into == MAP {
-                self.chronicle.graph.placed(agent, &merged.pose);
+                self.keyframes.graph.placed(agent, &merged.pose);
             } else {
-                self.chronicle.graph.transformed(agent, &merged.pose);
+                self.keyframes.graph.transformed(agent, &merged.pose);
             }
         }
     }
 }
 
 impl Fold<'_> {
-    /// Relaxes the past when enough has come since the last time to pay for it and matches wait, and tells the
-    /// estimate where the agents are by those that are believed.
+    /// Relaxes the past when enough has come since the last time to pay for it and matches wait,
+    /// and tells the estimate where the agents are by those that are believed.
     ///
     /// When that is depends on the records alone.
-    pub(super) fn believe_matches(&mut self) {
-        if !self.chronicle.graph.is_due() {
+    pub(super) fn relax_matches(&mut self) {
+        if !self.keyframes.graph.is_due() {
             return;
         }
-        for correction in self.chronicle.graph.relax() {
+        for correction in self.keyframes.graph.relax() {
             if let Some(covariance) = correction.covariance {
                 self.estimator.fuse_pose(
                     correction.agent,
@@ -110,27 +110,28 @@ impl Fold<'_> {
 impl Fold<'_> {
     /// Moves some of the places that turned out to lie elsewhere.
     pub(super) fn move_places(&mut self) {
-        for (place, at) in self.chronicle.graph.moved_places() {
+        for (place, at) in self.keyframes.graph.moved_places() {
             self.places.put(PlaceId(place), &at, self.revision);
         }
     }
 }
 
 impl CognitiveMap {
-    /// Where all agents were and all landmarks are, by everything that was seen until now: the whole map
-    /// relaxed. A function of the map alone; takes time in proportion to what is remembered.
+    /// Where all agents were and all landmarks are, by everything that was seen until now: the
+    /// whole map relaxed. A function of the map alone; takes time in proportion to what is
+    /// remembered.
     pub fn refined(&self) -> Refined {
-        self.chronicle.graph.refine()
+        self.keyframes.graph.refine()
     }
 
-    /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in the making as
-    /// [`refined`](Self::refined).
+    /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in
+    /// the making as [`refined`](Self::refined).
     pub fn experience_map(&self) -> PoseGraph {
-        self.chronicle.graph.experience_map()
+        self.keyframes.graph.experience_map()
     }
 
     /// Number of matches and revisits that are believed.
     pub fn closure_count(&self) -> usize {
-        self.chronicle.graph.n_matches_believed()
+        self.keyframes.graph.n_matches_believed()
     }
 }

@@ -1,9 +1,9 @@
-//! What levels and descriptors do to the map.
+//! Levels and descriptors: they teach places, and recognise them.
 
 use nalgebra::Point3;
 
 use super::apply::Fold;
-use super::motion::ANSWER_MIN;
+use super::tuning::{ANSWER_MIN, DRIFT_MAX, KIDNAPPED_SD};
 use crate::agent::Status;
 use crate::event::EventKind;
 use crate::input::{Descriptor, Level};
@@ -12,11 +12,6 @@ use crate::memory::percept::Compared;
 use crate::memory::place::{PlaceId, confidence};
 use crate::memory::trip::TripEnd;
 use geometry::PoseCovariance;
-
-/// An agent that is found more than so many deviations from where it was thought to be did not come there by itself.
-const DRIFTED: f64 = 3.0;
-/// How far from where it was believed to be an agent may be that was carried off, in deviations from which on it is lost.
-const ANYWHERE: f64 = 10.0;
 
 impl Fold<'_> {
     /// A level was felt, where the sensor is.
@@ -37,7 +32,7 @@ impl Fold<'_> {
     pub(super) fn descriptor(&mut self, descriptor: &Descriptor) {
         self.agent.percepts += 1;
         self.touch(|episode, objects| episode.descriptor(descriptor, objects));
-        self.look_back(descriptor);
+        self.recognise_place(descriptor);
         let body = self.agent.body.in_map().translation.vector.into();
         let Some((place, weight)) = self.answering(&body) else {
             return;
@@ -49,9 +44,9 @@ impl Fold<'_> {
         self.compared(place, compared);
     }
 
-    /// Remembers what an agent of the map saw, and finds out whether it has come where something like it was seen. One that
-    /// does not know where it is finds that out.
-    fn look_back(&mut self, descriptor: &Descriptor) {
+    /// Remembers what an agent of the map saw, and finds out whether it has come where something
+    /// like it was seen. One that does not know where it is finds that out.
+    fn recognise_place(&mut self, descriptor: &Descriptor) {
         let number = self.agent_id.0;
         let Some((_, covariance)) = self.estimator.pose(number) else {
             return;
@@ -61,27 +56,27 @@ impl Fold<'_> {
         };
         let moment = self.moment();
         let view = self
-            .chronicle
+            .keyframes
             .observe(&moment, descriptor, in_odom, covariance);
         let is_lost = self.is_lost(&covariance);
         if self.agent.placed && !is_lost {
             let accepted = self.agent.evidence.accepted;
-            if self.chronicle.is_contradicted(&view, accepted) {
-                return self.go_astray();
+            if self.keyframes.is_contradicted(&view, accepted) {
+                return self.lose_agent();
             }
         }
-        let is_sought = self.chronicle.is_seeking(number);
+        let is_sought = self.keyframes.is_seeking(number);
         if self.agent.placed && !is_sought {
             // Nobody knows where that is seen.
-            if !(is_lost && self.chronicle.is_kidnapped(number)) {
-                self.chronicle.view(&view);
+            if !(is_lost && self.keyframes.is_kidnapped(number)) {
+                self.keyframes.view(&view);
             }
             if !is_lost {
                 return;
             }
         }
         let sd_max_m = self.settings.field_radius_m;
-        if let Some(found) = self.chronicle.seek(&view, sd_max_m) {
+        if let Some(found) = self.keyframes.seek(&view, sd_max_m) {
             self.relocalised(&found);
         }
     }
@@ -94,22 +89,22 @@ impl Fold<'_> {
     }
 
     /// What the agent sees contradicts where it is believed to be: it may be anywhere from now on.
-    fn go_astray(&mut self) {
+    fn lose_agent(&mut self) {
         let moment = self.moment();
         self.end_trip(TripEnd::Gap);
         self.end_episode();
-        let sd_m = ANYWHERE * self.settings.lost_sd_m;
+        let sd_m = KIDNAPPED_SD * self.settings.lost_sd_m;
         self.estimator.lose(self.agent_id.0, sd_m);
-        self.chronicle.declare_kidnapped(&moment);
-        self.stand();
+        self.keyframes.declare_kidnapped(&moment);
+        self.place_agent();
     }
 
     /// The agent recognised where it is.
     fn relocalised(&mut self, found: &Relocalised) {
         let number = self.agent_id.0;
         let was_placed = self.agent.placed;
-        // One that only drifted is where it may have drifted to: its way leads there. One that was put astray, by looks that could
-        // be read in two ways, is put anew.
+        // One that only drifted is where it may have drifted to: its way leads there. One that was
+        // put astray, by looks that could be read in two ways, is put anew.
         let is_refused = was_placed && !found.is_first && !self.fuse(found);
         let is_elsewhere = is_refused || (was_placed && found.is_first && self.is_elsewhere(found));
         if is_elsewhere || !was_placed {
@@ -123,19 +118,19 @@ impl Fold<'_> {
         }
         if found.is_first || found.is_last || is_elsewhere {
             let moment = self.moment();
-            self.chronicle.relocalised(&moment, found, is_elsewhere);
+            self.keyframes.relocalised(&moment, found, is_elsewhere);
         }
         if found.is_first || is_elsewhere {
             let seq = self.moment().seq;
-            self.chronicle.confirm_pose(number, seq);
+            self.keyframes.confirm_pose(number, seq);
         }
         if is_elsewhere {
             self.end_trip(TripEnd::StartPose);
-            self.stand();
+            self.place_agent();
             let position = found.pose.translation.vector.into();
             self.emit(EventKind::AgentPlaced { position });
         } else {
-            self.follow();
+            self.update_pose();
         }
     }
 
@@ -155,14 +150,14 @@ impl Fold<'_> {
         let Some((pose, covariance)) = self.estimator.pose(number) else {
             return true;
         };
-        if self.chronicle.is_kidnapped(number) {
+        if self.keyframes.is_kidnapped(number) {
             return true;
         }
         let apart_m = (pose.translation.vector - found.pose.translation.vector).norm();
         let sd_m = covariance
             .position_sd_m()
             .hypot(found.covariance.position_sd_m());
-        apart_m > DRIFTED * sd_m
+        apart_m > DRIFT_MAX * sd_m
     }
 
     /// The place that answers at a position, with its confidence; none for an agent that is not

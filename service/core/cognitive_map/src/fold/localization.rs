@@ -23,11 +23,12 @@ pub struct Localization {
 }
 
 impl CognitiveMap {
-    /// Where a sequence of samples was taken: as an agent without a start pose finds out that takes them, in a map that does not
-    /// change. Motions say how the moments of the sequence lie to one another; descriptors and labelled landmarks say where.
+    /// Where a sequence of samples was taken: as an agent without a start pose finds out that takes
+    /// them, in a map that does not change. Motions say how the moments of the sequence lie to one
+    /// another; descriptors and labelled landmarks say where.
     ///
-    /// Nothing is told that is not believed: where the map does not know what was seen, or knows it of several places, the status
-    /// is not [`Status::Localized`].
+    /// Nothing is told that is not believed: where the map does not know what was seen, or knows it
+    /// of several places, the status is not [`Status::Localized`].
     pub fn localize<'a>(&self, samples: impl IntoIterator<Item = &'a Sample>) -> Localization {
         let nowhere = Localization {
             status: Status::Lost,
@@ -36,7 +37,7 @@ impl CognitiveMap {
             guesses: Vec::new(),
         };
         // No agent of a service has this name, so no target of a sighting is taken for it.
-        let (true, Ok(name)) = (self.framed, Label::new("(localize)")) else {
+        let (true, Ok(name)) = (self.is_map_defined, Label::new("(localize)")) else {
             return nowhere;
         };
         let Ok(number) = u32::try_from(self.agents.len()) else {
@@ -63,7 +64,7 @@ impl CognitiveMap {
         let placed = map.agent(agent).filter(|agent| agent.placed);
         let pose = placed.zip(map.covariance(agent));
         let status = map.status(agent).unwrap_or(Status::Lost);
-        let guesses = map.chronicle.guesses(agent.0);
+        let guesses = map.keyframes.guesses(agent.0);
         Localization {
             // One place that is likely is more than nothing.
             status: if pose.is_none() && !guesses.is_empty() {

@@ -1,4 +1,4 @@
-//! What sightings do to the map.
+//! Sightings of landmarks, agents and own samples.
 
 use super::apply::Fold;
 use crate::event::EventKind;
@@ -19,14 +19,14 @@ impl Fold<'_> {
                 // It waits until it is found in agreement with the map.
                 let moment = self.moment();
                 let is_remembered = self
-                    .chronicle
+                    .keyframes
                     .graph
                     .closure(&moment, *seq, &sighting.relation);
                 self.agent.forgotten_matches += u64::from(!is_remembered);
                 return;
             }
         }
-        self.follow();
+        self.update_pose();
         if self.agent.placed {
             self.place_landmarks();
         }
@@ -62,8 +62,8 @@ impl Fold<'_> {
         }
     }
 
-    /// Takes over where the landmarks are now: a sighting corrects all of them that are correlated with
-    /// what it shows, and may have brought those of another frame.
+    /// Takes over where the landmarks are now: a sighting corrects all of them that are correlated
+    /// with what it shows, and may have brought those of another frame.
     fn place_landmarks(&mut self) {
         for (label, position, covariance) in self.estimator.landmarks() {
             let estimate = PositionEstimate {
