@@ -65,80 +65,113 @@ impl Estimator {
         }
     }
 
-    /// Takes in a sighting of an agent.
+    /// Takes in a sighting of an agent: it corrects a frame that both agents are in, and says how two
+    /// frames lie otherwise.
     fn take_in_agent_sighting(&mut self, pending: &PendingSighting, effects: &mut Vec<Effect>) {
         let motion_since = |this: &Self, agent: u32| {
             let filter = this.filter(agent)?;
             filter.history.motion_since(pending.stamp_ns)
         };
-        // The observer itself may not have moved up to its sighting: then it is where it was.
+        // An observer that has not moved up to its sighting is where it was.
         let own = motion_since(self, pending.observer);
         let back = own.unwrap_or_else(Isometry3::identity);
         let Some(target_back) = motion_since(self, pending.target) else {
             return; // too long ago
         };
-        // Letting the one take part may move the other in the list of those who do.
-        let admitted = self
+        // As the second one joins, the first one's index may change.
+        let joined = self
             .join_estimate(pending.observer)
             .zip(self.join_estimate(pending.target));
-        let Some(((number, _), (target_number, target))) = admitted else {
+        let Some(((number, _), (target_number, target))) = joined else {
             return;
         };
         let Some(observer) = self.frame(number).member(pending.observer) else {
             return;
         };
-        if number == target_number {
-            let measurement = Measurement {
-                observer,
-                back: &back,
-                stamp_ns: pending.stamp_ns,
-                relation: &pending.relation,
-                parameters: &self.parameters,
-            };
-            let Some(frame) = self.frames.get_mut(number, 0) else {
-                return;
-            };
-            let outcome = frame.update_by_member(&measurement, target, &target_back);
-            let refused = frame.members[observer].state.refused;
-            self.count(pending.observer, outcome.verdict, refused);
-            effects.push(Effect::AgentSighted(AgentSighted {
-                observer: pending.observer,
-                target: pending.target,
-                stamp_ns: pending.stamp_ns,
-                relation: pending.relation,
-                accepted: outcome.verdict != Verdict::Refused,
-                variance: outcome.variance,
-            }));
-            self.sweep(number, effects);
-            self.judge_evidence(pending.observer, effects);
-            return;
-        }
-        let pose_of = |frame: usize, index: usize| self.frame(frame).members[index].filter().pose;
-        let (point, noise) = seen_at(&pending.relation);
-        let lasting = self.parameters.lasting_range_error * point.norm();
-        let observer_pose = pose_of(number, observer) * back.inverse();
-        let target_pose = pose_of(target_number, target) * target_back.inverse();
-        let cross_sighting = CrossFrameSighting {
+        let ends = Ends {
             frames: [number, target_number],
+            members: [observer, target],
+            backs: [back, target_back],
+        };
+        if number == target_number {
+            self.update_by_agent(pending, &ends, effects);
+        } else if self.keep_cross_sighting(self.cross_sighting(&pending.relation, &ends)) {
+            self.merge_with(pending.observer, None, effects);
+        }
+    }
+
+    /// Corrects the frame of two agents by a sighting of the one by the other.
+    fn update_by_agent(
+        &mut self,
+        pending: &PendingSighting,
+        ends: &Ends,
+        effects: &mut Vec<Effect>,
+    ) {
+        let (number, [observer, target]) = (ends.frames[0], ends.members);
+        let measurement = Measurement {
+            observer,
+            back: &ends.backs[0],
+            stamp_ns: pending.stamp_ns,
+            relation: &pending.relation,
+            parameters: &self.parameters,
+        };
+        let Some(frame) = self.frames.get_mut(number, 0) else {
+            return;
+        };
+        let outcome = frame.update_by_member(&measurement, target, &ends.backs[1]);
+        let refused = frame.members[observer].state.refused;
+        self.count(pending.observer, outcome.verdict, refused);
+        effects.push(Effect::AgentSighted(AgentSighted {
+            observer: pending.observer,
+            target: pending.target,
+            stamp_ns: pending.stamp_ns,
+            relation: pending.relation,
+            accepted: outcome.verdict != Verdict::Refused,
+            variance: outcome.variance,
+        }));
+        self.sweep(number, effects);
+        self.judge_evidence(pending.observer, effects);
+    }
+
+    /// Where the target of a sighting was in its own frame and in its observer's.
+    fn cross_sighting(&self, relation: &Relation, ends: &Ends) -> CrossFrameSighting {
+        let pose_then = |end: usize| {
+            let frame = self.frame(ends.frames[end]);
+            frame.members[ends.members[end]].filter().pose * ends.backs[end].inverse()
+        };
+        let (point, noise) = seen_at(relation);
+        let lasting = self.parameters.lasting_range_error * point.norm();
+        CrossFrameSighting {
+            frames: ends.frames,
             points: [
-                observer_pose * Point3::from(point),
-                target_pose.translation.vector.into(),
+                pose_then(0) * Point3::from(point),
+                pose_then(1).translation.vector.into(),
             ],
             variance: noise.trace() / 3.0 + lasting * lasting / 2.0,
-        };
-        // Sightings from one place share their error, and say nothing about how the frames are
-        // turned.
+        }
+    }
+
+    /// Keeps a sighting across frames; answers whether it did. Sightings from one place share their
+    /// error, and do not say how the frames are turned.
+    fn keep_cross_sighting(&mut self, sighting: CrossFrameSighting) -> bool {
         let is_elsewhere = |other: &CrossFrameSighting| {
-            other.frames != cross_sighting.frames
-                || (other.points[1] - cross_sighting.points[1]).norm() >= CROSS_SIGHTINGS_APART_M
+            other.frames != sighting.frames
+                || (other.points[1] - sighting.points[1]).norm() >= CROSS_SIGHTINGS_APART_M
         };
         if !self.cross_sightings.iter().all(is_elsewhere) {
-            return;
+            return false;
         }
         if self.cross_sightings.len() >= CROSS_SIGHTINGS_MAX {
             self.cross_sightings.remove(0);
         }
-        self.cross_sightings.push(cross_sighting);
-        self.merge_with(pending.observer, None, effects);
+        self.cross_sightings.push(sighting);
+        true
     }
+}
+
+/// Observer and target of a sighting: the frame of each, its index there, and its motion since.
+struct Ends {
+    frames: [usize; 2],
+    members: [usize; 2],
+    backs: [Isometry3<f64>; 2],
 }
