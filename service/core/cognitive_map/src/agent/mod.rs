@@ -32,8 +32,8 @@ pub struct Agent {
     pub(crate) session: Option<u64>,
     pub(crate) next_seq: u64,
     pub(crate) stamp_ns: Option<i64>,
-    /// Whether the agent was in the map as of its latest record. The estimator may have placed it since,
-    /// by what others saw: its next record says so, with an event and a trip of its own.
+    /// Whether the agent was in the map as of its latest record. The estimator may have placed it
+    /// since, by what others saw: its next record says so, with an event and a trip of its own.
     pub(crate) placed: bool,
     pub(crate) body: Body,
     /// What became of its sightings, as of its latest record.

@@ -1,4 +1,4 @@
-//! A body that moves: its pose, what its odometry gets wrong, and the covariance of both.
+//! Filter of an agent: pose, lasting errors of odometry, and the covariance of both.
 
 use std::ops::SubAssign;
 
@@ -24,7 +24,7 @@ const CALIBRATION: usize = BODY_DIM - POSE;
 type BodyCovariance = SMatrix<f64, BODY_DIM, BODY_DIM>;
 type Tail = SMatrix<f64, POSE, CALIBRATION>;
 
-/// A body that moves.
+/// Pose and odometry calibration of an agent, with their covariance.
 #[derive(Clone, Debug)]
 pub(super) struct AgentFilter {
     /// Pose in the frame of the estimate.
@@ -45,7 +45,7 @@ pub(super) struct AgentFilter {
     pub(super) is_planar: bool,
 }
 
-/// Motion that has not been carried over to the covariance yet, about the axes of where it began.
+/// Motion that is not in the covariance yet, about the axes of the pose where it began.
 ///
 /// To carry a covariance along with every step would be most of a step's work, and hardly any step
 /// is asked for it.
@@ -105,7 +105,7 @@ impl AgentFilter {
         self
     }
 
-    /// The body's frame was laid into another one.
+    /// Transforms the body into the frame that its own is merged into.
     pub(super) fn transform_by(&mut self, alignment: &FrameAlignment) {
         let by_alignment = pose_by_alignment(&self.pose);
         let spread = by_alignment * alignment.covariance * by_alignment.transpose();
@@ -126,7 +126,7 @@ impl AgentFilter {
 
     /// Covariance of the body's error, which nothing waits to be added to.
     pub(super) fn covariance(&self) -> &BodyCovariance {
-        debug_assert!(self.run.steps == 0, "the run must be settled before");
+        debug_assert!(self.run.steps == 0, "the run must be carried over before");
         &self.at_run_start
     }
 
@@ -316,8 +316,8 @@ impl AgentFilter {
         self.calibration = Calibration::of_components(&bounded);
     }
 
-    /// Whether the body may be anywhere, or is where nothing is: its pose then tells nobody
-    /// anything.
+    /// Whether the position is out of bounds or of unbounded variance, so that the pose says
+    /// nothing.
     ///
     /// Cheap, for every motion asks: what the lasting errors of odometry add in the run under way
     /// does not count yet.

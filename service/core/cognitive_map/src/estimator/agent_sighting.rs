@@ -65,8 +65,8 @@ impl Estimator {
         }
     }
 
-    /// Takes in a sighting of an agent: it corrects a frame that both agents are in, and says how two
-    /// frames lie otherwise.
+    /// Takes in a sighting of an agent: it corrects a frame that both agents are in, and says how
+    /// two frames lie otherwise.
     fn take_in_agent_sighting(&mut self, pending: &PendingSighting, effects: &mut Vec<Effect>) {
         let motion_since = |this: &Self, agent: u32| {
             let filter = this.filter(agent)?;

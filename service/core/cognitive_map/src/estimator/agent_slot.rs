@@ -1,4 +1,4 @@
-//! An agent: which frame it is in, and whether its errors are estimated jointly with others.
+//! Slot of an agent: its frame, and its state while that is not part of the frame's joint estimate.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use super::outcome::Evidence;
 use super::sensor::Sensor;
 use super::tuning::RETURN_WIDENING;
 
-/// What is known of an agent itself. A clone shares it.
+/// State of an agent: its filter, its sensor, and how its sightings agree with the estimate.
 #[derive(Clone, Debug)]
 pub(super) struct AgentState {
     pub(super) filter: AgentFilter,
@@ -18,19 +18,20 @@ pub(super) struct AgentState {
     pub(super) doubt: u32,
 }
 
-/// An agent, in whatever frame.
+/// Slot of an agent.
 #[derive(Clone, Debug)]
 pub(super) struct AgentSlot {
-    /// Its frame.
+    /// Number of its frame.
     pub(super) frame: usize,
     pub(super) evidence: Evidence,
-    /// Whether it was set aside, and its evidence has not fitted since.
+    /// Whether it was set aside, and its sightings have not agreed with the map since.
     pub(super) is_aside: bool,
-    /// The agent itself, while it does not take part in its frame's joint estimate.
+    /// Its state while it is not a member of the frame's joint estimate; a member's is in the
+    /// frame.
     pub(super) detached: Option<Detached>,
 }
 
-/// An agent that does not take part in its frame's joint estimate.
+/// State of an agent that is not a member of its frame's joint estimate.
 #[derive(Clone, Debug)]
 pub(super) struct Detached {
     pub(super) state: Arc<AgentState>,
@@ -40,7 +41,7 @@ pub(super) struct Detached {
 }
 
 impl AgentSlot {
-    /// Of an agent that begins at a frame's identity.
+    /// Of a new agent.
     pub(super) fn new(frame: usize, filter: AgentFilter) -> Self {
         Self {
             frame,
@@ -57,7 +58,7 @@ impl AgentSlot {
 }
 
 impl Detached {
-    /// Of an agent that nothing ties to the others.
+    /// Of an agent whose errors are independent of the others'.
     pub(super) fn new(state: Arc<AgentState>) -> Self {
         Self {
             state,
@@ -65,10 +66,10 @@ impl Detached {
         }
     }
 
-    /// The agent as it may take part: its errors count as independent of all others'.
+    /// The state with which it becomes a member: its errors count as independent of the others'.
     pub(super) fn independent(mut self) -> Arc<AgentState> {
         let filter = &mut Arc::make_mut(&mut self.state).filter;
-        // Nothing waits for what happened to the errors.
+        // No cross terms wait for this transition.
         filter.flush();
         if self.was_joint {
             *filter.covariance_mut() *= RETURN_WIDENING * RETURN_WIDENING;

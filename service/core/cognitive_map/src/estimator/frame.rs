@@ -80,7 +80,7 @@ impl Member {
 }
 
 impl Frame {
-    /// Lets an agent take part that nothing ties to the others yet.
+    /// Makes an agent a member, with errors that are independent of the others'.
     pub(super) fn join(&mut self, agent: u32, mut state: Arc<AgentState>) {
         let offset = self.covariance.grow(BODY_DIM);
         let own = Arc::make_mut(&mut state).filter.covariance_mut();

@@ -1,4 +1,4 @@
-//! Alignment of two frames: the rigid motion that best lays points known in both over each other.
+//! Alignment of two frames: the rigid motion of least squares between points known in both.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 
@@ -13,7 +13,7 @@ use geometry::{align, centre, se3};
 pub(super) struct PointPair {
     /// In the frame that stays \[m\].
     pub(super) older: Point3<f64>,
-    /// In the frame that is laid into it \[m\].
+    /// In the frame that is merged into it \[m\].
     pub(super) newer: Point3<f64>,
     /// Variance of their distance along an axis \[m²\].
     pub(super) variance: f64,

@@ -1,4 +1,4 @@
-//! Two frames become one.
+//! Merging of a frame into another one: members, landmarks, covariance.
 
 use std::collections::btree_map::Entry;
 use std::sync::Arc;
@@ -45,10 +45,10 @@ impl Frame {
         }
     }
 
-    /// Lays a newer frame into this one. Landmarks known in both become one.
+    /// Merges a newer frame into this one. Landmarks known in both become one.
     ///
-    /// With the newer frame's pose T in this one, whose error is τ, a body's error gains
-    /// `Ad(T_b⁻¹) τ` and a landmark's error δ becomes R (δ + ρ − l × φ). The landmarks known in both then say
+    /// With the newer frame's pose T in this one, whose error is τ, a body's error gains `Ad(T_b⁻¹)
+    /// τ` and a landmark's error δ becomes R (δ + ρ − l × φ). The landmarks known in both then say
     /// how T really lies, so that its covariance need only be wide.
     pub(super) fn merge(
         &mut self,
@@ -56,18 +56,18 @@ impl Frame {
         alignment: &FrameAlignment,
         parameters: &Parameters,
     ) {
-        self.lay(newer, alignment, Some(parameters));
+        self.merge_with_parameters(newer, alignment, Some(parameters));
     }
 
     /// The same for a newer frame whose agents are doubted: landmarks known in both stay as they
     /// are here.
     pub(super) fn merge_doubted(&mut self, newer: Self, alignment: &FrameAlignment) {
-        self.lay(newer, alignment, None);
+        self.merge_with_parameters(newer, alignment, None);
     }
 
-    /// Lays a newer frame into this one, and equates the landmarks known in both if there are
-    /// parameters for that.
-    fn lay(
+    /// Merges a newer frame into this one. With parameters, the landmarks known in both are
+    /// equated.
+    fn merge_with_parameters(
         &mut self,
         mut newer: Self,
         alignment: &FrameAlignment,
@@ -137,7 +137,7 @@ impl Frame {
         self.make_room();
     }
 
-    /// The landmarks that sleep in a newer frame sleep here, unless they are known here.
+    /// Archives the archived landmarks of a newer frame here, unless they are known here.
     fn take_over(&mut self, newer: &LandmarkArchive, alignment: &FrameAlignment) {
         let rotation = alignment.pose.rotation.to_rotation_matrix().into_inner();
         for (label, landmark) in newer.iter() {
@@ -167,7 +167,7 @@ impl Frame {
         parameters: &Parameters,
     ) {
         if self.members.is_empty() {
-            return; // of nobody is there a rotation by which errors could be counted
+            return; // errors are counted relative to the rotation of a member
         }
         let (label, other) = &duplicates[index];
         if let Some(one) = Arc::make_mut(&mut self.landmarks).get_mut(label) {

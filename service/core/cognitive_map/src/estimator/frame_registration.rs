@@ -1,4 +1,4 @@
-//! Frames whose landmarks lie alike, though they are called otherwise.
+//! Registration of two frames by their landmarks, whatever these are called.
 
 use std::cmp::Reverse;
 
@@ -111,7 +111,7 @@ impl Estimator {
         n_found
     }
 
-    /// Lays a frame into an older one by landmarks that are the same, which go by the older one's
+    /// Merges a frame into an older one by landmarks that are the same, which go by the older one's
     /// names from now on.
     fn accept(
         &mut self,

@@ -32,7 +32,7 @@ pub(super) struct LandmarkArchive {
 }
 
 impl LandmarkArchive {
-    /// Puts a landmark to sleep.
+    /// Archives a landmark.
     pub(super) fn insert(&mut self, label: Label, landmark: ArchivedLandmark) {
         while self.parts.len() < ARCHIVE_PARTS {
             self.parts.push(Arc::default(), 0);
@@ -50,7 +50,7 @@ impl LandmarkArchive {
         part.insert(label, landmark);
     }
 
-    /// Puts one to sleep that comes after all others in their order; answers whether it does, and
+    /// Archives a landmark that comes after all others in their order; answers whether it does, and
     /// whether there was room.
     pub(super) fn append(&mut self, label: Label, landmark: ArchivedLandmark) -> bool {
         let number = part_of(&label);

@@ -1,10 +1,10 @@
-//! Landmarks of one frame that have another name for some of its agents.
+//! Association of landmarks of one frame that agents call by different names.
 //!
-//! What one agent calls by names of its own lies, landmark by landmark, where others know
-//! something. One such pair is no proof: as many must agree as chance would bring together once in
-//! ten thousand times, by how densely landmarks lie. Those that were found to be the same before
-//! count with them, so that what the agent comes to see later follows one by one. Two landmarks
-//! that one agent has told apart are never one.
+//! A landmark of one agent that lies where others know a landmark may be the same. One such pair
+//! proves nothing: as many must agree as chance would bring together once in ten thousand times,
+//! given how densely landmarks lie. Landmarks that were associated before count with them, so that
+//! later ones follow one by one. Two landmarks that one agent has called by different names are
+//! never one.
 
 use nalgebra::Matrix3;
 

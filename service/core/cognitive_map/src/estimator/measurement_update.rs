@@ -1,4 +1,4 @@
-//! What a sighting does to a frame.
+//! Measurement update of a frame by a sighting.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -129,7 +129,7 @@ impl Frame {
         if self.members[measurement.observer].state.is_doubted()
             && let Some(archived) = self.archive.remove(label)
         {
-            // It corrects itself by it, as by one that is awake.
+            // A doubted observer corrects itself by the archived estimate.
             self.restore(label, &archived);
             return self.update_by_landmark(measurement, label);
         }
@@ -150,7 +150,7 @@ impl Frame {
         let offset = self
             .covariance
             .append(&[past.block(&by_pose)], &symmetric(&noise));
-        // Who saw one that was asleep is forgotten.
+        // The observers of an archived landmark are not known any more.
         let mut observers = if self.archive.contains(label) {
             Observers::unknown()
         } else {
@@ -174,7 +174,7 @@ impl Frame {
         Outcome { verdict, variance }
     }
 
-    /// A landmark wakes up as it was, and correlated with nothing.
+    /// Restores an archived landmark with its own covariance, correlated with nothing.
     fn restore(&mut self, label: &Label, archived: &ArchivedLandmark) {
         let offset = self.covariance.grow(LANDMARK_DIM);
         self.covariance.set_diagonal(offset, &archived.covariance);

@@ -11,7 +11,7 @@ use super::tuning::{FRAMES_COMPARED_MAX, MEMBERS_MAX};
 use crate::input::Label;
 
 impl Estimator {
-    /// Looks whether an agent's frame and another one can be laid into each other, after a sighting
+    /// Merges an agent's frame with another one if their alignment is known, after a sighting
     /// of a landmark, or of another agent.
     pub(super) fn merge_with(
         &mut self,
@@ -69,7 +69,7 @@ impl Estimator {
         align_frames(&pairs, one.is_planar() && other.is_planar())
     }
 
-    /// Lays a frame into an older one.
+    /// Merges a frame into an older one.
     pub(super) fn merge(
         &mut self,
         older: usize,
@@ -100,7 +100,7 @@ impl Estimator {
                 if let Some(state) = self.agent_state_mut(agent) {
                     state.doubt = doubt;
                 }
-                // What one has seen that was nowhere lies as the map has it.
+                // Doubt remains only if its sightings had been refused.
                 let is_doubted = self.was_contradicted(agent);
                 self.slot_mut(agent).is_aside &= is_doubted;
             }

@@ -40,7 +40,7 @@ impl Estimator {
         true
     }
 
-    /// An agent was told where it stands in the map.
+    /// Takes in a start pose of an agent.
     pub fn start_pose(&mut self, agent: u32, start: &StartPose, effects: &mut Vec<Effect>) {
         let sd = start.noise().sd();
         // No rotation is off by more than half a turn.

@@ -1,15 +1,13 @@
-//! Agents whose evidence contradicts the estimate: how much that counts, and when it is absurd.
+//! Agents whose sightings contradict the estimate.
 //!
-//! Each sighting that is refused is one more against its observer, and each that is where it should
-//! be one less. An agent that many speak against is *doubted*: what it sees corrects itself alone,
-//! and sightings of it correct only it. One that nearly all speak against for long is *set aside*:
-//! it begins anew in a frame of its own, as one that has just joined, and what only it has seen is
-//! nobody else's landmark any more. So is an agent whose pose may be anywhere, or where nothing is.
+//! An agent's *doubt* counts its refused sightings, less those that fit.
 //!
-//! It comes back as a newcomer does, when enough of what it sees lies as the map has it, or it is
-//! told where it stands. It stays doubted until more of its sightings fit than do not, by
-//! [`DOUBT_ON_RETURN`]; then its landmarks in the map, which have been kept for that, are
-//! everybody's again.
+//! - From [`DOUBT_MIN`] on the agent is doubted: its sightings correct itself alone, and sightings of it
+//!   correct only it, as in a Schmidt-Kalman filter.
+//! - At [`DOUBT_MAX`] it is *set aside*: it begins anew in a frame of its own, and landmarks that only it
+//!   has seen are hidden from the others. An agent whose pose may be anywhere is set aside at once.
+//! - It returns to the map as a newcomer does: by landmarks that lie as the map has them, or by a start
+//!   pose. It then has the doubt [`DOUBT_ON_RETURN`]; once that is zero, its landmarks count again.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -27,7 +25,7 @@ use crate::input::Label;
 use geometry::is_somewhere;
 
 impl AgentState {
-    /// Whether its sightings contradict the estimate so much that they correct nobody but itself.
+    /// Whether its sightings contradict the estimate, so that they correct the agent alone.
     pub(super) fn is_doubted(&self) -> bool {
         self.doubt >= DOUBT_MIN
     }
@@ -65,7 +63,7 @@ impl Frame {
         }
     }
 
-    /// Whether a landmark is where nothing is, or may be anywhere.
+    /// Whether a landmark's position is out of bounds or of unbounded variance.
     fn is_nowhere(&self, landmark: &LandmarkState) -> bool {
         let axes = landmark.offset..landmark.offset + 3;
         let variance: f64 = axes.map(|k| self.covariance.variance(k)).sum();
@@ -111,7 +109,7 @@ impl Estimator {
         }
     }
 
-    /// Whether an agent was set aside that had been contradicted, and not only nowhere.
+    /// Whether an agent was set aside for its refused sightings, and not for its covariance alone.
     pub(super) fn was_contradicted(&self, agent: u32) -> bool {
         let slot = self.slot(agent);
         slot.is_some_and(|slot| slot.is_aside && slot.evidence.refused > 0)
@@ -200,7 +198,7 @@ impl Estimator {
     pub(super) fn depart(&mut self, from: usize) {
         self.frame_mut(from).population -= 1;
         if from != MAP && self.frame(from).population == 0 {
-            // Nobody will ever tell where that frame lay.
+            // Without an agent no sighting can align this frame any more.
             *self.frame_mut(from) = Frame::default();
             self.forget_cross_sightings(from);
         }

@@ -1,4 +1,4 @@
-//! What a sample does to the map.
+//! The fold of one record: sessions, skips, samples, and the agent's place in the map.
 
 use std::collections::BTreeMap;
 
@@ -47,7 +47,8 @@ pub(super) struct Fold<'a> {
 }
 
 impl Fold<'_> {
-    /// Lets go of a place and a trip that have been forgotten since the agent's record before this.
+    /// Drops references to a place and a trip that have been forgotten since the agent's latest
+    /// record.
     pub(super) fn drop_forgotten(&mut self) {
         if let Some((place, _)) = self.agent.place
             && self.places.get(place).is_none()
@@ -126,7 +127,7 @@ impl Fold<'_> {
         self.rest();
     }
 
-    /// The agent was told where it stands.
+    /// Takes in a start pose.
     fn start_pose(&mut self, start: &StartPose) {
         self.end_trip(TripEnd::StartPose);
         self.estimator

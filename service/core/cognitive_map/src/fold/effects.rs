@@ -1,4 +1,5 @@
-//! What the estimator brings about: kept in the keyframe graph, and applied to landmarks and places.
+//! What the estimator brings about: kept in the keyframe graph, and applied to landmarks and
+//! places.
 
 use super::CognitiveMap;
 use super::apply::Fold;

@@ -1,4 +1,4 @@
-//! What motion does to the map: path integration, place cells, trips.
+//! Motion: path integration, place cells, trips.
 
 use nalgebra::Point3;
 

@@ -1,4 +1,4 @@
-//! What touching does to the objects that are known.
+//! Contacts with objects: episodes that teach or identify them.
 
 use super::CognitiveMap;
 use super::apply::Fold;

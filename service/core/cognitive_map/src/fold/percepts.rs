@@ -67,7 +67,7 @@ impl Fold<'_> {
         }
         let is_sought = self.keyframes.is_seeking(number);
         if self.agent.placed && !is_sought {
-            // Nobody knows where that is seen.
+            // Where a kidnapped agent sees it is not known.
             if !(is_lost && self.keyframes.is_kidnapped(number)) {
                 self.keyframes.view(&view);
             }

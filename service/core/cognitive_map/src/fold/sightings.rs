@@ -51,7 +51,7 @@ impl Fold<'_> {
         }
     }
 
-    /// Another agent was seen. One that the space does not know yet is nowhere.
+    /// Another agent was seen. The sighting of an agent that the space does not know is dropped.
     fn other_agent(&mut self, name: &Label, relation: &Relation) {
         if let Some(target) = self.names.get(name) {
             let (agent, stamp_ns) = (self.agent_id.0, self.stamp_ns);

@@ -1,4 +1,4 @@
-//! Pairs of landmarks of which another landmark could be meant about as well.
+//! Ambiguous correspondences: those in which another landmark fits about as well.
 
 use nalgebra::{Isometry3, Point3};
 

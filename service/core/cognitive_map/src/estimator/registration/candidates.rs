@@ -1,4 +1,4 @@
-//! The motions that are worth a closer look.
+//! The hypotheses that are worth refining.
 
 use nalgebra::Isometry3;
 

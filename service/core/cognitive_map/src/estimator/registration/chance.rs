@@ -1,4 +1,4 @@
-//! How often a motion would be as good by chance.
+//! Number of false alarms: how many motions would be as good by chance.
 
 use super::point_index::{Correspondence, PointIndex};
 

@@ -1,4 +1,4 @@
-//! Landmarks that lie so close together that they agree together.
+//! Groups of landmarks so close together that their agreements are not independent.
 
 use super::UncertainPoint;
 use super::hypotheses::Hypothesis;

@@ -1,4 +1,5 @@
-//! Motions that lay a few landmarks of one frame over landmarks of another that lie alike.
+//! Hypotheses: rigid motions that take two landmarks of one frame (three in space) to two of
+//! another.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
@@ -6,7 +7,8 @@ use super::tuning::{DISTANCE_MIN, HYPOTHESES_MAX, SEEDS_MAX};
 use super::{GATE, UncertainPoint};
 use geometry::align;
 
-/// A motion that lays two landmarks (three in space) over others.
+/// A rigid motion that takes two landmarks (three in space) of the newer frame to two of the older
+/// one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hypothesis {
     /// Pose of the newer frame in the older one.
@@ -95,7 +97,7 @@ fn spans(points: &[UncertainPoint]) -> Vec<Span> {
     spans
 }
 
-/// The motion in the plane that lays a pair over another one.
+/// The motion in the plane that takes a pair of landmarks to another one.
 fn by_two(
     older: &[UncertainPoint],
     newer: &[UncertainPoint],

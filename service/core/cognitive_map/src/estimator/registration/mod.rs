@@ -1,21 +1,20 @@
-//! Constellations: two frames that know the same landmarks by other names, told by how these lie to
-//! one another.
+//! Registration of two frames that know the same landmarks by other names, by how these lie.
 //!
 //! ```text
-//! hypotheses   rigid motions that lay two landmarks of one frame (three in space) over two of the other which are as
-//!              far from one another, within the deviations of both distances
-//! correspondences        landmarks that a motion lays within their deviations of one another, one to one; the motion is fitted to
-//!              those in which no other landmark may be meant, and they are sought again
-//! chance       H · m · P(at least k − 2 of m − 2 are so near by chance), the least over k; in space k − 3 of m − 3
+//! hypotheses        rigid motions that take two landmarks of one frame (three in space) to two of the other
+//!                   that are as far apart, within the deviations of both distances
+//! correspondences   landmarks that coincide under a motion within their deviations, one to one; the
+//!                   motion is fitted to the unambiguous ones, and they are sought again
+//! false alarms      H · m · P(at least k − 2 of m − 2 are so near by chance), the least over k;
+//!                   in space k − 3 of m − 3
 //! ```
 //!
-//! H is the number of hypotheses, m that of the landmarks that are sought, and how near something
-//! lies by chance follows from the density of the other frame's landmarks. Landmarks close together
-//! agree together: a group of them counts once, among the hypotheses, too. That is the expected
-//! number of motions which are as good where nothing is the same (the number of false alarms of
-//! Desolneux, Moisan & Morel 2000; Moisan & Stival 2004 for such hypotheses). Landmarks in a
-//! regular order are no matter of chance: so no other motion may explain nearly as much. A mirrored
-//! constellation is another one: a motion is refused if the mirror image explains more.
+//! H is the number of hypotheses, m that of the landmarks that are sought; how near something lies
+//! by chance follows from the density of the other frame's landmarks. A group of landmarks close
+//! together counts once. The result is the expected number of motions that are as good where
+//! nothing is the same (number of false alarms: Desolneux, Moisan & Morel 2000; Moisan & Stival
+//! 2004). Landmarks in a regular order do not lie by chance, so no other motion may explain nearly
+//! as much, nor the mirror image more.
 
 mod ambiguity;
 mod candidates;

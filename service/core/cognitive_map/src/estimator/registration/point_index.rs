@@ -1,4 +1,4 @@
-//! The landmarks of one frame, to be found by where they are.
+//! Index of a frame's landmarks by position.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
@@ -17,7 +17,7 @@ pub(in super::super) struct PointIndex<'a> {
     is_planar: bool,
 }
 
-/// Two landmarks that a motion lays over each other.
+/// Landmarks of the older and of the newer frame that coincide under a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Correspondence {
     pub(super) older: usize,
