@@ -56,13 +56,14 @@ const TOP: [&str; 22] = [
 const LINES_MAX: usize = 500;
 
 /// Manifests whose dependencies each have their reason beside them.
-const MANIFESTS: [&str; 14] = [
+const MANIFESTS: [&str; 15] = [
     "proto/Cargo.toml",
     "service/Cargo.toml",
     "service/core/cognitive_map/Cargo.toml",
     "service/core/geometry/Cargo.toml",
     "service/core/grid/Cargo.toml",
     "service/core/object_recognition/Cargo.toml",
+    "service/core/place_recognition/Cargo.toml",
     "service/core/pose_graph/Cargo.toml",
     "service/core/random/Cargo.toml",
     "service/core/state/Cargo.toml",
@@ -74,7 +75,7 @@ const MANIFESTS: [&str; 14] = [
 ];
 
 /// Crates of the core, each with all that it may depend on: the arrows of the core, and the wall around it.
-const CORE: [(&str, &[&str]); 8] = [
+const CORE: [(&str, &[&str]); 9] = [
     ("random", &[]),
     ("state", &["nalgebra", "thiserror"]),
     ("trajectory", &["nalgebra", "thiserror"]),
@@ -84,6 +85,7 @@ const CORE: [(&str, &[&str]); 8] = [
         "pose_graph",
         &["geometry", "nalgebra", "pulp", "state", "thiserror"],
     ),
+    ("place_recognition", &["geometry", "nalgebra", "state"]),
     (
         "object_recognition",
         &["geometry", "grid", "nalgebra", "pulp", "state"],
@@ -95,6 +97,7 @@ const CORE: [(&str, &[&str]); 8] = [
             "grid",
             "nalgebra",
             "object_recognition",
+            "place_recognition",
             "pose_graph",
             "random",
             "state",

@@ -8,9 +8,10 @@ mod planar;
 mod positive;
 pub mod se3;
 mod se3_jacobian;
+mod symmetric;
 
 pub use alignment::{align, centre};
-pub use bounds::is_somewhere;
+pub use bounds::{is_somewhere, is_within};
 pub use covariance::{PoseCovariance, upper_triangle};
 pub use motion_sum::MotionSum;
 pub use planar::{
@@ -18,3 +19,4 @@ pub use planar::{
 };
 pub use positive::positive;
 pub use se3_jacobian::log_jacobian;
+pub use symmetric::symmetric;

@@ -3,6 +3,7 @@
 mod bytes;
 mod digest;
 mod matrix;
+mod moments;
 mod paged;
 mod slab;
 mod sparse;
@@ -10,6 +11,7 @@ mod summary;
 
 pub use bytes::{CorruptState, ITEMS_MAX, State, StateReader, StateWriter, read_list, write_list};
 pub use digest::{Digest, InvalidDigest};
+pub use moments::Moments;
 pub use paged::{PagedVec, write_page};
 pub use slab::{NONE, Slab, Slot};
 pub use sparse::{PageItems, SparseVec};

@@ -1,9 +1,9 @@
-//! A team's samples through the joint estimate and the chronicle.
+//! A team's samples through the joint estimate and the graph.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use cognitive_map::estimator::{Estimator, Parameters};
+use cognitive_map::estimator::{Effect, Estimator, Parameters};
 use cognitive_map::keyframes::{KeyframeGraph, KeyframeSettings, Moment, Refined};
 use cognitive_map::{Sample, SampleBody, Target};
 use trajectory::{Alignment, Span, StampedPose, Trajectory, ate_rmse_m};
@@ -11,24 +11,24 @@ use trajectory::{Alignment, Span, StampedPose, Trajectory, ate_rmse_m};
 /// A team as it lives.
 pub(crate) struct Lived {
     pub(crate) estimator: Estimator,
-    pub(crate) chronicle: KeyframeGraph,
+    pub(crate) graph: KeyframeGraph,
     agents: BTreeMap<u32, u32>,
     names: BTreeMap<String, u32>,
     seqs: BTreeMap<u32, u64>,
     pub(crate) causal: BTreeMap<u32, Vec<StampedPose>>,
-    /// Seconds that the chronicle took for each sample.
+    /// Seconds that the graph took for each sample.
     pub(crate) times_s: Vec<f64>,
 }
 
 impl Lived {
-    pub(crate) fn new(anchors_max: Option<u32>) -> Self {
+    pub(crate) fn new(keyframes_max: Option<u32>) -> Self {
         let mut settings = KeyframeSettings::default();
-        if let Some(anchors_max) = anchors_max {
-            settings.anchors_max = anchors_max;
+        if let Some(keyframes_max) = keyframes_max {
+            settings.keyframes_max = keyframes_max;
         }
         Self {
             estimator: Estimator::new(Parameters::default()),
-            chronicle: KeyframeGraph::new(settings),
+            graph: KeyframeGraph::new(settings),
             agents: BTreeMap::new(),
             names: BTreeMap::new(),
             seqs: BTreeMap::new(),
@@ -40,7 +40,7 @@ impl Lived {
     /// A robot of the team.
     pub(crate) fn enrol(&mut self, robot: u32, name: String) {
         let agent = self.estimator.enrol();
-        self.chronicle.enrol();
+        self.graph.enrol();
         self.agents.insert(robot, agent);
         self.names.insert(name, agent);
     }
@@ -51,22 +51,27 @@ impl Lived {
         let seq = self.seqs.entry(agent).or_default();
         *seq += 1;
         let seq = *seq;
-        let mut step = None;
-        let mut taken = None;
+        let mut effects = Vec::new();
         match &sample.body {
             SampleBody::Motion(motion) => {
-                step = Some(self.estimator.motion(agent, stamp_ns, motion));
+                self.estimator.motion(agent, stamp_ns, motion, &mut effects);
             }
-            SampleBody::StartPose(start) => self.estimator.start_pose(agent, start),
+            SampleBody::StartPose(start) => self.estimator.start_pose(agent, start, &mut effects),
             SampleBody::Sighting(sighting) => match &sighting.target {
                 Target::Landmark(label) => {
                     let relation = &sighting.relation;
-                    taken = Some(self.estimator.landmark(agent, stamp_ns, label, relation));
+                    self.estimator
+                        .landmark(agent, stamp_ns, label, relation, &mut effects);
                 }
                 Target::Agent(name) if sees_robots => {
                     let target = self.names[name.as_str()];
-                    self.estimator
-                        .sighting(agent, stamp_ns, target, &sighting.relation);
+                    self.estimator.sighting(
+                        agent,
+                        stamp_ns,
+                        target,
+                        &sighting.relation,
+                        &mut effects,
+                    );
                 }
                 _ => {}
             },
@@ -81,45 +86,54 @@ impl Lived {
             stamp_ns,
             pose,
         };
-        let (settled, merged) = (self.estimator.take_settled(), self.estimator.take_merged());
         let begin = Instant::now();
-        match (&sample.body, step, taken) {
-            (SampleBody::Motion(_), Some(step), _) => {
-                self.chronicle
-                    .motion(&moment, &step.increment, &step.variance, &step.calibrated);
-            }
-            (SampleBody::StartPose(start), ..) => self.chronicle.start_pose(&moment, start),
-            (SampleBody::Sighting(sighting), _, Some(taken)) if taken.accepted => {
-                if let Target::Landmark(label) = &sighting.target {
-                    let (relation, variance) = (&sighting.relation, &taken.variance);
-                    self.chronicle.landmark(&moment, label, relation, variance);
-                }
-            }
-            _ => {}
+        if let SampleBody::StartPose(start) = &sample.body {
+            self.graph.start_pose(&moment, start);
         }
-        for merged in merged {
-            for agent in merged.agents {
-                if merged.into == 0 {
-                    self.chronicle.placed(agent, &merged.pose);
-                } else {
-                    self.chronicle.carried(agent, &merged.pose);
-                }
-            }
-        }
-        for seen in settled.iter().filter(|seen| seen.accepted) {
-            let variance = seen.variance.fixed_rows::<3>(0).into_owned();
-            self.chronicle.sighted(
-                seen.observer,
-                seen.target,
-                seen.stamp_ns,
-                &seen.relation,
-                &variance,
-            );
+        effects.sort_by_key(Effect::order);
+        for effect in &effects {
+            self.apply(&moment, effect);
         }
         self.times_s.push(begin.elapsed().as_secs_f64());
         let poses = self.causal.entry(robot).or_default();
         poses.pop_if(|last| last.stamp_ns == stamp_ns);
         poses.push(StampedPose { stamp_ns, pose });
+    }
+
+    /// Tells the keyframe graph what a sample brought about.
+    fn apply(&mut self, moment: &Moment, effect: &Effect) {
+        match effect {
+            Effect::Moved { step, .. } => {
+                self.graph
+                    .motion(moment, &step.increment, &step.variance, &step.calibrated);
+            }
+            Effect::LandmarkSighted {
+                label,
+                relation,
+                variance,
+                ..
+            } => self.graph.landmark(moment, label, relation, variance),
+            Effect::AgentSighted(seen) if seen.accepted => {
+                let variance = seen.variance.fixed_rows::<3>(0).into_owned();
+                self.graph.sighted(
+                    seen.observer,
+                    seen.target,
+                    seen.stamp_ns,
+                    &seen.relation,
+                    &variance,
+                );
+            }
+            Effect::FramesMerged(merged) => {
+                for &agent in &merged.agents {
+                    if merged.into == 0 {
+                        self.graph.placed(agent, &merged.pose);
+                    } else {
+                        self.graph.transformed(agent, &merged.pose);
+                    }
+                }
+            }
+            _ => {}
+        }
     }
 
     /// Prints causal and refined errors against the truth; answers their means over the robots.

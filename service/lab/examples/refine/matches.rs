@@ -40,9 +40,9 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
         let after = stamps.partition_point(|&stamp| stamp < stamp_ns);
         after.min(stamps.len() - 1)
     };
-    let mut chronicle = KeyframeGraph::new(KeyframeSettings::default());
-    let agent = chronicle.enrol();
-    chronicle.found(agent);
+    let mut graph = KeyframeGraph::new(KeyframeSettings::default());
+    let agent = graph.enrol();
+    graph.found(agent);
     let (mut pose, mut alone) = (Isometry3::identity(), Isometry3::identity());
     let (mut causal, mut odometry) = (Vec::new(), Vec::new());
     let mut relaxations_s = Vec::new();
@@ -57,7 +57,7 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
             pose,
         };
         let variance = step.noise_sd.component_mul(&step.noise_sd);
-        chronicle.motion(
+        graph.motion(
             &moment(pose),
             &step.motion,
             &variance,
@@ -65,11 +65,11 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
         );
         while let Some(found) = next.next_if(|found| step_of(found.later_ns) <= index) {
             let earlier = step_of(found.earlier_ns) as u64 + 1;
-            chronicle.closure(&moment(pose), earlier, &relation);
+            graph.closure(&moment(pose), earlier, &relation);
         }
-        if chronicle.is_due() {
+        if graph.is_due() {
             let begin = Instant::now();
-            let corrections = chronicle.relax();
+            let corrections = graph.relax();
             relaxations_s.push(begin.elapsed().as_secs_f64());
             if let Some(correction) = corrections.first() {
                 pose = correction.pose;
@@ -83,7 +83,7 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
         odometry.push(at(alone));
     }
     let begin = Instant::now();
-    let refined = chronicle.refine();
+    let refined = graph.refine();
     let seconds = begin.elapsed().as_secs_f64();
     let poses: Vec<StampedPose> = refined.agents[0]
         .poses
@@ -104,15 +104,15 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
     println!(
         "{} matches, {n_false} false; {} believed; aligned: odometry {odometry_m:.3} m, causal {causal_m:.3} m, refined {refined_m:.3} m",
         matches.len(),
-        chronicle.n_matches_believed(),
+        graph.n_matches_believed(),
     );
     println!(
         "{} anchors; {} relaxations in {relaxed_s:.2} s, the longest {:.0} ms; refined in {seconds:.2} s",
-        chronicle.n_anchors(),
+        graph.n_keyframes(),
         relaxations_s.len(),
         relaxations_s.iter().copied().fold(0.0, f64::max) * 1e3,
     );
-    g2o.is_none_or(|file| std::fs::write(file, text(&chronicle)).is_ok())
+    g2o.is_none_or(|file| std::fs::write(file, text(&graph)).is_ok())
 }
 
 /// The set's matches over longer gaps, and false ones until they make up a share; how many are false.
@@ -149,10 +149,10 @@ fn matches_of(set: &Tuc, share: f64) -> (Vec<Match>, usize) {
 }
 
 /// The graph in the plane, as g2o writes it.
-fn text(chronicle: &KeyframeGraph) -> String {
+fn text(graph: &KeyframeGraph) -> String {
     use std::fmt::Write as _;
 
-    let map = chronicle.experience_map();
+    let map = graph.experience_map();
     let planar = |pose: &Isometry3<f64>| {
         let (_, _, heading) = pose.rotation.euler_angles();
         format!("{} {} {heading}", pose.translation.x, pose.translation.y)

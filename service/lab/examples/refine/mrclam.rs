@@ -11,11 +11,11 @@ use trajectory::Alignment;
 use crate::lived::Lived;
 
 /// Prints the errors; answers whether the set could be read.
-pub(crate) fn run(directory: &str, sees_robots: bool, anchors_max: Option<u32>) -> bool {
+pub(crate) fn run(directory: &str, sees_robots: bool, keyframes_max: Option<u32>) -> bool {
     let Ok(set) = Mrclam::load(Path::new(directory)) else {
         return false;
     };
-    let mut lived = Lived::new(anchors_max);
+    let mut lived = Lived::new(keyframes_max);
     for &robot in set.robots().keys() {
         lived.enrol(robot, robot_name(robot));
     }
@@ -25,7 +25,7 @@ pub(crate) fn run(directory: &str, sees_robots: bool, anchors_max: Option<u32>) 
         }
     }
     let begin = Instant::now();
-    let refined = lived.chronicle.refine();
+    let refined = lived.graph.refine();
     let seconds = begin.elapsed().as_secs_f64();
     let truths = set
         .robots()
@@ -41,8 +41,8 @@ pub(crate) fn run(directory: &str, sees_robots: bool, anchors_max: Option<u32>) 
     );
     println!(
         "{} anchors, {} sightings; {} steps in {seconds:.2} s, chi2 {:.0} from {:.0}; us a sample: p50 {:.2}, p99 {:.2}, max {:.0}",
-        lived.chronicle.n_anchors(),
-        lived.chronicle.n_sightings(),
+        lived.graph.n_keyframes(),
+        lived.graph.n_sightings(),
         refined.relaxed.n_steps,
         refined.relaxed.chi_squared,
         refined.relaxed.chi_squared_at_start,

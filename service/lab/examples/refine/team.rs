@@ -51,7 +51,7 @@ pub(crate) fn run(runs: u64) -> bool {
         let Some(span) = Span::common([span]) else {
             return false;
         };
-        let refined = lived.chronicle.refine();
+        let refined = lived.graph.refine();
         let means = lived.compare(&refined, &truths, span, Alignment::Spatial);
         println!(
             "seed {seed}: causal {:.4} m, refined {:.4} m",

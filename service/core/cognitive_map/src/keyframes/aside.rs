@@ -1,28 +1,27 @@
-//! Agents that are set aside: their past counts no longer.
+//! Detached agents: what they did in the map no longer counts.
 
 use nalgebra::Isometry3;
 
 use super::graph::KeyframeGraph;
 
 impl KeyframeGraph {
-    /// An agent was set aside: it begins anew in a frame of its own, and what it did and saw in the
-    /// map no longer counts there.
+    /// Detaches an agent: it begins anew in a frame of its own, and what it did in the map no
+    /// longer counts there.
     pub fn set_aside(&mut self, agent: u32) {
         let revision = self.revision;
-        let Some(life) = self.lives.get_mut(agent as usize, revision) else {
+        let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
             return;
         };
-        life.is_in_map = false;
-        life.own_frame = None;
-        life.founds = false;
-        life.is_cut = true;
-        life.pose = Isometry3::identity();
-        let is_fresh = life.is_fresh;
-        self.revisits.cut(agent, revision);
-        self.waiting
-            .retain(|waiting| waiting.observer != agent && waiting.target != agent);
-        if !is_fresh {
-            self.anchor_anew(agent);
+        track.is_in_map = false;
+        track.own_frame = None;
+        track.is_origin = false;
+        track.begins_anew = true;
+        track.pose = Isometry3::identity();
+        let needs_keyframe = track.needs_keyframe;
+        self.pending
+            .retain(|pending| pending.observer != agent && pending.target != agent);
+        if !needs_keyframe {
+            self.add_keyframe(agent);
         }
     }
 }

@@ -1,35 +1,36 @@
-//! The past with few anchors: what is relaxed while samples come in.
+//! The coarse graph: few keyframes, relaxed while samples come in.
 
 use nalgebra::Isometry3;
 
+use super::constraint::ClosureState;
 use super::graph::KeyframeGraph;
-use super::life::is_within;
-use super::tie::Standing;
+use geometry::is_within;
 use state::{NONE, Slab};
 
-/// Motion between the anchors of the coarse past \[m, rad\]. Over so short a way the noise of odometry is less than what
-/// matches state, and what hangs on the anchors in between goes to a neighbour with it.
+/// Motion between keyframes of the coarse graph \[m, rad\]. Over so short a way the noise of
+/// odometry is below that of closures, and is added to what moves to a neighbour.
 const STEP: (f64, f64) = (1.0, 0.5);
 
-/// Matches that wait and are looked at again: the latest ones. Earlier ones have been looked at many times; once the whole
-/// past is refined they are again.
+/// Most pending closures of the coarse graph, the latest ones. Earlier ones have been judged many
+/// times; a refinement of the whole past judges them again.
 const WAITING_MAX: usize = 512;
 
 impl KeyframeGraph {
-    /// A copy with an anchor a step only, and where something was seen, where an agent began anew, and where it is now.
-    /// Anchors and ties keep their numbers.
+    /// A copy with one keyframe a step, and those with sightings, at the begin of a stretch, and
+    /// the latest ones. Keyframes and constraints keep their numbers.
     pub(super) fn coarse(&self) -> Self {
         let mut coarse = self.clone();
-        // What is moored goes with the anchors afterwards.
-        coarse.moorings = Slab::default();
-        for agent in 0..self.lives.len() {
-            let newest = self.lives.get(agent).map_or(NONE, |life| life.newest);
+        // Attachments move with the keyframes afterwards.
+        coarse.attachments.slab = Slab::default();
+        for agent in 0..self.tracks.len() {
+            let newest = self.tracks.get(agent).map_or(NONE, |track| track.newest);
             let mut way = Isometry3::identity();
             let mut number = newest;
-            while let Some(anchor) = coarse.anchors.get(number) {
-                let (motion, previous) = (anchor.motion, anchor.previous);
-                // Which neighbours an anchor has decides where the way goes on; the chain is walked from its end.
-                if number == newest || coarse.is_key(number) || !is_within(&way, STEP.0, STEP.1) {
+            while let Some(keyframe) = coarse.keyframes.get(number) {
+                let (motion, previous) = (keyframe.motion, keyframe.previous);
+                // The chain is walked from its end, since removals change the neighbours.
+                if number == newest || coarse.must_stay(number) || !is_within(&way, STEP.0, STEP.1)
+                {
                     way = motion;
                 } else {
                     coarse.dissolve(number);
@@ -38,96 +39,110 @@ impl KeyframeGraph {
                 number = previous;
             }
         }
-        coarse.leave_out();
+        coarse.drop_old_candidates();
         coarse
     }
 
-    /// Leaves out matches that wait, but for the latest ones.
-    fn leave_out(&mut self) {
-        let mut waiting: Vec<(i64, u32)> = self
-            .ties
+    /// Removes pending closures but the latest ones.
+    fn drop_old_candidates(&mut self) {
+        let mut pending: Vec<(i64, u32)> = self
+            .constraints
             .iter()
-            .filter(|(_, tie)| matches!(tie.standing, Standing::Pending | Standing::Refuted))
-            .filter_map(|(number, tie)| Some((self.anchors.get(tie.from)?.stamp_ns, number)))
+            .filter(|(_, constraint)| {
+                matches!(
+                    constraint.state,
+                    ClosureState::Pending | ClosureState::Refuted
+                )
+            })
+            .filter_map(|(number, constraint)| {
+                Some((self.keyframes.get(constraint.from)?.stamp_ns, number))
+            })
             .collect();
-        waiting.sort_unstable();
-        let n_old = waiting.len().saturating_sub(WAITING_MAX);
-        for &(_, number) in &waiting[..n_old] {
-            self.untie(number);
+        pending.sort_unstable();
+        let n_old = pending.len().saturating_sub(WAITING_MAX);
+        for &(_, number) in &pending[..n_old] {
+            self.remove_constraint(number);
         }
     }
 
-    /// Whether an anchor has to stay in a coarse past.
-    fn is_key(&self, number: u32) -> bool {
-        let Some(anchor) = self.anchors.get(number) else {
+    /// Whether a keyframe must stay in the coarse graph.
+    fn must_stay(&self, number: u32) -> bool {
+        let Some(keyframe) = self.keyframes.get(number) else {
             return true;
         };
         let goes_on = self
-            .anchors
-            .get(anchor.next)
+            .keyframes
+            .get(keyframe.next)
             .is_some_and(|next| !next.begins);
-        if anchor.begins || !goes_on || anchor.sightings != NONE || anchor.shown != NONE {
+        if keyframe.begins || !goes_on || keyframe.sightings != NONE || keyframe.shown != NONE {
             return true;
         }
-        let mut at = anchor.ties;
-        while let Some(tie) = self.ties.get(at) {
-            if matches!(tie.standing, Standing::Origin | Standing::Stated) {
+        let mut at = keyframe.constraints;
+        while let Some(constraint) = self.constraints.get(at) {
+            if matches!(
+                constraint.state,
+                ClosureState::Origin | ClosureState::Stated
+            ) {
                 return true;
             }
-            at = self.next_tie(at, number);
+            at = self.next_constraint(at, number);
         }
         false
     }
 
-    /// Takes over where the anchors of a relaxed coarse copy are, and which matches it believes. What is between two of
-    /// its anchors moves with the earlier one.
-    pub(super) fn take_over(&mut self, coarse: &Self) {
+    /// Moves the keyframes as in a relaxed coarse copy, and adopts the states of its closures.
+    /// Keyframes between two of the copy move with the earlier one.
+    pub(super) fn adopt(&mut self, coarse: &Self) {
         let revision = self.revision;
-        for number in 0..self.ties.numbers() {
-            let standing = coarse.ties.get(number).map(|tie| tie.standing);
-            if let (Some(standing), Some(tie)) = (standing, self.ties.get(number))
-                && standing != tie.standing
-                && let Some(tie) = self.ties.get_mut(number, revision)
+        for number in 0..self.constraints.numbers() {
+            let state = coarse
+                .constraints
+                .get(number)
+                .map(|constraint| constraint.state);
+            if let (Some(state), Some(constraint)) = (state, self.constraints.get(number))
+                && state != constraint.state
+                && let Some(constraint) = self.constraints.get_mut(number, revision)
             {
-                tie.standing = standing;
+                constraint.state = state;
             }
         }
-        self.cast_off();
-        for agent in 0..self.lives.len() {
-            let Some(life) = self.lives.get(agent) else {
+        self.check_attachments();
+        for agent in 0..self.tracks.len() {
+            let Some(track) = self.tracks.get(agent) else {
                 continue;
             };
-            if !life.is_in_map {
+            if !track.is_in_map {
                 continue;
             }
-            // The latest anchors of the coarse past that have been met on the way back, and how they have moved.
+            // Keyframes since the last one of the coarse graph, on the way back.
             let mut behind: Vec<u32> = Vec::new();
-            let mut number = life.newest;
-            while let Some(anchor) = self.anchors.get(number) {
-                let previous = anchor.previous;
+            let mut number = track.newest;
+            while let Some(keyframe) = self.keyframes.get(number) {
+                let previous = keyframe.previous;
                 behind.push(number);
-                if let (Some(key), Some(was)) = (coarse.anchors.get(number), self.in_map(number)) {
+                if let (Some(key), Some(was)) = (coarse.keyframes.get(number), self.in_map(number))
+                {
                     let moved = key.pose * was.inverse();
                     for number in behind.drain(..) {
-                        self.move_anchor(number, &moved);
+                        self.move_keyframe(number, &moved);
                     }
                 }
                 number = previous;
             }
-            let newest = self.lives.get(agent).map_or(NONE, |life| life.newest);
-            let pose = self.anchors.get(newest).map(|anchor| anchor.pose);
-            if let (Some(pose), Some(life)) = (pose, self.lives.get_mut(agent, revision)) {
-                life.pose = pose * life.since.motion();
+            let newest = self.tracks.get(agent).map_or(NONE, |track| track.newest);
+            let pose = self.keyframes.get(newest).map(|keyframe| keyframe.pose);
+            if let (Some(pose), Some(track)) = (pose, self.tracks.get_mut(agent, revision)) {
+                track.pose = pose * track.since.motion();
             }
         }
     }
 
-    fn move_anchor(&mut self, number: u32, moved: &Isometry3<f64>) {
+    fn move_keyframe(&mut self, number: u32, moved: &Isometry3<f64>) {
         let was = self.in_map(number);
-        if let (Some(was), Some(anchor)) = (was, self.anchors.get_mut(number, self.revision)) {
-            anchor.pose = moved * was;
-            anchor.pose.rotation.renormalize_fast();
-            anchor.is_in_map = true;
+        if let (Some(was), Some(keyframe)) = (was, self.keyframes.get_mut(number, self.revision)) {
+            keyframe.pose = moved * was;
+            keyframe.pose.rotation.renormalize_fast();
+            keyframe.is_in_map = true;
         }
     }
 }

@@ -1,40 +1,39 @@
-//! The record itself, and what is told to it.
+//! The keyframe graph, and what is added to it.
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
-use super::anchor::Anchor;
+use super::agent_track::AgentTrack;
+use super::attachment::Attachments;
+use super::constraint::{ClosureState, Constraint};
+use super::keyframe::Keyframe;
+use super::keyframe_index::KeyframeIndex;
 use super::landmarks::Landmarks;
-use super::life::{Life, is_within};
-use super::milestones::Milestones;
-use super::mooring::Mooring;
-use super::relocalisation::{Doubts, Searches};
-use super::revisit::Revisits;
 use super::settings::KeyframeSettings;
-use super::sighting::{SeenPoint, Shown, Sighting};
-use super::tie::{Standing, Tie};
+use super::sighting::{Seen, SeenPoint, Sighting};
 use crate::estimator::Calibrated;
 use crate::input::{Label, Relation, StartPose};
-use geometry::{PoseCovariance, se3};
+use geometry::{PoseCovariance, is_within, se3};
 use state::PagedVec;
 use state::state_of_struct;
 use state::{NONE, Slab};
 
-/// Motion after which there is a new anchor in any case \[m, rad\]: between two, a pose is interpolated.
+/// Motion after which a keyframe is added in any case \[m, rad\]: poses between two are
+/// interpolated.
 const STEP: (f64, f64) = (0.1, 0.1);
-/// Motion since an anchor up to which sightings are still attached to it \[m, rad\].
+/// Motion since a keyframe up to which sightings are attached to it \[m, rad\].
 const NEAR: (f64, f64) = (0.02, 0.02);
 /// Motion that counts as rest \[m, rad\].
 pub(super) const REST: (f64, f64) = (0.005, 0.005);
-/// Rest after which there is a new anchor where the agent rests \[ns\].
+/// Rest after which a keyframe is added \[ns\].
 const REST_NS: i64 = 1_000_000_000;
-/// Sightings of agents that wait for the other agent's motion to come up to them.
+/// Most sightings that wait for the motion of the agent that was seen.
 const WAITING_MAX: usize = 64;
-/// How long they wait, by the observer's clock \[ns\].
+/// Longest time that they wait, by the observer's clock \[ns\].
 const PATIENCE_NS: i64 = 2_000_000_000;
-/// How many anchors back a sighting may show an agent.
+/// Keyframes searched back for the instant of a sighting.
 const LOOK_BACK_MAX: usize = 256;
-/// Sightings made at one anchor.
-pub(super) const SIGHTINGS_PER_ANCHOR_MAX: usize = 32;
+/// Most sightings of a keyframe.
+pub(super) const SIGHTINGS_PER_KEYFRAME_MAX: usize = 32;
 
 /// A moment of an agent.
 #[derive(Clone, Copy, Debug)]
@@ -45,68 +44,69 @@ pub struct Moment {
     pub seq: u64,
     /// Its stamp \[ns\].
     pub stamp_ns: i64,
-    /// Where the agent is thought to be after it, in the frame in which the agent is estimated. Only the start of a
-    /// relaxation depends on it.
+    /// Pose of the agent after it, in the frame in which it is estimated: the initial value of
+    /// relaxations.
     pub pose: Isometry3<f64>,
 }
 
-/// A sighting of an agent that has not moved up to it yet.
+/// A sighting of an agent whose motion has not come up to it yet.
 #[derive(Clone, Debug)]
-pub(super) struct Waiting {
-    pub(super) anchor: u32,
+pub(super) struct PendingSighting {
+    pub(super) keyframe: u32,
     pub(super) observer: u32,
     pub(super) target: u32,
     pub(super) stamp_ns: i64,
     pub(super) point: SeenPoint,
 }
 
-state_of_struct!(Waiting {
-    anchor,
+state_of_struct!(PendingSighting {
+    keyframe,
     observer,
     target,
     stamp_ns,
     point
 });
 
-/// What agents did and saw, as a graph that can be relaxed: the past, to be smoothed.
+/// The keyframe graph: the past motions and sightings of all agents, to be smoothed.
 ///
-/// It is told every motion and sighting, and answers with [`refine`](Self::refine), a pure function of what it was told.
-/// A clone is a snapshot that shares all pages.
+/// [`refine`](Self::refine) is a pure function of what was added. A clone is a snapshot that shares
+/// all pages.
 #[derive(Clone, Debug)]
 pub struct KeyframeGraph {
     pub(super) settings: KeyframeSettings,
-    /// Of the changes that are made now; for checkpoints only.
+    /// The revision under which changes are noted; for checkpoints only.
     pub(super) revision: u64,
-    pub(super) lives: PagedVec<Life, 4>,
-    pub(super) anchors: Slab<Anchor, 32>,
+    pub(super) tracks: PagedVec<AgentTrack, 4>,
+    pub(super) keyframes: Slab<Keyframe, 32>,
     pub(super) sightings: Slab<Sighting, 64>,
-    pub(super) ties: Slab<Tie, 32>,
+    pub(super) constraints: Slab<Constraint, 32>,
     pub(super) landmarks: Landmarks,
-    /// What lies beside anchors, by number.
-    pub(super) moorings: Slab<Mooring, 32>,
-    /// The latest mooring that was looked at, and how many are to be since anchors were moved.
-    pub(super) swung: u32,
-    pub(super) adrift: u32,
-    pub(super) waiting: Vec<Waiting>,
-    /// The number of the anchor at which the search for what may be thinned goes on.
-    pub(super) hand: u32,
-    /// Motions told since the last relaxation, and matches.
-    pub(super) told: u32,
-    pub(super) fresh_matches: u32,
-    /// Matches believed since then without waiting.
-    pub(super) agreed: u32,
-    /// What was seen, for who comes there again.
-    pub(super) revisits: Revisits,
-    /// Who does not know where it is, and what it has seen since.
-    pub(super) searches: Searches,
-    /// Whether what agents of the map see contradicts where they are believed to be.
-    pub(super) doubts: Doubts,
-    pub(super) milestones: Milestones,
+    /// Places that keep their pose relative to a keyframe.
+    pub(super) attachments: Attachments,
+    /// Sightings of agents whose motion has not come up to them yet.
+    pub(super) pending: Vec<PendingSighting>,
+    /// Sweep cursor: the number of the keyframe at which sparsification goes on.
+    pub(super) sweep: u32,
+    /// When to relax.
+    pub(super) schedule: Schedule,
+    pub(super) index: KeyframeIndex,
 }
 
-/// A place between anchors: an anchor, the motion from there, and the covariance of its error.
-pub(super) struct Beside {
-    pub(super) anchor: u32,
+/// What has come in since the last relaxation.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Schedule {
+    /// Motions.
+    pub(super) records: u32,
+    /// Loop closures that were kept.
+    pub(super) new_closures: u32,
+    /// Those of them that were accepted at once.
+    pub(super) accepted: u32,
+}
+
+/// An instant between keyframes: a keyframe, the motion from there, and the covariance of its
+/// error.
+pub(super) struct KeyframeOffset {
+    pub(super) keyframe: u32,
     pub(super) motion: Isometry3<f64>,
     pub(super) covariance: PoseCovariance,
 }
@@ -117,34 +117,28 @@ impl KeyframeGraph {
         Self {
             settings,
             revision: 1,
-            lives: PagedVec::default(),
-            anchors: Slab::default(),
+            tracks: PagedVec::default(),
+            keyframes: Slab::default(),
             sightings: Slab::default(),
-            ties: Slab::default(),
+            constraints: Slab::default(),
             landmarks: Landmarks::default(),
-            moorings: Slab::default(),
-            swung: 0,
-            adrift: 0,
-            waiting: Vec::new(),
-            hand: 0,
-            told: 0,
-            fresh_matches: 0,
-            agreed: 0,
-            revisits: Revisits::default(),
-            searches: Searches::default(),
-            doubts: Doubts::default(),
-            milestones: Milestones::default(),
+            attachments: Attachments::default(),
+            pending: Vec::new(),
+            sweep: 0,
+            schedule: Schedule::default(),
+            index: KeyframeIndex::default(),
         }
     }
 
-    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds the later ones.
+    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds
+    /// the later ones.
     pub fn set_revision(&mut self, revision: u64) {
         self.revision = revision;
     }
 
-    /// Number of anchors.
-    pub fn n_anchors(&self) -> usize {
-        self.anchors.len()
+    /// Number of keyframes.
+    pub fn n_keyframes(&self) -> usize {
+        self.keyframes.len()
     }
 
     /// Number of sightings, those joined into one counted once.
@@ -152,109 +146,109 @@ impl KeyframeGraph {
         self.sightings.len()
     }
 
-    /// A new agent, in a frame of its own; answers its number, counted from 0.
+    /// Adds an agent in a frame of its own; answers its number, counted from 0.
     pub fn enrol(&mut self) -> u32 {
-        let agent = u32::try_from(self.lives.len()).unwrap_or(NONE);
-        self.lives.push(Life::new(), self.revision);
+        let agent = u32::try_from(self.tracks.len()).unwrap_or(NONE);
+        self.tracks.push(AgentTrack::new(), self.revision);
         agent
     }
 
-    /// The frame of an agent is that of the map: its first anchor stays where it is.
+    /// The frame of an agent becomes that of the map: its first keyframe is the origin.
     pub fn found(&mut self, agent: u32) {
-        let Some(life) = self.lives.get(agent as usize) else {
+        let Some(track) = self.tracks.get(agent as usize) else {
             return;
         };
-        if life.is_in_map {
+        if track.is_in_map {
             return;
         }
         self.placed(agent, &Isometry3::identity());
-        let first = self.first_of(agent);
-        if let Some(anchor) = self.anchors.get(first) {
-            let at = anchor.pose;
-            self.tie_to_map(first, at, &PoseCovariance::zero(), Standing::Origin);
-        } else if let Some(life) = self.lives.get_mut(agent as usize, self.revision) {
-            life.founds = true;
+        let first = self.first_keyframe(agent);
+        if let Some(keyframe) = self.keyframes.get(first) {
+            let at = keyframe.pose;
+            self.constrain_to_map(first, at, &PoseCovariance::zero(), ClosureState::Origin);
+        } else if let Some(track) = self.tracks.get_mut(agent as usize, self.revision) {
+            track.is_origin = true;
         }
     }
 
-    /// The frame in which an agent was estimated turned out to lie in the map, there. All its anchors move with it.
+    /// Aligns the frame of an agent with the map. All its keyframes move with it.
     pub fn placed(&mut self, agent: u32, frame: &Isometry3<f64>) {
         let revision = self.revision;
-        let Some(life) = self.lives.get_mut(agent as usize, revision) else {
+        let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
             return;
         };
-        if !life.is_in_map {
-            life.own_frame = Some(*frame);
-            life.is_in_map = true;
-            life.pose = frame * life.pose;
+        if !track.is_in_map {
+            track.own_frame = Some(*frame);
+            track.is_in_map = true;
+            track.pose = frame * track.pose;
         }
     }
 
-    /// The frame in which an agent was estimated turned out to lie in another one that is not the map's, there. Walks the
-    /// whole chain of the agent; anchors from before it was set aside stay in the map.
-    pub fn carried(&mut self, agent: u32, frame: &Isometry3<f64>) {
+    /// Transforms the poses of an agent from its own frame to another one that is not the map's.
+    /// Walks the whole chain of the agent; keyframes from before it was detached stay in the map.
+    pub fn transformed(&mut self, agent: u32, frame: &Isometry3<f64>) {
         let revision = self.revision;
-        let Some(life) = self.lives.get_mut(agent as usize, revision) else {
+        let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
             return;
         };
-        if life.is_in_map {
+        if track.is_in_map {
             return;
         }
-        life.pose = frame * life.pose;
-        let mut number = life.newest;
-        while let Some(anchor) = self.anchors.get_mut(number, revision) {
-            if !anchor.is_in_map {
-                anchor.pose = frame * anchor.pose;
+        track.pose = frame * track.pose;
+        let mut number = track.newest;
+        while let Some(keyframe) = self.keyframes.get_mut(number, revision) {
+            if !keyframe.is_in_map {
+                keyframe.pose = frame * keyframe.pose;
             }
-            number = anchor.previous;
+            number = keyframe.previous;
         }
     }
 
-    /// An agent was told where it stands in the map. If it was in the map already, it has been put there: what it did
-    /// before does not lead there.
+    /// Sets the pose of an agent in the map. If it was in the map already, no motion leads there
+    /// from what it did before.
     pub fn start_pose(&mut self, moment: &Moment, start: &StartPose) {
-        let Some(life) = self.lives.get(moment.agent as usize) else {
+        let Some(track) = self.tracks.get(moment.agent as usize) else {
             return;
         };
-        let was_in_map = life.is_in_map;
-        let own_frame = start.pose() * life.pose.inverse();
+        let was_in_map = track.is_in_map;
+        let own_frame = start.pose() * track.pose.inverse();
         self.placed(moment.agent, &own_frame);
         self.note(moment);
         let revision = self.revision;
-        let Some(life) = self.lives.get_mut(moment.agent as usize, revision) else {
+        let Some(track) = self.tracks.get_mut(moment.agent as usize, revision) else {
             return;
         };
-        life.pose = *start.pose();
-        life.is_cut |= was_in_map;
-        life.founds = false;
-        life.is_planar &= is_level(start.pose());
-        let anchor = self.anchor_anew(moment.agent);
+        track.pose = *start.pose();
+        track.begins_anew |= was_in_map;
+        track.is_origin = false;
+        track.is_planar &= is_level(start.pose());
+        let keyframe = self.add_keyframe(moment.agent);
         let covariance = PoseCovariance::from_sd(start.noise().sd());
-        self.revisits.cut(moment.agent, self.revision);
-        self.tie_to_map(anchor, *start.pose(), &covariance, Standing::Stated);
+        self.constrain_to_map(keyframe, *start.pose(), &covariance, ClosureState::Stated);
     }
 
-    /// A new session of an agent: it may have been moved by about `sd` \[m, m, m, rad, rad, rad\] since its latest sample.
+    /// Begins a session of an agent, which may have been moved by about `sd` \[m, m, m, rad, rad,
+    /// rad\] since its latest sample.
     pub fn restart(&mut self, agent: u32, sd: &Vector6<f64>) {
         let revision = self.revision;
-        let Some(life) = self.lives.get(agent as usize) else {
+        let Some(track) = self.tracks.get(agent as usize) else {
             return;
         };
-        if life.newest != NONE && *life.since.motion() != Isometry3::identity() {
-            self.anchor_anew(agent);
+        if track.newest != NONE && *track.since.motion() != Isometry3::identity() {
+            self.add_keyframe(agent);
         }
-        let Some(life) = self.lives.get_mut(agent as usize, revision) else {
+        let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
             return;
         };
-        life.session += 1;
-        life.is_fresh = true;
-        life.since.inflate(&sd.component_mul(sd));
-        self.waiting
-            .retain(|waiting| waiting.observer != agent && waiting.target != agent);
+        track.session += 1;
+        track.needs_keyframe = true;
+        track.since.inflate(&sd.component_mul(sd));
+        self.pending
+            .retain(|pending| pending.observer != agent && pending.target != agent);
     }
 
-    /// An agent moved by an increment in its own frame before, with these variances of the error on its right \[m², m²,
-    /// m², rad², rad², rad²\]; `calibrated` says how the increment was corrected.
+    /// Adds a motion of an agent, in its frame before, with the variances of the error on its right
+    /// \[m², m², m², rad², rad², rad²\]; `calibrated` says how the motion was corrected.
     pub fn motion(
         &mut self,
         moment: &Moment,
@@ -263,48 +257,49 @@ impl KeyframeGraph {
         calibrated: &Calibrated,
     ) {
         let agent = moment.agent;
-        self.told = self.told.saturating_add(1);
-        let Some(life) = self.lives.get(agent as usize) else {
+        self.schedule.records = self.schedule.records.saturating_add(1);
+        let Some(track) = self.tracks.get(agent as usize) else {
             return;
         };
-        if life.is_fresh {
-            // The first anchor lies where the agent was before it moved.
+        if track.needs_keyframe {
+            // The first keyframe lies where the agent was before it moved.
             self.note(&Moment {
                 pose: moment.pose * increment.inverse(),
                 ..*moment
             });
-            self.anchor_anew(agent);
+            self.add_keyframe(agent);
         }
         let revision = self.revision;
-        let Some(life) = self.lives.get_mut(agent as usize, revision) else {
+        let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
             return;
         };
-        life.go(increment, variance, calibrated);
-        life.is_planar &= is_level(increment);
-        life.pose = moment.pose;
-        (life.seq, life.stamp_ns) = (moment.seq, moment.stamp_ns);
-        if is_within(life.since.motion(), REST.0, REST.1) {
-            (life.until_seq, life.until_ns) = (moment.seq, moment.stamp_ns);
+        track.go(increment, variance, calibrated);
+        track.is_planar &= is_level(increment);
+        track.pose = moment.pose;
+        (track.seq, track.stamp_ns) = (moment.seq, moment.stamp_ns);
+        if is_within(track.since.motion(), REST.0, REST.1) {
+            (track.until_seq, track.until_ns) = (moment.seq, moment.stamp_ns);
         }
-        let is_step = !is_within(life.since.motion(), STEP.0, STEP.1);
+        let is_step = !is_within(track.since.motion(), STEP.0, STEP.1);
         let mut rests = false;
-        if is_within(&life.rest.inv_mul(life.since.motion()), REST.0, REST.1) {
-            rests = !is_within(life.since.motion(), NEAR.0, NEAR.1)
-                && moment.stamp_ns.saturating_sub(life.rest_ns) >= REST_NS;
+        if is_within(&track.rest.inv_mul(track.since.motion()), REST.0, REST.1) {
+            rests = !is_within(track.since.motion(), NEAR.0, NEAR.1)
+                && moment.stamp_ns.saturating_sub(track.rest_ns) >= REST_NS;
         } else {
-            life.rest = *life.since.motion();
-            (life.rest_seq, life.rest_ns) = (moment.seq, moment.stamp_ns);
+            track.rest = *track.since.motion();
+            (track.rest_seq, track.rest_ns) = (moment.seq, moment.stamp_ns);
         }
         if is_step || rests {
-            self.anchor_anew(agent);
+            self.add_keyframe(agent);
         }
-        if !self.waiting.is_empty() {
-            self.settle();
+        if !self.pending.is_empty() {
+            self.resolve_pending();
         }
     }
 
-    /// An agent saw a landmark. `variance` is that of the relation's components: along the axes, or of distance, azimuth
-    /// and elevation; the angles are those by which the seen direction is off.
+    /// Adds a sighting of a landmark. `variance` is that of the relation's components: along the
+    /// axes, or of distance, azimuth and elevation; the angles are those by which the seen
+    /// direction is off.
     pub fn landmark(
         &mut self,
         moment: &Moment,
@@ -318,11 +313,12 @@ impl KeyframeGraph {
         };
         let point = SeenPoint::new(relation, variance).before(&here.motion, &here.covariance);
         if let Some(landmark) = self.landmarks.show(label, self.revision) {
-            self.sight(here.anchor, Shown::Landmark(landmark), point);
+            self.remember_sighting(here.keyframe, Seen::Landmark(landmark), point);
         }
     }
 
-    /// An agent saw another one at an instant that may be over. It is taken in as soon as both have moved up to it.
+    /// Adds a sighting of another agent, perhaps at an instant that is over. It takes effect once
+    /// both have moved up to it.
     pub fn sighted(
         &mut self,
         observer: u32,
@@ -331,55 +327,56 @@ impl KeyframeGraph {
         relation: &Relation,
         variance: &Vector3<f64>,
     ) {
-        if observer == target || target as usize >= self.lives.len() {
+        if observer == target || target as usize >= self.tracks.len() {
             return;
         }
         let Some(here) = self.at_stamp(observer, stamp_ns) else {
             return; // too long ago
         };
-        if self.waiting.len() >= WAITING_MAX {
-            self.waiting.remove(0);
+        if self.pending.len() >= WAITING_MAX {
+            self.pending.remove(0);
         }
-        self.waiting.push(Waiting {
-            anchor: here.anchor,
+        self.pending.push(PendingSighting {
+            keyframe: here.keyframe,
             observer,
             target,
             stamp_ns,
             point: SeenPoint::new(relation, variance).before(&here.motion, &here.covariance),
         });
-        self.settle();
+        self.resolve_pending();
     }
 
-    /// Takes in the waiting sightings whose time has come.
-    fn settle(&mut self) {
-        for waiting in std::mem::take(&mut self.waiting) {
+    /// Resolves the pending sightings whose time has come.
+    fn resolve_pending(&mut self) {
+        for pending in std::mem::take(&mut self.pending) {
             let stamp_ns = |agent: u32| {
-                let life = self.lives.get(agent as usize);
-                life.filter(|life| life.newest != NONE)
-                    .map(|life| life.stamp_ns)
+                let track = self.tracks.get(agent as usize);
+                track
+                    .filter(|track| track.newest != NONE)
+                    .map(|track| track.stamp_ns)
             };
-            if stamp_ns(waiting.target).is_some_and(|stamp| stamp >= waiting.stamp_ns) {
-                self.show(&waiting);
-            } else if stamp_ns(waiting.observer)
-                .is_none_or(|stamp| stamp.saturating_sub(waiting.stamp_ns) < PATIENCE_NS)
+            if stamp_ns(pending.target).is_some_and(|stamp| stamp >= pending.stamp_ns) {
+                self.resolve(&pending);
+            } else if stamp_ns(pending.observer)
+                .is_none_or(|stamp| stamp.saturating_sub(pending.stamp_ns) < PATIENCE_NS)
             {
-                self.waiting.push(waiting);
+                self.pending.push(pending);
             }
         }
     }
 
-    /// Takes in a sighting of an agent.
-    fn show(&mut self, waiting: &Waiting) {
-        let Some(there) = self.at_stamp(waiting.target, waiting.stamp_ns) else {
+    /// Resolves a sighting of an agent.
+    fn resolve(&mut self, pending: &PendingSighting) {
+        let Some(there) = self.at_stamp(pending.target, pending.stamp_ns) else {
             return; // too long ago
         };
         let (Some(observer), Some(target)) = (
-            self.anchors.get(waiting.anchor),
-            self.anchors.get(there.anchor),
+            self.keyframes.get(pending.keyframe),
+            self.keyframes.get(there.keyframe),
         ) else {
             return;
         };
-        // What the way from the anchor adds to the error, in the frame of the observer.
+        // Noise of the motion from the keyframe, in the frame of the observer.
         let turn = observer.pose.rotation.inverse() * target.pose.rotation * there.motion.rotation;
         let turn = turn.to_rotation_matrix().into_inner();
         let spread = there
@@ -388,106 +385,110 @@ impl KeyframeGraph {
             .fixed_view::<3, 3>(0, 0)
             .into_owned();
         let point = SeenPoint {
-            fresh: waiting.point.fresh + turn * spread * turn.transpose(),
-            ..waiting.point
+            fresh: pending.point.fresh + turn * spread * turn.transpose(),
+            ..pending.point
         };
         let lever = there.motion.translation.vector;
-        self.sight(waiting.anchor, Shown::Agent(there.anchor, lever), point);
+        self.remember_sighting(pending.keyframe, Seen::Agent(there.keyframe, lever), point);
     }
 
-    /// Remembers a sighting; where memory is full, another one makes room for it.
-    fn sight(&mut self, anchor: u32, shown: Shown, point: SeenPoint) {
+    /// Adds a sighting; where memory is full, another one makes room for it.
+    fn remember_sighting(&mut self, keyframe: u32, shown: Seen, point: SeenPoint) {
         let is_full = |this: &Self| this.sightings.len() >= this.settings.sightings_max as usize;
         if is_full(self) {
-            self.thin();
+            self.sparsify();
         }
         if is_full(self) {
-            self.forget_vaguest();
+            self.forget_least_certain();
         }
         let sighting = Sighting {
-            anchor,
+            keyframe,
             next: NONE,
             shown,
             next_shown: NONE,
             point,
         };
-        if !self.attach(sighting)
-            && let Shown::Landmark(landmark) = shown
+        if !self.add_sighting(sighting)
+            && let Seen::Landmark(landmark) = shown
         {
             self.landmarks.release(landmark, self.revision);
         }
     }
 
-    /// The agent is at a moment, without having moved.
+    /// Notes the present sample and pose of an agent that has not moved.
     pub(super) fn note(&mut self, moment: &Moment) {
         let revision = self.revision;
-        let Some(life) = self.lives.get_mut(moment.agent as usize, revision) else {
+        let Some(track) = self.tracks.get_mut(moment.agent as usize, revision) else {
             return;
         };
-        life.pose = moment.pose;
-        life.seq = moment.seq;
-        life.stamp_ns = life.stamp_ns.max(moment.stamp_ns);
-        if !life.is_fresh && is_within(life.since.motion(), REST.0, REST.1) {
-            (life.until_seq, life.until_ns) = (life.seq, life.stamp_ns);
+        track.pose = moment.pose;
+        track.seq = moment.seq;
+        track.stamp_ns = track.stamp_ns.max(moment.stamp_ns);
+        if !track.needs_keyframe && is_within(track.since.motion(), REST.0, REST.1) {
+            (track.until_seq, track.until_ns) = (track.seq, track.stamp_ns);
         }
     }
 
-    /// Where an agent is: at its latest anchor, if that is near, or at a new one.
-    pub(super) fn here(&mut self, agent: u32) -> Option<Beside> {
-        let life = self.lives.get(agent as usize)?;
-        if life.is_fresh || !is_within(life.since.motion(), NEAR.0, NEAR.1) {
-            self.anchor_anew(agent);
+    /// The present instant of an agent: at its latest keyframe if that is near, or at a new one.
+    pub(super) fn here(&mut self, agent: u32) -> Option<KeyframeOffset> {
+        let track = self.tracks.get(agent as usize)?;
+        if track.needs_keyframe || !is_within(track.since.motion(), NEAR.0, NEAR.1) {
+            self.add_keyframe(agent);
         }
         let revision = self.revision;
-        let life = self.lives.get(agent as usize)?;
-        let at = life.pose * life.since.motion().inverse();
-        let (newest, is_in_map) = (life.newest, life.is_in_map);
-        let here = Beside {
-            anchor: newest,
-            motion: *life.since.motion(),
-            covariance: life.since.covariance(),
+        let track = self.tracks.get(agent as usize)?;
+        let at = track.pose * track.since.motion().inverse();
+        let (newest, is_in_map) = (track.newest, track.is_in_map);
+        let here = KeyframeOffset {
+            keyframe: newest,
+            motion: *track.since.motion(),
+            covariance: track.since.covariance(),
         };
-        // What is seen now has corrected the pose.
-        let anchor = self.anchors.get_mut(newest, revision)?;
-        (anchor.pose, anchor.is_in_map) = (at, is_in_map);
+        // The estimator has corrected the pose since.
+        let keyframe = self.keyframes.get_mut(newest, revision)?;
+        (keyframe.pose, keyframe.is_in_map) = (at, is_in_map);
         Some(here)
     }
 
-    /// Where an agent was at an instant that is over, if that was not long ago.
-    fn at_stamp(&mut self, agent: u32, stamp_ns: i64) -> Option<Beside> {
-        let life = self.lives.get(agent as usize)?;
-        if stamp_ns >= life.stamp_ns {
+    /// An instant of an agent, if it was not long ago.
+    fn at_stamp(&mut self, agent: u32, stamp_ns: i64) -> Option<KeyframeOffset> {
+        let track = self.tracks.get(agent as usize)?;
+        if stamp_ns >= track.stamp_ns {
             return self.here(agent);
         }
-        let mut later = (life.stamp_ns, *life.since.motion(), life.since.covariance());
-        let (mut number, mut until_ns) = (life.newest, life.until_ns);
+        let mut later = (
+            track.stamp_ns,
+            *track.since.motion(),
+            track.since.covariance(),
+        );
+        let (mut number, mut until_ns) = (track.newest, track.until_ns);
         for _ in 0..LOOK_BACK_MAX {
-            let anchor = self.anchors.get(number)?;
-            if anchor.stamp_ns <= stamp_ns {
+            let keyframe = self.keyframes.get(number)?;
+            if keyframe.stamp_ns <= stamp_ns {
                 let (end_ns, motion, covariance) = later;
                 let way_ns = end_ns.saturating_sub(until_ns).max(1) as f64;
                 let share = stamp_ns.saturating_sub(until_ns) as f64 / way_ns;
-                return Some(beside(number, &motion, &covariance, share));
+                return Some(offset(number, &motion, &covariance, share));
             }
-            later = (anchor.stamp_ns, anchor.motion, anchor.covariance);
-            number = anchor.previous;
-            until_ns = self.anchors.get(number)?.until_ns;
+            later = (keyframe.stamp_ns, keyframe.motion, keyframe.covariance);
+            number = keyframe.previous;
+            until_ns = self.keyframes.get(number)?.until_ns;
         }
         None
     }
 }
 
-/// A place on the way that begins at an anchor, after a share of it.
-pub(super) fn beside(
-    anchor: u32,
+/// The instant after a share of the motion that begins at a keyframe.
+pub(super) fn offset(
+    keyframe: u32,
     motion: &Isometry3<f64>,
     covariance: &PoseCovariance,
     share: f64,
-) -> Beside {
+) -> KeyframeOffset {
     let share = share.clamp(0.0, 1.0);
     let (linear, angular) = se3::log(motion);
-    Beside {
-        anchor,
+    KeyframeOffset {
+        keyframe,
         motion: se3::exp(&(linear * share), &(angular * share)),
         covariance: PoseCovariance::from_matrix(&(covariance.matrix() * share)),
     }

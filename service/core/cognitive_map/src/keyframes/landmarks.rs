@@ -1,4 +1,4 @@
-//! The landmarks that sightings show, by number and by label.
+//! The landmarks of sightings, by number and by label.
 
 use std::sync::Arc;
 
@@ -21,11 +21,12 @@ pub(super) struct Landmark {
 
 state_of_struct!(Landmark { label, sightings });
 
-/// The landmarks, each as long as sightings of it are remembered.
+/// The landmarks, each kept as long as its sightings.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Landmarks {
     pub(super) slots: Slab<Landmark, PAGE>,
-    /// The numbers in the order of the labels, in runs, none of them empty; not part of a checkpoint.
+    /// The numbers in the order of the labels, in runs, none of them empty; not part of a
+    /// checkpoint.
     by_label: Arc<Vec<Arc<Vec<u32>>>>,
 }
 
@@ -60,7 +61,7 @@ impl Landmarks {
         }
     }
 
-    /// A sighting of a landmark is remembered no more, and the landmark no longer than its sightings.
+    /// Counts a sighting less; without any the landmark is removed.
     pub(super) fn release(&mut self, number: u32, revision: u64) {
         let Some(landmark) = self.slots.get_mut(number, revision) else {
             return;

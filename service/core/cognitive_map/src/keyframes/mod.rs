@@ -1,40 +1,44 @@
-//! The chronicle: what agents did and saw, kept so that the past can be smoothed.
+//! The keyframe graph: past motions and sightings of all agents, kept so that the past can be
+//! smoothed.
 //!
-//! A chain of *anchors* for each agent, moments that are remembered with the motion from one to the next; on them hang
-//! *sightings*, of landmarks and of other agents, and *ties*, to the map (start poses) or between anchors (matches). From
-//! these alone follows the refined map: the graph of [`experience`](pose_graph), relaxed.
+//! Each agent has a chain of *keyframes*: remembered poses, with the motion from one to the next. A
+//! keyframe has *sightings*, of landmarks and of other agents, and *constraints*, to the map (start
+//! poses) or to another keyframe (loop closures). Together they are a pose graph; the refined map
+//! is its relaxation ([`pose_graph`]).
 //!
-//! Memory is bounded. When it is full, anchors from which next to nothing is lost are taken out of their chains: the motions
-//! to and from them are composed, and what hangs on them goes to a neighbour with the noise of the way there.
+//! Memory is bounded. When it is full, sparsification removes keyframes from which next to nothing
+//! is lost: the motions to and from them are composed, and their sightings and constraints move to
+//! a neighbour with the noise of the motion there.
+//!
+//! [`KeyframeMap`] is the graph with place recognition, which closes loops by what was seen.
 
-mod anchor;
+mod agent_track;
 mod aside;
+mod attachment;
+mod calibration_smoothing;
 mod chain;
 mod checkpoint;
+mod closures;
 mod coarse;
-mod field;
+mod constraint;
 mod graph;
+mod keyframe;
+mod keyframe_index;
+mod landmark_association;
 mod landmarks;
-mod life;
-mod matches;
-mod milestones;
-mod mooring;
-mod names;
-mod refine;
-mod relocalisation;
+mod map;
+mod pose_lookup;
+mod refined;
 mod removal;
-mod revisit;
-mod revisited;
 mod settings;
 mod sighting;
-mod smoothing;
-mod thinning;
-mod tie;
+mod soundness;
+mod sparsification;
 
 pub use checkpoint::{CorruptKeyframes, KeyframePage};
+pub use closures::Correction;
 pub use graph::{KeyframeGraph, Moment};
-pub use matches::Correction;
-pub use refine::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
-pub use relocalisation::{Guess, Relocalised};
-pub use revisited::Viewed;
+pub use map::KeyframeMap;
+pub use place_recognition::{Guess, Relocalised};
+pub use refined::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
 pub use settings::KeyframeSettings;

@@ -1,55 +1,53 @@
 //! Agents that leave the space.
 
+use super::agent_track::AgentTrack;
 use super::graph::KeyframeGraph;
-use super::life::Life;
 use state::NONE;
 
 impl KeyframeGraph {
-    /// An agent of the map is gone. What it did stays part of the past.
+    /// An agent of the map has left. What it did stays part of the past.
     pub fn retire(&mut self, agent: u32) {
-        self.end_search(agent);
-        let latest = self.lives.get(agent as usize).map(|life| life.seq);
-        self.dispel_doubt(agent, latest.unwrap_or(0));
-        self.waiting
-            .retain(|waiting| waiting.observer != agent && waiting.target != agent);
+        self.pending
+            .retain(|pending| pending.observer != agent && pending.target != agent);
     }
 
-    /// Forgets an agent that was never in the map: its number is as it was when it enrolled. Walks the
-    /// whole chain of the agent.
+    /// Forgets an agent that was never in the map: its number is as it was when it enrolled. Walks
+    /// the whole chain of the agent.
     pub fn clear(&mut self, agent: u32) {
         self.retire(agent);
-        let Some(life) = self.lives.get(agent as usize) else {
+        let Some(track) = self.tracks.get(agent as usize) else {
             return;
         };
-        let (mut number, session) = (life.newest, life.session + 1);
-        while let Some(anchor) = self.anchors.get(number) {
-            let previous = anchor.previous;
+        let (mut number, session) = (track.newest, track.session + 1);
+        while let Some(keyframe) = self.keyframes.get(number) {
+            let previous = keyframe.previous;
             self.strip(number);
-            self.anchors.remove(number, self.revision);
+            self.keyframes.remove(number, self.revision);
             number = previous;
         }
-        if let Some(life) = self.lives.get_mut(agent as usize, self.revision) {
-            // Runs are counted on: milestones and searches of earlier ones must not pass for the next agent's.
-            *life = Life {
+        if let Some(track) = self.tracks.get_mut(agent as usize, self.revision) {
+            // The session numbers go on: index entries and searches of earlier ones must not pass
+            // for the next agent's.
+            *track = AgentTrack {
                 session,
-                ..Life::new()
+                ..AgentTrack::new()
             };
         }
     }
 
-    /// Takes off an anchor all that hangs on it.
+    /// Removes all sightings and constraints of a keyframe.
     fn strip(&mut self, number: u32) {
         let first = |this: &Self| {
-            let anchor = this.anchors.get(number)?;
-            Some((anchor.sightings, anchor.shown, anchor.ties))
+            let keyframe = this.keyframes.get(number)?;
+            Some((keyframe.sightings, keyframe.shown, keyframe.constraints))
         };
-        while let Some((sighting, shown, tie)) = first(self) {
+        while let Some((sighting, shown, constraint)) = first(self) {
             if sighting != NONE {
-                self.detach(sighting);
+                self.remove_sighting(sighting);
             } else if shown != NONE {
-                self.detach(shown);
-            } else if tie != NONE {
-                self.untie(tie);
+                self.remove_sighting(shown);
+            } else if constraint != NONE {
+                self.remove_constraint(constraint);
             } else {
                 return;
             }

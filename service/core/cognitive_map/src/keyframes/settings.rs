@@ -1,26 +1,26 @@
-//! How much of the past is kept.
+//! Limits of the keyframe graph.
 
 use crate::settings::Settings;
 
-/// Limits of a chronicle.
+/// Limits of a keyframe graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KeyframeSettings {
-    /// Anchors at most. An anchor with a motion takes about 600 bytes.
-    pub anchors_max: u32,
+    /// Keyframes at most. A keyframe with a motion takes about 600 bytes.
+    pub keyframes_max: u32,
     /// Sightings at most. One takes about 220 bytes.
     pub sightings_max: u32,
-    /// Ties at most: start poses and matches. One takes about 250 bytes.
-    pub ties_max: u32,
+    /// Constraints at most: start poses and loop closures. One takes about 250 bytes.
+    pub constraints_max: u32,
 }
 
 impl KeyframeSettings {
-    /// Those of a space: for each anchor two sightings and half a tie.
+    /// The limits of a space: for each keyframe two sightings and half a constraint.
     pub(crate) fn of(settings: &Settings) -> Self {
-        let anchors_max = settings.anchors_max;
+        let keyframes_max = settings.anchors_max;
         Self {
-            anchors_max,
-            sightings_max: anchors_max.saturating_mul(2),
-            ties_max: anchors_max / 2,
+            keyframes_max,
+            sightings_max: keyframes_max.saturating_mul(2),
+            constraints_max: keyframes_max / 2,
         }
     }
 }
@@ -28,9 +28,9 @@ impl KeyframeSettings {
 impl Default for KeyframeSettings {
     fn default() -> Self {
         Self {
-            anchors_max: 65_536,
+            keyframes_max: 65_536,
             sightings_max: 131_072,
-            ties_max: 32_768,
+            constraints_max: 32_768,
         }
     }
 }

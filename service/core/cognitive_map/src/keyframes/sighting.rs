@@ -1,4 +1,4 @@
-//! What was seen from an anchor.
+//! Sightings from a keyframe.
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
 
@@ -6,39 +6,40 @@ use crate::input::Relation;
 use geometry::PoseCovariance;
 use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
-/// Least deviation of a sighting, so that one that states none has an inverse \[m\].
+/// Least standard deviation of a sighting, so that its covariance has an inverse \[m\].
 const DEVIATION_MIN_M: f64 = 1e-3;
 /// Shortest distance at which a direction means something \[m\].
 const DISTANCE_MIN_M: f64 = 0.02;
 
-/// What was seen.
+/// What a sighting shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Shown {
+pub(super) enum Seen {
     /// A landmark, by number.
     Landmark(u32),
-    /// An agent, at this place in the frame of one of its anchors.
+    /// An agent, at this place in the frame of one of its keyframes.
     Agent(u32, Vector3<f64>),
 }
 
-/// A position seen from an anchor.
+/// A position seen from a keyframe.
 #[derive(Clone, Debug)]
 pub(super) struct Sighting {
-    /// The anchor from which, and the next sighting made there.
-    pub(super) anchor: u32,
+    /// The keyframe from which, and the next sighting made there.
+    pub(super) keyframe: u32,
     pub(super) next: u32,
-    pub(super) shown: Shown,
-    /// The next sighting that shows the same anchor.
+    pub(super) shown: Seen,
+    /// The next sighting that shows the same keyframe.
     pub(super) next_shown: u32,
     pub(super) point: SeenPoint,
 }
 
-/// A position in the frame of an anchor \[m\], with the covariance of its error \[m²\].
+/// A position in the frame of a keyframe \[m\], with the covariance of its error \[m²\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SeenPoint {
     pub(super) position: Vector3<f64>,
-    /// Of what is another error each time.
+    /// Covariance of the noise, which is independent each time.
     pub(super) fresh: Matrix3<f64>,
-    /// Of what is the same error each time that the point is seen from the same place.
+    /// Covariance of the bias, which is the same each time that the point is seen from the same
+    /// place.
     pub(super) lasting: Matrix3<f64>,
 }
 
@@ -48,23 +49,23 @@ state_of_struct!(SeenPoint {
     lasting
 });
 state_of_struct!(Sighting {
-    anchor,
+    keyframe,
     next,
     shown,
     next_shown,
     point
 });
 
-impl State for Shown {
+impl State for Seen {
     fn write(&self, out: &mut StateWriter) {
         match self {
             Self::Landmark(landmark) => {
                 0_u8.write(out);
                 landmark.write(out);
             }
-            Self::Agent(anchor, lever) => {
+            Self::Agent(keyframe, lever) => {
                 1_u8.write(out);
-                anchor.write(out);
+                keyframe.write(out);
                 lever.write(out);
             }
         }
@@ -80,9 +81,9 @@ impl State for Shown {
 }
 
 impl SeenPoint {
-    /// Of a relation, with the variances of its components: along the axes \[m²\], or of the distance \[m²\] and of the
-    /// two angles about the seen direction, along growing azimuth and elevation \[rad²\]. What these are beyond what the
-    /// relation itself states counts as an error that lasts.
+    /// Of a relation, with the variances of its components: along the axes \[m²\], or of the
+    /// distance \[m²\] and of the two angles about the seen direction, along growing azimuth and
+    /// elevation \[rad²\]. The part beyond what the relation states is bias.
     pub(super) fn new(relation: &Relation, variance: &Vector3<f64>) -> Self {
         let floor = DEVIATION_MIN_M * DEVIATION_MIN_M;
         let (position, axes, scale) = match relation {
@@ -131,11 +132,11 @@ impl SeenPoint {
         self.fresh + self.lasting
     }
 
-    /// The point in the frame of an anchor from which a motion with this covariance led to where it was seen:
-    /// Δ exp(ξ) p.
+    /// The point in the frame of the keyframe from which a motion with this covariance led to where
+    /// it was seen: Δ exp(ξ) p.
     pub(super) fn before(&self, motion: &Isometry3<f64>, covariance: &PoseCovariance) -> Self {
         let turn = motion.rotation.to_rotation_matrix().into_inner();
-        let fresh = self.fresh + swing(&self.position, covariance);
+        let fresh = self.fresh + lever_covariance(&self.position, covariance);
         Self {
             position: turn * self.position + motion.translation.vector,
             fresh: symmetric(&(turn * fresh * turn.transpose())),
@@ -143,7 +144,8 @@ impl SeenPoint {
         }
     }
 
-    /// The point in the frame of the anchor to which a motion led from where it was seen: exp(−ξ) Δ⁻¹ p.
+    /// The point in the frame of the keyframe to which a motion led from where it was seen: exp(−ξ)
+    /// Δ⁻¹ p.
     pub(super) fn after(&self, motion: &Isometry3<f64>, covariance: &PoseCovariance) -> Self {
         let back = motion
             .rotation
@@ -151,7 +153,7 @@ impl SeenPoint {
             .into_inner()
             .transpose();
         let position = back * (self.position - motion.translation.vector);
-        let fresh = back * self.fresh * back.transpose() + swing(&position, covariance);
+        let fresh = back * self.fresh * back.transpose() + lever_covariance(&position, covariance);
         Self {
             position,
             fresh: symmetric(&fresh),
@@ -159,8 +161,8 @@ impl SeenPoint {
         }
     }
 
-    /// The mean of two points that were seen from one place, weighted by how sure they are but for what lasts. That
-    /// the mean keeps.
+    /// The mean of two points that were seen from one place, weighted by their noise. It keeps the
+    /// smaller bias.
     pub(super) fn mean(&self, other: &Self) -> Option<Self> {
         let own = self.fresh.try_inverse()?;
         let others = other.fresh.try_inverse()?;
@@ -192,8 +194,8 @@ pub(super) fn stated_variance(relation: &Relation) -> Vector3<f64> {
     sd.component_mul(&sd)
 }
 
-/// What an error ξ of a pose does to a point p in its frame, ρ + φ×p: the covariance of that.
-pub(super) fn swing(point: &Vector3<f64>, covariance: &PoseCovariance) -> Matrix3<f64> {
+/// Covariance of ρ + φ×p: the effect of a pose error ξ = (ρ, φ) on a point p in its frame.
+pub(super) fn lever_covariance(point: &Vector3<f64>, covariance: &PoseCovariance) -> Matrix3<f64> {
     let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
     let lever = -point.cross_matrix();

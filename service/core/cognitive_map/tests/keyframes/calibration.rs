@@ -1,7 +1,7 @@
 //! Lasting errors of odometry that are found out late.
 
 use cognitive_map::estimator::{Calibrated, Calibration};
-use cognitive_map::keyframes::{KeyframeGraph, KeyframeSettings, Moment};
+use cognitive_map::keyframes::{KeyframeMap, KeyframeSettings, Moment};
 use cognitive_map::{PoseNoise, StartPose};
 use geometry::se3;
 use nalgebra::{Isometry3, SVector, Vector3, Vector6};
@@ -15,12 +15,12 @@ const BIAS_RAD_S: f64 = 0.01;
 
 /// A walk whose errors are known from one sample on; answers the largest distances between refined poses and truth, before
 /// that sample and after.
-fn largest_errors(known_from: u64, anchors_max: u32, sense: f64) -> [f64; 2] {
-    let mut chronicle = KeyframeGraph::new(KeyframeSettings {
-        anchors_max,
+fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
+    let mut chronicle = KeyframeMap::new(KeyframeSettings {
+        keyframes_max,
         ..KeyframeSettings::default()
     });
-    let agent = chronicle.enrol();
+    let agent = chronicle.graph.enrol();
     let (mut truth, mut told) = (Isometry3::identity(), Isometry3::identity());
     let start = StartPose::new([0.0; 3], [0.0, 0.0, 0.0, 1.0], PoseNoise::none()).unwrap();
     let first = Moment {
@@ -70,10 +70,12 @@ fn largest_errors(known_from: u64, anchors_max: u32, sense: f64) -> [f64; 2] {
             pose: told,
         };
         let variance = Vector6::new(1e-6, 1e-6, 0.0, 0.0, 0.0, 1e-6);
-        chronicle.motion(&moment, &increment, &variance, &calibrated);
+        chronicle
+            .graph
+            .motion(&moment, &increment, &variance, &calibrated);
     }
     let mut largest = [0.0_f64; 2];
-    for row in &chronicle.refine().agents[0].poses {
+    for row in &chronicle.graph.refine().agents[0].poses {
         let seq = (row.stamp_ns.cast_unsigned() * RATE_HZ + 500_000_000) / 1_000_000_000;
         let off = (row.pose.translation.vector - path[seq as usize].translation.vector).norm();
         let side = &mut largest[usize::from(seq >= known_from)];
@@ -85,10 +87,10 @@ fn largest_errors(known_from: u64, anchors_max: u32, sense: f64) -> [f64; 2] {
 #[test]
 fn what_is_learned_of_odometry_corrects_the_past() {
     for sense in [1.0, -1.0] {
-        for anchors_max in [4096, 96] {
-            let [unknown, _] = largest_errors(601, anchors_max, sense);
+        for keyframes_max in [4096, 96] {
+            let [unknown, _] = largest_errors(601, keyframes_max, sense);
             assert!(unknown > 1.0, "the walk tells nothing: {unknown} m");
-            let [before, after] = largest_errors(500, anchors_max, sense);
+            let [before, after] = largest_errors(500, keyframes_max, sense);
             assert!(before < 0.03 * unknown, "{before} m of {unknown} m");
             assert!(after < 0.03 * unknown, "{after} m of {unknown} m");
         }

@@ -1,7 +1,7 @@
 //! Laws of the chronicle.
 
 use cognitive_map::estimator::Calibrated;
-use cognitive_map::keyframes::{KeyframeGraph, KeyframeSettings, Moment, Refined};
+use cognitive_map::keyframes::{KeyframeMap, KeyframeSettings, Moment, Refined};
 use cognitive_map::{Label, PoseNoise, Relation, RelativePosition, StartPose};
 use geometry::PoseCovariance;
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
@@ -31,7 +31,7 @@ const SEEN_SD_M: f64 = 0.05;
 
 /// Robots that walk on circles among landmarks, what they tell, and the truth.
 struct Walk {
-    chronicle: KeyframeGraph,
+    chronicle: KeyframeMap,
     noise: Noise,
     /// Of each robot: its true pose, and by motion alone.
     truth: Vec<Isometry3<f64>>,
@@ -44,12 +44,12 @@ struct Walk {
 
 impl Walk {
     fn new(robots: usize, settings: KeyframeSettings, frame: &Isometry3<f64>) -> Self {
-        let mut chronicle = KeyframeGraph::new(settings);
+        let mut chronicle = KeyframeMap::new(settings);
         let start: Vec<_> = (0..robots)
             .map(|k| frame * Isometry3::translation(0.0, 2.0 * k as f64, 0.0))
             .collect();
         for pose in &start {
-            let agent = chronicle.enrol();
+            let agent = chronicle.graph.enrol();
             let told = StartPose::new(
                 pose.translation.vector.into(),
                 pose.rotation.coords.into(),
@@ -93,6 +93,7 @@ impl Walk {
             let variance = Vector6::new(t * t, t * t, 0.0, 0.0, 0.0, r * r) / 3.0;
             let moment = self.moment(robot);
             self.chronicle
+                .graph
                 .motion(&moment, &read, &variance, &Calibrated::default());
             self.paths[robot].push(self.truth[robot]);
         }
@@ -113,6 +114,7 @@ impl Walk {
                 let variance = Vector3::repeat(SEEN_SD_M * SEEN_SD_M / 3.0);
                 let moment = self.moment(robot);
                 self.chronicle
+                    .graph
                     .landmark(&moment, &label, &relation, &variance);
             }
         }
@@ -124,6 +126,7 @@ impl Walk {
                 let stamp_ns = self.moment(robot).stamp_ns;
                 let [robot, other] = [robot, other].map(|k| u32::try_from(k).unwrap());
                 self.chronicle
+                    .graph
                     .sighted(robot, other, stamp_ns, &relation, &variance);
             }
         }
@@ -177,7 +180,7 @@ fn roomy() -> KeyframeSettings {
 
 fn tight() -> KeyframeSettings {
     KeyframeSettings {
-        anchors_max: 150,
+        keyframes_max: 150,
         sightings_max: 1500,
         ..KeyframeSettings::default()
     }
@@ -186,7 +189,7 @@ fn tight() -> KeyframeSettings {
 #[test]
 fn the_refined_past_is_closer_to_the_truth_than_motion_alone() {
     let walk = walked(3, 400, roomy());
-    let refined = walk.chronicle.refine();
+    let refined = walk.chronicle.graph.refine();
     assert!(refined.relaxed.has_converged);
     let motion_m: f64 = (0..3)
         .map(|robot| {
@@ -264,7 +267,7 @@ fn refined_equals_the_batch_of_all_samples() {
         }
     }
     map.relax(&RelaxationSettings::default());
-    let refined = walk.chronicle.refine();
+    let refined = walk.chronicle.graph.refine();
     for row in &refined.agents[0].poses {
         let node = nodes[usize::try_from(row.stamp_ns / 1_000_000_000).unwrap()];
         let off = map.pose(node).inv_mul(&row.pose);
@@ -281,7 +284,10 @@ fn moving_the_starts_moves_everything() {
     for _ in 0..120 {
         there.step();
     }
-    let (here, there) = (here.chronicle.refine(), there.chronicle.refine());
+    let (here, there) = (
+        here.chronicle.graph.refine(),
+        there.chronicle.graph.refine(),
+    );
     for (a, b) in here.agents.iter().zip(&there.agents) {
         assert_eq!(a.poses.len(), b.poses.len());
         for (a, b) in a.poses.iter().zip(&b.poses) {
@@ -295,9 +301,9 @@ fn moving_the_starts_moves_everything() {
 fn thinning_keeps_the_loops() {
     let whole = walked(2, 1500, roomy());
     let thinned = walked(2, 1500, tight());
-    assert!(whole.chronicle.n_anchors() > 2500);
-    assert!(thinned.chronicle.n_anchors() <= 150);
-    let rows_at_anchors = |walk: &Walk| walk.error_m(&walk.chronicle.refine());
+    assert!(whole.chronicle.graph.n_keyframes() > 2500);
+    assert!(thinned.chronicle.graph.n_keyframes() <= 150);
+    let rows_at_anchors = |walk: &Walk| walk.error_m(&walk.chronicle.graph.refine());
     let (whole_m, thinned_m) = (rows_at_anchors(&whole), rows_at_anchors(&thinned));
     let motion = whole.told[0].translation.vector - whole.truth[0].translation.vector;
     assert!(motion.norm() > 0.5, "{}", motion.norm());
@@ -314,9 +320,9 @@ fn what_is_seen_is_taken_in_though_there_is_room_for_anchors_only() {
         ..roomy()
     };
     let bounded = walked(1, 1500, bounded);
-    assert!(whole.chronicle.n_sightings() > 1000);
-    assert!(bounded.chronicle.n_sightings() <= 500);
-    let error_m = |walk: &Walk| walk.error_m(&walk.chronicle.refine());
+    assert!(whole.chronicle.graph.n_sightings() > 1000);
+    assert!(bounded.chronicle.graph.n_sightings() <= 500);
+    let error_m = |walk: &Walk| walk.error_m(&walk.chronicle.graph.refine());
     // Without room for what is seen anew it was 0.17 m.
     let (whole_m, bounded_m) = (error_m(&whole), error_m(&bounded));
     assert!(bounded_m < 0.12, "{bounded_m} {whole_m}");
@@ -330,7 +336,7 @@ fn memory_stays_flat() {
         walk.step();
     }
     assert!(walk.chronicle.bytes() <= bytes + bytes / 4);
-    assert!(walk.chronicle.n_anchors() <= 150);
+    assert!(walk.chronicle.graph.n_keyframes() <= 150);
 }
 
 #[test]
@@ -344,10 +350,10 @@ fn a_checkpoint_goes_on_identically() {
             walk.step();
         }
         pages.extend(walk.chronicle.checkpoint(6));
-        let mut restored = KeyframeGraph::restore(settings, 7, pages.clone()).unwrap();
+        let mut restored = KeyframeMap::restore(settings, 7, pages.clone()).unwrap();
         assert_eq!(restored.digest(), walk.chronicle.digest());
         assert_ne!(restored.digest(), snapshot.digest());
-        assert_eq!(restored.refine(), walk.chronicle.refine());
+        assert_eq!(restored.graph.refine(), walk.chronicle.graph.refine());
         for _ in 0..50 {
             walk.step();
         }
@@ -362,7 +368,7 @@ fn a_checkpoint_goes_on_identically() {
         for missing in 0..complete.len() {
             let mut pages = complete.clone();
             pages.remove(missing);
-            assert!(KeyframeGraph::restore(settings, 9, pages).is_err());
+            assert!(KeyframeMap::restore(settings, 9, pages).is_err());
         }
     }
 }
@@ -370,33 +376,33 @@ fn a_checkpoint_goes_on_identically() {
 #[test]
 fn an_agent_that_finds_its_place_takes_its_past_along() {
     let tie = Isometry3::new(Vector3::new(3.0, -2.0, 0.0), Vector3::z() * 1.2);
-    let mut chronicle = KeyframeGraph::new(roomy());
-    let agent = chronicle.enrol();
+    let mut chronicle = KeyframeMap::new(roomy());
+    let agent = chronicle.graph.enrol();
     let step = Isometry3::new(Vector3::x() * 0.3, Vector3::z() * 0.1);
     let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-4);
     let mut pose = Isometry3::identity();
     for seq in 1..=10 {
         pose *= step;
-        chronicle.motion(
+        chronicle.graph.motion(
             &moment(agent, seq, &pose),
             &step,
             &variance,
             &Calibrated::default(),
         );
     }
-    assert!(!chronicle.refine().agents[0].is_in_map);
+    assert!(!chronicle.graph.refine().agents[0].is_in_map);
     pose = tie * pose;
-    chronicle.placed(agent, &tie);
+    chronicle.graph.placed(agent, &tie);
     for seq in 11..=20 {
         pose *= step;
-        chronicle.motion(
+        chronicle.graph.motion(
             &moment(agent, seq, &pose),
             &step,
             &variance,
             &Calibrated::default(),
         );
     }
-    let refined = &chronicle.refine().agents[0];
+    let refined = &chronicle.graph.refine().agents[0];
     assert!(refined.is_in_map && refined.poses.len() == 20);
     let mut expected = tie;
     for row in &refined.poses {
@@ -412,20 +418,21 @@ fn a_new_session_may_begin_elsewhere() {
     let mut walk = walked(1, 120, roomy());
     let carried = Isometry3::new(Vector3::new(0.8, -0.5, 0.0), Vector3::z() * 0.3);
     walk.chronicle
+        .graph
         .restart(0, &Vector6::new(1.0, 1.0, 0.0, 0.0, 0.0, 0.5));
     walk.truth[0] *= carried;
     for _ in 0..120 {
         walk.step();
     }
-    let refined = walk.chronicle.refine();
+    let refined = walk.chronicle.graph.refine();
     assert!(walk.error_m(&refined) < 0.05, "{}", walk.error_m(&refined));
 }
 
 #[test]
 fn rest_is_remembered_as_rest() {
-    let mut chronicle = KeyframeGraph::new(roomy());
-    let agent = chronicle.enrol();
-    chronicle.found(agent);
+    let mut chronicle = KeyframeMap::new(roomy());
+    let agent = chronicle.graph.enrol();
+    chronicle.graph.found(agent);
     let step = Isometry3::translation(0.05, 0.0, 0.0);
     let variance = Vector6::new(1e-6, 1e-6, 0.0, 0.0, 0.0, 1e-6);
     let mut pose = Isometry3::identity();
@@ -435,7 +442,7 @@ fn rest_is_remembered_as_rest() {
         let moves = seq <= 30 || (201..=202).contains(&seq) || seq > 300;
         let increment = if moves { step } else { Isometry3::identity() };
         pose *= increment;
-        chronicle.motion(
+        chronicle.graph.motion(
             &moment(agent, seq, &pose),
             &increment,
             &if moves { variance } else { Vector6::zeros() },
@@ -443,7 +450,7 @@ fn rest_is_remembered_as_rest() {
         );
         truth.push(pose);
     }
-    let rows = &chronicle.refine().agents[0].poses;
+    let rows = &chronicle.graph.refine().agents[0].poses;
     assert!(
         rows.windows(2)
             .all(|pair| pair[0].stamp_ns < pair[1].stamp_ns)

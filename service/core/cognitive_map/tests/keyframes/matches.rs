@@ -1,7 +1,7 @@
 //! Matches: true ones correct, false ones do not bend.
 
 use cognitive_map::estimator::Calibrated;
-use cognitive_map::keyframes::{Correction, KeyframeGraph, KeyframeSettings, Moment};
+use cognitive_map::keyframes::{Correction, KeyframeMap, KeyframeSettings, Moment};
 use cognitive_map::{PoseNoise, Relation, RelativePose};
 use nalgebra::{Isometry3, Vector3, Vector6};
 
@@ -11,7 +11,7 @@ const STEP_M: f64 = 0.3;
 
 /// A robot on a circle whose gyroscope drifts, so that the round does not close.
 struct Rounds {
-    chronicle: KeyframeGraph,
+    chronicle: KeyframeMap,
     told: Isometry3<f64>,
     truth: Vec<Isometry3<f64>>,
     corrections: Vec<Correction>,
@@ -19,8 +19,8 @@ struct Rounds {
 
 impl Rounds {
     fn new(frame: &Isometry3<f64>) -> Self {
-        let mut chronicle = KeyframeGraph::new(KeyframeSettings::default());
-        let agent = chronicle.enrol();
+        let mut chronicle = KeyframeMap::new(KeyframeSettings::default());
+        let agent = chronicle.graph.enrol();
         let start = cognitive_map::StartPose::new(
             frame.translation.vector.into(),
             frame.rotation.coords.into(),
@@ -45,14 +45,14 @@ impl Rounds {
             .push(self.truth[self.truth.len() - 1] * true_step);
         self.told *= read;
         let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-4);
-        self.chronicle.motion(
+        self.chronicle.graph.motion(
             &moment(seq, &self.told),
             &read,
             &variance,
             &Calibrated::default(),
         );
-        if self.chronicle.is_due() {
-            self.corrections = self.chronicle.relax();
+        if self.chronicle.graph.is_due() {
+            self.corrections = self.chronicle.graph.relax();
             if let Some(correction) = self.corrections.first() {
                 self.told = correction.pose;
             }
@@ -79,6 +79,7 @@ impl Rounds {
         let relation = Relation::Pose(relation.unwrap());
         assert!(
             self.chronicle
+                .graph
                 .closure(&moment(seq, &told), earlier, &relation)
         );
     }
@@ -126,7 +127,7 @@ fn true_matches_close_the_loop_whichever_way_the_gyroscope_drifts() {
                 walk.matched(seq - ROUND, &Isometry3::identity());
             }
         });
-        assert!(closed.chronicle.n_matches_believed() > 20);
+        assert!(closed.chronicle.graph.n_matches_believed() > 20);
         assert!(closed.off_m() < 0.35 * alone.off_m(), "{}", closed.off_m());
         let covariance = closed.corrections[0].covariance.unwrap();
         assert!(covariance.position_sd_m() < 0.5);
@@ -140,7 +141,7 @@ fn a_single_match_that_the_map_cannot_judge_waits() {
             walk.matched(2 * ROUND, &Isometry3::identity());
         }
     });
-    assert_eq!(walk.chronicle.n_matches_believed(), 0);
+    assert_eq!(walk.chronicle.graph.n_matches_believed(), 0);
 }
 
 #[test]
@@ -192,11 +193,14 @@ fn a_restored_chronicle_relaxes_to_the_same_bits() {
     let recovered = rounds_in(&Isometry3::identity(), 0.004, &mut |walk, seq| {
         if seq.is_multiple_of(50) {
             let pages: Vec<_> = walk.chronicle.checkpoint(0).collect();
-            walk.chronicle = KeyframeGraph::restore(KeyframeSettings::default(), 1, pages).unwrap();
+            walk.chronicle = KeyframeMap::restore(KeyframeSettings::default(), 1, pages).unwrap();
         }
         at(walk, seq);
     });
     assert_eq!(live.chronicle.digest(), recovered.chronicle.digest());
     assert_eq!(live.told, recovered.told);
-    assert_eq!(live.chronicle.refine(), recovered.chronicle.refine());
+    assert_eq!(
+        live.chronicle.graph.refine(),
+        recovered.chronicle.graph.refine()
+    );
 }

@@ -1,7 +1,7 @@
 //! Revisits: what was seen before corrects the way, and nothing else does.
 
 use cognitive_map::estimator::Calibrated;
-use cognitive_map::keyframes::{KeyframeGraph, KeyframeSettings, Moment, Viewed};
+use cognitive_map::keyframes::{KeyframeMap, KeyframeSettings, Moment};
 use cognitive_map::{Descriptor, Label};
 use geometry::PoseCovariance;
 use nalgebra::{Isometry3, Vector3, Vector6};
@@ -15,7 +15,7 @@ const NUMBERS: usize = 64;
 
 /// A robot that goes round and round, with a gyroscope that drifts.
 struct Round {
-    chronicle: KeyframeGraph,
+    chronicle: KeyframeMap,
     scenery: Vec<(Vector3<f64>, f64)>,
     odom: Isometry3<f64>,
     told: Isometry3<f64>,
@@ -31,9 +31,9 @@ impl Round {
             (wave, random.uniform() * std::f64::consts::TAU)
         });
         let scenery = scenery.collect();
-        let mut chronicle = KeyframeGraph::new(KeyframeSettings::default());
-        let agent = chronicle.enrol();
-        chronicle.found(agent);
+        let mut chronicle = KeyframeMap::new(KeyframeSettings::default());
+        let agent = chronicle.graph.enrol();
+        chronicle.graph.found(agent);
         Self {
             chronicle,
             scenery,
@@ -61,7 +61,7 @@ impl Round {
         };
         // The drift is about what independent errors may add up to in a round.
         let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 5e-4);
-        self.chronicle.motion(
+        self.chronicle.graph.motion(
             &moment(self.told, self.seq),
             &read,
             &variance,
@@ -87,14 +87,15 @@ impl Round {
             .collect();
         let far = self.seq as f64;
         let sd = Vector6::new(0.02, 0.02, 0.0, 0.0, 0.0, 0.004) * far;
-        let viewed = Viewed {
-            descriptor: &Descriptor::new(Label::new("view").unwrap(), &view).unwrap(),
-            in_odom: self.odom,
-            covariance: PoseCovariance::from_sd(&sd),
-        };
-        self.chronicle.viewed(&moment(self.told, self.seq), &viewed);
-        if self.chronicle.is_due() {
-            for correction in self.chronicle.relax() {
+        let descriptor = Descriptor::new(Label::new("view").unwrap(), &view).unwrap();
+        let covariance = PoseCovariance::from_sd(&sd);
+        let moment = moment(self.told, self.seq);
+        let view = self
+            .chronicle
+            .observe(&moment, &descriptor, self.odom, covariance);
+        self.chronicle.view(&view);
+        if self.chronicle.graph.is_due() {
+            for correction in self.chronicle.graph.relax() {
                 self.told = correction.pose;
             }
         }
@@ -113,13 +114,13 @@ fn what_was_seen_before_corrects_the_way() {
     }
     let reckoned = (round.odom.translation.vector - round.truth.translation.vector).norm();
     assert!(reckoned > 1.0, "{reckoned}");
-    assert!(round.chronicle.n_matches_believed() > 0);
+    assert!(round.chronicle.graph.n_matches_believed() > 0);
     assert!(
         round.off_m() < 0.5 * reckoned,
         "{} of {reckoned}",
         round.off_m()
     );
-    let refined = round.chronicle.refine();
+    let refined = round.chronicle.graph.refine();
     let last = refined.agents[0].poses.last().unwrap().pose;
     let off = (last.translation.vector - round.truth.translation.vector).norm();
     assert!(off < 0.5 * reckoned, "{off} of {reckoned}");
@@ -131,7 +132,7 @@ fn what_was_never_seen_corrects_nothing() {
     for step in 0..4 * ROUND {
         round.step(Some(step));
     }
-    assert_eq!(round.chronicle.n_matches_believed(), 0);
+    assert_eq!(round.chronicle.graph.n_matches_believed(), 0);
     assert_eq!(round.told, round.odom);
 }
 
@@ -143,7 +144,7 @@ fn a_restored_chronicle_goes_on_like_the_original() {
         round.step(None);
     }
     let pages: Vec<_> = round.chronicle.checkpoint(0).collect();
-    let restored = KeyframeGraph::restore(KeyframeSettings::default(), 1, pages).unwrap();
+    let restored = KeyframeMap::restore(KeyframeSettings::default(), 1, pages).unwrap();
     assert_eq!(restored.digest(), round.chronicle.digest());
     let mut other = Round {
         chronicle: restored,
@@ -157,7 +158,7 @@ fn a_restored_chronicle_goes_on_like_the_original() {
         round.step(None);
         other.step(None);
     }
-    assert!(round.chronicle.n_matches_believed() > 0);
+    assert!(round.chronicle.graph.n_matches_believed() > 0);
     assert_eq!(other.told, round.told);
     assert_eq!(other.chronicle.digest(), round.chronicle.digest());
 }

@@ -1,8 +1,7 @@
 //! Channels: what percepts are felt on.
 
-use super::moments::Moments;
 use crate::input::Label;
-use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
 
 /// Least deviation that a level is compared with, as a part of the deviation of its channel's
 /// levels. Without it, two equal values at a place would make every later one a wonder.

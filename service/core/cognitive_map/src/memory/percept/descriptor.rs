@@ -6,15 +6,13 @@
 
 use super::sketch::{Sketcher, Sketches};
 use crate::memory::place::PlaceId;
+use place_recognition::dot;
 use state::PagedVec;
 use state::SparseVec;
 use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
 /// Numbers in a block: a change after a snapshot copies one block.
 const BLOCK_LEN: usize = 4096;
-/// Sums of a scalar product that grow side by side, so that the compiler may use vector registers:
-/// a single sum has an order of additions that it has to keep.
-const LANES: usize = 16;
 /// Shortest descriptor; the longest fills a block.
 const DIMENSION_MIN: usize = 8;
 
@@ -378,18 +376,4 @@ fn scale(vector: &[f32]) -> f32 {
 /// The cosine, from the scalar product with a sum and one over the sum's length.
 fn cosine(product: f32, scale: f32) -> f64 {
     f64::from(product * scale).clamp(-1.0, 1.0)
-}
-
-/// Scalar product of two vectors of one length.
-pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let (a, a_rest) = a.as_chunks::<LANES>();
-    let (b, b_rest) = b.as_chunks::<LANES>();
-    let mut sums = [0.0; LANES];
-    for (a, b) in a.iter().zip(b) {
-        for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f32>() + rest
 }

@@ -1,9 +1,7 @@
 //! What places remember of a channel of levels.
 
-use super::moments::Moments;
 use crate::memory::place::PlaceId;
-use state::CorruptState;
-use state::SparseVec;
+use state::{CorruptState, Moments, SparseVec};
 
 /// Places per page.
 const PAGE: usize = 64;

@@ -4,13 +4,10 @@ use std::sync::Arc;
 
 use super::descriptor::{Block, DescriptorMemory};
 use super::level::{LEVEL_MAX, LevelMemory, surprise};
-use super::moments::Moments;
 use super::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
 use crate::input::{Descriptor, Label};
 use crate::memory::place::PlaceId;
-use state::PageItems;
-use state::PagedVec;
-use state::{CorruptState, StateWriter};
+use state::{CorruptState, Moments, PageItems, PagedVec, StateWriter};
 
 /// Most channels of a space. What is felt on further ones is counted and stays in the journal.
 const CHANNELS_MAX: usize = 64;

@@ -9,13 +9,10 @@ mod channel;
 mod descriptor;
 mod level;
 mod map;
-mod moments;
 mod sketch;
 
 pub use channel::{Channel, ChannelId, ChannelKind};
-pub(crate) use descriptor::dot;
 pub(crate) use map::{CHANNEL_PAGES_MAX, Compared, PerceptMap};
-pub(crate) use moments::Moments;
 
 use crate::input::{Descriptor, Label};
 use crate::memory::place::PlaceId;

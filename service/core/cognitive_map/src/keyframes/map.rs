@@ -1,0 +1,171 @@
+//! Keyframes with what was seen from them: the graph, and place recognition.
+
+use geometry::PoseCovariance;
+use nalgebra::Isometry3;
+use place_recognition::{Guess, PlaceRecognition, Relocalised, SampleKey, View};
+
+use super::graph::{KeyframeGraph, Moment};
+use super::settings::KeyframeSettings;
+use crate::input::{Descriptor, StartPose};
+
+/// The past: a keyframe graph, and place recognition, which asks the graph where views were taken
+/// and gives it loop closures.
+///
+/// What concerns both is a method of this type. A clone is a snapshot that shares all pages.
+#[derive(Clone, Debug)]
+pub struct KeyframeMap {
+    /// The graph.
+    pub graph: KeyframeGraph,
+    pub(super) recognition: PlaceRecognition,
+}
+
+impl KeyframeMap {
+    /// Without any agent.
+    pub fn new(settings: KeyframeSettings) -> Self {
+        Self {
+            graph: KeyframeGraph::new(settings),
+            recognition: PlaceRecognition::default(),
+        }
+    }
+
+    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds
+    /// the later ones.
+    pub fn set_revision(&mut self, revision: u64) {
+        self.graph.set_revision(revision);
+        self.recognition.set_revision(revision);
+    }
+
+    /// An agent was told where it stands in the map. If it was in the map already, it has been put
+    /// there: no motion leads there from what it did before.
+    pub fn start_pose(&mut self, moment: &Moment, start: &StartPose) {
+        self.graph.start_pose(moment, start);
+        self.recognition.cut(moment.agent);
+    }
+
+    /// An agent was detached: it begins anew in a frame of its own, and what it did and saw in the
+    /// map no longer counts there.
+    pub fn set_aside(&mut self, agent: u32) {
+        self.graph.set_aside(agent);
+        self.recognition.cut(agent);
+    }
+
+    /// An agent of the map has left. What it did stays part of the past.
+    pub fn retire(&mut self, agent: u32) {
+        self.forget_searches(agent);
+        self.graph.retire(agent);
+    }
+
+    /// Forgets an agent that was never in the map: its number is as it was when it enrolled. Walks
+    /// the whole chain of the agent.
+    pub fn clear(&mut self, agent: u32) {
+        self.forget_searches(agent);
+        self.graph.clear(agent);
+    }
+
+    fn forget_searches(&mut self, agent: u32) {
+        self.recognition.end_search(agent);
+        let latest = self.graph.latest_seq(agent);
+        self.recognition.confirm_pose(agent, latest);
+    }
+
+    /// An agent sees something, with this pose by motion alone since its session began, and this
+    /// covariance of its pose in the map.
+    pub fn observe<'a>(
+        &mut self,
+        moment: &Moment,
+        descriptor: &'a Descriptor,
+        in_odom: Isometry3<f64>,
+        covariance: PoseCovariance,
+    ) -> View<'a> {
+        self.graph.note(moment);
+        View {
+            sample: self.sample(moment),
+            in_odom,
+            pose: moment.pose,
+            covariance,
+            channel: descriptor.channel().as_str(),
+            vector: descriptor.vector(),
+        }
+    }
+
+    /// Remembers a view of an agent in the map, and closes the loops that end with it.
+    pub fn view(&mut self, view: &View<'_>) {
+        if !self.graph.has_keyframe_in_map(view.sample.agent) {
+            return;
+        }
+        for revisit in self.recognition.view(view, &self.graph) {
+            self.graph.close(&revisit);
+        }
+    }
+
+    /// Whether what an agent of the map saw lately contradicts where it is believed to be.
+    /// `accepted` is the number of its sightings so far that agree with that.
+    pub fn is_contradicted(&mut self, view: &View<'_>, accepted: u64) -> bool {
+        let (recognition, graph) = (&mut self.recognition, &self.graph);
+        recognition.is_contradicted(view, accepted, graph)
+    }
+
+    /// An agent may be anywhere. What it saw since that is contradicted is forgotten where it was
+    /// believed to be, and a search begins with it.
+    pub fn declare_kidnapped(&mut self, moment: &Moment) {
+        self.recognition.declare_kidnapped(self.sample(moment));
+        self.graph.begin_stretch(moment.agent, None);
+    }
+
+    /// Whether an agent of the map may be anywhere, by what it has seen.
+    pub fn is_kidnapped(&self, agent: u32) -> bool {
+        self.recognition.is_kidnapped(agent)
+    }
+
+    /// An agent is where it is believed to be, from a sample on: it was told, or found.
+    pub fn confirm_pose(&mut self, agent: u32, seq: u64) {
+        self.recognition.confirm_pose(agent, seq);
+    }
+
+    /// An agent that does not know where it is sees something. Answers where it is, once that is
+    /// known to better than `sd_max_m`.
+    pub fn seek(&mut self, view: &View<'_>, sd_max_m: f64) -> Option<Relocalised> {
+        self.recognition.seek(view, sd_max_m, &self.graph)
+    }
+
+    /// Whether an agent that was found still searches for its heading.
+    pub fn is_seeking(&self, agent: u32) -> bool {
+        let session = self.graph.session(agent);
+        self.recognition.is_seeking(agent, session)
+    }
+
+    /// An agent was found. `is_elsewhere` says that it was believed to be in the map, but somewhere
+    /// else. A loop closure ties it to what was recognised.
+    pub fn relocalised(&mut self, moment: &Moment, found: &Relocalised, is_elsewhere: bool) {
+        let agent = moment.agent;
+        let Some(similar) = self.recognition.most_similar(agent) else {
+            return;
+        };
+        if is_elsewhere {
+            self.recognition.cut(agent);
+            self.graph.begin_stretch(agent, Some(&found.pose));
+        }
+        if found.is_last {
+            self.recognition.end_search(agent);
+        }
+        self.graph.close_to_recognised(agent, similar, found);
+    }
+
+    /// An agent knows where it is, or begins anew: its search is over.
+    pub fn end_search(&mut self, agent: u32) {
+        self.recognition.end_search(agent);
+    }
+
+    /// Where an agent may be that searches, the most probable first.
+    pub fn guesses(&self, agent: u32) -> Vec<Guess> {
+        self.recognition.guesses(agent, &self.graph)
+    }
+
+    fn sample(&self, moment: &Moment) -> SampleKey {
+        SampleKey {
+            agent: moment.agent,
+            session: self.graph.session(moment.agent),
+            seq: moment.seq,
+        }
+    }
+}

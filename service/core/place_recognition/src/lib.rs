@@ -1,0 +1,16 @@
+#![doc = include_str!("../README.md")]
+
+mod appearance;
+mod descriptor;
+mod keyframes;
+mod recognition;
+mod relocalisation;
+mod sequences;
+mod twist;
+mod view;
+mod views;
+
+pub use descriptor::dot;
+pub use keyframes::{Keyframes, SampleKey};
+pub use recognition::{Guess, Part, PlaceRecognition, Relocalised, Revisit};
+pub use view::View;

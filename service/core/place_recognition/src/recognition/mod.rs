@@ -1,0 +1,45 @@
+//! Place recognition as a whole: all that is remembered of what was seen.
+
+mod bytes;
+mod kidnap;
+mod relocalise;
+mod revisit;
+
+pub use bytes::Part;
+pub use relocalise::{Guess, Relocalised};
+pub use revisit::Revisit;
+
+use crate::relocalisation::{KidnapTests, Searches};
+use crate::sequences::ViewMemory;
+
+/// What agents have seen, and the searches of those that do not know where they are.
+///
+/// It never changes anybody's pose: its answers are values. A clone shares all pages.
+#[derive(Clone, Debug, Default)]
+pub struct PlaceRecognition {
+    /// The revision under which changes are noted; for checkpoints only.
+    revision: u64,
+    views: ViewMemory,
+    /// What agents that do not know where they are have seen since.
+    searches: Searches,
+    /// Whether what agents of the map see contradicts where they are believed to be.
+    kidnap_tests: KidnapTests,
+}
+
+impl PlaceRecognition {
+    /// Says under which revision changes are noted from now on: a checkpoint since a revision holds
+    /// the later ones.
+    pub fn set_revision(&mut self, revision: u64) {
+        self.revision = revision;
+    }
+
+    /// An agent was put somewhere else: what it sees from now on is not beside what it saw.
+    pub fn cut(&mut self, agent: u32) {
+        self.views.cut(agent, self.revision);
+    }
+
+    /// Bytes of memory that the views take.
+    pub fn bytes(&self) -> usize {
+        self.views.bytes()
+    }
+}

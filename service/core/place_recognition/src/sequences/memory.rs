@@ -1,0 +1,417 @@
+//! The memory of views, and the sequence matches among them.
+
+use nalgebra::Isometry3;
+
+use super::sequence_match::SequenceMatch;
+use super::track::{RECENT_MAX, ViewTrack};
+use crate::descriptor::angle_rad;
+use crate::keyframes::SampleKey;
+use crate::view::View;
+use crate::views::{ChannelModel, Distance, Kernel, SimilarView, StoredView, read_all, write_all};
+use state::PagedVec;
+use state::{CorruptState, State, StateReader, StateWriter};
+
+/// Most channels.
+const CHANNELS_MAX: usize = 64;
+/// Most views.
+const VIEWS_MAX: usize = 16_384;
+/// Most numbers in their descriptors, all of which a new view is compared with: 8 MiB.
+const NUMBERS_MAX: usize = 1 << 21;
+/// Least motion between two views that are compared \[m, rad\].
+const MOVED: (f64, f64) = (0.05, 0.1);
+/// Least motion after which a view may be new \[m, rad\]: that between keyframes.
+const STEP: (f64, f64) = (0.1, 0.1);
+/// A view that is similar to none of those nearer than this, in reaches, is an outlier: somebody
+/// passes by.
+const BESIDE: f64 = 0.6;
+/// Ordinals by which an agent's own views must be earlier to count as revisited.
+const EARLIER: u32 = 16;
+/// Two views may be of one place if they are nearer than so many standard deviations of their
+/// positions.
+const APART_SD: f64 = 3.0;
+/// Ordinals skipped where an agent was put somewhere else.
+const APART: u32 = 64;
+/// Most similar views of a view, the most similar first.
+pub(crate) const SIMILAR_MAX: usize = 32;
+/// Most incomplete sequence matches of an agent on a channel.
+const MATCHES_MAX: usize = 4;
+
+/// The remembered views of all agents.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ViewMemory {
+    channels: Vec<ChannelModel>,
+    pub(crate) tracks: PagedVec<ViewTrack, 1>,
+    pub(crate) stored: PagedVec<StoredView, 16>,
+    /// Numbers in all descriptors.
+    numbers: u64,
+    /// Times that views were renumbered.
+    pub(crate) thinnings: u64,
+}
+
+impl ViewMemory {
+    /// Remembers a view; answers the sequence matches that end with it.
+    pub(crate) fn add(&mut self, view: &View<'_>, revision: u64) -> Vec<SequenceMatch> {
+        let vector = view.vector;
+        let Some(channel) = self.channel_of(view) else {
+            return Vec::new();
+        };
+        let at = self.track(view.sample, channel, revision);
+        let Some(track) = self.tracks.get_mut(at, revision) else {
+            return Vec::new();
+        };
+        let has_moved = track
+            .last
+            .is_none_or(|last| is_beyond(&last.inv_mul(&view.in_odom), MOVED));
+        if !has_moved {
+            return Vec::new();
+        }
+        track.last = Some(view.in_odom);
+        let model = &mut self.channels[usize::from(channel)];
+        let (mut is_news, mut is_outlier) = (true, None);
+        for (index, recent) in track.recent.iter().enumerate() {
+            let angle_rad = angle_rad(&recent.vector, vector);
+            let way = recent.in_odom.inv_mul(&view.in_odom);
+            let distance_m = way.translation.vector.norm();
+            model.learn(angle_rad, distance_m);
+            if index + 1 == track.recent.len() {
+                is_news = angle_rad > model.news_rad() && is_beyond(&way, STEP);
+            }
+            if model
+                .reach_m()
+                .is_some_and(|reach_m| distance_m < BESIDE * reach_m)
+            {
+                let is_unlike = model.distance(angle_rad).is_none();
+                is_outlier = Some(is_unlike && is_outlier.unwrap_or(true));
+            }
+        }
+        if !is_news || is_outlier == Some(true) {
+            return Vec::new();
+        }
+        track.note(&view.in_odom, vector);
+        let stored = StoredView {
+            channel,
+            sample: view.sample,
+            ordinal: track.next,
+            in_odom: view.in_odom,
+            in_map: view.position(),
+            spread: view.spread(),
+            vector: vector.into(),
+        };
+        track.next = track.next.saturating_add(1);
+        let (alike, is_known) = self.alike(&stored);
+        let over = self.extend_matches(at, &stored, &alike, revision);
+        if !is_known {
+            self.remember(stored, revision);
+        }
+        over
+    }
+
+    /// An agent was put somewhere else: what it sees from now on is not beside what it saw.
+    pub(crate) fn cut(&mut self, agent: u32, revision: u64) {
+        for number in 0..self.tracks.len() {
+            if self
+                .tracks
+                .get(number)
+                .is_none_or(|track| track.agent != agent)
+            {
+                continue;
+            }
+            if let Some(track) = self.tracks.get_mut(number, revision) {
+                track.recent.clear();
+                track.matches.clear();
+                track.next = track.next.saturating_add(APART);
+            }
+        }
+    }
+
+    /// The similar earlier views, by number, with their distances; and whether one of them makes
+    /// the view redundant.
+    fn alike(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
+        let model = &mut self.channels[usize::from(view.channel)];
+        let mut alike = Vec::new();
+        let mut is_known = false;
+        for (number, other) in self.stored.iter().enumerate() {
+            let is_recent = other.sample.agent == view.sample.agent
+                && other.sample.session == view.sample.session
+                && other.ordinal.saturating_add(EARLIER) >= view.ordinal;
+            if other.channel != view.channel || is_recent {
+                continue;
+            }
+            let angle_rad = angle_rad(&other.vector, &view.vector);
+            model.learn_unrelated(angle_rad);
+            if let Some(distance) = model.distance(angle_rad) {
+                // A similar view somewhere else does not make it redundant.
+                let apart_m = (other.in_map - view.in_map).norm();
+                let unsure_m = APART_SD * other.spread[0].hypot(view.spread[0]);
+                is_known |= angle_rad < model.news_rad() && apart_m <= distance.mean_m + unsure_m;
+                alike.push((number, distance));
+            }
+        }
+        if alike.len() > SIMILAR_MAX {
+            alike.sort_by(|a, b| a.1.mean_m.total_cmp(&b.1.mean_m).then(a.0.cmp(&b.0)));
+            alike.truncate(SIMILAR_MAX);
+            alike.sort_by_key(|(number, _)| *number);
+        }
+        (alike, is_known)
+    }
+
+    /// Adds a view and its similar views to the sequence matches of a track; answers those that are
+    /// complete.
+    fn extend_matches(
+        &mut self,
+        track: usize,
+        view: &StoredView,
+        alike: &[(usize, Distance)],
+        revision: u64,
+    ) -> Vec<SequenceMatch> {
+        let Some(track) = self.tracks.get_mut(track, revision) else {
+            return Vec::new();
+        };
+        let mut is_met = vec![false; track.matches.len()];
+        for &(number, distance) in alike {
+            let Some(other) = self.stored.get(number) else {
+                continue;
+            };
+            let known = track
+                .matches
+                .iter()
+                .position(|matched| matched.leads_to(other));
+            match known {
+                Some(index) => {
+                    is_met[index] = true;
+                    track.matches[index].add(view, other, distance);
+                }
+                None if track.matches.len() < MATCHES_MAX => {
+                    is_met.push(true);
+                    track
+                        .matches
+                        .push(SequenceMatch::new(view, other, distance));
+                }
+                None => {}
+            }
+        }
+        for (matched, is_met) in track.matches.iter_mut().zip(is_met) {
+            if !is_met {
+                matched.miss();
+            }
+        }
+        let (over, open) = std::mem::take(&mut track.matches)
+            .into_iter()
+            .partition::<Vec<_>, _>(SequenceMatch::is_over);
+        track.matches = open;
+        let telling = over.into_iter().filter(SequenceMatch::is_telling);
+        let last = track.next.saturating_sub(1);
+        telling
+            .map(|mut matched| {
+                let count = last.saturating_sub(matched.first_now()) as usize + 1;
+                let from = track.recent.len().saturating_sub(count);
+                matched.queries = track.recent[from..].to_vec();
+                matched
+            })
+            .collect()
+    }
+
+    /// Remembers a view; every second one is forgotten when there is no room for it.
+    fn remember(&mut self, view: StoredView, revision: u64) {
+        self.numbers += view.vector.len() as u64;
+        self.stored.push(view, revision);
+        if self.stored.len() <= VIEWS_MAX && self.numbers <= NUMBERS_MAX as u64 {
+            return;
+        }
+        let mut kept = 0;
+        self.thinnings += 1;
+        self.numbers = 0;
+        for number in 0..self.stored.len() {
+            let Some(mut view) = self.stored.get(number).cloned() else {
+                continue;
+            };
+            if !view.ordinal.is_multiple_of(2) {
+                continue;
+            }
+            // Neighbours still have consecutive ordinals.
+            view.ordinal /= 2;
+            self.numbers += view.vector.len() as u64;
+            if let Some(slot) = self.stored.get_mut(kept, revision) {
+                *slot = view;
+            }
+            kept += 1;
+        }
+        while self.stored.len() > kept {
+            self.stored.pop(revision);
+        }
+        for number in 0..self.tracks.len() {
+            if let Some(track) = self.tracks.get_mut(number, revision) {
+                track.next = track.next.div_ceil(2);
+                track.matches.clear();
+            }
+        }
+    }
+
+    /// Forgets what an agent saw in a session, from a sample on.
+    pub(crate) fn forget_since(&mut self, since: SampleKey, revision: u64) {
+        let is_gone = |view: &StoredView| view.is_since(since);
+        let Some(first) = self.stored.iter().position(is_gone) else {
+            return;
+        };
+        // Later views change their numbers.
+        self.thinnings += 1;
+        let mut kept = first;
+        for number in first..self.stored.len() {
+            let Some(view) = self.stored.get(number) else {
+                continue;
+            };
+            if is_gone(view) {
+                self.numbers -= view.vector.len() as u64;
+                continue;
+            }
+            let view = view.clone();
+            if let Some(slot) = self.stored.get_mut(kept, revision) {
+                *slot = view;
+            }
+            kept += 1;
+        }
+        while self.stored.len() > kept {
+            self.stored.pop(revision);
+        }
+    }
+
+    /// The number of a descriptor's channel; a new one if there is room for it.
+    fn channel_of(&mut self, view: &View<'_>) -> Option<u8> {
+        let dimension = u16::try_from(view.vector.len()).ok()?;
+        self.known_channel(view).or_else(|| {
+            if self.channels.len() >= CHANNELS_MAX {
+                return None;
+            }
+            let model = ChannelModel::new(view.channel.into(), dimension);
+            self.channels.push(model);
+            u8::try_from(self.channels.len() - 1).ok()
+        })
+    }
+
+    /// The number of the track of an agent on a channel, in its present session.
+    fn track(&mut self, sample: SampleKey, channel: u8, revision: u64) -> usize {
+        let known = self
+            .tracks
+            .iter()
+            .position(|track| track.agent == sample.agent && track.channel == channel);
+        let Some(number) = known else {
+            self.tracks.push(
+                ViewTrack::new(sample.agent, channel, sample.session),
+                revision,
+            );
+            return self.tracks.len() - 1;
+        };
+        if let Some(track) = self.tracks.get_mut(number, revision)
+            && track.session != sample.session
+        {
+            *track = ViewTrack::new(sample.agent, channel, sample.session);
+        }
+        number
+    }
+
+    /// Bytes of memory that it takes.
+    pub(crate) fn bytes(&self) -> usize {
+        let numbers = usize::try_from(self.numbers).unwrap_or(usize::MAX);
+        let recent = self.tracks.iter().map(|track| {
+            let numbers = track.recent.iter().map(|recent| recent.vector.len());
+            numbers.sum::<usize>()
+        });
+        let recent: usize = recent.sum();
+        self.stored.bytes() + self.tracks.bytes() + 4 * (numbers + recent)
+    }
+
+    pub(crate) fn write_head(&self, out: &mut StateWriter) {
+        write_all(&self.channels, out);
+        self.thinnings.write(out);
+    }
+
+    pub(crate) fn read_head(&mut self, input: &mut StateReader<'_>) -> Result<(), CorruptState> {
+        self.channels = read_all(input)?;
+        self.thinnings = State::read(input)?;
+        self.numbers = self
+            .stored
+            .iter()
+            .map(|view| view.vector.len() as u64)
+            .sum();
+        Ok(())
+    }
+
+    /// The similar views from a number on, the most similar first.
+    pub(crate) fn likes(
+        &self,
+        channel: u8,
+        vector: &[f32],
+        from: usize,
+        is_left_out: impl Fn(&StoredView) -> bool,
+    ) -> Vec<SimilarView> {
+        let views = self.stored.iter_from(from);
+        let mut likes: Vec<SimilarView> = views
+            .filter(|view| view.channel == channel && !is_left_out(view))
+            .filter_map(|view| {
+                Some(SimilarView {
+                    sample: view.sample,
+                    distance: self.distance(channel, angle_rad(&view.vector, vector))?,
+                })
+            })
+            .collect();
+        likes.sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
+        likes.truncate(SIMILAR_MAX);
+        likes
+    }
+
+    /// Whether two views of a channel are more similar than unrelated ones.
+    pub(crate) fn is_alike(&self, channel: u8, one: &[f32], other: &[f32]) -> bool {
+        self.distance(channel, angle_rad(one, other)).is_some()
+    }
+
+    /// The distance between two views of a channel, if they are similar.
+    pub(crate) fn distance(&self, channel: u8, angle_rad: f64) -> Option<Distance> {
+        self.channels.get(usize::from(channel))?.distance(angle_rad)
+    }
+
+    /// The kernel of a channel, once it is known.
+    pub(crate) fn kernel(&self, channel: u8) -> Option<Kernel> {
+        self.channels.get(usize::from(channel))?.kernel()
+    }
+
+    /// Reach of a channel \[m\], once it is known.
+    pub(crate) fn reach_m(&self, channel: u8) -> Option<f64> {
+        self.channels.get(usize::from(channel))?.reach_m()
+    }
+
+    /// The number of a descriptor's channel, if anything was remembered of it.
+    pub(crate) fn known_channel(&self, view: &View<'_>) -> Option<u8> {
+        let dimension = u16::try_from(view.vector.len()).ok()?;
+        let known = self
+            .channels
+            .iter()
+            .position(|channel| channel.dimension == dimension && &*channel.name == view.channel)?;
+        u8::try_from(known).ok()
+    }
+
+    /// Whether a channel has views of so many numbers.
+    pub(crate) fn is_channel(&self, channel: u8, length: usize) -> bool {
+        let model = self.channels.get(usize::from(channel));
+        model.is_some_and(|model| usize::from(model.dimension) == length)
+    }
+
+    /// Whether everything that it names is there, and all views of a channel are of one length.
+    pub(crate) fn is_sound(&self, agents: usize) -> bool {
+        let is_channel = |channel: u8, length: usize| self.is_channel(channel, length);
+        let views = self.stored.iter().all(|view| {
+            (view.sample.agent as usize) < agents && is_channel(view.channel, view.vector.len())
+        });
+        let tracks = self.tracks.iter().all(|track| {
+            let mut recent = track.recent.iter();
+            (track.agent as usize) < agents
+                && track.recent.len() <= RECENT_MAX
+                && recent.all(|recent| is_channel(track.channel, recent.vector.len()))
+        });
+        views && tracks
+    }
+}
+
+/// Whether a motion is longer than these \[m, rad\].
+fn is_beyond(motion: &Isometry3<f64>, (length_m, angle_rad): (f64, f64)) -> bool {
+    !geometry::is_within(motion, length_m, angle_rad)
+}

@@ -1,0 +1,16 @@
+//! Sequence matches: stretches of views that are alike (cf. SeqSLAM, Milford & Wyeth 2012).
+//!
+//! How alike two views are says how far apart they were taken. Each channel learns that from views
+//! of the last few metres, whose distances are known from motion. A *sequence match* collects pairs
+//! of views of two stretches that are more alike than chance would have them. When it is complete,
+//! the distances between both stretches are fitted like those of a trilateration, which gives the
+//! relative pose of the two as far as they determine it.
+
+mod memory;
+mod range_alignment;
+mod sequence_match;
+mod track;
+
+pub(crate) use memory::{SIMILAR_MAX, ViewMemory};
+pub(crate) use range_alignment::{NEAR, OPEN_DISTANCES, OPEN_RAD, Range, align_roughly, equations};
+pub(crate) use sequence_match::SequenceMatch;

@@ -1,0 +1,276 @@
+//! What the likeness of two views says of the distance between them.
+
+use std::f64::consts::FRAC_PI_2;
+
+use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
+
+/// Classes of angles between two views, from 0 to a right angle.
+const CLASSES: usize = 32;
+/// Fewest pairs of views for a class to be used.
+const PAIRS_MIN: u64 = 8;
+/// Pairs over which the mean of a class fades.
+const PAIRS: f64 = 1000.0;
+/// Pairs over which the mean of unrelated views fades.
+const UNRELATED: f64 = 4096.0;
+/// Fewest unrelated pairs before views are compared with chance.
+const UNRELATED_MIN: u64 = 64;
+/// Views are similar when their angle is so many standard deviations below that of unrelated ones.
+const ALIKE: f64 = 4.0;
+/// A pair whose angle is so many standard deviations below the mean is not counted as unrelated.
+const RELATED: f64 = 3.0;
+/// Least standard deviation of a distance, as a share of it.
+const SHARE_MIN: f64 = 0.1;
+/// Least standard deviation of a distance \[m\]: odometry over a few metres is no better.
+const SD_M_MIN: f64 = 0.02;
+/// Share of the mean angle between unrelated views beyond which a view is new beside another.
+const NEWS: f64 = 0.25;
+
+/// Least cosine of a class from which the kernel is fitted: views farther apart may be as alike by
+/// chance.
+const KERNEL_LIKENESS_MIN: f64 = 0.5;
+/// Largest cosine of two views of one place: views are noisy.
+const LIKENESS_MAX: f64 = 0.999;
+
+/// Kernel of a channel: the expected cosine of two views at a distance d is c exp(−d² / 2ℓ²).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Kernel {
+    /// c: cosine of two views of one place.
+    pub(crate) likeness: f64,
+    /// ℓ: length scale \[m\].
+    pub(crate) length_m: f64,
+    /// Effective dimension n: the cosines of unrelated views have standard deviation 1/√n.
+    pub(crate) numbers: f64,
+}
+
+/// The statistics of a channel: distance by angle, and the angle of unrelated views.
+#[derive(Clone, Debug)]
+pub(crate) struct ChannelModel {
+    pub(crate) name: Box<str>,
+    pub(crate) dimension: u16,
+    /// Distances of the pairs of each class \[m\].
+    distances_m: Vec<Moments>,
+    /// Angles between unrelated views \[rad\].
+    unrelated: Moments,
+}
+
+/// A distance with its standard deviation \[m\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Distance {
+    pub(crate) mean_m: f64,
+    pub(crate) sd_m: f64,
+}
+
+impl ChannelModel {
+    /// A channel without statistics.
+    pub(crate) fn new(name: Box<str>, dimension: u16) -> Self {
+        Self {
+            name,
+            dimension,
+            distances_m: vec![Moments::default(); CLASSES],
+            unrelated: Moments::default(),
+        }
+    }
+
+    /// Learns from two views whose distance is known from motion.
+    pub(crate) fn learn(&mut self, angle_rad: f64, distance_m: f64) {
+        if let Some(class) = self.distances_m.get_mut(class_of(angle_rad)) {
+            class.fade(1.0 - 1.0 / PAIRS);
+            class.add(distance_m, 1.0);
+        }
+    }
+
+    /// Learns from two views that are far from one another along the way.
+    pub(crate) fn learn_unrelated(&mut self, angle_rad: f64) {
+        let unrelated = &mut self.unrelated;
+        let is_known = unrelated.count() >= UNRELATED_MIN;
+        if is_known && angle_rad < unrelated.mean() - RELATED * unrelated.sd() {
+            return;
+        }
+        unrelated.fade(1.0 - 1.0 / UNRELATED);
+        unrelated.add(angle_rad, 1.0);
+    }
+
+    /// Angle beyond which a view is new beside another \[rad\].
+    pub(crate) fn news_rad(&self) -> f64 {
+        if self.unrelated.count() >= UNRELATED_MIN {
+            NEWS * self.unrelated.mean()
+        } else {
+            NEWS * FRAC_PI_2
+        }
+    }
+
+    /// The kernel, once the statistics determine it.
+    pub(crate) fn kernel(&self) -> Option<Kernel> {
+        let sd = self.unrelated.sd();
+        if self.unrelated.count() < UNRELATED_MIN || sd <= 0.0 {
+            return None;
+        }
+        // Least squares of ln cos = ln c − d² / 2ℓ², over the classes that say something.
+        let (mut weights, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (class, known) in self.distances_m.iter().enumerate() {
+            let likeness = ((class as f64 + 0.5) * WIDTH_RAD).cos();
+            if known.count() < PAIRS_MIN || likeness < KERNEL_LIKENESS_MIN {
+                continue;
+            }
+            let squared = known.mean().powi(2);
+            let weight = known.weight() * likeness * likeness;
+            weights += weight;
+            x += weight * squared;
+            y += weight * likeness.ln();
+            xx += weight * squared * squared;
+            xy += weight * squared * likeness.ln();
+        }
+        let spread = weights * xx - x * x;
+        let slope = (weights * xy - x * y) / spread;
+        if slope >= 0.0 || !slope.is_finite() {
+            return None;
+        }
+        Some(Kernel {
+            likeness: ((y - slope * x) / weights).exp().clamp(0.5, LIKENESS_MAX),
+            length_m: (-0.5 / slope).sqrt(),
+            numbers: (1.0 / (sd * sd)).max(1.0),
+        })
+    }
+
+    /// Reach: distance beyond which views are no more similar than unrelated ones \[m\], once that
+    /// is known.
+    pub(crate) fn reach_m(&self) -> Option<f64> {
+        let unrelated = &self.unrelated;
+        if unrelated.count() < UNRELATED_MIN {
+            return None;
+        }
+        let limit = class_of(unrelated.mean() - ALIKE * unrelated.sd()).min(CLASSES - 1);
+        let known = (0..=limit)
+            .rev()
+            .filter_map(|class| self.distances_m.get(class));
+        let farthest = known
+            .filter(|class| class.count() >= PAIRS_MIN)
+            .map(Moments::mean);
+        farthest
+            .max_by(f64::total_cmp)
+            .filter(|reach_m| *reach_m > 0.0)
+    }
+
+    /// The distance between two views; `None` if they are no more similar than unrelated ones.
+    pub(crate) fn distance(&self, angle_rad: f64) -> Option<Distance> {
+        let unrelated = &self.unrelated;
+        let is_known = unrelated.count() >= UNRELATED_MIN;
+        if !is_known || angle_rad > unrelated.mean() - ALIKE * unrelated.sd() {
+            return None;
+        }
+        let known = |class: usize| {
+            let class = self.distances_m.get(class)?;
+            (class.count() >= PAIRS_MIN).then(|| (class.mean(), class.sd()))
+        };
+        let class = class_of(angle_rad);
+        let Some(own) = known(class) else {
+            // Nearer than all pairs so far: the distance is interpolated down to zero.
+            let (nearest, (mean_m, sd_m)) =
+                (class..CLASSES).find_map(|at| Some((at, known(at)?)))?;
+            let share = angle_rad / ((nearest as f64 + 0.5) * WIDTH_RAD);
+            return Some(Distance::new(share * mean_m, sd_m));
+        };
+        // Linear interpolation between the centres of two classes.
+        let within = angle_rad / WIDTH_RAD - class as f64 - 0.5;
+        let other = if within < 0.0 {
+            class.checked_sub(1).and_then(known)
+        } else {
+            known(class + 1)
+        };
+        let (mean_m, sd_m) = other.map_or(own, |other| {
+            let share = within.abs();
+            (
+                own.0 + share * (other.0 - own.0),
+                own.1 + share * (other.1 - own.1),
+            )
+        });
+        Some(Distance::new(mean_m, sd_m))
+    }
+}
+
+state_of_struct!(Distance { mean_m, sd_m });
+
+impl Distance {
+    fn new(mean_m: f64, sd_m: f64) -> Self {
+        Self {
+            mean_m,
+            sd_m: sd_m.max(SHARE_MIN * mean_m).max(SD_M_MIN),
+        }
+    }
+}
+
+/// Width of a class \[rad\].
+const WIDTH_RAD: f64 = FRAC_PI_2 / CLASSES as f64;
+
+/// The class of an angle; obtuse angles lie beyond the last one.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "an angle of 0 to π is from 0 to 64 classes wide"
+)]
+fn class_of(angle_rad: f64) -> usize {
+    (angle_rad / WIDTH_RAD) as usize
+}
+
+impl State for ChannelModel {
+    fn write(&self, out: &mut StateWriter) {
+        u8::try_from(self.name.len())
+            .expect("a channel's name fits a byte")
+            .write(out);
+        out.extend(self.name.as_bytes());
+        self.dimension.write(out);
+        for class in &self.distances_m {
+            class.write(out);
+        }
+        self.unrelated.write(out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        let length = u8::read(input)?;
+        let name = std::str::from_utf8(input.take(length.into())?);
+        let name = name.map_err(|_| CorruptState::Invalid)?;
+        let mut model = Self::new(name.into(), State::read(input)?);
+        for class in &mut model.distances_m {
+            *class = State::read(input)?;
+        }
+        model.unrelated = State::read(input)?;
+        Ok(model)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A channel whose angle grows by a radian a metre, up to chance.
+    fn learned() -> ChannelModel {
+        let mut model = ChannelModel::new("view".into(), 64);
+        for step in 0..4000_u32 {
+            let distance_m = f64::from(step % 100) * 0.015;
+            model.learn(distance_m, distance_m);
+            model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin());
+        }
+        model
+    }
+
+    #[test]
+    fn what_was_learned_is_told() {
+        let model = learned();
+        for angle_rad in [0.1, 0.33, 0.5, 0.77, 1.0] {
+            let found = model.distance(angle_rad).unwrap();
+            assert!((found.mean_m - angle_rad).abs() < 0.02, "{found:?}");
+            assert!(found.sd_m >= 0.1 * found.mean_m && found.sd_m < 0.15);
+        }
+        assert_eq!(model.distance(1.45), None);
+        assert!((model.news_rad() - 0.375).abs() < 0.02);
+    }
+
+    #[test]
+    fn nothing_is_told_before_chance_is_known() {
+        let mut model = ChannelModel::new("view".into(), 64);
+        for _ in 0..100 {
+            model.learn(0.2, 0.2);
+        }
+        assert_eq!(model.distance(0.2), None);
+    }
+}
