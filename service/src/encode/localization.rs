@@ -33,7 +33,7 @@ fn hypothesis(guess: &Guess) -> wire::LocalizationHypothesis {
     wire::LocalizationHypothesis {
         pose: pose(&guess.pose, &guess.covariance),
         probability: guess.probability,
-        looks: guess.looks.into(),
+        looks: guess.queries.into(),
     }
 }
 
