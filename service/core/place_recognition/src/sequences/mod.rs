@@ -1,4 +1,4 @@
-//! Sequence matches: stretches of views that are alike (cf. SeqSLAM, Milford & Wyeth 2012).
+//! Sequence matches: stretches of views that are alike (cf. `SeqSLAM`, Milford & Wyeth 2012).
 //!
 //! How alike two views are says how far apart they were taken. Each channel learns that from views
 //! of the last few metres, whose distances are known from motion. A *sequence match* collects pairs
