@@ -4,7 +4,8 @@ use state::NONE;
 
 use super::tuning;
 
-/// A keyframe with its sample when it was added. It may be gone since, and its number another one's.
+/// A keyframe with its sample when it was added. It may be gone since, and its number another
+/// one's.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct IndexEntry {
     pub(super) session: u32,
@@ -12,8 +13,8 @@ pub(super) struct IndexEntry {
     pub(super) keyframe: u32,
 }
 
-/// For each agent every 64th of its keyframes, in the order of time. It follows from the chains, is not
-/// part of a checkpoint, and changes no answer.
+/// For each agent every 64th of its keyframes, in the order of time. It follows from the chains, is
+/// not part of a checkpoint, and changes no answer.
 #[derive(Clone, Debug, Default)]
 pub(super) struct KeyframeIndex {
     of_agents: Vec<AgentIndex>,
@@ -27,7 +28,8 @@ struct AgentIndex {
 }
 
 impl KeyframeIndex {
-    /// Adds a keyframe of an agent, one of so many; `is_valid` tells whether that of an entry is there.
+    /// Adds a keyframe of an agent, one of so many; `is_valid` tells whether that of an entry is
+    /// there.
     pub(super) fn add(
         &mut self,
         agent: u32,

@@ -1,5 +1,5 @@
-//! Sightings of the keyframe graph: those of landmarks, and those of other agents, which wait until both
-//! have moved up to them.
+//! Sightings of the keyframe graph: those of landmarks, and those of other agents, which wait until
+//! both have moved up to them.
 
 use nalgebra::Vector3;
 
