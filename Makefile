@@ -68,6 +68,25 @@ $(VENV)/installed: $(CLIENT)/pyproject.toml
 drills: release ## attacks and faults that take minutes, as JSON; DRILLS="NAME…" for some of them
 	COGMAP_BIN=$(TARGET)/release/cogmap cargo run --quiet --locked --package cogmap-tests --bin drills -- $(DRILLS)
 
+# What `cargo fuzz` would set, without the sanitizers that need another compiler.
+COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
+    -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
+    -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1 --cfg=fuzzing
+FUZZ := $(CURDIR)/tests/fuzz
+TARGETS ?= decode block checkpoint fold
+SECONDS ?= 60
+
+.PHONY: fuzz
+fuzz: ## arbitrary bytes against all that reads bytes; TARGETS="fold" SECONDS=3600
+	$(PYTHON) $(FUZZ)/seeds.py $(FUZZ)/corpus
+	mkdir -p $(FUZZ)/artifacts
+	host=$$(rustc -vV | sed -n 's/^host: //p'); cd $(FUZZ); \
+	RUSTFLAGS="$(COVERAGE)" cargo build --release --target $$host --bins; \
+	for target in $(TARGETS); do \
+	    target/$$host/release/$$target -max_total_time=$(SECONDS) -max_len=65536 -timeout=60 \
+	        -artifact_prefix=artifacts/$$target- corpus/$$target; \
+	done
+
 .PHONY: demo
 demo: release ## the service with a simulated team of robots; ARGS="--robots 8 --duration 30"
 	$(TARGET)/release/cogmap demo $(ARGS)

@@ -8,9 +8,32 @@ use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 
-use crate::codec::DecodeError;
+use crate::error::DecodeError;
 use crate::limits::BATCH_SAMPLES_MAX;
 use crate::sample::{Sample, SampleBatch};
+
+impl SampleBatch {
+    /// Checks the bounds of the batch as a whole.
+    ///
+    /// # Errors
+    /// It is empty, too large, or its numbers leave none for what comes after it.
+    pub fn check(&self) -> Result<(), DecodeError> {
+        if self.samples.is_empty() {
+            return Err(DecodeError::EmptyBatch);
+        }
+        if self.samples.len() > BATCH_SAMPLES_MAX {
+            return Err(DecodeError::TooManySamples(self.samples.len()));
+        }
+        if self.session == u64::MAX {
+            return Err(DecodeError::LastSession);
+        }
+        match self.first_seq.checked_add(self.samples.len() as u64) {
+            // The number after the last sample, and one beyond it, can still be counted.
+            Some(end) if end < u64::MAX => Ok(()),
+            _ => Err(DecodeError::SequenceOverflow),
+        }
+    }
+}
 
 /// A [`SampleBatch`] on its way in. The fields are the same, in the same order.
 #[derive(serde::Deserialize)]

@@ -8,16 +8,11 @@ use serde_path_to_error::Path;
 
 use crate::bounded::BoundedBatch;
 use crate::cbor;
+use crate::encoding::{CBOR, JSON, POSTCARD_V1};
+use crate::error::DecodeError;
 use crate::field;
-use crate::limits::{BATCH_SAMPLES_MAX, MESSAGE_BYTES_MAX};
+use crate::limits::MESSAGE_BYTES_MAX;
 use crate::sample::SampleBatch;
-
-/// Encoding of version 1 postcard messages.
-pub const POSTCARD_V1: &str = "application/vnd.cogmap.postcard;v1";
-/// Encoding of CBOR messages.
-pub const CBOR: &str = "application/cbor";
-/// Encoding of JSON messages.
-pub const JSON: &str = "application/json";
 
 /// What all postcard encodings start with, whatever their version.
 const POSTCARD: &str = "application/vnd.cogmap.postcard";
@@ -34,40 +29,6 @@ pub enum Codec {
     Cbor,
     /// JSON (RFC 8259).
     Json,
-}
-
-/// Why bytes are not the message that they should be.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum DecodeError {
-    /// No codec has this encoding.
-    #[error("unknown encoding {0:?}")]
-    UnknownEncoding(String),
-    /// The codec is known, this version of it is not.
-    #[error("unsupported version {0:?}; this build speaks {POSTCARD_V1:?}")]
-    UnsupportedVersion(String),
-    /// The message is longer than [`MESSAGE_BYTES_MAX`].
-    #[error("message of {0} bytes, the limit is {MESSAGE_BYTES_MAX}")]
-    TooLong(usize),
-    /// The bytes are not a message in this codec.
-    #[error("malformed {codec}: {detail}")]
-    Malformed {
-        /// Name of the codec.
-        codec: &'static str,
-        /// What the codec says.
-        detail: String,
-    },
-    /// A batch without samples.
-    #[error("a batch has at least one sample")]
-    EmptyBatch,
-    /// A batch with more than [`BATCH_SAMPLES_MAX`] samples.
-    #[error("batch of {0} samples, the limit is {BATCH_SAMPLES_MAX}")]
-    TooManySamples(usize),
-    /// Sequence numbers beyond what can be counted.
-    #[error("the batch's sequence numbers run past the largest number")]
-    SequenceOverflow,
-    /// The largest session: no later one could ever take over from it.
-    #[error("session {} leaves no number for a later one", u64::MAX)]
-    LastSession,
 }
 
 impl Codec {
@@ -181,27 +142,4 @@ impl Codec {
 /// What is wrong, at the field where it is.
 fn located(path: Option<Path>, error: &impl Display) -> String {
     path.map_or_else(|| error.to_string(), |path| field::at_field(&path, error))
-}
-
-impl SampleBatch {
-    /// Checks the bounds of the batch as a whole.
-    ///
-    /// # Errors
-    /// It is empty, too large, or its numbers leave none for what comes after it.
-    pub fn check(&self) -> Result<(), DecodeError> {
-        if self.samples.is_empty() {
-            return Err(DecodeError::EmptyBatch);
-        }
-        if self.samples.len() > BATCH_SAMPLES_MAX {
-            return Err(DecodeError::TooManySamples(self.samples.len()));
-        }
-        if self.session == u64::MAX {
-            return Err(DecodeError::LastSession);
-        }
-        match self.first_seq.checked_add(self.samples.len() as u64) {
-            // The number after the last sample, and one beyond it, can still be counted.
-            Some(end) if end < u64::MAX => Ok(()),
-            _ => Err(DecodeError::SequenceOverflow),
-        }
-    }
 }

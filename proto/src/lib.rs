@@ -4,7 +4,7 @@
 //! for everyone else, with the same field names in both. The Zenoh `Encoding` of a message (or the
 //! `Content-Type` of an HTTP body) says which codec it is in; nothing is guessed.
 //!
-//! **Version rule.** The version stands in the postcard encoding string ([`codec::POSTCARD_V1`]),
+//! **Version rule.** The version stands in the postcard encoding string ([`POSTCARD_V1`]),
 //! because postcard has no field tags: a change there is a new enum variant at the end, or a new
 //! version. CBOR and JSON evolve by addition: a reader ignores sample fields it does not know, and a
 //! field that it does not find takes its documented default.
@@ -16,6 +16,8 @@ mod answer;
 mod bounded;
 mod cbor;
 mod codec;
+mod encoding;
+mod error;
 mod estimate;
 mod event;
 mod field;
@@ -25,6 +27,7 @@ mod localize;
 mod name;
 mod narrow;
 mod object;
+mod percept;
 mod predict;
 mod query;
 mod sample;
@@ -36,7 +39,9 @@ pub use answer::{
     Landmark, LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer, RecalledPlace, Rivals,
     SpaceInfo, SpaceList, StampedPose, Trajectory, Trip, TripDetail, TripPage,
 };
-pub use codec::{CBOR, Codec, DecodeError, JSON, POSTCARD_V1};
+pub use codec::Codec;
+pub use encoding::{CBOR, JSON, POSTCARD_V1};
+pub use error::DecodeError;
 pub use estimate::{Estimate, Status};
 pub use event::{
     Event, EventId, EventIdError, EventKind, EventPage, EventRecord, MissedEvents, PerceptKind,
@@ -55,11 +60,12 @@ pub use object::{
     ObjectPose, ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached,
     TouchNoise,
 };
+pub use percept::{Descriptor, Level};
 pub use predict::{ExpectedPercept, MotionBody, PredictAnswer, PredictQuery, PredictedPercept};
 pub use query::{PerceptCue, RecallQuery, Verb, WatermarkQuery};
 pub use sample::{
-    Descriptor, Increment, Level, Marker, MotionNoise, Relation, Sample, SampleBatch, SampleBody,
-    Sighting, StartPose, Target, Velocity,
+    Increment, Marker, MotionNoise, Relation, Sample, SampleBatch, SampleBody, Sighting, StartPose,
+    Target, Velocity,
 };
 pub use settings::{NoiseSettings, Recruitment, SpaceSettings};
 pub use watermark::{Rejection, SeqRange, SkipReason, Watermark};

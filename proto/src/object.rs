@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::sample::Descriptor;
+use crate::percept::Descriptor;
 
 /// Begins or ends an episode with an object. What is felt in between counts in the frame of the body when the episode began.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

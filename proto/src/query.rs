@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::sample::{Descriptor, Level};
+use crate::percept::{Descriptor, Level};
 
 /// Queries that a space answers on `cogmap/{space}/query/{verb}`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

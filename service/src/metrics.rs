@@ -166,6 +166,14 @@ fn builder() -> Result<PrometheusBuilder, BuildError> {
 /// Tells the recorder what the metrics mean.
 fn describe() {
     describe_damage();
+    describe_samples();
+    describe_memory();
+    describe_http();
+    describe_states();
+}
+
+/// Tells the recorder what the metrics of samples on their way to the maps and back mean.
+fn describe_samples() {
     describe_counter!(
         RECEIVED_MESSAGES,
         Unit::Count,
@@ -203,6 +211,22 @@ fn describe() {
     describe_counter!(DURABLE_SAMPLES, Unit::Count, "Samples made durable");
     describe_counter!(JOURNAL_BYTES, Unit::Bytes, "Bytes appended to journals");
     describe_histogram!(COMMIT_SECONDS, Unit::Seconds, "Time of a sync of the store");
+    describe_histogram!(ROUND_SAMPLES, Unit::Count, "Samples applied in one round");
+    describe_gauge!(
+        QUEUE_MESSAGES,
+        Unit::Count,
+        "Messages that wait for a space's writer"
+    );
+    describe_counter!(PUBLISHED_ESTIMATES, Unit::Count, "Estimates published");
+    describe_counter!(
+        UNPUBLISHED_EVENTS,
+        Unit::Count,
+        "Events not published over Zenoh: too many waited"
+    );
+}
+
+/// Tells the recorder what the metrics of what the maps hold mean.
+fn describe_memory() {
     describe_gauge!(AGENTS, Unit::Count, "Agents of a space");
     describe_counter!(
         AGENTS_MADE_ROOM,
@@ -232,18 +256,10 @@ fn describe() {
         Unit::Count,
         "Distance of descriptors from what was expected, as one minus the cosine"
     );
-    describe_histogram!(ROUND_SAMPLES, Unit::Count, "Samples applied in one round");
-    describe_gauge!(
-        QUEUE_MESSAGES,
-        Unit::Count,
-        "Messages that wait for a space's writer"
-    );
-    describe_counter!(PUBLISHED_ESTIMATES, Unit::Count, "Estimates published");
-    describe_counter!(
-        UNPUBLISHED_EVENTS,
-        Unit::Count,
-        "Events not published over Zenoh: too many waited"
-    );
+}
+
+/// Tells the recorder what the metrics of HTTP mean.
+fn describe_http() {
     describe_counter!(
         HTTP_REQUESTS,
         Unit::Count,
@@ -260,7 +276,6 @@ fn describe() {
         "HTTP connections that the service closed, by reason"
     );
     describe_gauge!(HTTP_STREAMS, Unit::Count, "Event streams open now");
-    describe_states();
 }
 
 /// Tells the recorder what the metrics of the agents' and the process's state mean.

@@ -12,12 +12,14 @@ use tokio::task::JoinHandle;
 use zenoh::Session;
 
 use crate::config::{Config, ConfigError};
+use crate::decode::core_settings;
 use crate::descriptors::{self, Shares};
-use crate::engine::{self, Engine, Outlet, Silent, SpaceError, core_settings};
+use crate::engine::{Engine, Publisher, Silent, SpaceError};
 use crate::http::{self, HttpSettings};
+use crate::journal;
 use crate::metrics;
 use crate::store::{self, Journal, LocalStore, StoreError};
-use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohOutlet};
+use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohPublisher};
 
 /// Longest wait for the Zenoh session to close.
 const SESSION_CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -32,7 +34,7 @@ pub struct Service {
     engine: Engine,
     address: SocketAddr,
     session: Option<Session>,
-    outlet: Option<Arc<ZenohOutlet>>,
+    publisher: Option<Arc<ZenohPublisher>>,
     intake: Option<Intake>,
     stop_http: oneshot::Sender<()>,
     http: JoinHandle<std::io::Result<()>>,
@@ -83,12 +85,7 @@ impl Service {
     pub async fn start(config: &Config, prometheus: PrometheusHandle) -> Result<Self, StartError> {
         // What may fail comes in the order of what it leaves behind: settings nothing, a port or a
         // session nothing that outlives the process, the store files.
-        for (name, settings) in &config.spaces {
-            core_settings(settings).map_err(|source| StartError::Space {
-                name: name.to_string(),
-                source: source.into(),
-            })?;
-        }
+        check_spaces(config)?;
         let (http_settings, shares) = share_descriptors(config);
         let address = config.http.listen;
         let of_http = |source| StartError::Http { address, source };
@@ -97,59 +94,15 @@ impl Service {
             tracing::warn!(%address, "anyone who reaches this address can read and write: set http.token");
         }
         let address = listener.local_addr().map_err(of_http)?;
-
-        let session = match transport_settings(config, shares) {
-            Some(settings) => Some(transport::open(&settings).await?),
-            None => None,
-        };
-        let zenoh_outlet = match &session {
-            Some(session) => {
-                let codec = config.zenoh.encoding.codec();
-                let outlet = ZenohOutlet::declare(session.clone(), codec).await?;
-                Some(Arc::new(outlet))
-            }
-            None => None,
-        };
-        let outlet: Arc<dyn Outlet> = match &zenoh_outlet {
-            Some(outlet) => Arc::clone(outlet) as Arc<dyn Outlet>,
-            None => Arc::new(Silent),
-        };
-        let directory = &config.store.directory;
-        let of_store = |source| StartError::Store {
-            directory: directory.display().to_string(),
-            source,
-        };
-        let store = Arc::new(open_store(directory).map_err(of_store)?);
-        let stored = store.spaces().map_err(of_store)?;
-        let name_lost = stored.iter().any(|space| space.settings.is_none());
-        let engine = Engine::open(store, config.engine.settings(), outlet).map_err(of_store)?;
-        for (name, settings) in &config.spaces {
-            if let Some(space) = engine.space(name.as_str()) {
-                if space.settings() != settings {
-                    tracing::warn!(space = %name,
-                        "the settings given for the space are without effect: they were fixed when it was created");
-                }
-                continue;
-            }
-            if name_lost {
-                // A robot must not find an empty map where its own may be.
-                tracing::error!(space = %name,
-                    "the space is not created: it may be one whose name is lost, see /v1/spaces");
-                continue;
-            }
-            engine
-                .create_space(name, settings)
-                .map_err(|source| StartError::Space {
-                    name: name.to_string(),
-                    source,
-                })?;
-        }
+        let (session, publisher) = open_zenoh(config, shares).await?;
+        let engine = open_engine(config, publisher.as_ref())?;
         let intake = match &session {
             Some(session) => Some(Intake::start(session, &engine).await?),
             None => None,
         };
+        let directory = config.store.directory.clone();
         let upkeep = [
-            tokio::spawn(metrics::upkeep(prometheus.clone(), directory.clone())),
+            tokio::spawn(metrics::upkeep(prometheus.clone(), directory)),
             tokio::spawn(transport::forbid_lingering()),
         ];
         let (stop_http, stopped) = oneshot::channel();
@@ -167,7 +120,7 @@ impl Service {
             engine,
             address,
             session,
-            outlet: zenoh_outlet,
+            publisher,
             intake,
             stop_http,
             http,
@@ -200,11 +153,11 @@ impl Service {
             Err(error) => tracing::error!(%error, "the http task ended with a panic"),
         }
         self.upkeep.iter().for_each(JoinHandle::abort);
-        let (engine, outlet) = (self.engine, self.outlet);
+        let (engine, publisher) = (self.engine, self.publisher);
         let end = move || {
             engine.shutdown();
-            if let Some(outlet) = outlet {
-                outlet.close();
+            if let Some(publisher) = publisher {
+                publisher.close();
             }
         };
         if tokio::task::spawn_blocking(end).await.is_err() {
@@ -220,12 +173,85 @@ impl Service {
     }
 }
 
+/// Checks the settings of the spaces that are to be there.
+fn check_spaces(config: &Config) -> Result<(), StartError> {
+    for (name, settings) in &config.spaces {
+        core_settings(settings).map_err(|source| StartError::Space {
+            name: name.to_string(),
+            source: source.into(),
+        })?;
+    }
+    Ok(())
+}
+
+/// The Zenoh session and what publishes over it; neither where the settings ask for none.
+async fn open_zenoh(
+    config: &Config,
+    shares: Shares,
+) -> Result<(Option<Session>, Option<Arc<ZenohPublisher>>), StartError> {
+    let Some(settings) = transport_settings(config, shares) else {
+        return Ok((None, None));
+    };
+    let session = transport::open(&settings).await?;
+    let codec = config.zenoh.encoding.codec();
+    let publisher = ZenohPublisher::declare(session.clone(), codec).await?;
+    Ok((Some(session), Some(Arc::new(publisher))))
+}
+
+/// The engine over the store, with the spaces of the settings.
+fn open_engine(
+    config: &Config,
+    publisher: Option<&Arc<ZenohPublisher>>,
+) -> Result<Engine, StartError> {
+    let publisher: Arc<dyn Publisher> = match publisher {
+        Some(publisher) => Arc::clone(publisher) as Arc<dyn Publisher>,
+        None => Arc::new(Silent),
+    };
+    let directory = &config.store.directory;
+    let of_store = |source| StartError::Store {
+        directory: directory.display().to_string(),
+        source,
+    };
+    let store = Arc::new(open_store(directory).map_err(of_store)?);
+    let stored = store.spaces().map_err(of_store)?;
+    let name_lost = stored.iter().any(|space| space.settings.is_none());
+    let engine = Engine::open(store, config.engine.settings(), publisher).map_err(of_store)?;
+    create_spaces(config, &engine, name_lost)?;
+    Ok(engine)
+}
+
+/// Creates the spaces of the settings that the store does not hold.
+fn create_spaces(config: &Config, engine: &Engine, name_lost: bool) -> Result<(), StartError> {
+    for (name, settings) in &config.spaces {
+        if let Some(space) = engine.space(name.as_str()) {
+            if space.settings() != settings {
+                tracing::warn!(space = %name,
+                    "the settings given for the space are without effect: they were fixed when it was created");
+            }
+            continue;
+        }
+        if name_lost {
+            // A robot must not find an empty map where its own may be.
+            tracing::error!(space = %name,
+                "the space is not created: it may be one whose name is lost, see /v1/spaces");
+            continue;
+        }
+        engine
+            .create_space(name, settings)
+            .map_err(|source| StartError::Space {
+                name: name.to_string(),
+                source,
+            })?;
+    }
+    Ok(())
+}
+
 /// Opens the store in `directory`, made anew in the present format where it has an older one.
 ///
 /// # Errors
 /// See [`LocalStore::open`] and [`store::migrate`].
 pub fn open_store(directory: &Path) -> Result<LocalStore, StoreError> {
-    store::migrate(directory, engine::samples_in)?;
+    store::migrate(directory, journal::samples_in)?;
     LocalStore::open(directory)
 }
 

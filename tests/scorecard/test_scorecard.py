@@ -34,7 +34,7 @@ def _card(directory: Path, **changes: Any) -> Path:
     runs: List[Dict[str, Any]] = [
         {
             "id": "walk",
-            "command": "cogmap walk --json",
+            "command": "cogmap-lab walk --json",
             "quick": True,
             "figures": [{**figure, **changes}, fast],
         },

@@ -6,6 +6,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+#[path = "tidy/service.rs"]
+mod service;
+
 /// Directories that are built or fetched, wherever they stand.
 const NOT_OURS: [&str; 13] = [
     "target",
@@ -411,80 +414,6 @@ fn each_part_depends_only_on_what_it_may() {
                 "{manifest} names {name}. {why}"
             );
         }
-    }
-}
-
-#[test]
-fn each_part_of_the_service_knows_only_its_neighbours() {
-    // Words, the paths in `service/src` that may have them, and where the rest belongs.
-    let walls: [(&[&str], &[&str], &str); 7] = [
-        (
-            &["zenoh::", "use zenoh"],
-            &[
-                "transport/",
-                "service.rs",
-                "cli/demo/",
-                "config/mod.rs", // its own module of that name
-            ],
-            "Only the transport speaks Zenoh, the composition root opens it, and commands that play \
-             robots use it from outside. Go through engine::Outlet or Engine::offer.",
-        ),
-        (
-            &["axum::", "use axum"],
-            &["http/"],
-            "Only http speaks axum.",
-        ),
-        (
-            &["fjall::", "use fjall"],
-            &["store/"],
-            "Only the store knows the disk format. Go through the trait Store.",
-        ),
-        (
-            &[
-                "crate::http",
-                "crate::transport",
-                "crate::cli",
-                "crate::service",
-                "crate::config",
-            ],
-            &["http/", "transport/", "cli/", "service.rs", "config/"],
-            "The engine, its store and what they are made of know nobody who uses them. Pass it in.",
-        ),
-        (
-            &["crate::engine", "crate::answer", "crate::decode"],
-            &[
-                "http/",
-                "transport/",
-                "cli/",
-                "service.rs",
-                "config/",
-                "answer/",
-                "engine/",
-            ],
-            "The store keeps bytes and knows not whose.",
-        ),
-        (
-            &["crate::transport"],
-            &["transport/", "service.rs"],
-            "HTTP and Zenoh are two doors of one engine and do not know one another.",
-        ),
-        (
-            &["crate::http"],
-            &["http/", "service.rs", "config/"],
-            "HTTP and Zenoh are two doors of one engine and do not know one another.",
-        ),
-    ];
-    let sources = sources();
-    for (words, allowed, advice) in walls {
-        let found: Vec<_> = sources
-            .iter()
-            .filter_map(|source| Some((source, source.path.strip_prefix("service/src/")?)))
-            .filter(|(source, path)| {
-                source.has_extension(&["rs"]) && !allowed.iter().any(|part| path.starts_with(part))
-            })
-            .flat_map(|(source, _)| source.mentions(words))
-            .collect();
-        assert_none(&found, advice);
     }
 }
 

@@ -22,6 +22,7 @@
 
 mod api;
 mod batch;
+mod builder;
 mod credentials;
 mod error;
 mod link;
@@ -33,11 +34,12 @@ mod state;
 mod window;
 
 pub use api::{Api, ApiError};
+pub use builder::RobotBuilder;
 pub use cogmap_proto as proto;
 pub use credentials::Credentials;
 pub use error::ClientError;
 pub use link::{open_session, open_session_as};
 pub use robot::Robot;
 pub use sampling::TripMark;
-pub use settings::{RobotBuilder, RobotSettings};
+pub use settings::RobotSettings;
 pub use state::Counters;

@@ -16,7 +16,7 @@ use zenoh::{Session, Wait};
 use crate::batch::{self, BATCH_BYTES_MAX};
 use crate::error::ClientError;
 use crate::sender::Sender;
-use crate::settings::{RobotBuilder, RobotSettings, deadline};
+use crate::settings::{RobotSettings, deadline};
 use crate::state::{Counters, Shared, State};
 use crate::window::{Window, WindowLimits};
 
@@ -51,19 +51,6 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Connects to a Zenoh router as `agent` of `space`, with the default settings.
-    ///
-    /// # Errors
-    /// As [`RobotBuilder::connect`].
-    pub fn connect(endpoint: &str, space: &str, agent: &str) -> Result<Self, ClientError> {
-        Self::builder(space, agent).endpoint(endpoint).connect()
-    }
-
-    /// Starts a builder for `agent` of `space`.
-    pub fn builder(space: &str, agent: &str) -> RobotBuilder {
-        RobotBuilder::new(space, agent)
-    }
-
     pub(crate) fn start(
         zenoh: Session,
         space: String,
@@ -139,7 +126,7 @@ impl Robot {
     }
 
     /// The Zenoh session, to be shared with further robots
-    /// ([`RobotBuilder::zenoh_session`]).
+    /// ([`RobotBuilder::zenoh_session`](crate::RobotBuilder::zenoh_session)).
     pub fn zenoh_session(&self) -> &Session {
         &self.zenoh
     }

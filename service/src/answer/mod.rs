@@ -1,36 +1,66 @@
-//! From the map to the messages that answer questions about it, and from questions to cues.
+//! Questions: whom they name, and what the map answers. Each is read by [`decode`](crate::decode), asked,
+//! and its answer written by [`encode`](crate::encode); HTTP and Zenoh ask alike.
 
-mod channel;
-mod grid;
-mod landmark;
-mod localize;
 mod named;
-mod object;
-mod place;
-mod predict;
-mod problem;
-mod recall;
-mod space;
-mod trip;
 
-pub use channel::InvalidChannel;
-pub use grid::grid_state;
-pub use landmark::landmark;
-pub use localize::{InvalidSequence, localization, samples_to_localize};
 pub use named::{agent_named, agent_once_named, any_space_named, nobody_named, space_named};
-pub use object::{
-    InvalidContacts, agent_object, identification, journaled_lesson, lesson, object_detail,
-    object_summary, touches_to_identify,
-};
-pub use place::place;
-pub use predict::{InvalidPrediction, predict};
-pub use problem::{Expected, Kind, Problem};
-pub use recall::{InvalidQuery, cue, recall, unknown_agent};
-pub use space::space_info;
-pub use trip::{leg, trip, trip_detail};
 
-/// Frame of all positions in answers.
-pub const FRAME: &str = "map";
+use cogmap_proto::{
+    AgentObject, EndedEpisode, PredictAnswer, PredictQuery, RecallAnswer, RecallQuery,
+};
+use cognitive_map::{AgentId, CognitiveMap};
+
+use crate::decode::{self, InvalidPrediction, InvalidQuery};
+use crate::encode;
+
+/// The places of a space that answer a query.
+///
+/// # Errors
+/// Says which rule the query breaks, or that an agent or channel in it is unknown.
+pub fn recall(
+    space: &str,
+    map: &CognitiveMap,
+    query: &RecallQuery,
+) -> Result<RecallAnswer, InvalidQuery> {
+    let cue = decode::cue(map, query)?;
+    let recalled = map.recall(&cue);
+    let rivals = { recalled.first() }.and_then(|best| map.rivals(&cue, best));
+    Ok(encode::recall(space, map, recalled, rivals.as_ref()))
+}
+
+/// What an agent would feel if it moved so.
+///
+/// # Errors
+/// Says which rule the query breaks, or that the agent is not placed.
+pub fn predict(
+    space: &str,
+    map: &CognitiveMap,
+    agent: AgentId,
+    query: &PredictQuery,
+) -> Result<PredictAnswer, InvalidPrediction> {
+    let cue = decode::prediction(map, query)?;
+    let predicted = map.predict(agent, &cue.motion, &cue.offset_m, cue.channel.as_ref());
+    let (predicted, agent) = predicted
+        .zip(map.agent(agent))
+        .ok_or(InvalidPrediction::NotPlaced)?;
+    Ok(encode::prediction(
+        space,
+        map,
+        agent.name().as_str(),
+        predicted,
+    ))
+}
+
+/// The episode of an agent, and the latest one that has ended.
+pub fn agent_object(
+    space: &str,
+    map: &CognitiveMap,
+    agent: AgentId,
+    name: &str,
+    last: Option<EndedEpisode>,
+) -> AgentObject {
+    encode::agent_object(space, map, name, map.episode(agent).as_ref(), last)
+}
 
 #[cfg(test)]
 mod tests;

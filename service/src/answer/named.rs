@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use cogmap_proto::Name;
 
-use super::{Kind, Problem, unknown_agent};
-use crate::engine::{AgentDesk, Engine, Space};
+use crate::decode::unknown_agent;
+use crate::engine::{AgentView, Engine, Space};
+use crate::problem::{Kind, Problem};
 
 /// The space of a name in a path or a key.
 ///
@@ -36,9 +37,9 @@ pub fn any_space_named(engine: &Engine, name: &str) -> Result<Arc<Space>, Proble
 /// # Errors
 /// There is none, or the name is none that an agent can have; or the space is still loading, and nobody
 /// knows.
-pub fn agent_named(space: &Space, name: &str) -> Result<Arc<AgentDesk>, Problem> {
-    if let Some(desk) = space.agent(name) {
-        return Ok(desk);
+pub fn agent_named(space: &Space, name: &str) -> Result<Arc<AgentView>, Problem> {
+    if let Some(view) = space.agent(name) {
+        return Ok(view);
     }
     Err(nobody_named(space, name))
 }

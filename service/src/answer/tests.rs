@@ -8,6 +8,8 @@ use cognitive_map::{
 };
 
 use super::*;
+use crate::decode::InvalidChannel;
+use crate::encode::{grid_state, landmark, place, trip_detail};
 
 fn label(text: &str) -> Label {
     Label::new(text).expect("a label")

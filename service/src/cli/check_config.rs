@@ -3,7 +3,7 @@
 use anyhow::Context;
 
 use super::{ConfigArgs, output};
-use crate::engine::core_settings;
+use crate::decode::core_settings;
 
 pub(super) fn run(args: &ConfigArgs) -> anyhow::Result<()> {
     let config = args.load()?;

@@ -6,8 +6,9 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 
 use super::output;
-use crate::decode::stamped_pose;
-use crate::engine::{Recorder, core_settings, entries, records_of, trajectory_interval_ns};
+use crate::decode::{core_settings, records_of, trajectory_interval_ns};
+use crate::engine::Recorder;
+use crate::journal::entries;
 use crate::store::{Journal, LocalJournal, SpaceNumber};
 use cogmap_proto::SpaceSettings;
 use cognitive_map::{CognitiveMap, Record};
@@ -115,6 +116,5 @@ fn trajectory(source: &Source, agent: &str) -> anyhow::Result<()> {
     }
     known.with_context(|| format!("the space has no agent {agent:?}"))?;
     rows.extend_from_slice(recorder.rows());
-    let poses: Vec<_> = rows.iter().map(stamped_pose).collect();
-    Ok(output::line(write_tum(&poses).trim_end())?)
+    Ok(output::line(write_tum(&rows).trim_end())?)
 }

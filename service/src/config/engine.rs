@@ -2,50 +2,45 @@
 
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
-
 use super::ConfigError;
-use super::rule::{INTERVAL_S, check, is_interval_s};
+use super::setting::{COUNT, INTERVAL_S, Rule, section};
 use crate::engine::EngineSettings;
 
-/// Bounds and intervals of the engine. None of these changes the maps.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct EngineConfig {
-    /// Most messages that wait for a space's writer.
-    pub queue_messages: usize,
-    /// Most bytes of such messages.
-    pub queue_bytes: usize,
-    /// Most agents of a space.
-    pub agents_max: usize,
-    /// How far ahead of the service's clock the number of a session may be that begins \[s\].
-    pub session_ahead_max_s: f64,
-    /// Most spaces.
-    pub spaces_max: usize,
-    /// How far ahead of the next sample of an agent one may be that waits for it.
-    pub reorder_window_samples: usize,
-    /// How long missing samples are waited for before they count as lost \[s\].
-    pub gap_timeout_s: f64,
-    /// Longest time between syncs of the store while samples come in \[s\].
-    pub commit_interval_s: f64,
-    /// Time between checkpoints while samples come in \[s\].
-    pub checkpoint_interval_s: f64,
-}
+/// Two of the longest messages fit.
+const BYTES: Rule<usize> = Rule {
+    words: "at least 2097152, two of the longest messages",
+    holds: |bytes| *bytes >= 2 << 20,
+    shown: usize::to_string,
+};
 
-impl Default for EngineConfig {
-    fn default() -> Self {
-        let settings = EngineSettings::default();
-        Self {
-            queue_messages: settings.queue_messages,
-            queue_bytes: settings.queue_bytes,
-            agents_max: settings.agents_max,
-            session_ahead_max_s: settings.session_ahead_max.as_secs_f64(),
-            spaces_max: settings.spaces_max,
-            reorder_window_samples: settings.reorder_window,
-            gap_timeout_s: settings.gap_timeout.as_secs_f64(),
-            commit_interval_s: settings.commit_interval.as_secs_f64(),
-            checkpoint_interval_s: settings.checkpoint_interval.as_secs_f64(),
-        }
+const AHEAD_S: Rule<f64> = Rule {
+    words: "1 to 1e9 seconds",
+    holds: |time_s| (1.0..=1e9).contains(time_s),
+    shown: f64::to_string,
+};
+
+section! {
+    /// Bounds and intervals of the engine. None of these changes the maps.
+    pub struct EngineConfig of "engine" {
+        /// Most messages that wait for a space's writer.
+        queue_messages: usize = EngineSettings::default().queue_messages, COUNT;
+        /// Most bytes of such messages.
+        queue_bytes: usize = EngineSettings::default().queue_bytes, BYTES;
+        /// Most agents of a space.
+        agents_max: usize = EngineSettings::default().agents_max, COUNT;
+        /// How far ahead of the service's clock the number of a session may be that begins \[s\].
+        session_ahead_max_s: f64 = EngineSettings::default().session_ahead_max.as_secs_f64(), AHEAD_S;
+        /// Most spaces.
+        spaces_max: usize = EngineSettings::default().spaces_max, COUNT;
+        /// How far ahead of the next sample of an agent one may be that waits for it.
+        reorder_window_samples: usize = EngineSettings::default().reorder_window, COUNT;
+        /// How long missing samples are waited for before they count as lost \[s\].
+        gap_timeout_s: f64 = EngineSettings::default().gap_timeout.as_secs_f64(), INTERVAL_S;
+        /// Longest time between syncs of the store while samples come in \[s\].
+        commit_interval_s: f64 = EngineSettings::default().commit_interval.as_secs_f64(), INTERVAL_S;
+        /// Time between checkpoints while samples come in \[s\].
+        checkpoint_interval_s: f64 =
+            EngineSettings::default().checkpoint_interval.as_secs_f64(), INTERVAL_S;
     }
 }
 
@@ -66,38 +61,6 @@ impl EngineConfig {
     }
 
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        let counts = [
-            ("engine.queue_messages", self.queue_messages),
-            ("engine.agents_max", self.agents_max),
-            ("engine.spaces_max", self.spaces_max),
-            ("engine.reorder_window_samples", self.reorder_window_samples),
-        ];
-        for (key, value) in counts {
-            check(
-                (1..=1_000_000).contains(&value),
-                key,
-                &value,
-                "1 to 1000000",
-            )?;
-        }
-        let bytes = self.queue_bytes;
-        let rule = "at least 2097152, two of the longest messages";
-        check(bytes >= 2 << 20, "engine.queue_bytes", &bytes, rule)?;
-        let ahead = self.session_ahead_max_s;
-        check(
-            (1.0..=1e9).contains(&ahead),
-            "engine.session_ahead_max_s",
-            &ahead,
-            "1 to 1e9 seconds",
-        )?;
-        let times = [
-            ("engine.gap_timeout_s", self.gap_timeout_s),
-            ("engine.commit_interval_s", self.commit_interval_s),
-            ("engine.checkpoint_interval_s", self.checkpoint_interval_s),
-        ];
-        for (key, value) in times {
-            check(is_interval_s(value), key, &value, INTERVAL_S)?;
-        }
-        Ok(())
+        self.check_values()
     }
 }

@@ -4,16 +4,22 @@ use serde::{Deserialize, Serialize};
 use tracing_subscriber::EnvFilter;
 
 use super::ConfigError;
-use super::rule::check;
+use super::setting::{Rule, any, section};
 
-/// What is logged, and how.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LogConfig {
-    /// Level, or directives by module, like `info,cogmap=debug`.
-    pub filter: String,
-    /// Form of a line.
-    pub format: LogFormat,
+const FILTER: Rule<String> = Rule {
+    words: "a level or a list of target=level",
+    holds: |filter| EnvFilter::try_new(filter).is_ok(),
+    shown: |filter| format!("{filter:?}"),
+};
+
+section! {
+    /// What is logged, and how.
+    pub struct LogConfig of "log" {
+        /// Level, or directives by module, like `info,cogmap=debug`.
+        filter: String = "info,fjall=warn,lsm_tree=warn,zenoh=warn".to_owned(), FILTER;
+        /// Form of a line: for people, or one JSON object a line for machines.
+        format: LogFormat = LogFormat::Text, any("text or json");
+    }
 }
 
 /// Form of a line of the log.
@@ -26,24 +32,8 @@ pub enum LogFormat {
     Json,
 }
 
-impl Default for LogConfig {
-    fn default() -> Self {
-        Self {
-            filter: "info,fjall=warn,lsm_tree=warn,zenoh=warn".to_owned(),
-            format: LogFormat::Text,
-        }
-    }
-}
-
 impl LogConfig {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        let readable = EnvFilter::try_new(&self.filter).is_ok();
-        let rule = "a level or a list of target=level";
-        check(
-            readable,
-            "log.filter",
-            &format_args!("{:?}", self.filter),
-            rule,
-        )
+        self.check_values()
     }
 }

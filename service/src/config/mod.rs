@@ -9,9 +9,8 @@ mod engine;
 mod error;
 mod http;
 mod log;
-mod rule;
+mod setting;
 mod store;
-mod token;
 mod zenoh;
 
 use std::collections::BTreeMap;
@@ -20,7 +19,8 @@ use std::path::Path;
 use cogmap_proto::{Name, SpaceSettings};
 use serde::{Deserialize, Serialize};
 
-use crate::engine::core_settings;
+use crate::decode::core_settings;
+pub use crate::http::Token;
 
 pub use assignment::Assignment;
 pub use engine::EngineConfig;
@@ -28,7 +28,6 @@ pub use error::ConfigError;
 pub use http::HttpConfig;
 pub use log::{LogConfig, LogFormat};
 pub use store::StoreConfig;
-pub use token::Token;
 pub use zenoh::{ZenohConfig, ZenohEncoding, ZenohMode};
 
 /// All settings of the service.
@@ -132,5 +131,7 @@ impl Config {
     }
 }
 
+#[cfg(test)]
+mod document;
 #[cfg(test)]
 mod tests;

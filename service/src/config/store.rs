@@ -2,35 +2,25 @@
 
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
-
 use super::ConfigError;
-use super::rule::check;
+use super::setting::{Rule, section};
 
-/// Settings of the store.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct StoreConfig {
-    /// Directory of the store, relative to the working directory; created when it is not there.
-    pub directory: PathBuf,
-}
+const DIRECTORY: Rule<PathBuf> = Rule {
+    words: "the path of a directory",
+    holds: |path| !path.as_os_str().is_empty(),
+    shown: |_| "empty".to_owned(),
+};
 
-impl Default for StoreConfig {
-    fn default() -> Self {
-        Self {
-            directory: PathBuf::from("cogmap-data"),
-        }
+section! {
+    /// Settings of the store.
+    pub struct StoreConfig of "store" {
+        /// Directory of the store, relative to the working directory; created when it is not there.
+        directory: PathBuf = PathBuf::from("cogmap-data"), DIRECTORY;
     }
 }
 
 impl StoreConfig {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        let named = !self.directory.as_os_str().is_empty();
-        check(
-            named,
-            "store.directory",
-            &"empty",
-            "the path of a directory",
-        )
+        self.check_values()
     }
 }

@@ -6,27 +6,48 @@ use cogmap_proto::Codec;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
-use super::rule::check;
+use super::setting::{COUNT, Rule, any, section};
 
-/// Settings of the Zenoh session.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ZenohConfig {
-    /// Whether there is a session; without one, samples come over HTTP alone.
-    pub enabled: bool,
-    /// Part that the service plays in the network.
-    pub mode: ZenohMode,
-    /// Endpoints that the service listens on, like `tcp/0.0.0.0:7447`.
-    pub listen: Vec<String>,
-    /// Endpoints that it connects to.
-    pub connect: Vec<String>,
-    /// Zenoh's own configuration (JSON5), which the keys above are put over.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub config_file: Option<PathBuf>,
-    /// Most sessions of others: robots, and whoever listens or asks.
-    pub sessions_max: usize,
-    /// Codec of what the service publishes.
-    pub encoding: ZenohEncoding,
+/// Endpoints, each with a link that the service is built with.
+const ENDPOINTS: Rule<Vec<String>> = Rule {
+    words: "endpoints that begin with tcp/ or tls/",
+    holds: |endpoints| endpoints.iter().all(|endpoint| is_endpoint(endpoint)),
+    shown: |endpoints| {
+        let mut refused = endpoints.iter().filter(|endpoint| !is_endpoint(endpoint));
+        refused
+            .next()
+            .map_or_else(String::new, |endpoint| format!("{endpoint:?}"))
+    },
+};
+
+section! {
+    /// Settings of the Zenoh session.
+    pub struct ZenohConfig of "zenoh" {
+        /// Whether there is a session; without one, samples come over HTTP alone.
+        enabled: bool = true, any("true or false");
+        /// Part that the service plays in the network.
+        mode: ZenohMode = ZenohMode::Peer, any("peer, client or router");
+        /// Endpoints that the service listens on, like `tcp/0.0.0.0:7447`.
+        listen: Vec<String> = vec!["tcp/127.0.0.1:7447".to_owned()], ENDPOINTS;
+        /// Endpoints that it connects to.
+        connect: Vec<String> = Vec::new(), ENDPOINTS;
+        /// Zenoh's own configuration (JSON5), which the keys above are put over.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        config_file: Option<PathBuf> = None, any("the path of a file");
+        /// Most sessions of others: robots, and whoever listens or asks.
+        sessions_max: usize = 1000, COUNT;
+        /// Codec of what the service publishes.
+        encoding: ZenohEncoding = ZenohEncoding::Cbor, any("postcard, cbor or json");
+    }
+}
+
+fn is_endpoint(endpoint: &str) -> bool {
+    let mut links = ["tcp/", "tls/"].iter();
+    links.any(|link| {
+        endpoint
+            .strip_prefix(link)
+            .is_some_and(|rest| !rest.is_empty())
+    })
 }
 
 /// Part of a Zenoh node in its network.
@@ -53,47 +74,19 @@ pub enum ZenohEncoding {
     Json,
 }
 
-impl Default for ZenohConfig {
-    fn default() -> Self {
-        Self {
-            enabled: true,
-            mode: ZenohMode::Peer,
-            listen: vec!["tcp/127.0.0.1:7447".to_owned()],
-            connect: Vec::new(),
-            config_file: None,
-            sessions_max: 1000,
-            encoding: ZenohEncoding::Cbor,
-        }
-    }
-}
-
 impl ZenohConfig {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        let rule = "endpoints that begin with tcp/ or tls/";
-        for (key, endpoints) in [
-            ("zenoh.listen", &self.listen),
-            ("zenoh.connect", &self.connect),
-        ] {
-            for endpoint in endpoints {
-                let known = ["tcp/", "tls/"].iter().any(|link| {
-                    endpoint
-                        .strip_prefix(link)
-                        .is_some_and(|rest| !rest.is_empty())
-                });
-                check(known, key, &format_args!("{endpoint:?}"), rule)?;
-            }
-        }
-        let sessions = self.sessions_max;
-        let in_range = (1..=1_000_000).contains(&sessions);
-        check(in_range, "zenoh.sessions_max", &sessions, "1 to 1000000")?;
+        self.check_values()?;
         let alone =
             self.mode == ZenohMode::Client && self.connect.is_empty() && self.config_file.is_none();
-        check(
-            !alone,
-            "zenoh.connect",
-            &"empty",
-            "at least one router in client mode",
-        )
+        if alone {
+            return Err(ConfigError::Invalid {
+                key: "zenoh.connect",
+                value: "empty".to_owned(),
+                rule: "at least one router in client mode",
+            });
+        }
+        Ok(())
     }
 }
 

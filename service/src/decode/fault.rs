@@ -6,7 +6,10 @@ use std::fmt::Debug;
 use cogmap_proto as wire;
 use cognitive_map::{Descriptor, Label, Level, Motion, PoseNoise, StartPose, Touch, TouchNoise};
 
-use super::{check_name, noise, relation, touch, touch_noise};
+use super::contact::{check_channels, touch, touch_noise};
+use super::motion::noise;
+use super::name::check_name;
+use super::sighting::{relation, target};
 
 /// A rotation by nothing.
 const IDENTITY_XYZW: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
@@ -33,14 +36,14 @@ impl Fault {
 }
 
 /// The field of a sample.
-pub(crate) fn in_sample(sample: &wire::Sample) -> String {
+pub(super) fn in_sample(sample: &wire::Sample) -> String {
     match &sample.body {
         wire::SampleBody::Increment(body) => in_increment(body).within("body.increment"),
         wire::SampleBody::Velocity(body) => in_velocity(body).within("body.velocity"),
         wire::SampleBody::Level(level) => in_level(level).within("body.level"),
         wire::SampleBody::Descriptor(body) => in_descriptor(body).within("body.descriptor"),
         wire::SampleBody::Sighting(body) => Fault(None)
-            .or("target", &body.target, super::target(&body.target))
+            .or("target", &body.target, target(&body.target))
             .or("relation", &body.relation, relation(&body.relation))
             .within("body.sighting"),
         wire::SampleBody::StartPose(body) => Fault(None)
@@ -65,7 +68,7 @@ pub(crate) fn in_sample(sample: &wire::Sample) -> String {
 }
 
 /// The field of a motion that is asked about.
-pub(crate) fn in_motion(motion: &wire::MotionBody) -> String {
+pub(super) fn in_motion(motion: &wire::MotionBody) -> String {
     match motion {
         wire::MotionBody::Increment(body) => in_increment(body).within("motion.increment"),
         wire::MotionBody::Velocity(body) => in_velocity(body).within("motion.velocity"),
@@ -73,7 +76,7 @@ pub(crate) fn in_motion(motion: &wire::MotionBody) -> String {
 }
 
 /// The field of a percept that is a cue.
-pub(crate) fn in_percept(cue: &wire::PerceptCue) -> String {
+pub(super) fn in_percept(cue: &wire::PerceptCue) -> String {
     match cue {
         wire::PerceptCue::Level(level) => in_level(level).within("percept.level"),
         wire::PerceptCue::Descriptor(body) => in_descriptor(body).within("percept.descriptor"),
@@ -81,7 +84,7 @@ pub(crate) fn in_percept(cue: &wire::PerceptCue) -> String {
 }
 
 /// The field of a contact that stands at a place of a list.
-pub(crate) fn in_contact(at: usize, contact: &wire::Contact) -> String {
+pub(super) fn in_contact(at: usize, contact: &wire::Contact) -> String {
     let plain = || TouchNoise::new(0.001, 0.1, 0.1);
     let at_origin = || plain().and_then(|noise| Touch::new([0.0; 3], noise));
     let normal = contact.normal.map(|normal| {
@@ -97,7 +100,7 @@ pub(crate) fn in_contact(at: usize, contact: &wire::Contact) -> String {
         ..contact.clone()
     };
     let felt = plain().and_then(|noise| touch(&felt, noise));
-    let channels = super::check_channels(std::slice::from_ref(contact));
+    let channels = check_channels(std::slice::from_ref(contact));
     Fault(None)
         .or("position_m", &contact.position_m, position)
         .or("normal", &contact.normal, normal.transpose())
@@ -111,7 +114,7 @@ pub(crate) fn in_contact(at: usize, contact: &wire::Contact) -> String {
 }
 
 /// The field of the noise of contacts.
-pub(crate) fn in_touch_noise(given: &wire::TouchNoise) -> String {
+pub(super) fn in_touch_noise(given: &wire::TouchNoise) -> String {
     let alone = |position_sd_m, normal_sd_rad, level_sd| {
         touch_noise(&wire::TouchNoise {
             position_sd_m,

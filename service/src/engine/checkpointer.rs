@@ -200,8 +200,8 @@ impl Checkpointer {
 mod tests {
     use cogmap_proto::SpaceSettings;
 
-    use super::super::fold::core_settings;
     use super::*;
+    use crate::decode::core_settings;
     use crate::store::{Derived, Journal, LocalStore};
 
     #[test]

@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 
 use cogmap_proto::IngestAnswer;
 
+use super::agent_view::AgentView;
 use super::counters::CommitCounters;
-use super::desk::AgentDesk;
 use super::health::Health;
 use super::message::{ChangeReply, IngestError, Reply};
-use super::outlet::Outlet;
+use super::publisher::Publisher;
 use crate::store::Store;
 
 /// What a writer has appended to the store and applied.
@@ -31,7 +31,7 @@ pub(crate) struct Commit {
 /// Samples of an agent's session below `next` are in the store.
 #[derive(Debug)]
 pub(crate) struct Mark {
-    pub(crate) desk: Arc<AgentDesk>,
+    pub(crate) view: Arc<AgentView>,
     pub(crate) session: u64,
     pub(crate) next: u64,
 }
@@ -40,28 +40,28 @@ pub(crate) struct Mark {
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) reply: Reply,
-    pub(crate) desk: Arc<AgentDesk>,
+    pub(crate) view: Arc<AgentView>,
     pub(crate) duplicates: u64,
 }
 
 /// Starts the committer. It ends when all senders are gone.
 pub(crate) fn start(
     store: Arc<dyn Store>,
-    outlet: Arc<dyn Outlet>,
+    publisher: Arc<dyn Publisher>,
     health: Arc<Health>,
     interval: Duration,
 ) -> (Sender<Commit>, JoinHandle<()>) {
     let (sender, receiver) = channel();
     let thread = Builder::new()
         .name("committer".into())
-        .spawn(move || run(&*store, &*outlet, &health, &receiver, interval))
+        .spawn(move || run(&*store, &*publisher, &health, &receiver, interval))
         .expect("the system can start a thread");
     (sender, thread)
 }
 
 fn run(
     store: &dyn Store,
-    outlet: &dyn Outlet,
+    publisher: &dyn Publisher,
     health: &Health,
     commits: &Receiver<Commit>,
     interval: Duration,
@@ -92,7 +92,7 @@ fn run(
         match result {
             Some(Ok(())) => group
                 .drain(..)
-                .for_each(|commit| acknowledge(commit, outlet, &counters)),
+                .for_each(|commit| acknowledge(commit, publisher, &counters)),
             Some(Err(error)) => {
                 health.fail(&error);
                 group.drain(..).for_each(|commit| refuse(commit, health));
@@ -102,23 +102,23 @@ fn run(
     }
 }
 
-fn acknowledge(commit: Commit, outlet: &dyn Outlet, counters: &CommitCounters) {
+fn acknowledge(commit: Commit, publisher: &dyn Publisher, counters: &CommitCounters) {
     counters.durable(&commit.space, commit.samples);
     for mark in &commit.marks {
-        mark.desk.marks().durable(mark.session, mark.next);
+        mark.view.marks().durable(mark.session, mark.next);
     }
     for mark in &commit.marks {
-        outlet.watermark(&commit.space, &mark.desk);
+        publisher.watermark(&commit.space, &mark.view);
     }
     for Answer {
         reply,
-        desk,
+        view,
         duplicates,
     } in commit.answers
     {
         // Whoever asked may have gone; the samples are durable all the same.
         let _ = reply.send(Ok(IngestAnswer {
-            watermark: desk.watermark(),
+            watermark: view.watermark(),
             duplicates,
         }));
     }

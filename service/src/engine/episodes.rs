@@ -3,57 +3,15 @@
 
 use std::sync::Arc;
 
-use cogmap_proto::{EndedEpisode, EpisodeKind};
-use cognitive_map::{AgentId, CognitiveMap, Event, EventKind, Identified};
-
-use crate::answer;
+use cogmap_proto::EndedEpisode;
 
 /// The latest ended episode of each agent, in the agents' order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct EndedEpisodes(pub(crate) Vec<Option<Arc<EndedEpisode>>>);
 
-/// The latest ended episode of an agent, if there is one.
-pub(crate) struct Latest(pub(crate) Option<Arc<EndedEpisode>>);
-
-/// What an event makes of its agent's latest ended episode, if anything.
-pub(crate) fn change(space: &str, map: &CognitiveMap, event: &Event) -> Option<Latest> {
-    match &event.kind {
-        EventKind::EpisodeEnded {
-            session,
-            teaches,
-            posterior,
-        } => {
-            let said = posterior.as_deref().map(|posterior| {
-                let said = Identified {
-                    posterior: posterior.clone(),
-                    next_touch: None,
-                };
-                answer::identification(space, map, &said)
-            });
-            let ended = EndedEpisode {
-                episode: EpisodeKind::of(*teaches),
-                session: *session,
-                stamp_ns: event.stamp_ns,
-                identification: said,
-            };
-            Some(Latest(Some(Arc::new(ended))))
-        }
-        EventKind::AgentRemoved { .. } => Some(Latest(None)),
-        _ => None,
-    }
-}
-
 impl EndedEpisodes {
-    /// Notes what the latest record of a map has brought about.
-    pub(crate) fn note(&mut self, space: &str, map: &CognitiveMap, events: &[Event]) {
-        for event in events {
-            if let Some(Latest(episode)) = change(space, map, event) {
-                self.put(event.agent, episode);
-            }
-        }
-    }
-
-    fn put(&mut self, AgentId(agent): AgentId, episode: Option<Arc<EndedEpisode>>) {
+    /// Notes the latest ended episode of an agent, by its number; none where the agent is removed.
+    pub(crate) fn put(&mut self, agent: u32, episode: Option<Arc<EndedEpisode>>) {
         let index = agent as usize;
         if self.0.len() <= index {
             self.0.resize(index + 1, None);
@@ -77,7 +35,7 @@ impl EndedEpisodes {
         let mut episodes = Self::default();
         for (agent, episode) in known {
             if (agent as usize) < agents {
-                episodes.put(AgentId(agent), Some(Arc::new(episode)));
+                episodes.put(agent, Some(Arc::new(episode)));
             }
         }
         episodes
@@ -86,6 +44,8 @@ impl EndedEpisodes {
 
 #[cfg(test)]
 mod tests {
+    use cogmap_proto::EpisodeKind;
+
     use super::*;
 
     #[test]
@@ -97,7 +57,7 @@ mod tests {
             identification: None,
         };
         let mut episodes = EndedEpisodes::default();
-        episodes.put(AgentId(2), Some(Arc::new(episode)));
+        episodes.put(2, Some(Arc::new(episode)));
         let bytes = episodes.write();
         assert_eq!(EndedEpisodes::read(&bytes, 3), episodes);
         assert_eq!(EndedEpisodes::read(&bytes, 2), EndedEpisodes::default());

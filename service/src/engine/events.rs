@@ -4,10 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use cogmap_proto::{EventId, EventRecord, MissedEvents};
-use cognitive_map::{CognitiveMap, Event};
 use tokio::sync::watch;
-
-use super::readout;
 
 /// Events that are kept: who falls behind or comes back later than that misses some.
 pub const EVENTS_KEPT: usize = 1024;
@@ -50,21 +47,6 @@ pub struct Followed {
     pub events: Vec<Arc<EventRecord>>,
 }
 
-/// What is published of what the latest record of a map has brought about. Told by the map as it is
-/// then, so that a replay tells the same.
-pub(crate) fn published(
-    space: &str,
-    map: &CognitiveMap,
-    events: &[Event],
-) -> impl Iterator<Item = Arc<EventRecord>> {
-    let revision = map.revision();
-    let told = { events.iter() }.filter_map(move |event| readout::event(space, map, event));
-    (0..).zip(told).map(move |(index, event)| {
-        let id = EventId { revision, index };
-        Arc::new(EventRecord { id, event })
-    })
-}
-
 impl EventRing {
     /// A ring that knows no event of the records up to `revision`, and will be told all later ones.
     pub(crate) fn since(revision: u64) -> Self {
@@ -73,11 +55,6 @@ impl EventRing {
             since: EventId { revision, index },
             ..Self::default()
         }
-    }
-
-    /// Takes what the latest record of a map has brought about.
-    pub(crate) fn note(&mut self, space: &str, map: &CognitiveMap, events: &[Event]) {
-        published(space, map, events).for_each(|event| self.push(event));
     }
 
     pub(crate) fn push(&mut self, event: Arc<EventRecord>) {

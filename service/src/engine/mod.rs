@@ -6,24 +6,21 @@
 //!                                            committer: sync ─┴─► watermark
 //! ```
 //!
-//! The writer owns the map; nobody else locks it. Readers take readouts from an agent's desk, or a
+//! The writer owns the map; nobody else locks it. Readers take readouts from an agent's view, or a
 //! snapshot of the whole map, which the writer hands out between two rounds.
 
-mod block;
+mod agent_view;
 mod checkpointer;
 mod committer;
 mod counters;
-mod desk;
 mod due;
 mod episodes;
 mod events;
-mod fold;
 mod health;
 mod message;
-mod outlet;
+mod publisher;
 mod question;
 mod queue;
-mod readout;
 mod recovery;
 mod refinement;
 mod removal;
@@ -32,8 +29,8 @@ mod sequencer;
 mod session_bound;
 mod settings;
 mod space;
-mod surprise;
 mod trajectory;
+mod unavailable;
 mod writer;
 
 #[cfg(test)]
@@ -48,25 +45,22 @@ use cogmap_proto::{Codec, DecodeError, Name, SpaceSettings};
 use cognitive_map::InvalidSettings;
 use metrics::gauge;
 
-pub use block::{CorruptBlock, Entry, entries, samples_in};
-pub use desk::AgentDesk;
+pub use agent_view::AgentView;
 #[cfg(test)]
-pub(crate) use desk::desk_of;
+pub(crate) use agent_view::view_of;
 pub(crate) use due::Messages;
 pub use events::{EVENTS_KEPT, EventFollower, Followed};
-pub use fold::{core_settings, records_of, trajectory_interval_ns};
 pub use message::IngestError;
-pub use outlet::{Outlet, Silent};
+pub use publisher::{Publisher, Silent};
 pub use question::QuestionError;
-pub use readout::evidence;
-pub(crate) use readout::{status, trip_end};
 pub use refinement::{SharedText, refined_trajectories};
 pub use repair::{AgentLoss, LostBlocks, MissingSamples, RepairReport, repair};
 pub use settings::EngineSettings;
-pub use space::{Space, TrajectoryError, Unavailable};
-pub use trajectory::stamped;
-pub use trajectory::{Chunk, Recorder};
+pub use space::Space;
+pub use trajectory::{Chunk, Recorder, TrajectoryPage};
+pub use unavailable::{TrajectoryError, Unavailable};
 
+use crate::decode::{core_settings, trajectory_interval_ns};
 use crate::metrics::SPACE_STOPPED;
 use crate::store::{Store, StoreError, StoredSpace};
 use counters::{Drop, IntakeCounters};
@@ -167,13 +161,13 @@ impl Engine {
     pub fn open(
         store: Arc<dyn Store>,
         settings: EngineSettings,
-        outlet: Arc<dyn Outlet>,
+        publisher: Arc<dyn Publisher>,
     ) -> Result<Self, StoreError> {
         let health = Arc::new(Health::default());
         let stored = store.spaces()?;
         let (commits, committer) = committer::start(
             Arc::clone(&store),
-            Arc::clone(&outlet),
+            Arc::clone(&publisher),
             Arc::clone(&health),
             settings.commit_interval,
         );
@@ -181,7 +175,7 @@ impl Engine {
         let spaces_max = settings.spaces_max;
         let around = Surroundings {
             store,
-            outlet,
+            publisher,
             health: Arc::clone(&health),
             commits,
             jobs,

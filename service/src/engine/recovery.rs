@@ -1,15 +1,18 @@
 //! Recovery: the checkpoint, and the journal's tail folded on top of it.
 
+use std::sync::Arc;
+
 use cognitive_map::{CognitiveMap, Settings};
 use metrics::counter;
 
-use super::block::{self, CorruptBlock};
 use super::checkpointer::Beside;
 use super::episodes::EndedEpisodes;
 use super::events::EventRing;
-use super::fold::records_of;
 use super::health::Health;
 use super::trajectory::{self, Chunk, Recorder};
+use crate::decode::records_of;
+use crate::encode;
+use crate::journal::{CorruptBlock, entries};
 use crate::metrics::{LOST_MARKS, TORN_TAILS};
 use crate::store::{ChunkKey, OpenJournal, SpaceNumber, Store, StoreError};
 
@@ -89,7 +92,7 @@ pub(crate) fn recover(
         if number != recovered.next_block {
             return Err(RecoveryError::MissingBlock(recovered.next_block));
         }
-        let entries = block::entries(&bytes).map_err(|error| RecoveryError::Block {
+        let entries = entries(&bytes).map_err(|error| RecoveryError::Block {
             block: number,
             error,
         })?;
@@ -97,8 +100,13 @@ pub(crate) fn recover(
         for entry in &entries {
             records_of(entry, |record| {
                 recovered.map.apply(&record, &mut events);
-                recovered.events.note(name, &recovered.map, &events);
-                recovered.episodes.note(name, &recovered.map, &events);
+                let records = encode::event_records(name, &recovered.map, &events);
+                records.for_each(|event| recovered.events.push(Arc::new(event)));
+                for event in &events {
+                    if let Some(change) = encode::ended_episode(name, &recovered.map, event) {
+                        recovered.episodes.put(event.agent.0, change.0);
+                    }
+                }
                 events.clear();
                 let (map, recorders) = (&recovered.map, &mut recovered.recorders);
                 chunks.extend(trajectory::note_all(recorders, map, &record, interval_ns));
@@ -195,7 +203,7 @@ fn put(store: &dyn Store, health: &Health, space: SpaceNumber, agent: u32, chunk
         session: chunk.session,
         first_stamp_ns,
     };
-    if let Err(error) = store.put_chunk(space, key, &trajectory::encode(&chunk.rows)) {
+    if let Err(error) = store.put_chunk(space, key, &trajectory::chunk_bytes(&chunk.rows)) {
         health.derived_fail(&error);
     }
 }

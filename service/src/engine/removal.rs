@@ -17,7 +17,7 @@ impl Space {
     /// # Errors
     /// It lies too far in the future.
     pub fn check_session(&self, agent: &str, session: u64) -> Result<(), IngestError> {
-        let current = self.agent(agent).map(|desk| desk.watermark().session);
+        let current = self.agent(agent).map(|view| view.watermark().session);
         match current {
             Some(current) if session <= current => Ok(()),
             _ => self.shared().sessions.check(session),

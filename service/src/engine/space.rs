@@ -1,6 +1,9 @@
 //! A space, as everyone but its writer sees it.
 
 mod loading;
+mod questions;
+mod refined;
+mod trajectories;
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -14,20 +17,21 @@ use cognitive_map::{AgentId, CognitiveMap, Label, Lesson, Settings};
 use metrics::gauge;
 use tokio::sync::oneshot;
 
+use super::agent_view::AgentView;
 use super::checkpointer::Job;
 use super::committer::Commit;
-use super::desk::AgentDesk;
 use super::events::{EventFollower, EventLog};
 use super::health::Health;
 use super::message::{Call, IngestError, ObjectRequest, Request};
-use super::outlet::Outlet;
+use super::publisher::Publisher;
 use super::question::QuestionRoom;
 use super::queue::{NotQueued, Queue, queue};
 use super::refinement::Refinements;
 use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
+use super::unavailable::Unavailable;
 use crate::metrics::SPACE_STOPPED;
-use crate::store::{DerivedError, SpaceNumber, Store};
+use crate::store::{SpaceNumber, Store};
 
 /// A space: its readers' and senders' side.
 #[derive(Debug)]
@@ -49,7 +53,7 @@ pub(crate) struct Shared {
     pub(crate) reorder_window: usize,
     pub(crate) gap_timeout: Duration,
     pub(crate) store: Arc<dyn Store>,
-    pub(crate) outlet: Arc<dyn Outlet>,
+    pub(crate) publisher: Arc<dyn Publisher>,
     pub(crate) health: Arc<Health>,
     /// What happened of late.
     pub(crate) events: EventLog,
@@ -59,12 +63,12 @@ pub(crate) struct Shared {
     pub(crate) closing: AtomicBool,
     /// Set once the map is loaded, or could not be.
     loaded: OnceLock<Result<(), Unavailable>>,
-    agents: RwLock<BTreeMap<String, Arc<AgentDesk>>>,
+    agents: RwLock<BTreeMap<String, Arc<AgentView>>>,
     /// Removed agents that were in the map, by name, the latest last.
     former: RwLock<BTreeMap<String, Vec<AgentId>>>,
     snapshot: ArcSwapOption<CognitiveMap>,
     /// Those who wait for a snapshot; none once the writer is gone.
-    wishes: Mutex<Option<Vec<Wish>>>,
+    snapshot_requests: Mutex<Option<Vec<SnapshotRequest>>>,
     /// The map relaxed for those who asked for the past.
     refinements: Refinements,
     questions: QuestionRoom,
@@ -73,55 +77,13 @@ pub(crate) struct Shared {
 }
 
 /// Someone who waits for a snapshot.
-type Wish = oneshot::Sender<Arc<CognitiveMap>>;
-
-/// Why a space cannot be read now.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Unavailable {
-    /// It is still loading.
-    #[error("the space is recovering")]
-    Recovering,
-    /// It is closing.
-    #[error("the space is closing")]
-    Closing,
-    /// The work on it ended with a panic.
-    #[error("the work was interrupted")]
-    Interrupted,
-    /// It could not be loaded: its journal is damaged.
-    #[error("{0}")]
-    Stopped(String),
-    /// Its writer has failed.
-    #[error("{0}")]
-    Failed(String),
-}
-
-/// Why a trajectory cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum TrajectoryError {
-    /// There is no such agent.
-    #[error("unknown agent")]
-    UnknownAgent,
-    /// It has been removed.
-    #[error(
-        "the agent has been removed; causal trajectories of its sessions can be read by their number"
-    )]
-    RemovedAgent,
-    /// The stored part cannot be read.
-    #[error(transparent)]
-    Derived(#[from] DerivedError),
-    /// The reading was interrupted.
-    #[error("the reading was interrupted")]
-    Interrupted,
-    /// The map cannot be read.
-    #[error(transparent)]
-    Unavailable(#[from] Unavailable),
-}
+type SnapshotRequest = oneshot::Sender<Arc<CognitiveMap>>;
 
 /// What a space needs of the engine.
 #[derive(Clone, Debug)]
 pub(crate) struct Surroundings {
     pub(crate) store: Arc<dyn Store>,
-    pub(crate) outlet: Arc<dyn Outlet>,
+    pub(crate) publisher: Arc<dyn Publisher>,
     pub(crate) health: Arc<Health>,
     pub(crate) commits: std::sync::mpsc::Sender<Commit>,
     pub(crate) jobs: std::sync::mpsc::Sender<Job>,
@@ -218,11 +180,11 @@ impl Space {
         {
             return Ok(snapshot);
         }
-        let (wish, granted) = oneshot::channel();
-        match &mut *self.shared.wishes() {
-            Some(wishes) => wishes.push(wish),
+        let (request, granted) = oneshot::channel();
+        match &mut *self.shared.snapshot_requests() {
+            Some(requests) => requests.push(request),
             // The writer is gone: nobody will grant it.
-            None => drop(wish),
+            None => drop(request),
         }
         self.queue.call();
         granted.await.map_err(|_| {
@@ -232,19 +194,19 @@ impl Space {
     }
 
     /// An agent, by name.
-    pub fn agent(&self, name: &str) -> Option<Arc<AgentDesk>> {
+    pub fn agent(&self, name: &str) -> Option<Arc<AgentView>> {
         self.shared.agents().get(name).cloned()
     }
 
     /// Up to `limit` agents in the order of their names, those after `after`.
-    pub fn agents_after(&self, after: Option<&str>, limit: usize) -> Vec<Arc<AgentDesk>> {
+    pub fn agents_after(&self, after: Option<&str>, limit: usize) -> Vec<Arc<AgentView>> {
         use std::ops::Bound::{Excluded, Unbounded};
         let from = after.map_or(Unbounded, Excluded);
         let agents = self.shared.agents();
         agents
             .range::<str, _>((from, Unbounded))
             .take(limit)
-            .map(|(_, desk)| desk.clone())
+            .map(|(_, view)| view.clone())
             .collect()
     }
 
@@ -388,7 +350,7 @@ impl Shared {
             reorder_window: around.settings.reorder_window,
             gap_timeout: around.settings.gap_timeout,
             store: Arc::clone(&around.store),
-            outlet: Arc::clone(&around.outlet),
+            publisher: Arc::clone(&around.publisher),
             health: Arc::clone(&around.health),
             events: EventLog::new(),
             revision: AtomicU64::new(0),
@@ -397,7 +359,7 @@ impl Shared {
             agents: RwLock::default(),
             former: RwLock::default(),
             snapshot: ArcSwapOption::empty(),
-            wishes: Mutex::new(Some(Vec::new())),
+            snapshot_requests: Mutex::new(Some(Vec::new())),
             refinements: Refinements::default(),
             questions: around.questions.clone(),
             broken: AtomicBool::new(false),
@@ -412,13 +374,13 @@ impl Shared {
     }
 
     /// Lists a new agent.
-    pub(crate) fn seat(&self, desk: Arc<AgentDesk>) {
+    pub(crate) fn add_view(&self, view: Arc<AgentView>) {
         let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);
-        agents.insert(desk.name().to_owned(), desk);
+        agents.insert(view.name().to_owned(), view);
     }
 
     /// Lists an agent no longer.
-    pub(crate) fn unseat(&self, name: &str) {
+    pub(crate) fn remove_view(&self, name: &str) {
         let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);
         agents.remove(name);
     }
@@ -435,26 +397,28 @@ impl Shared {
         former.get(name).cloned().unwrap_or_default()
     }
 
-    /// Gives the map to all who wish for it: one copy for all, and copying is cheap.
+    /// Gives the map to all who request for it: one copy for all, and copying is cheap.
     pub(crate) fn serve_snapshots(&self, map: &CognitiveMap) {
-        let wishes = self.wishes().as_mut().map(std::mem::take);
-        let wishes = wishes.unwrap_or_default();
-        if wishes.is_empty() {
+        let requests = self.snapshot_requests().as_mut().map(std::mem::take);
+        let requests = requests.unwrap_or_default();
+        if requests.is_empty() {
             return;
         }
         let snapshot = Arc::new(map.clone());
         self.snapshot.store(Some(Arc::clone(&snapshot)));
-        for wish in wishes {
+        for request in requests {
             // Whoever wished may have gone.
-            let _ = wish.send(Arc::clone(&snapshot));
+            let _ = request.send(Arc::clone(&snapshot));
         }
     }
 
-    fn agents(&self) -> std::sync::RwLockReadGuard<'_, BTreeMap<String, Arc<AgentDesk>>> {
+    fn agents(&self) -> std::sync::RwLockReadGuard<'_, BTreeMap<String, Arc<AgentView>>> {
         self.agents.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn wishes(&self) -> std::sync::MutexGuard<'_, Option<Vec<Wish>>> {
-        self.wishes.lock().unwrap_or_else(PoisonError::into_inner)
+    fn snapshot_requests(&self) -> std::sync::MutexGuard<'_, Option<Vec<SnapshotRequest>>> {
+        self.snapshot_requests
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }

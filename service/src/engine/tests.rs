@@ -11,9 +11,9 @@ use cogmap_proto::{
 use cognitive_map::CognitiveMap;
 use proptest::prelude::*;
 
-use super::{
-    Engine, EngineSettings, Entry, QuestionError, Readiness, Silent, core_settings, records_of,
-};
+use super::{Engine, EngineSettings, QuestionError, Readiness, Silent};
+use crate::decode::{core_settings, records_of, trajectory_interval_ns};
+use crate::journal::Entry;
 use crate::store::{Derived, Journal, LocalStore};
 
 mod faults;
@@ -117,7 +117,7 @@ fn applied(engine: &Engine) -> u64 {
     let space = engine.space(SPACE).expect("the space is there");
     space
         .agent(AGENT)
-        .map_or(0, |desk| desk.watermark().applied)
+        .map_or(0, |view| view.watermark().applied)
 }
 
 fn digest(engine: &Engine) -> String {
@@ -218,11 +218,11 @@ fn samples_that_make_no_sense_are_named_in_the_watermark() {
     let engine = open(directory.path(), EngineSettings::default());
     offer(&engine, 0, &drive());
     wait_for(|| applied(&engine) == SAMPLES);
-    let desk = engine
+    let view = engine
         .space(SPACE)
         .and_then(|space| space.agent(AGENT))
         .expect("the agent");
-    let rejected: Vec<_> = desk
+    let rejected: Vec<_> = view
         .watermark()
         .rejected
         .iter()
@@ -249,11 +249,11 @@ fn samples_refused_in_a_row_are_one_range_of_the_watermark() {
     }
     offer(&engine, 0, &drive);
     wait_for(|| applied(&engine) == SAMPLES);
-    let desk = engine
+    let view = engine
         .space(SPACE)
         .and_then(|space| space.agent(AGENT))
         .expect("the agent");
-    let rejected: Vec<_> = { desk.watermark().rejected.into_iter() }
+    let rejected: Vec<_> = { view.watermark().rejected.into_iter() }
         .map(|one| (one.range.from, one.range.to, one.reason))
         .collect();
     assert_eq!(
@@ -280,11 +280,11 @@ fn what_never_comes_is_lost_after_its_time_and_the_rest_goes_on() {
     offer(&engine, 0, &drive[..10]);
     offer(&engine, 20, &drive[20..30]);
     wait_for(|| applied(&engine) == 30);
-    let desk = engine
+    let view = engine
         .space(SPACE)
         .and_then(|space| space.agent(AGENT))
         .expect("the agent");
-    let watermark = desk.watermark();
+    let watermark = view.watermark();
     assert_eq!(watermark.gap, None);
     assert_eq!(watermark.rejected.len(), 1);
     assert_eq!(
@@ -312,16 +312,16 @@ fn the_json_of_an_agent_is_that_of_its_detail_before_and_after_its_first_sample(
             offer(&engine, 0, &drive[..count]);
         }
         wait_for(|| {
-            let watermark = space.agent(AGENT).map(|desk| desk.watermark());
+            let watermark = space.agent(AGENT).map(|view| view.watermark());
             watermark.is_some_and(|mark| {
                 mark.durable >= count as u64 && mark.gap.is_some() == (count < 5)
             })
         });
-        let desk = space.agent(AGENT).expect("the agent");
+        let view = space.agent(AGENT).expect("the agent");
         for _ in 0..times {
-            let detail = serde_json::to_vec(&desk.detail()).expect("plain data encodes");
+            let detail = serde_json::to_vec(&view.detail()).expect("plain data encodes");
             assert_eq!(
-                String::from_utf8(desk.detail_json()),
+                String::from_utf8(view.detail_json()),
                 String::from_utf8(detail)
             );
         }
@@ -376,7 +376,7 @@ fn lessons_outlive_the_engine_with_and_without_a_checkpoint() {
         assert_eq!(before.object_count(), usize::from(round));
         let name = cognitive_map::Label::new(&format!("cup {round}")).expect("a label");
         let lesson = lesson(f64::from(round));
-        let valid = crate::answer::lesson(&lesson).expect("a lesson");
+        let valid = crate::decode::lesson(&lesson).expect("a lesson");
         runtime
             .block_on(space.teach(&name, lesson, valid))
             .expect("taught");

@@ -5,22 +5,16 @@
 //! row    = stamp_ns:i64  x y z qx qy qz qw : f64        little endian, 64 bytes
 //! ```
 
-use std::sync::Arc;
+use ::trajectory::StampedPose;
+use cognitive_map::{Agent, CognitiveMap, Record, SampleBody};
 
-use cogmap_proto::{StampedPose, Trajectory};
-use cognitive_map::{Agent, AgentId, CognitiveMap, Record, SampleBody};
-
-use super::desk::AgentDesk;
-use super::space::{Space, TrajectoryError};
-use crate::store::{DerivedError, SpaceNumber, Store};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 /// Rows of a full chunk.
 const CHUNK_ROWS: usize = 256;
 /// Version of chunks that this build writes.
 const VERSION: u8 = 1;
 const ROW_BYTES: usize = 64;
-/// Chunks read from the store at once.
-const CHUNKS_AT_ONCE: usize = 64;
 
 /// The part of an agent's trajectory that is not yet a full chunk.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,6 +35,19 @@ pub struct Chunk {
     pub session: u64,
     /// Rows; at least one.
     pub rows: Vec<StampedPose>,
+}
+
+/// Rows of an agent's trajectory, oldest first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrajectoryPage {
+    /// Session of a causal trajectory; the current one where it is refined.
+    pub session: u64,
+    /// Revision of the relaxed map that a refined trajectory is of; none of a causal one.
+    pub revision: Option<u64>,
+    /// The rows.
+    pub poses: Vec<StampedPose>,
+    /// Stamp of the first row of the next page, if there is one \[ns\].
+    pub next_from_ns: Option<i64>,
 }
 
 /// Chunk bytes that cannot be read.
@@ -79,7 +86,10 @@ impl Recorder {
         if !agent.placed() {
             return complete;
         }
-        let row = stamped(sample.stamp_ns, agent.pose());
+        let row = StampedPose {
+            stamp_ns: sample.stamp_ns,
+            pose: *agent.pose(),
+        };
         match self.latest_ns {
             Some(latest) if jumped && latest == sample.stamp_ns => match self.rows.last_mut() {
                 Some(last) => *last = row,
@@ -124,7 +134,7 @@ impl Recorder {
     pub(crate) fn write_all(recorders: &[Self]) -> Vec<u8> {
         let plain: Vec<_> = recorders
             .iter()
-            .map(|r| (r.session, r.latest_ns, encode(&r.rows)))
+            .map(|r| (r.session, r.latest_ns, chunk_bytes(&r.rows)))
             .collect();
         postcard::to_stdvec(&plain).expect("plain data encodes")
     }
@@ -138,7 +148,7 @@ impl Recorder {
             .map(|(session, latest_ns, rows)| {
                 Ok(Self {
                     session,
-                    rows: decode(&rows)?,
+                    rows: chunk_rows(&rows)?,
                     latest_ns,
                 })
             })
@@ -167,23 +177,14 @@ pub(crate) fn note_all(
     Some((agent.0, chunk))
 }
 
-/// A pose at a time, as the wire has it.
-pub fn stamped(stamp_ns: i64, pose: &nalgebra::Isometry3<f64>) -> StampedPose {
-    let rotation = pose.rotation.coords;
-    StampedPose {
-        stamp_ns,
-        translation_m: pose.translation.vector.into(),
-        rotation_xyzw: [rotation.x, rotation.y, rotation.z, rotation.w],
-    }
-}
-
 /// Bytes of a chunk.
-pub(crate) fn encode(rows: &[StampedPose]) -> Vec<u8> {
+pub(crate) fn chunk_bytes(rows: &[StampedPose]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(1 + rows.len() * ROW_BYTES);
     bytes.push(VERSION);
     for row in rows {
         bytes.extend_from_slice(&row.stamp_ns.to_le_bytes());
-        for number in row.translation_m.iter().chain(&row.rotation_xyzw) {
+        let (position, rotation) = (&row.pose.translation.vector, &row.pose.rotation.coords);
+        for number in position.iter().chain(rotation) {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
     }
@@ -191,7 +192,7 @@ pub(crate) fn encode(rows: &[StampedPose]) -> Vec<u8> {
 }
 
 /// Rows of a chunk.
-pub(crate) fn decode(bytes: &[u8]) -> Result<Vec<StampedPose>, CorruptChunk> {
+pub(super) fn chunk_rows(bytes: &[u8]) -> Result<Vec<StampedPose>, CorruptChunk> {
     let (&version, rows) = bytes.split_first().ok_or(CorruptChunk)?;
     if version != VERSION || rows.len() % ROW_BYTES != 0 {
         return Err(CorruptChunk);
@@ -201,188 +202,16 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Vec<StampedPose>, CorruptChunk> {
     };
     Ok(rows
         .chunks_exact(ROW_BYTES)
-        .map(|row| StampedPose {
-            stamp_ns: i64::from_le_bytes(eight(row, 0)),
-            translation_m: [1, 2, 3].map(|at| f64::from_le_bytes(eight(row, at))),
-            rotation_xyzw: [4, 5, 6, 7].map(|at| f64::from_le_bytes(eight(row, at))),
+        .map(|row| {
+            let number = |at| f64::from_le_bytes(eight(row, at));
+            let [i, j, k, w] = [4, 5, 6, 7].map(number);
+            // It was one when it was written, and is to be the same to the last bit.
+            let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
+            let translation = Translation3::from([1, 2, 3].map(number));
+            StampedPose {
+                stamp_ns: i64::from_le_bytes(eight(row, 0)),
+                pose: Isometry3::from_parts(translation, rotation),
+            }
         })
         .collect())
-}
-
-impl Space {
-    /// Up to `limit` poses of an agent's causal trajectory with `from_ns <= stamp < to_ns`; of its
-    /// current session when none is named. A session may be one of a removed agent of that name.
-    ///
-    /// # Errors
-    /// There is no such agent, or the store cannot be read.
-    pub async fn trajectory(
-        &self,
-        agent: &str,
-        session: Option<u64>,
-        from_ns: Option<i64>,
-        to_ns: Option<i64>,
-        limit: usize,
-    ) -> Result<Trajectory, TrajectoryError> {
-        let desk = self.agent(agent);
-        let present = desk.as_deref().map(Part::of_desk);
-        let former = self.shared().former(agent);
-        let session = match (&present, session) {
-            (Some(present), session) => session.unwrap_or(present.session),
-            (None, Some(session)) if !former.is_empty() => session,
-            (None, _) => return Err(self.no_agent(agent)),
-        };
-        // The latest agent of that name that had such a session.
-        let former = former.into_iter().rev();
-        let parts: Vec<Part> = { present.into_iter() }
-            .chain(former.map(Part::of_former))
-            .collect();
-        let (shared, name) = (Arc::clone(self.shared()), agent.to_owned());
-        let work = move || {
-            let window = Window {
-                session,
-                from_ns,
-                to_ns,
-                limit,
-            };
-            read(&*shared.store, shared.number, &name, &parts, &window)
-        };
-        tokio::task::spawn_blocking(work)
-            .await
-            .map_err(|_| TrajectoryError::Interrupted)?
-    }
-
-    /// Why there is no agent of a name.
-    pub(super) fn no_agent(&self, name: &str) -> TrajectoryError {
-        if self.has_removed(name) {
-            TrajectoryError::RemovedAgent
-        } else {
-            TrajectoryError::UnknownAgent
-        }
-    }
-}
-
-/// Where an agent's rows are: in the store, and the latest of them at its desk.
-#[derive(Debug)]
-pub(crate) struct Part {
-    agent: u32,
-    /// Session of the rows at the desk.
-    pub(crate) session: u64,
-    fresh: Vec<StampedPose>,
-}
-
-/// Which rows are asked for.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Window {
-    pub(crate) session: u64,
-    pub(crate) from_ns: Option<i64>,
-    pub(crate) to_ns: Option<i64>,
-    pub(crate) limit: usize,
-}
-
-impl Part {
-    /// Of an agent of the space. The rows at the desk are to be taken first and those in the store
-    /// afterwards: a chunk that moves from one to the other in between is then found twice and never missed.
-    pub(crate) fn of_desk(desk: &AgentDesk) -> Self {
-        let recorder = desk.recorder();
-        Self {
-            agent: desk.id().0,
-            session: recorder.session(),
-            fresh: recorder.rows().to_vec(),
-        }
-    }
-
-    /// Of a removed agent: all its rows are in the store.
-    pub(crate) fn of_former(agent: AgentId) -> Self {
-        Self {
-            agent: agent.0,
-            session: 0,
-            fresh: Vec::new(),
-        }
-    }
-
-    /// Whether it has rows of a session.
-    fn had(
-        &self,
-        session: u64,
-        store: &dyn Store,
-        space: SpaceNumber,
-    ) -> Result<bool, DerivedError> {
-        if self.session == session && !self.fresh.is_empty() {
-            return Ok(true);
-        }
-        Ok(!store
-            .chunks(space, self.agent, session, i64::MIN, 1)?
-            .is_empty())
-    }
-}
-
-/// Rows of a session with `from_ns <= stamp < to_ns`, at most `limit` of them: of the first of the parts that
-/// had such a session.
-pub(crate) fn read(
-    store: &dyn Store,
-    space: SpaceNumber,
-    name: &str,
-    parts: &[Part],
-    window: &Window,
-) -> Result<Trajectory, TrajectoryError> {
-    let mut poses = Vec::new();
-    for (at, part) in parts.iter().enumerate() {
-        let is_last = at + 1 == parts.len();
-        if is_last || part.had(window.session, store, space)? {
-            poses = rows(store, space, part, window)?;
-            break;
-        }
-    }
-    let next_from_ns = poses.get(window.limit).map(|row| row.stamp_ns);
-    poses.truncate(window.limit);
-    Ok(Trajectory {
-        agent: name.to_owned(),
-        session: window.session,
-        frame: "map".to_owned(),
-        kind: "causal".to_owned(),
-        map_revision: None,
-        poses,
-        next_from_ns,
-    })
-}
-
-/// The rows of one part, and one beyond the limit if there is.
-fn rows(
-    store: &dyn Store,
-    space: SpaceNumber,
-    part: &Part,
-    window: &Window,
-) -> Result<Vec<StampedPose>, TrajectoryError> {
-    let from_ns = window.from_ns.unwrap_or(i64::MIN);
-    let to_ns = window.to_ns.unwrap_or(i64::MAX);
-    let mut poses: Vec<StampedPose> = Vec::new();
-    let mut next_from_ns = from_ns;
-    'chunks: loop {
-        let chunks = store.chunks(
-            space,
-            part.agent,
-            window.session,
-            next_from_ns,
-            CHUNKS_AT_ONCE,
-        )?;
-        let last = chunks.len() < CHUNKS_AT_ONCE;
-        for (_, bytes) in chunks {
-            let rows = decode(&bytes).map_err(|error| DerivedError(error.to_string()))?;
-            poses.extend(rows.into_iter().filter(|row| row.stamp_ns >= next_from_ns));
-            let Some(latest) = poses.last() else { continue };
-            if poses.len() > window.limit || latest.stamp_ns >= to_ns {
-                break 'chunks;
-            }
-            next_from_ns = latest.stamp_ns.saturating_add(1);
-        }
-        if last {
-            if window.session == part.session {
-                let fresh = part.fresh.iter();
-                poses.extend(fresh.filter(|row| row.stamp_ns >= next_from_ns));
-            }
-            break;
-        }
-    }
-    poses.retain(|row| row.stamp_ns < to_ns);
-    Ok(poses)
 }

@@ -14,6 +14,7 @@ use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
 use crate::answer;
+use crate::encode;
 use crate::engine::IngestError;
 
 /// Which page of the agents.
@@ -41,15 +42,15 @@ pub(crate) async fn list(
 ) -> Result<Response<Body>, Problem> {
     let limit = page::limit(query.limit)?;
     space.available()?;
-    let desks = space.agents_after(query.after.as_deref(), limit + 1);
-    let (desks, next) = page::cut(desks.into_iter(), limit, |desk| desk.name().to_owned());
+    let views = space.agents_after(query.after.as_deref(), limit + 1);
+    let (views, next) = page::cut(views.into_iter(), limit, |view| view.name().to_owned());
     let summary = |name: &str, estimate| AgentSummary {
         name: name.to_owned(),
         estimate,
     };
-    let agents = desks
+    let agents = views
         .iter()
-        .map(|desk| summary(desk.name(), desk.estimate()))
+        .map(|view| summary(view.name(), view.estimate()))
         .collect();
     Ok(reply::json(&AgentPage { agents, next }))
 }
@@ -60,8 +61,8 @@ pub(crate) async fn list(
     responses(
         (status = 200, description = "The agent", body = AgentDetail),
         (status = 404, description = "There is no such space or agent")))]
-pub(crate) async fn get(AgentOfPath(_, desk): AgentOfPath, _: NoQuery) -> Response<Body> {
-    reply::with_type("application/json", Body::from(desk.detail_json()))
+pub(crate) async fn get(AgentOfPath(_, view): AgentOfPath, _: NoQuery) -> Response<Body> {
+    reply::with_type("application/json", Body::from(view.detail_json()))
 }
 
 /// Remove an agent.
@@ -97,14 +98,14 @@ pub(crate) async fn delete(
         (status = 404, description = "There is no such space or agent, or it has no sample yet")))]
 pub(crate) async fn grid(
     State(_): State<Service>,
-    AgentOfPath(space, desk): AgentOfPath,
+    AgentOfPath(space, view): AgentOfPath,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
     let state = map
-        .agent(desk.id())
-        .and_then(|agent| answer::grid_state(&map, agent));
-    let detail = || format!("the agent {:?} has no sample yet", desk.name());
+        .agent(view.id())
+        .and_then(|agent| encode::grid_state(&map, agent));
+    let detail = || format!("the agent {:?} has no sample yet", view.name());
     state.map_or_else(
         || Err(Problem::new(Kind::UnknownAgent, detail())),
         |state| Ok(reply::json(&state)),

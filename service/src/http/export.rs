@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::io;
 use std::sync::Arc;
 
+use ::trajectory::write_tum;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::Response;
@@ -22,8 +23,9 @@ use super::long::LongAnswers;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
-use super::trajectory::{TUM, tum};
-use crate::answer::{self, agent_once_named};
+use super::trajectory::TUM;
+use crate::answer::agent_once_named;
+use crate::encode;
 use crate::engine::Space;
 
 /// Items that are written at once: an answer of any length takes the memory of this many.
@@ -128,7 +130,7 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
     let head = {
         let (space, map) = (Arc::clone(space), Arc::clone(&map));
         std::iter::once_with(move || {
-            let info = answer::space_info(space.name(), space.settings(), &map);
+            let info = encode::space_info(space.name(), space.settings(), &map);
             format!("{{\"space\":{}", text(&info))
         })
     };
@@ -143,14 +145,14 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
         ("places", |map, _, first| {
             let places = map.places_from(PlaceId(first)).take(CHUNK_ITEMS);
             places
-                .map(|(id, place)| (id.0, text(&answer::place(map, id, place))))
+                .map(|(id, place)| (id.0, text(&encode::place(map, id, place))))
                 .collect()
         }),
         ("trips", |map, _, first| {
             // A trip has up to a thousand legs.
             let trips = map.trips_from(TripId(first)).take(1);
             trips
-                .map(|(id, trip)| (id.0, text(&answer::trip_detail(map, id, trip))))
+                .map(|(id, trip)| (id.0, text(&encode::trip_detail(map, id, trip))))
                 .collect()
         }),
         ("landmarks", |map, _, first| {
@@ -161,16 +163,16 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
                 named.is_some_and(|(named, _)| named.0 == *id)
             });
             told.take(CHUNK_ITEMS)
-                .map(|(id, landmark)| (id, text(&answer::landmark(landmark))))
+                .map(|(id, landmark)| (id, text(&encode::landmark(landmark))))
                 .collect()
         }),
     ];
-    let desks = space.agents_after(None, usize::MAX);
-    let agents: Arc<[_]> = desks
+    let views = space.agents_after(None, usize::MAX);
+    let agents: Arc<[_]> = views
         .iter()
-        .map(|desk| AgentSummary {
-            name: desk.name().to_owned(),
-            estimate: desk.estimate(),
+        .map(|view| AgentSummary {
+            name: view.name().to_owned(),
+            estimate: view.estimate(),
         })
         .collect();
     let lists = sections.into_iter().flat_map(move |(name, section)| {
@@ -253,7 +255,7 @@ async fn trajectory(
                         .map_err(io::Error::other)?,
                 ),
             };
-            let text = long.make(move || tum(&page.poses)).await;
+            let text = long.make(move || write_tum(&page.poses)).await;
             let text = text.map_err(|_| io::ErrorKind::Interrupted)?;
             Ok::<_, io::Error>(Some((Bytes::from(text), next)))
         }

@@ -17,7 +17,7 @@ use super::json;
 use super::problem::{Kind, Problem};
 use super::state::Service;
 use crate::answer;
-use crate::engine::{AgentDesk, Space};
+use crate::engine::{AgentView, Space};
 
 /// What curl calls a body that it was not told the type of.
 const CURL_DEFAULT: &str = "application/x-www-form-urlencoded";
@@ -38,7 +38,7 @@ pub(crate) struct AnySpaceOfPath(pub(crate) Arc<Space>);
 
 /// The space and the agent that the path names.
 #[derive(Debug)]
-pub(crate) struct AgentOfPath(pub(crate) Arc<Space>, pub(crate) Arc<AgentDesk>);
+pub(crate) struct AgentOfPath(pub(crate) Arc<Space>, pub(crate) Arc<AgentView>);
 
 /// Query parameters; unknown ones are refused.
 #[derive(Debug)]
@@ -179,8 +179,8 @@ impl FromRequestParts<Service> for AgentOfPath {
         let params: AgentParams = path(parts, service).await?;
         let space = space(service, &params.space)?;
         let agent = name(&params.agent)?;
-        let desk = answer::agent_named(&space, agent.as_str())?;
-        Ok(Self(space, desk))
+        let view = answer::agent_named(&space, agent.as_str())?;
+        Ok(Self(space, view))
     }
 }
 

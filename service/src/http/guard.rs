@@ -24,7 +24,7 @@ use super::held::holding;
 use super::hosts::HostRule;
 use super::problem::{Kind, Problem};
 use super::settings::HttpSettings;
-use crate::config::Token;
+use super::token::Token;
 use crate::metrics::{HTTP_REQUEST_SECONDS, HTTP_REQUESTS};
 
 /// Paths that need no token and are answered however much is under way.

@@ -15,7 +15,7 @@ use super::places::unknown;
 use super::problem::Problem;
 use super::reply;
 use super::state::Service;
-use crate::answer;
+use crate::encode;
 use crate::engine::Space;
 
 /// Which landmarks.
@@ -50,8 +50,8 @@ pub(crate) async fn list(
         landmark.label().as_str().to_owned()
     });
     Ok(reply::json(&LandmarkPage {
-        frame: answer::FRAME.to_owned(),
-        landmarks: landmarks.into_iter().map(answer::landmark).collect(),
+        frame: encode::FRAME.to_owned(),
+        landmarks: landmarks.into_iter().map(encode::landmark).collect(),
         next,
     }))
 }
@@ -69,7 +69,7 @@ pub(crate) async fn get(
     let map = space.snapshot().await?;
     let found = map
         .landmark_by_label(&label)
-        .map(|(_, landmark)| answer::landmark(landmark));
+        .map(|(_, landmark)| encode::landmark(landmark));
     found
         .map(|landmark| reply::json(&landmark))
         .ok_or_else(|| unknown("landmark"))

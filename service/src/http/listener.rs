@@ -14,7 +14,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{Instant, Sleep};
 
-use super::seat::{Seat, Seats};
+use super::activity::{Activity, IdleConnections};
 use super::settings::HttpSettings;
 use crate::metrics::HTTP_CLOSED_CONNECTIONS;
 
@@ -27,7 +27,7 @@ const ROOM_PAUSE: Duration = Duration::from_millis(50);
 pub(crate) struct BoundedListener {
     listener: TcpListener,
     room: Arc<Semaphore>,
-    seats: Arc<Seats>,
+    idle: Arc<IdleConnections>,
     closed: ClosedCounters,
     head_timeout: Duration,
     idle_timeout: Duration,
@@ -37,7 +37,7 @@ pub(crate) struct BoundedListener {
 #[derive(Debug)]
 pub(crate) struct Connection {
     stream: TcpStream,
-    seat: Arc<Seat>,
+    activity: Arc<Activity>,
     /// When bytes have passed last.
     used: Instant,
     /// Since when the head of a request is awaited: from its first byte on, or the connection's begin.
@@ -72,7 +72,7 @@ impl BoundedListener {
         Self {
             listener,
             room: Arc::new(Semaphore::new(settings.connections_max)),
-            seats: Arc::default(),
+            idle: Arc::default(),
             closed: Closed::counters(),
             head_timeout: settings.head_timeout,
             idle_timeout: settings.idle_timeout,
@@ -85,7 +85,7 @@ impl BoundedListener {
             return permit;
         }
         loop {
-            self.seats.send_away();
+            self.idle.close_idlest();
             let permit = Arc::clone(&self.room).acquire_owned();
             // Where none waits now, one may soon.
             if let Ok(permit) = tokio::time::timeout(ROOM_PAUSE, permit).await {
@@ -110,7 +110,7 @@ impl Listener for BoundedListener {
         let now = Instant::now();
         let connection = Connection {
             stream,
-            seat: self.seats.seat(),
+            activity: self.idle.activity(),
             used: now,
             head_since: Some(now),
             requests: 0,
@@ -131,8 +131,8 @@ impl Listener for BoundedListener {
 
 impl Connection {
     /// Where the connection's requests are noted.
-    pub(crate) fn seat(&self) -> &Arc<Seat> {
-        &self.seat
+    pub(crate) fn activity(&self) -> &Arc<Activity> {
+        &self.activity
     }
 
     /// Ends a wait for the other side: when the connection has been sent away, a head has not come in
@@ -152,7 +152,7 @@ impl Connection {
     /// Waits for a reason to close the connection.
     fn poll_close(&mut self, context: &mut Context<'_>) -> Poll<Closed> {
         // One whose next request came meanwhile answers it first.
-        if self.seat.is_sent_away(context) && !self.seat.has_request() {
+        if self.activity.is_to_close(context) && !self.activity.has_request() {
             return Poll::Ready(Closed::Room);
         }
         self.look_at_requests();
@@ -177,14 +177,14 @@ impl Connection {
     fn note_read(&mut self) {
         self.used = Instant::now();
         self.look_at_requests();
-        if self.head_since.is_none() && !self.seat.has_request() {
+        if self.head_since.is_none() && !self.activity.has_request() {
             self.head_since = Some(self.used);
         }
     }
 
     /// Where a request has begun since, its head has come.
     fn look_at_requests(&mut self) {
-        let requests = self.seat.requests();
+        let requests = self.activity.requests();
         if requests != self.requests {
             self.requests = requests;
             self.head_since = None;
@@ -220,7 +220,7 @@ impl Closed {
 
 impl Drop for Connection {
     fn drop(&mut self) {
-        self.seat.leave();
+        self.activity.leave();
     }
 }
 

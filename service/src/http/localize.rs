@@ -9,7 +9,8 @@ use super::extract::{Json, NoQuery, SpaceOfPath, SpaceParam};
 use super::problem::Problem;
 use super::reply;
 use super::state::Service;
-use crate::answer;
+use crate::decode;
+use crate::encode;
 
 /// Find out where a sequence of samples was taken, by what the map knows: its motions, what it saw and the landmarks in it.
 ///
@@ -29,11 +30,11 @@ pub(crate) async fn post(
 ) -> Result<Response<Body>, Problem> {
     let samples = service
         .long
-        .make(move || answer::samples_to_localize(&query));
+        .make(move || decode::samples_to_localize(&query));
     let samples = samples.await??;
     let (map, found) = space.localize(samples).await?;
     let answered = service.long.make(move || {
-        let answer: Localization = answer::localization(space.name(), &map, &found);
+        let answer: Localization = encode::localization(space.name(), &map, &found);
         reply::json(&answer)
     });
     answered.await

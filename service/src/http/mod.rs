@@ -3,6 +3,7 @@
 //! Routes and their description are one: each handler carries both. Every error is a problem
 //! document; `guard` stands before all handlers.
 
+mod activity;
 mod agents;
 mod docs;
 mod elsewhere;
@@ -29,10 +30,10 @@ mod problem;
 mod recall;
 mod reply;
 mod samples;
-mod seat;
 mod settings;
 mod spaces;
 mod state;
+mod token;
 mod trajectory;
 mod trips;
 
@@ -50,11 +51,12 @@ use utoipa_axum::routes;
 pub use hosts::HostRule;
 pub use problem::{Kind, Problem};
 pub use settings::HttpSettings;
+pub use token::Token;
 
 use crate::engine::Engine;
+use activity::Noting;
 use guard::Guard;
 use listener::BoundedListener;
-use seat::Noting;
 use state::{Service, Shared};
 
 /// What the description says of the whole.

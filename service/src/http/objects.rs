@@ -21,7 +21,9 @@ use super::places::unknown;
 use super::problem::Problem;
 use super::reply;
 use super::state::Service;
-use crate::answer::{self, InvalidContacts};
+use crate::answer;
+use crate::decode::{self, InvalidContacts};
+use crate::encode;
 use crate::engine::Space;
 
 /// An object of a space in a path.
@@ -81,7 +83,7 @@ fn summaries(map: &CognitiveMap, after: Option<&str>, limit: usize) -> Response<
     objects.sort_by(|a, b| a.1.name().cmp(b.1.name()));
     let summaries = objects
         .iter()
-        .map(|(_, known, model)| answer::object_summary(known, model));
+        .map(|(_, known, model)| encode::object_summary(known, model));
     let (objects, next) = page::cut(summaries, limit, |summary| summary.name.clone());
     reply::json(&ObjectPage { objects, next })
 }
@@ -117,7 +119,7 @@ pub(crate) async fn put(
     Json(lesson): Json<ObjectLesson>,
 ) -> Result<Response<Body>, Problem> {
     let name = name.map_err(InvalidContacts::Name)?;
-    let valid = answer::lesson(&lesson)?;
+    let valid = decode::lesson(&lesson)?;
     space.teach(&name, lesson, valid).await?;
     let map = space.snapshot().await?;
     detail(&map, &name)
@@ -158,9 +160,9 @@ pub(crate) async fn identify(
     _: NoQuery,
     Json(query): Json<IdentifyQuery>,
 ) -> Result<Response<Body>, Problem> {
-    let (orientation, touches) = answer::touches_to_identify(&query)?;
+    let (orientation, touches) = decode::touches_to_identify(&query)?;
     let (map, identified) = space.identify(orientation, touches).await?;
-    let answer = answer::identification(space.name(), &map, &identified);
+    let answer = encode::identification(space.name(), &map, &identified);
     Ok(reply::json(&answer))
 }
 
@@ -173,15 +175,15 @@ pub(crate) async fn identify(
         (status = 404, description = "There is no such space or agent")))]
 pub(crate) async fn of_agent(
     State(service): State<Service>,
-    AgentOfPath(space, desk): AgentOfPath,
+    AgentOfPath(space, view): AgentOfPath,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
     // After the map: an episode that ends in between is told twice and never missed.
-    let last = desk.ended_episode().as_deref().cloned();
+    let last = view.ended_episode().as_deref().cloned();
     // All contacts of the episode may be judged anew.
     let answered = service.long.make(move || {
-        let answer = answer::agent_object(space.name(), &map, desk.id(), desk.name(), last);
+        let answer = answer::agent_object(space.name(), &map, view.id(), view.name(), last);
         reply::json(&answer)
     });
     answered.await
@@ -190,7 +192,7 @@ pub(crate) async fn of_agent(
 fn detail(map: &CognitiveMap, name: &Label) -> Option<ObjectDetail> {
     let id = map.object_by_name(name)?;
     let (_, known, model) = map.objects().find(|(object, ..)| *object == id)?;
-    Some(answer::object_detail(map, known, model))
+    Some(encode::object_detail(map, known, model))
 }
 
 /// The space that the path names, and the name of an object that may be there or not, or none that an object can have.

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::examples;
 use super::problem::{Kind, PROBLEM_JSON};
+use crate::decode::{Bound, SPACE_BOUNDS, TRAJECTORY_INTERVAL_S};
 
 /// Statuses that every route may answer with, whoever handles it.
 const EVERYWHERE: [(&str, &str); 7] = [
@@ -201,53 +202,54 @@ fn merge_into_array(schema: &mut Value, length: usize) {
 
 /// Writes the bounds of request bodies into their schemas: the types cannot carry them.
 fn constrain(schemas: &mut Value) {
+    constrain_recall(&mut schemas["RecallQuery"]["properties"]);
+    constrain_batch(&mut schemas["SampleBatch"]["properties"]);
+    constrain_rotations(&mut schemas["Orientation"]);
+    constrain_lists(schemas);
+    merge_into_array(&mut schemas["Landmark"]["properties"]["covariance"], 6);
+    constrain_settings(schemas);
+}
+
+fn constrain_recall(query: &mut Value) {
     let metres = json!({ "minimum": -METRES_MAX, "maximum": METRES_MAX });
-    let query = &mut schemas["RecallQuery"]["properties"];
     merge(&mut query["position_m"]["items"], &metres);
-    merge(
-        &mut query["radius_m"],
-        &json!({ "minimum": 0.0, "maximum": METRES_MAX }),
-    );
-    merge(
-        &mut query["limit"],
-        &json!({ "minimum": 1, "maximum": 1000 }),
-    );
-    merge(
-        &mut query["agent"],
-        &json!({
-            "pattern": "^[A-Za-z0-9][A-Za-z0-9_.-]*$",
-            "minLength": 1,
-            "maxLength": NAME_BYTES_MAX,
-        }),
-    );
+    let radius = json!({ "minimum": 0.0, "maximum": METRES_MAX });
+    merge(&mut query["radius_m"], &radius);
+    let limit = json!({ "minimum": 1, "maximum": 1000 });
+    merge(&mut query["limit"], &limit);
+    let name = json!({
+        "pattern": "^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+        "minLength": 1,
+        "maxLength": NAME_BYTES_MAX,
+    });
+    merge(&mut query["agent"], &name);
     let phase = &mut query["code"]["items"];
     merge_into_array(phase, 3);
-    merge(
-        &mut phase["items"],
-        &json!({ "minimum": 0.0, "exclusiveMaximum": 1.0 }),
-    );
-    merge(
-        &mut query["code"],
-        &json!({ "minItems": 1, "maxItems": GRID_MODULES_MAX }),
-    );
-    merge_into_array(&mut schemas["Landmark"]["properties"]["covariance"], 6);
-    let batch = &mut schemas["SampleBatch"]["properties"];
-    merge(
-        &mut batch["first_seq"],
-        &json!({ "maximum": u64::MAX - 1 - BATCH_SAMPLES_MAX as u64 }),
-    );
+    let turns = json!({ "minimum": 0.0, "exclusiveMaximum": 1.0 });
+    merge(&mut phase["items"], &turns);
+    let modules = json!({ "minItems": 1, "maxItems": GRID_MODULES_MAX });
+    merge(&mut query["code"], &modules);
+}
+
+fn constrain_batch(batch: &mut Value) {
+    let first = json!({ "maximum": u64::MAX - 1 - BATCH_SAMPLES_MAX as u64 });
+    merge(&mut batch["first_seq"], &first);
     merge(&mut batch["session"], &json!({ "maximum": u64::MAX - 1 }));
-    let turns = schemas["Orientation"]["oneOf"].as_array_mut();
+}
+
+fn constrain_rotations(orientation: &mut Value) {
+    let turns = orientation["oneOf"].as_array_mut();
     for variant in turns.into_iter().flatten() {
         let finite = "/properties/finite/properties/rotations_xyzw";
         if let Some(rotations) = variant.pointer_mut(finite) {
-            merge(
-                rotations,
-                &json!({ "minItems": 1, "maxItems": ROTATIONS_MAX }),
-            );
+            let count = json!({ "minItems": 1, "maxItems": ROTATIONS_MAX });
+            merge(rotations, &count);
             merge_into_array(&mut rotations["items"], 4);
         }
     }
+}
+
+fn constrain_lists(schemas: &mut Value) {
     let lists = [
         ("SampleBatch", "samples", BATCH_SAMPLES_MAX),
         ("LocalizeQuery", "samples", LOCALIZE_SAMPLES_MAX),
@@ -258,9 +260,11 @@ fn constrain(schemas: &mut Value) {
         let list = &mut schemas[name]["properties"][field];
         merge(list, &json!({ "minItems": 1, "maxItems": most }));
     }
-    let share = json!({ "minimum": 0.0, "maximum": 1.0 });
-    let noise = &mut schemas["NoiseSettings"]["properties"];
-    for (_, field) in entries(noise) {
+}
+
+fn constrain_settings(schemas: &mut Value) {
+    let share = of_bound(Bound::Share);
+    for (_, field) in entries(&mut schemas["NoiseSettings"]["properties"]) {
         merge(field, &share);
     }
     let bernoulli = "/Recruitment/oneOf/1/properties/bernoulli/properties/probability";
@@ -268,36 +272,32 @@ fn constrain(schemas: &mut Value) {
         merge(probability, &share);
     }
     let settings = &mut schemas["SpaceSettings"]["properties"];
-    merge(&mut settings["lasting_range_error"], &share);
-    let large = json!({ "minimum": 0.001, "maximum": 1e6 });
-    for field in ["grid_spacing_m", "field_radius_m"] {
-        merge(&mut settings[field], &large);
+    let interval = ("trajectory_interval_s", TRAJECTORY_INTERVAL_S);
+    for (field, bound) in SPACE_BOUNDS.into_iter().chain([interval]) {
+        merge(&mut settings[field], &of_bound(bound));
     }
-    let positive = json!({ "exclusiveMinimum": 0.0, "maximum": 1e6 });
-    for field in [
-        "localized_sd_m",
-        "lost_sd_m",
-        "trip_stillness_s",
-        "trip_gap_s",
-    ] {
-        merge(&mut settings[field], &positive);
+}
+
+/// A bound of a setting, as a schema says it.
+fn of_bound(bound: Bound) -> Value {
+    match bound {
+        Bound::Share => json!({ "minimum": 0.0, "maximum": 1.0 }),
+        Bound::Real {
+            min,
+            is_open: true,
+            max,
+        } => json!({ "exclusiveMinimum": min, "maximum": max }),
+        Bound::Real {
+            min,
+            is_open: false,
+            max,
+        } => json!({ "minimum": min, "maximum": max }),
+        Bound::Whole { min, max: None } => json!({ "minimum": min }),
+        Bound::Whole {
+            min,
+            max: Some(max),
+        } => json!({ "minimum": min, "maximum": max }),
     }
-    merge(
-        &mut settings["grid_modules"],
-        &json!({ "minimum": 1, "maximum": 16 }),
-    );
-    merge(
-        &mut settings["grid_ratio"],
-        &json!({ "exclusiveMinimum": 1.0, "maximum": 10.0 }),
-    );
-    merge(&mut settings["places_max"], &json!({ "minimum": 2 }));
-    let anchors = json!({ "minimum": 64, "maximum": 1 << 24 });
-    merge(&mut settings["anchors_max"], &anchors);
-    for field in ["legs_max", "strength_half_life_samples"] {
-        merge(&mut settings[field], &json!({ "minimum": 1 }));
-    }
-    let interval = json!({ "minimum": 0.001, "maximum": 3600.0 });
-    merge(&mut settings["trajectory_interval_s"], &interval);
 }
 
 fn merge(into: &mut Value, from: &Value) {

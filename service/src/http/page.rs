@@ -3,7 +3,7 @@
 use cogmap_proto::limits::{PAGE_ITEMS_DEFAULT, PAGE_ITEMS_MAX};
 
 use super::problem::Problem;
-use crate::answer::InvalidQuery;
+use crate::decode::InvalidQuery;
 
 /// Number of items that a query asks for.
 pub(crate) fn limit(asked: Option<u32>) -> Result<usize, Problem> {

@@ -13,7 +13,7 @@ use super::page;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
-use crate::answer;
+use crate::encode;
 
 /// Which places.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -74,11 +74,11 @@ fn places(map: &CognitiveMap, query: &PlacesQuery, limit: usize) -> Response<Bod
     });
     let (places, next) = page::cut(wanted, limit, |(id, _)| u64::from(id.0));
     reply::json(&PlacePage {
-        frame: answer::FRAME.to_owned(),
+        frame: encode::FRAME.to_owned(),
         map_revision: map.revision(),
         places: places
             .into_iter()
-            .map(|(id, place)| answer::place(map, id, place))
+            .map(|(id, place)| encode::place(map, id, place))
             .collect(),
         next,
     })
@@ -100,7 +100,7 @@ pub(crate) async fn get(
         .map(PlaceId)
         .map_err(|_| unknown("place"))?;
     match map.place(id) {
-        Some(place) => Ok(reply::json(&answer::place(&map, id, place))),
+        Some(place) => Ok(reply::json(&encode::place(&map, id, place))),
         None if map.is_forgotten_place(id) => Err(forgotten("place")),
         None => Err(unknown("place")),
     }

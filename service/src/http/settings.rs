@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::hosts::HostRule;
-use crate::config::Token;
+use super::token::Token;
 
 /// Settings of the HTTP interface. The settings file explains them.
 #[derive(Clone, Debug)]

@@ -18,7 +18,7 @@ use super::json;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
-use crate::answer;
+use crate::encode;
 use crate::engine::{Space, Unavailable};
 
 /// How often to look whether a new space has been set up.
@@ -142,7 +142,7 @@ async fn info(service: &Service, space: &Arc<Space>) -> Result<SpaceInfo, Proble
     })?;
     // The digest looks at everything that changed.
     let space = Arc::clone(space);
-    let info = move || answer::space_info(space.name(), space.settings(), &map);
+    let info = move || encode::space_info(space.name(), space.settings(), &map);
     service.long.make(info).await
 }
 

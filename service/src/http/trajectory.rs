@@ -1,10 +1,11 @@
 //! Trajectories, as JSON or in the TUM format.
 
+use ::trajectory::write_tum;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::header::{ACCEPT, HeaderMap, HeaderValue, LINK};
 use axum::http::{Response, Uri};
-use cogmap_proto::{StampedPose, Trajectory};
+use cogmap_proto::Trajectory;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -14,6 +15,7 @@ use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
 use crate::answer::agent_once_named;
+use crate::encode;
 
 /// Media type of the TUM format.
 pub(crate) const TUM: &str = "text/plain; charset=utf-8";
@@ -106,11 +108,19 @@ pub(crate) async fn get(
     // A page is a text of a thousand poses.
     let written = service.long.make(move || {
         if format == TrajectoryFormat::Json {
-            return reply::json(&read);
+            let (poses, next) = (&read.poses, read.next_from_ns);
+            let name = agent.as_str();
+            return reply::json(&encode::trajectory(
+                name,
+                read.session,
+                read.revision,
+                poses,
+                next,
+            ));
         }
-        let mut response = reply::with_type(TUM, Body::from(tum(&read.poses)));
+        let mut response = reply::with_type(TUM, Body::from(write_tum(&read.poses)));
         if let Some(next) = read.next_from_ns {
-            let session = (read.kind == "causal").then_some(read.session);
+            let session = read.revision.is_none().then_some(read.session);
             let link = next_page(&uri, session, next);
             response.headers_mut().insert(LINK, link);
         }
@@ -151,38 +161,21 @@ fn next_page(uri: &Uri, session: Option<u64>, from_ns: i64) -> HeaderValue {
     HeaderValue::try_from(link).expect("a URI is visible ASCII, and so are numbers")
 }
 
-/// Poses as TUM lines: seconds with all nanoseconds, metres and quaternion as exact as they are.
-pub(crate) fn tum(poses: &[StampedPose]) -> String {
-    use std::fmt::Write;
-    let mut text = String::with_capacity(poses.len() * 128);
-    for pose in poses {
-        let sign = if pose.stamp_ns < 0 { "-" } else { "" };
-        let stamp_ns = pose.stamp_ns.unsigned_abs();
-        let (whole, rest) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
-        let [x, y, z] = pose.translation_m;
-        let [qx, qy, qz, qw] = pose.rotation_xyzw;
-        writeln!(
-            text,
-            "{sign}{whole}.{rest:09} {x} {y} {z} {qx} {qy} {qz} {qw}"
-        )
-        .expect("a text takes what fits into memory");
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
+    use ::trajectory::StampedPose;
+    use nalgebra::Isometry3;
+
     use super::*;
 
     #[test]
     fn stamps_keep_their_nanoseconds_and_sign() {
         let pose = |stamp_ns| StampedPose {
             stamp_ns,
-            translation_m: [1.5, -2.0, 0.0],
-            rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+            pose: Isometry3::translation(1.5, -2.0, 0.0),
         };
         let stamps = [1_700_000_000_123_456_789, -1, 0, i64::MIN];
-        let text = tum(&stamps.map(pose));
+        let text = write_tum(&stamps.map(pose));
         let first: Vec<_> = text
             .lines()
             .map(|line| line.split(' ').next().expect("a stamp"))

@@ -13,7 +13,8 @@ use super::places::{MemoryOfPath, forgotten, unknown};
 use super::problem::Problem;
 use super::reply;
 use super::state::Service;
-use crate::answer::{self, agent_once_named};
+use crate::answer::agent_once_named;
+use crate::encode;
 
 /// Which trips.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
@@ -73,7 +74,7 @@ fn trips(map: &CognitiveMap, query: &TripsQuery, limit: usize) -> Response<Body>
     let (trips, next) = page::cut(wanted, limit, |(id, _)| u64::from(id.0));
     let trips = trips
         .into_iter()
-        .map(|(id, trip)| answer::trip(map, id, trip))
+        .map(|(id, trip)| encode::trip(map, id, trip))
         .collect();
     reply::json(&TripPage { trips, next })
 }
@@ -92,7 +93,7 @@ pub(crate) async fn get(
     let map = space.snapshot().await?;
     let id = u32::try_from(id).map(TripId).map_err(|_| unknown("trip"))?;
     match map.trip(id) {
-        Some(trip) => Ok(reply::json(&answer::trip_detail(&map, id, trip))),
+        Some(trip) => Ok(reply::json(&encode::trip_detail(&map, id, trip))),
         None if map.is_forgotten_trip(id) => Err(forgotten("trip")),
         None => Err(unknown("trip")),
     }

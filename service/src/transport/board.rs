@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use cogmap_proto::EventRecord;
 use metrics::{Counter, counter};
 
-use crate::engine::{AgentDesk, Messages};
+use crate::engine::{AgentView, Messages};
 use crate::metrics::UNPUBLISHED_EVENTS;
 
 /// Most events that wait; further ones are dropped and counted.
@@ -33,7 +33,7 @@ struct Notices {
 #[derive(Debug)]
 pub(super) enum Notice {
     /// Something is due of this agent of the space.
-    Agent(Arc<str>, Arc<AgentDesk>),
+    Agent(Arc<str>, Arc<AgentView>),
     /// An event.
     Event(Arc<EventRecord>),
 }
@@ -56,7 +56,7 @@ impl std::fmt::Debug for Board {
 
 impl Board {
     /// Makes messages of an agent due.
-    pub(super) fn agent(&self, space: &Arc<str>, agent: &Arc<AgentDesk>, messages: Messages) {
+    pub(super) fn agent(&self, space: &Arc<str>, agent: &Arc<AgentView>, messages: Messages) {
         if agent.make_due(messages) {
             let mut notices = self.lock();
             notices
@@ -127,23 +127,23 @@ impl Notices {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::desk_of;
+    use crate::engine::view_of;
 
     #[test]
     fn what_changes_often_is_due_once() {
-        let (board, space, desk) = (Board::default(), "lab".into(), Arc::new(desk_of("ada")));
+        let (board, space, view) = (Board::default(), "lab".into(), Arc::new(view_of("ada")));
         for _ in 0..100_000 {
-            board.agent(&space, &desk, Messages::ESTIMATE);
-            board.agent(&space, &desk, Messages::WATERMARK);
+            board.agent(&space, &view, Messages::ESTIMATE);
+            board.agent(&space, &view, Messages::WATERMARK);
         }
         let mut taken = Vec::new();
         assert!(board.wait(&mut taken));
         assert_eq!(taken.len(), 1);
-        assert_eq!(desk.take_due(Messages::BOTH), Messages::BOTH);
-        board.agent(&space, &desk, Messages::WATERMARK);
+        assert_eq!(view.take_due(Messages::BOTH), Messages::BOTH);
+        board.agent(&space, &view, Messages::WATERMARK);
         assert!(board.wait(&mut taken));
         assert_eq!(
-            (taken.len(), desk.take_due(Messages::BOTH)),
+            (taken.len(), view.take_due(Messages::BOTH)),
             (2, Messages::WATERMARK)
         );
         board.close();

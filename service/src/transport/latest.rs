@@ -9,10 +9,11 @@ use zenoh::Session;
 use zenoh::key_expr::KeyExpr;
 use zenoh::query::{Query, Queryable};
 
-use super::queries::{busy, codec_of, refuse, send};
+use super::reply::{busy, codec_of, refuse, send};
 use super::session::TransportError;
-use crate::answer::{Kind, Problem, agent_named, space_named};
-use crate::engine::{AgentDesk, Engine};
+use crate::answer::{agent_named, space_named};
+use crate::engine::{AgentView, Engine};
+use crate::problem::{Kind, Problem};
 
 /// What is published of each agent.
 #[derive(Clone, Copy, Debug)]
@@ -30,10 +31,10 @@ impl Latest {
     }
 
     /// What there is of an agent; no estimate before its first sample.
-    fn encoded(self, desk: &AgentDesk, codec: Codec) -> Option<Vec<u8>> {
+    fn encoded(self, view: &AgentView, codec: Codec) -> Option<Vec<u8>> {
         match self {
-            Self::Estimate => desk.estimate().map(|estimate| codec.encode(&estimate)),
-            Self::Watermark => Some(codec.encode(&desk.watermark())),
+            Self::Estimate => view.estimate().map(|estimate| codec.encode(&estimate)),
+            Self::Watermark => Some(codec.encode(&view.watermark())),
         }
     }
 }
@@ -86,9 +87,9 @@ fn reply_one(engine: &Engine, latest: Latest, query: &Query, codec: Codec) -> Re
     let mut names = query.key_expr().as_str().split('/').skip(1);
     let mut name = || names.next().unwrap_or_default();
     let space = space_named(engine, name())?;
-    let desk = agent_named(&space, name())?;
-    let bytes = latest.encoded(&desk, codec).ok_or_else(|| {
-        let detail = format!("the agent {:?} has no sample yet", desk.name());
+    let view = agent_named(&space, name())?;
+    let bytes = latest.encoded(&view, codec).ok_or_else(|| {
+        let detail = format!("the agent {:?} has no sample yet", view.name());
         Problem::new(Kind::UnknownAgent, detail)
     })?;
     send(query, query.key_expr().as_str(), codec, bytes);
@@ -98,10 +99,10 @@ fn reply_one(engine: &Engine, latest: Latest, query: &Query, codec: Codec) -> Re
 /// Answers for all agents whose keys the query matches.
 fn reply_all(engine: &Engine, latest: Latest, query: &Query, codec: Codec) {
     for space in engine.spaces() {
-        for desk in space.agents_after(None, usize::MAX) {
-            let key = latest.key(space.name(), desk.name());
+        for view in space.agents_after(None, usize::MAX) {
+            let key = latest.key(space.name(), view.name());
             let asked = KeyExpr::try_from(&*key).is_ok_and(|key| query.key_expr().intersects(&key));
-            if asked && let Some(bytes) = latest.encoded(&desk, codec) {
+            if asked && let Some(bytes) = latest.encoded(&view, codec) {
                 send(query, &key, codec, bytes);
             }
         }

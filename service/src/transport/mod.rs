@@ -4,12 +4,13 @@ mod board;
 mod intake;
 mod latest;
 mod linger;
-mod outlet;
 mod publisher;
+mod publishing;
 mod queries;
+mod reply;
 mod session;
 
 pub use intake::Intake;
 pub use linger::forbid as forbid_lingering;
-pub use outlet::ZenohOutlet;
+pub use publisher::ZenohPublisher;
 pub use session::{TransportError, TransportSettings, open};

@@ -9,13 +9,17 @@ use cogmap_proto::{
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use zenoh::Session;
 use zenoh::query::{Query, Queryable};
-use zenoh::{Session, Wait};
 
 use super::latest;
+use super::reply::{busy, codec_of, refuse, send};
 use super::session::TransportError;
-use crate::answer::{self, InvalidPrediction, Kind, Problem};
+use crate::answer;
+use crate::decode::{self, InvalidPrediction};
+use crate::encode;
 use crate::engine::Engine;
+use crate::problem::{Kind, Problem};
 
 /// Most queries under way; further ones are told to come back.
 const QUERIES_MAX: usize = 64;
@@ -71,37 +75,6 @@ async fn reply(engine: &Engine, verb: Verb, query: Query, permit: Option<OwnedSe
     }
 }
 
-/// Sends an answer under a key, which may wait.
-pub(super) fn send(query: &Query, key: &str, codec: Codec, bytes: Vec<u8>) {
-    let sent = query.reply(key, bytes).encoding(codec.encoding()).wait();
-    if let Err(error) = sent {
-        tracing::debug!(%error, "answer a query");
-    }
-}
-
-/// Answers with a problem, which may wait.
-pub(super) fn refuse(query: &Query, codec: Codec, problem: &Problem) {
-    let sent = query.reply_err(codec.encode(&problem.to_wire()));
-    if let Err(error) = sent.encoding(codec.encoding()).wait() {
-        tracing::debug!(%error, "refuse a query");
-    }
-}
-
-/// The codec of a question, and so of its answer. A question without an encoding means JSON.
-pub(super) fn codec_of(query: &Query) -> Result<Codec, Problem> {
-    let encoding = query.encoding().map(ToString::to_string);
-    // An encoding that was not given comes as Zenoh's default.
-    match encoding.as_deref() {
-        None | Some("" | "zenoh/bytes") => Ok(Codec::Json),
-        Some(encoding) => Ok(Codec::of_encoding(encoding)?),
-    }
-}
-
-/// As many questions as may be are under way.
-pub(super) fn busy() -> Problem {
-    Problem::new(Kind::Busy, "too much is under way")
-}
-
 async fn answer(
     engine: &Engine,
     verb: Verb,
@@ -130,23 +103,23 @@ async fn answer(
         Verb::Predict => {
             let body: PredictQuery = body(query, codec)?;
             let name = body.agent.as_deref().ok_or(InvalidPrediction::NoAgent)?;
-            let desk = answer::agent_named(&space, name)?;
+            let view = answer::agent_named(&space, name)?;
             let map = space.snapshot().await?;
-            let predicted = answer::predict(space.name(), &map, desk.id(), &body)?;
+            let predicted = answer::predict(space.name(), &map, view.id(), &body)?;
             Ok(codec.encode(&predicted))
         }
         Verb::Identify => {
             let body: IdentifyQuery = body(query, codec)?;
-            let (orientation, touches) = answer::touches_to_identify(&body)?;
+            let (orientation, touches) = decode::touches_to_identify(&body)?;
             let (map, identified) = space.identify(orientation, touches).await?;
-            let answer = answer::identification(space.name(), &map, &identified);
+            let answer = encode::identification(space.name(), &map, &identified);
             Ok(codec.encode(&answer))
         }
         Verb::Localize => {
             let body: LocalizeQuery = body(query, codec)?;
-            let samples = answer::samples_to_localize(&body)?;
+            let samples = decode::samples_to_localize(&body)?;
             let (map, found) = space.localize(samples).await?;
-            let answer = answer::localization(space.name(), &map, &found);
+            let answer = encode::localization(space.name(), &map, &found);
             Ok(codec.encode(&answer))
         }
     }

@@ -132,7 +132,8 @@ pub enum EventKind {
         /// Contacts of this episode.
         contacts: u64,
     },
-    /// An episode was to teach an object and has not: it did not become clear how its frame lies in the object's.
+    /// An episode was to teach an object and has not: it did not become clear how its frame lies in
+    /// the object's.
     ObjectNotLearned {
         /// Contacts of this episode.
         contacts: u64,
@@ -163,8 +164,8 @@ pub enum EventKind {
         session: u64,
         /// Whether it was to teach an object.
         teaches: bool,
-        /// What its contacts said in the end, before anything was learned from it; none where it taught
-        /// an object by its name.
+        /// What its contacts said in the end, before anything was learned from it; none where it
+        /// taught an object by its name.
         posterior: Option<Box<Posterior>>,
     },
     /// A percept was felt where a place remembers its channel; before the place learned from it.

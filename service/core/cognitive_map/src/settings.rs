@@ -18,7 +18,8 @@ pub struct SettingsValues {
     pub grid_modules: usize,
     /// Spacing of the finest grid module \[m\].
     pub grid_spacing_m: f64,
-    /// Ratio of the spacings of neighbouring modules, above 1 (1.4 to 1.7 in rats: Stensola et al. 2012).
+    /// Ratio of the spacings of neighbouring modules, above 1 (1.4 to 1.7 in rats: Stensola et al.
+    /// 2012).
     pub grid_ratio: f64,
     /// Distance at which a place's confidence has fallen to one half \[m\].
     pub field_radius_m: f64,
@@ -50,10 +51,11 @@ pub struct SettingsValues {
     pub places_max: u32,
     /// Most legs of all trips together: for one more, the weakest trip is forgotten.
     pub legs_max: u32,
-    /// Most moments of all agents that are remembered, so that the past can be smoothed: for one more, one
-    /// from which next to nothing is lost is left out.
+    /// Most moments of all agents that are remembered, so that the past can be smoothed: for one
+    /// more, one from which next to nothing is lost is left out.
     pub anchors_max: u32,
-    /// After this many records of the space, a use counts half as much for the strength of a memory.
+    /// After this many records of the space, a use counts half as much for the strength of a
+    /// memory.
     pub strength_half_life_samples: u32,
 }
 
@@ -62,8 +64,8 @@ pub struct SettingsValues {
 pub enum Recruitment {
     /// Where no place answers with a confidence of at least one half.
     Novelty,
-    /// At every motion sample with this probability (seed `P_new`), unless a place is closer than an
-    /// eighth of a field radius: those two could not be told apart.
+    /// At every motion sample with this probability (seed `P_new`), unless a place is closer than
+    /// an eighth of a field radius: those two could not be told apart.
     Bernoulli {
         /// Probability, in \[0, 1\].
         probability: f64,

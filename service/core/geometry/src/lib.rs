@@ -8,6 +8,7 @@ mod planar;
 mod positive;
 pub mod se3;
 mod se3_jacobian;
+mod symmetric;
 
 pub use alignment::{align, centre};
 pub use bounds::{is_somewhere, is_within};
@@ -18,3 +19,4 @@ pub use planar::{
 };
 pub use positive::positive;
 pub use se3_jacobian::log_jacobian;
+pub use symmetric::symmetric;

@@ -51,18 +51,24 @@ pub(crate) fn run(directory: &str, told: &Told) -> bool {
         let begin = Instant::now();
         match &sample.body {
             SampleBody::Motion(motion) => {
-                estimator.motion(agent, stamp_ns, motion);
+                estimator.motion(agent, stamp_ns, motion, &mut Vec::new());
             }
             SampleBody::StartPose(start) if agent == 0 || told.all_starts => {
-                estimator.start_pose(agent, start);
+                estimator.start_pose(agent, start, &mut Vec::new());
             }
             SampleBody::Sighting(sighting) => match &sighting.target {
                 Target::Landmark(label) => {
-                    estimator.landmark(agent, stamp_ns, label, &sighting.relation);
+                    estimator.landmark(agent, stamp_ns, label, &sighting.relation, &mut Vec::new());
                 }
                 Target::Agent(name) if told.sightings_of_robots => {
                     let target = by_name[name.as_str()];
-                    estimator.sighting(agent, stamp_ns, target, &sighting.relation);
+                    estimator.sighting(
+                        agent,
+                        stamp_ns,
+                        target,
+                        &sighting.relation,
+                        &mut Vec::new(),
+                    );
                 }
                 _ => {}
             },

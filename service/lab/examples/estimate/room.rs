@@ -108,20 +108,20 @@ impl Room {
         let agent = estimator.enrol();
         let (shift, turn) = (body.pose().translation.vector, body.pose().rotation.coords);
         let start = StartPose::new(shift.into(), turn.into(), PoseNoise::none()).ok()?;
-        estimator.start_pose(agent, &start);
+        estimator.start_pose(agent, &start, &mut Vec::new());
         let (mut errors, mut compared) = (Errors::default(), 0.0);
         for step in 0..=self.steps {
             let stamp_ns = step * 100_000_000;
             if step > 0 {
                 let reading = odometer.read(&body.step(&world), stamp_ns, 0.1);
                 if let SampleBody::Motion(motion) = Sample::try_from(&reading).ok()?.body {
-                    estimator.motion(agent, stamp_ns, &motion);
+                    estimator.motion(agent, stamp_ns, &motion, &mut Vec::new());
                 }
             }
             let truth = body.pose();
             if step % EVERY == 0 && (step > 0 || self.looks_first) {
                 self.look(&world, &truth, &mut eyes, |label, relation| {
-                    estimator.landmark(agent, stamp_ns, label, relation);
+                    estimator.landmark(agent, stamp_ns, label, relation, &mut Vec::new());
                 })?;
             }
             let (pose, covariance) = estimator.pose(agent)?;

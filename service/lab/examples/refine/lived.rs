@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use cognitive_map::estimator::{Estimator, Parameters};
+use cognitive_map::estimator::{Effect, Estimator, Parameters};
 use cognitive_map::keyframes::{KeyframeGraph, KeyframeSettings, Moment, Refined};
 use cognitive_map::{Sample, SampleBody, Target};
 use trajectory::{Alignment, Span, StampedPose, Trajectory, ate_rmse_m};
@@ -51,22 +51,27 @@ impl Lived {
         let seq = self.seqs.entry(agent).or_default();
         *seq += 1;
         let seq = *seq;
-        let mut step = None;
-        let mut taken = None;
+        let mut effects = Vec::new();
         match &sample.body {
             SampleBody::Motion(motion) => {
-                step = Some(self.estimator.motion(agent, stamp_ns, motion));
+                self.estimator.motion(agent, stamp_ns, motion, &mut effects);
             }
-            SampleBody::StartPose(start) => self.estimator.start_pose(agent, start),
+            SampleBody::StartPose(start) => self.estimator.start_pose(agent, start, &mut effects),
             SampleBody::Sighting(sighting) => match &sighting.target {
                 Target::Landmark(label) => {
                     let relation = &sighting.relation;
-                    taken = Some(self.estimator.landmark(agent, stamp_ns, label, relation));
+                    self.estimator
+                        .landmark(agent, stamp_ns, label, relation, &mut effects);
                 }
                 Target::Agent(name) if sees_robots => {
                     let target = self.names[name.as_str()];
-                    self.estimator
-                        .sighting(agent, stamp_ns, target, &sighting.relation);
+                    self.estimator.sighting(
+                        agent,
+                        stamp_ns,
+                        target,
+                        &sighting.relation,
+                        &mut effects,
+                    );
                 }
                 _ => {}
             },
@@ -81,45 +86,54 @@ impl Lived {
             stamp_ns,
             pose,
         };
-        let (settled, merged) = (self.estimator.take_settled(), self.estimator.take_merged());
         let begin = Instant::now();
-        match (&sample.body, step, taken) {
-            (SampleBody::Motion(_), Some(step), _) => {
-                self.graph
-                    .motion(&moment, &step.increment, &step.variance, &step.calibrated);
-            }
-            (SampleBody::StartPose(start), ..) => self.graph.start_pose(&moment, start),
-            (SampleBody::Sighting(sighting), _, Some(taken)) if taken.accepted => {
-                if let Target::Landmark(label) = &sighting.target {
-                    let (relation, variance) = (&sighting.relation, &taken.variance);
-                    self.graph.landmark(&moment, label, relation, variance);
-                }
-            }
-            _ => {}
+        if let SampleBody::StartPose(start) = &sample.body {
+            self.graph.start_pose(&moment, start);
         }
-        for merged in merged {
-            for agent in merged.agents {
-                if merged.into == 0 {
-                    self.graph.placed(agent, &merged.pose);
-                } else {
-                    self.graph.transformed(agent, &merged.pose);
-                }
-            }
-        }
-        for seen in settled.iter().filter(|seen| seen.accepted) {
-            let variance = seen.variance.fixed_rows::<3>(0).into_owned();
-            self.graph.sighted(
-                seen.observer,
-                seen.target,
-                seen.stamp_ns,
-                &seen.relation,
-                &variance,
-            );
+        effects.sort_by_key(Effect::order);
+        for effect in &effects {
+            self.apply(&moment, effect);
         }
         self.times_s.push(begin.elapsed().as_secs_f64());
         let poses = self.causal.entry(robot).or_default();
         poses.pop_if(|last| last.stamp_ns == stamp_ns);
         poses.push(StampedPose { stamp_ns, pose });
+    }
+
+    /// Tells the keyframe graph what a sample brought about.
+    fn apply(&mut self, moment: &Moment, effect: &Effect) {
+        match effect {
+            Effect::Moved { step, .. } => {
+                self.graph
+                    .motion(moment, &step.increment, &step.variance, &step.calibrated);
+            }
+            Effect::LandmarkSighted {
+                label,
+                relation,
+                variance,
+                ..
+            } => self.graph.landmark(moment, label, relation, variance),
+            Effect::AgentSighted(seen) if seen.accepted => {
+                let variance = seen.variance.fixed_rows::<3>(0).into_owned();
+                self.graph.sighted(
+                    seen.observer,
+                    seen.target,
+                    seen.stamp_ns,
+                    &seen.relation,
+                    &variance,
+                );
+            }
+            Effect::FramesMerged(merged) => {
+                for &agent in &merged.agents {
+                    if merged.into == 0 {
+                        self.graph.placed(agent, &merged.pose);
+                    } else {
+                        self.graph.transformed(agent, &merged.pose);
+                    }
+                }
+            }
+            _ => {}
+        }
     }
 
     /// Prints causal and refined errors against the truth; answers their means over the robots.

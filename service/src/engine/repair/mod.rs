@@ -20,8 +20,8 @@ use cogmap_proto::{SkipReason, SpaceSettings};
 use cognitive_map::CognitiveMap;
 use serde::Serialize;
 
-use super::block::{BlockWriter, CorruptBlock, Entry, entries};
-use super::fold::core_settings;
+use crate::decode::core_settings;
+use crate::journal::{BlockWriter, CorruptBlock, Entry, entries};
 use crate::store::{
     Damage, Derived, Flaw, LocalJournal, LocalStore, Replacement, StoreError, StoredSpace,
 };

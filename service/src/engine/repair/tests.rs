@@ -53,7 +53,7 @@ fn repaired(blocks: &[&[Entry<'static>]], gone: u64) -> (Vec<Entry<'static>>, Re
     for (number_of_block, block) in (0..).zip(blocks) {
         writer.clear();
         block.iter().for_each(|entry| writer.push(entry));
-        let count = crate::engine::samples_in(writer.bytes());
+        let count = crate::journal::samples_in(writer.bytes());
         store
             .append(number, number_of_block, count, writer.bytes())
             .unwrap();

@@ -22,7 +22,7 @@ impl Drop for Presence<'_> {
             tracing::error!(space = %self.0.name, "the space's writer has ended");
         }
         // Whoever waits learns it by the end of the channel.
-        *self.0.wishes() = None;
+        *self.0.snapshot_requests() = None;
     }
 }
 

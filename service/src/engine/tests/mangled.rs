@@ -9,10 +9,10 @@ use proptest::sample::Index;
 use proptest::test_runner::Config;
 
 use super::*;
-use crate::engine::block::{BlockWriter, entries};
+use crate::engine::Health;
 use crate::engine::recovery::{Loading, recover};
 use crate::engine::trajectory::{Recorder, note_all};
-use crate::engine::{Health, trajectory_interval_ns};
+use crate::journal::{BlockWriter, entries};
 
 /// So many cases, or as many as `PROPTEST_CASES` says.
 fn cases(count: u32) -> Config {
@@ -199,7 +199,7 @@ fn store_of(directory: &Path, blocks: &[Vec<u8>]) -> LocalStore {
     let space = store.create_space(SPACE, b"{}").expect("created");
     store.open_journal(space).expect("opened");
     for (number, block) in (0..).zip(blocks) {
-        let samples = crate::engine::samples_in(block);
+        let samples = crate::journal::samples_in(block);
         store
             .append(space, number, samples, block)
             .expect("appended");

@@ -3,10 +3,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use cogmap_proto::Trajectory;
-
 use super::*;
-use crate::engine::{IngestError, TrajectoryError};
+use crate::engine::{IngestError, TrajectoryError, TrajectoryPage};
 use crate::store::{Derived, Journal};
 
 pub(super) fn wait<T>(answer: impl Future<Output = T>) -> T {
@@ -39,15 +37,15 @@ fn trajectory(
     engine: &Engine,
     agent: &str,
     session: Option<u64>,
-) -> Result<Trajectory, TrajectoryError> {
+) -> Result<TrajectoryPage, TrajectoryError> {
     let space = engine.space(SPACE).expect("the space is there");
     wait(space.trajectory(agent, session, None, None, 1000))
 }
 
 fn names(engine: &Engine) -> Vec<String> {
     let space = engine.space(SPACE).expect("the space is there");
-    let desks = space.agents_after(None, 100);
-    desks.iter().map(|desk| desk.name().to_owned()).collect()
+    let views = space.agents_after(None, 100);
+    views.iter().map(|view| view.name().to_owned()).collect()
 }
 
 fn forget_checkpoint(directory: &Path) {

@@ -42,9 +42,9 @@ fn a_small_disorder_is_healed_beside_agents_that_fill_the_window() {
     wait_for(|| applied(&engine) == 20);
     let space = engine.space(SPACE).expect("the space is there");
     let waiting = hostile.map(|agent| {
-        let desk = space.agent(agent).expect("it is enrolled");
-        assert!(desk.watermark().gap.is_some(), "{agent} is not told");
-        desk.detail().lag_samples
+        let view = space.agent(agent).expect("it is enrolled");
+        assert!(view.watermark().gap.is_some(), "{agent} is not told");
+        view.detail().lag_samples
     });
     // The first may reach 8192 ahead; each later one gets half of what is left.
     assert_eq!(waiting, [8191, 4096, 2048]);

@@ -7,14 +7,14 @@ use cogmap_proto::Sample;
 use cognitive_map::{AgentId, CognitiveMap, Label, Record};
 
 use super::{AgentSlot, Writer};
-use crate::engine::block::Entry;
+use crate::engine::agent_view::AgentView;
 use crate::engine::counters::Drop;
-use crate::engine::desk::AgentDesk;
 use crate::engine::episodes::EndedEpisodes;
 use crate::engine::message::{IngestError, RemovalRequest};
 use crate::engine::sequencer::{Sequencer, Window};
 use crate::engine::space::Shared;
 use crate::engine::trajectory::Recorder;
+use crate::journal::Entry;
 
 /// An agent that was heard of within this time makes no room for others: names that come in great
 /// numbers cannot drive out a robot that is at work.
@@ -24,18 +24,18 @@ const FULL_PAUSE: Duration = Duration::from_millis(100);
 
 impl Writer {
     /// Seats the agents of a recovered map.
-    pub(super) fn seat_all(&mut self, recorders: Vec<Recorder>, episodes: EndedEpisodes) {
+    pub(super) fn restore_agents(&mut self, recorders: Vec<Recorder>, episodes: EndedEpisodes) {
         let now = Instant::now();
         let (mut recorders, mut episodes) = (recorders.into_iter(), episodes.0.into_iter());
         let known: Vec<_> = { self.map.agents_ever() }
             .map(|(id, agent)| {
                 let recorder = recorders.next().unwrap_or_default();
                 let name = agent.name().as_str();
-                let desk = AgentDesk::new(id, name, agent.session(), agent.next_seq(), recorder);
-                desk.put_ended_episode(episodes.next().flatten());
+                let view = AgentView::new(id, name, agent.session(), agent.next_seq(), recorder);
+                view.put_ended_episode(episodes.next().flatten());
                 let sequencer = Sequencer::new(agent.session(), agent.next_seq());
                 let latest_ns = agent.stamp_ns().unwrap_or(i64::MIN);
-                let slot = AgentSlot::new(desk, sequencer, latest_ns, now);
+                let slot = AgentSlot::new(view, sequencer, latest_ns, now);
                 (slot, agent.is_enrolled())
             })
             .collect();
@@ -44,7 +44,7 @@ impl Writer {
             if !is_enrolled {
                 note_removal(&self.shared, &self.map, &mut self.vacant, &slot);
             }
-            self.seat(number, slot);
+            self.put_slot(number, slot);
         }
     }
 
@@ -64,19 +64,19 @@ impl Writer {
             agent: id,
             name: label,
         });
-        let desk = AgentDesk::new(id, name, 0, 0, Recorder::default());
-        self.seat(
+        let view = AgentView::new(id, name, 0, 0, Recorder::default());
+        self.put_slot(
             number,
-            AgentSlot::new(desk, Sequencer::new(0, 0), i64::MIN, now),
+            AgentSlot::new(view, Sequencer::new(0, 0), i64::MIN, now),
         );
         Some(number)
     }
 
     /// Puts an agent under a number that is the next one or vacant.
-    fn seat(&mut self, number: usize, slot: AgentSlot) {
+    fn put_slot(&mut self, number: usize, slot: AgentSlot) {
         if !slot.removed {
-            self.by_name.insert(slot.desk.name().into(), number);
-            self.shared.seat(Arc::clone(&slot.desk));
+            self.by_name.insert(slot.view.name().into(), number);
+            self.shared.add_view(Arc::clone(&slot.view));
         }
         match self.agents.get_mut(number) {
             Some(vacant) => *vacant = slot,
@@ -96,7 +96,7 @@ impl Writer {
             if self.shared.health.failed().is_none()
                 && let Some(slot) = self.idlest_without_trace(now)
             {
-                let (space, agent) = (&self.shared.name, self.agents[slot].desk.name());
+                let (space, agent) = (&self.shared.name, self.agents[slot].view.name());
                 tracing::debug!(%space, agent, "removed to make room: it was never in the map");
                 self.remove(slot);
                 self.counters.made_room();
@@ -113,7 +113,7 @@ impl Writer {
         let slots = self.agents.iter().enumerate();
         let idle = slots.filter(|(_, slot)| {
             let quiet = now.saturating_duration_since(slot.heard);
-            !slot.removed && quiet >= QUIET_MIN && !self.map.has_been_in_map(slot.desk.id())
+            !slot.removed && quiet >= QUIET_MIN && !self.map.has_been_in_map(slot.view.id())
         });
         idle.min_by_key(|(_, slot)| slot.heard)
             .map(|(slot, _)| slot)
@@ -144,12 +144,12 @@ impl Writer {
     fn remove(&mut self, slot: usize) {
         let agent = &mut self.agents[slot];
         agent.removed = true;
-        self.by_name.remove(agent.desk.name());
-        self.shared.unseat(agent.desk.name());
+        self.by_name.remove(agent.view.name());
+        self.shared.remove_view(agent.view.name());
         let abandoned = agent.sequencer.begin(0);
         self.waiting.recount(abandoned, Window::NONE);
         self.counters.abandoned(abandoned.samples);
-        let id = agent.desk.id();
+        let id = agent.view.id();
         self.block.push(&Entry::Remove { agent: id.0 });
         self.records.push(Record::Remove { agent: id });
         self.full_until = None;
@@ -164,21 +164,21 @@ pub(super) fn note_removal(
     vacant: &mut std::collections::BTreeSet<usize>,
     slot: &AgentSlot,
 ) {
-    let id = slot.desk.id();
+    let id = slot.view.id();
     if !slot.removed {
         return;
     }
     if map.is_vacant(id) {
         vacant.insert(id.0 as usize);
     } else {
-        shared.note_former(slot.desk.name(), id);
+        shared.note_former(slot.view.name(), id);
     }
 }
 
 impl AgentSlot {
-    fn new(desk: AgentDesk, sequencer: Sequencer<Sample>, latest_ns: i64, heard: Instant) -> Self {
+    fn new(view: AgentView, sequencer: Sequencer<Sample>, latest_ns: i64, heard: Instant) -> Self {
         Self {
-            desk: Arc::new(desk),
+            view: Arc::new(view),
             sequencer,
             latest_ns,
             heard,

@@ -2,18 +2,18 @@
 
 use std::time::Instant;
 
-use cogmap_proto::{Rejection, Sample, SampleBatch, SeqRange, SkipReason};
-use cognitive_map::{AgentId, Record};
+use cogmap_proto::{Rejection, Sample, SampleBatch, SeqRange};
+use cognitive_map::{AgentId, Record, SkipReason};
 
 use super::Writer;
 use crate::decode;
-use crate::engine::block::Entry;
-use crate::engine::readout::{skip_reason, skip_reason_of_wire};
+use crate::encode;
+use crate::journal::Entry;
 
 impl Writer {
     /// Journals samples that are in order now, refusing those that make no sense.
     pub(super) fn accept(&mut self, slot: usize, session: u64, accepted: Vec<(u64, Sample)>) {
-        let agent = self.agents[slot].desk.id();
+        let agent = self.agents[slot].view.id();
         let mut run = SampleBatch {
             session,
             first_seq: 0,
@@ -22,7 +22,7 @@ impl Writer {
         for (seq, wire) in accepted {
             let slot = &mut self.agents[slot];
             let refusal = match decode::sample(&wire) {
-                Err(invalid) => skip_reason(cognitive_map::SkipReason::Invalid(invalid)),
+                Err(invalid) => SkipReason::Invalid(invalid),
                 Ok(sample) if sample.stamp_ns < slot.latest_ns => SkipReason::TimeBackwards,
                 Ok(sample) => {
                     slot.latest_ns = sample.stamp_ns;
@@ -69,27 +69,29 @@ impl Writer {
     /// Journals that samples are refused for good.
     fn skip(&mut self, agent: AgentId, session: u64, range: SeqRange, reason: SkipReason) {
         let SeqRange { from, to } = range;
+        let published = encode::skip_reason(reason);
         self.block.push(&Entry::Skip {
             agent: agent.0,
             session,
             from,
             to,
-            reason,
+            reason: published,
         });
-        let reason_of_core = skip_reason_of_wire(reason);
         self.records.push(Record::Skip {
             agent,
             session,
             from,
             to,
-            reason: reason_of_core,
+            reason,
         });
-        self.counters.skipped(to - from, reason);
+        self.counters.skipped(to - from, published);
         let slot = &mut self.agents[agent.0 as usize];
         slot.remind = true;
-        slot.desk
-            .marks()
-            .rejected(session, Rejection { range, reason });
+        let rejection = Rejection {
+            range,
+            reason: published,
+        };
+        slot.view.marks().rejected(session, rejection);
     }
 
     /// Gives up samples that have been missing for too long.
@@ -112,8 +114,8 @@ impl Writer {
             );
             self.waiting.recount(before, sequencer.waiting());
             if let Some(range) = lost {
-                let agent = self.agents[slot].desk.id();
-                tracing::warn!(space = %self.shared.name, agent = self.agents[slot].desk.name(),
+                let agent = self.agents[slot].view.id();
+                tracing::warn!(space = %self.shared.name, agent = self.agents[slot].view.name(),
                     session, from = range.from, to = range.to, "samples lost");
                 self.skip(agent, session, range, SkipReason::Lost);
                 self.accept(slot, session, accepted);

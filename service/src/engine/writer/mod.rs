@@ -22,19 +22,19 @@ use cognitive_map::{CognitiveMap, Event, Record};
 
 use agents::note_removal;
 
-use super::block::BlockWriter;
+use super::agent_view::AgentView;
 use super::checkpointer::{Beside, Checkpointer};
 use super::committer::{Answer, Commit};
 use super::counters::SpaceCounters;
-use super::desk::AgentDesk;
-use super::episodes::{self, EndedEpisodes, Latest};
-use super::events::published;
+use super::episodes::EndedEpisodes;
 use super::message::{Call, ChangeReply};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
 use super::sequencer::{Sequencer, Window};
 use super::space::Shared;
 use super::trajectory;
+use crate::encode::{self, LatestEpisode};
+use crate::journal::BlockWriter;
 use crate::store::ChunkKey;
 use pace::Pace;
 
@@ -80,14 +80,14 @@ pub(crate) struct Writer {
     /// What the record under way brings about.
     events: Vec<Event>,
     /// What the round has brought about that is published.
-    told: Vec<Arc<EventRecord>>,
+    published: Vec<Arc<EventRecord>>,
     /// Samples that it has applied.
     applied: u64,
 }
 
 /// What the writer knows of an agent beside the map: how its samples stand before the journal.
 struct AgentSlot {
-    desk: Arc<AgentDesk>,
+    view: Arc<AgentView>,
     sequencer: Sequencer<cogmap_proto::Sample>,
     /// Stamp of the latest accepted sample of the session.
     latest_ns: i64,
@@ -138,16 +138,16 @@ impl Writer {
             answers: Vec::new(),
             changes: Vec::new(),
             events: Vec::new(),
-            told: Vec::new(),
+            published: Vec::new(),
             applied: 0,
         };
-        writer.seat_all(recorders, episodes);
+        writer.restore_agents(recorders, episodes);
         writer
     }
 
     /// Runs until the space closes.
     pub(crate) fn run(mut self, mut inbox: Inbox) {
-        self.greet();
+        self.publish_initial();
         let mut next_look = Instant::now() + PATIENCE;
         loop {
             // What came before the space closed is still taken: the flag is read before the queue.
@@ -225,14 +225,14 @@ impl Writer {
             self.map.apply(record, &mut self.events);
             for event in &self.events {
                 self.counters.event(&self.map, event);
-                let change = episodes::change(&self.shared.name, &self.map, event);
-                if let Some(Latest(episode)) = change {
+                let change = encode::ended_episode(&self.shared.name, &self.map, event);
+                if let Some(LatestEpisode(episode)) = change {
                     let slot = &self.agents[event.agent.0 as usize];
-                    slot.desk.put_ended_episode(episode);
+                    slot.view.put_ended_episode(episode);
                 }
             }
-            self.told
-                .extend(published(&self.shared.name, &self.map, &self.events));
+            let records = encode::event_records(&self.shared.name, &self.map, &self.events);
+            self.published.extend(records.map(Arc::new));
             self.events.clear();
             self.applied += u64::from(matches!(record, Record::Sample { .. }));
             let (Record::Sample { agent, .. }
@@ -257,7 +257,7 @@ impl Writer {
             };
             // The chunk is stored before the lock is released, so a reader that takes the rows here
             // first and the chunks in the store afterwards misses none.
-            let mut recorder = slot.desk.recorder();
+            let mut recorder = slot.view.recorder();
             if let Some(chunk) = recorder.note(record, agent_in_map, self.interval_ns) {
                 let first_stamp_ns = chunk.rows[0].stamp_ns;
                 let key = ChunkKey {
@@ -265,7 +265,7 @@ impl Writer {
                     session: chunk.session,
                     first_stamp_ns,
                 };
-                let bytes = trajectory::encode(&chunk.rows);
+                let bytes = trajectory::chunk_bytes(&chunk.rows);
                 if let Err(error) = self.shared.store.put_chunk(self.shared.number, key, &bytes) {
                     self.shared.health.derived_fail(&error);
                 }
@@ -278,12 +278,12 @@ impl Writer {
 fn beside(shared: &Shared, agents: &[AgentSlot]) -> Beside {
     Beside {
         recorders: { agents.iter() }
-            .map(|slot| slot.desk.recorder().clone())
+            .map(|slot| slot.view.recorder().clone())
             .collect(),
         events: shared.events.ring(),
         episodes: EndedEpisodes(
             { agents.iter() }
-                .map(|slot| slot.desk.ended_episode())
+                .map(|slot| slot.view.ended_episode())
                 .collect(),
         ),
     }

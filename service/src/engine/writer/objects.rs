@@ -3,9 +3,9 @@
 use cognitive_map::Record;
 
 use super::Writer;
-use crate::engine::block::Entry;
 use crate::engine::counters::Drop;
 use crate::engine::message::ObjectRequest;
+use crate::journal::Entry;
 
 impl Writer {
     /// Journals a change of what is known of objects. Whoever waits is answered when it is durable.

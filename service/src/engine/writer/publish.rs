@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::{AgentSlot, Writer};
+use crate::engine::agent_view::Readout;
 use crate::engine::committer::{Commit, Mark};
 use crate::engine::counters::Standing;
-use crate::engine::readout;
 
 impl Writer {
     /// Records the sizes of the space, and how its agents stand.
@@ -14,18 +14,18 @@ impl Writer {
         self.counters.sizes(&self.map, queued);
         let mut standing = Standing::default();
         for slot in &self.agents {
-            slot.desk.stand(&mut standing);
+            slot.view.stand(&mut standing);
         }
         self.counters.standing(&standing);
     }
 
     /// After a start: tells everyone where each agent stands.
-    pub(super) fn greet(&self) {
+    pub(super) fn publish_initial(&self) {
         self.measure(0);
         for slot in self.agents.iter().filter(|slot| !slot.removed) {
-            let id = slot.desk.id();
-            if let Some(readout) = readout::readout(&self.shared.name, &self.map, id) {
-                slot.desk.publish(readout);
+            let id = slot.view.id();
+            if let Some(readout) = Readout::of(&self.shared.name, &self.map, id) {
+                slot.view.publish(readout);
             }
             self.remind(slot);
         }
@@ -52,17 +52,17 @@ impl Writer {
             if slot.removed {
                 continue;
             }
-            let Some(agent) = self.map.agent(slot.desk.id()) else {
+            let Some(agent) = self.map.agent(slot.view.id()) else {
                 continue;
             };
             let (session, next) = (agent.session(), agent.next_seq());
             if applied {
-                if let Some(readout) = readout::readout(space, &self.map, slot.desk.id()) {
-                    slot.desk.publish(readout);
-                    self.shared.outlet.estimate(space, &slot.desk);
+                if let Some(readout) = Readout::of(space, &self.map, slot.view.id()) {
+                    slot.view.publish(readout);
+                    self.shared.publisher.estimate(space, &slot.view);
                 }
                 commit.marks.push(Mark {
-                    desk: Arc::clone(&slot.desk),
+                    view: Arc::clone(&slot.view),
                     session,
                     next,
                 });
@@ -75,11 +75,11 @@ impl Writer {
             } else {
                 (sequencer.session(), sequencer.next())
             };
-            slot.desk
+            slot.view
                 .marks()
                 .applied(session, next, waiting, sequencer.gap());
             if remind {
-                self.shared.outlet.watermark(space, &slot.desk);
+                self.shared.publisher.watermark(space, &slot.view);
             }
         }
         self.counters
@@ -95,13 +95,15 @@ impl Writer {
     }
 
     fn publish_events(&mut self) {
-        for event in &self.told {
-            self.shared.outlet.event(event);
+        for event in &self.published {
+            self.shared.publisher.event(event);
         }
-        self.shared.events.extend(self.told.drain(..));
+        self.shared.events.extend(self.published.drain(..));
     }
 
     fn remind(&self, slot: &AgentSlot) {
-        self.shared.outlet.watermark(&self.shared.name, &slot.desk);
+        self.shared
+            .publisher
+            .watermark(&self.shared.name, &slot.view);
     }
 }

@@ -8,11 +8,11 @@ use cognitive_map::Record;
 
 use super::{WAITING_MAX, Writer};
 use crate::decode;
-use crate::engine::block::Entry;
 use crate::engine::committer::Answer;
 use crate::engine::counters::{self, Drop};
 use crate::engine::message::{IngestError, Request};
 use crate::engine::sequencer::{Offered, SessionOrder, Window};
+use crate::journal::Entry;
 
 impl Writer {
     /// Takes a message of Zenoh.
@@ -45,7 +45,7 @@ impl Writer {
                 let duplicates = self.take(slot, batch, None, now);
                 self.answers.push(Answer {
                     reply,
-                    desk: Arc::clone(&self.agents[slot].desk),
+                    view: Arc::clone(&self.agents[slot].view),
                     duplicates,
                 });
             }
@@ -169,17 +169,17 @@ impl Writer {
         let reason = SkipReason::SequenceLeap;
         self.counters.skipped(count as u64, reason);
         let slot = &mut self.agents[slot];
-        tracing::warn!(space = %self.shared.name, agent = slot.desk.name(), session,
+        tracing::warn!(space = %self.shared.name, agent = slot.view.name(), session,
             from = range.from, next = slot.sequencer.next(), "samples too far ahead refused");
         slot.remind = true;
         let rejection = Rejection { range, reason };
-        slot.desk.marks().rejected(session, rejection);
+        slot.view.marks().rejected(session, rejection);
     }
 
     /// The common case: the batch continues the session and every sample makes sense, so it goes to
     /// the journal as it came. Changes nothing and returns false otherwise.
     fn take_whole(&mut self, slot: usize, batch: &SampleBatch, raw: Option<&[u8]>) -> bool {
-        let agent = self.agents[slot].desk.id();
+        let agent = self.agents[slot].view.id();
         let mut latest_ns = self.agents[slot].latest_ns;
         let before = self.records.len();
         for (seq, wire) in (batch.first_seq..).zip(&batch.samples) {

@@ -6,7 +6,7 @@ use axum::routing::get;
 use tokio::sync::Notify;
 
 use super::*;
-use crate::config::Token;
+use crate::http::Token;
 
 /// A guarded router of handlers that go wrong.
 fn guarded(settings: &HttpSettings, entered: Arc<Notify>) -> Router {

@@ -16,6 +16,7 @@
 
 #[cfg(test)]
 mod fixture;
+pub(super) mod marker;
 
 use std::fs;
 use std::io;
@@ -27,20 +28,12 @@ use super::local::record::{self, SpaceRecord};
 use super::local::{FORMAT_VERSION, SPACES, files, is_local_store};
 use super::log::{Extent, SpaceLog, Survey, create_mark};
 use super::{SpaceNumber, StoreError, StoredSpace};
+use marker::{KEYSPACES, MARKER, is_store};
 
-/// File by which fjall recognises its directory.
-const MARKER: &str = "version";
-/// Directory of fjall's keyspaces.
-const KEYSPACES: &str = "keyspaces";
 /// Ending of fjall's journals.
 const JOURNAL_ENDING: &str = ".jnl";
 /// Directory of the new store until it is whole.
 const UNFINISHED: &str = "format-2.new";
-
-/// Whether the directory holds a store of format 1.
-pub(super) fn is_store(directory: &Path) -> bool {
-    directory.join(MARKER).is_file() && directory.join(KEYSPACES).is_dir()
-}
 
 /// Makes a store of format 1 one of the present format, with the same spaces and journals; leaves
 /// any other directory as it is. `samples_in` counts the samples in a block. Says whether there was

@@ -24,6 +24,7 @@ pub(super) mod record;
 mod replacement;
 mod store;
 mod survey;
+mod syncing;
 
 #[cfg(test)]
 mod damage_tests;
@@ -37,21 +38,18 @@ mod tests;
 #[cfg(test)]
 pub(super) use tests::copy_files as copy_for_tests;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
-use std::thread::{Builder, JoinHandle};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::log::{Item, LogReader, Pending, SpaceLog, Survey, create_mark, read_mark};
 use super::{
     Blocks, DamagedJournal, Extent, Journal, OpenJournal, SpaceNumber, StoreError, StoredSpace,
 };
 use record::{Found, SpaceRecord};
+use syncing::{Logs, MarkSync, sync_all};
 
 pub(super) use opening::{is_store as is_local_store, lock, refuse_foreign};
 pub use replacement::Replacement;
@@ -69,11 +67,6 @@ const SET_ASIDE: &str = "set-aside";
 const DELETED: &str = "deleted";
 /// Ending of names that are not finished.
 const UNFINISHED: &str = ".new";
-
-/// Time between syncs of the marks, which bounds what a power cut takes from them.
-const MARK_SYNC_INTERVAL: Duration = Duration::from_secs(1);
-/// Most files that are synced at once.
-const SYNCS_AT_ONCE: usize = 8;
 
 /// The journals in a directory of this machine.
 #[derive(Debug)]
@@ -97,9 +90,6 @@ struct FirstFailure {
     disk_full: bool,
     detail: String,
 }
-
-/// The journals that are open for writing.
-type Logs = RwLock<BTreeMap<SpaceNumber, Arc<SpaceLog>>>;
 
 impl LocalJournal {
     /// Opens the journals of the store in `directory`.
@@ -378,34 +368,6 @@ impl Journal for LocalJournal {
     }
 }
 
-/// Syncs several journals: side by side, for the disk can join what comes at the same time.
-fn sync_all(pending: &[(Arc<SpaceLog>, Pending)]) -> io::Result<()> {
-    let sync_some = |some: &[(Arc<SpaceLog>, Pending)]| {
-        some.iter().try_for_each(|(log, pending)| log.sync(pending))
-    };
-    if pending.len() <= 1 {
-        return sync_some(pending);
-    }
-    std::thread::scope(|scope| {
-        let some = pending.chunks(pending.len().div_ceil(SYNCS_AT_ONCE));
-        let threads: Vec<_> = some
-            .map(|some| {
-                let thread = Builder::new().name("sync".into());
-                // Where the system has no thread to spare, one after the other.
-                let spawned = thread.spawn_scoped(scope, move || sync_some(some));
-                spawned.map_err(|_| sync_some(some))
-            })
-            .collect();
-        let interrupted = |_| Err(io::Error::other("a sync ended with a panic"));
-        let results = threads.into_iter().map(|thread| match thread {
-            Ok(thread) => thread.join().unwrap_or_else(interrupted),
-            Err(synced) => synced,
-        });
-        // All have ended before the first error is told.
-        results.collect::<Vec<_>>().into_iter().collect()
-    })
-}
-
 /// Blocks of a journal, up to the first damage.
 struct Reading<'a> {
     journal: &'a LocalJournal,
@@ -486,54 +448,10 @@ pub(super) fn numbers(directory: &Path) -> io::Result<Vec<u32>> {
     Ok(numbers)
 }
 
-/// The thread that syncs the marks beside the committer.
-#[derive(Debug)]
-struct MarkSync {
-    stop: Sender<()>,
-    thread: JoinHandle<()>,
-    due: Arc<AtomicBool>,
-}
-
-impl MarkSync {
-    fn start(logs: Arc<Logs>) -> io::Result<Self> {
-        let (stop, stopped) = channel::<()>();
-        let due = Arc::new(AtomicBool::new(false));
-        let is_due = Arc::clone(&due);
-        let run = move || loop {
-            let stopping = stopped.recv_timeout(MARK_SYNC_INTERVAL);
-            if is_due.swap(false, Ordering::AcqRel) {
-                let logs: Vec<_> = {
-                    let logs = logs.read().unwrap_or_else(PoisonError::into_inner);
-                    logs.values().cloned().collect()
-                };
-                for log in logs {
-                    if let Err(error) = log.sync_mark() {
-                        tracing::warn!(%error, "sync how far a space is durable");
-                    }
-                }
-            }
-            if stopping != Err(RecvTimeoutError::Timeout) {
-                break;
-            }
-        };
-        let thread = Builder::new().name("marks".into()).spawn(run)?;
-        Ok(Self { stop, thread, due })
-    }
-
-    fn wake(&self, written: bool) {
-        if written {
-            self.due.store(true, Ordering::Release);
-        }
-    }
-}
-
 impl Drop for LocalJournal {
     fn drop(&mut self) {
-        if let Some(MarkSync { stop, thread, .. }) = self.marks.take() {
-            drop(stop);
-            if thread.join().is_err() {
-                tracing::error!("the thread that syncs marks ended with a panic");
-            }
+        if let Some(marks) = self.marks.take() {
+            marks.end();
         }
     }
 }

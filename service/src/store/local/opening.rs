@@ -8,9 +8,8 @@ use std::sync::{Arc, Mutex, OnceLock, RwLock};
 
 use super::super::{SpaceNumber, StoreError};
 use super::record::{self, Found, SpaceRecord};
-use super::{
-    DELETED, FORMAT_VERSION, LocalJournal, MarkSync, SET_ASIDE, SPACES, UNFINISHED, files, numbers,
-};
+use super::syncing::MarkSync;
+use super::{DELETED, FORMAT_VERSION, LocalJournal, SET_ASIDE, SPACES, UNFINISHED, files, numbers};
 
 /// File that is locked while a process has the directory open.
 pub(in crate::store) const LOCK: &str = "lock";
@@ -119,7 +118,7 @@ pub(in crate::store) fn lock(directory: &Path) -> Result<File, StoreError> {
 pub(in crate::store) fn refuse_foreign(directory: &Path) -> Result<(), StoreError> {
     let on_disk = |error: io::Error| files::fault(&error, directory);
     let names = files::names(directory).map_err(on_disk)?;
-    if super::super::format1::is_store(directory) {
+    if super::super::format1::marker::is_store(directory) {
         return Err(StoreError::OlderFormat);
     }
     for name in names {

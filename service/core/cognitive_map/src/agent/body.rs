@@ -1,11 +1,14 @@
-//! Where a body is: by its own motion, and by the estimate that everybody's sightings correct, which keeps how sure that is.
+//! An agent's body: its pose as of its latest record, its grid state, and its latest movements.
 
 use nalgebra::{Isometry3, Vector3};
 
 use grid::{GridModules, GridState};
 use state::state_of_struct;
 
-/// Poses, and the grid state that goes with them.
+/// Poses as of the agent's latest record, and the grid state that goes with them.
+///
+/// The estimator holds the poses and goes on correcting them with the samples of other agents; the
+/// agent's next record brings these copies up to date. Grid state and events follow the copies.
 #[derive(Clone, Debug)]
 pub(crate) struct Body {
     /// Pose by motion alone since the session began.
@@ -53,32 +56,32 @@ impl Body {
         self.grid.modules().len() == modules.lattices().len()
     }
 
-    /// Moves the body by what it measured of its motion, of which the estimate says that it led by
-    /// `displacement` along the axes of its frame. Calls `entered` with each grid module that came into a
-    /// new lattice cell.
+    /// Moves the body to where odometry has it now, after a path of `path_m` by odometry and a
+    /// displacement along the axes of its frame by the estimate. Calls `entered` with each grid
+    /// module that came into a new lattice cell.
     ///
-    /// Costs the same whatever the path so far and the places known.
+    /// The cost depends neither on the path so far nor on the places known.
     pub(crate) fn step(
         &mut self,
-        increment: &Isometry3<f64>,
+        in_odom: &Isometry3<f64>,
+        path_m: f64,
         displacement: &Vector3<f64>,
         modules: &GridModules,
         entered: impl FnMut(usize, [i64; 3]),
     ) {
-        append(&mut self.in_odom, increment);
+        self.in_odom = *in_odom;
         // The grid moves by the displacement, not by a difference of positions, which far away from
         // the origin would have lost digits.
         self.in_map.translation.vector += displacement;
         self.grid.advance(modules, displacement, entered);
-        let path_m = increment.translation.vector.norm();
         if path_m > 0.0 {
             self.before_latest = self.latest.replace(*displacement);
             self.travelled_m += path_m;
         }
     }
 
-    /// Goes to where the estimate has the body now, and the grid with it. Without a correction since the
-    /// latest step the position is the same to the last bit.
+    /// Goes to where the estimate has the body now, and the grid with it. Without a correction
+    /// since the latest step the position is the same to the last bit.
     pub(crate) fn follow(
         &mut self,
         pose: &Isometry3<f64>,
@@ -105,12 +108,4 @@ impl Body {
         self.before_latest = None;
         self.travelled_m = 0.0;
     }
-}
-
-/// Moves a pose by an increment in its own frame.
-fn append(pose: &mut Isometry3<f64>, increment: &Isometry3<f64>) {
-    pose.translation.vector += pose.rotation * increment.translation.vector;
-    pose.rotation *= increment.rotation;
-    // One Newton step: products of unit quaternions leave the unit sphere by rounding alone.
-    pose.rotation.renormalize_fast();
 }

@@ -21,9 +21,9 @@ use state::state_of_struct;
 /// An agent of a space.
 ///
 /// The first agent that moves or sees a landmark in an empty map defines the `map` frame: it starts
-/// at identity. Any later agent is *unplaced* until a start pose tells where it stands, or until enough
-/// landmarks and sightings of agents tie it to the map: its pose still counts from identity, and nothing
-/// that it does changes what places, trips and landmarks the map knows.
+/// at identity. Any later agent is *unplaced* until a start pose tells where it stands, or until
+/// enough landmarks and sightings of agents tie it to the map: its pose still counts from identity,
+/// and nothing that it does changes what places, trips and landmarks the map knows.
 #[derive(Clone, Debug)]
 pub struct Agent {
     pub(crate) name: Label,
@@ -32,9 +32,11 @@ pub struct Agent {
     pub(crate) session: Option<u64>,
     pub(crate) next_seq: u64,
     pub(crate) stamp_ns: Option<i64>,
+    /// Whether the agent was in the map as of its latest record. The estimator may have placed it
+    /// since, by what others saw: its next record says so, with an event and a trip of its own.
     pub(crate) placed: bool,
     pub(crate) body: Body,
-    /// What became of its sightings.
+    /// What became of its sightings, as of its latest record.
     pub(crate) evidence: Evidence,
     /// Where the places were last asked who answers; `None` asks at the next motion.
     pub(crate) asked_at: Option<Point3<f64>>,
@@ -204,13 +206,14 @@ impl Agent {
         self.sightings
     }
 
-    /// Levels and descriptors so far, of all sessions. Those felt where a place answers teach it; the
-    /// others are counted and stay in the journal.
+    /// Levels and descriptors so far, of all sessions. Those felt where a place answers teach it;
+    /// the others are counted and stay in the journal.
     pub fn percepts(&self) -> u64 {
         self.percepts
     }
 
-    /// Matches so far whose earlier sample was not, or no longer, remembered, of all sessions. They are dropped.
+    /// Matches so far whose earlier sample was not, or no longer, remembered, of all sessions. They
+    /// are dropped.
     pub fn forgotten_matches(&self) -> u64 {
         self.forgotten_matches
     }

@@ -3,15 +3,15 @@
 use super::Agent;
 use crate::settings::Settings;
 
-/// From this many sightings on that were refused one after the other, an agent is not where it is thought
-/// to be, whatever the covariance says.
+/// From this many sightings on that were refused one after the other, an agent is not where it is
+/// thought to be, whatever the covariance says.
 const REFUSED_MAX: u32 = 4;
 
 /// How well an agent is localised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// Its position in `map` is known to within the space's `localized_sd_m`, and what it sees is where
-    /// it should be.
+    /// Its position in `map` is known to within the space's `localized_sd_m`, and what it sees is
+    /// where it should be.
     Localized,
     /// It is known less well than that, or what it sees contradicts it: its latest sightings, or
     /// many more of them than agree.

@@ -2,11 +2,9 @@
 
 use nalgebra::{Isometry3, SVector, Vector3};
 
+use super::tuning::CALIBRATION_FACTOR_MIN;
 use ::state::state_of_struct;
 use geometry::se3;
-
-/// Least factor by which a reading was multiplied.
-const FACTOR_MIN: f64 = 0.1;
 
 /// What odometry gets wrong all the time: reading = true · (1 + error) + bias.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,8 +63,8 @@ impl Calibrated {
 
     /// A motion that was corrected so, as it would have been corrected by another calibration.
     ///
-    /// As if the motion had been an even one, of this twist over the time T that the body moved, with the
-    /// calibration c by which it was corrected and the new one c′:
+    /// As if the motion had been an even one, of this twist over the time T that the body moved,
+    /// with the calibration c by which it was corrected and the new one c′:
     ///
     /// ```text
     /// v′ = v (1 − c′_l) / (1 − c_l)      ω′ = (ω + b T) (1 − c′_a) / (1 − c_a) − b′ T
@@ -78,8 +76,8 @@ impl Calibrated {
     ) -> Isometry3<f64> {
         let (linear, angular) = se3::log(motion);
         let then = &self.calibration;
-        let length = (1.0 - calibration.length) / (1.0 - then.length).max(FACTOR_MIN);
-        let angle = (1.0 - calibration.angle) / (1.0 - then.angle).max(FACTOR_MIN);
+        let length = (1.0 - calibration.length) / (1.0 - then.length).max(CALIBRATION_FACTOR_MIN);
+        let angle = (1.0 - calibration.angle) / (1.0 - then.angle).max(CALIBRATION_FACTOR_MIN);
         let angles = (angular + then.bias_rad_s * self.moving_s) * angle;
         let bias = calibration.bias_rad_s * self.moving_s;
         se3::exp(&(linear * length), &(angles - bias))

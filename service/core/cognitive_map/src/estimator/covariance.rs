@@ -6,13 +6,8 @@ use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
 
-/// Least variance of a component of a measurement that the estimate expects, as a part of the
-/// variances of whose differences it is made: below that it is rounding. A measurement then says at
-/// most so much more than was known.
-const CONDITION: f64 = 1e-8;
-/// By how much variances grow with each update, as a part of what they were: more than what
-/// rounding takes away.
-const ROUNDING: f64 = 1e-10;
+use super::tuning::{CONDITION_MIN, COVARIANCE_ROUNDING};
+use geometry::symmetric;
 
 /// A covariance of any dimension, exactly symmetric, row by row. A clone shares the entries.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -111,7 +106,8 @@ impl JointCovariance {
         old
     }
 
-    /// Appends y = J x + n, where x are `width` components from `offset` on; answers where y begins.
+    /// Appends y = J x + n, where x are `width` components from `offset` on; answers where y
+    /// begins.
     pub(super) fn append<const K: usize>(
         &mut self,
         blocks: &[Block<K>],
@@ -144,8 +140,8 @@ impl JointCovariance {
         self.dim = new;
     }
 
-    /// Replaces components by a linear function of themselves, x ← F x, in all cross terms; the block
-    /// on the diagonal becomes `own`.
+    /// Replaces components by a linear function of themselves, x ← F x, in all cross terms; the
+    /// block on the diagonal becomes `own`.
     pub(super) fn transform<const N: usize>(
         &mut self,
         offset: usize,
@@ -192,21 +188,21 @@ impl JointCovariance {
                 }
             }
         }
-        let mut spread = (spread + spread.transpose()) * 0.5;
+        let mut spread = symmetric(&spread);
         for block in blocks {
             for column in 0..block.width {
                 let variance = self.variance(block.offset + column);
                 for k in 0..M {
                     let factor = block.jacobian[(k, column)];
-                    spread[(k, k)] += CONDITION * factor * factor * variance;
+                    spread[(k, k)] += CONDITION_MIN * factor * factor * variance;
                 }
             }
         }
         Projection { rows, spread }
     }
 
-    /// Takes in a measurement with this innovation, whose covariance is S; answers the correction of
-    /// the state, or `None` when S is not positive definite.
+    /// Takes in a measurement with this innovation, whose covariance is S; answers the correction
+    /// of the state, or `None` when S is not positive definite.
     ///
     /// ```text
     /// S = L Lᵀ      W = P Hᵀ L⁻ᵀ      δ = W L⁻¹ ν      P ← P − W Wᵀ + ε diag P
@@ -275,13 +271,13 @@ impl JointCovariance {
                     }
                 }
             }
-            target[index] += ROUNDING * variance;
+            target[index] += COVARIANCE_ROUNDING * variance;
         }
         Some(correction)
     }
 
-    /// Lets three components from `source` on act on all others: P ← (I + E) P (I + E)ᵀ, where column k
-    /// of E at `source` is `levers[k]`, which is zero at the three components themselves.
+    /// Lets three components from `source` on act on all others: P ← (I + E) P (I + E)ᵀ, where
+    /// column k of E at `source` is `levers[k]`, which is zero at the three components themselves.
     ///
     /// ```text
     /// P ← P + V W + Wᵀ Vᵀ      W = U + ½ P_ss Vᵀ
@@ -312,7 +308,7 @@ impl JointCovariance {
                 }
             }
             for (lever, variance) in levers.iter().zip(variances) {
-                target[index] += ROUNDING * lever[index] * lever[index] * variance;
+                target[index] += COVARIANCE_ROUNDING * lever[index] * lever[index] * variance;
             }
         }
     }

@@ -6,22 +6,18 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
+use super::agent_filter::{AgentFilter, BODY_DIM, make_up_for_rounding};
+use super::agent_slot::AgentState;
 use super::covariance::{Block, JointCovariance};
-use super::dormant::{Dormant, DormantMarks};
-use super::mover::{BODY_DIM, Mover, make_up_for_rounding};
+use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
 use super::observers::Observers;
-use super::parameters::{ANY_TURN_SD_RAD, Parameters};
-use super::seat::Traveller;
+use super::parameters::Parameters;
+use super::tuning::{ANY_TURN_SD_RAD, ANY_TURN_SLACK, LANDMARKS_MAX};
 use crate::input::Label;
-use geometry::{positive, se3};
+use geometry::{OUT_OF_PLANE, positive, se3};
 
-/// Agents whose errors are estimated jointly; of more, those that saw and were seen longest ago leave.
-pub(super) const MEMBERS_MAX: usize = 32;
-
-/// Landmarks that are estimated jointly; of more, those seen longest ago leave.
-pub(super) const MARKS_MAX: usize = 96;
 /// Components of a landmark.
-pub(super) const MARK_DIM: usize = 3;
+pub(super) const LANDMARK_DIM: usize = 3;
 
 /// An agent that takes part in a frame's joint estimate.
 #[derive(Clone, Debug)]
@@ -32,12 +28,12 @@ pub(super) struct Member {
     pub(super) offset: usize,
     /// The sighting of the frame that it took part in last.
     pub(super) used: u64,
-    pub(super) traveller: Arc<Traveller>,
+    pub(super) state: Arc<AgentState>,
 }
 
 /// A landmark in a frame.
 #[derive(Clone, Debug)]
-pub(super) struct Mark {
+pub(super) struct LandmarkState {
     /// Its number in the frame, never given twice.
     pub(super) number: u64,
     pub(super) position: Point3<f64>,
@@ -57,8 +53,8 @@ pub(super) struct Frame {
     /// Number of agents, whether they take part in the joint estimate or not.
     pub(super) population: u32,
     pub(super) members: Vec<Member>,
-    pub(super) marks: Arc<BTreeMap<Label, Mark>>,
-    pub(super) dormant: DormantMarks,
+    pub(super) landmarks: Arc<BTreeMap<Label, LandmarkState>>,
+    pub(super) archive: LandmarkArchive,
     pub(super) covariance: JointCovariance,
     /// Landmarks numbered so far.
     pub(super) numbered: u64,
@@ -73,36 +69,36 @@ impl Member {
     }
 
     /// Its body.
-    pub(super) fn mover(&self) -> &Mover {
-        &self.traveller.mover
+    pub(super) fn filter(&self) -> &AgentFilter {
+        &self.state.filter
     }
 
     /// The agent itself, to be changed.
-    pub(super) fn traveller_mut(&mut self) -> &mut Traveller {
-        Arc::make_mut(&mut self.traveller)
+    pub(super) fn state_mut(&mut self) -> &mut AgentState {
+        Arc::make_mut(&mut self.state)
     }
 }
 
 impl Frame {
-    /// Lets an agent take part that nothing ties to the others yet.
-    pub(super) fn join(&mut self, agent: u32, mut traveller: Arc<Traveller>) {
+    /// Makes an agent a member, with errors that are independent of the others'.
+    pub(super) fn join(&mut self, agent: u32, mut state: Arc<AgentState>) {
         let offset = self.covariance.grow(BODY_DIM);
-        let own = Arc::make_mut(&mut traveller).mover.covariance_mut();
+        let own = Arc::make_mut(&mut state).filter.covariance_mut();
         self.covariance.set_diagonal(offset, own);
         self.members.push(Member {
             agent,
             offset,
             used: self.sightings,
-            traveller,
+            state,
         });
     }
 
     /// An agent takes part no longer.
-    pub(super) fn leave(&mut self, agent: u32) -> Option<Arc<Traveller>> {
+    pub(super) fn leave(&mut self, agent: u32) -> Option<Arc<AgentState>> {
         let index = self.member(agent)?;
         let member = self.members.remove(index);
         self.drop_components(member.offset, BODY_DIM);
-        Some(member.traveller)
+        Some(member.state)
     }
 
     /// The agent that saw and was seen longest ago.
@@ -123,13 +119,13 @@ impl Frame {
     }
 
     /// Covariance of a landmark \[m²\].
-    pub(super) fn mark_covariance(&self, mark: &Mark) -> Matrix3<f64> {
-        positive(&self.covariance.block(mark.offset, mark.offset))
+    pub(super) fn landmark_covariance(&self, landmark: &LandmarkState) -> Matrix3<f64> {
+        positive(&self.covariance.block(landmark.offset, landmark.offset))
     }
 
     /// Whether all motion was in the plane.
     pub(super) fn is_planar(&self) -> bool {
-        self.members.iter().all(|member| member.mover().is_planar)
+        self.members.iter().all(|member| member.filter().is_planar)
     }
 
     /// Removes components and closes the gap.
@@ -143,63 +139,67 @@ impl Frame {
         for member in &mut self.members {
             behind(&mut member.offset);
         }
-        for mark in Arc::make_mut(&mut self.marks).values_mut() {
-            behind(&mut mark.offset);
+        for landmark in Arc::make_mut(&mut self.landmarks).values_mut() {
+            behind(&mut landmark.offset);
         }
     }
 
     /// Forgets where a landmark is.
     pub(super) fn forget(&mut self, label: &Label) {
-        if let Some(mark) = Arc::make_mut(&mut self.marks).remove(label) {
-            self.drop_components(mark.offset, MARK_DIM);
+        if let Some(landmark) = Arc::make_mut(&mut self.landmarks).remove(label) {
+            self.drop_components(landmark.offset, LANDMARK_DIM);
         }
-        self.dormant.remove(label);
+        self.archive.remove(label);
     }
 
     /// Takes a landmark out of the list, and leaves its components.
-    pub(super) fn take_out(&mut self, label: &Label) -> Option<Mark> {
-        self.marks
+    pub(super) fn take_out(&mut self, label: &Label) -> Option<LandmarkState> {
+        self.landmarks
             .contains_key(label)
-            .then(|| Arc::make_mut(&mut self.marks).remove(label))?
+            .then(|| Arc::make_mut(&mut self.landmarks).remove(label))?
     }
 
     /// Makes room for one more landmark: those seen longest ago keep their own covariance only.
     pub(super) fn make_room(&mut self) {
-        while self.marks.len() >= MARKS_MAX {
-            let oldest = self.marks.iter().min_by_key(|(_, mark)| mark.used);
+        while self.landmarks.len() >= LANDMARKS_MAX {
+            let oldest = self
+                .landmarks
+                .iter()
+                .min_by_key(|(_, landmark)| landmark.used);
             let Some(label) = oldest.map(|(label, _)| label.clone()) else {
                 return;
             };
-            if let Some(mark) = Arc::make_mut(&mut self.marks).remove(&label) {
-                let dormant = Dormant {
-                    position: mark.position,
-                    covariance: self.mark_covariance(&mark),
+            if let Some(landmark) = Arc::make_mut(&mut self.landmarks).remove(&label) {
+                let archived = ArchivedLandmark {
+                    position: landmark.position,
+                    covariance: self.landmark_covariance(&landmark),
                     left: self.sightings,
-                    only: mark.observers.only(),
+                    only: landmark.observers.only(),
                 };
-                self.drop_components(mark.offset, MARK_DIM);
-                self.dormant.insert(label, dormant);
+                self.drop_components(landmark.offset, LANDMARK_DIM);
+                self.archive.insert(label, archived);
             }
         }
     }
 
-    /// Forgets that an agent saw landmarks, whose number will be another one's: it may have been anybody.
+    /// Forgets that an agent saw landmarks, whose number will be another one's: it may have been
+    /// anybody.
     pub(super) fn forget_observer(&mut self, agent: u32) {
-        for mark in Arc::make_mut(&mut self.marks).values_mut() {
-            mark.observers.forget(agent);
+        for landmark in Arc::make_mut(&mut self.landmarks).values_mut() {
+            landmark.observers.forget(agent);
         }
-        self.dormant.forget_observer(agent);
+        self.archive.forget_observer(agent);
     }
 
     /// Brings all cross terms up to date.
     ///
-    /// Between sightings a moving body keeps only its own covariance and its transition; what ties it to
-    /// the others waits until it is needed.
+    /// Between sightings a moving body keeps only its own covariance and its transition; what ties
+    /// it to the others waits until it is needed.
     pub(super) fn flush(&mut self) {
         for member in &mut self.members {
-            if member.mover().is_stale() {
-                let transition = member.traveller_mut().mover.flush();
-                let own = member.traveller.mover.covariance();
+            if member.filter().is_stale() {
+                let transition = member.state_mut().filter.flush();
+                let own = member.state.filter.covariance();
                 self.covariance.transform(member.offset, &transition, own);
             }
         }
@@ -218,7 +218,7 @@ impl Frame {
         let mut has_changed = false;
         for component in turns {
             let variance = self.covariance.variance(component);
-            if variance > 1.001 * most {
+            if variance > ANY_TURN_SLACK * most {
                 let mut jacobian = SMatrix::<f64, 1, 6>::zeros();
                 jacobian[0] = 1.0;
                 let block = Block {
@@ -244,7 +244,7 @@ impl Frame {
     fn tell_members(&mut self) {
         for member in &mut self.members {
             let own = self.covariance.block(member.offset, member.offset);
-            *member.traveller_mut().mover.covariance_mut() = own;
+            *member.state_mut().filter.covariance_mut() = own;
         }
     }
 
@@ -252,26 +252,26 @@ impl Frame {
     pub(super) fn widen(&mut self, index: usize, sd_m: f64, sd_rad: f64) {
         self.flush();
         let member = &mut self.members[index];
-        let mover = &mut member.traveller_mut().mover;
+        let filter = &mut member.state_mut().filter;
         for k in 0..6 {
-            let out_of_plane = matches!(k, 2..=4);
-            if !(mover.is_planar && out_of_plane) {
+            if !(filter.is_planar && OUT_OF_PLANE.contains(&k)) {
                 let sd = if k < 3 { sd_m } else { sd_rad };
-                mover.covariance_mut()[(k, k)] += sd * sd;
+                filter.covariance_mut()[(k, k)] += sd * sd;
             }
         }
         self.covariance
-            .set_diagonal(member.offset, member.traveller.mover.covariance());
+            .set_diagonal(member.offset, member.state.filter.covariance());
     }
 
     /// Corrects everything by what an observer's sighting tells, and carries the errors over to the
     /// corrected estimate.
     ///
-    /// What nobody can know is where the whole map lies: an error θ of the observer's rotation goes with
-    /// errors θ × (x − x̂₀) of all positions. Errors are therefore counted relative to the observer's
-    /// rotation (the right-invariant error of Barrau & Bonnabel 2015), which makes them independent of
-    /// the estimate: a correction Δ of a position changes its error by θ × Δ. Without this, corrections
-    /// would feign knowledge of the whole map's direction (Huang, Mourikis & Roumeliotis 2010).
+    /// What nobody can know is where the whole map lies: an error θ of the observer's rotation goes
+    /// with errors θ × (x − x̂₀) of all positions. Errors are therefore counted relative to the
+    /// observer's rotation (the right-invariant error of Barrau & Bonnabel 2015), which makes them
+    /// independent of the estimate: a correction Δ of a position changes its error by θ × Δ.
+    /// Without this, corrections would feign knowledge of the whole map's direction (Huang,
+    /// Mourikis & Roumeliotis 2010).
     ///
     /// Landmarks go along the arcs on which that rotation takes them, as they do in the group of
     /// that filter, and not along tangents: or else each large correction of a rotation would
@@ -286,7 +286,7 @@ impl Frame {
     ) -> Matrix3<f64> {
         let observer = &self.members[index];
         let world = observer
-            .mover()
+            .filter()
             .pose
             .rotation
             .to_rotation_matrix()
@@ -306,22 +306,22 @@ impl Frame {
         let mut turns = Vec::with_capacity(self.members.len());
         for member in &mut self.members {
             let error = SVector::from_fn(|k, _| correction[member.offset + k]);
-            let mover = &mut Arc::make_mut(&mut member.traveller).mover;
-            let before = mover.pose;
-            mover.correct(&error, parameters);
-            let moved = mover.pose.translation.vector - before.translation.vector;
+            let filter = &mut Arc::make_mut(&mut member.state).filter;
+            let before = filter.pose;
+            filter.correct(&error, parameters);
+            let moved = filter.pose.translation.vector - before.translation.vector;
             let to_body = before
                 .rotation
                 .to_rotation_matrix()
                 .into_inner()
                 .transpose();
             lever(member.offset, -(to_body * moved.cross_matrix() * world));
-            turns.push(mover.pose.rotation.inverse() * before.rotation);
+            turns.push(filter.pose.rotation.inverse() * before.rotation);
         }
-        for mark in Arc::make_mut(&mut self.marks).values_mut() {
-            let moved = arc * Vector3::from_fn(|k, _| correction[mark.offset + k]);
-            mark.position += moved;
-            lever(mark.offset, -(moved.cross_matrix() * world));
+        for landmark in Arc::make_mut(&mut self.landmarks).values_mut() {
+            let moved = arc * Vector3::from_fn(|k, _| correction[landmark.offset + k]);
+            landmark.position += moved;
+            lever(landmark.offset, -(moved.cross_matrix() * world));
         }
         self.covariance.shear(source, &levers);
         // Errors of a body are stated along its axes, which a correction has turned.
@@ -352,9 +352,4 @@ pub(super) fn point_by_pose(point: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
         .fixed_view_mut::<3, 3>(0, 3)
         .copy_from(&point.cross_matrix());
     jacobian
-}
-
-/// Without the asymmetry of rounding.
-pub(super) fn symmetric(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    (matrix + matrix.transpose()) * 0.5
 }

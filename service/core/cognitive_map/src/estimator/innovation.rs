@@ -2,13 +2,9 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3};
 
+use super::tuning::{DIRECTION_DISTANCE_MIN_M, SIGHTING_SD_MIN};
 use crate::input::{RangeBearing, Relation, RelativePosition};
 use geometry::se3;
-
-/// Shortest distance at which a direction means something \[m\].
-const DISTANCE_MIN_M: f64 = 0.02;
-/// Least deviation of a component, as a part of what the sighting states for others of its kind.
-const DEVIATION_MIN: f64 = 1e-6;
 
 /// A sighting of a point, linearised about where the observer and the point are thought to be.
 ///
@@ -58,8 +54,8 @@ impl PointInnovation {
         }
     }
 
-    /// By distance and direction. The angles are taken about the seen direction, along growing azimuth
-    /// and elevation, where they are linear also above and below the observer:
+    /// By distance and direction. The angles are taken about the seen direction, along growing
+    /// azimuth and elevation, where they are linear also above and below the observer:
     ///
     /// ```text
     /// α = atan2(e_α·d, e_r·d)      ε = atan2(e_ε·d, h)      h = hypot(e_r·d, e_α·d)
@@ -69,7 +65,7 @@ impl PointInnovation {
         let distance_m = expected.norm();
         let (ahead, aside, above) = (forward.dot(expected), left.dot(expected), up.dot(expected));
         let level = ahead.hypot(aside);
-        if level < DISTANCE_MIN_M {
+        if level < DIRECTION_DISTANCE_MIN_M {
             return None;
         }
         let residual = Vector3::new(
@@ -103,7 +99,9 @@ impl PointInnovation {
 pub(super) fn seen_at(relation: &Relation) -> (Vector3<f64>, Matrix3<f64>) {
     let point = match relation {
         Relation::Position(seen) => *seen.translation_m(),
-        Relation::RangeBearing(seen) => directions(seen).0 * seen.range_m().max(DISTANCE_MIN_M),
+        Relation::RangeBearing(seen) => {
+            directions(seen).0 * seen.range_m().max(DIRECTION_DISTANCE_MIN_M)
+        }
         Relation::Pose(seen) => seen.pose().translation.vector,
     };
     let covariance = PointInnovation::new(relation, &point).and_then(|innovation| {
@@ -113,8 +111,8 @@ pub(super) fn seen_at(relation: &Relation) -> (Vector3<f64>, Matrix3<f64>) {
     (point, covariance.unwrap_or_else(Matrix3::identity))
 }
 
-/// A sighting of a full pose, linearised: residual of the target's pose, derivatives by the errors of
-/// the observer's and of the target's pose, and variances.
+/// A sighting of a full pose, linearised: residual of the target's pose, derivatives by the errors
+/// of the observer's and of the target's pose, and variances.
 pub(super) fn pose_innovation(
     seen: &crate::input::RelativePose,
     observer: &Isometry3<f64>,
@@ -128,7 +126,7 @@ pub(super) fn pose_innovation(
     residual.fixed_rows_mut::<3>(3).copy_from(&angular);
     let by_observer = -se3::adjoint(&expected.inverse());
     let sd = seen.noise().sd();
-    let floor = SVector::<f64, 6>::repeat(DEVIATION_MIN);
+    let floor = SVector::<f64, 6>::repeat(SIGHTING_SD_MIN);
     let variance = sd.component_mul(sd) + floor.component_mul(&floor);
     (residual, by_observer, SMatrix::identity(), variance)
 }
@@ -153,5 +151,5 @@ fn directions(seen: &RangeBearing) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>,
 
 /// Squares, never quite zero.
 fn variances(sd: &Vector3<f64>) -> Vector3<f64> {
-    sd.map(|sd| sd * sd + DEVIATION_MIN * DEVIATION_MIN)
+    sd.map(|sd| sd * sd + SIGHTING_SD_MIN * SIGHTING_SD_MIN)
 }

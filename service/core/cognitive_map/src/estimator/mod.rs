@@ -17,7 +17,7 @@
 //! - **Cost.** Between sightings an agent keeps its own covariance and its transition only, so that a
 //!   motion costs the same in every map. A sighting costs the square of the number of components, which
 //!   is bounded: at most 32 agents and 96 landmarks of a frame are held jointly. Agents that neither see
-//!   nor are seen go on by themselves, and more landmarks lie dormant, up to 65,536 a frame. A clone
+//!   nor are seen go on by themselves, and further landmarks are archived, up to 65,536 a frame. A clone
 //!   shares what it holds.
 //! - **Dropped correlations.** A landmark that comes back is fused by covariance intersection; an agent
 //!   that comes back counts for a ninth of what it knew.
@@ -28,39 +28,49 @@
 //!   everything for long, or may be
 //!   anywhere, is set aside in a frame of its own, with its landmarks (`aside`).
 //! - **Frames.** Agents whose place in the map is unknown have frames of their own until enough points
-//!   are known in both, or their landmarks lie alike whatever they are called (`constellation`).
+//!   are known in both, or their landmarks lie alike whatever they are called (`registration`).
 
-mod alias;
-mod aside;
+mod agent_filter;
+mod agent_sighting;
+mod agent_slot;
+mod associations;
 mod calibration;
-mod constellation;
 mod covariance;
-mod dormant;
-mod fix;
+mod effect;
+mod external_pose;
 mod frame;
-mod history;
+mod frame_alignment;
+mod frame_match;
+mod frame_merge;
+mod frame_registration;
+mod gauge_free;
 mod innovation;
 mod joint;
-mod meeting;
-mod merge;
-mod mover;
+mod landmark_archive;
+mod landmark_association;
+mod landmark_sighting;
+mod measurement_update;
+mod merging;
+mod motion;
 mod observers;
+mod odometry_history;
 mod outcome;
 mod parameters;
+mod placement;
+mod registration;
 mod removal;
-mod resemblance;
-mod seat;
 mod sensor;
-mod shape;
-mod sight;
+mod set_aside;
+mod sightings;
 mod state;
-mod synonym;
-mod tie;
+mod tuning;
+mod verdict;
 
 pub use calibration::{Calibrated, Calibration};
+pub use effect::{AgentSighted, Effect, FramesMerged};
 pub use joint::Estimator;
 pub(crate) use observers::Observers;
-pub use outcome::{Evidence, Merged, Settled, Step, Taken};
+pub use outcome::{Evidence, LandmarkOutcome, Step};
 pub use parameters::Parameters;
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Which agents have seen a landmark.
 
-/// Agents that are remembered by number.
-pub(super) const OBSERVERS_MAX: usize = 8;
+use super::tuning::OBSERVERS_MAX;
 
 /// The agents that have seen a landmark under the names that it has.
 ///

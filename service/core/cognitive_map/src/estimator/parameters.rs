@@ -2,21 +2,9 @@
 
 use nalgebra::{SVector, Vector6};
 
+use super::tuning::{ANY_TURN_SD_RAD, LASTING_DEVIATIONS_MAX, LASTING_RATIO_MAX, WANDERED_MAX};
 use crate::input::Motion;
 use crate::settings::Settings;
-
-/// Deviation of a turn of which nothing is known \[rad\]: no rotation is off by more than half a
-/// turn.
-pub(crate) const ANY_TURN_SD_RAD: f64 = 3.0;
-/// Farthest that a lasting error of odometry is believed to be from none, in the deviations that
-/// the settings state.
-const LASTING_DEVIATIONS_MAX: f64 = 8.0;
-/// Largest lasting error of lengths and of angles: with more, readings would say next to nothing,
-/// or the contrary.
-const LASTING_RATIO_MAX: f64 = 0.9;
-/// Largest deviation of a lasting error, in those that the settings state: it may wander, but not
-/// for ever.
-const WANDERED_MAX: f64 = 2.0;
 
 /// Physical parameters of the estimation, the same for every robot and every sensor.
 ///
@@ -38,8 +26,8 @@ pub struct Parameters {
     pub rotation_sd_per_sqrt_m: f64,
     /// Rotation noise of motion that states none, by rotation \[rad/√rad\].
     pub rotation_sd_per_sqrt_rad: f64,
-    /// Part of a distance by which a seen distance is off, again and again, as long as the sightings do
-    /// not show that their errors change from one to the next.
+    /// Part of a distance by which a seen distance is off, again and again, as long as the
+    /// sightings do not show that their errors change from one to the next.
     pub lasting_range_error: f64,
     /// Normalised innovation from which a component of a sighting loses weight (Huber 1964).
     pub soft: f64,

@@ -2,34 +2,34 @@
 
 use nalgebra::{Isometry3, Matrix6};
 
+use super::agent_filter::AgentFilter;
+use super::agent_slot::{AgentSlot, Detached};
 use super::frame::Frame;
 use super::joint::{Estimator, MAP};
-use super::mover::Mover;
-use super::seat::{Apart, Seat};
 
 impl Estimator {
-    /// An agent of the map is gone: it stays where it was, and takes part in no joint estimate any more.
+    /// An agent of the map is gone: it stays where it was, and takes part in no joint estimate any
+    /// more.
     pub fn retire(&mut self, agent: u32) {
-        self.begin();
         self.forget_pending(agent);
         let Some(number) = self.frame_of(agent) else {
             return;
         };
-        if let Some(traveller) = self.frame_mut(number).leave(agent) {
-            self.seat_mut(agent).apart = Some(Apart {
-                traveller,
+        if let Some(state) = self.frame_mut(number).leave(agent) {
+            self.slot_mut(agent).detached = Some(Detached {
+                state,
                 was_joint: true,
             });
         }
     }
 
     /// Forgets an agent that was never in the map: its number is as it was when it enrolled, at the
-    /// identity of a frame of its own. Landmarks of the frame that it leaves stay as long as others are in it.
+    /// identity of a frame of its own. Landmarks of the frame that it leaves stay as long as others
+    /// are in it.
     ///
     /// # Panics
     /// Never: beside the map's there is one frame for each agent, and this one is in none.
     pub fn clear(&mut self, agent: u32) {
-        self.begin();
         self.forget_pending(agent);
         let Some(from) = self.frame_of(agent).filter(|&frame| frame != MAP) else {
             return;
@@ -39,7 +39,7 @@ impl Estimator {
         frame.population -= 1;
         if frame.population == 0 {
             *frame = Frame::default();
-            self.forget_meetings(from);
+            self.forget_cross_sightings(from);
         } else {
             frame.forget_observer(agent);
         }
@@ -49,8 +49,8 @@ impl Estimator {
             population: 1,
             ..Frame::default()
         };
-        let mover = Mover::new(Isometry3::identity(), &Matrix6::zeros(), &self.parameters);
-        *self.seat_mut(agent) = Seat::new(own, mover);
+        let filter = AgentFilter::new(Isometry3::identity(), &Matrix6::zeros(), &self.parameters);
+        *self.slot_mut(agent) = AgentSlot::new(own, filter);
     }
 
     /// Forgets the sightings by and of an agent that have not been taken in.

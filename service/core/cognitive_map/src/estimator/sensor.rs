@@ -4,28 +4,17 @@ use std::collections::BTreeMap;
 
 use super::innovation::PointInnovation;
 use super::parameters::Parameters;
+use super::tuning::{
+    CORRELATION_INTERVAL_S_MAX, CORRELATION_SQUARE_MIN, LASTING_OVER_STATED_MAX, LEARNED_ERROR_MAX,
+    MEMORY_SIGHTINGS, PRIOR_SIGHTINGS, SENSOR_SCALE_MAX, SENSOR_TARGETS_MAX,
+};
 use nalgebra::Vector3;
-
-/// Sightings for which the stated noise counts before any was seen.
-const PRIOR_SIGHTINGS: f64 = 15.0;
-/// Sightings over which the past fades.
-const MEMORY_SIGHTINGS: f64 = 1000.0;
-/// Longest interval between two sightings of one target that tell whether errors last \[s\].
-const INTERVAL_S_MAX: f64 = 4.0;
-/// Largest factor between a variance and the stated one.
-const SCALE_MAX: f64 = 25.0;
-/// Most by which the lasting error of distances exceeds the stated deviation.
-const LASTING_OVER_STATED_MAX: f64 = 3.0;
-/// Least sum of squares that a correlation is the quotient of.
-const SQUARE_MIN: f64 = 1e-12;
-/// Targets whose latest sighting is remembered.
-pub(super) const TARGETS_MAX: usize = 128;
 
 /// What is seen.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Seen {
+pub(super) enum SightingTarget {
     /// A landmark, by its number within the frame.
-    Mark(u64),
+    Landmark(u64),
     /// An agent, by its number.
     Agent(u32),
 }
@@ -42,7 +31,7 @@ pub(super) struct Sensor {
     /// Sum of their squares.
     pub(super) square: f64,
     /// Stamp \[ns\] and normalised error of distance of each target's latest sighting.
-    pub(super) latest: BTreeMap<Seen, (i64, f64)>,
+    pub(super) latest: BTreeMap<SightingTarget, (i64, f64)>,
 }
 
 impl Default for Sensor {
@@ -60,9 +49,9 @@ impl Default for Sensor {
 impl Sensor {
     /// Variances of a sighting's components.
     ///
-    /// Errors of distance that last (a marker seen at a slant, a lens) cannot be averaged away; they grow
-    /// with the distance d. How much of such an error is assumed goes by the correlation ρ of successive
-    /// errors of one target, which is learned, from 1 on:
+    /// Errors of distance that last (a marker seen at a slant, a lens) cannot be averaged away;
+    /// they grow with the distance d. How much of such an error is assumed goes by the correlation
+    /// ρ of successive errors of one target, which is learned, from 1 on:
     ///
     /// ```text
     /// σ_r² = s_r (σ² + ρ min(e d, 3 σ)²)      σ_b² = s_b σ²
@@ -91,14 +80,14 @@ impl Sensor {
     fn correlation(&self) -> f64 {
         // Where errors have been exactly zero for ever, nothing is left of what was assumed at
         // first.
-        (self.product / self.square.max(SQUARE_MIN)).clamp(0.0, 1.0)
+        (self.product / self.square.max(CORRELATION_SQUARE_MIN)).clamp(0.0, 1.0)
     }
 
-    /// A sighting of a target was expected with these variances from the estimate alone (`spread`) and
-    /// from the sensor (`variance`).
+    /// A sighting of a target was expected with these variances from the estimate alone (`spread`)
+    /// and from the sensor (`variance`).
     pub(super) fn note(
         &mut self,
-        seen: Seen,
+        seen: SightingTarget,
         stamp_ns: i64,
         innovation: &PointInnovation,
         spread: &Vector3<f64>,
@@ -113,24 +102,25 @@ impl Sensor {
             let expected = variance[k] / self.scales[k];
             let squared = innovation.residual[k]
                 .powi(2)
-                .min(9.0 * (variance[k] + spread[k]));
+                .min(LEARNED_ERROR_MAX * LEARNED_ERROR_MAX * (variance[k] + spread[k]));
             let ratio = (squared - spread[k]) / expected;
             let (scale, count) = (&mut self.scales[k], &mut self.counts[k]);
             *count = (*count + 1.0).min(MEMORY_SIGHTINGS);
-            *scale = (*scale + (ratio - *scale) / *count).clamp(1.0, SCALE_MAX);
+            *scale = (*scale + (ratio - *scale) / *count).clamp(1.0, SENSOR_SCALE_MAX);
         }
         if !innovation.is_polar || spread[0] > variance[0] {
             return;
         }
-        let now = (innovation.residual[0] / innovation.variance[0].sqrt()).clamp(-3.0, 3.0);
+        let now = (innovation.residual[0] / innovation.variance[0].sqrt())
+            .clamp(-LEARNED_ERROR_MAX, LEARNED_ERROR_MAX);
         if let Some(&(before_ns, before)) = self.latest.get(&seen) {
             let interval_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
-            if interval_s <= INTERVAL_S_MAX {
+            if interval_s <= CORRELATION_INTERVAL_S_MAX {
                 let fade = 1.0 - 1.0 / MEMORY_SIGHTINGS;
                 self.product = self.product * fade + now * before;
                 self.square = self.square * fade + 0.5 * (now * now + before * before);
             }
-        } else if self.latest.len() >= TARGETS_MAX {
+        } else if self.latest.len() >= SENSOR_TARGETS_MAX {
             self.latest.clear();
         }
         self.latest.insert(seen, (stamp_ns, now));
@@ -155,7 +145,7 @@ mod tests {
             let seen = innovation(4.0 + error(k));
             let variance = sensor.variance(&seen, &parameters);
             sensor.note(
-                Seen::Mark(0),
+                SightingTarget::Landmark(0),
                 i64::from(k) * 1_000_000_000,
                 &seen,
                 &Vector3::zeros(),

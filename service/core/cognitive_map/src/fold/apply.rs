@@ -1,11 +1,12 @@
-//! What a sample does to the map.
+//! The fold of one record: sessions, skips, samples, and the agent's place in the map.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector6};
 
+use super::tuning::RESTART_SD;
 use crate::agent::Agent;
-use crate::estimator::Estimator;
+use crate::estimator::{Effect, Estimator};
 use crate::event::{Event, EventKind};
 use crate::input::{AgentId, SkipReason};
 use crate::input::{Label, Marker, Sample, SampleBody, StartPose};
@@ -19,24 +20,22 @@ use crate::memory::trip::{TripEnd, TripMap, interval_s};
 use crate::settings::Settings;
 use grid::GridModules;
 
-/// What a restart between two sessions adds to the uncertainty of a pose: 1 m and 0.5 rad about
-/// each axis. A robot usually restarts where it stopped, but nobody knows.
-const RESTART_SD: [f64; 6] = [1.0, 1.0, 1.0, 0.5, 0.5, 0.5];
-
 /// The map, open for one record of one agent.
 pub(super) struct Fold<'a> {
     pub(super) settings: &'a Settings,
     pub(super) modules: &'a GridModules,
     pub(super) revision: u64,
     pub(super) now: Clock,
-    pub(super) framed: &'a mut bool,
+    pub(super) is_map_defined: &'a mut bool,
     pub(super) places: &'a mut PlaceMap,
     pub(super) trips: &'a mut TripMap,
     pub(super) landmarks: &'a mut LandmarkMap,
     pub(super) percepts: &'a mut PerceptMap,
     pub(super) objects: &'a mut ObjectMemory,
     pub(super) estimator: &'a mut Estimator,
-    pub(super) chronicle: &'a mut KeyframeMap,
+    /// What the latest call of the estimator brought about, until it is applied.
+    pub(super) effects: Vec<Effect>,
+    pub(super) keyframes: &'a mut KeyframeMap,
     pub(super) names: &'a BTreeMap<Label, AgentId>,
     pub(super) agent_id: AgentId,
     pub(super) agent: &'a mut Agent,
@@ -48,8 +47,9 @@ pub(super) struct Fold<'a> {
 }
 
 impl Fold<'_> {
-    /// Lets go of a place and a trip that have been forgotten since the agent's record before this.
-    pub(super) fn notice_what_is_gone(&mut self) {
+    /// Drops references to a place and a trip that have been forgotten since the agent's latest
+    /// record.
+    pub(super) fn drop_forgotten(&mut self) {
         if let Some((place, _)) = self.agent.place
             && self.places.get(place).is_none()
         {
@@ -81,7 +81,7 @@ impl Fold<'_> {
         if before.is_some() {
             let sd = Vector6::from(RESTART_SD);
             self.estimator.restart(self.agent_id.0, &sd);
-            self.chronicle.graph.restart(self.agent_id.0, &sd);
+            self.keyframes.graph.restart(self.agent_id.0, &sd);
         }
         self.emit(EventKind::SessionStarted { session });
     }
@@ -127,21 +127,22 @@ impl Fold<'_> {
         self.rest();
     }
 
-    /// The agent was told where it stands.
+    /// Takes in a start pose.
     fn start_pose(&mut self, start: &StartPose) {
         self.end_trip(TripEnd::StartPose);
-        self.estimator.start_pose(self.agent_id.0, start);
+        self.estimator
+            .start_pose(self.agent_id.0, start, &mut self.effects);
+        self.apply_effects();
         if !self.estimator.is_in_map(self.agent_id.0) {
-            // One that says that it may be anywhere has said nothing.
-            self.remember_who_was_set_aside();
+            // A start pose whose noise admits any place says nothing.
             return;
         }
-        self.chronicle.start_pose(&self.moment(), start);
-        self.chronicle.end_search(self.agent_id.0);
+        self.keyframes.start_pose(&self.moment(), start);
+        self.keyframes.end_search(self.agent_id.0);
         let seq = self.agent.next_seq.saturating_sub(1);
-        self.chronicle.confirm_pose(self.agent_id.0, seq);
-        *self.framed = true;
-        self.stand();
+        self.keyframes.confirm_pose(self.agent_id.0, seq);
+        *self.is_map_defined = true;
+        self.place_agent();
     }
 
     /// The agent passed a marker.
@@ -157,10 +158,10 @@ impl Fold<'_> {
     /// Lets the first agent that does something define the `map` frame, by the identity at which it
     /// stands.
     pub(super) fn define_frame(&mut self) {
-        if !*self.framed {
-            *self.framed = true;
+        if !*self.is_map_defined {
+            *self.is_map_defined = true;
             self.estimator.found(self.agent_id.0);
-            self.chronicle.graph.found(self.agent_id.0);
+            self.keyframes.graph.found(self.agent_id.0);
             self.agent.placed = true;
         }
     }
@@ -183,24 +184,25 @@ impl Fold<'_> {
         }
     }
 
-    /// Ends the record: the agent is where the estimate has it now, by all that has been seen until now.
+    /// Ends the record: the agent is where the estimate has it now, by all that has been seen until
+    /// now.
     pub(super) fn finish(&mut self) {
-        self.believe_matches();
+        self.relax_matches();
         self.move_places();
-        self.follow();
-        self.hold();
+        self.update_pose();
+        self.hold_places();
     }
 
-    /// Brings the agent to where the estimate has it. One that turns out to lie in the map begins there
-    /// anew.
-    pub(super) fn follow(&mut self) {
+    /// Brings the agent to where the estimate has it. One that turns out to lie in the map begins
+    /// there anew.
+    pub(super) fn update_pose(&mut self) {
         let number = self.agent_id.0;
         if !self.estimator.is_in_map(number) && self.agent.placed {
-            self.fall();
+            self.unplace();
         }
         if self.estimator.is_in_map(number) && !self.agent.placed {
             self.end_trip(TripEnd::StartPose);
-            self.stand();
+            self.place_agent();
             let position = Point3::from(self.agent.body.in_map().translation.vector);
             self.emit(EventKind::AgentPlaced { position });
             return;
@@ -220,7 +222,7 @@ impl Fold<'_> {
     }
 
     /// Puts the agent where the estimate has it, without a way there.
-    pub(super) fn stand(&mut self) {
+    pub(super) fn place_agent(&mut self) {
         if let Some(pose) = self.estimator.in_frame(self.agent_id.0) {
             self.agent.body.place(pose, self.modules);
         }
@@ -232,15 +234,15 @@ impl Fold<'_> {
 
     /// Takes the agent out of the map, for it was set aside: it begins anew, as one that has just
     /// joined.
-    fn fall(&mut self) {
+    fn unplace(&mut self) {
         self.end_trip(TripEnd::Gap);
         self.end_episode();
-        self.stand();
+        self.place_agent();
         self.agent.placed = false;
     }
 
     /// Holds the places that the agent needs now, and releases those that it no longer does.
-    pub(super) fn hold(&mut self) {
+    pub(super) fn hold_places(&mut self) {
         let needed = self.agent.holds();
         if needed == self.held {
             return; // as most often
@@ -264,8 +266,8 @@ impl Fold<'_> {
     }
 }
 
-/// The event that a grid module came into a new lattice cell. Of an agent that is not placed, the cells
-/// are those of no map.
+/// The event that a grid module came into a new lattice cell. Of an agent that is not placed, the
+/// cells are those of no map.
 pub(super) fn cell_entered(
     placed: bool,
     agent: AgentId,

@@ -12,16 +12,16 @@
 //! 7     channel · 2²⁶ + page      up to 64 places' memories of a channel of levels
 //! 8     channel · 2²⁶ + page      up to 16 KiB of places' memories of a channel of descriptors
 //! 9     0                         the joint estimate of agents and landmarks
-//! 10..  page                      the chronicle, by part
+//! 10..  page                      the keyframe graph, by part
 //! 32    0                         objects: counts, names of channels
 //! 33    object                    an object
 //! ```
 //!
-//! A page is a count (u16) and its items one after the other, little endian, floats as their bits. Where
-//! items can be missing (places, trips, memories of levels), a mask (u64) of those that are there
-//! stands for the count. A checkpoint since an earlier one has only the pages that changed in between;
-//! laid over the earlier ones by kind and index, they are the whole again. A page of no bytes says that
-//! there is no such page any more. Indices are rebuilt, not stored.
+//! A page is a count (u16) and its items one after the other, little endian, floats as their bits.
+//! Where items can be missing (places, trips, memories of levels), a mask (u64) of those that are
+//! there stands for the count. A checkpoint since an earlier one has only the pages that changed in
+//! between; laid over the earlier ones by kind and index, they are the whole again. A page of no
+//! bytes says that there is no such page any more. Indices are rebuilt, not stored.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -42,9 +42,9 @@ use state::write_page;
 use state::{CorruptState, State, StateReader, StateWriter};
 
 /// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps,
-/// version 3 no joint estimate and no chronicle, version 4 no views in it and no objects, version 5 no searches,
-/// version 6 no other names of landmarks, version 7 none of what was joined into objects, version 8 no moorings and no
-/// doubts, version 9 nobody removed or set aside.
+/// version 3 no joint estimate and no keyframe graph, version 4 no views in it and no objects,
+/// version 5 no searches, version 6 no other names of landmarks, version 7 none of what was joined
+/// into objects, version 8 no moorings and no doubts, version 9 nobody removed or set aside.
 const VERSION: u16 = 10;
 
 const HEADER: u8 = 0;
@@ -57,8 +57,8 @@ const CHANNELS: u8 = 6;
 const LEVELS: u8 = 7;
 const DESCRIPTORS: u8 = 8;
 const ESTIMATE: u8 = 9;
-/// The chronicle's part 0; its other parts are the next kinds.
-const CHRONICLE: u8 = 10;
+/// Part 0 of the keyframe graph; its other parts are the next kinds.
+const KEYFRAMES: u8 = 10;
 const OBJECTS: u8 = 32;
 const OBJECT: u8 = 33;
 
@@ -131,14 +131,14 @@ impl CognitiveMap {
                 of_items(DESCRIPTORS, channel_page(channel, page), items)
             }))
             .chain(self.estimate_page(since))
-            .chain(self.chronicle_pages(since))
+            .chain(self.keyframe_pages(since))
             .chain(self.object_pages(since))
     }
 
     /// The map of a checkpoint. It has the digest of the map that wrote it, and goes on like it.
     ///
-    /// `settings` are those of the space; `pages` come in any order, and of several of the same kind
-    /// and index the last one counts.
+    /// `settings` are those of the space; `pages` come in any order, and of several of the same
+    /// kind and index the last one counts.
     ///
     /// # Errors
     /// A page is missing, damaged or left over, or the settings are not those of the checkpoint.
@@ -160,20 +160,20 @@ impl CognitiveMap {
         }
         let mut map = Self::new(settings);
         map.revision = header.revision;
-        map.framed = header.framed;
+        map.is_map_defined = header.is_map_defined;
         // A map of more would have had a page for each 64 of them, and its digest is another one.
         let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
         map.places.skip_to(count(header.places));
         map.trips.skip_to(count(header.trips));
         let objects = pages.split_off(&(OBJECTS, 0));
         map.restore_objects(objects)?;
-        let lived = pages.split_off(&(CHRONICLE, 0));
-        map.restore_chronicle(lived)?;
+        let lived = pages.split_off(&(KEYFRAMES, 0));
+        map.restore_keyframes(lived)?;
         let mut trips = Vec::new();
         let mut expected = 0;
         for ((kind, index), bytes) in pages {
-            // Pages of a kind without gaps must follow one another; those of legs begin anew with each
-            // trip, those of descriptors with each channel.
+            // Pages of a kind without gaps must follow one another; those of legs begin anew with
+            // each trip, those of descriptors with each channel.
             let first = match kind {
                 PLACES | TRIPS | LEVELS => true,
                 LEGS => index % LEG_PAGES_MAX == 0,
@@ -235,19 +235,19 @@ impl CognitiveMap {
         })
     }
 
-    /// The pages of the chronicle that changed.
-    fn chronicle_pages(&self, since_revision: u64) -> impl Iterator<Item = CheckpointPage> {
+    /// The pages of the keyframe graph that changed.
+    fn keyframe_pages(&self, since_revision: u64) -> impl Iterator<Item = CheckpointPage> {
         let is_new = self.revision > since_revision;
-        let pages = is_new.then(|| self.chronicle.checkpoint(since_revision));
+        let pages = is_new.then(|| self.keyframes.checkpoint(since_revision));
         pages.into_iter().flatten().map(|page| CheckpointPage {
-            kind: CHRONICLE + page.part,
+            kind: KEYFRAMES + page.part,
             index: page.index,
             bytes: page.bytes,
         })
     }
 
-    /// Reads the chronicle; a map in which nothing has happened has none.
-    fn restore_chronicle(
+    /// Reads the keyframe graph; a map in which nothing has happened has none.
+    fn restore_keyframes(
         &mut self,
         pages: BTreeMap<(u8, u32), Vec<u8>>,
     ) -> Result<(), CorruptCheckpoint> {
@@ -257,14 +257,14 @@ impl CognitiveMap {
         let pages = pages
             .into_iter()
             .map(|((kind, index), bytes)| KeyframePage {
-                part: kind - CHRONICLE,
+                part: kind - KEYFRAMES,
                 index,
                 bytes,
             });
         let settings = KeyframeSettings::of(&self.settings);
-        let chronicle = KeyframeMap::restore(settings, self.revision, pages)
+        let keyframes = KeyframeMap::restore(settings, self.revision, pages)
             .map_err(|_| CorruptCheckpoint::DamagedPage { kind, index })?;
-        self.chronicle = Arc::new(chronicle);
+        self.keyframes = Arc::new(keyframes);
         Ok(())
     }
 
@@ -345,8 +345,8 @@ impl CognitiveMap {
         }
     }
 
-    /// Whether all identifiers lead somewhere, those that may be of forgotten places and trips included.
-    /// The digest finds damage; this finds pages that were made up.
+    /// Whether all identifiers lead somewhere, those that may be of forgotten places and trips
+    /// included. The digest finds damage; this finds pages that were made up.
     fn refers_to_what_is_there(&self) -> bool {
         let (recruited, recorded) = (self.places_recruited(), self.trips.recorded());
         let is_there = |place| self.places.get(place).is_some();
@@ -361,14 +361,14 @@ impl CognitiveMap {
                     .trip
                     .is_none_or(|trip| (trip.0 as usize) < recorded)
         });
-        let is_moored = |id: PlaceId, mooring| self.chronicle.graph.is_attached(mooring, id.0);
+        let is_moored = |id: PlaceId, mooring| self.keyframes.graph.is_attached(mooring, id.0);
         let places = self.places().all(|(id, place)| {
             is_agent(place.founder())
                 && place.trip.is_none_or(|trip| (trip.0 as usize) < recorded)
                 && place.mooring.is_none_or(|mooring| is_moored(id, mooring))
         });
         let moored = self.places().filter(|(_, place)| place.mooring.is_some());
-        let places = places && moored.count() == self.chronicle.graph.n_attachments();
+        let places = places && moored.count() == self.keyframes.graph.n_attachments();
         let trips = self.trips().all(|(_, trip)| {
             is_agent(trip.agent())
                 && trip

@@ -11,7 +11,8 @@ use crate::input::Label;
 use crate::memory::trip::TripEnd;
 
 impl CognitiveMap {
-    /// Enrols an agent under the next number, or under one that is vacant. A name is one agent's at a time.
+    /// Enrols an agent under the next number, or under one that is vacant. A name is one agent's at
+    /// a time.
     pub(super) fn enrol(&mut self, id: AgentId, name: &Label, events: &mut Vec<Event>) {
         let index = id.0 as usize;
         let is_next = index == self.agents.len();
@@ -24,11 +25,12 @@ impl CognitiveMap {
         if is_next {
             self.agents.push(agent, self.revision);
             Arc::make_mut(&mut self.estimator).enrol();
-            let chronicle = Arc::make_mut(&mut self.chronicle);
-            chronicle.set_revision(self.revision);
-            chronicle.graph.enrol();
+            let keyframes = Arc::make_mut(&mut self.keyframes);
+            keyframes.set_revision(self.revision);
+            keyframes.graph.enrol();
         } else if let Some(vacant) = self.agents.get_mut(index, self.revision) {
-            // The estimate and the chronicle have held a new agent under this number since it is vacant.
+            // The estimate and the keyframe graph have held a new agent under this number since it
+            // is vacant.
             *vacant = agent;
         }
         Arc::make_mut(&mut self.names).insert(name.clone(), id);
@@ -40,7 +42,8 @@ impl CognitiveMap {
     }
 
     /// Removes an agent. One that was in the map leaves there what it did; of any other one nothing
-    /// stays, and its number is vacant. Takes time in proportion to what is remembered of the latter.
+    /// stays, and its number is vacant. Takes time in proportion to what is remembered of the
+    /// latter.
     pub(super) fn remove(&mut self, id: AgentId, events: &mut Vec<Event>) {
         let Some(agent) = self.agent(id).filter(|agent| agent.is_enrolled()) else {
             return;
@@ -52,13 +55,14 @@ impl CognitiveMap {
         }
     }
 
-    /// Whether an agent was ever in the map: it stood in its frame, so that something there may be its own.
+    /// Whether an agent was ever in the map: it stood in its frame, so that something there may be
+    /// its own.
     pub fn has_been_in_map(&self, id: AgentId) -> bool {
         self.agent(id).is_some_and(Agent::placed) || self.estimator.has_been_in_map(id.0)
     }
 
-    /// Whether a number belonged to an agent that has been removed without a trace, so that it is the
-    /// next newcomer's.
+    /// Whether a number belonged to an agent that has been removed without a trace, so that it is
+    /// the next newcomer's.
     pub fn is_vacant(&self, id: AgentId) -> bool {
         let agent = self.agent(id);
         agent.is_some_and(|agent| agent.membership == Membership::Vacant)
@@ -68,20 +72,20 @@ impl CognitiveMap {
 impl Fold<'_> {
     /// The agent goes.
     fn remove(&mut self, name: Label) {
-        self.notice_what_is_gone();
+        self.drop_forgotten();
         self.end_trip(TripEnd::SessionEnd);
         self.end_episode();
         self.agent.place = None;
         self.agent.entered = None;
-        self.hold();
+        self.hold_places();
         let number = self.agent_id.0;
         if self.agent.placed || self.estimator.has_been_in_map(number) {
             self.estimator.retire(number);
-            self.chronicle.retire(number);
+            self.keyframes.retire(number);
             self.agent.membership = Membership::Removed;
         } else {
             self.estimator.clear(number);
-            self.chronicle.clear(number);
+            self.keyframes.clear(number);
             *self.agent = Agent::new(name.clone(), self.modules);
             self.agent.membership = Membership::Vacant;
         }

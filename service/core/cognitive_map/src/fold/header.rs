@@ -10,7 +10,7 @@ use state::{State, StateWriter, state_of_struct};
 pub(super) struct Header {
     pub(super) settings: u128,
     pub(super) revision: u64,
-    pub(super) framed: bool,
+    pub(super) is_map_defined: bool,
     agents: u64,
     /// How many there have been, forgotten ones included; of trips too.
     pub(super) places: u64,
@@ -22,7 +22,7 @@ pub(super) struct Header {
 state_of_struct!(Header {
     settings,
     revision,
-    framed,
+    is_map_defined,
     agents,
     places,
     trips,
@@ -36,7 +36,7 @@ impl Header {
         Self {
             settings: digest_of(&map.settings).0,
             revision: map.revision,
-            framed: map.framed,
+            is_map_defined: map.is_map_defined,
             agents: map.agents.len() as u64,
             places: map.places.places().next_index() as u64,
             trips: map.trips.recorded() as u64,

@@ -2,24 +2,25 @@
 
 mod apply;
 mod checkpoint;
+mod effects;
 mod enrolment;
-mod feel;
-mod forget;
+mod forgetting;
 mod header;
-mod localize;
+mod localization;
 mod motion;
 mod objects;
-mod predict;
-mod read;
-mod remember;
-mod see;
+mod percepts;
+mod prediction;
+mod queries;
+mod sightings;
+mod tuning;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub use checkpoint::{CheckpointPage, CorruptCheckpoint};
-pub use localize::Localization;
-pub use predict::{Predicted, Prediction};
+pub use localization::Localization;
+pub use prediction::{Predicted, Prediction};
 
 use crate::agent::Agent;
 use crate::estimator::{Estimator, Parameters};
@@ -42,8 +43,8 @@ use apply::Fold;
 /// Agents per page: few, because the agents change with every sample.
 const AGENT_PAGE: usize = 4;
 
-/// The cognitive map of a space, a fold over its journal: [`CognitiveMap::apply`] is the only way to
-/// change it, and the same records in the same order give the same map, bit by bit.
+/// The cognitive map of a space, a fold over its journal: [`CognitiveMap::apply`] is the only way
+/// to change it, and the same records in the same order give the same map, bit by bit.
 ///
 /// A clone is a snapshot. It shares all memory with the original and stays as it is while the
 /// original goes on; the original then copies the pages that it changes.
@@ -54,14 +55,14 @@ pub struct CognitiveMap {
     /// Number of records that had an effect.
     revision: u64,
     /// Whether some agent has defined the `map` frame.
-    framed: bool,
+    is_map_defined: bool,
     agents: PagedVec<Agent, AGENT_PAGE>,
     /// The agents by name.
     names: Arc<BTreeMap<Label, AgentId>>,
     /// Where agents and the landmarks seen lately are, jointly.
     estimator: Arc<Estimator>,
     /// What they did and saw, so that the past can be smoothed.
-    chronicle: Arc<KeyframeMap>,
+    keyframes: Arc<KeyframeMap>,
     places: PlaceMap,
     trips: TripMap,
     landmarks: LandmarkMap,
@@ -76,11 +77,11 @@ impl CognitiveMap {
             modules: Arc::new(GridModules::new(&settings.grid())),
             places: PlaceMap::new(&settings),
             estimator: Arc::new(Estimator::new(Parameters::of(&settings))),
-            chronicle: Arc::new(KeyframeMap::new(KeyframeSettings::of(&settings))),
+            keyframes: Arc::new(KeyframeMap::new(KeyframeSettings::of(&settings))),
             names: Arc::default(),
             settings: Arc::new(settings),
             revision: 0,
-            framed: false,
+            is_map_defined: false,
             agents: PagedVec::default(),
             trips: TripMap::default(),
             landmarks: LandmarkMap::default(),
@@ -92,11 +93,11 @@ impl CognitiveMap {
     /// Applies the next record of the journal, and appends to `events` what it brought about.
     ///
     /// Every record is legal. One that says nothing new has no effect at all: the enrolment of an
-    /// agent that is there (or is neither next in line nor vacant, or has another one's name), the removal of one that is not, a
-    /// lesson that is not next in line, a sample of an unknown or removed agent, of an earlier session, or with a sequence number that has been applied or
-    /// skipped. A sample whose number is
-    /// ahead first skips the missing ones as [`SkipReason::Lost`]. Work and memory per sample are
-    /// bounded, whatever the size of the map.
+    /// agent that is there (or is neither next in line nor vacant, or has another one's name), the
+    /// removal of one that is not, a lesson that is not next in line, a sample of an unknown or
+    /// removed agent, of an earlier session, or with a sequence number that has been applied or
+    /// skipped. A sample whose number is ahead first skips the missing ones as
+    /// [`SkipReason::Lost`]. Work and memory per sample are bounded, whatever the size of the map.
     pub fn apply(&mut self, record: &Record, events: &mut Vec<Event>) {
         match record {
             Record::Enrol { agent, name } => self.enrol(*agent, name, events),
@@ -114,7 +115,7 @@ impl CognitiveMap {
                 let Some(mut fold) = self.fold(*agent, *session, next_seq, events) else {
                     return;
                 };
-                fold.notice_what_is_gone();
+                fold.drop_forgotten();
                 fold.enter_session(*session, Some(sample.stamp_ns));
                 fold.skip(*seq, SkipReason::Lost);
                 fold.sample(*seq, sample);
@@ -133,7 +134,7 @@ impl CognitiveMap {
                 let Some(mut fold) = self.fold(*agent, *session, *to, events) else {
                     return;
                 };
-                fold.notice_what_is_gone();
+                fold.drop_forgotten();
                 fold.enter_session(*session, None);
                 fold.skip(*from, SkipReason::Lost);
                 fold.skip(*to, *reason);
@@ -179,19 +180,20 @@ impl CognitiveMap {
         self.agents.get(index)?;
         self.revision += 1;
         let agent = self.agents.get_mut(index, self.revision)?;
-        let chronicle = Arc::make_mut(&mut self.chronicle);
-        chronicle.set_revision(self.revision);
+        let keyframes = Arc::make_mut(&mut self.keyframes);
+        keyframes.set_revision(self.revision);
         Some(Fold {
             settings: &self.settings,
             modules: &self.modules,
             revision: self.revision,
             now: Clock::at(self.revision, &self.settings),
-            framed: &mut self.framed,
+            is_map_defined: &mut self.is_map_defined,
             places: &mut self.places,
             trips: &mut self.trips,
             landmarks: &mut self.landmarks,
             estimator: Arc::make_mut(&mut self.estimator),
-            chronicle,
+            effects: Vec::new(),
+            keyframes,
             names: &self.names,
             percepts: &mut self.percepts,
             objects: &mut self.objects,

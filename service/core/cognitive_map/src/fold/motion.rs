@@ -1,19 +1,14 @@
-//! What motion does to the map: path integration, place cells, trips.
+//! Motion: path integration, place cells, trips.
 
 use nalgebra::Point3;
 
 use super::apply::{Fold, cell_entered};
+use super::tuning::{ANSWER_MIN, ASK_PER_FIELD_RADIUS};
 use crate::event::EventKind;
 use crate::input::Motion;
 use crate::memory::place::{Place, PlaceId, confidence};
 use crate::memory::trip::{Leg, LegUnderWay, Trip, TripEnd, TripId, interval_s};
 use crate::settings::Recruitment;
-
-/// The places are asked again when the agent has moved by this part of a field radius. Confidence
-/// changes by at most a tenth over that distance, and a robot at rest asks nothing.
-const ASK_PER_FIELD_RADIUS: f64 = 0.125;
-/// A place answers from this confidence on.
-pub(super) const ANSWER_MIN: f64 = 0.5;
 
 impl Fold<'_> {
     /// The body moved.
@@ -21,15 +16,10 @@ impl Fold<'_> {
         self.define_frame();
         let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
         let increment = motion.increment();
-        let step = self.estimator.motion(agent.0, stamp_ns, motion);
-        self.remember_who_was_set_aside();
-        self.chronicle.graph.motion(
-            &self.moment(),
-            &step.increment,
-            &step.variance,
-            &step.calibrated,
-        );
-        self.remember_what_was_settled();
+        let step = self
+            .estimator
+            .motion(agent.0, stamp_ns, motion, &mut self.effects);
+        self.apply_effects();
         if let Some(episode) = &mut self.agent.episode {
             episode.go(&step.increment, &step.variance);
         }
@@ -37,10 +27,13 @@ impl Fold<'_> {
         let entered = |module, reference| {
             events.extend(cell_entered(placed, agent, stamp_ns, module, reference));
         };
+        let in_odom = self.estimator.in_odom(agent.0).unwrap_or_default();
+        let path_m = increment.translation.vector.norm();
+        let displacement = &step.displacement;
         self.agent
             .body
-            .step(increment, &step.displacement, self.modules, entered);
-        self.follow();
+            .step(&in_odom, path_m, displacement, self.modules, entered);
+        self.update_pose();
         if !self.agent.placed {
             return;
         }
@@ -62,7 +55,7 @@ impl Fold<'_> {
             .asked_at
             .is_none_or(|at| self.is_step_away(&at, &position));
         if drawn || (moved && !rests) {
-            self.ask(&position, drawn);
+            self.ask_places(&position, drawn);
         }
     }
 
@@ -89,7 +82,7 @@ impl Fold<'_> {
     }
 
     /// Asks which place answers here; recruits one, enters one, closes the leg under way.
-    fn ask(&mut self, position: &Point3<f64>, drawn: bool) {
+    fn ask_places(&mut self, position: &Point3<f64>, drawn: bool) {
         self.agent.asked_at = Some(*position);
         let winner = self.places.winner(position);
         let novel = match self.settings.recruitment {
@@ -120,18 +113,18 @@ impl Fold<'_> {
                 self.arrive(place);
             }
             Some(_) => {}
-            // An agent that hovers at the rim of a field does not enter it again and again; one that
-            // has left the reach of all places enters the next one afresh.
+            // An agent that hovers at the rim of a field does not enter it again and again; one
+            // that has left the reach of all places enters the next one afresh.
             None => self.agent.entered = None,
         }
     }
 
-    /// Recruits a place cell where the agent stands. None when there is no room for it: other agents
-    /// hold all places, or there are no more identifiers.
+    /// Recruits a place cell where the agent stands. None when there is no room for it: other
+    /// agents hold all places, or there are no more identifiers.
     fn recruit(&mut self, position: &Point3<f64>) -> Option<PlaceId> {
         // The place that answers too weakly is not held any more.
         self.agent.place = None;
-        self.hold();
+        self.hold_places();
         if !self.make_room_for_place() {
             return None;
         }
@@ -152,7 +145,7 @@ impl Fold<'_> {
             self.now,
         );
         let place = self.places.recruit(place, self.revision)?;
-        if let Some(mooring) = self.chronicle.graph.attach_place(self.agent_id.0, place.0) {
+        if let Some(mooring) = self.keyframes.graph.attach_place(self.agent_id.0, place.0) {
             self.places.set_mooring(place, mooring, self.revision);
         }
         self.emit(EventKind::PlaceRecruited {
@@ -201,7 +194,8 @@ impl Fold<'_> {
         }
     }
 
-    /// A leg between two places that the same earlier trip leads through is that trip's, travelled again.
+    /// A leg between two places that the same earlier trip leads through is that trip's, travelled
+    /// again.
     fn travel_again(&mut self, [from, to]: [PlaceId; 2]) {
         let earlier = self.trip_through(from);
         if let Some(trip) = earlier

@@ -1,4 +1,4 @@
-//! What touching does to the objects that are known.
+//! Contacts with objects: episodes that teach or identify them.
 
 use super::CognitiveMap;
 use super::apply::Fold;
@@ -39,7 +39,7 @@ impl Fold<'_> {
         if let Some(episode) = &mut self.agent.episode {
             let news = feel(episode, self.objects);
             let contacts = episode.count();
-            self.tell(news, contacts);
+            self.emit_object_news(news, contacts);
         }
     }
 
@@ -49,7 +49,7 @@ impl Fold<'_> {
             return;
         };
         let (news, said) = episode.end(self.objects, (self.now, self.revision));
-        self.tell(news, episode.count());
+        self.emit_object_news(news, episode.count());
         if episode.count() > 0 {
             self.emit(EventKind::EpisodeEnded {
                 session: self.agent.session(),
@@ -59,7 +59,7 @@ impl Fold<'_> {
         }
     }
 
-    fn tell(&mut self, news: Vec<News>, contacts: u64) {
+    fn emit_object_news(&mut self, news: Vec<News>, contacts: u64) {
         for news in news {
             let name =
                 |object: ObjectId| self.objects.get(object).map(|known| known.name().clone());
@@ -140,13 +140,14 @@ impl CognitiveMap {
         self.objects.channel_name(channel)
     }
 
-    /// Which object explains a sequence of contacts, in which pose, and what would tell more. Levels and descriptors of
-    /// channels on which no object was felt do not count.
+    /// Which object explains a sequence of contacts, in which pose, and what would tell more.
+    /// Levels and descriptors of channels on which no object was felt do not count.
     pub fn identify(&self, orientation: &Orientation, touches: &[Touch]) -> Identified {
         self.objects.identify(orientation, touches)
     }
 
-    /// What an agent's episode says so far, if one is under way: whether it teaches, and what is recognised.
+    /// What an agent's episode says so far, if one is under way: whether it teaches, and what is
+    /// recognised.
     pub fn episode(&self, agent: AgentId) -> Option<(bool, Identified)> {
         let episode = self.agent(agent)?.episode.as_ref()?;
         Some((episode.teaches(), episode.identified(&self.objects)))

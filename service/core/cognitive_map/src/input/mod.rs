@@ -1,6 +1,7 @@
 //! Input of the fold: records of samples that make sense.
 //!
-//! Constructors refuse what could not have been sensed, so an invalid sample can't exist further in.
+//! Constructors refuse what could not have been sensed, so an invalid sample can't exist further
+//! in.
 
 mod invalid;
 mod label;

@@ -11,8 +11,8 @@ const RADIANS_PER_SECOND_MAX: f64 = 1e3;
 /// Longest interval of one velocity sample \[s\].
 const DURATION_S_MAX: f64 = 3600.0;
 
-/// Standard deviations of a relative pose in right-perturbation coordinates (translation along, then
-/// rotation about, the body axes x, y, z at its end) \[m, rad\]. Finite and not negative.
+/// Standard deviations of a relative pose in right-perturbation coordinates (translation along,
+/// then rotation about, the body axes x, y, z at its end) \[m, rad\]. Finite and not negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseNoise(Vector6<f64>);
 

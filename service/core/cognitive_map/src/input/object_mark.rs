@@ -54,8 +54,8 @@ pub struct TouchNoise {
 }
 
 impl TouchNoise {
-    /// Standard deviations of a contact's position per axis \[m\], of a normal's direction per axis \[rad\], and of a level in
-    /// its channel's unit.
+    /// Standard deviations of a contact's position per axis \[m\], of a normal's direction per axis
+    /// \[rad\], and of a level in its channel's unit.
     ///
     /// # Errors
     /// A number is not finite, negative or too large.
@@ -100,8 +100,8 @@ impl TouchNoise {
 pub enum ObjectMark {
     /// What is felt from here on teaches an object.
     Learn {
-        /// Its name. One that is known is extended if the episode shows how its frame lies in the object's; without a name
-        /// it is the object that is recognised, or a new one.
+        /// Its name. One that is known is extended if the episode shows how its frame lies in the
+        /// object's; without a name it is the object that is recognised, or a new one.
         name: Option<Label>,
         /// How far apart the places of a new object are.
         spacing: Spacing,
@@ -110,7 +110,8 @@ pub enum ObjectMark {
         /// How exactly is felt.
         noise: TouchNoise,
     },
-    /// What is felt from here on is to be recognised. If it turns out to be unknown, it is learned at the end.
+    /// What is felt from here on is to be recognised. If it turns out to be unknown, it is learned
+    /// at the end.
     Identify {
         /// How the frame may be turned against an object's.
         orientation: Orientation,

@@ -3,8 +3,8 @@
 use super::{InvalidSample, Label, Lesson, Sample};
 use state::{CorruptState, State, StateReader, StateWriter};
 
-/// An agent of a space, counted from 0 in the order of enrolment. The number of a removed agent that was
-/// never in the map goes to a later one.
+/// An agent of a space, counted from 0 in the order of enrolment. The number of a removed agent
+/// that was never in the map goes to a later one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AgentId(pub u32);
 

@@ -148,7 +148,8 @@ impl RelativePose {
         })
     }
 
-    /// The same with a pose that was read back as it was: normalising anew might change its last bit.
+    /// The same with a pose that was read back as it was: normalising anew might change its last
+    /// bit.
     fn exactly(self, pose: Isometry3<f64>) -> Self {
         Self { pose, ..self }
     }

@@ -108,7 +108,7 @@ impl Hall {
             let noise = PoseNoise::new([0.02, 0.02, 0.0], [0.0, 0.0, 0.01]).unwrap();
             let (shift, turn) = (pose.translation.vector, pose.rotation.coords);
             let start = StartPose::new(shift.into(), turn.into(), noise).unwrap();
-            estimator.start_pose(agent, &start);
+            estimator.start_pose(agent, &start, &mut Vec::new());
         }
         let scales = [(); ROBOTS].map(|()| (1.0 + 0.01 * random.normal(), 0.001 * random.normal()));
         let mut errors_m = Vec::new();
@@ -125,7 +125,7 @@ impl Hall {
                 if !silent {
                     let motion = drive(&mut truth[robot], &mut random, scales[robot]);
                     let motion = self.as_stated(&motion);
-                    estimator.motion(number(robot), stamp_ns, &motion);
+                    estimator.motion(number(robot), stamp_ns, &motion, &mut Vec::new());
                 }
             }
             for robot in 0..ROBOTS {
@@ -196,7 +196,13 @@ impl Hall {
                 _ => post,
             };
             let relation = self.relation(liar, &pose, &posts[post], random);
-            estimator.landmark(number(robot), stamp_ns, &label(called), &relation);
+            estimator.landmark(
+                number(robot),
+                stamp_ns,
+                &label(called),
+                &relation,
+                &mut Vec::new(),
+            );
         }
         let others = (0..ROBOTS).filter(|&other| {
             other != robot && is_seen(&Point3::from(truth[other].translation.vector))
@@ -206,7 +212,13 @@ impl Hall {
             let other = others[step % others.len()];
             let point = Point3::from(truth[other].translation.vector);
             let relation = self.relation(liar, &pose, &point, random);
-            estimator.sighting(number(robot), stamp_ns, number(other), &relation);
+            estimator.sighting(
+                number(robot),
+                stamp_ns,
+                number(other),
+                &relation,
+                &mut Vec::new(),
+            );
         }
     }
 

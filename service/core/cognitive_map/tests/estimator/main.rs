@@ -1,10 +1,11 @@
-//! The joint estimate from outside: teams in a simulated hall, and everything that may go wrong there.
+//! The joint estimate from outside: teams in a simulated hall, and everything that may go wrong
+//! there.
 
 #![expect(
     clippy::unwrap_used,
     reason = "clippy knows test functions, but not what they call"
 )]
 
-mod fix; // poses told by another estimate
+mod external_pose; // poses told by another estimate
 mod hall; // robots that drive and see
 mod trouble; // liars, slips, moved and mistaken landmarks, silence, walls

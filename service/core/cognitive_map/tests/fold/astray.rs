@@ -9,7 +9,8 @@ use crate::journal::{Robot, descriptor, start_pose};
 
 use random::Seeded;
 
-/// Numbers of a view; step of a robot \[m\]; edge of the room \[m\], and distance between the lanes in which it is explored.
+/// Numbers of a view; step of a robot \[m\]; edge of the room \[m\], and distance between the lanes
+/// in which it is explored.
 const NUMBERS: usize = 64;
 const STEP_M: f64 = 0.1;
 const EDGE_M: f64 = 8.0;
@@ -77,7 +78,8 @@ impl Walker {
         self.truth = Isometry3::new(Vector3::new(at[0], at[1], 0.0), turn);
     }
 
-    /// Goes a step and turns, with odometry that errs as it says, and sees the room; or something else, one time in twenty.
+    /// Goes a step and turns, with odometry that errs as it says, and sees the room; or something
+    /// else, one time in twenty.
     fn step(&mut self, map: &mut CognitiveMap, room: &Room, turn_rad: f64) {
         self.go(map, turn_rad);
         let is_wrong = self.random.uniform() < 0.05;
@@ -106,7 +108,8 @@ impl Walker {
         self.robot.sample(map, SampleBody::Motion(motion));
     }
 
-    /// Goes so many steps within the room, back towards its middle where it comes too near to a wall; answers how it called itself.
+    /// Goes so many steps within the room, back towards its middle where it comes too near to a
+    /// wall; answers how it called itself.
     fn roam(&mut self, map: &mut CognitiveMap, room: &Room, steps: u32) -> Vec<Status> {
         let mut called = Vec::new();
         for _ in 0..steps {
@@ -170,7 +173,8 @@ fn a_robot_that_is_carried_off_says_that_it_is_lost_and_is_found() {
         assert!(lost.is_some_and(|steps| steps < 30), "{seed}: {after:?}");
         assert_eq!(after.last(), Some(&Status::Localized), "{seed}: {after:?}");
         assert!(walker.off_m(&map) < 0.25, "{seed}: {}", walker.off_m(&map));
-        // Afterwards, too, it is known where it went, and where it was put is not where it came by itself.
+        // Afterwards, too, it is known where it went, and where it was put is not where it came by
+        // itself.
         let refined = map.refined();
         let own = &refined.agents[walker.robot.id.0 as usize].poses;
         let end = own.last().unwrap().pose.translation.vector;
@@ -213,7 +217,8 @@ fn what_was_told_wrongly_is_noticed() {
     assert_eq!(called.last(), Some(&Status::Localized));
 }
 
-/// Sightings that agree with where a robot is believed to be outweigh views that do not: the light may have changed.
+/// Sightings that agree with where a robot is believed to be outweigh views that do not: the light
+/// may have changed.
 #[test]
 fn a_robot_that_sights_landmarks_where_they_are_is_not_lost() {
     let (mut map, room) = explored();

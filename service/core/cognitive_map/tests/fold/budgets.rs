@@ -49,8 +49,8 @@ impl Uses {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Two robots wander about a corner of the world that has room for more places than the budget. The
-    /// strengths are summed up beside the map, from what it tells of uses.
+    /// Two robots wander about a corner of the world that has room for more places than the budget.
+    /// The strengths are summed up beside the map, from what it tells of uses.
     #[test]
     fn the_weakest_goes_and_never_comes_back(
         steps in prop::collection::vec((any::<bool>(), -1.5..1.5f64), 1..400),
@@ -317,7 +317,8 @@ fn a_held_place_goes_only_where_all_are_held() {
     assert_eq!(map.place_count(), 4);
 }
 
-/// Robots that fall silent for good, each in a place and on a trip of its own, leave room for the others.
+/// Robots that fall silent for good, each in a place and on a trip of its own, leave room for the
+/// others.
 #[test]
 fn silent_robots_do_not_take_the_memory_with_them() {
     let (mut map, mut alive) = small(|values| {

@@ -82,7 +82,8 @@ fn at_start() -> Isometry3<f64> {
     Isometry3::new(Vector3::new(2.0, 0.0, 0.0), Vector3::new(0.0, 0.0, 1.6))
 }
 
-/// Drives ten rounds and a half with odometry that reads 3 % too much, and answers the error at the end.
+/// Drives ten rounds and a half with odometry that reads 3 % too much, and answers the error at the
+/// end.
 fn drive(looks: bool) -> f64 {
     let mut map = new_map();
     let mut driver = Driver::new(&mut map, at_start(), 1.03);
@@ -198,8 +199,8 @@ fn an_agent_whose_sightings_contradict_the_map_says_so_and_finds_back() {
     assert_eq!(map.status(driver.robot.id).unwrap(), Status::Localized);
 }
 
-/// A robot is nudged on its way, and sees at the end what it saw at the start: then it is known better
-/// where it was on the way.
+/// A robot is nudged on its way, and sees at the end what it saw at the start: then it is known
+/// better where it was on the way.
 #[test]
 fn what_is_seen_at_the_end_corrects_the_way() {
     let mut map = new_map();
@@ -240,15 +241,16 @@ fn what_is_seen_at_the_end_corrects_the_way() {
     assert!(off.norm() < 0.05, "{off}");
 }
 
-/// A robot on a circle whose odometry turns 2 % too much, which is told again and again that it is where it was a round
-/// ago, sometimes wrongly.
+/// A robot on a circle whose odometry turns 2 % too much, which is told again and again that it is
+/// where it was a round ago, sometimes wrongly.
 struct Circling {
     driver: Driver,
     /// By odometry alone.
     blind: Isometry3<f64>,
     /// Where it was at each step, and the sample that says so.
     way: Vec<(Isometry3<f64>, u64)>,
-    /// The places that it founded, with where it was then and how far that was from where it thought to be \[m\].
+    /// The places that it founded, with where it was then and how far that was from where it
+    /// thought to be \[m\].
     founded: Vec<(PlaceId, Point3<f64>, f64)>,
 }
 

@@ -26,8 +26,8 @@ fn effective(settings: &Settings, records: &[Record]) -> Vec<Record> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// However far motions lead and however sure sightings are of themselves, the past can be relaxed, and
-    /// a map that goes on from a checkpoint has the same one.
+    /// However far motions lead and however sure sightings are of themselves, the past can be
+    /// relaxed, and a map that goes on from a checkpoint has the same one.
     #[test]
     fn the_past_of_any_journal_can_be_refined(
         settings in any_settings(), records in journals(),

@@ -313,7 +313,8 @@ fn reasons() -> impl Strategy<Value = SkipReason> {
 fn junk() -> impl Strategy<Value = Record> {
     let number = || prop_oneof![0u64..5, Just(u64::MAX), Just(u64::MAX - 1)];
     let agent = || prop_oneof![0u32..4, Just(u32::MAX)].prop_map(AgentId);
-    // A huge number would leave nothing to come after it, so those go to agents that do little else.
+    // A huge number would leave nothing to come after it, so those go to agents that do little
+    // else.
     prop_oneof![
         2 => agent().prop_map(|agent| Record::Enrol { agent, name: label("late") }),
         2 => (agent(), 0u64..3, 0u64..200, 0i64..9, bodies())

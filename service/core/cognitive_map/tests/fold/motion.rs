@@ -144,9 +144,9 @@ fn well_calibrated() -> (CognitiveMap, Robot) {
     (map, robot)
 }
 
-/// Along a straight line of n steps δ with variances s²δ and r²δ per step: along it s² n δ; across it
-/// s² n δ + r²δ · δ² Σ j², as the turn of each step moves all later ones sideways. A robot that has only
-/// moved in its plane does not leave it.
+/// Along a straight line of n steps δ with variances s²δ and r²δ per step: along it s² n δ; across
+/// it s² n δ + r²δ · δ² Σ j², as the turn of each step moves all later ones sideways. A robot that
+/// has only moved in its plane does not leave it.
 #[test]
 fn uncertainty_grows_as_the_closed_form_says() {
     let (mut map, mut robot) = well_calibrated();

@@ -1,4 +1,5 @@
-//! Agents that are removed: what they did in the map stays, their names and what they never tied to it go.
+//! Agents that are removed: what they did in the map stays, their names and what they never tied to
+//! it go.
 
 use cognitive_map::{
     AgentId, CognitiveMap, Event, EventKind, PoseNoise, Record, Relation, RelativePose, SampleBody,
@@ -186,7 +187,8 @@ fn removed_agents_leave_room_in_the_joint_estimate() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Agents may come and go at any point of any journal: the map is sound, and goes on from a checkpoint like itself.
+    /// Agents may come and go at any point of any journal: the map is sound, and goes on from a
+    /// checkpoint like itself.
     #[test]
     fn a_map_whose_agents_come_and_go_is_restored(
         settings in any_settings(),

@@ -15,7 +15,7 @@ use super::load::raw_key;
 use cogmap::cli::duration::seconds;
 use cogmap::cli::{free_port, output};
 use cogmap::config::Config;
-use cogmap::engine::{AgentDesk, Space};
+use cogmap::engine::{AgentView, Space};
 use cogmap::metrics;
 use cogmap::service::Service;
 
@@ -211,7 +211,7 @@ impl Bench {
 pub(super) fn durable_of(space: &Space) -> u64 {
     space
         .agent("robot")
-        .map_or(0, |desk: Arc<AgentDesk>| desk.watermark().durable)
+        .map_or(0, |view: Arc<AgentView>| view.watermark().durable)
 }
 
 /// Rate of a count over the middle of a measurement: from when it moves, without the first tenth.

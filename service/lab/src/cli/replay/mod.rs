@@ -9,6 +9,7 @@ mod outcome;
 mod points;
 mod recorded;
 mod recorded_report;
+mod team_batch;
 mod touch;
 mod tuc;
 mod tuc_samples;

@@ -15,6 +15,7 @@ use trajectory::write_tum;
 
 use super::mrclam_report::report;
 use super::outcome::Outcome;
+use super::team_batch::TeamBatch;
 use super::{offline, online};
 use cogmap::cli::output;
 use cogmap::decode::stamped_pose;
@@ -67,13 +68,6 @@ pub(in crate::cli) struct MrclamArgs {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-}
-
-/// Consecutive samples of one robot, in the order in which the team sends.
-#[derive(Clone, Debug)]
-pub(super) struct TeamBatch {
-    pub(super) robot: String,
-    pub(super) samples: Vec<Sample>,
 }
 
 pub(super) fn run(args: &MrclamArgs) -> anyhow::Result<()> {

@@ -10,8 +10,8 @@ use nalgebra::Vector2;
 use serde::Serialize;
 use trajectory::{Alignment, Trajectory, ate_rmse_m};
 
-use super::mrclam::TeamBatch;
 use super::outcome::{Outcome, RobotOutcome, Timing};
+use super::team_batch::TeamBatch;
 use cogmap::cli::output;
 use cogmap::decode::stamped_pose;
 

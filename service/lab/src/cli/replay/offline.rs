@@ -6,12 +6,12 @@ use std::time::Instant;
 use cogmap_proto::{SampleBatch, SpaceSettings};
 use cognitive_map::{AgentId, CognitiveMap, Record};
 
-use super::mrclam::TeamBatch;
 use super::outcome::{Outcome, RobotOutcome, Timing};
-use cogmap::engine::{
-    Entry, Recorder, core_settings, evidence, records_of, refined_trajectories, stamped,
-    trajectory_interval_ns,
-};
+use super::team_batch::TeamBatch;
+use cogmap::decode::{core_settings, records_of, trajectory_interval_ns};
+use cogmap::encode::{evidence, stamped};
+use cogmap::engine::{Recorder, refined_trajectories};
+use cogmap::journal::Entry;
 
 /// Time between two beliefs that are kept \[ns\].
 const BELIEF_INTERVAL_NS: i64 = 1_000_000_000;
@@ -70,8 +70,9 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
     let mut refined = refined_trajectories(&map);
     let finish = |(name, mut robot): (&str, Robot)| {
         let rest = robot.recorder.rows();
-        robot.outcome.causal.extend_from_slice(rest);
-        robot.outcome.refined = refined.remove(name).unwrap_or_default();
+        robot.outcome.causal.extend(rest.iter().map(row));
+        let poses = refined.remove(name).unwrap_or_default();
+        robot.outcome.refined = poses.iter().map(row).collect();
         let agent = map.agent(AgentId(robot.agent));
         robot.outcome.evidence = agent.map(evidence).unwrap_or_default();
         (name.to_owned(), robot.outcome)
@@ -85,6 +86,11 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
         landmarks: map.landmark_count() as u64,
         timing: Timing::of(times_s),
     })
+}
+
+/// A row of a trajectory as a service answers it.
+fn row(row: &trajectory::StampedPose) -> cogmap_proto::StampedPose {
+    stamped(row.stamp_ns, &row.pose)
 }
 
 #[derive(Default)]
@@ -103,7 +109,7 @@ impl Robot {
             return;
         };
         if let Some(chunk) = self.recorder.note(record, agent, interval_ns) {
-            self.outcome.causal.extend(chunk.rows);
+            self.outcome.causal.extend(chunk.rows.iter().map(row));
         }
         let Some(stamp_ns) = agent.stamp_ns().filter(|_| agent.placed()) else {
             return;

@@ -13,8 +13,8 @@ use std::sync::mpsc::{Receiver, channel};
 use zenoh::qos::CongestionControl;
 use zenoh::{Session, Wait};
 
-use super::mrclam::TeamBatch;
 use super::outcome::{Outcome, RobotOutcome};
+use super::team_batch::TeamBatch;
 
 /// Bytes under way: so few of a robot wait at the service in the order in which they came, beside those
 /// of other robots. Of who sends more, the service takes some at a time.

@@ -10,9 +10,9 @@ use nalgebra::{Isometry3, Vector2};
 use serde::Serialize;
 use trajectory::{Alignment, Pairs, Span, Trajectory};
 
-use super::mrclam::TeamBatch;
 use super::offline;
 use super::outcome::{RobotOutcome, Timing};
+use super::team_batch::TeamBatch;
 use cogmap::cli::output;
 use cogmap::decode::stamped_pose;
 

@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::colour::{self, GRID, INK, PALE_INK, PAPER};
-use super::{Figure, FigureError};
+use super::picture::{Figure, FigureError};
 use crate::eval::experiment::Experiment;
 use crate::eval::quantity::Quantity;
 use crate::eval::statistic::quantile;

@@ -6,7 +6,7 @@ use plotters::prelude::*;
 
 use super::chart::{HEADER, SIZE, header};
 use super::colour::{GRID, INK, PALE_INK, PAPER, of_share};
-use super::{Figure, FigureError};
+use super::picture::{Figure, FigureError};
 use crate::eval::run::Path;
 
 /// Edge of a column in which visits are counted \[m\]: the field radius.

@@ -3,35 +3,18 @@
 mod chart;
 mod colour;
 mod heat;
+mod picture;
 
 use chart::{Chart, Line, Mark, YAxis};
 pub(crate) use chart::{HEADER, SIZE, header};
 pub(crate) use colour::{GRID, INK, LINES, PALE_INK};
+pub use picture::{Figure, FigureError};
 
 use super::experiment::Experiment;
 use super::protocol::PAPER_P_NEW;
 use super::quantity::Quantity;
 use super::report::Report;
 use super::table::conditions;
-
-/// A picture.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Figure {
-    /// Its name, fit for a file.
-    pub name: &'static str,
-    /// The picture as SVG.
-    pub svg: String,
-}
-
-/// A figure could not be drawn.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("draw {figure}: {reason}")]
-pub struct FigureError {
-    /// Its name.
-    pub figure: &'static str,
-    /// Why.
-    pub reason: String,
-}
 
 /// All figures of an experiment: the paper's Figs. 12 to 20 and the errors over time.
 ///

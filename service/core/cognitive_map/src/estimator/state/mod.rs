@@ -1,33 +1,38 @@
 //! The bytes of the estimate. What is read back goes on to the last bit as what was written.
 //!
-//! The parameters are constant and not written. Neither is what the latest call settled and merged: it
-//! does not influence the future.
+//! The parameters are constant and not written.
 
 mod lists;
 
 use std::sync::Arc;
 
+use nalgebra::Isometry3;
+
 use lists::{read_all, read_count, read_map, write_all, write_count, write_map, write_pairs};
 
-use super::alias::{ALIASES_MAX, Alias, Aliases};
+use super::agent_filter::{AgentFilter, BODY_DIM, Run};
+use super::agent_slot::{AgentSlot, AgentState, Detached};
+use super::associations::{Association, Associations};
 use super::covariance::JointCovariance;
-use super::dormant::{Dormant, DormantMarks, PART_MAX, PARTS};
-use super::frame::{Frame, MARK_DIM, MARKS_MAX, MEMBERS_MAX, Mark, Member};
-use super::history::{History, KEPT};
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
+use super::frame_match::FrameMatch;
 use super::joint::Estimator;
-use super::meeting::{MEETINGS_MAX, Meeting, PENDING_MAX, Pending};
-use super::mover::{BODY_DIM, Mover, Run};
-use super::observers::{OBSERVERS_MAX, Observers};
+use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::observers::Observers;
+use super::odometry_history::OdometryHistory;
 use super::outcome::Evidence;
 use super::parameters::Parameters;
-use super::resemblance::{RESEMBLANCES_MAX, Resemblance};
-use super::seat::{Apart, Seat, Traveller};
-use super::sensor::{Seen, Sensor, TARGETS_MAX};
+use super::sensor::{Sensor, SightingTarget};
+use super::sightings::{CrossFrameSighting, PendingSighting};
+use super::tuning::{
+    ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
+    HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, OBSERVERS_MAX, PENDING_MAX, SENSOR_TARGETS_MAX,
+};
 use ::state::PagedVec;
 use ::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 
 /// Most components of a joint covariance.
-const DIM_MAX: usize = MEMBERS_MAX * BODY_DIM + MARKS_MAX * MARK_DIM;
+const DIM_MAX: usize = MEMBERS_MAX * BODY_DIM + LANDMARKS_MAX * LANDMARK_DIM;
 /// Most agents of a space, against counts that no bytes can follow.
 const AGENTS_MAX: usize = 1 << 24;
 
@@ -44,10 +49,10 @@ state_of_struct!(Run {
     wander,
     steps
 });
-state_of_struct!(Mover {
+state_of_struct!(AgentFilter {
     pose,
     calibration,
-    settled,
+    at_run_start,
     tail,
     since_flush,
     is_stale,
@@ -55,43 +60,43 @@ state_of_struct!(Mover {
     history,
     is_planar
 });
-state_of_struct!(Traveller {
-    mover,
+state_of_struct!(AgentState {
+    filter,
     sensor,
     refused,
     doubt
 });
-state_of_struct!(Dormant {
+state_of_struct!(ArchivedLandmark {
     position,
     covariance,
     left,
     only
 });
 
-impl State for History {
+impl State for OdometryHistory {
     fn write(&self, out: &mut StateWriter) {
         write_all(self.instants.len(), &self.instants, out);
         self.latest.write(out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let instants = read_all(input, KEPT)?.into();
+        let instants = read_all(input, HISTORY_LEN)?.into();
         let latest = State::read(input)?;
         Ok(Self { instants, latest })
     }
 }
 
-impl State for Seen {
+impl State for SightingTarget {
     fn write(&self, out: &mut StateWriter) {
         match self {
-            Self::Mark(number) => (0u8, *number).write(out),
+            Self::Landmark(number) => (0u8, *number).write(out),
             Self::Agent(number) => (1u8, u64::from(*number)).write(out),
         }
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         match State::read(input)? {
-            (0u8, number) => Ok(Self::Mark(number)),
+            (0u8, number) => Ok(Self::Landmark(number)),
             (1u8, number) => u32::try_from(number)
                 .map(Self::Agent)
                 .map_err(|_| CorruptState::Invalid),
@@ -115,43 +120,21 @@ impl State for Sensor {
             counts: State::read(input)?,
             product: State::read(input)?,
             square: State::read(input)?,
-            latest: read_map(input, TARGETS_MAX)?,
+            latest: read_map(input, SENSOR_TARGETS_MAX)?,
         })
     }
 }
 
-impl State for Apart {
+impl State for Detached {
     fn write(&self, out: &mut StateWriter) {
         self.was_joint.write(out);
-        self.traveller.write(out);
+        self.state.write(out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         Ok(Self {
             was_joint: State::read(input)?,
-            traveller: Arc::new(State::read(input)?),
-        })
-    }
-}
-
-impl State for Seat {
-    fn write(&self, out: &mut StateWriter) {
-        write_count(self.frame, out);
-        self.in_odom.write(out);
-        self.stamp_ns.write(out);
-        self.evidence.write(out);
-        self.is_aside.write(out);
-        self.apart.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            frame: read_count(input, AGENTS_MAX)?,
-            in_odom: State::read(input)?,
-            stamp_ns: State::read(input)?,
-            evidence: State::read(input)?,
-            is_aside: State::read(input)?,
-            apart: State::read(input)?,
+            state: Arc::new(State::read(input)?),
         })
     }
 }
@@ -161,7 +144,7 @@ impl State for Member {
         self.agent.write(out);
         write_count(self.offset, out);
         self.used.write(out);
-        self.traveller.write(out);
+        self.state.write(out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
@@ -169,7 +152,7 @@ impl State for Member {
             agent: State::read(input)?,
             offset: read_count(input, DIM_MAX)?,
             used: State::read(input)?,
-            traveller: Arc::new(State::read(input)?),
+            state: Arc::new(State::read(input)?),
         })
     }
 }
@@ -190,7 +173,7 @@ impl State for Observers {
     }
 }
 
-impl State for Mark {
+impl State for LandmarkState {
     fn write(&self, out: &mut StateWriter) {
         self.number.write(out);
         self.position.write(out);
@@ -212,21 +195,21 @@ impl State for Mark {
     }
 }
 
-impl State for DormantMarks {
+impl State for LandmarkArchive {
     fn write(&self, out: &mut StateWriter) {
         write_pairs(self.len(), self.iter(), out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let mut marks = Self::default();
-        for _ in 0..read_count(input, PARTS * PART_MAX)? {
-            let (label, mark) = State::read(input)?;
+        let mut landmarks = Self::default();
+        for _ in 0..read_count(input, ARCHIVE_PARTS * ARCHIVE_PART_MAX)? {
+            let (label, landmark) = State::read(input)?;
             // In their own order, none twice, and none that drives out another.
-            if !marks.append(label, mark) {
+            if !landmarks.append(label, landmark) {
                 return Err(CorruptState::Invalid);
             }
         }
-        Ok(marks)
+        Ok(landmarks)
     }
 }
 
@@ -269,8 +252,8 @@ impl State for Frame {
     fn write(&self, out: &mut StateWriter) {
         self.population.write(out);
         write_all(self.members.len(), &self.members, out);
-        write_map(&self.marks, out);
-        self.dormant.write(out);
+        write_map(&self.landmarks, out);
+        self.archive.write(out);
         self.covariance.write(out);
         self.numbered.write(out);
         self.sightings.write(out);
@@ -280,16 +263,19 @@ impl State for Frame {
         let frame = Self {
             population: State::read(input)?,
             members: read_all(input, MEMBERS_MAX)?,
-            marks: Arc::new(read_map(input, MARKS_MAX)?),
-            dormant: State::read(input)?,
+            landmarks: Arc::new(read_map(input, LANDMARKS_MAX)?),
+            archive: State::read(input)?,
             covariance: State::read(input)?,
             numbered: State::read(input)?,
             sightings: State::read(input)?,
         };
         // Everybody has components of his own, and there are no others.
         let bodies = frame.members.iter().map(|member| (member.offset, BODY_DIM));
-        let marks = frame.marks.values().map(|mark| (mark.offset, MARK_DIM));
-        let mut parts: Vec<(usize, usize)> = bodies.chain(marks).collect();
+        let landmarks = frame
+            .landmarks
+            .values()
+            .map(|landmark| (landmark.offset, LANDMARK_DIM));
+        let mut parts: Vec<(usize, usize)> = bodies.chain(landmarks).collect();
         parts.sort_unstable();
         let end = parts.iter().try_fold(0, |end, &(offset, width)| {
             (offset == end).then_some(end + width)
@@ -302,14 +288,14 @@ impl State for Frame {
     }
 }
 
-state_of_struct!(Pending {
+state_of_struct!(PendingSighting {
     observer,
     target,
     stamp_ns,
     relation
 });
 
-impl State for Meeting {
+impl State for CrossFrameSighting {
     fn write(&self, out: &mut StateWriter) {
         let [from, to] = self.frames;
         write_count(from, out);
@@ -333,13 +319,13 @@ impl State for Meeting {
     }
 }
 
-impl State for Resemblance {
+impl State for FrameMatch {
     fn write(&self, out: &mut StateWriter) {
         let [older, newer] = self.frames;
         write_count(older, out);
         write_count(newer, out);
         self.pose.write(out);
-        self.looks.write(out);
+        self.n_found.write(out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
@@ -350,28 +336,31 @@ impl State for Resemblance {
         Ok(Self {
             frames,
             pose: State::read(input)?,
-            looks: State::read(input)?,
+            n_found: State::read(input)?,
         })
     }
 }
 
-state_of_struct!(Alias { name, refused });
+state_of_struct!(Association { name, refused });
 
 impl State for Estimator {
     fn write(&self, out: &mut StateWriter) {
-        write_all(self.seats.len(), self.seats.iter(), out);
+        write_count(self.slots.len(), out);
+        for (slot, agent) in self.slots.iter().zip(0..) {
+            self.write_slot(agent, slot, out);
+        }
         write_all(self.frames.len(), self.frames.iter(), out);
         write_all(self.pending.len(), &self.pending, out);
-        write_all(self.meetings.len(), &self.meetings, out);
+        write_all(self.cross_sightings.len(), &self.cross_sightings, out);
         write_count(self.turn, out);
-        write_all(self.resemblances.len(), &self.resemblances, out);
-        write_map(&self.aliases.names, out);
+        write_all(self.frame_matches.len(), &self.frame_matches, out);
+        write_map(&self.associations.names, out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let mut seats = PagedVec::default();
+        let mut slots = PagedVec::default();
         for _ in 0..read_count(input, AGENTS_MAX)? {
-            seats.push(Seat::read(input)?, 0);
+            slots.push(read_slot(input)?, 0);
         }
         let mut frames = PagedVec::default();
         for _ in 0..read_count(input, AGENTS_MAX + 1)? {
@@ -380,18 +369,14 @@ impl State for Estimator {
         let estimator = Self {
             parameters: Parameters::default(),
             frames,
-            seats,
+            slots,
             pending: read_all(input, PENDING_MAX)?,
-            meetings: read_all(input, MEETINGS_MAX)?,
+            cross_sightings: read_all(input, CROSS_SIGHTINGS_MAX)?,
             turn: read_count(input, AGENTS_MAX)?,
-            resemblances: read_all(input, RESEMBLANCES_MAX)?,
-            aliases: Aliases {
-                names: Arc::new(read_map(input, ALIASES_MAX)?),
+            frame_matches: read_all(input, FRAME_MATCHES_MAX)?,
+            associations: Associations {
+                names: Arc::new(read_map(input, ASSOCIATIONS_MAX)?),
             },
-            settled: Vec::new(),
-            merged: Vec::new(),
-            same: Vec::new(),
-            set_aside: Vec::new(),
         };
         if estimator.is_sound() {
             Ok(estimator)
@@ -401,21 +386,46 @@ impl State for Estimator {
     }
 }
 
+/// Reads a slot. The odometry in it repeats the history of the agent's filter, which is read with
+/// that; a checkpoint where the two differ has another digest.
+fn read_slot(input: &mut StateReader<'_>) -> Result<AgentSlot, CorruptState> {
+    let frame = read_count(input, AGENTS_MAX)?;
+    let _: (Isometry3<f64>, Option<i64>) = State::read(input)?;
+    Ok(AgentSlot {
+        frame,
+        evidence: State::read(input)?,
+        is_aside: State::read(input)?,
+        detached: State::read(input)?,
+    })
+}
+
 impl Estimator {
-    /// Whether seats, frames and what waits belong together.
+    /// Writes a slot, with the pose and the stamp of the agent's latest odometry.
+    fn write_slot(&self, agent: u32, slot: &AgentSlot, out: &mut StateWriter) {
+        let history = self.filter(agent).map(|filter| &filter.history);
+        let pose = history.map_or_else(Isometry3::identity, OdometryHistory::pose);
+        write_count(slot.frame, out);
+        pose.write(out);
+        history.and_then(OdometryHistory::stamp_ns).write(out);
+        slot.evidence.write(out);
+        slot.is_aside.write(out);
+        slot.detached.write(out);
+    }
+
+    /// Whether slots, frames and what waits belong together.
     fn is_sound(&self) -> bool {
-        let (seats, frames) = (self.seats.len(), self.frames.len());
-        let is_seat = |agent: u32| (agent as usize) < seats;
+        let (slots, frames) = (self.slots.len(), self.frames.len());
+        let is_slot = |agent: u32| (agent as usize) < slots;
         // How many agents each frame has, and how many of them take part.
         let mut agents = vec![(0u32, 0usize); frames];
-        for (seat, agent) in self.seats.iter().zip(0..) {
-            let Some(count) = agents.get_mut(seat.frame) else {
+        for (slot, agent) in self.slots.iter().zip(0..) {
+            let Some(count) = agents.get_mut(slot.frame) else {
                 return false;
             };
             count.0 += 1;
-            if seat.apart.is_none() {
+            if slot.detached.is_none() {
                 count.1 += 1;
-                if self.frame(seat.frame).member(agent).is_none() {
+                if self.frame(slot.frame).member(agent).is_none() {
                     return false;
                 }
             }
@@ -424,17 +434,19 @@ impl Estimator {
             frame.population == population && frame.members.len() == members
         };
         let mut pending = self.pending.iter();
-        let mut meetings = self.meetings.iter();
-        let mut resemblances = self.resemblances.iter();
-        let names = &self.aliases.names;
-        frames == seats + 1
+        let mut cross_sightings = self.cross_sightings.iter();
+        let mut frame_matches = self.frame_matches.iter();
+        let names = &self.associations.names;
+        frames == slots + 1
             && self.frames.iter().zip(&agents).all(is_whole)
             && pending.all(|one| {
-                is_seat(one.observer) && is_seat(one.target) && one.observer != one.target
+                is_slot(one.observer) && is_slot(one.target) && one.observer != one.target
             })
-            && meetings.all(|one| one.frames.iter().all(|&frame| frame < frames))
-            && resemblances.all(|one| one.frames[0] < one.frames[1] && one.frames[1] < frames)
-            && names.values().all(|alias| !names.contains_key(&alias.name))
+            && cross_sightings.all(|one| one.frames.iter().all(|&frame| frame < frames))
+            && frame_matches.all(|one| one.frames[0] < one.frames[1] && one.frames[1] < frames)
+            && names
+                .values()
+                .all(|association| !names.contains_key(&association.name))
     }
 }
 

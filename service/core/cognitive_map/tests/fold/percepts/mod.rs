@@ -321,8 +321,8 @@ fn a_percept_and_a_position_multiply() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Any number of places, of percepts for each and of numbers in a descriptor, also such that are
-    /// no multiple of anything.
+    /// Any number of places, of percepts for each and of numbers in a descriptor, also such that
+    /// are no multiple of anything.
     #[test]
     fn search_equals_a_plain_scan(
         views in prop::collection::vec(prop::collection::vec(-1.0..1.0f32, 700), 1..12),

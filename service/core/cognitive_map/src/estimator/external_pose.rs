@@ -1,0 +1,165 @@
+//! Fusion of an external pose: one stated by another estimate, which may rest on the same samples.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix6, SMatrix, Vector6};
+
+use super::covariance::Block;
+use super::effect::Effect;
+use super::frame::Frame;
+use super::joint::Estimator;
+use super::parameters::Parameters;
+use super::tuning::{
+    INTERSECTION_GAIN_MAX, INTERSECTION_GAIN_MIN, INTERSECTION_STEPS, INTERSECTION_VARIANCE_MIN,
+};
+use geometry::{PoseCovariance, is_somewhere, se3, symmetric};
+
+impl Estimator {
+    /// Takes in what an outside estimate says of an agent's pose in its frame, with the covariance
+    /// of its error (right perturbation); answers whether it counts. One that lies too far off does
+    /// not.
+    ///
+    /// How its error is correlated with that of the present estimate is not known: both may rest
+    /// upon the same samples. The pose becomes the covariance intersection (Julier & Uhlmann 1997)
+    /// of the two, and everything correlated with it follows; to say the same twice adds nothing.
+    pub fn fuse_pose(
+        &mut self,
+        agent: u32,
+        pose: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+        effects: &mut Vec<Effect>,
+    ) -> bool {
+        let Some(number) = self.frame_of(agent) else {
+            return false;
+        };
+        if !is_somewhere(&pose.translation.vector) {
+            return false;
+        }
+        let external = ExternalPose { pose, covariance };
+        if let Some(detached) = &mut self.slot_mut(agent).detached {
+            let state = Arc::clone(&detached.state);
+            let mut alone = Frame::default();
+            alone.join(agent, state);
+            let is_taken = alone.fuse_pose(0, &external, &self.parameters);
+            if let Some(state) = alone.leave(agent)
+                && is_taken
+                && let Some(detached) = &mut self.slot_mut(agent).detached
+            {
+                detached.state = state;
+                // The outside estimate may rest upon what the others saw.
+                detached.was_joint = true;
+            }
+            return is_taken;
+        }
+        let Some(frame) = self.frames.get_mut(number, 0) else {
+            return false;
+        };
+        let is_taken = frame
+            .member(agent)
+            .is_some_and(|index| frame.fuse_pose(index, &external, &self.parameters));
+        self.sweep(number, effects);
+        is_taken
+    }
+}
+
+/// A pose that another estimate states.
+struct ExternalPose<'a> {
+    pose: &'a Isometry3<f64>,
+    covariance: &'a PoseCovariance,
+}
+
+impl Frame {
+    /// Fuses an external pose of a member; answers whether it was accepted.
+    ///
+    /// With the member's own P and the external Σ, in units of the own deviations, and the
+    /// innovation ν:
+    ///
+    /// ```text
+    /// ω of the largest det(ω P⁻¹ + (1 − ω) Σ⁻¹)      G = (1 − ω) (Σ⁻¹ − P⁻¹) = V Λ Vᵀ
+    /// a measurement Vᵀ ξ = Λ⁻¹ Vᵀ (1 − ω) Σ⁻¹ ν of covariance Λ⁻¹, where Λ is large enough
+    /// ```
+    fn fuse_pose(
+        &mut self,
+        index: usize,
+        external: &ExternalPose<'_>,
+        parameters: &Parameters,
+    ) -> bool {
+        self.flush();
+        let member = &self.members[index];
+        let filter = member.filter();
+        let own: Matrix6<f64> = filter.covariance().fixed_view::<6, 6>(0, 0).into_owned();
+        let (linear, angular) = se3::log(&filter.pose.inv_mul(external.pose));
+        let innovation = Vector6::from_fn(|k, _| if k < 3 { linear[k] } else { angular[k - 3] });
+        // What is known without error is left alone, e.g. the height of a robot on a floor.
+        let scale = own.diagonal().map(|variance| {
+            let is_open = variance.is_normal() && variance > 0.0;
+            if is_open {
+                variance.sqrt().recip()
+            } else {
+                0.0
+            }
+        });
+        let unit = |matrix: &Matrix6<f64>, floor: f64| {
+            Matrix6::from_fn(|row, column| {
+                let entry = matrix[(row, column)] * scale[row] * scale[column];
+                match (row == column, scale[row] == 0.0) {
+                    (true, true) => 1.0,
+                    (true, false) => entry + floor,
+                    _ => entry,
+                }
+            })
+        };
+        let (own, others) = (
+            unit(&own, INTERSECTION_VARIANCE_MIN),
+            unit(external.covariance.matrix(), INTERSECTION_VARIANCE_MIN),
+        );
+        let innovation = innovation.component_mul(&scale);
+        // Of two errors that may be correlated in any way, the variances' sum counts twice.
+        let is_near = (0..6).all(|k| {
+            let expected = 2.0 * (own[(k, k)] + others[(k, k)]);
+            innovation[k].powi(2) <= parameters.gate.powi(2) * expected
+        });
+        let inverses = own.cholesky().zip(others.cholesky());
+        let Some((own, others)) = inverses.map(|(own, others)| (own.inverse(), others.inverse()))
+        else {
+            return false;
+        };
+        let weights =
+            (0..=INTERSECTION_STEPS).map(|step| f64::from(step) / f64::from(INTERSECTION_STEPS));
+        let known = |weight: f64| (own * weight + others * (1.0 - weight)).determinant();
+        // Of equal ones the last, so that what adds nothing moves nothing.
+        let weight = weights.max_by(|a, b| known(*a).total_cmp(&known(*b)));
+        let share = 1.0 - weight.unwrap_or(1.0);
+        let gain = (others - own) * share;
+        let gain = symmetric(&gain);
+        if !is_near || !gain.iter().all(|entry| entry.is_finite()) {
+            return false;
+        }
+        let gain = gain.symmetric_eigen();
+        let axes = gain.eigenvectors.transpose();
+        let pull = axes * others * innovation * share;
+        let mut jacobian = axes * Matrix6::from_diagonal(&scale);
+        let mut residual = Vector6::zeros();
+        let mut variance = Vector6::repeat(1.0);
+        for (k, &information) in gain.eigenvalues.iter().enumerate() {
+            if information < INTERSECTION_GAIN_MIN {
+                jacobian.row_mut(k).fill(0.0);
+            } else {
+                residual[k] = pull[k] / information;
+                variance[k] = 1.0 / information.min(INTERSECTION_GAIN_MAX);
+            }
+        }
+        let block = Block {
+            offset: member.offset,
+            width: 6,
+            jacobian,
+        };
+        let projection = self.covariance.project(&[block]);
+        let s = projection.spread + SMatrix::from_diagonal(&variance);
+        let all = self.covariance.all();
+        if let Some(correction) = self.covariance.update(projection, &residual, &s, &all) {
+            self.correct(index, &correction, parameters);
+        }
+        true
+    }
+}

@@ -1,0 +1,203 @@
+//! Merging of a frame into another one: members, landmarks, covariance.
+
+use std::collections::btree_map::Entry;
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use super::covariance::Block;
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState};
+use super::frame_alignment::{FrameAlignment, PointPair, point_by_alignment, pose_by_alignment};
+use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::measurement_update::point_block;
+use super::parameters::Parameters;
+use super::tuning::SAME_LANDMARK_VARIANCE_M2;
+use crate::input::Label;
+use geometry::symmetric;
+
+impl Frame {
+    /// The landmarks known in both frames.
+    pub(super) fn shared(&self, newer: &Self) -> Vec<PointPair> {
+        let pair = |(label, landmark): (&Label, &LandmarkState)| {
+            let other = newer.landmarks.get(label)?;
+            let spread = self.landmark_covariance(landmark).trace()
+                + newer.landmark_covariance(other).trace();
+            let variance = spread / 3.0 + SAME_LANDMARK_VARIANCE_M2;
+            Some(PointPair {
+                older: landmark.position,
+                newer: other.position,
+                variance,
+            })
+        };
+        self.landmarks.iter().filter_map(pair).collect()
+    }
+
+    /// A landmark is called by another name, which is not known here.
+    pub(super) fn rename(&mut self, from: &Label, to: &Label) {
+        if self.landmarks.contains_key(from) {
+            let landmarks = Arc::make_mut(&mut self.landmarks);
+            if let Some(landmark) = landmarks.remove(from) {
+                landmarks.insert(to.clone(), landmark);
+            }
+        }
+        if let Some(landmark) = self.archive.remove(from) {
+            self.archive.insert(to.clone(), landmark);
+        }
+    }
+
+    /// Merges a newer frame into this one. Landmarks known in both become one.
+    ///
+    /// With the newer frame's pose T in this one, whose error is τ, a body's error gains `Ad(T_b⁻¹)
+    /// τ` and a landmark's error δ becomes R (δ + ρ − l × φ). The landmarks known in both then say
+    /// how T really lies, so that its covariance need only be wide.
+    pub(super) fn merge(
+        &mut self,
+        newer: Self,
+        alignment: &FrameAlignment,
+        parameters: &Parameters,
+    ) {
+        self.merge_with_parameters(newer, alignment, Some(parameters));
+    }
+
+    /// The same for a newer frame whose agents are doubted: landmarks known in both stay as they
+    /// are here.
+    pub(super) fn merge_doubted(&mut self, newer: Self, alignment: &FrameAlignment) {
+        self.merge_with_parameters(newer, alignment, None);
+    }
+
+    /// Merges a newer frame into this one. With parameters, the landmarks known in both are
+    /// equated.
+    fn merge_with_parameters(
+        &mut self,
+        mut newer: Self,
+        alignment: &FrameAlignment,
+        parameters: Option<&Parameters>,
+    ) {
+        self.flush();
+        newer.flush();
+        let start = self.covariance.grow(newer.covariance.dim());
+        self.covariance.place(start, &newer.covariance);
+        let tau = self.covariance.grow(6);
+        self.covariance
+            .set_diagonal::<6>(tau, &alignment.covariance);
+        let rotation = alignment.pose.rotation.to_rotation_matrix().into_inner();
+        let newcomers = self.members.len();
+        for mut member in std::mem::take(&mut newer.members) {
+            member.offset += start;
+            member.used = self.sightings;
+            let by_alignment = pose_by_alignment(&member.filter().pose);
+            self.covariance.add(member.offset, 6, tau, &by_alignment);
+            let state = member.state_mut();
+            state.filter.pose = alignment.pose * state.filter.pose;
+            // Numbers of landmarks change.
+            state.sensor.latest.clear();
+            self.members.push(member);
+        }
+        let mut duplicates = Vec::new();
+        let landmarks = Arc::make_mut(&mut self.landmarks);
+        for (label, mut landmark) in Arc::unwrap_or_clone(newer.landmarks) {
+            landmark.offset += start;
+            let by_alignment = point_by_alignment(&landmark.position);
+            self.covariance.add(landmark.offset, 3, tau, &by_alignment);
+            let own = self
+                .covariance
+                .block::<3, 3>(landmark.offset, landmark.offset);
+            let turned = rotation * own * rotation.transpose();
+            let turned = symmetric(&turned);
+            self.covariance
+                .transform::<3>(landmark.offset, &rotation, &turned);
+            landmark.position = alignment.pose * landmark.position;
+            landmark.used = self.sightings;
+            landmark.number = self.numbered;
+            self.numbered += 1;
+            match landmarks.entry(label) {
+                Entry::Occupied(entry) => duplicates.push((entry.key().clone(), landmark)),
+                Entry::Vacant(entry) => {
+                    entry.insert(landmark);
+                }
+            }
+        }
+        for member in &mut self.members[newcomers..] {
+            let own = self.covariance.block(member.offset, member.offset);
+            *member.state_mut().filter.covariance_mut() = own;
+        }
+        if let Some(parameters) = parameters {
+            for index in 0..duplicates.len() {
+                self.equate(&mut duplicates, index, parameters);
+            }
+        }
+        // From the end, so that the offsets of the others stay as they are.
+        duplicates.sort_by_key(|(_, duplicate)| std::cmp::Reverse(duplicate.offset));
+        self.drop_components(tau, 6);
+        for (_, duplicate) in duplicates {
+            self.drop_components(duplicate.offset, LANDMARK_DIM);
+        }
+        self.take_over(&newer.archive, alignment);
+        self.population += newer.population;
+        self.make_room();
+    }
+
+    /// Archives the archived landmarks of a newer frame here, unless they are known here.
+    fn take_over(&mut self, newer: &LandmarkArchive, alignment: &FrameAlignment) {
+        let rotation = alignment.pose.rotation.to_rotation_matrix().into_inner();
+        for (label, landmark) in newer.iter() {
+            if self.landmarks.contains_key(label) || self.archive.contains(label) {
+                continue;
+            }
+            let by_alignment: SMatrix<f64, 3, 6> = point_by_alignment(&landmark.position)
+                .fixed_view::<3, 6>(0, 0)
+                .into_owned();
+            let spread = landmark.covariance
+                + by_alignment * alignment.covariance * by_alignment.transpose();
+            let archived = ArchivedLandmark {
+                position: alignment.pose * landmark.position,
+                covariance: symmetric(&(rotation * spread * rotation.transpose())),
+                left: self.sightings,
+                only: landmark.only,
+            };
+            self.archive.insert(label.clone(), archived);
+        }
+    }
+
+    /// Two landmarks are one.
+    pub(super) fn equate(
+        &mut self,
+        duplicates: &mut [(Label, LandmarkState)],
+        index: usize,
+        parameters: &Parameters,
+    ) {
+        if self.members.is_empty() {
+            return; // errors are counted relative to the rotation of a member
+        }
+        let (label, other) = &duplicates[index];
+        if let Some(one) = Arc::make_mut(&mut self.landmarks).get_mut(label) {
+            one.observers.join(&other.observers);
+        }
+        let Some(one) = self.landmarks.get(label) else {
+            return;
+        };
+        let blocks: [Block<3>; 2] = [
+            point_block(one.offset, &Matrix3::identity()),
+            point_block(other.offset, &-Matrix3::identity()),
+        ];
+        let innovation = other.position - one.position;
+        let projection = self.covariance.project(&blocks);
+        let mut variance = SMatrix::<f64, 3, 1>::repeat(SAME_LANDMARK_VARIANCE_M2);
+        for k in 0..3 {
+            let expected = projection.spread[(k, k)] + variance[k];
+            let square = innovation[k] * innovation[k] / expected;
+            // A contradiction counts little: the points do not agree, or the label is not one
+            // landmark's.
+            variance[k] += expected * (square / parameters.soft.powi(2) - 1.0).max(0.0);
+        }
+        let s = projection.spread + Matrix3::from_diagonal(&variance);
+        let all = self.covariance.all();
+        if let Some(correction) = self.covariance.update(projection, &innovation, &s, &all) {
+            let arc = self.correct(0, &correction, parameters);
+            for (_, duplicate) in duplicates {
+                duplicate.position +=
+                    arc * Vector3::from_fn(|k, _| correction[duplicate.offset + k]);
+            }
+        }
+    }
+}

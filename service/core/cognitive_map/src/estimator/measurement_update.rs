@@ -1,0 +1,420 @@
+//! Measurement update of a frame by a sighting.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
+
+use super::agent_slot::AgentState;
+use super::covariance::Block;
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member, point_by_pose};
+use super::innovation::{PointInnovation, pose_innovation, seen_at};
+use super::landmark_archive::ArchivedLandmark;
+use super::observers::Observers;
+use super::parameters::Parameters;
+use super::sensor::SightingTarget;
+use super::tuning::{
+    ARCHIVE_GAIN_MIN_M2, ARCHIVE_GATE, REFUSED_TO_FORGET, REFUSED_TO_WIDEN, WIDENED_SD,
+};
+use super::verdict::{Outcome, Verdict};
+use crate::input::{Label, Relation, RelativePose};
+use geometry::{se3, symmetric};
+
+/// A sighting of a frame's member: who, how it moved since, when, and what it saw.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measurement<'a> {
+    /// Index of the observer among the members.
+    pub(super) observer: usize,
+    /// The observer's motion since then.
+    pub(super) back: &'a Isometry3<f64>,
+    pub(super) stamp_ns: i64,
+    pub(super) relation: &'a Relation,
+    pub(super) parameters: &'a Parameters,
+}
+
+impl Frame {
+    /// A landmark was seen.
+    pub(super) fn update_by_landmark(
+        &mut self,
+        measurement: &Measurement<'_>,
+        label: &Label,
+    ) -> Outcome {
+        self.flush();
+        let past = PastPose::new(&self.members[measurement.observer], measurement.back);
+        let Some(landmark) = self.landmarks.get(label) else {
+            return self.initialise_landmark(measurement, label);
+        };
+        let expected = past.pose.inverse_transform_point(&landmark.position).coords;
+        let Some(innovation) = PointInnovation::new(measurement.relation, &expected) else {
+            return Outcome::nothing();
+        };
+        let to_body = past
+            .pose
+            .rotation
+            .to_rotation_matrix()
+            .into_inner()
+            .transpose();
+        let blocks = [
+            past.block(&(innovation.by_point * point_by_pose(&expected))),
+            point_block(landmark.offset, &(innovation.by_point * to_body)),
+        ];
+        let seen = SightingTarget::Landmark(landmark.number);
+        let scope = CorrectionScope {
+            corrected: self.corrected_by(measurement.observer),
+            counts: true,
+        };
+        let outcome = self.update_by_point(measurement, &blocks, &innovation, seen, &scope);
+        let observer_refused = self.members[measurement.observer].state.refused;
+        let sightings = self.sightings;
+        let agent = self.members[measurement.observer].agent;
+        let is_doubted = self.members[measurement.observer].state.is_doubted();
+        if let Some(landmark) = Arc::make_mut(&mut self.landmarks).get_mut(label) {
+            landmark.used = sightings;
+            // Who is doubted speaks neither against a landmark nor for it.
+            if outcome.verdict != Verdict::Refused {
+                landmark.observers.note(agent);
+            }
+            if !is_doubted {
+                let is_refused = outcome.verdict == Verdict::Refused;
+                landmark.refused = if is_refused { landmark.refused + 1 } else { 0 };
+            }
+            // Of an agent that contradicts everything, the landmark is not to blame.
+            if landmark.refused >= REFUSED_TO_FORGET && observer_refused < REFUSED_TO_WIDEN / 2 {
+                self.forget(label);
+            }
+        }
+        self.widen_if_refused(measurement.observer);
+        outcome
+    }
+
+    /// Another member was seen, which has moved by `back` since.
+    pub(super) fn update_by_member(
+        &mut self,
+        measurement: &Measurement<'_>,
+        target: usize,
+        back: &Isometry3<f64>,
+    ) -> Outcome {
+        self.flush();
+        let past = PastPose::new(&self.members[measurement.observer], measurement.back);
+        let other = PastPose::new(&self.members[target], back);
+        let (corrected, counts) = self.corrected_between(measurement.observer, target);
+        let scope = CorrectionScope { corrected, counts };
+        let outcome = if let Relation::Pose(seen) = measurement.relation {
+            self.update_by_pose(measurement, [&past, &other], seen, &scope)
+        } else {
+            let expected = past.pose.inv_mul(&other.pose).translation.vector;
+            let Some(innovation) = PointInnovation::new(measurement.relation, &expected) else {
+                return Outcome::nothing();
+            };
+            let relative = past.pose.rotation.inverse() * other.pose.rotation;
+            let turn = relative.to_rotation_matrix().into_inner();
+            let mut by_target = SMatrix::<f64, 3, 6>::zeros();
+            by_target
+                .fixed_view_mut::<3, 3>(0, 0)
+                .copy_from(&(innovation.by_point * turn));
+            let blocks = [
+                past.block(&(innovation.by_point * point_by_pose(&expected))),
+                other.block(&by_target),
+            ];
+            let seen = SightingTarget::Agent(self.members[target].agent);
+            self.update_by_point(measurement, &blocks, &innovation, seen, &scope)
+        };
+        self.widen_if_refused(measurement.observer);
+        outcome
+    }
+
+    /// A landmark that is not among those estimated jointly.
+    fn initialise_landmark(&mut self, measurement: &Measurement<'_>, label: &Label) -> Outcome {
+        self.make_room();
+        if self.members[measurement.observer].state.is_doubted()
+            && let Some(archived) = self.archive.remove(label)
+        {
+            // A doubted observer corrects itself by the archived estimate.
+            self.restore(label, &archived);
+            return self.update_by_landmark(measurement, label);
+        }
+        let member = &self.members[measurement.observer];
+        let past = PastPose::new(member, measurement.back);
+        let (point, stated) = seen_at(measurement.relation);
+        let mut variance = Vector6::zeros();
+        let noise = PointInnovation::new(measurement.relation, &point).and_then(|innovation| {
+            let sensor = &member.state.sensor;
+            let components = sensor.variance(&innovation, measurement.parameters);
+            variance.fixed_rows_mut::<3>(0).copy_from(&components);
+            let inverse = innovation.by_point.try_inverse()?;
+            Some(inverse * Matrix3::from_diagonal(&components) * inverse.transpose())
+        });
+        let world = past.pose.rotation.to_rotation_matrix().into_inner();
+        let noise = world * noise.unwrap_or(stated) * world.transpose();
+        let by_pose = -(world * point_by_pose(&point));
+        let offset = self
+            .covariance
+            .append(&[past.block(&by_pose)], &symmetric(&noise));
+        // The observers of an archived landmark are not known any more.
+        let mut observers = if self.archive.contains(label) {
+            Observers::unknown()
+        } else {
+            Observers::default()
+        };
+        observers.note(self.members[measurement.observer].agent);
+        let landmark = LandmarkState {
+            number: self.numbered,
+            position: past.pose * Point3::from(point),
+            offset,
+            used: self.sightings,
+            refused: 0,
+            observers,
+        };
+        self.numbered += 1;
+        Arc::make_mut(&mut self.landmarks).insert(label.clone(), landmark);
+        let verdict = match self.archive.remove(label) {
+            None => Verdict::Learned,
+            Some(archived) => self.fuse_archived(measurement, offset, &archived),
+        };
+        Outcome { verdict, variance }
+    }
+
+    /// Restores an archived landmark with its own covariance, correlated with nothing.
+    fn restore(&mut self, label: &Label, archived: &ArchivedLandmark) {
+        let offset = self.covariance.grow(LANDMARK_DIM);
+        self.covariance.set_diagonal(offset, &archived.covariance);
+        let mut observers = Observers::default();
+        match archived.only {
+            Some(agent) => observers.note(agent),
+            None => observers = Observers::unknown(),
+        }
+        let landmark = LandmarkState {
+            number: self.numbered,
+            position: archived.position,
+            offset,
+            used: self.sightings,
+            refused: 0,
+            observers,
+        };
+        self.numbered += 1;
+        Arc::make_mut(&mut self.landmarks).insert(label.clone(), landmark);
+    }
+
+    /// A landmark came back whose earlier estimate may be correlated with everything.
+    ///
+    /// Its own estimate becomes the covariance intersection (Julier & Uhlmann 1997) of the new and
+    /// the old one, with the weight ½; what it gains by that is passed on to the rest:
+    ///
+    /// ```text
+    /// R⁻¹ = ½ (Σ_old⁻¹ − Σ_new⁻¹), as far as that is positive
+    /// ```
+    fn fuse_archived(
+        &mut self,
+        measurement: &Measurement<'_>,
+        offset: usize,
+        archived: &ArchivedLandmark,
+    ) -> Verdict {
+        let accepted = Verdict::Accepted {
+            nis: 0.0,
+            components: 0,
+        };
+        let own: Matrix3<f64> = self.covariance.block(offset, offset);
+        let inverses = own.try_inverse().zip(archived.covariance.try_inverse());
+        let Some((own_information, old_information)) = inverses else {
+            return accepted;
+        };
+        let gain = symmetric(&((old_information - own_information) * 0.5));
+        if !gain.iter().all(|entry| entry.is_finite()) {
+            return accepted; // of such a matrix the search for eigenvalues need not end
+        }
+        let gain = gain.symmetric_eigen();
+        let variances = gain.eigenvalues.map(|information| {
+            1.0 / information.clamp(ARCHIVE_GAIN_MIN_M2, 1.0 / ARCHIVE_GAIN_MIN_M2)
+        });
+        let axes = gain.eigenvectors;
+        let block = point_block(offset, &axes.transpose());
+        let projection = self.covariance.project(&[block]);
+        let here = self
+            .landmarks
+            .values()
+            .find(|landmark| landmark.offset == offset);
+        let Some(here) = here.map(|landmark| landmark.position) else {
+            return accepted;
+        };
+        let innovation = axes.transpose() * (archived.position - here);
+        let spread = projection.spread;
+        let far = (0..3).any(|k| {
+            let expected = spread[(k, k)] + 2.0 * archived.covariance.trace();
+            innovation[k] * innovation[k] > ARCHIVE_GATE * ARCHIVE_GATE * expected
+        });
+        if far {
+            return Verdict::Refused;
+        }
+        let s = spread + Matrix3::from_diagonal(&variances);
+        let all = self.covariance.all();
+        if let Some(correction) = self.covariance.update(projection, &innovation, &s, &all) {
+            self.correct(measurement.observer, &correction, measurement.parameters);
+        }
+        accepted
+    }
+
+    /// Weighs an innovation and takes it in.
+    fn update_by_point(
+        &mut self,
+        measurement: &Measurement<'_>,
+        blocks: &[Block<3>],
+        innovation: &PointInnovation,
+        seen: SightingTarget,
+        scope: &CorrectionScope,
+    ) -> Outcome {
+        let parameters = measurement.parameters;
+        let projection = self.covariance.project(blocks);
+        let member = self.members[measurement.observer].state_mut();
+        let mut variance = member.sensor.variance(innovation, parameters);
+        let mut outcome = Outcome::nothing();
+        outcome.variance.fixed_rows_mut::<3>(0).copy_from(&variance);
+        let spread = projection.spread.diagonal();
+        let squares = innovation
+            .residual
+            .component_mul(&innovation.residual)
+            .component_div(&(spread + variance));
+        // A square that is not a number is refused, too.
+        if !squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.gate)
+        {
+            scope.weigh(member, true, false);
+            return outcome;
+        }
+        let fits = squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.soft);
+        scope.weigh(member, false, fits);
+        member
+            .sensor
+            .note(seen, measurement.stamp_ns, innovation, &spread, &variance);
+        // A planar robot's elevations are no measurements.
+        let is_flat =
+            member.filter.is_planar && innovation.is_polar && innovation.residual[2] == 0.0;
+        let components: usize = if is_flat { 2 } else { 3 };
+        let nis = squares.iter().take(components).sum();
+        for (variance, square) in variance.iter_mut().zip(squares.iter()) {
+            *variance *= (square / parameters.soft.powi(2)).max(1.0);
+        }
+        let s = projection.spread + Matrix3::from_diagonal(&variance);
+        let (joint, corrected) = (&mut self.covariance, &scope.corrected);
+        let update = joint.update(projection, &innovation.residual, &s, corrected);
+        if let Some(correction) = update {
+            self.correct(measurement.observer, &correction, parameters);
+        }
+        let components = if is_flat { 2 } else { 3 };
+        outcome.verdict = Verdict::Accepted { nis, components };
+        outcome
+    }
+
+    /// A full pose of another member was seen.
+    fn update_by_pose(
+        &mut self,
+        measurement: &Measurement<'_>,
+        [past, other]: [&PastPose; 2],
+        seen: &RelativePose,
+        scope: &CorrectionScope,
+    ) -> Outcome {
+        let (residual, by_observer, by_target, variance) =
+            pose_innovation(seen, &past.pose, &other.pose);
+        let blocks = [past.block(&by_observer), other.block(&by_target)];
+        let projection = self.covariance.project(&blocks);
+        let spread: SVector<f64, 6> = projection.spread.diagonal();
+        let squares = residual
+            .component_mul(&residual)
+            .component_div(&(spread + variance));
+        let parameters = measurement.parameters;
+        let member = self.members[measurement.observer].state_mut();
+        let mut outcome = Outcome {
+            verdict: Verdict::Refused,
+            variance,
+        };
+        if !squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.gate)
+        {
+            scope.weigh(member, true, false);
+            return outcome;
+        }
+        let fits = squares
+            .iter()
+            .all(|square| square.sqrt() <= parameters.soft);
+        scope.weigh(member, false, fits);
+        let factors = squares.map(|square| (square / parameters.soft.powi(2)).max(1.0));
+        let weighted = variance.component_mul(&factors);
+        let s = projection.spread + SMatrix::from_diagonal(&weighted);
+        let (joint, corrected) = (&mut self.covariance, &scope.corrected);
+        let update = joint.update(projection, &residual, &s, corrected);
+        if let Some(correction) = update {
+            self.correct(measurement.observer, &correction, parameters);
+        }
+        outcome.verdict = Verdict::Accepted {
+            nis: squares.sum(),
+            components: 6,
+        };
+        outcome
+    }
+
+    /// Lets an agent whose sightings contradict the estimate search farther around.
+    fn widen_if_refused(&mut self, observer: usize) {
+        if self.members[observer].state.refused >= REFUSED_TO_WIDEN {
+            self.members[observer].state_mut().refused = 0;
+            self.widen(observer, WIDENED_SD.0, WIDENED_SD.1);
+        }
+    }
+}
+
+/// What a sighting may do.
+#[derive(Clone, Debug)]
+struct CorrectionScope {
+    /// The components that it corrects.
+    corrected: Range<usize>,
+    /// Whether it speaks for or against its observer.
+    counts: bool,
+}
+
+impl CorrectionScope {
+    fn weigh(&self, observer: &mut AgentState, is_refused: bool, fits: bool) {
+        if self.counts {
+            observer.weigh(is_refused, fits);
+        }
+    }
+}
+
+/// A member at an instant.
+#[derive(Clone, Debug)]
+struct PastPose {
+    pose: Isometry3<f64>,
+    /// Jacobian of the pose error then with respect to the pose error now.
+    by_now: Matrix6<f64>,
+    offset: usize,
+}
+
+impl PastPose {
+    fn new(member: &Member, back: &Isometry3<f64>) -> Self {
+        Self {
+            pose: member.filter().pose * back.inverse(),
+            by_now: se3::adjoint(back),
+            offset: member.offset,
+        }
+    }
+
+    fn block<const M: usize>(&self, jacobian: &SMatrix<f64, M, 6>) -> Block<M> {
+        Block {
+            offset: self.offset,
+            width: 6,
+            jacobian: jacobian * self.by_now,
+        }
+    }
+}
+
+/// The part of a Jacobian that belongs to a landmark.
+pub(super) fn point_block(offset: usize, jacobian: &Matrix3<f64>) -> Block<3> {
+    let mut wide = SMatrix::<f64, 3, 6>::zeros();
+    wide.fixed_view_mut::<3, 3>(0, 0).copy_from(jacobian);
+    Block {
+        offset,
+        width: LANDMARK_DIM,
+        jacobian: wide,
+    }
+}

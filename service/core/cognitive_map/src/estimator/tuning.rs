@@ -1,0 +1,207 @@
+//! Constants of the estimator: unit, meaning and source of each.
+//!
+//! What a space sets is in [`Parameters`](super::Parameters). A source is an equation, a physical
+//! reason, or what measures the constant:
+//!
+//! - *team*: `cogmap-lab replay mrclam DIR`, also with `--unknown-starts` and `--anonymous 3`
+//! - *liars*: `make drills DRILLS="liars"`
+//! - *hall*: `cargo nextest run -p cognitive_map --test estimator`
+//!
+//! A constant without a source is a judgement: no measurement of it alone is recorded.
+
+// --- Bounds of memory and work -------------------------------------------------------------------
+
+/// Agents that a frame estimates jointly. Source: a sighting costs the square of the components;
+/// 32 agents of 11 and 96 landmarks of 3 are 640.
+pub(super) const MEMBERS_MAX: usize = 32;
+/// Landmarks that a frame estimates jointly. Source: as [`MEMBERS_MAX`].
+pub(super) const LANDMARKS_MAX: usize = 96;
+/// Parts of a landmark archive. A change after a snapshot copies one part.
+pub(super) const ARCHIVE_PARTS: usize = 1024;
+/// Landmarks of a part of an archive: 65,536 in all. Labels are spread evenly over the parts; of a
+/// full one the landmark that was archived longest ago goes.
+pub(super) const ARCHIVE_PART_MAX: usize = 64;
+/// Observers of a landmark that are known by number; of more, it may have been anybody.
+pub(super) const OBSERVERS_MAX: usize = 8;
+/// Sightings of agents that wait for the motion of the other agent.
+pub(super) const PENDING_MAX: usize = 64;
+/// Sightings between agents of different frames that are kept.
+pub(super) const CROSS_SIGHTINGS_MAX: usize = 64;
+/// Pairs of frames of which a motion that was found is kept.
+pub(super) const FRAME_MATCHES_MAX: usize = 64;
+/// Frames that are compared with an agent's own after a sighting; the others come next.
+pub(super) const FRAMES_COMPARED_MAX: usize = 16;
+/// Frames among which the next one to register with is sought.
+pub(super) const FRAMES_SCANNED_MAX: usize = 16;
+/// Labels that stand for another one. Beyond that no landmarks are associated.
+pub(super) const ASSOCIATIONS_MAX: usize = 4096;
+/// Targets of which a sensor keeps the latest sighting.
+pub(super) const SENSOR_TARGETS_MAX: usize = 128;
+
+// --- Motion --------------------------------------------------------------------------------------
+
+/// Longest interval between two motions over which a bias counts \[s\].
+pub(super) const MOTION_INTERVAL_S_MAX: f64 = 10.0;
+/// Motions that are gathered before they are carried over to the covariance. Source: carrying it
+/// with each would be most of a motion's work (`docs/decisions/0028-motion-noise-is-gathered.md`).
+pub(super) const RUN_STEPS_MAX: u32 = 64;
+/// Length of gathered motion \[m\]. Source: digits are lost with the lever from where it began.
+pub(super) const RUN_LENGTH_MAX_M: f64 = 10.0;
+/// Poses of odometry that are kept.
+pub(super) const HISTORY_LEN: usize = 64;
+/// Least interval between two kept poses \[ns\]: 64 of them span three seconds, more than
+/// [`PENDING_NS_MAX`].
+pub(super) const HISTORY_INTERVAL_NS: i64 = 50_000_000;
+/// Standard deviation of a rotation of which nothing is known \[rad\]. Source: no rotation is off
+/// by more than half a turn.
+pub(super) const ANY_TURN_SD_RAD: f64 = 3.0;
+/// Factor by which a variance of a rotation may exceed that of [`ANY_TURN_SD_RAD`] until it is
+/// reduced.
+pub(super) const ANY_TURN_SLACK: f64 = 1.001;
+/// Standard deviation of a position from which on it says nothing \[m\]. Source: the largest
+/// `lost_sd_m` that settings may state.
+pub(super) const POSITION_SD_MAX_M: f64 = 1e6;
+/// Largest lasting error of odometry that is believed, in the deviations that the settings state.
+/// Source: *liars* (`docs/decisions/0027-covariances-stay-positive.md`).
+pub(super) const LASTING_DEVIATIONS_MAX: f64 = 8.0;
+/// Largest lasting error of lengths and of angles, as a ratio. Source: with more, readings would
+/// say next to nothing, or the contrary.
+pub(super) const LASTING_RATIO_MAX: f64 = 0.9;
+/// Largest deviation of a lasting error, in those that the settings state: it may wander, but not
+/// for ever.
+pub(super) const WANDERED_MAX: f64 = 2.0;
+/// Least factor 1 − c by which a reading may have been corrected, where a motion is corrected anew.
+/// Source: 1 − [`LASTING_RATIO_MAX`].
+pub(super) const CALIBRATION_FACTOR_MIN: f64 = 0.1;
+
+// --- Sightings -----------------------------------------------------------------------------------
+
+/// Shortest distance at which a direction means something \[m\].
+pub(super) const DIRECTION_DISTANCE_MIN_M: f64 = 0.02;
+/// Least deviation of a component of a sighting \[m, rad\], so that none is without error.
+pub(super) const SIGHTING_SD_MIN: f64 = 1e-6;
+/// How long a sighting of an agent waits for that agent's motion, by the observer's clock \[ns\].
+pub(super) const PENDING_NS_MAX: i64 = 2_000_000_000;
+/// Sightings for which the stated noise counts before any was seen.
+pub(super) const PRIOR_SIGHTINGS: f64 = 15.0;
+/// Sightings over which the past of a sensor fades.
+pub(super) const MEMORY_SIGHTINGS: f64 = 1000.0;
+/// Largest factor between a learned variance and the stated one.
+pub(super) const SENSOR_SCALE_MAX: f64 = 25.0;
+/// Largest error that a sensor learns from, in deviations.
+pub(super) const LEARNED_ERROR_MAX: f64 = 3.0;
+/// Largest lasting error of distances, in stated deviations.
+pub(super) const LASTING_OVER_STATED_MAX: f64 = 3.0;
+/// Longest interval between two sightings of one target that tell whether errors last \[s\].
+pub(super) const CORRELATION_INTERVAL_S_MAX: f64 = 4.0;
+/// Least sum of squares that a correlation is the quotient of.
+pub(super) const CORRELATION_SQUARE_MIN: f64 = 1e-12;
+
+// --- Outliers and contradictions -----------------------------------------------------------------
+
+/// Refused sightings in a row after which an agent's pose becomes less certain. Source: *hall*, an
+/// agent that slipped finds its way back.
+pub(super) const REFUSED_TO_WIDEN: u32 = 8;
+/// Deviations that are added to the pose then \[m, rad\]. Source: *hall*.
+pub(super) const WIDENED_SD: (f64, f64) = (1.0, 0.5);
+/// Refused sightings in a row after which a landmark is forgotten: it was moved or was never there.
+/// Source: *hall*, a post that is moved.
+pub(super) const REFUSED_TO_FORGET: u32 = 8;
+/// Refused sightings in a row after which a label stands for a landmark of its own again. Source:
+/// less than [`REFUSED_TO_FORGET`], so that the landmark itself stays.
+pub(super) const REFUSED_TO_DISSOCIATE: u32 = 6;
+/// Doubt from which on an agent corrects nobody but itself. Source: what it takes to search farther
+/// around once; *liars*.
+pub(super) const DOUBT_MIN: u32 = REFUSED_TO_WIDEN;
+/// Doubt at which an agent is set aside. Source: an agent that slipped or was carried off a few
+/// metres has found its way back before, by searching farther around eight times; *liars*.
+pub(super) const DOUBT_MAX: u32 = 64;
+/// Doubt of an agent that was set aside and is back in the map: so many sightings have to fit, more
+/// than do not, before it corrects others again.
+pub(super) const DOUBT_ON_RETURN: u32 = 2 * DOUBT_MIN;
+
+// --- Agents and landmarks that come back
+// -----------------------------------------------------------
+
+/// Factor of the deviations of an agent that comes back to a joint estimate.
+///
+/// Errors A and B of unknown correlation have at most the covariance A/w beside B/(1 − w), for any
+/// w in (0, 1) (Julier & Uhlmann 1997). With w = 1/9 the agent's own estimate counts for a ninth,
+/// and the others' variances would have to grow by an eighth each time. They stay as they are: what
+/// they miss is small, and a growth with every return would not end.
+pub(super) const RETURN_WIDENING: f64 = 3.0;
+/// Least variance and information of a component that an archived landmark gains \[m², 1/m²\].
+pub(super) const ARCHIVE_GAIN_MIN_M2: f64 = 1e-9;
+/// Normalised distance between an archived landmark and its new sighting from which on the archived
+/// estimate is dropped.
+pub(super) const ARCHIVE_GATE: f64 = 6.0;
+/// Steps of the search for the weight of a covariance intersection.
+pub(super) const INTERSECTION_STEPS: u32 = 16;
+/// Least information that a direction gains by an external pose, as a part of what is known of it.
+pub(super) const INTERSECTION_GAIN_MIN: f64 = 0.02;
+/// Most that it gains.
+pub(super) const INTERSECTION_GAIN_MAX: f64 = 1e9;
+/// Least variance of a component of an external pose, as a part of the estimate's own.
+pub(super) const INTERSECTION_VARIANCE_MIN: f64 = 1e-9;
+
+// --- Alignment of frames
+// ---------------------------------------------------------------------------
+
+/// Fewest points that align two planar frames, and two frames in space. Source: one more than a
+/// rigid motion needs.
+pub(super) const ALIGNMENT_POINTS_MIN: (usize, usize) = (3, 4);
+/// Part of the points that must agree. Source: *team*, unknown starts.
+pub(super) const ALIGNMENT_AGREEING_MIN: f64 = 0.7;
+/// Largest deviation of the rotation \[rad\]. Source: the joint update is linear in it.
+pub(super) const ALIGNMENT_ROTATION_SD_MAX_RAD: f64 = 0.12;
+/// Rounds of weighing the points anew.
+pub(super) const ALIGNMENT_ROUNDS: usize = 8;
+/// Normalised distance from which on a point loses weight (Cauchy).
+pub(super) const ALIGNMENT_SOFT: f64 = 2.0;
+/// Factor of the deviations of the found motion. Source: the points' errors are correlated, and the
+/// landmarks known in both frames correct the motion afterwards, so that it need only be wide.
+pub(super) const ALIGNMENT_WIDENING: f64 = 5.0;
+/// Least distance of the places where an agent was seen, for two sightings to count as two \[m\].
+/// Source: sightings from one place share their error.
+pub(super) const CROSS_SIGHTINGS_APART_M: f64 = 0.2;
+
+// --- Landmarks under other names
+// -------------------------------------------------------------------
+
+/// Sightings of a frame between two attempts to associate its landmarks. A prime: where agents see
+/// in turn, each has its turn.
+pub(super) const ASSOCIATE_EVERY: u64 = 31;
+/// Attempts in a row that must find one motion. Source: *team*, anonymous
+/// (`docs/decisions/0030-landmark-names-are-checked.md`).
+pub(super) const FRAME_MATCH_FOUND_MIN: u32 = 3;
+/// Rounds of testing whether two correspondences fit better with their points swapped.
+pub(super) const SWAP_ROUNDS: usize = 3;
+/// Landmarks of the older frame that are registered, in the plane and in space, where a motion
+/// takes three. Source: work.
+pub(super) const REGISTERED_MAX: (usize, usize) = (64, 32);
+/// Factor of the landmarks' variances. Source: sensors err alike for a while, so that the estimate
+/// is too sure of itself.
+pub(super) const LANDMARK_WIDENING: f64 = 4.0;
+/// Variance of the distance between two estimates of one landmark, beside their own \[m²\]: 1 cm.
+pub(super) const SAME_LANDMARK_VARIANCE_M2: f64 = 1e-4;
+/// Least variance that a landmark is weighed with \[m²\]: 1 mm.
+pub(super) const LANDMARK_VARIANCE_MIN_M2: f64 = 1e-6;
+/// Log₁₀ of the probability by chance of as many associations, for them to be accepted. Source:
+/// `docs/decisions/0030-landmark-names-are-checked.md`.
+pub(super) const ASSOCIATION_LOG10_CHANCE_MAX: f64 = -4.0;
+/// Largest probability that something lies by chance where a landmark would be associated with
+/// another.
+pub(super) const ASSOCIATION_CHANCE_MAX: f64 = 0.25;
+
+// --- Numbers
+// ---------------------------------------------------------------------------------------
+
+/// Most that rounding takes away of a variance, as a part of those that it is made of.
+pub(super) const ROUNDING: f64 = 1e-14;
+/// Growth of variances with each update, as a part of what they were: more than what rounding takes
+/// away.
+pub(super) const COVARIANCE_ROUNDING: f64 = 1e-10;
+/// Least variance of a component of a measurement that the estimate expects, as a part of the
+/// variances of whose differences it is made. Source: below that it is rounding; a measurement then
+/// adds at most 10⁴ times what was known (`docs/decisions/0027-covariances-stay-positive.md`).
+pub(super) const CONDITION_MIN: f64 = 1e-8;

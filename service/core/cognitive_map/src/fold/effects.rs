@@ -1,0 +1,138 @@
+//! What the estimator brings about: kept in the keyframe graph, and applied to landmarks and
+//! places.
+
+use super::CognitiveMap;
+use super::apply::Fold;
+use crate::estimator::{AgentSighted, Effect, FramesMerged};
+use crate::keyframes::{Moment, Refined};
+use crate::memory::place::PlaceId;
+use pose_graph::PoseGraph;
+
+/// Number of the frame that is the map's.
+const MAP: usize = 0;
+
+impl Fold<'_> {
+    /// The agent at the sample that is being applied.
+    pub(super) fn moment(&self) -> Moment {
+        let agent = self.agent_id.0;
+        let pose = self.estimator.in_frame(agent);
+        Moment {
+            agent,
+            seq: self.agent.next_seq.saturating_sub(1),
+            stamp_ns: self.stamp_ns,
+            pose: *pose.unwrap_or(self.agent.body.in_map()),
+        }
+    }
+
+    /// Tells the keyframe graph, the landmark map and the agent's body what the latest call of the
+    /// estimator brought about.
+    pub(super) fn apply_effects(&mut self) {
+        let mut effects = std::mem::take(&mut self.effects);
+        effects.sort_by_key(Effect::order);
+        for effect in effects.drain(..) {
+            match effect {
+                Effect::SetAside { agent } => self.keyframes.set_aside(agent),
+                Effect::Moved { step, .. } => self.keyframes.graph.motion(
+                    &self.moment(),
+                    &step.increment,
+                    &step.variance,
+                    &step.calibrated,
+                ),
+                Effect::LandmarkSighted {
+                    label,
+                    relation,
+                    variance,
+                    ..
+                } => self
+                    .keyframes
+                    .graph
+                    .landmark(&self.moment(), &label, &relation, &variance),
+                Effect::AgentSighted(sighted) => self.agent_sighted(&sighted),
+                Effect::LandmarksAssociated(names) => {
+                    self.keyframes.graph.merge_landmarks(&names);
+                    for (label, name) in &names {
+                        self.landmarks.unite(label, name, self.revision);
+                    }
+                }
+                Effect::FramesMerged(merged) => self.frames_merged(&merged),
+            }
+        }
+        self.effects = effects;
+    }
+
+    /// Remembers a sighting of an agent that was accepted.
+    fn agent_sighted(&mut self, sighted: &AgentSighted) {
+        if sighted.accepted {
+            self.keyframes.graph.sighted(
+                sighted.observer,
+                sighted.target,
+                sighted.stamp_ns,
+                &sighted.relation,
+                &sighted.variance.fixed_rows::<3>(0).into_owned(),
+            );
+        }
+    }
+
+    /// Remembers where the frame of some agents lies.
+    fn frames_merged(&mut self, merged: &FramesMerged) {
+        for &agent in &merged.agents {
+            if merged.into == MAP {
+                self.keyframes.graph.placed(agent, &merged.pose);
+            } else {
+                self.keyframes.graph.transformed(agent, &merged.pose);
+            }
+        }
+    }
+}
+
+impl Fold<'_> {
+    /// Relaxes the past when enough has come since the last time to pay for it and matches wait,
+    /// and tells the estimate where the agents are by those that are believed.
+    ///
+    /// When that is depends on the records alone.
+    pub(super) fn relax_matches(&mut self) {
+        if !self.keyframes.graph.is_due() {
+            return;
+        }
+        for correction in self.keyframes.graph.relax() {
+            if let Some(covariance) = correction.covariance {
+                self.estimator.fuse_pose(
+                    correction.agent,
+                    &correction.pose,
+                    &covariance,
+                    &mut self.effects,
+                );
+                self.apply_effects();
+            }
+        }
+    }
+}
+
+impl Fold<'_> {
+    /// Moves some of the places that turned out to lie elsewhere.
+    pub(super) fn move_places(&mut self) {
+        for (place, at) in self.keyframes.graph.moved_places() {
+            self.places.put(PlaceId(place), &at, self.revision);
+        }
+    }
+}
+
+impl CognitiveMap {
+    /// Where all agents were and all landmarks are, by everything that was seen until now: the
+    /// whole map relaxed. A function of the map alone; takes time in proportion to what is
+    /// remembered.
+    pub fn refined(&self) -> Refined {
+        self.keyframes.graph.refine()
+    }
+
+    /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in
+    /// the making as [`refined`](Self::refined).
+    pub fn experience_map(&self) -> PoseGraph {
+        self.keyframes.graph.experience_map()
+    }
+
+    /// Number of matches and revisits that are believed.
+    pub fn closure_count(&self) -> usize {
+        self.keyframes.graph.n_matches_believed()
+    }
+}

@@ -1,0 +1,185 @@
+//! Levels and descriptors: they teach places, and recognise them.
+
+use nalgebra::Point3;
+
+use super::apply::Fold;
+use super::tuning::{ANSWER_MIN, DRIFT_MAX, KIDNAPPED_SD};
+use crate::agent::Status;
+use crate::event::EventKind;
+use crate::input::{Descriptor, Level};
+use crate::keyframes::Relocalised;
+use crate::memory::percept::Compared;
+use crate::memory::place::{PlaceId, confidence};
+use crate::memory::trip::TripEnd;
+use geometry::PoseCovariance;
+
+impl Fold<'_> {
+    /// A level was felt, where the sensor is.
+    pub(super) fn level(&mut self, level: &Level) {
+        self.agent.percepts += 1;
+        self.touch(|episode, objects| episode.level(level, objects));
+        let sensor = self.agent.body.in_map() * Point3::from(*level.offset_m());
+        let Some((place, weight)) = self.answering(&sensor) else {
+            return;
+        };
+        let compared =
+            self.percepts
+                .feel_level(level.channel(), level.value(), place, weight, self.revision);
+        self.compared(place, compared);
+    }
+
+    /// A descriptor was seen, where the body is.
+    pub(super) fn descriptor(&mut self, descriptor: &Descriptor) {
+        self.agent.percepts += 1;
+        self.touch(|episode, objects| episode.descriptor(descriptor, objects));
+        self.recognise_place(descriptor);
+        let body = self.agent.body.in_map().translation.vector.into();
+        let Some((place, weight)) = self.answering(&body) else {
+            return;
+        };
+        let revision = self.revision;
+        let compared = self
+            .percepts
+            .feel_descriptor(descriptor, place, weight, revision);
+        self.compared(place, compared);
+    }
+
+    /// Remembers what an agent of the map saw, and finds out whether it has come where something
+    /// like it was seen. One that does not know where it is finds that out.
+    fn recognise_place(&mut self, descriptor: &Descriptor) {
+        let number = self.agent_id.0;
+        let Some((_, covariance)) = self.estimator.pose(number) else {
+            return;
+        };
+        let Some(in_odom) = self.estimator.in_odom(number) else {
+            return;
+        };
+        let moment = self.moment();
+        let view = self
+            .keyframes
+            .observe(&moment, descriptor, in_odom, covariance);
+        let is_lost = self.is_lost(&covariance);
+        if self.agent.placed && !is_lost {
+            let accepted = self.agent.evidence.accepted;
+            if self.keyframes.is_contradicted(&view, accepted) {
+                return self.lose_agent();
+            }
+        }
+        let is_sought = self.keyframes.is_seeking(number);
+        if self.agent.placed && !is_sought {
+            // Where a kidnapped agent sees it is not known.
+            if !(is_lost && self.keyframes.is_kidnapped(number)) {
+                self.keyframes.view(&view);
+            }
+            if !is_lost {
+                return;
+            }
+        }
+        let sd_max_m = self.settings.field_radius_m;
+        if let Some(found) = self.keyframes.seek(&view, sd_max_m) {
+            self.relocalised(&found);
+        }
+    }
+
+    /// Whether an agent in the map is known so little that it may be anywhere.
+    fn is_lost(&self, covariance: &PoseCovariance) -> bool {
+        let is_doubted = self.estimator.is_doubted(self.agent_id.0);
+        let sd_m = covariance.position_sd_m();
+        Status::of(self.agent, sd_m, is_doubted, self.settings) == Status::Lost
+    }
+
+    /// What the agent sees contradicts where it is believed to be: it may be anywhere from now on.
+    fn lose_agent(&mut self) {
+        let moment = self.moment();
+        self.end_trip(TripEnd::Gap);
+        self.end_episode();
+        let sd_m = KIDNAPPED_SD * self.settings.lost_sd_m;
+        self.estimator.lose(self.agent_id.0, sd_m);
+        self.keyframes.declare_kidnapped(&moment);
+        self.place_agent();
+    }
+
+    /// The agent recognised where it is.
+    fn relocalised(&mut self, found: &Relocalised) {
+        let number = self.agent_id.0;
+        let was_placed = self.agent.placed;
+        // One that only drifted is where it may have drifted to: its way leads there. One that was
+        // put astray, by looks that could be read in two ways, is put anew.
+        let is_refused = was_placed && !found.is_first && !self.fuse(found);
+        let is_elsewhere = is_refused || (was_placed && found.is_first && self.is_elsewhere(found));
+        if is_elsewhere || !was_placed {
+            let (pose, covariance) = (&found.pose, &found.covariance);
+            self.estimator
+                .recognised(number, pose, covariance, &mut self.effects);
+            self.apply_effects();
+        }
+        if found.is_first {
+            self.fuse(found);
+        }
+        if found.is_first || found.is_last || is_elsewhere {
+            let moment = self.moment();
+            self.keyframes.relocalised(&moment, found, is_elsewhere);
+        }
+        if found.is_first || is_elsewhere {
+            let seq = self.moment().seq;
+            self.keyframes.confirm_pose(number, seq);
+        }
+        if is_elsewhere {
+            self.end_trip(TripEnd::StartPose);
+            self.place_agent();
+            let position = found.pose.translation.vector.into();
+            self.emit(EventKind::AgentPlaced { position });
+        } else {
+            self.update_pose();
+        }
+    }
+
+    /// Fuses the pose at which the agent recognised itself; answers whether it was accepted.
+    fn fuse(&mut self, found: &Relocalised) -> bool {
+        let (agent, pose, covariance) = (self.agent_id.0, &found.pose, &found.covariance);
+        let is_accepted = self
+            .estimator
+            .fuse_pose(agent, pose, covariance, &mut self.effects);
+        self.apply_effects();
+        is_accepted
+    }
+
+    /// Whether an agent of the map was recognised where it cannot have come to.
+    fn is_elsewhere(&self, found: &Relocalised) -> bool {
+        let number = self.agent_id.0;
+        let Some((pose, covariance)) = self.estimator.pose(number) else {
+            return true;
+        };
+        if self.keyframes.is_kidnapped(number) {
+            return true;
+        }
+        let apart_m = (pose.translation.vector - found.pose.translation.vector).norm();
+        let sd_m = covariance
+            .position_sd_m()
+            .hypot(found.covariance.position_sd_m());
+        apart_m > DRIFT_MAX * sd_m
+    }
+
+    /// The place that answers at a position, with its confidence; none for an agent that is not
+    /// placed, whose positions are those of no map.
+    fn answering(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
+        if !self.agent.placed {
+            return None;
+        }
+        let (place, distance_m) = self.places.winner(position)?;
+        let confidence = confidence(distance_m, self.settings.field_radius_m);
+        (confidence >= ANSWER_MIN).then_some((place, confidence))
+    }
+
+    /// Says how well a percept was expected, if the place remembered anything of its channel.
+    fn compared(&mut self, place: PlaceId, compared: Option<Compared>) {
+        if let Some(compared) = compared {
+            self.emit(EventKind::PerceptCompared {
+                place,
+                channel: compared.channel,
+                percepts: compared.percepts,
+                surprise: compared.surprise,
+            });
+        }
+    }
+}

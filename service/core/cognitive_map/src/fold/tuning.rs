@@ -1,0 +1,16 @@
+//! Constants of the fold: unit, meaning and source of each.
+
+/// What a restart between two sessions adds to the uncertainty of a pose \[m, m, m, rad, rad,
+/// rad\]. Source: a robot usually restarts where it stopped, but nobody knows.
+pub(super) const RESTART_SD: [f64; 6] = [1.0, 1.0, 1.0, 0.5, 0.5, 0.5];
+/// Part of a field radius by which an agent moves until the places are asked again. Source:
+/// confidence changes by at most a tenth over that distance, and a robot at rest asks nothing.
+pub(super) const ASK_PER_FIELD_RADIUS: f64 = 0.125;
+/// Confidence from which on a place answers. Source: that at one field radius.
+pub(super) const ANSWER_MIN: f64 = 0.5;
+/// Distance from where an agent was believed to be from which on it did not drift there, in
+/// standard deviations of both poses. Source: three deviations.
+pub(super) const DRIFT_MAX: f64 = 3.0;
+/// Standard deviation of the position of an agent that was carried off, in the space's `lost_sd_m`.
+/// Without a recorded measurement.
+pub(super) const KIDNAPPED_SD: f64 = 10.0;

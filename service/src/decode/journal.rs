@@ -1,0 +1,113 @@
+//! Entries of the journal.
+//!
+//! Recovery and the offline commands meet the same records as the live writer, so that they cannot
+//! differ.
+
+use cogmap_proto as wire;
+use cognitive_map::{AgentId, InvalidSample, Label, Record, SkipReason};
+
+use super::lesson::journaled_lesson;
+use super::sample::journaled_sample;
+use crate::journal::Entry;
+
+/// Passes the records of a journal entry to `take`, in order.
+pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
+    match entry {
+        Entry::Enrol { agent, name } => {
+            if let Ok(name) = Label::new(name) {
+                take(Record::Enrol {
+                    agent: AgentId(*agent),
+                    name,
+                });
+            }
+        }
+        Entry::Samples { agent, batch } => {
+            let agent = AgentId(*agent);
+            let session = batch.session;
+            for (ahead, sample) in (0..).zip(&batch.samples) {
+                // The last number of all has no successor, so it is never a sample's.
+                let Some(seq) = batch
+                    .first_seq
+                    .checked_add(ahead)
+                    .filter(|seq| *seq < u64::MAX)
+                else {
+                    return;
+                };
+                take(match journaled_sample(sample) {
+                    Ok(sample) => Record::Sample {
+                        agent,
+                        session,
+                        seq,
+                        sample,
+                    },
+                    // Only samples that passed are journaled. A build with stricter rules than the
+                    // one that wrote the journal says so by skipping.
+                    Err(invalid) => {
+                        let reason = SkipReason::Invalid(invalid);
+                        Record::Skip {
+                            agent,
+                            session,
+                            from: seq,
+                            to: seq + 1,
+                            reason,
+                        }
+                    }
+                });
+            }
+        }
+        Entry::Skip {
+            agent,
+            session,
+            from,
+            to,
+            reason,
+        } => take(Record::Skip {
+            agent: AgentId(*agent),
+            session: *session,
+            from: *from,
+            to: *to,
+            reason: skip_reason(*reason),
+        }),
+        Entry::Teach {
+            number,
+            name,
+            lesson,
+        } => {
+            // Only lessons that passed are journaled.
+            if let (Ok(name), Ok(lesson)) = (Label::new(name), journaled_lesson(lesson)) {
+                take(Record::TeachObject {
+                    number: *number,
+                    name,
+                    lesson,
+                });
+            }
+        }
+        Entry::Remove { agent } => take(Record::Remove {
+            agent: AgentId(*agent),
+        }),
+        Entry::Forget { number, name } => {
+            if let Ok(name) = Label::new(name) {
+                take(Record::ForgetObject {
+                    number: *number,
+                    name,
+                });
+            }
+        }
+    }
+}
+
+/// Why samples are skipped, from the journal.
+fn skip_reason(reason: wire::SkipReason) -> SkipReason {
+    let invalid = match reason {
+        // A leap is refused before the journal, and so never in it.
+        wire::SkipReason::Lost | wire::SkipReason::SequenceLeap => return SkipReason::Lost,
+        wire::SkipReason::TimeBackwards => return SkipReason::TimeBackwards,
+        wire::SkipReason::NumberOutOfRange => InvalidSample::NumberOutOfRange,
+        wire::SkipReason::NonUnitQuaternion => InvalidSample::NonUnitQuaternion,
+        wire::SkipReason::NegativeNoise => InvalidSample::NegativeNoise,
+        wire::SkipReason::InvalidDescriptor => InvalidSample::InvalidDescriptor,
+        wire::SkipReason::InvalidLabel => InvalidSample::InvalidLabel,
+        wire::SkipReason::InvalidNormal => InvalidSample::InvalidNormal,
+    };
+    SkipReason::Invalid(invalid)
+}

@@ -1,0 +1,57 @@
+//! Settings of a space.
+
+use cogmap_proto::SpaceSettings;
+use cognitive_map::InvalidSettings;
+
+/// Settings of the core from those of the wire.
+///
+/// # Errors
+/// Names the field that makes no sense and the rule that it breaks.
+pub fn core_settings(settings: &SpaceSettings) -> Result<cognitive_map::Settings, InvalidSettings> {
+    let recruitment = match settings.recruitment {
+        cogmap_proto::Recruitment::Novelty {} => cognitive_map::Recruitment::Novelty,
+        cogmap_proto::Recruitment::Bernoulli { probability } => {
+            cognitive_map::Recruitment::Bernoulli { probability }
+        }
+    };
+    if !(0.001..=3600.0).contains(&settings.trajectory_interval_s) {
+        let field = "trajectory_interval_s";
+        return Err(InvalidSettings {
+            field,
+            rule: "0.001 to 3600",
+        });
+    }
+    cognitive_map::Settings::new(cognitive_map::SettingsValues {
+        seed: settings.seed,
+        grid_modules: settings.grid_modules as usize,
+        grid_spacing_m: settings.grid_spacing_m,
+        grid_ratio: settings.grid_ratio,
+        field_radius_m: settings.field_radius_m,
+        recruitment,
+        translation_sd_per_sqrt_m: settings.odometry_noise.translation_sd_per_sqrt_m,
+        rotation_sd_per_sqrt_m: settings.odometry_noise.rotation_sd_per_sqrt_m,
+        rotation_sd_per_sqrt_rad: settings.odometry_noise.rotation_sd_per_sqrt_rad,
+        length_error_sd: settings.odometry_noise.length_error_sd,
+        angle_error_sd: settings.odometry_noise.angle_error_sd,
+        bias_sd_rad_s: settings.odometry_noise.bias_sd_rad_s,
+        lasting_range_error: settings.lasting_range_error,
+        localized_sd_m: settings.localized_sd_m,
+        lost_sd_m: settings.lost_sd_m,
+        trip_stillness_s: settings.trip_stillness_s,
+        trip_gap_s: settings.trip_gap_s,
+        places_max: settings.places_max,
+        legs_max: settings.legs_max,
+        anchors_max: settings.anchors_max,
+        strength_half_life_samples: settings.strength_half_life_samples,
+    })
+}
+
+/// Closest rows of a stored trajectory \[ns\].
+pub fn trajectory_interval_ns(settings: &SpaceSettings) -> i64 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "checked to be at most an hour"
+    )]
+    let interval = (settings.trajectory_interval_s * 1e9).round() as i64;
+    interval
+}
