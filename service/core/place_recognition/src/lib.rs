@@ -3,9 +3,11 @@
 mod appearance;
 mod descriptor;
 mod keyframes;
+mod levenberg_marquardt;
 mod recognition;
 mod relocalisation;
 mod sequences;
+mod tuning;
 mod twist;
 mod view;
 mod views;

@@ -1,14 +1,14 @@
-//! Chains of keyframes, and the lists of sightings and constraints of a keyframe.
+//! The chains of keyframes, one for each agent, and their index.
 
 use nalgebra::Isometry3;
 
-use super::constraint::{ClosureState, Constraint};
-use super::graph::{KeyframeGraph, REST, SIGHTINGS_PER_KEYFRAME_MAX};
+use super::constraint::ClosureState;
+use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
-use super::sighting::{Seen, Sighting};
-use geometry::is_within;
-use geometry::{MotionSum, PoseCovariance};
-use state::NONE;
+use super::keyframe_index::IndexEntry;
+use super::tuning;
+use geometry::{MotionSum, PoseCovariance, is_within};
+use state::{NONE, Slab};
 
 impl KeyframeGraph {
     /// Adds a keyframe where an agent is; answers its number, or that of the latest one if memory
@@ -29,7 +29,11 @@ impl KeyframeGraph {
         let is_origin = track.is_origin;
         // An agent at rest came here earlier.
         let rests = !track.needs_keyframe
-            && is_within(&track.rest.inv_mul(track.since.motion()), REST.0, REST.1);
+            && is_within(
+                &track.rest.inv_mul(track.since.motion()),
+                tuning::REST_WITHIN.0,
+                tuning::REST_WITHIN.1,
+            );
         let (seq, stamp_ns) = if rests {
             (track.rest_seq, track.rest_ns)
         } else {
@@ -113,216 +117,48 @@ impl KeyframeGraph {
         Some(track.own_frame.unwrap_or_default() * keyframe.pose)
     }
 
-    /// Constrains a keyframe to the map.
-    pub(super) fn constrain_to_map(
-        &mut self,
-        keyframe: u32,
-        at: Isometry3<f64>,
-        covariance: &PoseCovariance,
-        state: ClosureState,
-    ) {
-        let constraint = Constraint {
-            from: NONE,
-            to: keyframe,
-            next_from: NONE,
-            next_to: NONE,
-            transform: at,
-            covariance: *covariance,
-            state,
-        };
-        self.add_constraint(constraint);
-    }
-
-    /// Adds a constraint; answers its number, or [`NONE`] if memory is full or an end is gone.
-    pub(super) fn add_constraint(&mut self, mut constraint: Constraint) -> u32 {
-        let revision = self.revision;
-        let (from, to) = (constraint.from, constraint.to);
-        let is_there = |number: u32| self.keyframes.get(number).is_some();
-        if self.constraints.len() >= self.settings.constraints_max as usize
-            || !is_there(to)
-            || (from != NONE && !is_there(from))
-            || from == to
-        {
-            return NONE;
-        }
-        constraint.next_to = self
-            .keyframes
-            .get(to)
-            .map_or(NONE, |keyframe| keyframe.constraints);
-        constraint.next_from = self
-            .keyframes
-            .get(from)
-            .map_or(NONE, |keyframe| keyframe.constraints);
-        let number = self.constraints.insert(constraint, revision);
-        for end in [from, to] {
-            if let Some(keyframe) = self.keyframes.get_mut(end, revision) {
-                keyframe.constraints = number;
-            }
-        }
-        number
-    }
-
-    /// Adds a sighting to the lists of its keyframe and of the one that it shows. It is merged with
-    /// one of the same landmark; in a full list it replaces the least certain one. Answers whether
-    /// there is one more.
-    pub(super) fn add_sighting(&mut self, mut sighting: Sighting) -> bool {
-        let revision = self.revision;
-        let Some(keyframe) = self.keyframes.get(sighting.keyframe) else {
-            return false;
-        };
-        let (mut number, first) = (keyframe.sightings, keyframe.sightings);
-        let (mut count, mut least_certain) = (0, (0.0, NONE));
-        while let Some(other) = self.sightings.get(number) {
-            let is_same = matches!(other.shown, Seen::Landmark(_)) && other.shown == sighting.shown;
-            if is_same {
-                let joined = other.point.mean(&sighting.point);
-                if let (Some(point), Some(other)) =
-                    (joined, self.sightings.get_mut(number, revision))
-                {
-                    other.point = point;
-                }
-                return false;
-            }
-            let spread = other.point.covariance().trace();
-            if spread > least_certain.0 {
-                least_certain = (spread, number);
-            }
-            count += 1;
-            number = other.next;
-        }
-        let is_crowded = count >= SIGHTINGS_PER_KEYFRAME_MAX
-            || self.sightings.len() >= self.settings.sightings_max as usize;
-        if is_crowded
-            && (least_certain.1 == NONE || sighting.point.covariance().trace() >= least_certain.0)
-        {
-            return false;
-        }
-        if is_crowded {
-            self.remove_sighting(least_certain.1);
-        }
-        let first = if first == least_certain.1 && is_crowded {
-            self.keyframes
-                .get(sighting.keyframe)
-                .map_or(NONE, |keyframe| keyframe.sightings)
-        } else {
-            first
-        };
-        sighting.next = first;
-        let shown = match sighting.shown {
-            Seen::Agent(target, _) => target,
-            Seen::Landmark(_) => NONE,
-        };
-        sighting.next_shown = self
-            .keyframes
-            .get(shown)
-            .map_or(NONE, |keyframe| keyframe.shown);
-        let at = sighting.keyframe;
-        let number = self.sightings.insert(sighting, revision);
-        if let Some(keyframe) = self.keyframes.get_mut(at, revision) {
-            keyframe.sightings = number;
-        }
-        if let Some(keyframe) = self.keyframes.get_mut(shown, revision) {
-            keyframe.shown = number;
-        }
-        true
-    }
-
-    /// Removes a sighting; answers it.
-    pub(super) fn remove_sighting(&mut self, number: u32) -> Option<Sighting> {
-        let sighting = self.sightings.get(number)?.clone();
-        self.unlink_sighting(sighting.keyframe, number, sighting.next);
-        if let Seen::Agent(target, _) = sighting.shown {
-            self.unlink_target(target, number, sighting.next_shown);
-        }
-        self.sightings.remove(number, self.revision);
-        if let Seen::Landmark(landmark) = sighting.shown {
-            self.landmarks.release(landmark, self.revision);
-        }
-        Some(sighting)
-    }
-
-    fn unlink_sighting(&mut self, keyframe: u32, gone: u32, next: u32) {
-        let revision = self.revision;
-        let Some(keyframe) = self.keyframes.get_mut(keyframe, revision) else {
+    /// Adds a keyframe to the index.
+    fn index_keyframe(&mut self, agent: u32, number: u32) {
+        let Some(keyframe) = self.keyframes.get(number) else {
             return;
         };
-        if keyframe.sightings == gone {
-            keyframe.sightings = next;
-            return;
-        }
-        let mut number = keyframe.sightings;
-        while let Some(sighting) = self.sightings.get(number) {
-            if sighting.next == gone {
-                if let Some(sighting) = self.sightings.get_mut(number, revision) {
-                    sighting.next = next;
-                }
-                return;
-            }
-            number = sighting.next;
-        }
-    }
-
-    fn unlink_target(&mut self, keyframe: u32, gone: u32, next: u32) {
-        let revision = self.revision;
-        let Some(keyframe) = self.keyframes.get_mut(keyframe, revision) else {
-            return;
+        let entry = IndexEntry {
+            session: keyframe.session,
+            seq: keyframe.seq,
+            keyframe: number,
         };
-        if keyframe.shown == gone {
-            keyframe.shown = next;
-            return;
-        }
-        let mut number = keyframe.shown;
-        while let Some(sighting) = self.sightings.get(number) {
-            if sighting.next_shown == gone {
-                if let Some(sighting) = self.sightings.get_mut(number, revision) {
-                    sighting.next_shown = next;
-                }
-                return;
+        let (keyframes, count) = (&self.keyframes, self.keyframes.len());
+        let is_valid = |entry: &IndexEntry| is_valid(keyframes, agent, entry);
+        self.index.add(agent, entry, count, is_valid);
+    }
+
+    /// Builds the index of chains that were read from a checkpoint.
+    pub(super) fn rebuild_index(&mut self) {
+        for agent in 0..self.tracks.len() {
+            let newest = self.tracks.get(agent).map_or(NONE, |track| track.newest);
+            let mut chain = Vec::new();
+            let mut number = newest;
+            while let Some(keyframe) = self.keyframes.get(number) {
+                chain.push(number);
+                number = keyframe.previous;
             }
-            number = sighting.next_shown;
+            let agent = u32::try_from(agent).unwrap_or(NONE);
+            for &number in chain.iter().rev() {
+                self.index_keyframe(agent, number);
+            }
         }
     }
 
-    /// Removes a constraint; answers it.
-    pub(super) fn remove_constraint(&mut self, number: u32) -> Option<Constraint> {
-        let revision = self.revision;
-        let constraint = self.constraints.get(number)?.clone();
-        for (end, next) in [
-            (constraint.from, constraint.next_from),
-            (constraint.to, constraint.next_to),
-        ] {
-            let Some(keyframe) = self.keyframes.get_mut(end, revision) else {
-                continue;
-            };
-            if keyframe.constraints == number {
-                keyframe.constraints = next;
-                continue;
-            }
-            let mut at = keyframe.constraints;
-            while let Some(other) = self.constraints.get_mut(at, revision) {
-                let follower = if other.from == end {
-                    &mut other.next_from
-                } else {
-                    &mut other.next_to
-                };
-                if *follower == number {
-                    *follower = next;
-                    break;
-                }
-                at = *follower;
-            }
-        }
-        self.constraints.remove(number, revision)
+    /// The earliest indexed keyframe of an agent after a sample; [`NONE`] if there is none.
+    pub(super) fn first_indexed_after(&self, agent: u32, session: u32, seq: u64) -> u32 {
+        let is_valid = |entry: &IndexEntry| is_valid(&self.keyframes, agent, entry);
+        self.index.first_after(agent, session, seq, is_valid)
     }
+}
 
-    /// The number of the constraint after another one in the list of a keyframe.
-    pub(super) fn next_constraint(&self, number: u32, keyframe: u32) -> u32 {
-        self.constraints.get(number).map_or(NONE, |constraint| {
-            if constraint.from == keyframe {
-                constraint.next_from
-            } else {
-                constraint.next_to
-            }
-        })
-    }
+/// Whether the keyframe of an index entry is still there.
+fn is_valid(keyframes: &Slab<Keyframe, 32>, agent: u32, entry: &IndexEntry) -> bool {
+    keyframes.get(entry.keyframe).is_some_and(|keyframe| {
+        (keyframe.agent, keyframe.session, keyframe.seq) == (agent, entry.session, entry.seq)
+    })
 }

@@ -17,9 +17,9 @@
 
 use std::collections::BTreeMap;
 
-use super::graph::PendingSighting;
 use super::map::KeyframeMap;
 use super::settings::KeyframeSettings;
+use super::sighting::PendingSighting;
 use place_recognition::Part;
 use state::Digest;
 use state::{CorruptState, State, StateReader, StateWriter};

@@ -4,38 +4,16 @@
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
 
 use super::constraint::{ClosureState, Constraint};
-use super::graph::{KeyframeGraph, KeyframeOffset, Moment};
+use super::graph::{KeyframeGraph, Moment};
+use super::instant::KeyframeOffset;
 use super::refined::{Among, Graph};
 use super::sighting::{SeenPoint, stated_variance};
 use super::sparsification::composed;
+use super::tuning;
 use crate::input::Relation;
 use geometry::{PoseCovariance, is_somewhere, se3, upper_triangle};
 use pose_graph::{Graduation, Marginals, RelaxationSettings, Relaxed};
 use state::NONE;
-
-/// Squared Mahalanobis distance up to which a closure agrees with the map or with another closure:
-/// a true one exceeds it once in a hundred times (χ², 3 degrees of freedom).
-const AGREES: f64 = 11.3;
-/// Squared Mahalanobis distance after a relaxation from which a closure is rejected.
-const CONTRADICTS: f64 = 25.0;
-/// Factor by which the map may be less certain than a closure for their agreement alone to count.
-const VAGUER_MAX: f64 = 2.0;
-/// Standard deviation up to which agreement counts, however certain the closures are: by chance few
-/// places lie so close \[m\].
-const TELLING_M: f64 = 0.5;
-/// Fewest other closures that must agree with one that the map cannot tell from a false one.
-const PARTNERS: usize = 2;
-/// Earlier closures, in the order of time, with which a closure is compared.
-const COMPARED: usize = 24;
-/// Standard deviation of an unknown angle \[rad\].
-const ANY_ANGLE_RAD: f64 = 3.0;
-/// Least standard deviation of a closure \[m, rad\].
-const DEVIATION_MIN: f64 = 1e-3;
-/// Keyframes for each record between two relaxations: so the amortised cost of a relaxation is that
-/// of so many keyframes a record.
-const KEYFRAMES_PER_RECORD: usize = 8;
-/// Most rounds of relaxation and rejection.
-const ROUNDS_MAX: usize = 3;
 
 /// The pose of an agent after a relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,7 +131,7 @@ impl KeyframeGraph {
     /// for another one.
     pub fn is_due(&self) -> bool {
         self.schedule.new_closures > 0
-            && self.schedule.records as usize >= self.keyframes.len() / KEYFRAMES_PER_RECORD
+            && self.schedule.records as usize >= self.keyframes.len() / tuning::KEYFRAMES_PER_RECORD
     }
 
     /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses
@@ -196,7 +174,7 @@ impl KeyframeGraph {
             for number in 0..self.constraints.numbers() {
                 let link = graph.constraints.get(number as usize).copied().flatten();
                 let squared = link.map_or(0.0, |link| graph.map.squared_error(link));
-                if squared > CONTRADICTS
+                if squared > tuning::REJECTED_MIN
                     && let Some(constraint) = self.constraints.get(number)
                     && constraint.state == ClosureState::Accepted
                     && let Some(constraint) = self.constraints.get_mut(number, revision)
@@ -205,7 +183,7 @@ impl KeyframeGraph {
                     refuted += 1;
                 }
             }
-            if refuted == before || rounds >= ROUNDS_MAX {
+            if refuted == before || rounds >= tuning::RELAXATION_ROUNDS_MAX {
                 return (graph, relaxed, refuted);
             }
             self.move_keyframes(&graph);
@@ -218,7 +196,7 @@ impl KeyframeGraph {
         links
             .filter_map(|(link, number)| Some(((*link)?, self.constraints.get(number)?)))
             .filter(|(_, constraint)| constraint.state == ClosureState::Accepted)
-            .all(|(link, _)| graph.map.squared_error(link) <= CONTRADICTS)
+            .all(|(link, _)| graph.map.squared_error(link) <= tuning::REJECTED_MIN)
     }
 
     /// Accepts pending closures that agree with the map or with one another; answers their number.
@@ -250,7 +228,7 @@ impl KeyframeGraph {
             };
             if waits(constraint) && agrees_with(constraint, &believed, &marginals) {
                 accepted.push(number);
-            } else if all.map.squared_error(link) <= AGREES {
+            } else if all.map.squared_error(link) <= tuning::AGREES_MAX {
                 candidates.extend(self.candidate(number, constraint, &all, &path_variances));
             }
         }
@@ -258,7 +236,7 @@ impl KeyframeGraph {
             .sort_by_key(|candidate| (candidate.agent, candidate.stamp_ns, candidate.constraint));
         let mut partners = vec![0; candidates.len()];
         for later in 0..candidates.len() {
-            for earlier in later.saturating_sub(COMPARED)..later {
+            for earlier in later.saturating_sub(tuning::CLOSURES_COMPARED)..later {
                 if candidates[later].agrees(&candidates[earlier]) {
                     partners[later] += 1;
                     partners[earlier] += 1;
@@ -269,7 +247,7 @@ impl KeyframeGraph {
             .iter()
             .zip(partners)
             .filter(|(candidate, partners)| {
-                *partners >= PARTNERS
+                *partners >= tuning::PARTNERS_MIN
                     && self
                         .constraints
                         .get(candidate.constraint)
@@ -328,7 +306,7 @@ impl KeyframeGraph {
                 way[1] += diagonal.rows(3, 3).max();
                 // No motion is known between two stretches.
                 if keyframe.begins {
-                    way[0] += 1e12;
+                    way[0] += tuning::UNKNOWN_MOTION_VARIANCE_M2;
                 }
                 path_variances[number as usize] = way;
                 number = keyframe.next;
@@ -397,24 +375,27 @@ fn agrees_with(constraint: &Constraint, graph: &Graph, marginals: &Marginals<'_>
         return false;
     };
     let own = constraint.covariance.matrix();
-    let least = DEVIATION_MIN * DEVIATION_MIN;
+    let least = tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
     let expected = graph.map.pose(from).inv_mul(graph.map.pose(to));
     let (linear, angular) = se3::log(&expected.inv_mul(&constraint.transform));
     let off = Vector6::from_iterator(linear.iter().chain(angular.iter()).copied());
     // One that is too far off in one direction is so for every map that is sure enough: its
     // covariance, which takes long to find, need not be known.
-    let least_certain = VAGUER_MAX * VAGUER_MAX + 1.0;
-    if (0..6).any(|k| off[k] * off[k] > AGREES * least_certain * (own[(k, k)] + least)) {
+    let least_certain = tuning::UNCERTAINTY_RATIO_MAX * tuning::UNCERTAINTY_RATIO_MAX + 1.0;
+    if (0..6).any(|k| off[k] * off[k] > tuning::AGREES_MAX * least_certain * (own[(k, k)] + least))
+    {
         return false;
     }
     let Some(spread) = marginals.relative_pose(from, to) else {
         return false;
     };
-    let is_known =
-        (0..6).all(|k| spread.matrix()[(k, k)] <= VAGUER_MAX * VAGUER_MAX * (own[(k, k)] + least));
+    let is_known = (0..6).all(|k| {
+        spread.matrix()[(k, k)]
+            <= tuning::UNCERTAINTY_RATIO_MAX * tuning::UNCERTAINTY_RATIO_MAX * (own[(k, k)] + least)
+    });
     let whole = spread.matrix() + own + Matrix6::from_diagonal_element(least);
     let inverse = whole.try_inverse();
-    is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= AGREES)
+    is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= tuning::AGREES_MAX)
 }
 
 impl Candidate {
@@ -443,14 +424,15 @@ impl Candidate {
         // Rotation errors of odometry and of the closures move the ends.
         let lever = now.translation.vector.norm() + then.translation.vector.norm();
         shift += turn * lever * lever;
-        shift += DEVIATION_MIN * DEVIATION_MIN;
-        turn += DEVIATION_MIN * DEVIATION_MIN;
+        shift += tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
+        turn += tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
         let squared =
             error.translation.vector.norm_squared() / shift + error.rotation.angle().powi(2) / turn;
         // Two closures that would agree wherever they were are no evidence for each other.
-        let own = self.own[0] + other.own[0] + DEVIATION_MIN * DEVIATION_MIN;
-        let telling = (4.0 * VAGUER_MAX * VAGUER_MAX * own).max(TELLING_M * TELLING_M);
-        squared <= AGREES && shift <= telling
+        let own = self.own[0] + other.own[0] + tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
+        let telling = (4.0 * tuning::UNCERTAINTY_RATIO_MAX * tuning::UNCERTAINTY_RATIO_MAX * own)
+            .max(tuning::CERTAIN_SD_M * tuning::CERTAIN_SD_M);
+        squared <= tuning::AGREES_MAX && shift <= telling
     }
 }
 
@@ -463,7 +445,8 @@ fn seen_pose(relation: &Relation, expected: &Isometry3<f64>) -> (Isometry3<f64>,
     let point = SeenPoint::new(relation, &stated_variance(relation));
     let rotation: UnitQuaternion<f64> = expected.rotation;
     let turn = rotation.to_rotation_matrix().into_inner();
-    let mut matrix = Matrix6::from_diagonal_element(ANY_ANGLE_RAD * ANY_ANGLE_RAD);
+    let mut matrix =
+        Matrix6::from_diagonal_element(tuning::UNKNOWN_ANGLE_SD_RAD * tuning::UNKNOWN_ANGLE_SD_RAD);
     let spread = turn.transpose() * point.fresh * turn;
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&spread);
     (

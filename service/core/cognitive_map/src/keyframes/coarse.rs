@@ -4,16 +4,9 @@ use nalgebra::Isometry3;
 
 use super::constraint::ClosureState;
 use super::graph::KeyframeGraph;
+use super::tuning;
 use geometry::is_within;
 use state::{NONE, Slab};
-
-/// Motion between keyframes of the coarse graph \[m, rad\]. Over so short a way the noise of
-/// odometry is below that of closures, and is added to what moves to a neighbour.
-const STEP: (f64, f64) = (1.0, 0.5);
-
-/// Most pending closures of the coarse graph, the latest ones. Earlier ones have been judged many
-/// times; a refinement of the whole past judges them again.
-const WAITING_MAX: usize = 512;
 
 impl KeyframeGraph {
     /// A copy with one keyframe a step, and those with sightings, at the begin of a stretch, and
@@ -29,7 +22,9 @@ impl KeyframeGraph {
             while let Some(keyframe) = coarse.keyframes.get(number) {
                 let (motion, previous) = (keyframe.motion, keyframe.previous);
                 // The chain is walked from its end, since removals change the neighbours.
-                if number == newest || coarse.must_stay(number) || !is_within(&way, STEP.0, STEP.1)
+                if number == newest
+                    || coarse.must_stay(number)
+                    || !is_within(&way, tuning::COARSE_STEP.0, tuning::COARSE_STEP.1)
                 {
                     way = motion;
                 } else {
@@ -59,7 +54,7 @@ impl KeyframeGraph {
             })
             .collect();
         pending.sort_unstable();
-        let n_old = pending.len().saturating_sub(WAITING_MAX);
+        let n_old = pending.len().saturating_sub(tuning::COARSE_PENDING_MAX);
         for &(_, number) in &pending[..n_old] {
             self.remove_constraint(number);
         }

@@ -1,6 +1,6 @@
 //! The keyframe graph, and what is added to it.
 
-use nalgebra::{Isometry3, Vector3, Vector6};
+use nalgebra::{Isometry3, Vector6};
 
 use super::agent_track::AgentTrack;
 use super::attachment::Attachments;
@@ -9,31 +9,13 @@ use super::keyframe::Keyframe;
 use super::keyframe_index::KeyframeIndex;
 use super::landmarks::Landmarks;
 use super::settings::KeyframeSettings;
-use super::sighting::{Seen, SeenPoint, Sighting};
+use super::sighting::{PendingSighting, Sighting};
+use super::tuning;
 use crate::estimator::Calibrated;
-use crate::input::{Label, Relation, StartPose};
-use geometry::{PoseCovariance, is_within, se3};
+use crate::input::StartPose;
+use geometry::{PoseCovariance, is_within};
 use state::PagedVec;
-use state::state_of_struct;
 use state::{NONE, Slab};
-
-/// Motion after which a keyframe is added in any case \[m, rad\]: poses between two are
-/// interpolated.
-const STEP: (f64, f64) = (0.1, 0.1);
-/// Motion since a keyframe up to which sightings are attached to it \[m, rad\].
-const NEAR: (f64, f64) = (0.02, 0.02);
-/// Motion that counts as rest \[m, rad\].
-pub(super) const REST: (f64, f64) = (0.005, 0.005);
-/// Rest after which a keyframe is added \[ns\].
-const REST_NS: i64 = 1_000_000_000;
-/// Most sightings that wait for the motion of the agent that was seen.
-const WAITING_MAX: usize = 64;
-/// Longest time that they wait, by the observer's clock \[ns\].
-const PATIENCE_NS: i64 = 2_000_000_000;
-/// Keyframes searched back for the instant of a sighting.
-const LOOK_BACK_MAX: usize = 256;
-/// Most sightings of a keyframe.
-pub(super) const SIGHTINGS_PER_KEYFRAME_MAX: usize = 32;
 
 /// A moment of an agent.
 #[derive(Clone, Copy, Debug)]
@@ -48,24 +30,6 @@ pub struct Moment {
     /// relaxations.
     pub pose: Isometry3<f64>,
 }
-
-/// A sighting of an agent whose motion has not come up to it yet.
-#[derive(Clone, Debug)]
-pub(super) struct PendingSighting {
-    pub(super) keyframe: u32,
-    pub(super) observer: u32,
-    pub(super) target: u32,
-    pub(super) stamp_ns: i64,
-    pub(super) point: SeenPoint,
-}
-
-state_of_struct!(PendingSighting {
-    keyframe,
-    observer,
-    target,
-    stamp_ns,
-    point
-});
 
 /// The keyframe graph: the past motions and sightings of all agents, to be smoothed.
 ///
@@ -101,14 +65,6 @@ pub(super) struct Schedule {
     pub(super) new_closures: u32,
     /// Those of them that were accepted at once.
     pub(super) accepted: u32,
-}
-
-/// An instant between keyframes: a keyframe, the motion from there, and the covariance of its
-/// error.
-pub(super) struct KeyframeOffset {
-    pub(super) keyframe: u32,
-    pub(super) motion: Isometry3<f64>,
-    pub(super) covariance: PoseCovariance,
 }
 
 impl KeyframeGraph {
@@ -277,14 +233,29 @@ impl KeyframeGraph {
         track.is_planar &= is_level(increment);
         track.pose = moment.pose;
         (track.seq, track.stamp_ns) = (moment.seq, moment.stamp_ns);
-        if is_within(track.since.motion(), REST.0, REST.1) {
+        if is_within(
+            track.since.motion(),
+            tuning::REST_WITHIN.0,
+            tuning::REST_WITHIN.1,
+        ) {
             (track.until_seq, track.until_ns) = (moment.seq, moment.stamp_ns);
         }
-        let is_step = !is_within(track.since.motion(), STEP.0, STEP.1);
+        let is_step = !is_within(
+            track.since.motion(),
+            tuning::KEYFRAME_STEP.0,
+            tuning::KEYFRAME_STEP.1,
+        );
         let mut rests = false;
-        if is_within(&track.rest.inv_mul(track.since.motion()), REST.0, REST.1) {
-            rests = !is_within(track.since.motion(), NEAR.0, NEAR.1)
-                && moment.stamp_ns.saturating_sub(track.rest_ns) >= REST_NS;
+        if is_within(
+            &track.rest.inv_mul(track.since.motion()),
+            tuning::REST_WITHIN.0,
+            tuning::REST_WITHIN.1,
+        ) {
+            rests = !is_within(
+                track.since.motion(),
+                tuning::ATTACHED_WITHIN.0,
+                tuning::ATTACHED_WITHIN.1,
+            ) && moment.stamp_ns.saturating_sub(track.rest_ns) >= tuning::REST_NS;
         } else {
             track.rest = *track.since.motion();
             (track.rest_seq, track.rest_ns) = (moment.seq, moment.stamp_ns);
@@ -295,202 +266,6 @@ impl KeyframeGraph {
         if !self.pending.is_empty() {
             self.resolve_pending();
         }
-    }
-
-    /// Adds a sighting of a landmark. `variance` is that of the relation's components: along the
-    /// axes, or of distance, azimuth and elevation; the angles are those by which the seen
-    /// direction is off.
-    pub fn landmark(
-        &mut self,
-        moment: &Moment,
-        label: &Label,
-        relation: &Relation,
-        variance: &Vector3<f64>,
-    ) {
-        self.note(moment);
-        let Some(here) = self.here(moment.agent) else {
-            return;
-        };
-        let point = SeenPoint::new(relation, variance).before(&here.motion, &here.covariance);
-        if let Some(landmark) = self.landmarks.show(label, self.revision) {
-            self.remember_sighting(here.keyframe, Seen::Landmark(landmark), point);
-        }
-    }
-
-    /// Adds a sighting of another agent, perhaps at an instant that is over. It takes effect once
-    /// both have moved up to it.
-    pub fn sighted(
-        &mut self,
-        observer: u32,
-        target: u32,
-        stamp_ns: i64,
-        relation: &Relation,
-        variance: &Vector3<f64>,
-    ) {
-        if observer == target || target as usize >= self.tracks.len() {
-            return;
-        }
-        let Some(here) = self.at_stamp(observer, stamp_ns) else {
-            return; // too long ago
-        };
-        if self.pending.len() >= WAITING_MAX {
-            self.pending.remove(0);
-        }
-        self.pending.push(PendingSighting {
-            keyframe: here.keyframe,
-            observer,
-            target,
-            stamp_ns,
-            point: SeenPoint::new(relation, variance).before(&here.motion, &here.covariance),
-        });
-        self.resolve_pending();
-    }
-
-    /// Resolves the pending sightings whose time has come.
-    fn resolve_pending(&mut self) {
-        for pending in std::mem::take(&mut self.pending) {
-            let stamp_ns = |agent: u32| {
-                let track = self.tracks.get(agent as usize);
-                track
-                    .filter(|track| track.newest != NONE)
-                    .map(|track| track.stamp_ns)
-            };
-            if stamp_ns(pending.target).is_some_and(|stamp| stamp >= pending.stamp_ns) {
-                self.resolve(&pending);
-            } else if stamp_ns(pending.observer)
-                .is_none_or(|stamp| stamp.saturating_sub(pending.stamp_ns) < PATIENCE_NS)
-            {
-                self.pending.push(pending);
-            }
-        }
-    }
-
-    /// Resolves a sighting of an agent.
-    fn resolve(&mut self, pending: &PendingSighting) {
-        let Some(there) = self.at_stamp(pending.target, pending.stamp_ns) else {
-            return; // too long ago
-        };
-        let (Some(observer), Some(target)) = (
-            self.keyframes.get(pending.keyframe),
-            self.keyframes.get(there.keyframe),
-        ) else {
-            return;
-        };
-        // Noise of the motion from the keyframe, in the frame of the observer.
-        let turn = observer.pose.rotation.inverse() * target.pose.rotation * there.motion.rotation;
-        let turn = turn.to_rotation_matrix().into_inner();
-        let spread = there
-            .covariance
-            .matrix()
-            .fixed_view::<3, 3>(0, 0)
-            .into_owned();
-        let point = SeenPoint {
-            fresh: pending.point.fresh + turn * spread * turn.transpose(),
-            ..pending.point
-        };
-        let lever = there.motion.translation.vector;
-        self.remember_sighting(pending.keyframe, Seen::Agent(there.keyframe, lever), point);
-    }
-
-    /// Adds a sighting; where memory is full, another one makes room for it.
-    fn remember_sighting(&mut self, keyframe: u32, shown: Seen, point: SeenPoint) {
-        let is_full = |this: &Self| this.sightings.len() >= this.settings.sightings_max as usize;
-        if is_full(self) {
-            self.sparsify();
-        }
-        if is_full(self) {
-            self.forget_least_certain();
-        }
-        let sighting = Sighting {
-            keyframe,
-            next: NONE,
-            shown,
-            next_shown: NONE,
-            point,
-        };
-        if !self.add_sighting(sighting)
-            && let Seen::Landmark(landmark) = shown
-        {
-            self.landmarks.release(landmark, self.revision);
-        }
-    }
-
-    /// Notes the present sample and pose of an agent that has not moved.
-    pub(super) fn note(&mut self, moment: &Moment) {
-        let revision = self.revision;
-        let Some(track) = self.tracks.get_mut(moment.agent as usize, revision) else {
-            return;
-        };
-        track.pose = moment.pose;
-        track.seq = moment.seq;
-        track.stamp_ns = track.stamp_ns.max(moment.stamp_ns);
-        if !track.needs_keyframe && is_within(track.since.motion(), REST.0, REST.1) {
-            (track.until_seq, track.until_ns) = (track.seq, track.stamp_ns);
-        }
-    }
-
-    /// The present instant of an agent: at its latest keyframe if that is near, or at a new one.
-    pub(super) fn here(&mut self, agent: u32) -> Option<KeyframeOffset> {
-        let track = self.tracks.get(agent as usize)?;
-        if track.needs_keyframe || !is_within(track.since.motion(), NEAR.0, NEAR.1) {
-            self.add_keyframe(agent);
-        }
-        let revision = self.revision;
-        let track = self.tracks.get(agent as usize)?;
-        let at = track.pose * track.since.motion().inverse();
-        let (newest, is_in_map) = (track.newest, track.is_in_map);
-        let here = KeyframeOffset {
-            keyframe: newest,
-            motion: *track.since.motion(),
-            covariance: track.since.covariance(),
-        };
-        // The estimator has corrected the pose since.
-        let keyframe = self.keyframes.get_mut(newest, revision)?;
-        (keyframe.pose, keyframe.is_in_map) = (at, is_in_map);
-        Some(here)
-    }
-
-    /// An instant of an agent, if it was not long ago.
-    fn at_stamp(&mut self, agent: u32, stamp_ns: i64) -> Option<KeyframeOffset> {
-        let track = self.tracks.get(agent as usize)?;
-        if stamp_ns >= track.stamp_ns {
-            return self.here(agent);
-        }
-        let mut later = (
-            track.stamp_ns,
-            *track.since.motion(),
-            track.since.covariance(),
-        );
-        let (mut number, mut until_ns) = (track.newest, track.until_ns);
-        for _ in 0..LOOK_BACK_MAX {
-            let keyframe = self.keyframes.get(number)?;
-            if keyframe.stamp_ns <= stamp_ns {
-                let (end_ns, motion, covariance) = later;
-                let way_ns = end_ns.saturating_sub(until_ns).max(1) as f64;
-                let share = stamp_ns.saturating_sub(until_ns) as f64 / way_ns;
-                return Some(offset(number, &motion, &covariance, share));
-            }
-            later = (keyframe.stamp_ns, keyframe.motion, keyframe.covariance);
-            number = keyframe.previous;
-            until_ns = self.keyframes.get(number)?.until_ns;
-        }
-        None
-    }
-}
-
-/// The instant after a share of the motion that begins at a keyframe.
-pub(super) fn offset(
-    keyframe: u32,
-    motion: &Isometry3<f64>,
-    covariance: &PoseCovariance,
-    share: f64,
-) -> KeyframeOffset {
-    let share = share.clamp(0.0, 1.0);
-    let (linear, angular) = se3::log(motion);
-    KeyframeOffset {
-        keyframe,
-        motion: se3::exp(&(linear * share), &(angular * share)),
-        covariance: PoseCovariance::from_matrix(&(covariance.matrix() * share)),
     }
 }
 

@@ -4,7 +4,7 @@ use geometry::{PoseCovariance, se3};
 use nalgebra::Isometry3;
 use place_recognition::{Keyframes, Relocalised, Revisit, SampleKey};
 
-use super::graph::{KeyframeGraph, KeyframeOffset, offset};
+use super::graph::KeyframeGraph;
 
 impl Keyframes for KeyframeGraph {
     fn pose_at(&self, sample: SampleKey) -> Option<Isometry3<f64>> {
@@ -87,60 +87,5 @@ impl KeyframeGraph {
         self.tracks
             .get(agent as usize)
             .map_or(0, |track| track.session)
-    }
-
-    /// Pose in the map of a place beside a keyframe; `None` if it lies in no map.
-    pub(super) fn pose_of(&self, offset: &KeyframeOffset) -> Option<Isometry3<f64>> {
-        let keyframe = self.keyframes.get(offset.keyframe)?;
-        let track = self.tracks.get(keyframe.agent as usize)?;
-        let pose = keyframe.pose * offset.motion;
-        if keyframe.is_in_map {
-            Some(pose)
-        } else {
-            Some(track.own_frame? * pose)
-        }
-    }
-
-    fn at_sample(&self, sample: SampleKey) -> Option<KeyframeOffset> {
-        self.at_seq(sample.agent, sample.session, sample.seq)
-    }
-
-    /// Where an agent was at a sample of a session. Walks back to it from the next index entry.
-    pub(super) fn at_seq(&self, agent: u32, session: u32, seq: u64) -> Option<KeyframeOffset> {
-        let track = self.tracks.get(agent as usize)?;
-        if session > track.session || (session == track.session && seq > track.seq) {
-            return None;
-        }
-        let mut later = (track.seq, *track.since.motion(), track.since.covariance());
-        let (mut number, mut until_seq) = (track.newest, track.until_seq);
-        if let Some(entry) = self
-            .keyframes
-            .get(self.first_indexed_after(agent, session, seq))
-        {
-            if entry.begins && entry.session == session {
-                return None;
-            }
-            later = (entry.seq, entry.motion, entry.covariance);
-            number = entry.previous;
-            until_seq = self.keyframes.get(number)?.until_seq;
-        }
-        loop {
-            let keyframe = self.keyframes.get(number)?;
-            if keyframe.session < session {
-                return None;
-            }
-            if keyframe.session == session && keyframe.seq <= seq {
-                let (end, motion, covariance) = later;
-                let way = end.saturating_sub(until_seq).max(1) as f64;
-                let share = seq.saturating_sub(until_seq) as f64 / way;
-                return Some(offset(number, &motion, &covariance, share));
-            }
-            if keyframe.begins && keyframe.session == session {
-                return None;
-            }
-            later = (keyframe.seq, keyframe.motion, keyframe.covariance);
-            number = keyframe.previous;
-            until_seq = self.keyframes.get(number)?.until_seq;
-        }
     }
 }

@@ -6,6 +6,7 @@ use super::constraint::{ClosureState, Constraint};
 use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
 use super::sighting::{Seen, Sighting};
+use super::tuning;
 use crate::input::Label;
 use geometry::{PoseCovariance, from_planar_part, is_somewhere, planar_part, positive};
 use pose_graph::{
@@ -13,13 +14,6 @@ use pose_graph::{
     PositionInformation, Relaxed, Scale, SightingTarget,
 };
 use state::NONE;
-
-/// Least standard deviation of a motion, so that its covariance has an inverse \[m, rad\].
-const MOTION_DEVIATION_MIN: f64 = 1e-4;
-/// Scale of the Cauchy kernel of sightings, in standard deviations.
-const SIGHTING_SCALE: f64 = 3.0;
-/// Scale of the Geman–McClure kernel of loop closures, in standard deviations.
-const MATCH_SCALE: f64 = 3.0;
 
 /// The past after relaxation.
 #[derive(Clone, Debug, PartialEq)]
@@ -271,7 +265,7 @@ impl KeyframeGraph {
             },
         };
         let kernel = if constraint.is_match() {
-            Kernel::GemanMcClure(Scale::new(MATCH_SCALE).expect("a positive constant"))
+            Kernel::GemanMcClure(Scale::new(tuning::CLOSURE_SCALE).expect("a positive constant"))
         } else {
             Kernel::Gaussian
         };
@@ -298,14 +292,15 @@ impl KeyframeGraph {
             position,
             information,
         };
-        let kernel = Kernel::Cauchy(Scale::new(SIGHTING_SCALE).expect("a positive constant"));
+        let kernel =
+            Kernel::Cauchy(Scale::new(tuning::SIGHTING_SCALE).expect("a positive constant"));
         graph.map.add_link(link, kernel).ok()
     }
 }
 
 /// The information of a covariance, of its planar part for planar motion.
 fn information(covariance: &PoseCovariance, is_planar: bool) -> PoseInformation {
-    let floor = MOTION_DEVIATION_MIN * MOTION_DEVIATION_MIN;
+    let floor = tuning::MOTION_SD_MIN * tuning::MOTION_SD_MIN;
     let mut matrix = *covariance.matrix();
     for k in 0..6 {
         matrix[(k, k)] += floor;

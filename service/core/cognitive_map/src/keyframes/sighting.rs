@@ -2,14 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
 
+use super::tuning;
 use crate::input::Relation;
 use geometry::PoseCovariance;
 use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
-
-/// Least standard deviation of a sighting, so that its covariance has an inverse \[m\].
-const DEVIATION_MIN_M: f64 = 1e-3;
-/// Shortest distance at which a direction means something \[m\].
-const DISTANCE_MIN_M: f64 = 0.02;
 
 /// What a sighting shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +52,24 @@ state_of_struct!(Sighting {
     point
 });
 
+/// A sighting of an agent whose motion has not come up to it yet.
+#[derive(Clone, Debug)]
+pub(super) struct PendingSighting {
+    pub(super) keyframe: u32,
+    pub(super) observer: u32,
+    pub(super) target: u32,
+    pub(super) stamp_ns: i64,
+    pub(super) point: SeenPoint,
+}
+
+state_of_struct!(PendingSighting {
+    keyframe,
+    observer,
+    target,
+    stamp_ns,
+    point
+});
+
 impl State for Seen {
     fn write(&self, out: &mut StateWriter) {
         match self {
@@ -85,7 +99,7 @@ impl SeenPoint {
     /// distance \[m²\] and of the two angles about the seen direction, along growing azimuth and
     /// elevation \[rad²\]. The part beyond what the relation states is bias.
     pub(super) fn new(relation: &Relation, variance: &Vector3<f64>) -> Self {
-        let floor = DEVIATION_MIN_M * DEVIATION_MIN_M;
+        let floor = tuning::SIGHTING_SD_MIN_M * tuning::SIGHTING_SD_MIN_M;
         let (position, axes, scale) = match relation {
             Relation::Position(seen) => (
                 *seen.translation_m(),
@@ -106,7 +120,7 @@ impl SeenPoint {
                     sin_elevation,
                 );
                 let left = Vector3::new(-sin_azimuth, cos_azimuth, 0.0);
-                let range_m = seen.range_m().max(DISTANCE_MIN_M);
+                let range_m = seen.range_m().max(tuning::DIRECTION_DISTANCE_MIN_M);
                 (
                     forward * range_m,
                     Matrix3::from_columns(&[forward, left, forward.cross(&left)]),

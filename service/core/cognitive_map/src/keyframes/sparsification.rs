@@ -6,17 +6,9 @@ use super::constraint::ClosureState;
 use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
 use super::sighting::{Seen, Sighting, lever_covariance, symmetric};
+use super::tuning;
 use geometry::{PoseCovariance, se3};
 use state::NONE;
-
-/// Keyframes that are compared; the one whose loss is least is removed.
-const COMPARED: u32 = 16;
-/// Most keyframes examined until one may be removed.
-const LOOKED_AT_MAX: u32 = 1024;
-/// Unevenness that counts as much as doubling the variance of a sighting \[m\].
-const UNEVENNESS_M: f64 = 0.05;
-/// Lever by which a rotation counts as unevenness \[m\].
-const LEVER_M: f64 = 0.5;
 
 /// The neighbour to which the lists of a removed keyframe move.
 #[derive(Clone, Copy)]
@@ -34,8 +26,8 @@ impl KeyframeGraph {
     pub(super) fn sparsify(&mut self) {
         let numbers = self.keyframes.numbers();
         let mut least = (f64::INFINITY, NONE);
-        for looked_at in 0..LOOKED_AT_MAX.min(numbers) {
-            if looked_at >= COMPARED && least.1 != NONE {
+        for looked_at in 0..tuning::KEYFRAMES_EXAMINED_MAX.min(numbers) {
+            if looked_at >= tuning::KEYFRAMES_COMPARED && least.1 != NONE {
                 break;
             }
             let number = self.sweep;
@@ -57,8 +49,8 @@ impl KeyframeGraph {
     pub(super) fn forget_least_certain(&mut self) {
         let numbers = self.keyframes.numbers();
         let (mut most, mut compared) = ((1, NONE), 0);
-        for _ in 0..LOOKED_AT_MAX.min(numbers) {
-            if compared >= COMPARED && most.1 != NONE {
+        for _ in 0..tuning::KEYFRAMES_EXAMINED_MAX.min(numbers) {
+            if compared >= tuning::KEYFRAMES_COMPARED && most.1 != NONE {
                 break;
             }
             let number = self.sweep;
@@ -101,7 +93,7 @@ impl KeyframeGraph {
                 (next.motion.inverse(), next.covariance)
             }
         };
-        let mut loss = self.unevenness_without(keyframe) / UNEVENNESS_M;
+        let mut loss = self.unevenness_without(keyframe) / tuning::UNEVENNESS_M;
         let mut at = keyframe.sightings;
         while let Some(sighting) = self.sightings.get(at) {
             let spread = lever_covariance(&sighting.point.position, &covariance).trace();
@@ -164,7 +156,7 @@ impl KeyframeGraph {
             // Interpolated as readers of trajectories do, which is much quicker than along a screw.
             let shift = whole.translation.vector * share - keyframe.motion.translation.vector;
             let even = UnitQuaternion::identity().nlerp(&whole.rotation, share);
-            shift.norm() + LEVER_M * even.angle_to(&keyframe.motion.rotation)
+            shift.norm() + tuning::ROTATION_LEVER_M * even.angle_to(&keyframe.motion.rotation)
         };
         known + off(keyframe.stamp_ns).max(off(keyframe.until_ns))
     }

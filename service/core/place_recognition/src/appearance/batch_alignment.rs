@@ -17,24 +17,12 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix3x6, Matrix6, Point3, Vector6};
 
-use super::descriptor_process::{OPEN_MIN, ReferenceView, ReferenceViews};
+use super::descriptor_process::{ReferenceView, ReferenceViews};
 use super::view_alignment::{LocalQuery, Prior, ViewAlignment};
 use crate::descriptor::dot;
+use crate::tuning::batch as tuning;
 use crate::twist::{moved, twist};
 use crate::views::Kernel;
-
-/// Most views about the way, those nearest to a query first.
-const VIEWS_MAX: usize = 64;
-/// Most halvings of a step that does not lower the cost.
-const HALVED_MAX: usize = 4;
-/// A step shorter than this is the last one \[m, rad\].
-const AT_REST: f64 = 1e-3;
-/// Squared leave-one-out residual, 1 on average, beyond which a query is an outlier.
-const OFF_MAX: f64 = 3.0;
-/// Largest share of outliers.
-const STRAY_MAX: f64 = 0.3;
-/// Variance of an outlier: larger than that of an unknown place.
-const ANYTHING: f64 = 4.0;
 
 /// The queries of a channel, and the views about them.
 struct ChannelBatch<'a> {
@@ -107,14 +95,14 @@ impl<'a> ChannelBatch<'a> {
             .filter(|(squared, _)| *squared <= 4.0 * kernel.length_m.powi(2))
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        near.truncate(VIEWS_MAX);
+        near.truncate(tuning::VIEWS_MAX);
         let count = near.len();
         if count == 0 {
             return None;
         }
         let matrix = DMatrix::from_fn(count, count, |row, column| {
             if row == column {
-                1.0 + OPEN_MIN
+                1.0 + crate::tuning::process::OPEN_MIN
             } else {
                 kernel.at((near[row].1.at - near[column].1.at).norm_squared())
             }
@@ -224,7 +212,7 @@ impl<'a> ChannelBatch<'a> {
     fn outlier(&self, pose: &Isometry3<f64>) -> Option<Vec<f64>> {
         let count = self.queries.len();
         let mut outlier = vec![0.0; count];
-        let mut left = (STRAY_MAX * count as f64).floor();
+        let mut left = (tuning::STRAY_MAX * count as f64).floor();
         while left >= 1.0 {
             let fit = self.fit(pose, &outlier)?;
             let log_odds = &fit.precision * &fit.off;
@@ -233,10 +221,10 @@ impl<'a> ChannelBatch<'a> {
             let Some((worst, off)) = worst.max_by(|a, b| a.1.total_cmp(&b.1)) else {
                 break;
             };
-            if off <= OFF_MAX || outlier[worst] > 0.0 {
+            if off <= tuning::OFF_MAX || outlier[worst] > 0.0 {
                 break;
             }
-            outlier[worst] = ANYTHING;
+            outlier[worst] = tuning::ANYTHING;
             left -= 1.0;
         }
         Some(outlier)
@@ -277,7 +265,7 @@ impl BatchAlignment<'_> {
             let (gradient, hessian) = self.normal_equations(&pose, &fits, prior);
             let mut step = -hessian.cholesky()?.solve(&gradient);
             let mut is_better = false;
-            for _ in 0..HALVED_MAX {
+            for _ in 0..tuning::HALVED_MAX {
                 let there = moved(&pose, &step);
                 if let Some(found) = self.fits(&there, &outliers)
                     && cost(&found) < cost(&fits)
@@ -287,7 +275,7 @@ impl BatchAlignment<'_> {
                 }
                 step *= 0.5;
             }
-            if !is_better || step.norm() < AT_REST {
+            if !is_better || step.norm() < tuning::AT_REST {
                 break;
             }
         }

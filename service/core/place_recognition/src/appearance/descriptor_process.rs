@@ -16,16 +16,8 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
 
 use crate::descriptor::dot;
+use crate::tuning::process as tuning;
 use crate::views::Kernel;
-
-/// Most views about a point, the nearest first.
-const NEAR_MAX: usize = 12;
-/// Least variance: positions and kernel are not exact.
-pub(super) const OPEN_MIN: f64 = 0.02;
-/// A point is known when the variance there is at most this.
-const OPEN_MAX: f64 = 0.8;
-/// A point is well known when the variance there is at most this.
-const KNOWN_MAX: f64 = 0.5;
 
 /// A view with its position.
 #[derive(Clone, Copy, Debug)]
@@ -88,14 +80,14 @@ impl DescriptorProcess {
             .filter(|(squared, _)| *squared <= 4.0 * kernel.length_m.powi(2))
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        near.truncate(NEAR_MAX);
+        near.truncate(tuning::NEAR_MAX);
         if near.is_empty() {
             return None;
         }
         let count = near.len();
         let matrix = DMatrix::from_fn(count, count, |row, column| {
             if row == column {
-                1.0 + OPEN_MIN
+                1.0 + tuning::OPEN_MIN
             } else {
                 kernel.at((near[row].1.at - near[column].1.at).norm_squared())
             }
@@ -133,7 +125,7 @@ impl DescriptorProcess {
         let known = DVector::from_fn(self.points.len(), |row, _| {
             self.kernel.at((self.points[row] - at).norm_squared())
         });
-        if (1.0 - known.dot(&(&self.inverse * &known))) * self.misfit > KNOWN_MAX {
+        if (1.0 - known.dot(&(&self.inverse * &known))) * self.misfit > tuning::KNOWN_MAX {
             return None;
         }
         let length_squared = self.kernel.length_m.powi(2);
@@ -144,8 +136,9 @@ impl DescriptorProcess {
             let apart = self.points[row] - at;
             self.kernel.likeness * share * (-0.5 * apart.dot(&factor.solve(&apart))).exp()
         });
-        let open = (1.0 - kernel.dot(&(&self.inverse * &kernel))).max(OPEN_MIN) * self.misfit;
-        if open > OPEN_MAX {
+        let open =
+            (1.0 - kernel.dot(&(&self.inverse * &kernel))).max(tuning::OPEN_MIN) * self.misfit;
+        if open > tuning::OPEN_MAX {
             return None;
         }
         let expected = kernel.dot(&(&self.gram * &kernel));
@@ -162,10 +155,11 @@ impl DescriptorProcess {
             self.kernel.at((self.points[row] - at).norm_squared())
         });
         let open = 1.0 - kernel.dot(&(&self.inverse * &kernel));
-        if open > OPEN_MAX {
+        if open > tuning::OPEN_MAX {
             return None;
         }
-        let open = (open.max(OPEN_MIN) + spread_m.powi(2) / length_squared).min(1.0) * self.misfit;
+        let open =
+            (open.max(tuning::OPEN_MIN) + spread_m.powi(2) / length_squared).min(1.0) * self.misfit;
         let expected = &self.gram * &kernel;
         let squared = (1.0 - 2.0 * kernel.dot(&self.likeness) + kernel.dot(&expected)).max(0.0);
         // ∂k/∂x = −k (x − p) / ℓ²

@@ -15,24 +15,9 @@
 use nalgebra::{Isometry3, Matrix3x6, Matrix6, Point3, Vector6};
 
 use super::descriptor_process::{DescriptorProcess, ReferenceView, ReferenceViews};
+use crate::tuning::alignment as tuning;
 use crate::twist::{moved, twist};
 use crate::views::Kernel;
-
-/// ε: probability of an outlier.
-const WRONG: f64 = 0.05;
-/// G: largest evidence of a query \[nats\].
-const TELLS_MAX: f64 = 3.0;
-/// Largest part τ of the effective dimension.
-const COUNTED_MAX: f64 = 0.5;
-/// Largest evidence of a query for a pose against another one at which it cannot be judged
-/// \[nats\].
-const OPEN: f64 = 0.1;
-/// Residual from which on a query loses weight.
-const SOFT: f64 = 2.0;
-/// Rounds of looking up the views about a pose, and steps of each.
-const ROUNDS: (usize, usize) = (3, 4);
-/// A round that moves a pose by less is the last one \[m, rad\].
-const AT_REST: f64 = 1e-3;
 
 /// A query along a way.
 #[derive(Clone, Copy, Debug)]
@@ -84,7 +69,7 @@ impl LocalQuery<'_> {
     /// Effective dimension of the query beside others at this distance.
     pub(crate) fn numbers(&self, spacing_m: f64) -> f64 {
         self.kernel.map_or(0.0, |kernel| {
-            kernel.numbers * (0.5 * spacing_m / kernel.length_m).min(COUNTED_MAX)
+            kernel.numbers * (0.5 * spacing_m / kernel.length_m).min(tuning::COUNTED_MAX)
         })
     }
 }
@@ -118,16 +103,16 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
     pub(crate) fn align(&self, start: &Isometry3<f64>, prior: &Prior) -> Option<AlignedPose> {
         let mut pose = *start;
         let mut about = self.about(&pose);
-        for _ in 0..ROUNDS.0 {
+        for _ in 0..tuning::ROUNDS.0 {
             let begun = pose;
-            for _ in 0..ROUNDS.1 {
+            for _ in 0..tuning::ROUNDS.1 {
                 let (gradient, hessian) = self.normal_equations(&pose, &about, prior);
                 let Some(factor) = hessian.cholesky() else {
                     break;
                 };
                 pose = moved(&pose, &-factor.solve(&gradient));
             }
-            if twist(&begun.inv_mul(&pose)).norm() < AT_REST {
+            if twist(&begun.inv_mul(&pose)).norm() < tuning::AT_REST {
                 break;
             }
             about = self.about(&pose);
@@ -163,7 +148,7 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
             let Some(expected) = near.expect(&at, query.drift_m) else {
                 continue;
             };
-            let weight = query.numbers(spacing_m) / (1.0 + (expected.off / SOFT).powi(2));
+            let weight = query.numbers(spacing_m) / (1.0 + (expected.off / tuning::SOFT).powi(2));
             // ∂x/∂(ρ, φ) = R | I  −y× |
             let mut lever = Matrix3x6::zeros();
             lever.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
@@ -198,7 +183,7 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
 /// dimension, the variance, and the squared residual.
 pub(crate) fn log_odds(numbers: f64, open: f64, off: f64) -> f64 {
     let tells = 0.5 * numbers * (1.0 - off - open.ln());
-    ((1.0 - WRONG) * tells.min(TELLS_MAX).exp() + WRONG).ln()
+    ((1.0 - tuning::WRONG) * tells.min(tuning::TELLS_MAX).exp() + tuning::WRONG).ln()
 }
 
 impl Evidence {
@@ -212,8 +197,8 @@ impl Evidence {
     pub(crate) fn against(&self, other: &Self) -> f64 {
         let say = |(own, other): (&Option<f64>, &Option<f64>)| match (own, other) {
             (Some(own), Some(other)) => own - other,
-            (Some(own), None) => own.min(OPEN),
-            (None, Some(other)) => -other.min(OPEN),
+            (Some(own), None) => own.min(tuning::OPEN),
+            (None, Some(other)) => -other.min(tuning::OPEN),
             (None, None) => 0.0,
         };
         self.queries.iter().zip(&other.queries).map(say).sum()

@@ -8,31 +8,13 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
 
 use super::PlaceRecognition;
-use super::relocalise::MOVED;
 use crate::appearance::{DescriptorProcess, LocalQuery, Prior, ReferenceView, log_odds};
 use crate::keyframes::{Keyframes, SampleKey};
 use crate::relocalisation::{KidnapTest, Positions, Problem, QueryView, Search, alignment};
+use crate::tuning::kidnap as tuning;
 use crate::twist::twist;
 use crate::view::View;
 use crate::views::Kernel;
-
-/// Threshold of the cumulative sum \[nats\]: one false alarm in a thousand, if one query in a
-/// thousand is the first one after a kidnapping.
-const SURE: f64 = 6.9 + 6.9;
-/// Least distance between weighed queries, in lengths of the channel's kernel: nearer ones have
-/// correlated errors.
-const SPACING: f64 = 0.25;
-/// Factor by which the errors of a pose may exceed their standard deviations.
-const WIDER: f64 = 2.0;
-/// A view nearer than this to the one before must be similar to it, in reaches: else one of them is
-/// an outlier.
-const BESIDE: f64 = 0.6;
-/// Most remembered views near the agent that are looked up.
-const NEAR_MAX: usize = 24;
-/// A query counts if its heading differs from one of the views about it by no more than this, or
-/// than these differ from one another: a channel may see something else in another direction
-/// \[rad\].
-const TURNED_RAD: f64 = 0.5;
 
 impl PlaceRecognition {
     /// Whether what an agent of the map saw lately contradicts its believed pose. `accepted` is the
@@ -55,7 +37,11 @@ impl PlaceRecognition {
         };
         let has_moved = test.latest.as_ref().is_none_or(|latest| {
             let way = latest.in_odom.inv_mul(&view.in_odom);
-            !geometry::is_within(&way, MOVED.0, MOVED.1)
+            !geometry::is_within(
+                &way,
+                crate::tuning::relocalise::MOVED.0,
+                crate::tuning::relocalise::MOVED.1,
+            )
         });
         if !has_moved {
             return false;
@@ -71,7 +57,7 @@ impl PlaceRecognition {
         let spacing_m = test.weighed_at.map_or(f64::INFINITY, |at| {
             (at.translation.vector - query.in_odom.translation.vector).norm()
         });
-        let says = (is_borne_out && spacing_m >= SPACING * kernel.length_m)
+        let says = (is_borne_out && spacing_m >= tuning::SPACING * kernel.length_m)
             .then(|| self.says(test, view, &query, kernel, spacing_m, keyframes))
             .flatten();
         let revision = self.revision;
@@ -99,7 +85,7 @@ impl PlaceRecognition {
             test.run
                 .push(query.in_odom, channel, &query.vector, Vec::new());
         }
-        let is_much = says.is_some() && test.against >= SURE;
+        let is_much = says.is_some() && test.against >= tuning::SURE;
         let Some(test) = self.kidnap_tests.get(number).filter(|_| is_much) else {
             return false;
         };
@@ -114,7 +100,7 @@ impl PlaceRecognition {
         };
         let apart = before.in_odom.translation.vector - query.in_odom.translation.vector;
         let reach_m = self.views.reach_m(query.channel).unwrap_or(0.0);
-        apart.norm() >= BESIDE * reach_m
+        apart.norm() >= tuning::BESIDE * reach_m
             || self
                 .views
                 .is_alike(query.channel, &before.vector, &query.vector)
@@ -143,7 +129,7 @@ impl PlaceRecognition {
             .collect();
         remembered.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut unsure_m2 = 0.0;
-        for (_, stored) in remembered.into_iter().take(NEAR_MAX) {
+        for (_, stored) in remembered.into_iter().take(tuning::NEAR_MAX) {
             if let Some(pose) = keyframes.pose_at(stored.sample) {
                 let from = Point3::from(pose.translation.vector);
                 let vector = &*stored.vector;
@@ -157,7 +143,7 @@ impl PlaceRecognition {
         let spread_rad = near
             .iter()
             .map(|(_, pose)| pose.rotation.angle_to(&near[0].1.rotation))
-            .fold(TURNED_RAD, f64::max);
+            .fold(tuning::TURNED_RAD, f64::max);
         if least_rad > spread_rad {
             return None;
         }
@@ -166,7 +152,7 @@ impl PlaceRecognition {
         // The views' positions are no more certain than their agents were then.
         let unsure_m2 = unsure_m2 / (3.0 * near.len() as f64);
         let own: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
-        let covariance = (own + Matrix3::identity() * unsure_m2) * WIDER.powi(2);
+        let covariance = (own + Matrix3::identity() * unsure_m2) * tuning::WIDER.powi(2);
         let about = DescriptorProcess::of(&query.vector, &at, &seen, kernel)?;
         let predicted = about.predict(&at, &covariance)?;
         let query = LocalQuery {
@@ -196,7 +182,7 @@ impl PlaceRecognition {
         for query in test.run.queries.iter().rev() {
             let is_apart = spaced.queries.last().is_none_or(|later| {
                 let apart = later.in_odom.translation.vector - query.in_odom.translation.vector;
-                apart.norm() >= SPACING * kernel.length_m
+                apart.norm() >= tuning::SPACING * kernel.length_m
             });
             if is_apart {
                 spaced.queries.push(query.clone());
@@ -208,7 +194,7 @@ impl PlaceRecognition {
             return false;
         };
         let open = problem.prior().open;
-        let stated = view.covariance.matrix() * WIDER.powi(2);
+        let stated = view.covariance.matrix() * tuning::WIDER.powi(2);
         // A floor, so that a component without error, such as the height of a robot on a floor, is
         // held.
         let floor = Matrix6::identity() * 1e-6;
@@ -225,7 +211,7 @@ impl PlaceRecognition {
             let off = twist(&view.pose.inv_mul(&aligned.pose));
             aligned.evidence.total() - 0.5 * off.dot(&(information * off))
         });
-        best.is_some_and(|best| best <= -SURE)
+        best.is_some_and(|best| best <= -tuning::SURE)
     }
 
     /// Declares an agent kidnapped. The contradicting views are forgotten at the believed pose, and

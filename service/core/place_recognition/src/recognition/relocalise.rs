@@ -6,33 +6,8 @@ use nalgebra::Isometry3;
 use super::PlaceRecognition;
 use crate::keyframes::{Keyframes, SampleKey};
 use crate::relocalisation::{Candidate, Search, candidates, turn_sd_rad};
+use crate::tuning::relocalise as tuning;
 use crate::view::View;
-
-/// Least motion between two queries \[m, rad\].
-pub(super) const MOVED: (f64, f64) = (0.05, 0.2);
-/// Queries between two attempts, before and after the agent was found.
-const FRESH: (u32, u32) = (2, 3);
-/// An agent that is not found for long makes attempts more rarely: one query more for so many
-/// queries.
-const PATIENCE: usize = 12;
-/// Fewest queries of an attempt.
-const LOOKS_MIN: usize = 6;
-/// Log odds at which a pose is accepted: one wrong answer in a thousand \[nats\].
-const SURE: f64 = 6.9;
-/// Largest standard deviation of the heading of an answer \[rad\].
-const HEADING_SD_MAX_RAD: f64 = 0.3;
-/// Standard deviation of the heading up to which the search goes on after the agent was found: an
-/// error of the heading becomes one of the position \[rad\].
-const HEADING_SD_RAD: f64 = 0.02;
-/// Way after which it ends in any case \[m\].
-const ON_M: f64 = 5.0;
-/// Factor by which a candidate may be less certain query by query than by all queries at once:
-/// where they differ by more, the map is thin, and the batch rests on what the map leaves open.
-const ROUGHLY: f64 = 2.0;
-/// Largest factor of the covariance: beyond it the map contradicts the queries, or itself.
-const WIDER_MAX: f64 = 2.0;
-/// Most guesses.
-const GUESSES_MAX: usize = 8;
 
 /// The pose of an agent that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +51,7 @@ impl PlaceRecognition {
         let search = self.searches.get_mut(number, revision)?;
         let has_moved = search.queries.last().is_none_or(|last| {
             let way = last.in_odom.inv_mul(&view.in_odom);
-            !geometry::is_within(&way, MOVED.0, MOVED.1)
+            !geometry::is_within(&way, tuning::MOVED.0, tuning::MOVED.1)
         });
         if !has_moved {
             return None;
@@ -88,13 +63,13 @@ impl PlaceRecognition {
         search.push(view.in_odom, channel, view.vector, alike);
         let queries = search.queries.len();
         let fresh = if search.found_m.is_some() {
-            FRESH.1
+            tuning::FRESH.1
         } else {
-            FRESH
+            tuning::FRESH
                 .0
-                .max(u32::try_from(queries / PATIENCE).unwrap_or(u32::MAX))
+                .max(u32::try_from(queries / tuning::PATIENCE).unwrap_or(u32::MAX))
         };
-        if search.fresh < fresh || queries < LOOKS_MIN {
+        if search.fresh < fresh || queries < tuning::QUERIES_MIN {
             return None;
         }
         search.fresh = 0;
@@ -102,17 +77,18 @@ impl PlaceRecognition {
         let places = candidates(search, &self.views, keyframes);
         let best = places.first()?;
         let views = (self.views.stored.len() as f64).max(1.0);
-        let is_sure = best.evidence.total() >= SURE + views.ln()
+        let is_sure = best.evidence.total() >= tuning::SURE + views.ln()
             && places[1..]
                 .iter()
-                .all(|other| best.evidence.against(&other.evidence) >= SURE);
+                .all(|other| best.evidence.against(&other.evidence) >= tuning::SURE);
         let covariance = PoseCovariance::from_matrix(&best.covariance);
         let turn_sd_rad = turn_sd_rad(&best.covariance);
         // After the agent was found, an answer where the map is thin is still useful.
         let is_rough = search.found_m.is_none()
-            && (best.rough_sd_m > ROUGHLY * sd_max_m || turn_sd_rad > HEADING_SD_MAX_RAD);
+            && (best.rough_sd_m > tuning::ROUGHLY * sd_max_m
+                || turn_sd_rad > tuning::HEADING_SD_MAX_RAD);
         let is_known =
-            covariance.position_sd_m() <= sd_max_m && best.wider <= WIDER_MAX && !is_rough;
+            covariance.position_sd_m() <= sd_max_m && best.wider <= tuning::WIDER_MAX && !is_rough;
         if !is_sure || !is_known {
             return None;
         }
@@ -125,7 +101,7 @@ impl PlaceRecognition {
             pose,
             covariance,
             is_first,
-            is_last: turn_sd_rad <= HEADING_SD_RAD || way_m - found_m >= ON_M,
+            is_last: turn_sd_rad <= tuning::HEADING_SD_RAD || way_m - found_m >= tuning::ON_M,
         })
     }
 
@@ -135,7 +111,7 @@ impl PlaceRecognition {
         let search = number.and_then(|number| self.searches.get(number));
         search.is_some_and(|search| {
             let is_found = search.found_m.is_some();
-            is_found && !search.is_over(ON_M) && search.session == session
+            is_found && !search.is_over(tuning::ON_M) && search.session == session
         })
     }
 
@@ -179,7 +155,7 @@ impl PlaceRecognition {
         let whole: f64 = places.iter().map(weight).sum::<f64>() + nowhere;
         places
             .iter()
-            .take(GUESSES_MAX)
+            .take(tuning::GUESSES_MAX)
             .map(|place| Guess {
                 pose: place.mean,
                 covariance: PoseCovariance::from_matrix(&place.covariance),
@@ -201,7 +177,7 @@ impl PlaceRecognition {
         if let Some(search) = self.searches.get_mut(number, revision)
             && (search.session != sample.session
                 || search.queries.is_empty()
-                || search.is_over(ON_M))
+                || search.is_over(tuning::ON_M))
         {
             *search = fresh;
         }

@@ -8,17 +8,11 @@ use crate::appearance::{
     AlignedPose, LocalQuery, Prior, ReferenceView, ViewAlignment, mixture, weighted,
 };
 use crate::keyframes::{Keyframes, SampleKey};
-use crate::sequences::{NEAR, OPEN_DISTANCES, OPEN_RAD, SequenceMatch, align_roughly};
+use crate::sequences::{SequenceMatch, align_roughly};
+use crate::tuning::revisit as tuning;
 use crate::twist::twist;
 use crate::view::{View, spread};
 use crate::views::StoredView;
-
-/// A revisit says nothing of an agent whose position is surer than the revisit by this factor.
-const SURER: f64 = 2.0;
-/// Deviations from one another beyond which two stretches are not one place.
-const AWAY: f64 = 6.0;
-/// Least evidence of the views along a stretch for where they are aligned \[nats\].
-const AGREE: f64 = 3.0;
 
 /// Two samples of one place, with their relative pose.
 #[derive(Clone, Copy, Debug)]
@@ -57,12 +51,12 @@ impl PlaceRecognition {
         // A place far away that only looks alike is dismissed before the alignment, which costs
         // more.
         let reach_m = self.views.reach_m(matched.channel()).unwrap_or(0.0);
-        if expected.translation.vector.norm() > AWAY * either[0] + 2.0 * reach_m {
+        if expected.translation.vector.norm() > tuning::AWAY * either[0] + 2.0 * reach_m {
             return None;
         }
         let is_planar = keyframes.is_planar(now.agent);
         let (transform, covariance) = self.align(matched, &expected, either, is_planar)?;
-        if view.spread()[0] * SURER < spread(&covariance)[0] {
+        if view.spread()[0] * tuning::SURER < spread(&covariance)[0] {
             return None;
         }
         Some(Revisit {
@@ -95,7 +89,7 @@ impl PlaceRecognition {
             .collect();
         let channel = matched.channel();
         let kernel = self.views.kernel(channel)?;
-        let reach = OPEN_DISTANCES * kernel.length_m;
+        let reach = crate::tuning::ranges::OPEN_DISTANCES * kernel.length_m;
         let views: Vec<(u8, ReferenceView<'_>)> = earlier
             .iter()
             .map(|view| {
@@ -126,9 +120,9 @@ impl PlaceRecognition {
                 1.0 / reach.powi(2),
                 1.0 / reach.powi(2),
                 1.0 / reach.powi(2),
-                1.0 / OPEN_RAD.powi(2),
-                1.0 / OPEN_RAD.powi(2),
-                1.0 / OPEN_RAD.powi(2),
+                1.0 / crate::tuning::ranges::OPEN_RAD.powi(2),
+                1.0 / crate::tuning::ranges::OPEN_RAD.powi(2),
+                1.0 / crate::tuning::ranges::OPEN_RAD.powi(2),
             )),
         };
         let mut aligned: Vec<(AlignedPose, f64)> = align_roughly(matched, expected, spread)
@@ -139,7 +133,9 @@ impl PlaceRecognition {
                 let cost = off.dot(&information.component_mul(&off));
                 (aligned, cost)
             })
-            .filter(|(aligned, cost)| aligned.evidence.total() > AGREE && *cost < NEAR)
+            .filter(|(aligned, cost)| {
+                aligned.evidence.total() > tuning::AGREE && *cost < crate::tuning::ranges::NEAR
+            })
             .collect();
         let best = aligned
             .iter()

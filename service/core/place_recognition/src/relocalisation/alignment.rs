@@ -7,10 +7,7 @@ use super::problem::{Problem, QueryPoint};
 use super::search::Search;
 use crate::appearance::{LocalQuery, ReferenceView, ReferenceViews, ViewAlignment};
 use crate::sequences::ViewMemory;
-
-/// Farthest that relaxation may have moved a view since it was stored, for the prefilter by the
-/// stored position to keep it \[m\].
-const DISPLACED_M: f64 = 5.0;
+use crate::tuning::references as tuning;
 
 /// The queries of a search, with all remembered views as references.
 pub(crate) fn alignment<'a>(
@@ -61,7 +58,8 @@ fn views<'a>(
         (0..3).all(|k| point[k] >= low[k] - more_m && point[k] <= high[k] + more_m)
     };
     let views = memory.stored.iter();
-    let near = views.filter(|view| is_within(&view.in_map, DISPLACED_M) && !search.is_own(view));
+    let near =
+        views.filter(|view| is_within(&view.in_map, tuning::DISPLACED_M) && !search.is_own(view));
     near.filter_map(|view| {
         let at = positions.at(view.sample)?;
         let vector = &*view.vector;

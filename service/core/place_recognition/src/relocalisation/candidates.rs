@@ -12,18 +12,11 @@ use crate::appearance::{
 };
 use crate::keyframes::Keyframes;
 use crate::sequences::ViewMemory;
+use crate::tuning::candidates as tuning;
 use geometry::PoseCovariance;
 
-/// Poses nearer than this are of one candidate, in reaches.
-const PLACE: f64 = 0.5;
-/// Most poses of a candidate that are refined by batch alignment.
-const WHOLE_MAX: usize = 4;
 /// Steps of batch alignment: of all poses, and of those about as likely as the best one.
 const WHOLE_STEPS: [usize; 2] = [2, 6];
-/// A pose is dropped when its cost exceeds the best one by this \[nats\].
-const RIVAL: f64 = 12.0;
-/// Standard deviation of a rotation beyond which other turns about the way are tried \[rad\].
-const TURN_OPEN_RAD: f64 = 0.5;
 
 /// A place where the agent may be: poses that differ by little.
 pub(crate) struct Candidate {
@@ -61,7 +54,7 @@ pub(crate) fn candidates(
         let known = places.iter_mut().find(|poses| {
             let best = &poses[0].0.pose;
             let apart = best.translation.vector - aligned.pose.translation.vector;
-            apart.norm() < PLACE * problem.reach_m
+            apart.norm() < tuning::PLACE * problem.reach_m
         });
         match known {
             Some(poses) => {
@@ -75,13 +68,14 @@ pub(crate) fn candidates(
     let places = places.into_iter().enumerate().map(|(rank, poses)| {
         let rough = mixture(&weighted(&poses));
         // An agent that was found knows its heading.
-        let is_turn_open = search.found_m.is_none() && turn_sd_rad(&rough.1) > TURN_OPEN_RAD;
+        let is_turn_open =
+            search.found_m.is_none() && turn_sd_rad(&rough.1) > tuning::TURN_OPEN_RAD;
         let fine = (rank == 0)
             .then(|| whole(&problem, &alignment, &poses, is_turn_open))
             .flatten();
         let is_there = |fine: &(Isometry3<f64>, Matrix6<f64>, f64)| {
             let apart = rough.0.translation.vector - fine.0.translation.vector;
-            apart.norm() < PLACE * problem.reach_m
+            apart.norm() < tuning::PLACE * problem.reach_m
         };
         let (mean, covariance, wider) = fine.filter(is_there).unwrap_or((rough.0, rough.1, 1.0));
         Candidate {
@@ -106,7 +100,7 @@ fn whole<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>>(
     let best = &poses.first()?.0;
     let whole = alignment.whole(&best.pose)?;
     let others = poses.iter().map(|(aligned, _)| aligned.pose);
-    let mut starts: Vec<Isometry3<f64>> = others.take(WHOLE_MAX).collect();
+    let mut starts: Vec<Isometry3<f64>> = others.take(tuning::WHOLE_MAX).collect();
     if is_turn_open {
         starts.extend(turns(problem, &best.pose));
     }
@@ -118,13 +112,13 @@ fn whole<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>>(
             .collect();
         laid.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let (least, wider) = (laid.first()?.cost, laid.first()?.wider);
-        laid.retain(|each| each.cost - least < RIVAL * wider);
+        laid.retain(|each| each.cost - least < tuning::RIVAL * wider);
         starts.clear();
         laid.retain(|each| {
             let is_new = !starts
                 .iter()
                 .any(|known| is_same(problem, known, &each.pose));
-            let is_kept = is_new && starts.len() < WHOLE_MAX;
+            let is_kept = is_new && starts.len() < tuning::WHOLE_MAX;
             if is_kept {
                 starts.push(each.pose);
             }

@@ -6,11 +6,9 @@ use super::positions::Positions;
 use super::search::Search;
 use crate::appearance::Prior;
 use crate::keyframes::Keyframes;
-use crate::sequences::{OPEN_DISTANCES, OPEN_RAD, ViewMemory};
+use crate::sequences::ViewMemory;
+use crate::tuning::problem as tuning;
 use crate::views::SimilarView;
-
-/// Standard deviation of odometry's lengths as a share of the way: that of a modest robot.
-const ODOMETRY_SHARE: f64 = 0.05;
 
 /// The position of a query in the frame of the body at the newest query.
 #[derive(Clone, Debug)]
@@ -60,7 +58,7 @@ impl Problem {
             .map(|(query, each)| QueryPoint {
                 query,
                 at: back * Point3::from(each.in_odom.translation.vector),
-                drift_m: ODOMETRY_SHARE * (newest.travelled_m - each.travelled_m),
+                drift_m: tuning::ODOMETRY_SHARE * (newest.travelled_m - each.travelled_m),
                 cues: each
                     .alike
                     .iter()
@@ -77,8 +75,8 @@ impl Problem {
 
     /// A weak prior \[m⁻², rad⁻²\]: a pose lies within some reaches of its seed.
     pub(crate) fn prior(&self) -> Prior {
-        let shift = 1.0 / (OPEN_DISTANCES * self.reach_m).powi(2);
-        let turn = 1.0 / (OPEN_RAD * OPEN_RAD);
+        let shift = 1.0 / (crate::tuning::ranges::OPEN_DISTANCES * self.reach_m).powi(2);
+        let turn = 1.0 / (crate::tuning::ranges::OPEN_RAD * crate::tuning::ranges::OPEN_RAD);
         let open = Matrix6::from_diagonal(&Vector6::new(shift, shift, shift, turn, turn, turn));
         Prior {
             pose: None,

@@ -3,17 +3,11 @@
 use nalgebra::Isometry3;
 
 use crate::keyframes::SampleKey;
-use crate::sequences::{SIMILAR_MAX, ViewMemory};
+use crate::sequences::ViewMemory;
+use crate::tuning::search as tuning;
 use crate::views::{SimilarView, StoredView, read_all, read_vector, write_all, write_vector};
 use state::PagedVec;
 use state::{CorruptState, State, StateReader, StateWriter};
-
-/// Most queries of a search, and longest way over which they lie \[m\]: beyond some metres odometry
-/// adds errors of its own.
-const LOOKS_MAX: usize = 48;
-const WAY_M_MAX: f64 = 5.0;
-/// Most numbers in their descriptors: a quarter of a MiB.
-const NUMBERS_MAX: usize = 1 << 16;
 
 /// A query: a view of an agent that does not know where it is, with the remembered views that are
 /// similar.
@@ -86,7 +80,9 @@ impl Search {
             alike,
         });
         let mut numbers: usize = self.queries.iter().map(|query| query.vector.len()).sum();
-        while self.queries.len() > LOOKS_MAX || numbers > NUMBERS_MAX.max(vector.len()) {
+        while self.queries.len() > tuning::QUERIES_MAX
+            || numbers > tuning::NUMBERS_MAX.max(vector.len())
+        {
             numbers -= self.queries.remove(self.dispensable()).vector.len();
         }
         self.fresh += 1;
@@ -96,7 +92,7 @@ impl Search {
     fn dispensable(&self) -> usize {
         let way_m = |from: &QueryView, to: &QueryView| to.travelled_m - from.travelled_m;
         if let [first, .., last] = &self.queries[..]
-            && way_m(first, last) > WAY_M_MAX
+            && way_m(first, last) > tuning::WAY_M_MAX
         {
             return 0;
         }
@@ -140,7 +136,7 @@ impl Search {
             query
                 .alike
                 .sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
-            query.alike.truncate(SIMILAR_MAX);
+            query.alike.truncate(crate::tuning::memory::SIMILAR_MAX);
         }
     }
 
@@ -161,7 +157,7 @@ impl Search {
     /// Whether the state is one that this program may have written to a checkpoint.
     pub(crate) fn is_sound(&self, agents: usize, is_channel: impl Fn(u8, usize) -> bool) -> bool {
         (self.agent as usize) < agents
-            && self.queries.len() <= LOOKS_MAX
+            && self.queries.len() <= tuning::QUERIES_MAX
             && self
                 .queries
                 .iter()

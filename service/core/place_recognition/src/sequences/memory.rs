@@ -3,38 +3,14 @@
 use nalgebra::Isometry3;
 
 use super::sequence_match::SequenceMatch;
-use super::track::{RECENT_MAX, ViewTrack};
+use super::track::ViewTrack;
 use crate::descriptor::angle_rad;
 use crate::keyframes::SampleKey;
+use crate::tuning::memory as tuning;
 use crate::view::View;
 use crate::views::{ChannelModel, Distance, Kernel, SimilarView, StoredView, read_all, write_all};
 use state::PagedVec;
 use state::{CorruptState, State, StateReader, StateWriter};
-
-/// Most channels.
-const CHANNELS_MAX: usize = 64;
-/// Most views.
-const VIEWS_MAX: usize = 16_384;
-/// Most numbers in their descriptors, all of which a new view is compared with: 8 MiB.
-const NUMBERS_MAX: usize = 1 << 21;
-/// Least motion between two views that are compared \[m, rad\].
-const MOVED: (f64, f64) = (0.05, 0.1);
-/// Least motion after which a view may be new \[m, rad\]: that between keyframes.
-const STEP: (f64, f64) = (0.1, 0.1);
-/// A view that is similar to none of those nearer than this, in reaches, is an outlier: somebody
-/// passes by.
-const BESIDE: f64 = 0.6;
-/// Ordinals by which an agent's own views must be earlier to count as revisited.
-const EARLIER: u32 = 16;
-/// Two views may be of one place if they are nearer than so many standard deviations of their
-/// positions.
-const APART_SD: f64 = 3.0;
-/// Ordinals skipped where an agent was put somewhere else.
-const APART: u32 = 64;
-/// Most similar views of a view, the most similar first.
-pub(crate) const SIMILAR_MAX: usize = 32;
-/// Most incomplete sequence matches of an agent on a channel.
-const MATCHES_MAX: usize = 4;
 
 /// The remembered views of all agents.
 #[derive(Clone, Debug, Default)]
@@ -61,7 +37,7 @@ impl ViewMemory {
         };
         let has_moved = track
             .last
-            .is_none_or(|last| is_beyond(&last.inv_mul(&view.in_odom), MOVED));
+            .is_none_or(|last| is_beyond(&last.inv_mul(&view.in_odom), tuning::MOVED));
         if !has_moved {
             return Vec::new();
         }
@@ -74,11 +50,11 @@ impl ViewMemory {
             let distance_m = way.translation.vector.norm();
             model.learn(angle_rad, distance_m);
             if index + 1 == track.recent.len() {
-                is_news = angle_rad > model.news_rad() && is_beyond(&way, STEP);
+                is_news = angle_rad > model.news_rad() && is_beyond(&way, tuning::STEP);
             }
             if model
                 .reach_m()
-                .is_some_and(|reach_m| distance_m < BESIDE * reach_m)
+                .is_some_and(|reach_m| distance_m < tuning::BESIDE * reach_m)
             {
                 let is_unlike = model.distance(angle_rad).is_none();
                 is_outlier = Some(is_unlike && is_outlier.unwrap_or(true));
@@ -119,7 +95,7 @@ impl ViewMemory {
             if let Some(track) = self.tracks.get_mut(number, revision) {
                 track.recent.clear();
                 track.matches.clear();
-                track.next = track.next.saturating_add(APART);
+                track.next = track.next.saturating_add(tuning::APART);
             }
         }
     }
@@ -133,7 +109,7 @@ impl ViewMemory {
         for (number, other) in self.stored.iter().enumerate() {
             let is_recent = other.sample.agent == view.sample.agent
                 && other.sample.session == view.sample.session
-                && other.ordinal.saturating_add(EARLIER) >= view.ordinal;
+                && other.ordinal.saturating_add(tuning::EARLIER) >= view.ordinal;
             if other.channel != view.channel || is_recent {
                 continue;
             }
@@ -142,14 +118,14 @@ impl ViewMemory {
             if let Some(distance) = model.distance(angle_rad) {
                 // A similar view somewhere else does not make it redundant.
                 let apart_m = (other.in_map - view.in_map).norm();
-                let unsure_m = APART_SD * other.spread[0].hypot(view.spread[0]);
+                let unsure_m = tuning::APART_SD * other.spread[0].hypot(view.spread[0]);
                 is_known |= angle_rad < model.news_rad() && apart_m <= distance.mean_m + unsure_m;
                 alike.push((number, distance));
             }
         }
-        if alike.len() > SIMILAR_MAX {
+        if alike.len() > tuning::SIMILAR_MAX {
             alike.sort_by(|a, b| a.1.mean_m.total_cmp(&b.1.mean_m).then(a.0.cmp(&b.0)));
-            alike.truncate(SIMILAR_MAX);
+            alike.truncate(tuning::SIMILAR_MAX);
             alike.sort_by_key(|(number, _)| *number);
         }
         (alike, is_known)
@@ -181,7 +157,7 @@ impl ViewMemory {
                     is_met[index] = true;
                     track.matches[index].add(view, other, distance);
                 }
-                None if track.matches.len() < MATCHES_MAX => {
+                None if track.matches.len() < tuning::MATCHES_MAX => {
                     is_met.push(true);
                     track
                         .matches
@@ -215,7 +191,7 @@ impl ViewMemory {
     fn remember(&mut self, view: StoredView, revision: u64) {
         self.numbers += view.vector.len() as u64;
         self.stored.push(view, revision);
-        if self.stored.len() <= VIEWS_MAX && self.numbers <= NUMBERS_MAX as u64 {
+        if self.stored.len() <= tuning::VIEWS_MAX && self.numbers <= tuning::NUMBERS_MAX as u64 {
             return;
         }
         let mut kept = 0;
@@ -279,7 +255,7 @@ impl ViewMemory {
     fn channel_of(&mut self, view: &View<'_>) -> Option<u8> {
         let dimension = u16::try_from(view.vector.len()).ok()?;
         self.known_channel(view).or_else(|| {
-            if self.channels.len() >= CHANNELS_MAX {
+            if self.channels.len() >= tuning::CHANNELS_MAX {
                 return None;
             }
             let model = ChannelModel::new(view.channel.into(), dimension);
@@ -355,7 +331,7 @@ impl ViewMemory {
             })
             .collect();
         likes.sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
-        likes.truncate(SIMILAR_MAX);
+        likes.truncate(tuning::SIMILAR_MAX);
         likes
     }
 
@@ -404,7 +380,7 @@ impl ViewMemory {
         let tracks = self.tracks.iter().all(|track| {
             let mut recent = track.recent.iter();
             (track.agent as usize) < agents
-                && track.recent.len() <= RECENT_MAX
+                && track.recent.len() <= crate::tuning::track::RECENT_MAX
                 && recent.all(|recent| is_channel(track.channel, recent.vector.len()))
         });
         views && tracks

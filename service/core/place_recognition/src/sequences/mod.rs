@@ -11,6 +11,6 @@ mod range_alignment;
 mod sequence_match;
 mod track;
 
-pub(crate) use memory::{SIMILAR_MAX, ViewMemory};
-pub(crate) use range_alignment::{NEAR, OPEN_DISTANCES, OPEN_RAD, Range, align_roughly, equations};
+pub(crate) use memory::ViewMemory;
+pub(crate) use range_alignment::{Range, align_roughly, equations};
 pub(crate) use sequence_match::SequenceMatch;

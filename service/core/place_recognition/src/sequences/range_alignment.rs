@@ -3,28 +3,9 @@
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
 use super::sequence_match::SequenceMatch;
-use crate::twist::{moved, twist};
-
-/// Share of the pairs that count as independent: neighbouring views are similar for the same
-/// reasons.
-const INDEPENDENT: f64 = 0.5;
-/// Residual beyond which the cost grows linearly (Huber), in standard deviations.
-const BOUNDED: f64 = 2.0;
-/// Largest mean squared residual of ranges that agree.
-const AGREE: f64 = 4.0;
-/// Largest squared Mahalanobis distance of a revisit from the expected pose: 1 in 10⁵ exceeds it
-/// (χ², 6 degrees of freedom).
-pub(crate) const NEAR: f64 = 33.0;
-/// Solutions count that cost by no more than this above the best one.
-const RIVAL: f64 = 12.0;
-/// Solutions closer than this share of the mean range are one.
-const SAME: f64 = 0.2;
-/// Most steps of a descent.
-const STEPS_MAX: usize = 25;
-/// Standard deviation of an unknown rotation \[rad\].
-pub(crate) const OPEN_RAD: f64 = 3.0;
-/// Standard deviation of an unknown shift, in mean ranges.
-pub(crate) const OPEN_DISTANCES: f64 = 10.0;
+use crate::levenberg_marquardt::NormalEquations;
+use crate::tuning::ranges as tuning;
+use crate::twist::twist;
 
 /// The expected pose.
 struct Prior {
@@ -47,13 +28,6 @@ struct Solution {
     cost: f64,
     /// Cost of the ranges alone.
     ranges_cost: f64,
-}
-
-/// Normal equations of the ranges at a pose.
-pub(crate) struct Equations {
-    pub(crate) hessian: Matrix6<f64>,
-    pub(crate) gradient: Vector6<f64>,
-    pub(crate) cost: f64,
 }
 
 /// The poses of the earlier frame in the present one that explain the ranges of a sequence match
@@ -90,11 +64,11 @@ pub(crate) fn align_roughly(
     let Some(best) = solutions.first() else {
         return Vec::new();
     };
-    let agree = AGREE * INDEPENDENT * ranges.len() as f64;
-    if best.ranges_cost > agree || prior.cost(&best.pose) > NEAR {
+    let agree = tuning::AGREE * tuning::INDEPENDENT * ranges.len() as f64;
+    if best.ranges_cost > agree || prior.cost(&best.pose) > tuning::NEAR {
         return Vec::new();
     }
-    let most = best.cost + RIVAL;
+    let most = best.cost + tuning::RIVAL;
     let rivals = solutions
         .iter()
         .take_while(|solution| solution.cost <= most);
@@ -120,8 +94,8 @@ fn solutions(ranges: &[Range], prior: &Prior, mean_m: f64) -> Vec<Solution> {
         let found = descend(ranges, prior, &start);
         let is_known = solutions.iter().any(|known| {
             let apart = known.pose.inv_mul(&found.pose) * Point3::from(then) - Point3::from(then);
-            apart.norm() < SAME * mean_m
-                && known.pose.rotation.angle_to(&found.pose.rotation) < SAME
+            apart.norm() < tuning::SAME * mean_m
+                && known.pose.rotation.angle_to(&found.pose.rotation) < tuning::SAME
         });
         if !is_known {
             solutions.push(found);
@@ -130,40 +104,20 @@ fn solutions(ranges: &[Range], prior: &Prior, mean_m: f64) -> Vec<Solution> {
     solutions
 }
 
-/// Descends to the next minimum (Levenberg–Marquardt).
+/// Descends to the next minimum.
 fn descend(ranges: &[Range], prior: &Prior, start: &Isometry3<f64>) -> Solution {
-    let mut pose = *start;
-    let mut damping = 1e-3;
-    let mut here = equations(ranges, &pose);
-    let mut cost = here.cost + prior.cost(&pose);
-    for _ in 0..STEPS_MAX {
-        let off = twist(&prior.pose.inv_mul(&pose));
-        let gradient = here.gradient + prior.information.component_mul(&off);
-        let mut hessian = here.hessian + Matrix6::from_diagonal(&prior.information);
-        for k in 0..6 {
-            hessian[(k, k)] *= 1.0 + damping;
-        }
-        let Some(factor) = hessian.cholesky() else {
-            break;
-        };
-        let next = moved(&pose, &-factor.solve(&gradient));
-        let there = equations(ranges, &next);
-        let cost_there = there.cost + prior.cost(&next);
-        if cost_there < cost {
-            let is_done = cost - cost_there < 1e-6 * cost;
-            (pose, here, cost) = (next, there, cost_there);
-            damping *= 0.2;
-            if is_done {
-                break;
-            }
-        } else {
-            damping *= 10.0;
-        }
-    }
+    let (pose, cost) = tuning::DESCENT.run(start, |pose| {
+        let mut sum = equations(ranges, pose);
+        let off = twist(&prior.pose.inv_mul(pose));
+        sum.gradient += prior.information.component_mul(&off);
+        sum.hessian += Matrix6::from_diagonal(&prior.information);
+        sum.cost += prior.cost(pose);
+        sum
+    });
     Solution {
         pose,
         cost,
-        ranges_cost: here.cost,
+        ranges_cost: equations(ranges, &pose).cost,
     }
 }
 
@@ -180,8 +134,8 @@ impl Prior {
 /// ```text
 /// e = now − T then    v = Rᵀ e / |e|    ∂|e|/∂(ρ, φ) = (−v, −then × v)
 /// ```
-pub(crate) fn equations(ranges: &[Range], pose: &Isometry3<f64>) -> Equations {
-    let mut sum = Equations {
+pub(crate) fn equations(ranges: &[Range], pose: &Isometry3<f64>) -> NormalEquations {
+    let mut sum = NormalEquations {
         hessian: Matrix6::zeros(),
         gradient: Vector6::zeros(),
         cost: 0.0,
@@ -195,17 +149,17 @@ pub(crate) fn equations(ranges: &[Range], pose: &Isometry3<f64>) -> Equations {
         let jacobian =
             Vector6::new(-along.x, -along.y, -along.z, -lever.x, -lever.y, -lever.z) / range.sd_m;
         let off = (length - range.mean_m) / range.sd_m;
-        let (cost, weight) = if off.abs() <= BOUNDED {
+        let (cost, weight) = if off.abs() <= tuning::BOUNDED {
             (off * off, 1.0)
         } else {
             (
-                2.0 * BOUNDED * off.abs() - BOUNDED * BOUNDED,
-                BOUNDED / off.abs(),
+                2.0 * tuning::BOUNDED * off.abs() - tuning::BOUNDED * tuning::BOUNDED,
+                tuning::BOUNDED / off.abs(),
             )
         };
-        sum.cost += INDEPENDENT * cost;
-        sum.gradient += jacobian * (INDEPENDENT * weight * off);
-        sum.hessian += jacobian * jacobian.transpose() * (INDEPENDENT * weight);
+        sum.cost += tuning::INDEPENDENT * cost;
+        sum.gradient += jacobian * (tuning::INDEPENDENT * weight * off);
+        sum.hessian += jacobian * jacobian.transpose() * (tuning::INDEPENDENT * weight);
     }
     sum
 }

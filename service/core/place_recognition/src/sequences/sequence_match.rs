@@ -3,22 +3,9 @@
 use nalgebra::{Isometry3, Point3};
 
 use crate::keyframes::SampleKey;
+use crate::tuning::sequence as tuning;
 use crate::views::{Distance, RecentView, StoredView, read_all, write_all};
 use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
-
-/// Largest difference of ordinals between views of a stretch.
-const GAP_MAX: u32 = 4;
-/// Consecutive views of the present stretch without a pair that complete a match.
-const MISSES_MAX: u32 = 2;
-/// Most views of the present stretch in a match: beyond, odometry adds errors of its own.
-const VIEWS_MAX: usize = 8;
-/// Fewest different views of each stretch. By chance one view in tens of thousands is as similar to
-/// another one.
-const VIEWS_MIN: usize = 2;
-/// Fewest pairs of a match that counts.
-const PAIRS_MIN: usize = 5;
-/// Most pairs.
-const PAIRS_MAX: usize = 96;
 
 /// A view of the present stretch and a similar one of the earlier stretch, with their distance.
 #[derive(Clone, Debug)]
@@ -104,8 +91,8 @@ impl SequenceMatch {
     pub(super) fn leads_to(&self, then: &StoredView) -> bool {
         self.then.sample.agent == then.sample.agent
             && self.then.sample.session == then.sample.session
-            && then.ordinal <= self.high.saturating_add(GAP_MAX)
-            && then.ordinal.saturating_add(GAP_MAX) >= self.low
+            && then.ordinal <= self.high.saturating_add(tuning::GAP_MAX)
+            && then.ordinal.saturating_add(tuning::GAP_MAX) >= self.low
     }
 
     /// Adds a pair.
@@ -114,7 +101,7 @@ impl SequenceMatch {
         self.now = SequenceFrame::of(now);
         self.low = self.low.min(then.ordinal);
         self.high = self.high.max(then.ordinal);
-        if self.pairs.len() < PAIRS_MAX {
+        if self.pairs.len() < tuning::PAIRS_MAX {
             self.pairs.push(ViewPair {
                 now_ordinal: now.ordinal,
                 then_ordinal: then.ordinal,
@@ -148,14 +135,15 @@ impl SequenceMatch {
 
     /// Whether it is complete.
     pub(super) fn is_over(&self) -> bool {
-        self.misses >= MISSES_MAX || self.count(|pair| pair.now_ordinal) >= VIEWS_MAX
+        self.misses >= tuning::MISSES_MAX
+            || self.count(|pair| pair.now_ordinal) >= tuning::VIEWS_MAX
     }
 
     /// Whether enough views agree that it is no accident.
     pub(super) fn is_telling(&self) -> bool {
-        self.pairs.len() >= PAIRS_MIN
-            && self.count(|pair| pair.now_ordinal) >= VIEWS_MIN
-            && self.count(|pair| pair.then_ordinal) >= VIEWS_MIN
+        self.pairs.len() >= tuning::PAIRS_MIN
+            && self.count(|pair| pair.now_ordinal) >= tuning::VIEWS_MIN
+            && self.count(|pair| pair.then_ordinal) >= tuning::VIEWS_MIN
     }
 
     /// How many different views of a stretch there are.

@@ -3,11 +3,9 @@
 use nalgebra::Isometry3;
 
 use super::sequence_match::SequenceMatch;
+use crate::tuning::track as tuning;
 use crate::views::{RecentView, read_all, write_all};
 use state::{CorruptState, State, StateReader, StateWriter};
-
-/// Latest views with which a new one is compared to learn the statistics of its channel.
-pub(super) const RECENT_MAX: usize = 12;
 
 /// An agent's latest views of a channel.
 #[derive(Clone, Debug)]
@@ -40,7 +38,7 @@ impl ViewTrack {
 
     /// Adds a new view.
     pub(super) fn note(&mut self, in_odom: &Isometry3<f64>, vector: &[f32]) {
-        if self.recent.len() >= RECENT_MAX {
+        if self.recent.len() >= tuning::RECENT_MAX {
             self.recent.remove(0);
         }
         self.recent.push(RecentView {

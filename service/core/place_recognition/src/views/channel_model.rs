@@ -2,34 +2,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use crate::tuning::channel as tuning;
 use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
-
-/// Classes of angles between two views, from 0 to a right angle.
-const CLASSES: usize = 32;
-/// Fewest pairs of views for a class to be used.
-const PAIRS_MIN: u64 = 8;
-/// Pairs over which the mean of a class fades.
-const PAIRS: f64 = 1000.0;
-/// Pairs over which the mean of unrelated views fades.
-const UNRELATED: f64 = 4096.0;
-/// Fewest unrelated pairs before views are compared with chance.
-const UNRELATED_MIN: u64 = 64;
-/// Views are similar when their angle is so many standard deviations below that of unrelated ones.
-const ALIKE: f64 = 4.0;
-/// A pair whose angle is so many standard deviations below the mean is not counted as unrelated.
-const RELATED: f64 = 3.0;
-/// Least standard deviation of a distance, as a share of it.
-const SHARE_MIN: f64 = 0.1;
-/// Least standard deviation of a distance \[m\]: odometry over a few metres is no better.
-const SD_M_MIN: f64 = 0.02;
-/// Share of the mean angle between unrelated views beyond which a view is new beside another.
-const NEWS: f64 = 0.25;
-
-/// Least cosine of a class from which the kernel is fitted: views farther apart may be as alike by
-/// chance.
-const KERNEL_LIKENESS_MIN: f64 = 0.5;
-/// Largest cosine of two views of one place: views are noisy.
-const LIKENESS_MAX: f64 = 0.999;
 
 /// Kernel of a channel: the expected cosine of two views at a distance d is c exp(−d² / 2ℓ²).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +40,7 @@ impl ChannelModel {
         Self {
             name,
             dimension,
-            distances_m: vec![Moments::default(); CLASSES],
+            distances_m: vec![Moments::default(); tuning::CLASSES],
             unrelated: Moments::default(),
         }
     }
@@ -74,7 +48,7 @@ impl ChannelModel {
     /// Learns from two views whose distance is known from motion.
     pub(crate) fn learn(&mut self, angle_rad: f64, distance_m: f64) {
         if let Some(class) = self.distances_m.get_mut(class_of(angle_rad)) {
-            class.fade(1.0 - 1.0 / PAIRS);
+            class.fade(1.0 - 1.0 / tuning::PAIRS);
             class.add(distance_m, 1.0);
         }
     }
@@ -82,34 +56,34 @@ impl ChannelModel {
     /// Learns from two views that are far from one another along the way.
     pub(crate) fn learn_unrelated(&mut self, angle_rad: f64) {
         let unrelated = &mut self.unrelated;
-        let is_known = unrelated.count() >= UNRELATED_MIN;
-        if is_known && angle_rad < unrelated.mean() - RELATED * unrelated.sd() {
+        let is_known = unrelated.count() >= tuning::UNRELATED_MIN;
+        if is_known && angle_rad < unrelated.mean() - tuning::RELATED * unrelated.sd() {
             return;
         }
-        unrelated.fade(1.0 - 1.0 / UNRELATED);
+        unrelated.fade(1.0 - 1.0 / tuning::UNRELATED);
         unrelated.add(angle_rad, 1.0);
     }
 
     /// Angle beyond which a view is new beside another \[rad\].
     pub(crate) fn news_rad(&self) -> f64 {
-        if self.unrelated.count() >= UNRELATED_MIN {
-            NEWS * self.unrelated.mean()
+        if self.unrelated.count() >= tuning::UNRELATED_MIN {
+            tuning::NEWS * self.unrelated.mean()
         } else {
-            NEWS * FRAC_PI_2
+            tuning::NEWS * FRAC_PI_2
         }
     }
 
     /// The kernel, once the statistics determine it.
     pub(crate) fn kernel(&self) -> Option<Kernel> {
         let sd = self.unrelated.sd();
-        if self.unrelated.count() < UNRELATED_MIN || sd <= 0.0 {
+        if self.unrelated.count() < tuning::UNRELATED_MIN || sd <= 0.0 {
             return None;
         }
         // Least squares of ln cos = ln c − d² / 2ℓ², over the classes that say something.
         let (mut weights, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for (class, known) in self.distances_m.iter().enumerate() {
-            let likeness = ((class as f64 + 0.5) * WIDTH_RAD).cos();
-            if known.count() < PAIRS_MIN || likeness < KERNEL_LIKENESS_MIN {
+            let likeness = ((class as f64 + 0.5) * tuning::WIDTH_RAD).cos();
+            if known.count() < tuning::PAIRS_MIN || likeness < tuning::KERNEL_LIKENESS_MIN {
                 continue;
             }
             let squared = known.mean().powi(2);
@@ -126,7 +100,9 @@ impl ChannelModel {
             return None;
         }
         Some(Kernel {
-            likeness: ((y - slope * x) / weights).exp().clamp(0.5, LIKENESS_MAX),
+            likeness: ((y - slope * x) / weights)
+                .exp()
+                .clamp(0.5, tuning::LIKENESS_MAX),
             length_m: (-0.5 / slope).sqrt(),
             numbers: (1.0 / (sd * sd)).max(1.0),
         })
@@ -136,15 +112,16 @@ impl ChannelModel {
     /// is known.
     pub(crate) fn reach_m(&self) -> Option<f64> {
         let unrelated = &self.unrelated;
-        if unrelated.count() < UNRELATED_MIN {
+        if unrelated.count() < tuning::UNRELATED_MIN {
             return None;
         }
-        let limit = class_of(unrelated.mean() - ALIKE * unrelated.sd()).min(CLASSES - 1);
+        let limit =
+            class_of(unrelated.mean() - tuning::ALIKE * unrelated.sd()).min(tuning::CLASSES - 1);
         let known = (0..=limit)
             .rev()
             .filter_map(|class| self.distances_m.get(class));
         let farthest = known
-            .filter(|class| class.count() >= PAIRS_MIN)
+            .filter(|class| class.count() >= tuning::PAIRS_MIN)
             .map(Moments::mean);
         farthest
             .max_by(f64::total_cmp)
@@ -154,24 +131,24 @@ impl ChannelModel {
     /// The distance between two views; `None` if they are no more similar than unrelated ones.
     pub(crate) fn distance(&self, angle_rad: f64) -> Option<Distance> {
         let unrelated = &self.unrelated;
-        let is_known = unrelated.count() >= UNRELATED_MIN;
-        if !is_known || angle_rad > unrelated.mean() - ALIKE * unrelated.sd() {
+        let is_known = unrelated.count() >= tuning::UNRELATED_MIN;
+        if !is_known || angle_rad > unrelated.mean() - tuning::ALIKE * unrelated.sd() {
             return None;
         }
         let known = |class: usize| {
             let class = self.distances_m.get(class)?;
-            (class.count() >= PAIRS_MIN).then(|| (class.mean(), class.sd()))
+            (class.count() >= tuning::PAIRS_MIN).then(|| (class.mean(), class.sd()))
         };
         let class = class_of(angle_rad);
         let Some(own) = known(class) else {
             // Nearer than all pairs so far: the distance is interpolated down to zero.
             let (nearest, (mean_m, sd_m)) =
-                (class..CLASSES).find_map(|at| Some((at, known(at)?)))?;
-            let share = angle_rad / ((nearest as f64 + 0.5) * WIDTH_RAD);
+                (class..tuning::CLASSES).find_map(|at| Some((at, known(at)?)))?;
+            let share = angle_rad / ((nearest as f64 + 0.5) * tuning::WIDTH_RAD);
             return Some(Distance::new(share * mean_m, sd_m));
         };
         // Linear interpolation between the centres of two classes.
-        let within = angle_rad / WIDTH_RAD - class as f64 - 0.5;
+        let within = angle_rad / tuning::WIDTH_RAD - class as f64 - 0.5;
         let other = if within < 0.0 {
             class.checked_sub(1).and_then(known)
         } else {
@@ -194,13 +171,10 @@ impl Distance {
     fn new(mean_m: f64, sd_m: f64) -> Self {
         Self {
             mean_m,
-            sd_m: sd_m.max(SHARE_MIN * mean_m).max(SD_M_MIN),
+            sd_m: sd_m.max(tuning::SHARE_MIN * mean_m).max(tuning::SD_M_MIN),
         }
     }
 }
-
-/// Width of a class \[rad\].
-const WIDTH_RAD: f64 = FRAC_PI_2 / CLASSES as f64;
 
 /// The class of an angle; obtuse angles lie beyond the last one.
 #[expect(
@@ -209,7 +183,7 @@ const WIDTH_RAD: f64 = FRAC_PI_2 / CLASSES as f64;
     reason = "an angle of 0 to π is from 0 to 64 classes wide"
 )]
 fn class_of(angle_rad: f64) -> usize {
-    (angle_rad / WIDTH_RAD) as usize
+    (angle_rad / tuning::WIDTH_RAD) as usize
 }
 
 impl State for ChannelModel {

@@ -1,0 +1,123 @@
+//! Tuning: all constants of the keyframe graph, with unit and reason.
+//!
+//! Pairs of a length and an angle bound a motion \[m, rad\]. Limits of memory are in
+//! [`KeyframeSettings`](super::settings::KeyframeSettings).
+
+// Keyframes and sightings.
+
+/// Motion after which a keyframe is added in any case \[m, rad\]: poses between two are
+/// interpolated.
+pub(super) const KEYFRAME_STEP: (f64, f64) = (0.1, 0.1);
+
+/// Motion since a keyframe up to which sightings are attached to it \[m, rad\].
+pub(super) const ATTACHED_WITHIN: (f64, f64) = (0.02, 0.02);
+
+/// Motion that counts as rest \[m, rad\].
+pub(super) const REST_WITHIN: (f64, f64) = (0.005, 0.005);
+
+/// Rest after which a keyframe is added \[ns\].
+pub(super) const REST_NS: i64 = 1_000_000_000;
+
+/// Most sightings that wait for the motion of the agent that was seen.
+pub(super) const PENDING_MAX: usize = 64;
+
+/// Longest time that they wait, by the observer's clock \[ns\].
+pub(super) const PENDING_NS: i64 = 2_000_000_000;
+
+/// Keyframes searched back for the instant of a sighting.
+pub(super) const LOOK_BACK_MAX: usize = 256;
+
+/// Most sightings of a keyframe.
+pub(super) const SIGHTINGS_PER_KEYFRAME_MAX: usize = 32;
+
+// Attachments.
+
+/// Most attachments that are checked with one record. The work after a relaxation is spread, so
+/// that no record pays for all of it.
+pub(super) const ATTACHMENTS_PER_RECORD: u32 = 16;
+
+// Index.
+
+/// Keyframes of an agent from one index entry to the next.
+pub(super) const INDEX_SPACING: u32 = 64;
+
+// Measurement models.
+
+/// Least standard deviation of a sighting, so that its covariance has an inverse \[m\].
+pub(super) const SIGHTING_SD_MIN_M: f64 = 1e-3;
+
+/// Shortest distance at which a direction means something \[m\].
+pub(super) const DIRECTION_DISTANCE_MIN_M: f64 = 0.02;
+
+// Sparsification.
+
+/// Keyframes that are compared; the one whose loss is least is removed.
+pub(super) const KEYFRAMES_COMPARED: u32 = 16;
+
+/// Most keyframes examined until one may be removed.
+pub(super) const KEYFRAMES_EXAMINED_MAX: u32 = 1024;
+
+/// Unevenness that counts as much as doubling the variance of a sighting \[m\].
+pub(super) const UNEVENNESS_M: f64 = 0.05;
+
+/// Lever by which a rotation counts as unevenness \[m\].
+pub(super) const ROTATION_LEVER_M: f64 = 0.5;
+
+// Loop closures.
+
+/// Squared Mahalanobis distance up to which a closure agrees with the map or with another closure:
+/// a true one exceeds it once in a hundred times (χ², 3 degrees of freedom).
+pub(super) const AGREES_MAX: f64 = 11.3;
+
+/// Squared Mahalanobis distance after a relaxation from which a closure is rejected.
+pub(super) const REJECTED_MIN: f64 = 25.0;
+
+/// Factor by which the map may be less certain than a closure for their agreement alone to count.
+pub(super) const UNCERTAINTY_RATIO_MAX: f64 = 2.0;
+
+/// Standard deviation up to which agreement counts, however certain the closures are: by chance few
+/// places lie so close \[m\].
+pub(super) const CERTAIN_SD_M: f64 = 0.5;
+
+/// Fewest other closures that must agree with one that the map cannot tell from a false one.
+pub(super) const PARTNERS_MIN: usize = 2;
+
+/// Earlier closures, in the order of time, with which a closure is compared.
+pub(super) const CLOSURES_COMPARED: usize = 24;
+
+/// Standard deviation of an unknown angle \[rad\].
+pub(super) const UNKNOWN_ANGLE_SD_RAD: f64 = 3.0;
+
+/// Least standard deviation of a closure \[m, rad\].
+pub(super) const CLOSURE_SD_MIN: f64 = 1e-3;
+
+/// Keyframes for each record between two relaxations: so the amortised cost of a relaxation is that
+/// of so many keyframes a record.
+pub(super) const KEYFRAMES_PER_RECORD: usize = 8;
+
+/// Most rounds of relaxation and rejection.
+pub(super) const RELAXATION_ROUNDS_MAX: usize = 3;
+
+// The coarse graph.
+
+/// Motion between keyframes of the coarse graph \[m, rad\]. Over so short a way the noise of
+/// odometry is below that of closures, and is added to what moves to a neighbour.
+pub(super) const COARSE_STEP: (f64, f64) = (1.0, 0.5);
+
+/// Most pending closures of the coarse graph, the latest ones. Earlier ones have been judged many
+/// times; a refinement of the whole past judges them again.
+pub(super) const COARSE_PENDING_MAX: usize = 512;
+
+// Kernels of the relaxation.
+
+/// Least standard deviation of a motion, so that its covariance has an inverse \[m, rad\].
+pub(super) const MOTION_SD_MIN: f64 = 1e-4;
+
+/// Scale of the Cauchy kernel of sightings, in standard deviations.
+pub(super) const SIGHTING_SCALE: f64 = 3.0;
+
+/// Scale of the Geman–McClure kernel of loop closures, in standard deviations.
+pub(super) const CLOSURE_SCALE: f64 = 3.0;
+
+/// Variance of a motion of which nothing is known \[m²\].
+pub(super) const UNKNOWN_MOTION_VARIANCE_M2: f64 = 1e12;

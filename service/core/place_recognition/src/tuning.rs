@@ -1,0 +1,299 @@
+//! Tuning: all constants of place recognition, by part, with unit and reason.
+//!
+//! Lengths *in reaches* are multiples of the reach of a channel: the distance beyond which its
+//! views are no more similar than unrelated ones. Pairs of a length and an angle bound a motion
+//! \[m, rad\].
+
+/// Statistics of a channel.
+pub(crate) mod channel {
+    use std::f64::consts::FRAC_PI_2;
+
+    /// Classes of angles between two views, from 0 to a right angle.
+    pub(crate) const CLASSES: usize = 32;
+    /// Fewest pairs of views for a class to be used.
+    pub(crate) const PAIRS_MIN: u64 = 8;
+    /// Pairs over which the mean of a class fades.
+    pub(crate) const PAIRS: f64 = 1000.0;
+    /// Pairs over which the mean of unrelated views fades.
+    pub(crate) const UNRELATED: f64 = 4096.0;
+    /// Fewest unrelated pairs before views are compared with chance.
+    pub(crate) const UNRELATED_MIN: u64 = 64;
+    /// Views are similar when their angle is so many standard deviations below that of unrelated
+    /// ones.
+    pub(crate) const ALIKE: f64 = 4.0;
+    /// A pair whose angle is so many standard deviations below the mean is not counted as
+    /// unrelated.
+    pub(crate) const RELATED: f64 = 3.0;
+    /// Least standard deviation of a distance, as a share of it.
+    pub(crate) const SHARE_MIN: f64 = 0.1;
+    /// Least standard deviation of a distance \[m\]: odometry over a few metres is no better.
+    pub(crate) const SD_M_MIN: f64 = 0.02;
+    /// Share of the mean angle between unrelated views beyond which a view is new beside another.
+    pub(crate) const NEWS: f64 = 0.25;
+    /// Least cosine of a class from which the kernel is fitted: views farther apart may be as alike
+    /// by chance.
+    pub(crate) const KERNEL_LIKENESS_MIN: f64 = 0.5;
+    /// Largest cosine of two views of one place: views are noisy.
+    pub(crate) const LIKENESS_MAX: f64 = 0.999;
+    /// Width of a class \[rad\].
+    pub(crate) const WIDTH_RAD: f64 = FRAC_PI_2 / CLASSES as f64;
+}
+
+/// The memory of views.
+pub(crate) mod memory {
+    /// Most channels.
+    pub(crate) const CHANNELS_MAX: usize = 64;
+    /// Most views.
+    pub(crate) const VIEWS_MAX: usize = 16_384;
+    /// Most numbers in their descriptors, all of which a new view is compared with: 8 MiB.
+    pub(crate) const NUMBERS_MAX: usize = 1 << 21;
+    /// Least motion between two views that are compared \[m, rad\].
+    pub(crate) const MOVED: (f64, f64) = (0.05, 0.1);
+    /// Least motion after which a view may be new \[m, rad\]: that between keyframes.
+    pub(crate) const STEP: (f64, f64) = (0.1, 0.1);
+    /// A view that is similar to none of those nearer than this, in reaches, is an outlier:
+    /// somebody passes by.
+    pub(crate) const BESIDE: f64 = 0.6;
+    /// Ordinals by which an agent's own views must be earlier to count as revisited.
+    pub(crate) const EARLIER: u32 = 16;
+    /// Two views may be of one place if they are nearer than so many standard deviations of their
+    /// positions.
+    pub(crate) const APART_SD: f64 = 3.0;
+    /// Ordinals skipped where an agent was put somewhere else.
+    pub(crate) const APART: u32 = 64;
+    /// Most similar views of a view, the most similar first.
+    pub(crate) const SIMILAR_MAX: usize = 32;
+    /// Most incomplete sequence matches of an agent on a channel.
+    pub(crate) const MATCHES_MAX: usize = 4;
+}
+
+/// Tracks of views.
+pub(crate) mod track {
+    /// Latest views with which a new one is compared to learn the statistics of its channel.
+    pub(crate) const RECENT_MAX: usize = 12;
+}
+
+/// Sequence matches.
+pub(crate) mod sequence {
+    /// Largest difference of ordinals between views of a stretch.
+    pub(crate) const GAP_MAX: u32 = 4;
+    /// Consecutive views of the present stretch without a pair that complete a match.
+    pub(crate) const MISSES_MAX: u32 = 2;
+    /// Most views of the present stretch in a match: beyond, odometry adds errors of its own.
+    pub(crate) const VIEWS_MAX: usize = 8;
+    /// Fewest different views of each stretch. By chance one view in tens of thousands is as
+    /// similar to another one.
+    pub(crate) const VIEWS_MIN: usize = 2;
+    /// Fewest pairs of a match that counts.
+    pub(crate) const PAIRS_MIN: usize = 5;
+    /// Most pairs.
+    pub(crate) const PAIRS_MAX: usize = 96;
+}
+
+/// Range alignment.
+pub(crate) mod ranges {
+    use crate::levenberg_marquardt::Descent;
+
+    /// Share of the pairs that count as independent: neighbouring views are similar for the same
+    /// reasons.
+    pub(crate) const INDEPENDENT: f64 = 0.5;
+    /// Residual beyond which the cost grows linearly (Huber), in standard deviations.
+    pub(crate) const BOUNDED: f64 = 2.0;
+    /// Largest mean squared residual of ranges that agree.
+    pub(crate) const AGREE: f64 = 4.0;
+    /// Largest squared Mahalanobis distance of a revisit from the expected pose: 1 in 10⁵ exceeds
+    /// it (χ², 6 degrees of freedom).
+    pub(crate) const NEAR: f64 = 33.0;
+    /// Solutions count that cost by no more than this above the best one.
+    pub(crate) const RIVAL: f64 = 12.0;
+    /// Solutions closer than this share of the mean range are one.
+    pub(crate) const SAME: f64 = 0.2;
+    /// The descent from a start.
+    pub(crate) const DESCENT: Descent = Descent {
+        steps: 25,
+        tolerance: 1e-6,
+        floor: 0.0,
+    };
+    /// Standard deviation of an unknown rotation \[rad\].
+    pub(crate) const OPEN_RAD: f64 = 3.0;
+    /// Standard deviation of an unknown shift, in mean ranges.
+    pub(crate) const OPEN_DISTANCES: f64 = 10.0;
+}
+
+/// The descriptor Gaussian process.
+pub(crate) mod process {
+    /// Most views about a point, the nearest first.
+    pub(crate) const NEAR_MAX: usize = 12;
+    /// Least variance: positions and kernel are not exact.
+    pub(crate) const OPEN_MIN: f64 = 0.02;
+    /// A point is known when the variance there is at most this.
+    pub(crate) const OPEN_MAX: f64 = 0.8;
+    /// A point is well known when the variance there is at most this.
+    pub(crate) const KNOWN_MAX: f64 = 0.5;
+}
+
+/// View alignment.
+pub(crate) mod alignment {
+    /// ε: probability of an outlier.
+    pub(crate) const WRONG: f64 = 0.05;
+    /// G: largest evidence of a query \[nats\].
+    pub(crate) const TELLS_MAX: f64 = 3.0;
+    /// Largest part τ of the effective dimension.
+    pub(crate) const COUNTED_MAX: f64 = 0.5;
+    /// Largest evidence of a query for a pose against another one at which it cannot be judged
+    /// \[nats\].
+    pub(crate) const OPEN: f64 = 0.1;
+    /// Residual from which on a query loses weight.
+    pub(crate) const SOFT: f64 = 2.0;
+    /// Rounds of looking up the views about a pose, and steps of each.
+    pub(crate) const ROUNDS: (usize, usize) = (3, 4);
+    /// A round that moves a pose by less is the last one \[m, rad\].
+    pub(crate) const AT_REST: f64 = 1e-3;
+}
+
+/// Batch alignment.
+pub(crate) mod batch {
+    /// Most views about the way, those nearest to a query first.
+    pub(crate) const VIEWS_MAX: usize = 64;
+    /// Most halvings of a step that does not lower the cost.
+    pub(crate) const HALVED_MAX: usize = 4;
+    /// A step shorter than this is the last one \[m, rad\].
+    pub(crate) const AT_REST: f64 = 1e-3;
+    /// Squared leave-one-out residual, 1 on average, beyond which a query is an outlier.
+    pub(crate) const OFF_MAX: f64 = 3.0;
+    /// Largest share of outliers.
+    pub(crate) const STRAY_MAX: f64 = 0.3;
+    /// Variance of an outlier: larger than that of an unknown place.
+    pub(crate) const ANYTHING: f64 = 4.0;
+}
+
+/// Revisits.
+pub(crate) mod revisit {
+    /// A revisit says nothing of an agent whose position is surer than the revisit by this factor.
+    pub(crate) const SURER: f64 = 2.0;
+    /// Deviations from one another beyond which two stretches are not one place.
+    pub(crate) const AWAY: f64 = 6.0;
+    /// Least evidence of the views along a stretch for where they are aligned \[nats\].
+    pub(crate) const AGREE: f64 = 3.0;
+}
+
+/// Searches.
+pub(crate) mod search {
+    /// Most queries of a search.
+    pub(crate) const QUERIES_MAX: usize = 48;
+    /// Longest way over which they lie \[m\]: beyond some metres odometry adds errors of its own.
+    pub(crate) const WAY_M_MAX: f64 = 5.0;
+    /// Most numbers in their descriptors: a quarter of a MiB.
+    pub(crate) const NUMBERS_MAX: usize = 1 << 16;
+}
+
+/// Ranges of a search.
+pub(crate) mod problem {
+    /// Standard deviation of odometry's lengths as a share of the way: that of a modest robot.
+    pub(crate) const ODOMETRY_SHARE: f64 = 0.05;
+}
+
+/// Lookup of reference views.
+pub(crate) mod references {
+    /// Farthest that relaxation may have moved a view since it was stored, for the prefilter by the
+    /// stored position to keep it \[m\].
+    pub(crate) const DISPLACED_M: f64 = 5.0;
+}
+
+/// Pose seeding.
+pub(crate) mod seeding {
+    use crate::levenberg_marquardt::Descent;
+
+    /// Most nodes of a query.
+    pub(crate) const NODES_PER_SPOT_MAX: usize = 4;
+    /// Most nodes from which poses are seeded.
+    pub(crate) const SEEDS_MAX: usize = 16;
+    /// Fewest queries whose nodes must be as far from one another as the queries are.
+    pub(crate) const SPOTS_MIN: usize = 4;
+    /// Deviations between two distances up to which they agree.
+    pub(crate) const AGREE: f64 = 2.5;
+    /// Rounds of reweighting.
+    pub(crate) const ROUNDS: usize = 5;
+    /// Turns about the way that are tried: a straight way leaves the turn about it open.
+    pub(crate) const TURNS: u32 = 6;
+    /// Most steps of an eigendecomposition, which needs some ten.
+    pub(crate) const EIGEN_STEPS_MAX: usize = 200;
+    /// When a descent ends, but for the steps.
+    pub(crate) const DESCENT: Descent = Descent {
+        steps: 0,
+        tolerance: 1e-5,
+        floor: 1e-9,
+    };
+    /// Steps of a first descent, and of a final one.
+    pub(crate) const STEPS: (usize, usize) = (6, 20);
+    /// Most poses of the final descent.
+    pub(crate) const POSES_MAX: usize = 12;
+    /// Poses closer than this are the same, in reaches of the channel and \[rad\].
+    pub(crate) const SAME: (f64, f64) = (0.15, 0.25);
+    /// Gate: largest residual of a range that counts, in reaches.
+    pub(crate) const GATE: f64 = 1.0;
+    /// Most ranges of a query that count.
+    pub(crate) const CUES_PER_SPOT: usize = 8;
+}
+
+/// Candidates.
+pub(crate) mod candidates {
+    /// Poses nearer than this are of one candidate, in reaches.
+    pub(crate) const PLACE: f64 = 0.5;
+    /// Most poses of a candidate that are refined by batch alignment.
+    pub(crate) const WHOLE_MAX: usize = 4;
+    /// A pose is dropped when its cost exceeds the best one by this \[nats\].
+    pub(crate) const RIVAL: f64 = 12.0;
+    /// Standard deviation of a rotation beyond which other turns about the way are tried \[rad\].
+    pub(crate) const TURN_OPEN_RAD: f64 = 0.5;
+}
+
+/// Acceptance of a relocalisation.
+pub(crate) mod relocalise {
+    /// Least motion between two queries \[m, rad\].
+    pub(crate) const MOVED: (f64, f64) = (0.05, 0.2);
+    /// Queries between two attempts, before and after the agent was found.
+    pub(crate) const FRESH: (u32, u32) = (2, 3);
+    /// An agent that is not found for long makes attempts more rarely: one query more for so many
+    /// queries.
+    pub(crate) const PATIENCE: usize = 12;
+    /// Fewest queries of an attempt.
+    pub(crate) const QUERIES_MIN: usize = 6;
+    /// Log odds at which a pose is accepted: one wrong answer in a thousand \[nats\].
+    pub(crate) const SURE: f64 = 6.9;
+    /// Largest standard deviation of the heading of an answer \[rad\].
+    pub(crate) const HEADING_SD_MAX_RAD: f64 = 0.3;
+    /// Standard deviation of the heading up to which the search goes on after the agent was found:
+    /// an error of the heading becomes one of the position \[rad\].
+    pub(crate) const HEADING_SD_RAD: f64 = 0.02;
+    /// Way after which it ends in any case \[m\].
+    pub(crate) const ON_M: f64 = 5.0;
+    /// Factor by which a candidate may be less certain query by query than by all queries at once:
+    /// where they differ by more, the map is thin, and the batch rests on what the map leaves open.
+    pub(crate) const ROUGHLY: f64 = 2.0;
+    /// Largest factor of the covariance: beyond it the map contradicts the queries, or itself.
+    pub(crate) const WIDER_MAX: f64 = 2.0;
+    /// Most guesses.
+    pub(crate) const GUESSES_MAX: usize = 8;
+}
+
+/// Kidnap detection.
+pub(crate) mod kidnap {
+    /// Threshold of the cumulative sum \[nats\]: one false alarm in a thousand, if one query in a
+    /// thousand is the first one after a kidnapping.
+    pub(crate) const SURE: f64 = 6.9 + 6.9;
+    /// Least distance between weighed queries, in lengths of the channel's kernel: nearer ones have
+    /// correlated errors.
+    pub(crate) const SPACING: f64 = 0.25;
+    /// Factor by which the errors of a pose may exceed their standard deviations.
+    pub(crate) const WIDER: f64 = 2.0;
+    /// A view nearer than this to the one before must be similar to it, in reaches: else one of
+    /// them is an outlier.
+    pub(crate) const BESIDE: f64 = 0.6;
+    /// Most remembered views near the agent that are looked up.
+    pub(crate) const NEAR_MAX: usize = 24;
+    /// A query counts if its heading differs from one of the views about it by no more than this,
+    /// or than these differ from one another: a channel may see something else in another direction
+    /// \[rad\].
+    pub(crate) const TURNED_RAD: f64 = 0.5;
+}
