@@ -12,7 +12,7 @@ use crate::engine::counters::Drop;
 use crate::engine::episodes::EndedEpisodes;
 use crate::engine::message::{IngestError, RemovalRequest};
 use crate::engine::sequencer::{Sequencer, Window};
-use crate::engine::space::Shared;
+use crate::engine::shared::Shared;
 use crate::engine::trajectory::Recorder;
 use crate::journal::Entry;
 

@@ -31,7 +31,7 @@ use super::message::{Call, ChangeReply};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
 use super::sequencer::{Sequencer, Window};
-use super::space::Shared;
+use super::shared::Shared;
 use super::trajectory;
 use crate::encode::{self, LatestEpisode};
 use crate::journal::BlockWriter;
