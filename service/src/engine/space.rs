@@ -185,8 +185,8 @@ impl Space {
         answer.await.unwrap_or(Err(IngestError::Closed))
     }
 
-    /// Teaches an object at once and answers when that is durable. `lesson` is what came, `valid` the same as the map
-    /// takes it.
+    /// Teaches an object at once and answers when that is durable. `lesson` is what came, `valid`
+    /// the same as the map takes it.
     ///
     /// # Errors
     /// See [`IngestError`].

@@ -1,8 +1,8 @@
 //! The writer of a space: one thread that owns the map.
 //!
-//! A round takes what waits in the queue, decodes it, puts each agent's samples in order, appends the
-//! round's block to the journal, and only then applies it. Estimates leave at the end of the round;
-//! the committer makes the block durable beside the next one.
+//! A round takes what waits in the queue, decodes it, puts each agent's samples in order, appends
+//! the round's block to the journal, and only then applies it. Estimates leave at the end of the
+//! round; the committer makes the block durable beside the next one.
 
 mod agents;
 mod journal;
