@@ -21,7 +21,7 @@ pub fn line(text: &str) -> io::Result<()> {
 /// Writes an object as one line of JSON.
 ///
 /// # Errors
-/// As [`line`], or the object is none in JSON.
+/// As [`line()`], or the object is none in JSON.
 pub fn json<T: Serialize>(value: &T) -> anyhow::Result<()> {
     Ok(line(&serde_json::to_string(value)?)?)
 }
