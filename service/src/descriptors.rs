@@ -1,5 +1,5 @@
-//! File descriptors: raises the limit, and shares out what there are, so that connections never use up
-//! those of the store.
+//! File descriptors: raises the limit, and shares out what there are, so that connections never use
+//! up those of the store.
 
 use crate::store;
 

@@ -10,8 +10,8 @@
 //!        | 5 agent:varint                                  an agent that is removed
 //! ```
 //!
-//! All of it is postcard of [`Entry`], so a batch that came as postcard and is accepted whole goes to
-//! disk as the bytes that came. The format is kept readable for ever: a change is a new version.
+//! All of it is postcard of [`Entry`], so a batch that came as postcard and is accepted whole goes
+//! to disk as the bytes that came. The format is kept readable for ever: a change is a new version.
 
 use std::borrow::Cow;
 

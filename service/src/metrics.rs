@@ -13,8 +13,9 @@ use tokio::time::MissedTickBehavior;
 pub const RECEIVED_MESSAGES: &str = "cogmap_received_messages_total";
 /// Bytes of messages received; label `codec`.
 pub const RECEIVED_BYTES: &str = "cogmap_received_bytes_total";
-/// Messages dropped whole; label `reason` (`queue_full`, `agent_queue_full`, `unknown_space`, `bad_key`,
-/// `too_many_agents`, `stale_session`, `session_in_future`, `space_closed`, `store_failed`).
+/// Messages dropped whole; label `reason` (`queue_full`, `agent_queue_full`, `unknown_space`,
+/// `bad_key`, `too_many_agents`, `stale_session`, `session_in_future`, `space_closed`,
+/// `store_failed`).
 pub const DROPPED_MESSAGES: &str = "cogmap_dropped_messages_total";
 /// Messages that could not be read; label `kind`.
 pub const DECODE_ERRORS: &str = "cogmap_decode_errors_total";
@@ -38,8 +39,8 @@ pub const JOURNAL_BYTES: &str = "cogmap_journal_bytes_total";
 pub const COMMIT_SECONDS: &str = "cogmap_commit_seconds";
 /// Spaces that are stopped because their journal is damaged; label `space`: 1, or 0 once repaired.
 pub const SPACE_STOPPED: &str = "cogmap_space_stopped";
-/// Blocks cut off the ends of journals, which a crash had caught before they were acknowledged; label
-/// `space`.
+/// Blocks cut off the ends of journals, which a crash had caught before they were acknowledged;
+/// label `space`.
 pub const TORN_TAILS: &str = "cogmap_journal_torn_tails_total";
 /// Journals of which it was not known how far they were acknowledged; label `space`.
 pub const LOST_MARKS: &str = "cogmap_journal_lost_marks_total";
@@ -78,15 +79,16 @@ pub const UNPUBLISHED_EVENTS: &str = "cogmap_unpublished_events_total";
 pub const HTTP_REQUESTS: &str = "cogmap_http_requests_total";
 /// Time from a request's head to its answer's head \[s\]; label `route`.
 pub const HTTP_REQUEST_SECONDS: &str = "cogmap_http_request_seconds";
-/// HTTP connections that the service closed; label `reason` (`room` for one that came, `head` that took
-/// too long, `idle`).
+/// HTTP connections that the service closed; label `reason` (`room` for one that came, `head` that
+/// took too long, `idle`).
 pub const HTTP_CLOSED_CONNECTIONS: &str = "cogmap_http_closed_connections_total";
 /// Event streams open now.
 pub const HTTP_STREAMS: &str = "cogmap_http_streams";
 /// Agents of a space by how they are localised; labels `space`, `status` (`localized`, `uncertain`,
 /// `lost`, or `new` before the first sample).
 pub const AGENTS_BY_STATUS: &str = "cogmap_agents_by_status";
-/// Samples of one agent that are applied and not yet durable, the most of all agents; label `space`.
+/// Samples of one agent that are applied and not yet durable, the most of all agents; label
+/// `space`.
 pub const NOT_DURABLE_MAX: &str = "cogmap_not_durable_samples_max";
 /// Samples of one agent that wait for earlier ones, the most of all agents; label `space`.
 pub const WAITING_MAX: &str = "cogmap_waiting_samples_max";
@@ -125,8 +127,8 @@ pub fn install() -> Result<PrometheusHandle, BuildError> {
     Ok(handle)
 }
 
-/// Moves what histograms have recorded into their buckets from time to time. A scrape does that too;
-/// where nobody scrapes, the records would pile up. Measures the store's `directory`, too.
+/// Moves what histograms have recorded into their buckets from time to time. A scrape does that
+/// too; where nobody scrapes, the records would pile up. Measures the store's `directory`, too.
 pub async fn upkeep(handle: PrometheusHandle, directory: PathBuf) {
     let mut ticks = tokio::time::interval(UPKEEP_INTERVAL);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);

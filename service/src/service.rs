@@ -77,8 +77,9 @@ pub enum StartError {
 }
 
 impl Service {
-    /// Opens the HTTP listener, the Zenoh session and the store, and begins to serve. Spaces may still
-    /// be loading when it returns. A start that fails leaves no store behind that was not there.
+    /// Opens the HTTP listener, the Zenoh session and the store, and begins to serve. Spaces may
+    /// still be loading when it returns. A start that fails leaves no store behind that was not
+    /// there.
     ///
     /// # Errors
     /// See [`StartError`].
@@ -255,8 +256,8 @@ pub fn open_store(directory: &Path) -> Result<LocalStore, StoreError> {
     LocalStore::open(directory)
 }
 
-/// Listens on an address. Connections that come faster than they are accepted wait in a long queue: of
-/// those beyond it the system drops the first packet, and they come again after a second.
+/// Listens on an address. Connections that come faster than they are accepted wait in a long queue:
+/// of those beyond it the system drops the first packet, and they come again after a second.
 fn listen(address: SocketAddr) -> std::io::Result<TcpListener> {
     let socket = match address {
         SocketAddr::V4(_) => TcpSocket::new_v4()?,
@@ -267,7 +268,8 @@ fn listen(address: SocketAddr) -> std::io::Result<TcpListener> {
     socket.listen(HTTP_BACKLOG)
 }
 
-/// Shares out the descriptors that the system allows. Bounds of the settings that do not fit are lowered.
+/// Shares out the descriptors that the system allows. Bounds of the settings that do not fit are
+/// lowered.
 fn share_descriptors(config: &Config) -> (HttpSettings, Shares) {
     let limit = descriptors::raise_limit();
     let wanted = Shares {

@@ -1,5 +1,5 @@
-//! Questions: whom they name, and what the map answers. Each is read by [`decode`](crate::decode), asked,
-//! and its answer written by [`encode`](crate::encode); HTTP and Zenoh ask alike.
+//! Questions: whom they name, and what the map answers. Each is read by [`decode`],
+//! asked, and its answer written by [`encode`]; HTTP and Zenoh ask alike.
 
 mod named;
 

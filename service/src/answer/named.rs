@@ -35,8 +35,8 @@ pub fn any_space_named(engine: &Engine, name: &str) -> Result<Arc<Space>, Proble
 /// The agent that a question names.
 ///
 /// # Errors
-/// There is none, or the name is none that an agent can have; or the space is still loading, and nobody
-/// knows.
+/// There is none, or the name is none that an agent can have; or the space is still loading, and
+/// nobody knows.
 pub fn agent_named(space: &Space, name: &str) -> Result<Arc<AgentView>, Problem> {
     if let Some(view) = space.agent(name) {
         return Ok(view);
@@ -47,8 +47,8 @@ pub fn agent_named(space: &Space, name: &str) -> Result<Arc<AgentView>, Problem>
 /// Checks that a question names an agent, or one that has been removed.
 ///
 /// # Errors
-/// There was never one, or the name is none that an agent can have; or the space is still loading, and
-/// nobody knows.
+/// There was never one, or the name is none that an agent can have; or the space is still loading,
+/// and nobody knows.
 pub fn agent_once_named(space: &Space, name: &str) -> Result<(), Problem> {
     if space.agent(name).is_some() || space.has_removed(name) {
         return Ok(());

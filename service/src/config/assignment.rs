@@ -14,10 +14,10 @@ const SECTIONS: [&str; 6] = ["HTTP", "ZENOH", "STORE", "ENGINE", "SPACES", "LOG"
 /// A setting of one key.
 ///
 /// In the environment, a name is a setting if it begins with `COGMAP_` and has `__` in it:
-/// `COGMAP_ENGINE__AGENTS_MAX` is `engine.agents_max`. Other names are not settings (`COGMAP_CONFIG`
-/// names the file), but one that begins with a section's name, like `COGMAP_ENGINE_AGENTS_MAX`, is
-/// surely misspelt and refused. Names are read in lower case: spaces with capitals, dots or hyphens
-/// in their names need the file.
+/// `COGMAP_ENGINE__AGENTS_MAX` is `engine.agents_max`. Other names are not settings
+/// (`COGMAP_CONFIG` names the file), but one that begins with a section's name, like
+/// `COGMAP_ENGINE_AGENTS_MAX`, is surely misspelt and refused. Names are read in lower case: spaces
+/// with capitals, dots or hyphens in their names need the file.
 ///
 /// A value is read as TOML where that fits the key (`1024`, `true`, `["tcp/a:7447"]`), otherwise as
 /// text, so that texts need no quotes.

@@ -32,15 +32,15 @@ section! {
     pub struct HttpConfig of "http" {
         /// Address and port; port 0 takes a free one.
         listen: SocketAddr = SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)), any("an address and a port");
-        /// Bearer token that every request but those for health and the pages must carry; absent, none is
-        /// asked for.
+        /// Bearer token that every request but those for health and the pages must carry; absent,
+        /// none is asked for.
         #[serde(skip_serializing_if = "Option::is_none")]
         token: Option<Token> = None, TOKEN;
         /// File whose first line is the token, instead of `token`.
         #[serde(skip_serializing_if = "Option::is_none")]
         token_file: Option<PathBuf> = None, any("the path of a file, absent when http.token is set");
-        /// Names of hosts by which the service is asked, beside its addresses and `localhost`; `*` stands for
-        /// any.
+        /// Names of hosts by which the service is asked, beside its addresses and `localhost`; `*`
+        /// stands for any.
         hosts: Vec<String> = Vec::new(), HOSTS;
         /// Longest time from a request's head to the head of its answer \[s\].
         request_timeout_s: f64 = 30.0, INTERVAL_S;
@@ -48,12 +48,14 @@ section! {
         requests_max: usize = 1024, COUNT;
         /// Most open event streams; further ones are told to come back.
         streams_max: usize = 256, COUNT;
-        /// Most connections; for a further one, the one that has waited longest without a request under
-        /// way is closed.
+        /// Most connections; for a further one, the one that has waited longest without a request
+        /// under way is closed.
         connections_max: usize = 4096, COUNT;
-        /// Longest time for the head of a request, from its first byte or the connection's begin \[s\].
+        /// Longest time for the head of a request, from its first byte or the connection's begin
+        /// \[s\].
         head_timeout_s: f64 = 10.0, INTERVAL_S;
-        /// A connection on which nothing passes for as long is closed \[s\]. Above `request_timeout_s`.
+        /// A connection on which nothing passes for as long is closed \[s\]. Above
+        /// `request_timeout_s`.
         idle_timeout_s: f64 = 60.0, INTERVAL_S;
         /// Longest wait for open requests when the service stops \[s\].
         shutdown_timeout_s: f64 = 5.0, INTERVAL_S;

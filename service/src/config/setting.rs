@@ -1,5 +1,5 @@
-//! Settings, each defined once: key, type, default, rule and meaning. From that come the keys of the file, the
-//! environment and the flags, the checks, and `docs/settings.md`.
+//! Settings, each defined once: key, type, default, rule and meaning. From that come the keys of
+//! the file, the environment and the flags, the checks, and `docs/settings.md`.
 
 use super::ConfigError;
 
@@ -62,8 +62,8 @@ pub(super) const INTERVAL_S: Rule<f64> = Rule {
     shown: f64::to_string,
 };
 
-/// Defines a section of settings: a struct with its defaults, the list of its settings, and the check of
-/// each value by itself.
+/// Defines a section of settings: a struct with its defaults, the list of its settings, and the
+/// check of each value by itself.
 macro_rules! section {
     (
         $(#[doc = $about:literal])+

@@ -36,8 +36,8 @@ const LENGTH_M: Bound = Bound::Real {
     max: 1e6,
 };
 
-/// Each number of a space's settings with what it may be, but for those of the odometry's noise, which are all
-/// shares, and for the seed, which is any.
+/// Each number of a space's settings with what it may be, but for those of the odometry's noise,
+/// which are all shares, and for the seed, which is any.
 pub const SPACE_BOUNDS: [(&str, Bound); 13] = [
     (
         "grid_modules",

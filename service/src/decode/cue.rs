@@ -112,8 +112,8 @@ fn code(map: &CognitiveMap, phases: &[Option<[f64; 3]>]) -> Result<PartialCode, 
     Ok(PartialCode::new(map.modules(), phases.collect())?)
 }
 
-/// An agent by its name; where there is none now, the latest one that was removed. Spaces have at most some
-/// thousand agents, so a scan will do.
+/// An agent by its name; where there is none now, the latest one that was removed. Spaces have at
+/// most some thousand agents, so a scan will do.
 fn agent(map: &CognitiveMap, name: &str) -> Result<AgentId, InvalidQuery> {
     map.agents_ever()
         .filter(|(_, agent)| agent.name().as_str() == name)

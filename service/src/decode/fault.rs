@@ -1,5 +1,5 @@
-//! Which field breaks a rule, for whoever asked. Each field is tried by itself by the rules that refused
-//! the whole; so nothing is decided here, and what makes sense pays nothing for it.
+//! Which field breaks a rule, for whoever asked. Each field is tried by itself by the rules that
+//! refused the whole; so nothing is decided here, and what makes sense pays nothing for it.
 
 use std::fmt::Debug;
 

@@ -21,40 +21,7 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
                 });
             }
         }
-        Entry::Samples { agent, batch } => {
-            let agent = AgentId(*agent);
-            let session = batch.session;
-            for (ahead, sample) in (0..).zip(&batch.samples) {
-                // The last number of all has no successor, so it is never a sample's.
-                let Some(seq) = batch
-                    .first_seq
-                    .checked_add(ahead)
-                    .filter(|seq| *seq < u64::MAX)
-                else {
-                    return;
-                };
-                take(match journaled_sample(sample) {
-                    Ok(sample) => Record::Sample {
-                        agent,
-                        session,
-                        seq,
-                        sample,
-                    },
-                    // Only samples that passed are journaled. A build with stricter rules than the
-                    // one that wrote the journal says so by skipping.
-                    Err(invalid) => {
-                        let reason = SkipReason::Invalid(invalid);
-                        Record::Skip {
-                            agent,
-                            session,
-                            from: seq,
-                            to: seq + 1,
-                            reason,
-                        }
-                    }
-                });
-            }
-        }
+        Entry::Samples { agent, batch } => records_of_batch(AgentId(*agent), batch, take),
         Entry::Skip {
             agent,
             session,
@@ -93,6 +60,41 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
                 });
             }
         }
+    }
+}
+
+/// Passes the records of consecutive samples to `take`, in order.
+fn records_of_batch(agent: AgentId, batch: &wire::SampleBatch, mut take: impl FnMut(Record)) {
+    let session = batch.session;
+    for (ahead, sample) in (0..).zip(&batch.samples) {
+        // The last number of all has no successor, so it is never a sample's.
+        let Some(seq) = batch
+            .first_seq
+            .checked_add(ahead)
+            .filter(|seq| *seq < u64::MAX)
+        else {
+            return;
+        };
+        take(match journaled_sample(sample) {
+            Ok(sample) => Record::Sample {
+                agent,
+                session,
+                seq,
+                sample,
+            },
+            // Only samples that passed are journaled. A build with stricter rules than the
+            // one that wrote the journal says so by skipping.
+            Err(invalid) => {
+                let reason = SkipReason::Invalid(invalid);
+                Record::Skip {
+                    agent,
+                    session,
+                    from: seq,
+                    to: seq + 1,
+                    reason,
+                }
+            }
+        });
     }
 }
 

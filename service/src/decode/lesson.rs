@@ -33,8 +33,8 @@ pub fn lesson(lesson: &wire::ObjectLesson) -> Result<Lesson, InvalidContacts> {
     journaled_lesson(lesson)
 }
 
-/// A lesson of the journal: as [`lesson`], but for names of channels, which older versions took in more
-/// forms.
+/// A lesson of the journal: as [`lesson`], but for names of channels, which older versions took in
+/// more forms.
 ///
 /// # Errors
 /// Says which rule it breaks.

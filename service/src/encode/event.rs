@@ -26,7 +26,24 @@ pub(crate) fn event_records(
 /// The published form of an event; cell crossings stay inside, there are too many, and so do
 /// percepts that are as expected and the ends of episodes, which are answered on request.
 fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wire::Event> {
-    let kind = match &event.kind {
+    let kind = event_kind(map, &event.kind)?;
+    // The number of a removed agent may be another one's by now.
+    let agent = match &event.kind {
+        EventKind::AgentRemoved { name } => name,
+        _ => map.agent(event.agent)?.name(),
+    };
+    Some(wire::Event {
+        space: space.to_owned(),
+        agent: agent.as_str().to_owned(),
+        map_revision: map.revision(),
+        stamp_ns: event.stamp_ns,
+        kind,
+    })
+}
+
+/// What happened; none of what is not published.
+fn event_kind(map: &CognitiveMap, kind: &EventKind) -> Option<wire::EventKind> {
+    Some(match kind {
         EventKind::CellEntered { .. } | EventKind::EpisodeEnded { .. } => return None,
         EventKind::AgentEnrolled => wire::EventKind::AgentEnrolled {},
         EventKind::AgentRemoved { .. } => wire::EventKind::AgentRemoved {},
@@ -75,43 +92,38 @@ fn event(space: &str, map: &CognitiveMap, event: &Event) -> Option<wire::Event> 
         | EventKind::ObjectLearned { .. }
         | EventKind::ObjectNotLearned { .. }
         | EventKind::ObjectsMerged { .. }
-        | EventKind::ObjectSplit { .. } => object_event(&event.kind)?,
+        | EventKind::ObjectSplit { .. } => object_event(kind)?,
         EventKind::MarkerPassed { label } => wire::EventKind::MarkerPassed {
             label: label.as_str().to_owned(),
         },
-        EventKind::PerceptCompared {
-            place,
-            channel,
-            percepts,
-            surprise,
-        } => {
-            let channel = map.channel(*channel)?;
-            if !is_surprising(channel.kind(), *percepts, *surprise) {
-                return None;
-            }
-            wire::EventKind::PerceptSurprising {
-                place: place.0.into(),
-                channel: channel.label().as_str().to_owned(),
-                percept: match channel.kind() {
-                    ChannelKind::Level => wire::PerceptKind::Level,
-                    ChannelKind::Descriptor { .. } => wire::PerceptKind::Descriptor,
-                },
-                percepts: *percepts,
-                surprise: *surprise,
-            }
-        }
+        EventKind::PerceptCompared { .. } => surprise(map, kind)?,
+    })
+}
+
+/// A percept that surprises; none of one that does not, and of anything else.
+fn surprise(map: &CognitiveMap, kind: &EventKind) -> Option<wire::EventKind> {
+    let EventKind::PerceptCompared {
+        place,
+        channel,
+        percepts,
+        surprise,
+    } = kind
+    else {
+        return None;
     };
-    // The number of a removed agent may be another one's by now.
-    let agent = match &event.kind {
-        EventKind::AgentRemoved { name } => name,
-        _ => map.agent(event.agent)?.name(),
-    };
-    Some(wire::Event {
-        space: space.to_owned(),
-        agent: agent.as_str().to_owned(),
-        map_revision: map.revision(),
-        stamp_ns: event.stamp_ns,
-        kind,
+    let channel = map.channel(*channel)?;
+    if !is_surprising(channel.kind(), *percepts, *surprise) {
+        return None;
+    }
+    Some(wire::EventKind::PerceptSurprising {
+        place: place.0.into(),
+        channel: channel.label().as_str().to_owned(),
+        percept: match channel.kind() {
+            ChannelKind::Level => wire::PerceptKind::Level,
+            ChannelKind::Descriptor { .. } => wire::PerceptKind::Descriptor,
+        },
+        percepts: *percepts,
+        surprise: *surprise,
     })
 }
 

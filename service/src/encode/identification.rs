@@ -8,8 +8,8 @@ use object_recognition::{ObjectId, PoseEstimate, Posterior, Verdict};
 /// Least probability of an object that is named in an answer.
 const PROBABILITY_MIN: f64 = 1e-6;
 
-/// The episode of an agent, and the latest one that has ended. An episode says whether it teaches, and
-/// what is recognised.
+/// The episode of an agent, and the latest one that has ended. An episode says whether it teaches,
+/// and what is recognised.
 pub fn agent_object(
     space: &str,
     map: &CognitiveMap,

@@ -1,7 +1,8 @@
 //! When a percept is so far from what was expected that it is said aloud.
 //!
-//! An event for every percept would be as many messages as there are percepts, and most of them would
-//! say that all is as it was. The histograms hold all of them; events hold those beyond a bound.
+//! An event for every percept would be as many messages as there are percepts, and most of them
+//! would say that all is as it was. The histograms hold all of them; events hold those beyond a
+//! bound.
 
 use cognitive_map::ChannelKind;
 

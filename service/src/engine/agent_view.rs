@@ -175,8 +175,8 @@ impl AgentView {
         }
     }
 
-    /// [`Self::detail`] as JSON. It is the question that is asked most, often many times between two
-    /// readouts, so what changes with the readout only is written once for each.
+    /// [`Self::detail`] as JSON. It is the question that is asked most, often many times between
+    /// two readouts, so what changes with the readout only is written once for each.
     ///
     /// # Panics
     /// Never: an agent is plain data.

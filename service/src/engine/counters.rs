@@ -93,8 +93,8 @@ impl IntakeCounters {
         }
     }
 
-    /// Counts a message for a space that does not exist, and says so in the log now and then: whoever
-    /// misspelt a name looks there.
+    /// Counts a message for a space that does not exist, and says so in the log now and then:
+    /// whoever misspelt a name looks there.
     pub(crate) fn unknown_space(&self, space: &str) {
         static SAID: Sparingly = Sparingly::new();
         self.dropped(Drop::UnknownSpace);
@@ -286,8 +286,8 @@ pub(crate) struct Standing {
 }
 
 impl Standing {
-    /// Notes an agent: how it is localised, none before its first sample, and how many of its samples
-    /// are not durable and wait.
+    /// Notes an agent: how it is localised, none before its first sample, and how many of its
+    /// samples are not durable and wait.
     pub(crate) fn note(&mut self, status: Option<Status>, not_durable: u64, waiting: u64) {
         let index = match status {
             Some(Status::Localized) => 0,

@@ -2,7 +2,8 @@
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Which of an agent's two messages are due. Told again before it is published, a message is due once.
+/// Which of an agent's two messages are due. Told again before it is published, a message is due
+/// once.
 #[derive(Debug, Default)]
 pub(crate) struct Due(AtomicU8);
 

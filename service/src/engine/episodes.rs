@@ -1,5 +1,5 @@
-//! The latest episode with an object of each agent that has ended. It is no part of the map, which does
-//! nothing with it: like the events it is told by the map as it was then, and kept beside it.
+//! The latest episode with an object of each agent that has ended. It is no part of the map, which
+//! does nothing with it: like the events it is told by the map as it was then, and kept beside it.
 
 use std::sync::Arc;
 
@@ -28,8 +28,8 @@ impl EndedEpisodes {
         postcard::to_stdvec(&known).expect("plain data encodes")
     }
 
-    /// Reads what [`EndedEpisodes::write`] wrote of at most so many agents; nothing where that is not what
-    /// the bytes are, as those of older versions.
+    /// Reads what [`EndedEpisodes::write`] wrote of at most so many agents; nothing where that is
+    /// not what the bytes are, as those of older versions.
     pub(crate) fn read(bytes: &[u8], agents: usize) -> Self {
         let known: Vec<(u32, EndedEpisode)> = postcard::from_bytes(bytes).unwrap_or_default();
         let mut episodes = Self::default();

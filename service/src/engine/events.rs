@@ -74,8 +74,9 @@ impl EventRing {
 
     /// Place of the first event after `id`, and whether some between are not kept any more.
     fn after(&self, id: EventId, revision: u64) -> (usize, bool) {
-        // An id of a record that the space does not have is one of another past: of a space that was
-        // deleted, or of records that a crash has taken. Nothing is known to be before what is kept.
+        // An id of a record that the space does not have is one of another past: of a space that
+        // was deleted, or of records that a crash has taken. Nothing is known to be before what is
+        // kept.
         if id < self.since || id.revision > revision {
             return (0, true);
         }
@@ -88,8 +89,8 @@ impl EventRing {
         postcard::to_stdvec(&(self.since, events)).expect("plain data encodes")
     }
 
-    /// Reads what [`EventRing::write`] wrote, and gives the bytes after it; nothing where that is not
-    /// what the bytes are.
+    /// Reads what [`EventRing::write`] wrote, and gives the bytes after it; nothing where that is
+    /// not what the bytes are.
     pub(crate) fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
         type Plain = (EventId, Vec<EventRecord>);
         let ((since, events), rest) = postcard::take_from_bytes::<Plain>(bytes).ok()?;
@@ -181,8 +182,8 @@ impl EventFollower {
         Followed { missed, events }
     }
 
-    /// Waits until there is something to take. False when there will be nothing any more: the space is
-    /// gone.
+    /// Waits until there is something to take. False when there will be nothing any more: the space
+    /// is gone.
     pub async fn wait(&mut self) -> bool {
         let (next, told) = (self.next, self.missed.is_none());
         let came = self.count.wait_for(|count| *count > next || !told).await;

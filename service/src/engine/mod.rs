@@ -28,6 +28,7 @@ mod repair;
 mod sequencer;
 mod session_bound;
 mod settings;
+mod shared;
 mod space;
 mod trajectory;
 mod unavailable;
@@ -67,7 +68,7 @@ use counters::{Drop, IntakeCounters};
 use health::Health;
 use question::QuestionRoom;
 use queue::NotQueued;
-use space::Surroundings;
+use shared::Surroundings;
 
 /// The engine. Clones share it.
 #[derive(Clone, Debug)]

@@ -7,8 +7,9 @@ use cogmap_proto::EventRecord;
 use super::agent_view::AgentView;
 
 /// Is told what there is to publish. Calls come from the writers' and the committer's threads and
-/// must not block, so an publisher publishes on a thread of its own: estimates and watermarks as they
-/// are on the agent's view by then, which supersede all before them; of events as many as it holds.
+/// must not block, so a publisher works on a thread of its own: estimates and watermarks as
+/// they are on the agent's view by then, which supersede all before them; of events as many as it
+/// holds.
 pub trait Publisher: std::fmt::Debug + Send + Sync + 'static {
     /// The estimate on an agent's view is a new one.
     fn estimate(&self, space: &Arc<str>, agent: &Arc<AgentView>);
@@ -19,7 +20,7 @@ pub trait Publisher: std::fmt::Debug + Send + Sync + 'static {
     fn event(&self, event: &Arc<EventRecord>);
 }
 
-/// An publisher into nowhere, for services without Zenoh.
+/// A publisher into nowhere, for services without Zenoh.
 #[derive(Clone, Copy, Debug)]
 pub struct Silent;
 

@@ -1,5 +1,5 @@
-//! Long questions to a map, such as where samples were taken and what object was touched: answered beside the writers, a few
-//! at once, and not for ever.
+//! Long questions to a map, such as where samples were taken and what object was touched: answered
+//! beside the writers, a few at once, and not for ever.
 
 use std::sync::Arc;
 use std::time::Duration;

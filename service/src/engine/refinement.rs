@@ -42,7 +42,8 @@ pub(super) struct Refinement {
     pub(super) agents: BTreeMap<String, Vec<StampedPose>>,
 }
 
-/// The refined trajectory of each agent of a map that has not been removed, by name; empty where it is not placed. Takes up to seconds.
+/// The refined trajectory of each agent of a map that has not been removed, by name; empty where it
+/// is not placed. Takes up to seconds.
 pub fn refined_trajectories(map: &CognitiveMap) -> BTreeMap<String, Vec<StampedPose>> {
     let mut refined = map.refined().agents.into_iter();
     let of_agent = |(_, agent): (AgentId, &Agent)| {

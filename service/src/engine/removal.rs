@@ -24,7 +24,8 @@ impl Space {
         }
     }
 
-    /// Removes an agent and answers when that is durable. What it did in the map stays, and its name is free.
+    /// Removes an agent and answers when that is durable. What it did in the map stays, and its
+    /// name is free.
     ///
     /// # Errors
     /// See [`IngestError`].

@@ -1,8 +1,8 @@
 //! Puts one agent's samples in order: duplicates out, gaps seen, late samples waited for.
 //!
-//! Pure: time comes as an argument, and the items are whatever the caller numbers. What comes out is
-//! the one order in which samples are journaled, so any arrival order inside the window gives the same
-//! journal.
+//! Pure: time comes as an argument, and the items are whatever the caller numbers. What comes out
+//! is the one order in which samples are journaled, so any arrival order inside the window gives
+//! the same journal.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -164,8 +164,8 @@ impl<T: Weight> Sequencer<T> {
         })
     }
 
-    /// Whether a run of samples from `first` on can be taken whole, as it is: it begins with the next
-    /// sample in order and no gap is open.
+    /// Whether a run of samples from `first` on can be taken whole, as it is: it begins with the
+    /// next sample in order and no gap is open.
     pub(crate) fn is_next(&self, first: u64) -> bool {
         let is_whole = self.waiting.is_empty() && self.dropped_to.is_none() && self.leap.is_none();
         first == self.next && is_whole
@@ -184,7 +184,8 @@ impl<T: Weight> Sequencer<T> {
     }
 
     /// Offers consecutive samples from `first` on; passes those that are in order now to `accept`.
-    /// Those that are not wait, up to `reach` ahead of the next one and as many as there is `room` for.
+    /// Those that are not wait, up to `reach` ahead of the next one and as many as there is `room`
+    /// for.
     ///
     /// They must not be [out of reach](Self::is_out_of_reach).
     pub(crate) fn offer(

@@ -7,8 +7,8 @@ use super::message::IngestError;
 /// A clock that shows less than this has not been set since its machine started: 2023-11-14.
 const CLOCK_SET: Duration = Duration::from_secs(1_700_000_000);
 
-/// The bound of the numbers of sessions. These are Unix times of a start \[ns\], and the larger one takes over:
-/// one in the far future would own its agent's name for good.
+/// The bound of the numbers of sessions. These are Unix times of a start \[ns\], and the larger one
+/// takes over: one in the far future would own its agent's name for good.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SessionBound {
     /// How far ahead of the service's clock a number may be.

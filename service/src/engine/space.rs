@@ -5,33 +5,23 @@ mod questions;
 mod refined;
 mod trajectories;
 
-use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{Builder, JoinHandle};
-use std::time::Duration;
 
-use arc_swap::ArcSwapOption;
 use cogmap_proto::{Codec, EventId, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings};
-use cognitive_map::{AgentId, CognitiveMap, Label, Lesson, Settings};
-use metrics::gauge;
+use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
 use tokio::sync::oneshot;
 
 use super::agent_view::AgentView;
-use super::checkpointer::Job;
-use super::committer::Commit;
-use super::events::{EventFollower, EventLog};
-use super::health::Health;
+use super::events::EventFollower;
 use super::message::{Call, IngestError, ObjectRequest, Request};
-use super::publisher::Publisher;
 use super::question::QuestionRoom;
 use super::queue::{NotQueued, Queue, queue};
 use super::refinement::Refinements;
-use super::session_bound::SessionBound;
-use super::settings::EngineSettings;
+use super::shared::{Shared, Surroundings};
 use super::unavailable::Unavailable;
-use crate::metrics::SPACE_STOPPED;
-use crate::store::{SpaceNumber, Store};
+use crate::store::SpaceNumber;
 
 /// A space: its readers' and senders' side.
 #[derive(Debug)]
@@ -40,55 +30,6 @@ pub struct Space {
     settings: SpaceSettings,
     queue: Queue,
     thread: Mutex<Option<JoinHandle<()>>>,
-}
-
-/// What the space and its writer share.
-#[derive(Debug)]
-pub(crate) struct Shared {
-    pub(crate) name: Arc<str>,
-    pub(crate) number: SpaceNumber,
-    pub(crate) interval_ns: i64,
-    pub(crate) agents_max: usize,
-    pub(crate) sessions: SessionBound,
-    pub(crate) reorder_window: usize,
-    pub(crate) gap_timeout: Duration,
-    pub(crate) store: Arc<dyn Store>,
-    pub(crate) publisher: Arc<dyn Publisher>,
-    pub(crate) health: Arc<Health>,
-    /// What happened of late.
-    pub(crate) events: EventLog,
-    /// Revision of the map at the end of the latest round.
-    pub(crate) revision: AtomicU64,
-    /// Set once: the writer takes what is queued and ends.
-    pub(crate) closing: AtomicBool,
-    /// Set once the map is loaded, or could not be.
-    loaded: OnceLock<Result<(), Unavailable>>,
-    agents: RwLock<BTreeMap<String, Arc<AgentView>>>,
-    /// Removed agents that were in the map, by name, the latest last.
-    former: RwLock<BTreeMap<String, Vec<AgentId>>>,
-    snapshot: ArcSwapOption<CognitiveMap>,
-    /// Those who wait for a snapshot; none once the writer is gone.
-    snapshot_requests: Mutex<Option<Vec<SnapshotRequest>>>,
-    /// The map relaxed for those who asked for the past.
-    refinements: Refinements,
-    questions: QuestionRoom,
-    /// Set when the writer ended although the space was not closing.
-    broken: AtomicBool,
-}
-
-/// Someone who waits for a snapshot.
-type SnapshotRequest = oneshot::Sender<Arc<CognitiveMap>>;
-
-/// What a space needs of the engine.
-#[derive(Clone, Debug)]
-pub(crate) struct Surroundings {
-    pub(crate) store: Arc<dyn Store>,
-    pub(crate) publisher: Arc<dyn Publisher>,
-    pub(crate) health: Arc<Health>,
-    pub(crate) commits: std::sync::mpsc::Sender<Commit>,
-    pub(crate) jobs: std::sync::mpsc::Sender<Job>,
-    pub(crate) questions: QuestionRoom,
-    pub(crate) settings: EngineSettings,
 }
 
 impl Space {
@@ -244,8 +185,8 @@ impl Space {
         answer.await.unwrap_or(Err(IngestError::Closed))
     }
 
-    /// Teaches an object at once and answers when that is durable. `lesson` is what came, `valid` the same as the map
-    /// takes it.
+    /// Teaches an object at once and answers when that is durable. `lesson` is what came, `valid`
+    /// the same as the map takes it.
     ///
     /// # Errors
     /// See [`IngestError`].
@@ -336,89 +277,5 @@ impl Space {
         }
         let loaded = self.shared.loaded.get();
         loaded.cloned().unwrap_or(Err(Unavailable::Recovering))
-    }
-}
-
-impl Shared {
-    fn new(number: SpaceNumber, name: &str, interval_ns: i64, around: &Surroundings) -> Arc<Self> {
-        Arc::new(Self {
-            name: name.into(),
-            number,
-            interval_ns,
-            agents_max: around.settings.agents_max,
-            sessions: SessionBound::new(around.settings.session_ahead_max),
-            reorder_window: around.settings.reorder_window,
-            gap_timeout: around.settings.gap_timeout,
-            store: Arc::clone(&around.store),
-            publisher: Arc::clone(&around.publisher),
-            health: Arc::clone(&around.health),
-            events: EventLog::new(),
-            revision: AtomicU64::new(0),
-            closing: AtomicBool::new(false),
-            loaded: OnceLock::new(),
-            agents: RwLock::default(),
-            former: RwLock::default(),
-            snapshot: ArcSwapOption::empty(),
-            snapshot_requests: Mutex::new(Some(Vec::new())),
-            refinements: Refinements::default(),
-            questions: around.questions.clone(),
-            broken: AtomicBool::new(false),
-        })
-    }
-
-    /// Stops the space for good, before it has begun: only an operator can help.
-    fn stop(&self, reason: String) {
-        tracing::error!(space = %self.name, reason, "the space is stopped");
-        gauge!(SPACE_STOPPED, "space" => self.name.to_string()).set(1.0);
-        let _ = self.loaded.set(Err(Unavailable::Stopped(reason)));
-    }
-
-    /// Lists a new agent.
-    pub(crate) fn add_view(&self, view: Arc<AgentView>) {
-        let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);
-        agents.insert(view.name().to_owned(), view);
-    }
-
-    /// Lists an agent no longer.
-    pub(crate) fn remove_view(&self, name: &str) {
-        let mut agents = self.agents.write().unwrap_or_else(PoisonError::into_inner);
-        agents.remove(name);
-    }
-
-    /// Notes a removed agent that was in the map.
-    pub(super) fn note_former(&self, name: &str, id: AgentId) {
-        let mut former = self.former.write().unwrap_or_else(PoisonError::into_inner);
-        former.entry(name.to_owned()).or_default().push(id);
-    }
-
-    /// The removed agents of a name that were in the map, the latest last.
-    pub(super) fn former(&self, name: &str) -> Vec<AgentId> {
-        let former = self.former.read().unwrap_or_else(PoisonError::into_inner);
-        former.get(name).cloned().unwrap_or_default()
-    }
-
-    /// Gives the map to all who request for it: one copy for all, and copying is cheap.
-    pub(crate) fn serve_snapshots(&self, map: &CognitiveMap) {
-        let requests = self.snapshot_requests().as_mut().map(std::mem::take);
-        let requests = requests.unwrap_or_default();
-        if requests.is_empty() {
-            return;
-        }
-        let snapshot = Arc::new(map.clone());
-        self.snapshot.store(Some(Arc::clone(&snapshot)));
-        for request in requests {
-            // Whoever wished may have gone.
-            let _ = request.send(Arc::clone(&snapshot));
-        }
-    }
-
-    fn agents(&self) -> std::sync::RwLockReadGuard<'_, BTreeMap<String, Arc<AgentView>>> {
-        self.agents.read().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn snapshot_requests(&self) -> std::sync::MutexGuard<'_, Option<Vec<SnapshotRequest>>> {
-        self.snapshot_requests
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
     }
 }

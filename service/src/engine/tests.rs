@@ -427,7 +427,8 @@ fn a_localisation_that_takes_too_long_is_given_up_and_makes_room() {
     };
     let whole = room();
     let overdue = Err(QuestionError::Overdue(Duration::ZERO));
-    // A machine that is busy elsewhere may have the answer before it looks at the clock, but not each time.
+    // A machine that is busy elsewhere may have the answer before it looks at the clock, but not
+    // each time.
     let told: Vec<_> = (0..20)
         .map(|_| {
             let told = localize(Duration::ZERO);

@@ -56,10 +56,11 @@ pub struct TrajectoryPage {
 pub(crate) struct CorruptChunk;
 
 impl Recorder {
-    /// Notes the pose of `agent` after a record has been applied to it, if the record moved or corrected
-    /// it and the latest row is at least `interval_ns` old. A start pose or a sighting at the stamp of the
-    /// latest row replaces that row. An agent that is not placed has no pose in the map, and no rows.
-    /// Returns a chunk when one is complete, and what is left when the agent is removed.
+    /// Notes the pose of `agent` after a record has been applied to it, if the record moved or
+    /// corrected it and the latest row is at least `interval_ns` old. A start pose or a sighting at
+    /// the stamp of the latest row replaces that row. An agent that is not placed has no pose in
+    /// the map, and no rows. Returns a chunk when one is complete, and what is left when the agent
+    /// is removed.
     pub fn note(&mut self, record: &Record, agent: &Agent, interval_ns: i64) -> Option<Chunk> {
         let (session, sample) = match record {
             Record::Sample {

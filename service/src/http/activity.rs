@@ -1,23 +1,11 @@
 //! Which connections have a request under way, and which wait.
 
 use std::collections::BTreeMap;
-use std::convert::Infallible;
-use std::future::Future;
-use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::task::{Context, Poll};
+use std::task::Context;
 
-use axum::Router;
-use axum::body::Body;
-use axum::extract::Request;
-use axum::http::Response;
-use axum::serve::IncomingStream;
 use futures_util::task::AtomicWaker;
-use tower::Service;
-
-use super::held::holding;
-use super::listener::BoundedListener;
 
 /// The connections that wait, the one that has waited longest first.
 #[derive(Debug, Default)]
@@ -110,7 +98,7 @@ impl Activity {
         waiting.remove(self);
     }
 
-    fn begin(self: &Arc<Self>) -> UnderWay {
+    pub(crate) fn begin(self: &Arc<Self>) -> UnderWay {
         self.idle.lock().remove(self);
         self.requests.fetch_add(1, Ordering::AcqRel);
         UnderWay(Arc::clone(self))
@@ -119,7 +107,7 @@ impl Activity {
 
 /// A request under way, from its head until its answer has been sent.
 #[derive(Debug)]
-struct UnderWay(Arc<Activity>);
+pub(crate) struct UnderWay(Arc<Activity>);
 
 impl Drop for UnderWay {
     fn drop(&mut self) {
@@ -127,52 +115,5 @@ impl Drop for UnderWay {
         if !self.0.gone.load(Ordering::Acquire) {
             waiting.insert(&self.0);
         }
-    }
-}
-
-/// Makes the service of each connection: the routes, with a note of each request.
-#[derive(Clone, Debug)]
-pub(crate) struct Noting(pub(crate) Router);
-
-/// The routes for one connection.
-#[derive(Clone, Debug)]
-pub(crate) struct Noted {
-    router: Router,
-    activity: Arc<Activity>,
-}
-
-impl Service<IncomingStream<'_, BoundedListener>> for Noting {
-    type Response = Noted;
-    type Error = Infallible;
-    type Future = std::future::Ready<Result<Noted, Infallible>>;
-
-    fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
-        Poll::Ready(Ok(()))
-    }
-
-    fn call(&mut self, stream: IncomingStream<'_, BoundedListener>) -> Self::Future {
-        std::future::ready(Ok(Noted {
-            router: self.0.clone(),
-            activity: Arc::clone(stream.io().activity()),
-        }))
-    }
-}
-
-impl Service<Request> for Noted {
-    type Response = Response<Body>;
-    type Error = Infallible;
-    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, Infallible>> + Send>>;
-
-    fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
-        Poll::Ready(Ok(())) // as the router always is
-    }
-
-    fn call(&mut self, request: Request) -> Self::Future {
-        let under_way = self.activity.begin();
-        let answer = self.router.call(request);
-        Box::pin(async move {
-            let response = answer.await?;
-            Ok(response.map(|body| holding(body, under_way)))
-        })
     }
 }

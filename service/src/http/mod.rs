@@ -34,6 +34,7 @@ mod settings;
 mod spaces;
 mod state;
 mod token;
+mod tracking;
 mod trajectory;
 mod trips;
 
@@ -54,10 +55,10 @@ pub use settings::HttpSettings;
 pub use token::Token;
 
 use crate::engine::Engine;
-use activity::Noting;
 use guard::Guard;
 use listener::BoundedListener;
 use state::{Service, Shared};
+use tracking::TrackedRoutes;
 
 /// What the description says of the whole.
 #[derive(OpenApi)]
@@ -152,7 +153,7 @@ pub async fn run(
         stop.send_replace(true);
     };
     let listener = BoundedListener::new(listener, &settings);
-    let served = axum::serve(listener, Noting(router))
+    let served = axum::serve(listener, TrackedRoutes(router))
         .with_graceful_shutdown(signal)
         .into_future();
     let mut stopping = stopping;

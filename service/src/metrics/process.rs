@@ -14,8 +14,8 @@ const BLOCK_BYTES: u64 = 512;
 /// Label of what lies in the store's directory itself.
 const TOP: &str = "top";
 
-/// Records memory and descriptors, as the system's books have them now. Where the system keeps no such
-/// books, nothing is recorded.
+/// Records memory and descriptors, as the system's books have them now. Where the system keeps no
+/// such books, nothing is recorded.
 pub(super) fn record() {
     if let Ok(status) = fs::read_to_string("/proc/self/status")
         && let Some(kibibytes) = field(&status, "VmRSS:")

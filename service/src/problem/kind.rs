@@ -1,4 +1,5 @@
-//! The table of problems: one kind, status and title for one mistake, whatever door it came through.
+//! The table of problems: one kind, status and title for one mistake, whatever door it came
+//! through.
 
 /// Kinds of problems. Their names are part of the interface and stay as they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

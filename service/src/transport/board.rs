@@ -13,8 +13,8 @@ use crate::metrics::UNPUBLISHED_EVENTS;
 const EVENTS_MAX: usize = 4096;
 
 /// Where the engine leaves word and the publisher finds it. Of an agent nothing waits but that
-/// something is due, however often it changes; so the board holds as many notices as there are agents,
-/// and a bounded number of events.
+/// something is due, however often it changes; so the board holds as many notices as there are
+/// agents, and a bounded number of events.
 pub(super) struct Board {
     notices: Mutex<Notices>,
     bell: Condvar,

@@ -51,8 +51,8 @@ pub(super) async fn declare(
         let queryable = session
             .declare_queryable(latest.key("*", "*"))
             .complete(true)
-            // The callback runs on a receiving thread: the answer is made elsewhere, on a thread that may
-            // wait for a congested link.
+            // The callback runs on a receiving thread: the answer is made elsewhere, on a thread
+            // that may wait for a congested link.
             .callback(move |query| {
                 let engine = engine.clone();
                 let permit = Arc::clone(&room).try_acquire_owned().ok();

@@ -1,10 +1,11 @@
 //! Takes from Zenoh's sockets the option to linger.
 //!
-//! Zenoh 1.10 has its sockets wait up to ten seconds, when they are closed, until what is left has been
-//! sent. Where the other side has stopped reading that never happens, and the thread that closes the
-//! socket is one of the two that receive for the whole session. Without the option the system sends
-//! the rest by itself, and closing waits for nobody. Zenoh has no setting for it and does not hand out
-//! its sockets: so they are looked for among the open files of the process, by the option itself.
+//! Zenoh 1.10 has its sockets wait up to ten seconds, when they are closed, until what is left has
+//! been sent. Where the other side has stopped reading that never happens, and the thread that
+//! closes the socket is one of the two that receive for the whole session. Without the option the
+//! system sends the rest by itself, and closing waits for nobody. Zenoh has no setting for it and
+//! does not hand out its sockets: so they are looked for among the open files of the process, by
+//! the option itself.
 
 use std::collections::BTreeSet;
 use std::fs;

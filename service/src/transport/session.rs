@@ -13,7 +13,8 @@ pub struct TransportSettings {
     pub listen: Vec<String>,
     /// Endpoints to connect to.
     pub connect: Vec<String>,
-    /// A Zenoh configuration file (JSON5) underneath these settings: TLS, passwords, access control.
+    /// A Zenoh configuration file (JSON5) underneath these settings: TLS, passwords, access
+    /// control.
     pub config_file: Option<PathBuf>,
     /// Most sessions of others.
     pub sessions_max: usize,
@@ -26,9 +27,9 @@ const SESSIONS: &str = "transport/unicast/max_sessions";
 /// Key of Zenoh's bound on connections that are not yet a session.
 const HANDSHAKES: &str = "transport/unicast/accept_pending";
 
-/// What keeps whoever does not read from holding up others, where the configuration file says nothing
-/// else. The threads that receive for the whole session also pass messages on, and would wait for a
-/// congested link.
+/// What keeps whoever does not read from holding up others, where the configuration file says
+/// nothing else. The threads that receive for the whole session also pass messages on, and would
+/// wait for a congested link.
 const PATIENCE: [(&str, &str); 3] = [
     // Samples that someone else listens to are passed on as far as its link takes them, after
     // everything that the service itself says. Answers get the priority of their query, so that of
@@ -51,7 +52,8 @@ const PATIENCE: [(&str, &str); 3] = [
             },
         ]"#,
     ),
-    // Declarations and answers are never dropped: a link that takes none for a second is closed [us].
+    // Declarations and answers are never dropped: a link that takes none for a second is closed
+    // [us].
     (
         "transport/link/tx/queue/congestion_control/block/wait_before_close",
         "1000000",

@@ -1,11 +1,11 @@
 //! What waits, a lane for each agent, and in which order it is taken.
 //!
-//! Messages are taken in the order in which they came, as long as each agent has only a few waiting.
-//! What an agent sends beyond that waits in its lane, and comes into the order bit by bit, as what it
-//! has there is taken: so those who send much take turns, and who sends little waits for a turn of
-//! each of them at most. A lane may hold as much as is free in the whole queue (dynamic thresholds,
-//! Choudhury & Hahne 1998): one that fills up alone stops at half of the room, and whoever comes next
-//! always finds some.
+//! Messages are taken in the order in which they came, as long as each agent has only a few
+//! waiting. What an agent sends beyond that waits in its lane, and comes into the order bit by bit,
+//! as what it has there is taken: so those who send much take turns, and who sends little waits for
+//! a turn of each of them at most. A lane may hold as much as is free in the whole queue (dynamic
+//! thresholds, Choudhury & Hahne 1998): one that fills up alone stops at half of the room, and
+//! whoever comes next always finds some.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -77,8 +77,8 @@ impl Lanes {
         self.order.is_empty()
     }
 
-    /// The lane of an agent, if it has room for one more message of so many bytes where `free` is left
-    /// of the whole.
+    /// The lane of an agent, if it has room for one more message of so many bytes where `free` is
+    /// left of the whole.
     pub(super) fn lane_for(
         &mut self,
         agent: &str,
@@ -124,7 +124,8 @@ impl Lanes {
     }
 
     /// Moves messages to `frames` and `calls` until some `bytes` have been moved or nothing waits.
-    /// Calls are handled before what is in `frames`, so one that comes after such a message ends it.
+    /// Calls are handled before what is in `frames`, so one that comes after such a message ends
+    /// it.
     pub(super) fn take(&mut self, frames: &mut Frames, calls: &mut VecDeque<Call>, bytes: usize) {
         let mut taken = 0;
         while taken < bytes

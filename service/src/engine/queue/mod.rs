@@ -1,7 +1,8 @@
 //! The bounded queue of a space's writer.
 //!
-//! A lane for each agent: whoever sends more than the writer can take fills his own and waits in it;
-//! otherwise messages are taken in the order in which they came. A message costs a copy at each end and no allocation, and the lock is held for these copies only.
+//! A lane for each agent: whoever sends more than the writer can take fills his own and waits in
+//! it; otherwise messages are taken in the order in which they came. A message costs a copy at each
+//! end and no allocation, and the lock is held for these copies only.
 
 mod frames;
 mod lanes;

@@ -1,12 +1,13 @@
 //! Repair: a damaged journal becomes one that folds, of all blocks that can be read.
 //!
-//! What follows a hole was written by an engine that knew the blocks in it, so it is fitted to a fold
-//! that does not:
+//! What follows a hole was written by an engine that knew the blocks in it, so it is fitted to a
+//! fold that does not:
 //!
-//! - An agent whose sequence numbers jump gets a journaled skip of what is missing, as for samples that
-//!   never came. In a session that began in the hole, that is everything before its first sample.
-//! - Agents keep their numbers. One whose enrolment is lost is enrolled again where the hole was, under
-//!   its name if the checkpoint knows it, else under a placeholder.
+//! - An agent whose sequence numbers jump gets a journaled skip of what is missing, as for samples
+//!   that never came. In a session that began in the hole, that is everything before its first
+//!   sample.
+//! - Agents keep their numbers. One whose enrolment is lost is enrolled again where the hole was,
+//!   under its name if the checkpoint knows it, else under a placeholder.
 //! - A number that was enrolled again although its removal is lost is removed first.
 //! - Lessons about objects are numbered anew, for the numbers count those before.
 
@@ -81,13 +82,13 @@ pub struct MissingSamples {
     pub from: u64,
     /// First beyond.
     pub to: u64,
-    /// Whether nothing of the session follows them, so that they are not journaled as lost: whoever still
-    /// has them may send them again.
+    /// Whether nothing of the session follows them, so that they are not journaled as lost: whoever
+    /// still has them may send them again.
     pub at_end: bool,
 }
 
-/// Replaces the damaged journal of a space by one of all blocks that can be read. The old one is kept.
-/// `None` where nothing is damaged.
+/// Replaces the damaged journal of a space by one of all blocks that can be read. The old one is
+/// kept. `None` where nothing is damaged.
 ///
 /// # Errors
 /// The store cannot be read or written.
@@ -285,8 +286,8 @@ impl Repair<'_> {
         self.journal.append(samples, bytes)
     }
 
-    /// Writes an entry as it has to be now to `fitted`, and what must come earlier to `before`. Says
-    /// whether the entry is as it was.
+    /// Writes an entry as it has to be now to `fitted`, and what must come earlier to `before`.
+    /// Says whether the entry is as it was.
     fn fit(
         &mut self,
         entry: Entry<'static>,
@@ -382,7 +383,8 @@ impl Repair<'_> {
         }
     }
 
-    /// Notes `count` samples of an agent from `from` on, and skips those that are missing before them.
+    /// Notes `count` samples of an agent from `from` on, and skips those that are missing before
+    /// them.
     fn advance(
         &mut self,
         agent: u32,

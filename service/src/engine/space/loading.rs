@@ -6,10 +6,11 @@ use std::sync::atomic::Ordering;
 
 use cognitive_map::Settings;
 
-use super::{Shared, Surroundings, Unavailable};
 use crate::engine::checkpointer::Checkpointer;
 use crate::engine::queue::Inbox;
 use crate::engine::recovery::{self, Loading, RecoveryError};
+use crate::engine::shared::{Shared, Surroundings};
+use crate::engine::unavailable::Unavailable;
 use crate::engine::writer::Writer;
 
 /// Stands for the writer's thread: when it ends, also by a panic, nobody waits for it any more.

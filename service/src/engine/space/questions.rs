@@ -10,11 +10,13 @@ use tokio::sync::oneshot;
 use super::Space;
 use crate::engine::question::QuestionError;
 
-/// Longest time until an answer: less than the ten seconds after which Zenoh and the Python client stop waiting for one.
+/// Longest time until an answer: less than the ten seconds after which Zenoh and the Python client
+/// stop waiting for one.
 const TIME_MAX: Duration = Duration::from_secs(8);
 
 impl Space {
-    /// Where samples were taken, and the map that says so. What is already in the map answers; it learns nothing.
+    /// Where samples were taken, and the map that says so. What is already in the map answers; it
+    /// learns nothing.
     ///
     /// # Errors
     /// See [`QuestionError`].
@@ -50,8 +52,8 @@ impl Space {
             .await
     }
 
-    /// Answers a question by the map as it is. Who no longer waits for the answer lets the work end when it next looks whether it
-    /// is wanted; until then it takes up its room.
+    /// Answers a question by the map as it is. Who no longer waits for the answer lets the work end
+    /// when it next looks whether it is wanted; until then it takes up its room.
     async fn ask<T: Send + 'static>(
         &self,
         time_max: Duration,

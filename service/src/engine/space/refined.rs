@@ -10,15 +10,17 @@ use crate::engine::refinement::{Graph, Refinement, SharedText, refined_trajector
 use crate::engine::trajectory::TrajectoryPage;
 use crate::engine::unavailable::{TrajectoryError, Unavailable};
 
-/// How long the later pages of a trajectory are those of the relaxation that its first page came from.
+/// How long the later pages of a trajectory are those of the relaxation that its first page came
+/// from.
 const PAGES_LAST: Duration = Duration::from_secs(60);
 
 impl Space {
     /// Up to `limit` poses of an agent's refined trajectory with `from_ns <= stamp < to_ns`, of all
     /// sessions: its past by all that has been seen since. Between two of them it moved evenly.
     ///
-    /// The whole map is relaxed for it, once for each revision that is asked for; a page that begins at
-    /// `from_ns` may come from the relaxation of a minute ago, so that the pages fit together.
+    /// The whole map is relaxed for it, once for each revision that is asked for; a page that
+    /// begins at `from_ns` may come from the relaxation of a minute ago, so that the pages fit
+    /// together.
     ///
     /// # Errors
     /// There is no such agent, or the space cannot be read.
@@ -46,8 +48,8 @@ impl Space {
         })
     }
 
-    /// What `write` makes of the map by relaxing it. The map is relaxed for one at a time, and all who
-    /// have come by then get the same text.
+    /// What `write` makes of the map by relaxing it. The map is relaxed for one at a time, and all
+    /// who have come by then get the same text.
     ///
     /// # Errors
     /// The space cannot be read.
@@ -78,8 +80,8 @@ impl Space {
         relaxed.map_err(|_| Unavailable::Interrupted)
     }
 
-    /// The relaxed map of now, or for a later page that of the first one. One that was made of the map
-    /// after the question came is of now.
+    /// The relaxed map of now, or for a later page that of the first one. One that was made of the
+    /// map after the question came is of now.
     async fn refinement(&self, is_later_page: bool) -> Result<Arc<Refinement>, Unavailable> {
         let asked = Instant::now();
         let mut latest = Arc::clone(&self.refinements().trajectories)
@@ -98,7 +100,8 @@ impl Space {
             return Ok(Arc::clone(latest));
         }
         let turn = self.question_room().relaxation().await;
-        // The turn goes with the work: who stops waiting for it does not let a second one begin beside it.
+        // The turn goes with the work: who stops waiting for it does not let a second one begin
+        // beside it.
         let relax = move || {
             let relaxed = Arc::new(Refinement {
                 revision: map.revision(),

@@ -86,7 +86,8 @@ struct Window {
 
 impl Part {
     /// Of an agent of the space. The rows at the view are to be taken first and those in the store
-    /// afterwards: a chunk that moves from one to the other in between is then found twice and never missed.
+    /// afterwards: a chunk that moves from one to the other in between is then found twice and
+    /// never missed.
     fn of_view(view: &AgentView) -> Self {
         let recorder = view.recorder();
         Self {
@@ -121,8 +122,8 @@ impl Part {
     }
 }
 
-/// Rows of a session with `from_ns <= stamp < to_ns`, at most `limit` of them: of the first of the parts that
-/// had such a session.
+/// Rows of a session with `from_ns <= stamp < to_ns`, at most `limit` of them: of the first of the
+/// parts that had such a session.
 fn read(
     store: &dyn Store,
     space: SpaceNumber,

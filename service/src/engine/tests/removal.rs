@@ -1,4 +1,5 @@
-//! Agents that go, and who comes after them: the same after a restart, with and without a checkpoint.
+//! Agents that go, and who comes after them: the same after a restart, with and without a
+//! checkpoint.
 
 use std::path::Path;
 use std::time::Duration;

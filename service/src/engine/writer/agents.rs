@@ -12,7 +12,7 @@ use crate::engine::counters::Drop;
 use crate::engine::episodes::EndedEpisodes;
 use crate::engine::message::{IngestError, RemovalRequest};
 use crate::engine::sequencer::{Sequencer, Window};
-use crate::engine::space::Shared;
+use crate::engine::shared::Shared;
 use crate::engine::trajectory::Recorder;
 use crate::journal::Entry;
 
@@ -84,8 +84,8 @@ impl Writer {
         }
     }
 
-    /// Makes room for one more agent: of those that were never in the map, and so have left nothing there,
-    /// the one heard of longest ago goes. False where there is none.
+    /// Makes room for one more agent: of those that were never in the map, and so have left nothing
+    /// there, the one heard of longest ago goes. False where there is none.
     fn make_room(&mut self, now: Instant) -> bool {
         if self.full_until.is_some_and(|until| now < until) {
             return false;
@@ -156,8 +156,8 @@ impl Writer {
     }
 }
 
-/// Notes what the map has made of a removed agent: its number is vacant, or it is remembered by name. One
-/// whose number has gone to another agent already is neither.
+/// Notes what the map has made of a removed agent: its number is vacant, or it is remembered by
+/// name. One whose number has gone to another agent already is neither.
 pub(super) fn note_removal(
     shared: &Shared,
     map: &CognitiveMap,

@@ -1,8 +1,8 @@
 //! The writer of a space: one thread that owns the map.
 //!
-//! A round takes what waits in the queue, decodes it, puts each agent's samples in order, appends the
-//! round's block to the journal, and only then applies it. Estimates leave at the end of the round;
-//! the committer makes the block durable beside the next one.
+//! A round takes what waits in the queue, decodes it, puts each agent's samples in order, appends
+//! the round's block to the journal, and only then applies it. Estimates leave at the end of the
+//! round; the committer makes the block durable beside the next one.
 
 mod agents;
 mod journal;
@@ -31,7 +31,7 @@ use super::message::{Call, ChangeReply};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
 use super::sequencer::{Sequencer, Window};
-use super::space::Shared;
+use super::shared::Shared;
 use super::trajectory;
 use crate::encode::{self, LatestEpisode};
 use crate::journal::BlockWriter;
