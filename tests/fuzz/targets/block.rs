@@ -5,7 +5,8 @@
 
 #![no_main]
 
-use cogmap::engine::{core_settings, entries, records_of};
+use cogmap::decode::{core_settings, records_of};
+use cogmap::journal::entries;
 use cogmap_proto::SpaceSettings;
 use cognitive_map::CognitiveMap;
 use libfuzzer_sys::fuzz_target;

@@ -5,8 +5,8 @@
 
 #![no_main]
 
-use cogmap::decode;
-use cogmap::engine::core_settings;
+use cogmap::decode::{self, core_settings};
+
 use cogmap_proto::{Codec, SpaceSettings};
 use cognitive_map::{AgentId, CognitiveMap, Label, Record};
 use libfuzzer_sys::fuzz_target;
