@@ -5,7 +5,7 @@
 //! that this takes long, the cue is compared with sketches first, and multiplied with the nearest.
 
 use super::sketch::{Sketcher, Sketches};
-use crate::memory::place::PlaceId;
+use crate::memory::ids::PlaceId;
 use state::PagedVec;
 use state::SparseVec;
 use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};

@@ -1,7 +1,7 @@
 //! What places remember of a channel of levels.
 
 use super::moments::Moments;
-use crate::memory::place::PlaceId;
+use crate::memory::ids::PlaceId;
 use state::CorruptState;
 use state::SparseVec;
 

@@ -7,7 +7,7 @@ use super::level::{LEVEL_MAX, LevelMemory, surprise};
 use super::moments::Moments;
 use super::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
 use crate::input::{Descriptor, Label};
-use crate::memory::place::PlaceId;
+use crate::memory::ids::PlaceId;
 use state::PageItems;
 use state::PagedVec;
 use state::{CorruptState, StateWriter};

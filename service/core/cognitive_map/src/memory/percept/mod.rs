@@ -18,7 +18,7 @@ pub(crate) use map::{CHANNEL_PAGES_MAX, Compared, PerceptMap};
 pub(crate) use moments::Moments;
 
 use crate::input::{Descriptor, Label};
-use crate::memory::place::PlaceId;
+use crate::memory::ids::PlaceId;
 
 /// A percept to recall places by.
 #[derive(Clone, Debug, PartialEq)]

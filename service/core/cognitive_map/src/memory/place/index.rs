@@ -1,10 +1,9 @@
 //! Where to look for places near a point: cells of equal edge, hashed into shards.
 
+use crate::memory::ids::PlaceId;
 use std::sync::Arc;
 
 use nalgebra::Point3;
-
-use super::PlaceId;
 
 /// Bits of the number of shards at first, when they are more, and at most. A place's insertion after a
 /// snapshot copies one shard, which is one in 4096 entries of a large index; a small one with as many

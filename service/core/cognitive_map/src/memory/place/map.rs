@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 
+use super::Place;
 use super::explainer::PlaceExplainer;
 use super::index::SpatialIndex;
 use super::summary::PlaceSummary;
-use super::{Place, PlaceId};
+use crate::memory::ids::{PlaceId, TripId};
 use crate::memory::strength::Clock;
-use crate::memory::trip::TripId;
 use crate::settings::Settings;
 use grid::{GridModules, PartialCode, Search};
 use state::CorruptState;

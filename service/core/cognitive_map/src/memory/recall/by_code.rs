@@ -2,7 +2,8 @@
 
 use super::Asked;
 use super::best::Best;
-use crate::memory::place::{Place, PlaceId, confidence};
+use crate::memory::ids::PlaceId;
+use crate::memory::place::{Place, confidence};
 use grid::similarity::CodeCue;
 use grid::{PartialCode, Search};
 

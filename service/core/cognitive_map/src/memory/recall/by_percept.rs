@@ -2,7 +2,8 @@
 
 use std::cmp::Ordering;
 
-use crate::memory::place::{PlaceId, confidence};
+use crate::memory::ids::PlaceId;
+use crate::memory::place::confidence;
 use grid::PartialCode;
 use grid::similarity::CodeCue;
 

@@ -11,8 +11,9 @@ use std::cmp::Ordering;
 use nalgebra::Point3;
 
 use crate::input::AgentId;
+use crate::memory::ids::PlaceId;
 use crate::memory::percept::{PerceptCue, PerceptMap};
-use crate::memory::place::{Place, PlaceId, PlaceMap, confidence};
+use crate::memory::place::{Place, PlaceMap, confidence};
 use crate::settings::Settings;
 use grid::similarity::CodeCue;
 use grid::{GridModules, PartialCode};

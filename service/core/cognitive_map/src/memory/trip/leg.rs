@@ -1,8 +1,8 @@
 //! Legs: from one place to the next.
 
+use crate::memory::ids::PlaceId;
 use nalgebra::{Isometry3, Vector3};
 
-use crate::memory::place::PlaceId;
 use geometry::PoseCovariance;
 use grid::{GridModules, octant};
 use state::state_of_struct;

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::{Leg, TRIPS_MAX, Trip, TripEnd, TripId};
+use super::{Leg, TRIPS_MAX, Trip, TripEnd};
+use crate::memory::ids::TripId;
 use crate::memory::strength::{Clock, Strength};
 use state::{CorruptState, StateWriter};
 use state::{PageItems, SparseVec};
