@@ -14,8 +14,8 @@ const CHUNK: usize = 64;
 /// Items by index, of which most may be missing, in pages of `N` indices, 64 at most.
 ///
 /// A page holds its items one behind the other and a bit for each index; a page without items takes
-/// 16 bytes, and [`CHUNK`] of them side by side take 16 bytes together. A clone shares all pages; the
-/// first change after that copies a page, a chunk of 64 pages and the list of chunks.
+/// 16 bytes, and [`CHUNK`] of them side by side take 16 bytes together. A clone shares all pages;
+/// the first change after that copies a page, a chunk of 64 pages and the list of chunks.
 #[derive(Clone, Debug)]
 pub struct SparseVec<T, const N: usize> {
     chunks: Arc<Vec<Slot<Chunk<T>>>>,

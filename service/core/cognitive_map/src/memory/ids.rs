@@ -2,8 +2,8 @@
 
 use state::state_of_newtype;
 
-/// A place, counted from 0 in the order of recruitment. The number of a forgotten place is not given
-/// to another one.
+/// A place, counted from 0 in the order of recruitment. The number of a forgotten place is not
+/// given to another one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PlaceId(pub u32);
 

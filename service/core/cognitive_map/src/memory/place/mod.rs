@@ -1,6 +1,6 @@
 //! Places: where the team has been.
 
-mod explainer;
+mod code_search;
 mod index;
 mod map;
 mod summary;

@@ -49,7 +49,8 @@ impl Leg {
         &self.relative
     }
 
-    /// Covariance of [`Leg::relative`] in the body frame at the end; it counts this leg's motion alone.
+    /// Covariance of [`Leg::relative`] in the body frame at the end; it counts this leg's motion
+    /// alone.
     pub fn covariance(&self) -> &PoseCovariance {
         &self.covariance
     }

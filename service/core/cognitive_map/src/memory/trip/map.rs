@@ -12,8 +12,9 @@ use state::{Summary, SummaryTree, merged};
 
 /// Trips per page.
 const PAGE: usize = 16;
-/// Most forgotten trips whose pages of legs a checkpoint can say are gone: far more than are forgotten
-/// between two checkpoints. The legs of others stay where they are stored, and are passed over.
+/// Most forgotten trips whose pages of legs a checkpoint can say are gone: far more than are
+/// forgotten between two checkpoints. The legs of others stay where they are stored, and are passed
+/// over.
 const FORGOTTEN_MAX: usize = 4096;
 
 /// All trips, in the order of recording.

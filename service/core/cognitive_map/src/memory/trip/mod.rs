@@ -29,7 +29,8 @@ const _: () = assert!(LEG_PAGE * LEG_PAGES_MAX as usize == LEGS_MAX);
 pub enum TripEnd {
     /// The agent stood still.
     Stillness,
-    /// Samples were lost, none came for a long time on the sensor's clock, or the agent turned out to have been carried off.
+    /// Samples were lost, none came for a long time on the sensor's clock, or the agent turned out
+    /// to have been carried off.
     Gap,
     /// The session ended.
     SessionEnd,
@@ -44,8 +45,8 @@ pub enum TripEnd {
 
 /// A trip: legs from place to place, as one agent travelled them.
 ///
-/// A trip is recorded when its first leg is complete, so every trip has at least one leg. Motion that
-/// reaches no second place before the trip ends leaves no trip.
+/// A trip is recorded when its first leg is complete, so every trip has at least one leg. Motion
+/// that reaches no second place before the trip ends leaves no trip.
 #[derive(Clone, Debug)]
 pub struct Trip {
     agent: AgentId,

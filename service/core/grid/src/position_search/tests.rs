@@ -1,8 +1,11 @@
-//! Explanations against positions that are known.
+//! The search against known positions.
+
+use nalgebra::{Point3, Vector3};
 
 use super::*;
 use crate::GridSettings;
 use crate::Phase;
+use crate::joint_lattice::MODULES_MIN;
 use proptest::prelude::*;
 
 fn modules_of(modules: usize, ratio: f64) -> GridModules {
@@ -35,7 +38,7 @@ proptest! {
     /// Whatever the box, the modules that are known and the noise: the position that a code was
     /// made at lies in one of the balls, at the very tolerance that it needs.
     #[test]
-    fn no_explanation_is_missed(
+    fn no_match_is_missed(
         (extent, position) in boxes(),
         grid_modules in 2usize..10,
         grid_ratio in 1.1..2.5f64,
@@ -60,14 +63,14 @@ proptest! {
         let n_known = phases.iter().take(CANDIDATES_MAX).flatten().count();
         prop_assume!(n_known >= MODULES_MIN);
         let code = PartialCode::new(&modules, phases).unwrap();
-        let explainer = Explainer::new(&extent, spacing_m, grid_modules);
+        let search = PositionSearch::new(&extent, spacing_m, grid_modules);
         let mut found = false;
-        let search = explainer.explain(&modules, &code, &extent, misfit, 100_000, |ball| {
+        let outcome = search.run(&modules, &code, &extent, misfit, 100_000, |ball| {
             let squared = (ball.centre - position).norm_squared();
             found |= squared <= ball.squared_radius_m2(ball.tolerance);
             ball.tolerance
         });
-        prop_assert!(found || search == Search::GivenUp);
+        prop_assert!(found || outcome == Search::GivenUp);
         // Codes that say enough are never given up.
         let tells = n_known >= 5 && scale < 0.06;
         let world_is_small = extent.levels(spacing_m).into_iter().all(|level| level <= 6);
@@ -76,7 +79,7 @@ proptest! {
 }
 
 #[test]
-fn what_cannot_be_explained_is_given_up() {
+fn what_cannot_be_searched_is_given_up() {
     let modules = modules_of(5, 1.5);
     let code = modules.code_at(&Point3::origin());
     let one = vec![None, None, Some(code.phases()[2]), None, None];
@@ -85,14 +88,14 @@ fn what_cannot_be_explained_is_given_up() {
     let near = Extent::of(&Point3::origin());
     let mut far = near;
     far.include(&Point3::new(1e9, f64::INFINITY, 0.0));
-    let explain = |extent: &Extent, code: &PartialCode, steps_max| {
-        let explainer = Explainer::new(extent, 1.0, 5);
-        explainer.explain(&modules, code, extent, 0.01, steps_max, |ball| {
+    let run = |extent: &Extent, code: &PartialCode, steps_max| {
+        let search = PositionSearch::new(extent, 1.0, 5);
+        search.run(&modules, code, extent, 0.01, steps_max, |ball| {
             ball.tolerance
         })
     };
-    assert_eq!(explain(&near, &code, 1000), Search::Complete);
-    assert_eq!(explain(&near, &code, 3), Search::GivenUp, "too few steps");
-    assert_eq!(explain(&near, &one, 1000), Search::GivenUp, "one module");
-    assert_eq!(explain(&far, &code, 1000), Search::GivenUp, "too far away");
+    assert_eq!(run(&near, &code, 1000), Search::Complete);
+    assert_eq!(run(&near, &code, 3), Search::GivenUp, "too few steps");
+    assert_eq!(run(&near, &one, 1000), Search::GivenUp, "one module");
+    assert_eq!(run(&far, &code, 1000), Search::GivenUp, "too far away");
 }

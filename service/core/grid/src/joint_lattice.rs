@@ -1,74 +1,46 @@
-//! Every position in a box that explains a grid code, found without looking at the box.
+//! The joint lattice of several modules, and its points in a ball.
 //!
-//! A module with phase φ says that the position is one of the points p(k) = basis · (k + φ), k whole.
-//! A position y explains the codes of several modules when it is near a point of each:
-//!
-//! ```text
-//! Σ |y − pₘ(kₘ)|² / sₘ² ≤ tolerance          sₘ spacing, kₘ ∈ Z³, m known
-//! ```
-//!
-//! Within a box of half edges Dᵢ around c, Σ wᵢ (yᵢ − cᵢ)² ≤ η as well, with wᵢ = η / (3 Dᵢ²). The sum of
-//! both is least at a y that follows linearly from the points, and what it is there is the squared
-//! distance, in R³ᴹ, of a fixed point from a point of a fixed lattice, that of all k together. So the
-//! explanations are the lattice points in a ball. The lattice is reduced once for each set of known
-//! modules and each size of the box; then a handful of steps enumerates the ball (Schnorr & Euchner
-//! 1994, "Lattice basis reduction: improved practical algorithms", section 6). How many depends on how
-//! ambiguous the code is in the box, and not on the box itself.
-
-#[cfg(test)]
-mod tests;
-
-use std::sync::OnceLock;
+//! The lattice is reduced once; a handful of steps then enumerates the ball (Schnorr & Euchner
+//! 1994, "Lattice basis reduction: improved practical algorithms", section 6).
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::reduction::{dot, reduce};
-use super::{Extent, GridModules, PartialCode};
+use crate::GridModules;
+use crate::reduction::{dot, reduce};
 
-/// Most modules that take part: further ones would tell more, but cost more than they save.
+/// Most modules that take part: further ones would narrow the search less than they cost.
 const MODULES_MAX: usize = 6;
-/// Modules that may take part: there is a reduced lattice for each subset of them that is asked for.
-const CANDIDATES_MAX: usize = 8;
-/// Fewer known modules explain a code by so many positions that a scan is better.
-const MODULES_MIN: usize = 2;
-/// Numbers that an enumeration is over: three of each module.
+/// Fewest known modules: fewer match a code at so many positions that a scan is faster.
+pub(crate) const MODULES_MIN: usize = 2;
+/// Dimensions of the lattice: three for each module.
 const DIMENSIONS_MAX: usize = 3 * MODULES_MAX;
-/// Sums are taken in so many parts at once: each waits for nothing but its own last addition.
+/// Partial sums of a product, which do not wait for one another.
 const LANES: usize = 4;
-/// The share η of the box in the squared distance. As much as a quarter to a half of a typical tolerance
-/// makes the ball that has to be searched smallest.
+/// The share η of the box in the squared distance. A quarter to a half of a typical tolerance makes
+/// the ball that has to be searched smallest.
 const BOX_SHARE: f64 = 0.006;
-/// Rounding of phases, lattices and distances is far below this \[spacings²\].
+/// Bound of the rounding of phases, lattices and distances \[spacings²\].
 const SLACK: f64 = 1e-6;
-/// The box that all places lie in, and what explains codes in it.
-///
-/// The lattices are made when they are first asked for; they follow from the modules and the size of
-/// the box alone, so it does not matter who asks.
-#[derive(Debug)]
-pub struct Explainer {
-    levels: [i32; 3],
-    lattices: Box<[OnceLock<Option<Box<JointLattice>>>]>,
-}
 
 /// A number for each dimension, filled up with zeros to whole lanes.
-type Row = [f64; DIMENSIONS_MAX.next_multiple_of(LANES)];
+pub(crate) type Row = [f64; DIMENSIONS_MAX.next_multiple_of(LANES)];
 /// A [`Row`] of zeros.
-const ZEROS: Row = [0.0; DIMENSIONS_MAX.next_multiple_of(LANES)];
+pub(crate) const ZEROS: Row = [0.0; DIMENSIONS_MAX.next_multiple_of(LANES)];
 
 /// The lattice of all known modules' points together.
 #[derive(Debug)]
-struct JointLattice {
+pub(crate) struct JointLattice {
     /// The modules that take part.
-    modules: Vec<usize>,
+    pub(crate) modules: Vec<usize>,
     /// Σ 1/sₘ² \[1/m²\].
     stiffness: f64,
     /// The weights w of the box \[1/m²\].
     box_weight: Vector3<f64>,
-    /// Row i: what the modules' points \[m\], one after the other, add to coordinate i, in units of the
-    /// i-th diagonal.
+    /// Row i: what the modules' points \[m\], one after the other, add to coordinate i, in units of
+    /// the i-th diagonal.
     coordinates: Vec<Row>,
-    /// Row i, column j > i: coordinate i of basis vector j, in units of the i-th diagonal; the other
-    /// columns are zero.
+    /// Row i, column j > i: coordinate i of basis vector j, in units of the i-th diagonal; the
+    /// other columns are zero.
     triangle: Vec<Row>,
     /// Squares of the diagonal: coordinate i of basis vector i.
     diagonal_squared: Row,
@@ -78,10 +50,10 @@ struct JointLattice {
     moves: [Row; 3],
 }
 
-/// The positions which one choice of the modules' points explains.
+/// The positions that match one choice of the modules' points.
 #[derive(Clone, Copy, Debug)]
 pub struct Ball {
-    /// The position that is explained best.
+    /// The position that matches best.
     pub centre: Point3<f64>,
     /// The tolerance that the ball was found with.
     pub tolerance: f64,
@@ -91,99 +63,28 @@ pub struct Ball {
     stiffness: f64,
 }
 
-/// Whether all explanations were visited.
+/// Whether all matching positions were visited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Search {
-    /// All of them were.
+    /// All were visited.
     Complete,
-    /// The work would have been more than allowed, or the code or the box is not one to be explained.
+    /// The work exceeded its bound, or the code or the box is not one for this search.
     GivenUp,
 }
 
 impl Ball {
-    /// Squared radius \[m²\] of the ball that holds what is within a tolerance; negative when nothing is.
-    /// The sum of squares rises from the centre by `|y − centre|²` Σ 1/sₘ².
+    /// Squared radius \[m²\] of the ball that holds what is within a tolerance; negative when
+    /// nothing is. The sum of squares rises from the centre by `|y − centre|²` Σ 1/sₘ².
     pub fn squared_radius_m2(&self, tolerance: f64) -> f64 {
         (tolerance + SLACK - self.misfit) / self.stiffness
     }
 }
 
-impl Explainer {
-    /// For boxes of about the size of `extent`.
-    pub fn new(extent: &Extent, finest_spacing_m: f64, modules: usize) -> Self {
-        let subsets = 1 << modules.min(CANDIDATES_MAX);
-        Self {
-            levels: extent.levels(finest_spacing_m),
-            lattices: std::iter::repeat_with(OnceLock::new)
-                .take(subsets)
-                .collect(),
-        }
-    }
-
-    /// Whether it serves boxes of the size of `extent`.
-    pub fn serves(&self, extent: &Extent, finest_spacing_m: f64) -> bool {
-        self.levels == extent.levels(finest_spacing_m)
-    }
-
-    /// Calls `visit` with balls that hold every position y in `extent` whose squared distance from the
-    /// code is within tolerance:
-    ///
-    /// ```text
-    /// Σ over known m of dₘ(y)² ≤ tolerance        dₘ torus distance in spacings
-    /// ```
-    ///
-    /// `visit` returns the tolerance for what is left to visit, which must not grow. The best
-    /// explanations tend to come first. Gives up after `steps_max` steps of some 20 ns.
-    ///
-    /// Nothing within tolerance is missed: dₘ(y) is the distance to some point pₘ(kₘ), so (k, y) has a
-    /// squared distance of at most tolerance + η, and that of k, which is the least over y, is no larger:
-    /// k is enumerated. From k follows the position that the modules alone explain best, without the
-    /// box, and around it the ball that holds y. With more modules than take part, those that do have a
-    /// sum that is smaller still.
-    pub fn explain(
-        &self,
-        modules: &GridModules,
-        code: &PartialCode,
-        extent: &Extent,
-        tolerance: f64,
-        steps_max: u64,
-        visit: impl FnMut(&Ball) -> f64,
-    ) -> Search {
-        let candidates = modules.lattices().len().min(CANDIDATES_MAX);
-        let known = code.phases().iter().take(candidates);
-        let subset = known
-            .enumerate()
-            .filter(|(_, phase)| phase.is_some())
-            .fold(0, |subset, (module, _)| subset | (1 << module));
-        let Some(slot) = self.lattices.get(subset) else {
-            return Search::GivenUp;
-        };
-        let spacing_m = modules.lattices()[0].spacing_m();
-        if !extent.is_legal(spacing_m) {
-            return Search::GivenUp;
-        }
-        let lattice = slot.get_or_init(|| JointLattice::new(modules, subset, self.levels));
-        let Some(lattice) = lattice else {
-            return Search::GivenUp;
-        };
-        let centre = extent.centre();
-        let mut points = ZEROS;
-        for (point, &module) in points.chunks_exact_mut(3).zip(&lattice.modules) {
-            let Some(phase) = code.phases()[module] else {
-                return Search::GivenUp; // cannot be: the subset is that of the known modules
-            };
-            let at = modules.lattices()[module].basis() * phase.turns() - centre.coords;
-            point.copy_from_slice(at.as_slice());
-        }
-        lattice.enumerate(&points, &centre, tolerance, steps_max, visit)
-    }
-}
-
 impl JointLattice {
-    /// The lattice of a subset of the modules (bit m for module m) for a box with half edges of these
-    /// powers of two in finest spacings. None for subsets that are too small.
-    fn new(modules: &GridModules, subset: usize, levels: [i32; 3]) -> Option<Box<Self>> {
-        let members: Vec<usize> = (0..CANDIDATES_MAX)
+    /// The lattice of a subset of the modules (bit m for module m) for a box with half edges of
+    /// these powers of two in finest spacings. None for subsets that are too small.
+    pub(crate) fn new(modules: &GridModules, subset: usize, levels: [i32; 3]) -> Option<Box<Self>> {
+        let members: Vec<usize> = (0..usize::BITS as usize)
             .filter(|module| subset & (1 << module) != 0)
             .take(MODULES_MAX)
             .collect();
@@ -207,8 +108,8 @@ impl JointLattice {
                 Matrix3::from_diagonal(&share)
             })
             .collect();
-        // What a shift of one module's point by one metre along one axis does to the residuals of all
-        // modules and of the box.
+        // What a shift of one module's point by one metre along one axis does to the residuals of
+        // all modules and of the box.
         let shifted = |module: usize, by: &Vector3<f64>| -> Vec<f64> {
             let position = weights[module] * by;
             let mut residuals = Vec::with_capacity(3 * lattices.len() + 3);
@@ -270,9 +171,9 @@ impl JointLattice {
         }))
     }
 
-    /// Visits the lattice points in the ball of squared radius tolerance + η, depth first, along each
-    /// coordinate from its middle outwards. `points` are relative to `centre`.
-    fn enumerate(
+    /// Visits the lattice points in the ball of squared radius tolerance + η, depth first, along
+    /// each coordinate from its middle outwards. `points` are relative to `centre`.
+    pub(crate) fn enumerate(
         &self,
         points: &Row,
         centre: &Point3<f64>,
