@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
-use crate::model::ObjectModel;
+use crate::model::{LevelMemory, ObjectModel};
 use crate::surfels::map::SurfelMap;
 
 use crate::tuning::{FIELD_PER_SPACING, SHARE_BINS, SHARE_SAMPLES};
@@ -60,6 +60,11 @@ impl IndexedModel {
             extent_m,
             places,
         }
+    }
+
+    /// The levels of all places, one of each channel for each place.
+    pub(crate) fn levels(&self) -> impl Iterator<Item = &LevelMemory> {
+        self.places.iter().flat_map(|place| &place.levels)
     }
 
     /// Mean share of the model within `reach_m` of one of its places.

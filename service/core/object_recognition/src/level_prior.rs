@@ -1,7 +1,6 @@
 //! Distribution of the levels of a channel over all places of a library.
 
 use crate::contact::Felt;
-use crate::indexed_model::IndexedModel;
 use crate::model::LevelMemory;
 use crate::tuning::LEVEL_DENSITY_FLOOR;
 
@@ -23,26 +22,22 @@ impl LevelPrior {
     }
 }
 
-/// Over all places of these models, each counted once.
-pub(crate) fn level_prior<'a>(
-    indexed_models: impl Iterator<Item = &'a IndexedModel>,
-) -> Vec<LevelPrior> {
+/// Distributions of these levels, one of each channel for each place, by channel.
+pub(crate) fn level_prior<'a>(levels: impl Iterator<Item = &'a LevelMemory>) -> Vec<LevelPrior> {
     let mut all: Vec<LevelMemory> = Vec::new();
-    for place in indexed_models.flat_map(|indexed| &indexed.places) {
-        for level in &place.levels {
-            match all.iter_mut().find(|sum| sum.channel == level.channel) {
-                Some(sum) => {
-                    sum.count += 1.0;
-                    let apart = level.mean - sum.mean;
-                    sum.mean += apart / sum.count;
-                    sum.squares += apart * (level.mean - sum.mean);
-                }
-                None => all.push(LevelMemory {
-                    count: 1.0,
-                    squares: 0.0,
-                    ..*level
-                }),
+    for level in levels {
+        match all.iter_mut().find(|sum| sum.channel == level.channel) {
+            Some(sum) => {
+                sum.count += 1.0;
+                let apart = level.mean - sum.mean;
+                sum.mean += apart / sum.count;
+                sum.squares += apart * (level.mean - sum.mean);
             }
+            None => all.push(LevelMemory {
+                count: 1.0,
+                squares: 0.0,
+                ..*level
+            }),
         }
     }
     let level_prior = |sum: LevelMemory| LevelPrior {

@@ -117,7 +117,9 @@ impl ObjectLibrary {
             })
         };
         self.samples = samples.filter_map(sample).collect();
-        self.level_prior = level_prior(self.objects.values().map(|object| &object.indexed));
+        let models = self.objects.values().map(|object| &object.indexed);
+        let prior = level_prior(models.flat_map(IndexedModel::levels));
+        self.level_prior = prior;
     }
 
     pub(crate) fn all(&self) -> impl Iterator<Item = (ObjectId, &Arc<LibraryEntry>)> {

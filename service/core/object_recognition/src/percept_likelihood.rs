@@ -272,6 +272,7 @@ mod tests {
     use nalgebra::{Point3, Unit, Vector3};
 
     use super::*;
+    use crate::level_prior::level_prior;
     use crate::model::{LevelMemory, ModelPlace};
     use crate::{ModelSettings, ObjectModel};
 
@@ -311,7 +312,7 @@ mod tests {
                 IndexedModel::new(&model)
             })
             .collect();
-        let level_prior = crate::level_prior::level_prior(indexed_models.iter());
+        let level_prior = level_prior(indexed_models.iter().flat_map(IndexedModel::levels));
         let bare = Contact::at(Point3::origin(), 0.001);
         let contacts = [
             bare.clone(),
