@@ -5,8 +5,9 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, SVD, Translation3, UnitQua
 /// Steps of a decomposition, which needs some ten.
 const STEPS_MAX: usize = 200;
 
-/// The rigid motion of least squares that takes the second point of each pair to the first (Horn 1987), by weight. `None`
-/// when the points have no extent. In the plane only a turn about z and a shift along x and y is sought.
+/// The rigid motion of least squares that takes the second point of each pair to the first (Horn
+/// 1987), by weight. `None` when the points have no extent. In the plane only a turn about z and a
+/// shift along x and y is sought.
 pub fn align(
     pairs: &[(Point3<f64>, Point3<f64>)],
     weights: &[f64],

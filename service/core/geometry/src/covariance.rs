@@ -40,15 +40,16 @@ impl PoseCovariance {
         Self(matrix)
     }
 
-    /// The covariance of T·Δ, where `increment` = Δ has independent errors on its right with standard
-    /// deviations `noise_sd` \[m, m, m, rad, rad, rad\].
+    /// The covariance of T·Δ, where `increment` = Δ has independent errors on its right with
+    /// standard deviations `noise_sd` \[m, m, m, rad, rad, rad\].
     ///
     /// ```text
     /// P′ = Ad(Δ⁻¹) P Ad(Δ⁻¹)ᵀ + diag(noise_sd²)
     /// ```
     ///
-    /// to first order in the errors. With Δ = (t, R), Ad(Δ⁻¹) is the shear `| I −t× ; 0 I |` followed by
-    /// Rᵀ on both blocks, so 3×3 blocks are multiplied instead of 6×6 matrices: every sample pays for this.
+    /// to first order in the errors. With Δ = (t, R), Ad(Δ⁻¹) is the shear `| I −t× ; 0 I |`
+    /// followed by Rᵀ on both blocks, so 3×3 blocks are multiplied instead of 6×6 matrices: every
+    /// sample pays for this.
     #[must_use]
     pub fn after_motion(&self, increment: &Isometry3<f64>, noise_sd: &Vector6<f64>) -> Self {
         let rotation = *increment.rotation.to_rotation_matrix().matrix();
@@ -81,8 +82,8 @@ impl PoseCovariance {
         &self.0
     }
 
-    /// The same uncertainty about the axes of `map`, with the pose's `rotation` = R̂: position along, and
-    /// rotation about, the map axes through the body's origin, as ROS messages state it.
+    /// The same uncertainty about the axes of `map`, with the pose's `rotation` = R̂: position
+    /// along, and rotation about, the map axes through the body's origin, as ROS messages state it.
     ///
     /// ```text
     /// diag(R, R) P diag(R, R)ᵀ
@@ -99,8 +100,9 @@ impl PoseCovariance {
 
     /// Standard deviation of the position \[m\]: the square root of the position block's trace.
     ///
-    /// That is the root mean square distance from the estimate. It needs no eigenvalues, is the same in
-    /// every frame, and is never less than the deviation along the worst axis, nor more than √3 times it.
+    /// That is the root mean square distance from the estimate. It needs no eigenvalues, is the
+    /// same in every frame, and is never less than the deviation along the worst axis, nor more
+    /// than √3 times it.
     pub fn position_sd_m(&self) -> f64 {
         (self.0[(0, 0)] + self.0[(1, 1)] + self.0[(2, 2)]).sqrt()
     }
@@ -129,8 +131,8 @@ fn cross_columns(t: &Vector3<f64>, matrix: &Matrix3<f64>) -> Matrix3<f64> {
     Matrix3::from_columns(&[column(0), column(1), column(2)])
 }
 
-/// A symmetric matrix of its blocks. Of the diagonal blocks the upper triangle counts, so that rounding
-/// cannot make the result asymmetric.
+/// A symmetric matrix of its blocks. Of the diagonal blocks the upper triangle counts, so that
+/// rounding cannot make the result asymmetric.
 fn assemble(upper: &Matrix3<f64>, cross: &Matrix3<f64>, lower: &Matrix3<f64>) -> Matrix6<f64> {
     let mut matrix = Matrix6::zeros();
     for row in 0..3 {

@@ -9,14 +9,15 @@ use state::state_of_struct;
 
 /// A motion that goes on step by step, with the covariance of its error.
 ///
-/// The errors of the steps are gathered about the axes of the beginning, where they just add up, and are
-/// carried to the end when someone asks:
+/// The errors of the steps are gathered about the axes of the beginning, where they just add up,
+/// and are carried to the end when someone asks:
 ///
 /// ```text
 /// T = Δ₁ Δ₂ … Δ_k      S = Σ Ad(Δ₁ … Δ_i) Q_i Ad(Δ₁ … Δ_i)ᵀ      P = Ad(T⁻¹) S Ad(T⁻¹)ᵀ
 /// ```
 ///
-/// A step costs three products of 3×3 matrices that way, instead of eight. To first order in the errors.
+/// A step costs three products of 3×3 matrices that way, instead of eight. To first order in the
+/// errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionSum {
     motion: Isometry3<f64>,
@@ -75,8 +76,8 @@ impl MotionSum {
         matrix
     }
 
-    /// Goes on by an increment whose error on its right has independent components of these variances
-    /// \[m², m², m², rad², rad², rad²\]. Answers the rotation until then, as a matrix.
+    /// Goes on by an increment whose error on its right has independent components of these
+    /// variances \[m², m², m², rad², rad², rad²\]. Answers the rotation until then, as a matrix.
     pub fn append(&mut self, increment: &Isometry3<f64>, variance: &Vector6<f64>) -> Matrix3<f64> {
         self.motion *= increment;
         self.motion.rotation.renormalize_fast();
@@ -108,7 +109,8 @@ impl MotionSum {
         self.turn += angles;
     }
 
-    /// The same where neither the noise nor the rotation leaves the plane, as of a robot on a floor.
+    /// The same where neither the noise nor the rotation leaves the plane, as of a robot on a
+    /// floor.
     fn add_planar(&mut self, rotation: &Matrix3<f64>, variance: &Vector6<f64>) {
         let (cos, sin) = (rotation[(0, 0)], rotation[(1, 0)]);
         let (along, across, about) = (variance[0], variance[1], variance[5]);

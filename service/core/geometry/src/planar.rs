@@ -1,7 +1,7 @@
 //! Planar motion as a part of spatial motion.
 //!
-//! A twist has the components (x, y, z, roll, pitch, yaw); planar motion has x, y and yaw alone. These three span a
-//! subgroup, so what is computed for them in SE(3) is what SE(2) gives.
+//! A twist has the components (x, y, z, roll, pitch, yaw); planar motion has x, y and yaw alone.
+//! These three span a subgroup, so what is computed for them in SE(3) is what SE(2) gives.
 
 use std::ops::Range;
 
@@ -37,8 +37,8 @@ pub fn clear_out_of_plane(matrix: &mut Matrix6<f64>) {
     }
 }
 
-/// Keeps a Gauss-Newton step in the plane: no gradient out of it, and `stiffness` of each such component on the diagonal
-/// of the Hessian, so that it can be inverted.
+/// Keeps a Gauss-Newton step in the plane: no gradient out of it, and `stiffness` of each such
+/// component on the diagonal of the Hessian, so that it can be inverted.
 pub fn hold_in_plane(
     gradient: &mut Vector6<f64>,
     hessian: &mut Matrix6<f64>,

@@ -1,7 +1,7 @@
 //! The group SE(3) of rigid motions: exponential, logarithm, adjoint.
 //!
-//! A twist is ξ = (ρ, φ): translation part ρ \[m\], then rotation part φ \[rad\] (axis times angle).
-//! With θ = |φ| and × the cross product (Solà, Deray & Atchuthan 2018, Eqs. 172–174):
+//! A twist is ξ = (ρ, φ): translation part ρ \[m\], then rotation part φ \[rad\] (axis times
+//! angle). With θ = |φ| and × the cross product (Solà, Deray & Atchuthan 2018, Eqs. 172–174):
 //!
 //! ```text
 //! exp(ρ, φ) = (V ρ, exp φ)      V   = I + b φ× + c φ×φ×    b = (1 − cos θ)/θ²   c = (θ − sin θ)/θ³

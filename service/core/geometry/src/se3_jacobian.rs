@@ -4,8 +4,9 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::se3::{HALF_ANGLE_COTANGENT, SERIES_BELOW_RAD, THETA_MINUS_SIN, polynomial};
 
-/// The 6×6 matrix A, order translation, rotation, with `log(exp(ξ) exp(δ)) = ξ + A δ` to first order in δ, at
-/// ξ = (`linear` = ρ \[m\], `angular` = φ \[rad\]), |φ| ≤ π: the inverse of the right Jacobian.
+/// The 6×6 matrix A, order translation, rotation, with `log(exp(ξ) exp(δ)) = ξ + A δ` to first
+/// order in δ, at ξ = (`linear` = ρ \[m\], `angular` = φ \[rad\]), |φ| ≤ π: the inverse of the
+/// right Jacobian.
 ///
 /// With ψ = −φ, ϱ = −ρ and θ = |φ| (Barfoot & Furgale 2014, Eqs. 99–102):
 ///

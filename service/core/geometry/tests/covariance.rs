@@ -79,8 +79,9 @@ fn sampled_trajectories_scatter_as_the_covariance_says() {
         let error = Vector6::new(away.x, away.y, away.z, turn.x, turn.y, turn.z);
         in_map += error * error.transpose() / f64::from(samples);
     }
-    // Each entry is compared on the scale of its row's and column's deviations. Sampling leaves about
-    // 1/√40000 = 0.005, and what first order leaves out is of the order of the angles' variance.
+    // Each entry is compared on the scale of its row's and column's deviations. Sampling leaves
+    // about 1/√40000 = 0.005, and what first order leaves out is of the order of the angles'
+    // variance.
     let compare = |expected: &Matrix6<f64>, scatter: &Matrix6<f64>| {
         for row in 0..6 {
             for column in 0..6 {

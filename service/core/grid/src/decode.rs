@@ -10,12 +10,13 @@ use super::{GridModules, Lattice, PartialCode, Phase};
 /// Standard deviation of each phase component that a code is believed to have at least \[turns\].
 pub const PHASE_NOISE_TURNS: f64 = 0.02;
 
-/// A second position is nearly as good when its likelihood is at least 1 % of the best one's; this is
-/// the difference in χ², 2 ln 100.
+/// A second position is nearly as good when its likelihood is at least 1 % of the best one's; this
+/// is the difference in χ², 2 ln 100.
 const NEARLY_AS_WELL: f64 = 9.210_340_371_976_182;
 
-/// Most lattice cells of the coarsest module that one decoding looks at. It bounds the work to about 0.1 s
-/// (0.07 s measured for a ball of 100 m with the default modules) and that ball to about 100 m.
+/// Most lattice cells of the coarsest module that one decoding looks at. It bounds the work to
+/// about 0.1 s (0.07 s measured for a ball of 100 m with the default modules) and that ball to
+/// about 100 m.
 const CANDIDATES_MAX: f64 = 100_000.0;
 
 /// Refinements over all modules after the coarse-to-fine pass; phases that agree need one.
@@ -26,15 +27,15 @@ const REFINEMENTS: usize = 3;
 pub struct Decoded {
     /// The position in `map` that explains the code best \[m\].
     pub position: Point3<f64>,
-    /// Root mean square distance of the modules' nearest points of that phase from it, weighted like
-    /// the fit \[m\]; 0 for an exact code, and always for a single module.
+    /// Root mean square distance of the modules' nearest points of that phase from it, weighted
+    /// like the fit \[m\]; 0 for an exact code, and always for a single module.
     pub residual_m: f64,
     /// Whether another position in the ball that was searched explains the code nearly as well.
     pub ambiguous: bool,
     /// [`unique_range_m`] of the known modules at a phase noise of [`PHASE_NOISE_TURNS`].
     pub range_m: f64,
-    /// Radius of the ball that was searched \[m\]: the one asked for, or less where that held too many
-    /// lattice cells.
+    /// Radius of the ball that was searched \[m\]: the one asked for, or less where that held too
+    /// many lattice cells.
     pub searched_m: f64,
 }
 
@@ -52,21 +53,23 @@ struct Candidate {
     cost: f64,
 }
 
-/// The position within `radius_m` of `near` (of the origin of `map` when `None`) that explains `code` best.
+/// The position within `radius_m` of `near` (of the origin of `map` when `None`) that explains
+/// `code` best.
 ///
-/// Candidates are the points of the coarsest known module's lattice that have its phase. Each is refined
-/// from coarse to fine: the next module's nearest point of the right phase is found and the position
-/// becomes the weighted mean of the points so far, weights 1/spacing² (equal noise in turns is noise in
-/// metres proportional to the spacing). Then the points of all modules are taken anew until they settle.
-/// The best candidate has the least Σ dₘ²/spacingₘ², dₘ its distance from the module's point.
+/// Candidates are the points of the coarsest known module's lattice that have its phase. Each is
+/// refined from coarse to fine: the next module's nearest point of the right phase is found and the
+/// position becomes the weighted mean of the points so far, weights 1/spacing² (equal noise in
+/// turns is noise in metres proportional to the spacing). Then the points of all modules are taken
+/// anew until they settle. The best candidate has the least Σ dₘ²/spacingₘ², dₘ its distance from
+/// the module's point.
 ///
-/// *Ambiguous* is: another candidate in the ball, more than half the finest known spacing away (a field
-/// width), has a likelihood of at least 1 % of the best one's, with Gaussian phase noise of
-/// [`PHASE_NOISE_TURNS`] or what the best fit's residual shows, whichever is larger. One known module
-/// is thus ambiguous as soon as the ball holds two of its points.
+/// *Ambiguous* is: another candidate in the ball, more than half the finest known spacing away (a
+/// field width), has a likelihood of at least 1 % of the best one's, with Gaussian phase noise of
+/// [`PHASE_NOISE_TURNS`] or what the best fit's residual shows, whichever is larger. One known
+/// module is thus ambiguous as soon as the ball holds two of its points.
 ///
-/// As noise may carry a position over the ball's edge, a quarter of the finest known spacing is added to
-/// the radius. If no candidate lies in the ball, the best one near its edge is the answer.
+/// As noise may carry a position over the ball's edge, a quarter of the finest known spacing is
+/// added to the radius. If no candidate lies in the ball, the best one near its edge is the answer.
 pub fn decode(
     modules: &GridModules,
     code: &PartialCode,
@@ -132,21 +135,23 @@ pub fn decode(
     }
 }
 
-/// Radius \[m\] of the ball in which a whole code is expected to have one false match: an estimate of how
-/// far codes with a phase noise of `phase_noise_turns` (standard deviation of each component) are unique.
+/// Radius \[m\] of the ball in which a whole code is expected to have one false match: an estimate
+/// of how far codes with a phase noise of `phase_noise_turns` (standard deviation of each
+/// component) are unique.
 ///
-/// A false position is accepted when its residuals, 3(M−1) numbers after the fit of a position, fall in a
-/// ball of radius q = s √(3(M−1) + 9.2) (what noise alone fills, plus the rule of [`decode`]). With the
-/// phases of far positions taken as independent and uniform, the number of false matches in a ball of
-/// radius L around the truth is
+/// A false position is accepted when its residuals, 3(M−1) numbers after the fit of a position,
+/// fall in a ball of radius q = s √(3(M−1) + 9.2) (what noise alone fills, plus the rule of
+/// [`decode`]). With the phases of far positions taken as independent and uniform, the number of
+/// false matches in a ball of radius L around the truth is
 ///
 /// ```text
 /// N(L) = (4/3) π L³ · 2^(M/2) · Vₙ(q) · (Σ 1/spacingₘ²)^(3/2)       n = 3(M−1), Vₙ volume of an n-ball
 /// ```
 ///
-/// and the range is where N = 1, at least half the coarsest spacing, infinite for several modules without
-/// noise. Measured on exact codes over ratios from 1.1 to 3, the first false match of [`decode`] lay at 0.4
-/// to 1.7 of the range with two modules (median 0.9), and from 0.9 up with three (median 1.5).
+/// and the range is where N = 1, at least half the coarsest spacing, infinite for several modules
+/// without noise. Measured on exact codes over ratios from 1.1 to 3, the first false match of
+/// [`decode`] lay at 0.4 to 1.7 of the range with two modules (median 0.9), and from 0.9 up with
+/// three (median 1.5).
 pub fn unique_range_m(modules: &GridModules, phase_noise_turns: f64) -> f64 {
     range_m(modules.lattices().iter(), phase_noise_turns)
 }
@@ -170,7 +175,8 @@ fn range_m<'a>(lattices: impl Iterator<Item = &'a Lattice>, phase_noise_turns: f
     (3.0 / (4.0 * PI * density)).cbrt().max(0.5 * coarsest_m)
 }
 
-/// Volume of the ball of this radius in `dimensions` dimensions: V₀ = 1, V₁ = 2r, Vₙ = 2π r²/n · Vₙ₋₂.
+/// Volume of the ball of this radius in `dimensions` dimensions: V₀ = 1, V₁ = 2r, Vₙ = 2π r²/n ·
+/// Vₙ₋₂.
 fn ball_volume(dimensions: u32, radius: f64) -> f64 {
     let mut volume = if dimensions.is_multiple_of(2) {
         1.0
@@ -199,10 +205,11 @@ fn known_modules<'a>(modules: &'a GridModules, code: &PartialCode) -> Vec<Known<
     known.collect()
 }
 
-/// The points of a module's phase within `radius_m` plus one spacing of `centre`, in order of lattice index.
+/// The points of a module's phase within `radius_m` plus one spacing of `centre`, in order of
+/// lattice index.
 ///
-/// The margin lets the points through from which refinement may still reach the ball, and at least one
-/// point always passes: none is farther than spacing/√2 from the next.
+/// The margin lets the points through from which refinement may still reach the ball, and at least
+/// one point always passes: none is farther than spacing/√2 from the next.
 fn for_each_point(
     module: &Known<'_>,
     centre: &Point3<f64>,

@@ -4,7 +4,8 @@ use nalgebra::Point3;
 
 /// The smallest half edge of a box, as a power of two in finest spacings.
 const LEVEL_MIN: i32 = -4;
-/// Beyond this many finest spacings from the origin of `map` phases lose more digits than a search allows for.
+/// Beyond this many finest spacings from the origin of `map` phases lose more digits than a search
+/// allows for.
 const SPACINGS_MAX: f64 = 1e6;
 
 /// An axis-aligned box.

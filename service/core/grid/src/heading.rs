@@ -4,21 +4,23 @@ use std::f64::consts::TAU;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Concentration κ of the cells' tuning; near the preferred heading it is a Gaussian of 1/√κ = 0.5 rad.
+/// Concentration κ of the cells' tuning; near the preferred heading it is a Gaussian of 1/√κ = 0.5
+/// rad.
 pub const CONCENTRATION: f64 = 4.0;
 
-/// Heading in (−π, π] \[rad\]: the direction of the body's x axis in the x-y plane of `map`, counted from
-/// its x axis towards its y axis.
+/// Heading in (−π, π] \[rad\]: the direction of the body's x axis in the x-y plane of `map`,
+/// counted from its x axis towards its y axis.
 ///
-/// When the body looks straight up or down there is no heading: the value is then decided by rounding.
+/// When the body looks straight up or down there is no heading: the value is then decided by
+/// rounding.
 pub fn heading_rad(orientation: &UnitQuaternion<f64>) -> f64 {
     let forward = orientation * Vector3::x();
     // Adding zero turns a negative zero into zero, so that due backwards is π and never −π.
     (forward.y + 0.0).atan2(forward.x)
 }
 
-/// Activations in (0, 1] of `cells` head-direction cells with preferred headings 2π i / `cells`: the
-/// Gaussian's counterpart on the circle, von Mises tuning.
+/// Activations in (0, 1] of `cells` head-direction cells with preferred headings 2π i / `cells`:
+/// the Gaussian's counterpart on the circle, von Mises tuning.
 ///
 /// ```text
 /// h_i = exp(κ (cos(heading − 2π i / cells) − 1))

@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
 use super::Phase;
 
-/// A face-centred cubic lattice: hexagonal layers with 60° between the axes, each layer staggered over
-/// the one below. It is the densest lattice in three dimensions and the best 3-D population code
-/// (Mathis, Stemmler & Herz 2015, eLife 4:e05979).
+/// A face-centred cubic lattice: hexagonal layers with 60° between the axes, each layer staggered
+/// over the one below. It is the densest lattice in three dimensions and the best 3-D population
+/// code (Mathis, Stemmler & Herz 2015, eLife 4:e05979).
 ///
 /// ```text
 /// basis = spacing · R · | 1  1/2   1/2  |
@@ -21,8 +21,8 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice with `spacing_m` \[m\] between neighbouring points (positive), rotated by `orientation`
-    /// from the standard axes into `map`.
+    /// The lattice with `spacing_m` \[m\] between neighbouring points (positive), rotated by
+    /// `orientation` from the standard axes into `map`.
     pub fn new(spacing_m: f64, orientation: UnitQuaternion<f64>) -> Self {
         let root_3 = 3.0_f64.sqrt();
         let root_6 = 6.0_f64.sqrt();
@@ -87,15 +87,17 @@ impl Lattice {
 
 /// Of all turns that differ from `turns` by whole turns, those of the shortest way through space.
 ///
-/// The lattice is A₃: with u₄ = −(u₁ + u₂ + u₃) a displacement's squared length is ½ Σ uᵢ² spacings²,
-/// and the lattice points are the integer u with sum zero. The nearest one is exact by rounding: round
-/// every uᵢ; if the sum is not zero, undo the roundings that went farthest the wrong way (Conway &
-/// Sloane 1982, "Fast quantizing and decoding algorithms", section on Aₙ). No images are tried.
+/// The lattice is A₃: with u₄ = −(u₁ + u₂ + u₃) a displacement's squared length is ½ Σ uᵢ²
+/// spacings², and the lattice points are the integer u with sum zero. The nearest one is exact by
+/// rounding: round every uᵢ; if the sum is not zero, undo the roundings that went farthest the
+/// wrong way (Conway & Sloane 1982, "Fast quantizing and decoding algorithms", section on Aₙ). No
+/// images are tried.
 pub(super) fn shortest_turns(turns: &Vector3<f64>) -> Vector3<f64> {
     let fourth = -(turns.x + turns.y + turns.z);
     let four = [turns.x, turns.y, turns.z, fourth];
     let mut rest = four.map(|u| u - nearest(u));
-    // The rests' sum is a whole number, minus two to two; one step of ±1 per unit brings it to zero.
+    // The rests' sum is a whole number, minus two to two; one step of ±1 per unit brings it to
+    // zero.
     let excess = nearest(rest[0] + rest[1] + rest[2] + rest[3]);
     let step = if excess > 0.0 { 1.0 } else { -1.0 };
     let mut left = excess.abs();

@@ -16,11 +16,11 @@ pub struct ModuleState {
 }
 
 impl ModuleState {
-    /// Moves by a displacement \[m\] in `map`; true when that entered a new lattice cell, whose corner is
-    /// the new reference grid point (seed, section 3.1 D).
+    /// Moves by a displacement \[m\] in `map`; true when that entered a new lattice cell, whose
+    /// corner is the new reference grid point (seed, section 3.1 D).
     ///
-    /// Indices are exact for positions up to 10⁸ m at 1 mm spacing, and far beyond; they stop at the
-    /// ends of `i64` instead of wrapping.
+    /// Indices are exact for positions up to 10⁸ m at 1 mm spacing, and far beyond; they stop at
+    /// the ends of `i64` instead of wrapping.
     pub fn advance(&mut self, lattice: &Lattice, displacement: &Vector3<f64>) -> bool {
         let turns = self.phase.turns() + lattice.phase_displacement(displacement);
         if let Some(phase) = Phase::within_cell(&turns) {

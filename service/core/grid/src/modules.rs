@@ -14,7 +14,8 @@ pub struct GridSettings {
     pub modules: usize,
     /// Spacing of the finest module \[m\].
     pub spacing_m: f64,
-    /// Ratio of the spacings of neighbouring modules, above 1 (1.4 to 1.7 in rats: Stensola et al. 2012).
+    /// Ratio of the spacings of neighbouring modules, above 1 (1.4 to 1.7 in rats: Stensola et al.
+    /// 2012).
     pub ratio: f64,
 }
 
@@ -30,15 +31,16 @@ impl Default for GridSettings {
 
 /// The modules' lattices: the immutable geometry of a space's grid cells.
 ///
-/// Module m has spacing d₀ rᵐ and orientation Aᵐ Bᵐ, where A and B are two fixed rotations. They were
-/// found by a search over small whole quaternions for the largest angle between the axes (the directions
-/// to the twelve nearest lattice points) of any two modules: 10° with 6 modules, 3.7° with 16. There are
-/// two of them because the powers of one rotation would leave its own axis where it is, and along that
-/// direction all modules would see the same lattice, only scaled.
+/// Module m has spacing d₀ rᵐ and orientation Aᵐ Bᵐ, where A and B are two fixed rotations. They
+/// were found by a search over small whole quaternions for the largest angle between the axes (the
+/// directions to the twelve nearest lattice points) of any two modules: 10° with 6 modules, 3.7°
+/// with 16. There are two of them because the powers of one rotation would leave its own axis where
+/// it is, and along that direction all modules would see the same lattice, only scaled.
 ///
-/// The orientations are the same in every space, not drawn from its seed: codes of spaces with equal
-/// spacings can then be compared, and no seed gives a worse code than another. Powers of whole
-/// quaternions take only multiplications and square roots, which are bit-identical on all machines.
+/// The orientations are the same in every space, not drawn from its seed: codes of spaces with
+/// equal spacings can then be compared, and no seed gives a worse code than another. Powers of
+/// whole quaternions take only multiplications and square roots, which are bit-identical on all
+/// machines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridModules(Box<[Lattice]>);
 

@@ -13,7 +13,8 @@ pub struct OctantActivation {
     pub activation: f64,
 }
 
-/// Algorithm 1 of the seed, literally: the activation of the grid neuron nearest to `position` \[m\].
+/// Algorithm 1 of the seed, literally: the activation of the grid neuron nearest to `position`
+/// \[m\].
 ///
 /// ```text
 /// I = ROUND(X / W)    J = CEIL(Y / H) − 1    K = FLOOR(Z / D)
@@ -21,10 +22,10 @@ pub struct OctantActivation {
 /// activation = max over G of  exp(−d² / (2 σ²)) if d < R else 0     d = |position − G|
 /// ```
 ///
-/// `lattice_size_m` = (W, H, D), `sigma_m` = σ and `cutoff_radius_m` = R are positive. ROUND takes halves
-/// away from zero. The three indices are rounded differently, as the paper has it, but on every axis one
-/// of the two centres is the odd multiple of half the size that is nearest: the activation is that of a
-/// simple cubic lattice, shifted by half a cell.
+/// `lattice_size_m` = (W, H, D), `sigma_m` = σ and `cutoff_radius_m` = R are positive. ROUND takes
+/// halves away from zero. The three indices are rounded differently, as the paper has it, but on
+/// every axis one of the two centres is the odd multiple of half the size that is nearest: the
+/// activation is that of a simple cubic lattice, shifted by half a cell.
 pub fn octant_activation(
     position: &Point3<f64>,
     lattice_size_m: &Vector3<f64>,
@@ -89,8 +90,8 @@ pub fn displacement_m(from: &Point3<f64>, to: &Point3<f64>) -> f64 {
 /// θ = arccos(v₁·v₂ / (|v₁| |v₂|)) = atan2(|v₁ × v₂|, v₁·v₂)
 /// ```
 ///
-/// The second form is computed: near 0 and π the arccos loses half the digits, and rounding can push its
-/// argument past one. A movement of zero length has no direction: the angle is then 0.
+/// The second form is computed: near 0 and π the arccos loses half the digits, and rounding can
+/// push its argument past one. A movement of zero length has no direction: the angle is then 0.
 pub fn turning_angle_rad(before: &Vector3<f64>, after: &Vector3<f64>) -> f64 {
     before.cross(after).norm().atan2(before.dot(after))
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-/// Position in one lattice cell, in turns along the three lattice axes; every component is in \[0, 1).
+/// Position in one lattice cell, in turns along the three lattice axes; every component is in \[0,
+/// 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase(Vector3<f64>);
 
@@ -14,7 +15,8 @@ impl Phase {
 
     /// The phase of any number of turns: whole turns fall away.
     ///
-    /// A component that is not finite becomes 0; the edges refuse such numbers before they come here.
+    /// A component that is not finite becomes 0; the edges refuse such numbers before they come
+    /// here.
     pub fn wrap(turns: Vector3<f64>) -> Self {
         Self(turns.map(|turns| split(turns).1))
     }
@@ -43,8 +45,9 @@ impl Phase {
 
 /// Whole turns and the rest in \[0, 1).
 ///
-/// A tiny negative number's rest rounds to 1, which is the next cell's 0. The conversion to an integer
-/// and back rounds down without a call to `floor`, which the x86-64 baseline has no instruction for.
+/// A tiny negative number's rest rounds to 1, which is the next cell's 0. The conversion to an
+/// integer and back rounds down without a call to `floor`, which the x86-64 baseline has no
+/// instruction for.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "saturates; no legal position is 2⁶³ cells away"

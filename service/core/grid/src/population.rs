@@ -14,13 +14,13 @@ pub const CELLS_PER_MODULE: usize = CELLS_PER_AXIS * CELLS_PER_AXIS * CELLS_PER_
 
 /// Tuning width σ of every cell as a share of its module's spacing.
 ///
-/// Half the distance between neighbouring preferred phases, so that neighbours' fields overlap and the
-/// activation varies smoothly between them, while a field (full width at half height 2.35 σ = 0.39
-/// spacings) stays clear of the next one of the same cell.
+/// Half the distance between neighbouring preferred phases, so that neighbours' fields overlap and
+/// the activation varies smoothly between them, while a field (full width at half height 2.35 σ =
+/// 0.39 spacings) stays clear of the next one of the same cell.
 pub const TUNING_WIDTH: f64 = 1.0 / 6.0;
 
-/// Preferred phase of a cell: its index counts thirds of a turn along the first lattice axis, then the
-/// second, then the third (the last runs fastest).
+/// Preferred phase of a cell: its index counts thirds of a turn along the first lattice axis, then
+/// the second, then the third (the last runs fastest).
 pub fn preferred_phase(cell: usize) -> Phase {
     let third = |index: usize| (index % CELLS_PER_AXIS) as f64 / CELLS_PER_AXIS as f64;
     let (row, layer) = (
@@ -30,8 +30,8 @@ pub fn preferred_phase(cell: usize) -> Phase {
     Phase::wrap(Vector3::new(third(layer), third(row), third(cell)))
 }
 
-/// Activations of one module's cells in \[0, 1\]: the Gaussian of seed Eq. 1 of the torus distance d
-/// between phase and preferred phase, both in metres.
+/// Activations of one module's cells in \[0, 1\]: the Gaussian of seed Eq. 1 of the torus distance
+/// d between phase and preferred phase, both in metres.
 ///
 /// ```text
 /// a_i = exp(−d² / (2 σ²))        σ = TUNING_WIDTH · spacing
@@ -62,8 +62,8 @@ pub struct Interference {
 }
 
 impl Interference {
-    /// The normalised form I / Σ aᵢ \[m\], the population vector's estimate of the position in `map`;
-    /// `None` when no cell is active.
+    /// The normalised form I / Σ aᵢ \[m\], the population vector's estimate of the position in
+    /// `map`; `None` when no cell is active.
     pub fn normalised(&self) -> Option<Point3<f64>> {
         (self.total > 0.0).then(|| Point3::from(self.pattern / self.total))
     }
@@ -71,10 +71,11 @@ impl Interference {
 
 /// The interference pattern I = Σ aᵢ cᵢ (seed Eq. 4) of a code.
 ///
-/// A grid cell has many firing fields; its centre cᵢ is that of its field nearest to `around` \[m\] in
-/// `map`, the position believed before. The normalised pattern corrects a belief that is wrong by less
-/// than half the finest spacing. Measured with the default settings (finest spacing 1 m), it is at most
-/// 0.012 m off for a true belief, 0.05 m for one that is 0.2 m off, and 0.2 m for one that is 0.4 m off.
+/// A grid cell has many firing fields; its centre cᵢ is that of its field nearest to `around` \[m\]
+/// in `map`, the position believed before. The normalised pattern corrects a belief that is wrong
+/// by less than half the finest spacing. Measured with the default settings (finest spacing 1 m),
+/// it is at most 0.012 m off for a true belief, 0.05 m for one that is 0.2 m off, and 0.2 m for one
+/// that is 0.4 m off.
 pub fn interference_pattern(
     modules: &GridModules,
     code: &GridCode,

@@ -9,8 +9,8 @@ use super::{GridCode, GridModules, Lattice, PartialCode};
 /// Newton steps at most; from 0 to anywhere that matters takes fewer than ten.
 const NEWTON_STEPS: u32 = 50;
 
-/// Cosine similarity of two activation vectors of equal length (seed Eqs. 5, 6 and 10), in \[−1, 1\];
-/// 0 when either is zero.
+/// Cosine similarity of two activation vectors of equal length (seed Eqs. 5, 6 and 10), in \[−1,
+/// 1\]; 0 when either is zero.
 ///
 /// ```text
 /// cos = a·b / (|a| |b|)
@@ -31,7 +31,8 @@ pub fn cosine(a: &[f64], b: &[f64]) -> f64 {
 /// ```
 ///
 /// where b⊥ is the part of b across a. The second form is computed: it has no difference of large
-/// numbers, so that it keeps its digits where the patterns are nearly equal, and needs no N×N matrix.
+/// numbers, so that it keeps its digits where the patterns are nearly equal, and needs no N×N
+/// matrix.
 pub fn frobenius(a: &[f64], b: &[f64]) -> f64 {
     let a_squared = dot(a, a);
     let along = if a_squared > 0.0 {
@@ -56,22 +57,24 @@ pub fn gaussian_confidence(distance: f64, sigma: f64) -> f64 {
     (-0.5 * ratio * ratio).exp()
 }
 
-/// Recall confidence of a distance with scale σ > 0 of the same unit (seed Eq. 9): exp(−d / σ), in \[0, 1\].
+/// Recall confidence of a distance with scale σ > 0 of the same unit (seed Eq. 9): exp(−d / σ), in
+/// \[0, 1\].
 pub fn exponential_confidence(distance: f64, sigma: f64) -> f64 {
     (-distance / sigma).exp()
 }
 
-/// Similarity of a partly known code to a code, in \[0, 1\]: the cosine of their population activations as
-/// if each module had infinitely many cells, averaged over the known modules.
+/// Similarity of a partly known code to a code, in \[0, 1\]: the cosine of their population
+/// activations as if each module had infinitely many cells, averaged over the known modules.
 ///
 /// ```text
 /// kernel = mean over known m of exp(−d_m² / (4 σ_m²))     d_m torus distance, σ_m = TUNING_WIDTH · spacing
 /// ```
 ///
-/// It costs one exponential per module instead of 27, and does not depend on how the cells tile the phase.
-/// It is not quite the cosine of the materialised [`population_vector`](super::population::population_vector)s,
-/// for 27 cells are few, and a far phase is near several images; they differ by
-/// less than a tenth (`the_kernel_is_the_cosine_of_activations_to_a_tenth` in `tests/grid_population.rs`).
+/// It costs one exponential per module instead of 27, and does not depend on how the cells tile the
+/// phase. It is not quite the cosine of the materialised
+/// [`population_vector`](super::population::population_vector)s, for 27 cells are few, and a far
+/// phase is near several images; they differ by less than a tenth
+/// (`the_kernel_is_the_cosine_of_activations_to_a_tenth` in `tests/grid_population.rs`).
 pub fn kernel(modules: &GridModules, cue: &PartialCode, code: &GridCode) -> f64 {
     let mut sum = 0.0;
     let mut known = 0.0;
@@ -131,11 +134,11 @@ impl<'a> CodeCue<'a> {
         (kernel >= least).then_some(kernel)
     }
 
-    /// The largest Σ dₘ² over the known modules, dₘ torus distance in spacings, at which [`kernel`] can
-    /// still be `least`; `None` when codes can be arbitrarily far apart in one module then.
+    /// The largest Σ dₘ² over the known modules, dₘ torus distance in spacings, at which [`kernel`]
+    /// can still be `least`; `None` when codes can be arbitrarily far apart in one module then.
     ///
-    /// With modules adding qₘ = exp(−dₘ²/4σ²) and a deficit ε = Σ (1 − qₘ) = known · (1 − least), Σ dₘ² =
-    /// −4σ² Σ ln qₘ. As −ln is convex, that is largest when one module has the whole deficit:
+    /// With modules adding qₘ = exp(−dₘ²/4σ²) and a deficit ε = Σ (1 − qₘ) = known · (1 − least), Σ
+    /// dₘ² = −4σ² Σ ln qₘ. As −ln is convex, that is largest when one module has the whole deficit:
     ///
     /// ```text
     /// Σ dₘ² ≤ −4σ² ln(1 − ε)        ε < 1
@@ -145,7 +148,8 @@ impl<'a> CodeCue<'a> {
         (deficit < 1.0).then(|| -4.0 * TUNING_WIDTH * TUNING_WIDTH * (1.0 - deficit.max(0.0)).ln())
     }
 
-    /// The distance \[m\] at which two codes are on average as alike as `kernel` says, i.e. the d with
+    /// The distance \[m\] at which two codes are on average as alike as `kernel` says, i.e. the d
+    /// with
     ///
     /// ```text
     /// mean over known m of exp(−d² / (4 σₘ²)) = kernel

@@ -15,8 +15,8 @@ impl GridState {
         Self(modules.into())
     }
 
-    /// Moves every module by a displacement \[m\] in `map`, and calls `entered` with the index of each
-    /// module that came into a new lattice cell and that cell's reference grid point.
+    /// Moves every module by a displacement \[m\] in `map`, and calls `entered` with the index of
+    /// each module that came into a new lattice cell and that cell's reference grid point.
     ///
     /// This is path integration: O(modules), whatever the distance and the memory.
     pub fn advance(
@@ -47,7 +47,8 @@ impl GridState {
         )
     }
 
-    /// The position \[m\] in `map`: the mean of what the modules say from reference grid point and phase.
+    /// The position \[m\] in `map`: the mean of what the modules say from reference grid point and
+    /// phase.
     ///
     /// Unlike a code's, this position is unique. The modules differ by rounding only.
     pub fn decode(&self, modules: &GridModules) -> Point3<f64> {

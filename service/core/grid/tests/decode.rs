@@ -69,7 +69,8 @@ fn noisy_codes_give_the_position_to_a_tenth_of_the_spacing() {
         let found = decode(&modules, &code, Some(near), 8.0);
         assert!(!found.ambiguous);
         assert!((found.position - position).norm() < 0.1);
-        // √3 · 0.02 turns at 15 of 18 degrees of freedom, on the scale of √(6/Σ 1/spacing²) = 2.31 m.
+        // √3 · 0.02 turns at 15 of 18 degrees of freedom, on the scale of √(6/Σ 1/spacing²) = 2.31
+        // m.
         assert!(
             found.residual_m > 0.015 && found.residual_m < 0.15,
             "{}",

@@ -94,7 +94,8 @@ fn the_normalised_interference_pattern_tells_the_position() {
             .normalised()
             .unwrap();
         assert!((exact_belief - position).norm() < 0.04);
-        // A belief that is a sixth of the finest spacing off is drawn to less than half of its error.
+        // A belief that is a sixth of the finest spacing off is drawn to less than half of its
+        // error.
         let belief = position + random_direction(&mut random) * 0.2;
         let corrected = interference_pattern(&modules, &code, &belief)
             .normalised()

@@ -1,10 +1,10 @@
-//! Contacts: what an episode consists of.
+//! Contacts: the observations of an episode.
 
 use std::sync::Arc;
 
 use nalgebra::{Point3, Unit, Vector3};
 
-/// A scalar felt on a channel.
+/// A scalar measured on a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Felt {
     /// Channel, as the caller numbers them.
@@ -15,7 +15,7 @@ pub struct Felt {
     pub sd: f64,
 }
 
-/// A descriptor seen on a channel.
+/// A descriptor measured on a channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seen {
     /// Channel, as the caller numbers them.
@@ -24,15 +24,15 @@ pub struct Seen {
     pub vector: Arc<[f32]>,
 }
 
-/// How a contact was come by, which says what its place tells about the map.
+/// How a contact was reached, which decides what its position tells about the object's size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reached {
-    /// It was come upon: anywhere on the map, or within a step of the contact before.
+    /// By a walk: anywhere on the object, or within a step of the contact before.
     #[default]
     Found,
-    /// It was drawn evenly from the whole map, wherever the contact before was.
+    /// Drawn evenly from the whole object, wherever the contact before was.
     Drawn,
-    /// It was asked for: where it lies is the asker's choice, and only its distance to the map counts.
+    /// Asked for: its position is the asker's choice, and only its distance to the surface counts.
     Aimed,
 }
 
@@ -43,8 +43,8 @@ pub struct Contact {
     pub position_m: Point3<f64>,
     /// Standard deviation of its own noise, per axis \[m\].
     pub position_sd_m: f64,
-    /// Standard deviation of what path integration has drifted since the episode began, per axis \[m\];
-    /// never less than that of the contact before.
+    /// Standard deviation of the drift of path integration since the episode began, per axis \[m\];
+    /// not less than that of the contact before.
     pub drift_sd_m: f64,
     /// The surface's outward normal, in the episode's frame.
     pub normal: Option<Unit<Vector3<f64>>>,
@@ -54,13 +54,12 @@ pub struct Contact {
     pub levels: Vec<Felt>,
     /// Descriptors, at most one per channel.
     pub descriptors: Vec<Seen>,
-    /// How it was come by.
+    /// How it was reached.
     pub reached: Reached,
 }
 
 impl Contact {
-    /// A contact at a position with `position_sd_m` \[m\] of noise per axis, of which nothing else is
-    /// known.
+    /// A contact at a position with `position_sd_m` \[m\] of noise per axis, and nothing else.
     pub fn at(position_m: Point3<f64>, position_sd_m: f64) -> Self {
         Self {
             position_m,
@@ -96,29 +95,29 @@ impl Contact {
         self
     }
 
-    /// The same with what path integration has drifted since the episode began, per axis \[m\].
+    /// The same with the drift of path integration since the episode began, per axis \[m\].
     #[must_use]
     pub fn with_drift(mut self, drift_sd_m: f64) -> Self {
         self.drift_sd_m = drift_sd_m;
         self
     }
 
-    /// The same as one that was drawn evenly from the whole map.
+    /// The same, drawn evenly from the whole object.
     #[must_use]
     pub fn drawn(mut self) -> Self {
         self.reached = Reached::Drawn;
         self
     }
 
-    /// The same as one that was asked for.
+    /// The same, asked for.
     #[must_use]
     pub fn aimed(mut self) -> Self {
         self.reached = Reached::Aimed;
         self
     }
 
-    /// The same without what it feels and looks like.
-    pub(super) fn bare(&self) -> Self {
+    /// The same without levels and descriptors.
+    pub(crate) fn bare(&self) -> Self {
         Self {
             levels: Vec::new(),
             descriptors: Vec::new(),
@@ -127,7 +126,7 @@ impl Contact {
     }
 
     /// Variance of its position in the episode's frame, per axis \[m²\].
-    pub(super) fn variance_m2(&self) -> f64 {
+    pub(crate) fn variance_m2(&self) -> f64 {
         self.position_sd_m * self.position_sd_m + self.drift_sd_m * self.drift_sd_m
     }
 }

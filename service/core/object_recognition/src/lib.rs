@@ -1,41 +1,32 @@
 #![doc = include_str!("../README.md")]
 
-mod asking;
-mod bricks;
-mod bytes;
-mod cells;
 mod contact;
-mod crowd;
-mod deviation;
-mod encounter;
-mod episode;
-mod facet;
-mod feeling;
-mod group;
-mod halves;
+mod index;
+mod indexed_model;
+mod indexed_place;
+mod level_prior;
 mod library;
 mod model;
-mod nearby;
-mod nearest;
+mod next_touch;
+mod numeric;
 mod orientation;
-mod pairs;
+mod percept_likelihood;
 mod poses;
 mod posterior;
-mod ranks;
-mod reaches;
-mod relief;
-mod shifts;
-mod spots;
-mod strain;
-mod strangers;
-mod surface;
+mod recognition;
+mod state;
+mod surfels;
 #[cfg(test)]
 mod tests;
+mod translations;
+mod tuning;
+mod z_score;
 
-pub use asking::NextTouch;
 pub use contact::{Contact, Felt, Reached, Seen};
-pub use episode::Recognition;
 pub use library::{ObjectId, ObjectLibrary};
 pub use model::{LevelMemory, ModelPlace, ModelSettings, ObjectModel};
+pub use next_touch::NextTouch;
 pub use orientation::Orientation;
-pub use posterior::{PoseEstimate, Posterior, SURE, Verdict};
+pub use posterior::{PoseEstimate, Posterior, Verdict};
+pub use recognition::Recognition;
+pub use tuning::SURE;

@@ -1,4 +1,4 @@
-//! The maps that may be meant.
+//! The library: all models that an episode may be of.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_6;
@@ -6,63 +6,62 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use super::model::ObjectModel;
-use super::surface::{Surface, Wide, wide};
+use crate::indexed_model::IndexedModel;
+use crate::level_prior::{LevelPrior, level_prior};
+use crate::model::ObjectModel;
+use crate::tuning::BACKGROUND_SAMPLES;
 
-/// Most places from which is judged what a surface is like: shares of it are then good to a few
-/// hundredths.
-const SAMPLES: usize = 256;
-
-/// A map, as the caller numbers them.
+/// Number of an object, chosen by the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ObjectId(pub u32);
 
-/// One map and its index.
+/// One model with its indexes.
 #[derive(Debug)]
-pub(super) struct Known {
+pub(crate) struct LibraryEntry {
     model: ObjectModel,
-    pub(super) surface: Surface,
+    pub(crate) indexed: IndexedModel,
 }
 
-/// A place of a map.
+/// A place of the library.
 #[derive(Clone, Debug)]
-pub(super) struct Sample {
-    pub(super) object: ObjectId,
-    /// Number among the map's spots.
-    pub(super) spot: u32,
-    pub(super) position: Point3<f64>,
+pub(crate) struct Sample {
+    pub(crate) object: ObjectId,
+    /// Number among the model's packed places.
+    pub(crate) packed_place: u32,
+    pub(crate) position: Point3<f64>,
 }
 
-/// The maps that may be meant, each with its index.
+/// All models that an episode may be of, with their indexes.
 ///
-/// Putting a model makes its index, which takes some milliseconds per thousand places; recognising
-/// changes nothing here.
+/// Putting a model builds its indexes, some milliseconds per thousand places. Recognition changes
+/// nothing here.
 #[derive(Clone, Debug, Default)]
 pub struct ObjectLibrary {
     /// Shared with the library's clones, so that a snapshot costs a pointer per object.
-    objects: BTreeMap<ObjectId, Arc<Known>>,
-    wide: Vec<Wide>,
+    objects: BTreeMap<ObjectId, Arc<LibraryEntry>>,
+    level_prior: Vec<LevelPrior>,
     samples: Vec<Sample>,
     extent_m: f64,
 }
 
 impl ObjectLibrary {
-    /// Puts a model, in place of what was learned of the same object before. Episodes that run go on
-    /// with what they have gathered.
+    /// Puts a model in place of an earlier one of the same object. Running episodes keep the
+    /// evidence that they have.
     pub fn put(&mut self, id: ObjectId, model: ObjectModel) {
-        let surface = Surface::new(&model);
-        self.objects.insert(id, Arc::new(Known { model, surface }));
-        self.survey();
+        let indexed = IndexedModel::new(&model);
+        self.objects
+            .insert(id, Arc::new(LibraryEntry { model, indexed }));
+        self.update_summary();
     }
 
-    /// Forgets an object, and says whether there was one.
+    /// Removes an object; `true` if there was one.
     pub fn remove(&mut self, id: ObjectId) -> bool {
         let removed = self.objects.remove(&id).is_some();
-        self.survey();
+        self.update_summary();
         removed
     }
 
-    /// A library of some of these objects, each under a number of its own.
+    /// A library of some of these objects, each under a new number.
     #[must_use]
     pub fn select(&self, objects: impl IntoIterator<Item = (ObjectId, ObjectId)>) -> Self {
         let mut selected = Self::default();
@@ -71,11 +70,11 @@ impl ObjectLibrary {
                 selected.objects.insert(number, Arc::clone(object));
             }
         }
-        selected.survey();
+        selected.update_summary();
         selected
     }
 
-    /// What was learned of an object.
+    /// The model of an object.
     pub fn get(&self, id: ObjectId) -> Option<&ObjectModel> {
         self.objects.get(&id).map(|object| &object.model)
     }
@@ -85,70 +84,75 @@ impl ObjectLibrary {
         self.objects.iter().map(|(id, object)| (*id, &object.model))
     }
 
-    /// How many there are.
+    /// Number of objects.
     pub fn len(&self) -> usize {
         self.objects.len()
     }
 
-    /// Whether there is none.
+    /// Whether there is no object.
     pub fn is_empty(&self) -> bool {
         self.objects.is_empty()
     }
 
-    fn survey(&mut self) {
-        let extents = self.surfaces().map(|(_, surface)| surface.extent_m);
+    fn update_summary(&mut self) {
+        let extents = self.indexed_models().map(|(_, indexed)| indexed.extent_m);
         self.extent_m = extents.fold(0.0, f64::max);
         let places = || {
-            self.surfaces().flat_map(|(object, surface)| {
-                let count = u32::try_from(surface.patches.len()).unwrap_or(u32::MAX);
+            self.indexed_models().flat_map(|(object, indexed)| {
+                let count = u32::try_from(indexed.places.len()).unwrap_or(u32::MAX);
                 (0..count).map(move |place| (object, place))
             })
         };
-        let step = places().count().div_ceil(SAMPLES).max(1);
+        let step = places().count().div_ceil(BACKGROUND_SAMPLES).max(1);
         let samples = places().skip(step / 2).step_by(step);
-        let sample = |(object, spot): (ObjectId, u32)| {
-            let surface = self.surface(object)?;
-            let patch = surface.patches.get(surface.spots.patch(spot as usize))?;
+        let sample = |(object, packed_place): (ObjectId, u32)| {
+            let indexed = self.indexed(object)?;
+            let place = indexed
+                .places
+                .get(indexed.packed.place(packed_place as usize))?;
             Some(Sample {
                 object,
-                spot,
-                position: patch.position,
+                packed_place,
+                position: place.position,
             })
         };
         self.samples = samples.filter_map(sample).collect();
-        self.wide = wide(self.objects.values().map(|object| &object.surface));
+        let models = self.objects.values().map(|object| &object.indexed);
+        let prior = level_prior(models.flat_map(IndexedModel::levels));
+        self.level_prior = prior;
     }
 
-    pub(super) fn all(&self) -> impl Iterator<Item = (ObjectId, &Arc<Known>)> {
+    pub(crate) fn all(&self) -> impl Iterator<Item = (ObjectId, &Arc<LibraryEntry>)> {
         self.objects.iter().map(|(id, object)| (*id, object))
     }
 
-    pub(super) fn surfaces(&self) -> impl Iterator<Item = (ObjectId, &Surface)> {
+    pub(crate) fn indexed_models(&self) -> impl Iterator<Item = (ObjectId, &IndexedModel)> {
         self.objects
             .iter()
-            .map(|(id, object)| (*id, &object.surface))
+            .map(|(id, object)| (*id, &object.indexed))
     }
 
-    pub(super) fn surface(&self, id: ObjectId) -> Option<&Surface> {
-        self.objects.get(&id).map(|object| &object.surface)
+    pub(crate) fn indexed(&self, id: ObjectId) -> Option<&IndexedModel> {
+        self.objects.get(&id).map(|object| &object.indexed)
     }
 
-    /// Some places, spread evenly over all maps: what a surface is like.
-    pub(super) fn samples(&self) -> &[Sample] {
+    /// An even sample of the places of all models, for the background model.
+    pub(crate) fn samples(&self) -> &[Sample] {
         &self.samples
     }
 
-    pub(super) fn wide(&self) -> &[Wide] {
-        &self.wide
+    pub(crate) fn level_prior(&self) -> &[LevelPrior] {
+        &self.level_prior
     }
 
-    /// Density of contacts with something of which only the size is known, that of the largest map, per m³.
-    pub(super) fn elsewhere(&self) -> f64 {
+    /// Density of contacts with something else \[1/m³\]: uniform in a ball of the largest model's
+    /// extent.
+    pub(crate) fn clutter_per_m3(&self) -> f64 {
         1.0 / (FRAC_PI_6 * self.extent_m().max(1e-6).powi(3))
     }
 
-    /// Extent of the largest map \[m\].
-    pub(super) fn extent_m(&self) -> f64 {
+    /// Extent of the largest model \[m\].
+    pub(crate) fn extent_m(&self) -> f64 {
         self.extent_m
     }
 }

@@ -1,10 +1,10 @@
-//! What is known of how the episode's frame is turned against a map's.
+//! Prior over the rotation between the episode's frame and a model's.
 
 use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Prior over the rotation from the episode's frame into a map's.
+/// Prior over the rotation from the episode's frame into a model's.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Orientation {
     /// The frames are parallel.
@@ -16,12 +16,12 @@ pub enum Orientation {
 }
 
 impl Orientation {
-    /// The 24 turns that take a cube into itself.
+    /// The 24 rotations of a cube.
     pub fn cube() -> Self {
         let quarter = |axis: Vector3<f64>, turns: u8| {
             UnitQuaternion::new(axis * (FRAC_PI_2 * f64::from(turns)))
         };
-        // Six ways to lay the z axis, four turns about it each.
+        // Six directions of the z axis, four rotations about each.
         let tilts = [
             quarter(Vector3::x(), 0),
             quarter(Vector3::x(), 1),
@@ -37,7 +37,7 @@ impl Orientation {
     }
 
     /// The rotations, if there are finitely many.
-    pub(super) fn rotations(&self) -> Option<Vec<UnitQuaternion<f64>>> {
+    pub(crate) fn rotations(&self) -> Option<Vec<UnitQuaternion<f64>>> {
         match self {
             Self::Known => Some(vec![UnitQuaternion::identity()]),
             Self::Finite(rotations) => Some(rotations.clone()),

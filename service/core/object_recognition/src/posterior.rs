@@ -1,12 +1,10 @@
-//! What an episode says so far.
+//! The posterior of an episode.
 
+use geometry::PoseCovariance;
 use nalgebra::Isometry3;
 
-use super::library::ObjectId;
-use geometry::PoseCovariance;
-
-/// Least probability at which an answer is given: one in two hundred such answers may be wrong.
-pub const SURE: f64 = 0.995;
+use crate::library::ObjectId;
+use crate::tuning::SURE;
 
 /// Answer of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,14 +13,14 @@ pub enum Verdict {
     Undecided,
     /// It is this one.
     Object(ObjectId),
-    /// It is none that was learned.
+    /// It is none of the library.
     Unknown,
 }
 
-/// Where the episode's frame lies in a map.
+/// Pose of the episode's frame in a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseEstimate {
-    /// Map.
+    /// Object.
     pub object: ObjectId,
     /// The most likely pose.
     pub map_from_episode: Isometry3<f64>,
@@ -30,29 +28,30 @@ pub struct PoseEstimate {
     pub covariance: PoseCovariance,
     /// Share of the object's evidence that this pose holds.
     pub share: f64,
-    /// Other poses in the same map that hold a share: for something symmetric, the symmetric ones.
+    /// Further poses in the same model with their shares: for symmetric objects, the symmetric
+    /// ones.
     pub others: Vec<(Isometry3<f64>, f64)>,
 }
 
-/// What an episode says so far.
+/// Posterior over objects and poses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
     /// Probability of each object, most probable first; equal ones by number.
     pub objects: Vec<(ObjectId, f64)>,
-    /// Probability that it is none of them.
+    /// Probability of an unknown object.
     pub unknown: f64,
     /// Pose in the most probable object.
     pub pose: Option<PoseEstimate>,
-    /// How many hypotheses (map, pose) together hold 99 % of the mass of all.
+    /// Number of hypotheses (object, pose) that hold 99 % of all mass.
     pub live_hypotheses: usize,
-    /// How many objects hold more than one hundredth of the probability each.
+    /// Number of objects with a probability above 1 %.
     pub live_objects: usize,
     /// Entropy over objects and unknown \[nats\].
     pub entropy_nats: f64,
     /// Contacts so far.
     pub contacts: usize,
-    /// How far the best hypothesis explains the contacts below what a right one does, in standard
-    /// deviations; about 0 for what was learned, and far below −3 for what was not.
+    /// Goodness of fit of the best hypothesis, as a z-score: about 0 for a learned object, far
+    /// below −3 for others. 0 where the orientation is not free.
     pub fit: f64,
 }
 
@@ -67,8 +66,8 @@ impl Posterior {
     }
 }
 
-/// Most probable first, and the rest.
-pub(super) fn entropy_nats(probabilities: impl Iterator<Item = f64>) -> f64 {
+/// Shannon entropy of probabilities \[nats\].
+pub(crate) fn entropy_nats(probabilities: impl Iterator<Item = f64>) -> f64 {
     -probabilities
         .filter(|p| *p > 0.0)
         .map(|p| p * p.ln())

@@ -2,11 +2,12 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::shifts::{Shifts, log_sum};
 use super::{
     Contact, ModelSettings, ObjectId, ObjectLibrary, ObjectModel, Orientation, Posterior,
     Recognition, Verdict,
 };
+use crate::numeric::log_sum;
+use crate::translations::GaussianSum;
 
 mod unknown;
 
@@ -262,17 +263,18 @@ fn the_evidence_is_that_of_all_assignments_of_contacts_to_places() {
                 Contact::at(at, noise_m).with_level(0, level, 1.0)
             })
             .collect();
-        let mut shifts = Shifts::new(rotations.clone());
+        let mut translations = GaussianSum::new(rotations.clone());
         for (count, contact) in contacts.iter().enumerate() {
-            shifts.touch(&library, &contacts[..count], contact);
+            translations.touch(&library, &contacts[..count], contact);
             let contacts = &contacts[..=count];
-            let found = |id: u32| shifts.object_logs()[&ObjectId(id)];
+            let found = |id: u32| translations.object_logs()[&ObjectId(id)];
             let told = |id: u32| by_assignment(&library, id, &rotations, contacts);
             let (one, two) = (told(1), told(2));
             let best = one.max(two);
             for (own, id) in [(one, 1), (two, 2)] {
                 let apart = found(id) - own;
-                // Where an outlier is the most likely, a hypothesis does not part, and is a little off after that.
+                // Where an outlier is the most likely, a hypothesis does not part, and is a little
+                // off after that.
                 let most = if stray > 2 && id == 1 { 0.15 } else { 0.4 };
                 // What hardly explains the contacts is dropped some day, but never overrated.
                 let about = format!("{trial} {count} {id}: {} {one} {two}", found(id));
@@ -283,16 +285,16 @@ fn the_evidence_is_that_of_all_assignments_of_contacts_to_places() {
     }
 }
 
-/// Log evidence of a map: over all rotations and all ways to take each contact for a place or an outlier, the integral over
-/// translations, which is a product of Gaussians.
+/// Log evidence of a map: over all rotations and all ways to take each contact for a place or an
+/// outlier, the integral over translations, which is a product of Gaussians.
 fn by_assignment(
     library: &ObjectLibrary,
     id: u32,
     rotations: &[UnitQuaternion<f64>],
     contacts: &[Contact],
 ) -> f64 {
-    let surface = library.surface(ObjectId(id)).unwrap();
-    let count = surface.patches.len();
+    let indexed = library.indexed(ObjectId(id)).unwrap();
+    let count = indexed.places.len();
     let mut logs = Vec::new();
     let ways = (count + 1).pow(u32::try_from(contacts.len() - 1).unwrap());
     let firsts = (0..count).flat_map(|first| rotations.iter().map(move |turn| (first, turn)));
@@ -301,22 +303,22 @@ fn by_assignment(
         for way in 0..ways {
             let mut rest = way;
             // The translation's Gaussian: mean and variance, begun by the first contact.
-            let patch = &surface.patches[first];
-            let mut mean = patch.position - turn * contacts[0].position_m;
-            let mut variance = patch.variance_m2 + contacts[0].variance_m2();
-            let mut log = patch.percept_log(&contacts[0], library.wide()) + prior;
+            let place = &indexed.places[first];
+            let mut mean = place.position - turn * contacts[0].position_m;
+            let mut variance = place.variance_m2 + contacts[0].variance_m2();
+            let mut log = place.percept_log(&contacts[0], library.level_prior()) + prior;
             for contact in &contacts[1..] {
                 let at = rest % (count + 1);
                 rest /= count + 1;
                 if at == count {
-                    log += (0.02 * library.elsewhere()).ln();
+                    log += (0.02 * library.clutter_per_m3()).ln();
                     continue;
                 }
-                let patch = &surface.patches[at];
-                let apart = patch.position - turn * contact.position_m - mean;
-                let noise = patch.variance_m2 + contact.variance_m2();
+                let place = &indexed.places[at];
+                let apart = place.position - turn * contact.position_m - mean;
+                let noise = place.variance_m2 + contact.variance_m2();
                 let sum = variance + noise;
-                log += patch.percept_log(contact, library.wide()) + 0.98_f64.ln()
+                log += place.percept_log(contact, library.level_prior()) + 0.98_f64.ln()
                     - (count as f64).ln()
                     - 0.5 * apart.norm_squared() / sum
                     - 1.5 * (std::f64::consts::TAU * sum).ln();
@@ -339,19 +341,19 @@ fn the_order_of_contacts_hardly_matters() {
         .into_iter()
         .map(|(point, level)| Contact::at(point, 0.004).with_level(0, level, 0.5))
         .collect();
-    let answer = |contacts: &[Contact]| {
+    let candidate = |contacts: &[Contact]| {
         let mut recognition = Recognition::new(&Orientation::Known);
         for contact in contacts {
             recognition.touch(&library, contact.clone());
         }
         recognition.posterior(&library)
     };
-    let forth = answer(&contacts[..4]);
+    let forth = candidate(&contacts[..4]);
     contacts[..4].reverse();
-    let back = answer(&contacts[..4]);
+    let back = candidate(&contacts[..4]);
     assert_eq!(forth.verdict(), Verdict::Object(ObjectId(3)), "{forth:?}");
     // How far a stranger may be from the contact before is another matter than which object it is.
-    let among = |answer: &Posterior| answer.objects[0].1 / (1.0 - answer.unknown);
+    let among = |candidate: &Posterior| candidate.objects[0].1 / (1.0 - candidate.unknown);
     assert_eq!(forth.objects[0].0, back.objects[0].0);
     assert!(
         (among(&forth) - among(&back)).abs() < 0.01,

@@ -7,8 +7,9 @@ use super::equations::NormalEquations;
 
 /// The step along the steepest descent, and the scale in which steps are measured.
 ///
-/// With the gradient g and the curvatures D² = diag H, the step is −τ D⁻² g with the τ at which the cost's second-order
-/// model is least. Lengths are |D δ|: so metres and radians compare by what they cost.
+/// With the gradient g and the curvatures D² = diag H, the step is −τ D⁻² g with the τ at which the
+/// cost's second-order model is least. Lengths are |D δ|: so metres and radians compare by what
+/// they cost.
 #[derive(Debug)]
 pub(super) struct SteepestDescent {
     gradient: Vec<f64>,
@@ -53,8 +54,8 @@ impl SteepestDescent {
             .sqrt()
     }
 
-    /// The step within `radius` on the way along the steepest descent and then on to the `newton` step, and by how much it
-    /// is expected to lower the cost.
+    /// The step within `radius` on the way along the steepest descent and then on to the `newton`
+    /// step, and by how much it is expected to lower the cost.
     pub(super) fn dogleg(
         &self,
         equations: &NormalEquations<'_>,

@@ -1,4 +1,4 @@
-//! The normal equations of a whole map.
+//! The normal equations of a whole graph.
 
 use nalgebra::Isometry3;
 

@@ -7,10 +7,10 @@ use super::link::{Link, LinkId};
 use super::node::{Freedom, Node, PointId, PoseId};
 use state::Digest;
 
-/// The graph of lived places and landmarks, with what was measured between them.
+/// A graph of poses and points with the measurements between them.
 ///
-/// Nodes and links are only ever added, and keep their numbers. A link may be switched off: it then says nothing, until
-/// it is switched on again.
+/// Nodes and links are only ever added, and keep their numbers. A link may be switched off: it then
+/// says nothing, until it is switched on again.
 #[derive(Clone, Debug, Default)]
 pub struct PoseGraph {
     pub(super) nodes: Vec<Node>,
@@ -29,10 +29,10 @@ pub(super) struct LinkSlot {
     pub(super) is_on: bool,
 }
 
-/// Why a link does not belong to a map.
+/// Why a link does not belong to a graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidLink {
-    /// A node of another map.
+    /// A node of another graph.
     #[error("the map has no such node")]
     UnknownNode,
     /// Nothing can be measured from itself.
@@ -41,7 +41,7 @@ pub enum InvalidLink {
 }
 
 impl PoseGraph {
-    /// A map without nodes.
+    /// A graph without nodes.
     pub fn new() -> Self {
         Self::default()
     }
@@ -56,9 +56,10 @@ impl PoseGraph {
         PointId(self.add_node(Node::point(point, freedom)))
     }
 
-    /// Puts a pose somewhere else and says how it may move from now on: so a frame that has turned out to lie in another is
-    /// carried there and its origin set free. An [`IncrementalRelaxation`](super::IncrementalRelaxation) does not take
-    /// notice of it; a new one is to be begun.
+    /// Puts a pose somewhere else and says how it may move from now on: so a frame that has turned
+    /// out to lie in another is carried there and its origin set free. An
+    /// [`IncrementalRelaxation`](super::IncrementalRelaxation) does not take notice of it; a new
+    /// one is to be begun.
     pub fn place_pose(&mut self, id: PoseId, pose: Isometry3<f64>, freedom: Freedom) {
         self.nodes[id.0 as usize] = Node::pose(pose, freedom);
     }
@@ -71,7 +72,7 @@ impl PoseGraph {
     /// Adds a link.
     ///
     /// # Errors
-    /// It names a node that is not of this map, or one node twice.
+    /// It names a node that is not of this graph, or one node twice.
     pub fn add_link(&mut self, link: Link, kernel: Kernel) -> Result<LinkId, InvalidLink> {
         let (from, to) = link.nodes();
         let id = self.insert(link, kernel, true)?;
@@ -146,12 +147,13 @@ impl PoseGraph {
         self.links.len()
     }
 
-    /// χ²: what all links cost, each by its kernel. Twice the negative logarithm of the likelihood, up to a constant.
+    /// χ²: the cost of all links, each by its kernel. Twice the negative log-likelihood, up to a
+    /// constant.
     pub fn chi_squared(&self) -> f64 {
         self.cost(|node| &self.nodes[node as usize].pose, 1.0)
     }
 
-    /// What one link costs without its kernel: its squared error in standard deviations.
+    /// Squared Mahalanobis error of one link, without its kernel.
     pub fn squared_error(&self, link: LinkId) -> f64 {
         let link = &self.links[link.0 as usize].link;
         let (from, to) = link.nodes();
@@ -166,7 +168,8 @@ impl PoseGraph {
         self.links[link.0 as usize].is_on
     }
 
-    /// Digest of where all nodes are and of which links count: equal digests, equal maps, to the last bit.
+    /// Digest of where all nodes are and of which links count: equal digests, equal graphs, to the
+    /// last bit.
     pub fn digest(&self) -> Digest {
         let mut bytes = Vec::with_capacity(self.nodes.len() * 56 + self.links.len());
         for node in &self.nodes {

@@ -1,4 +1,4 @@
-//! Keeping a growing map relaxed, link by link.
+//! Incremental relaxation: the optimum is kept up to date as links come.
 
 use std::borrow::Cow;
 
@@ -9,20 +9,21 @@ use super::equations::NormalEquations;
 use super::graph::PoseGraph;
 use super::marginals::Marginals;
 
-/// How closely a growing map is kept relaxed.
+/// How closely a growing graph is kept relaxed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IncrementalSettings {
-    /// A node is linearised anew once it has turned by more than this since \[rad\]. What a turn of φ does to a lever of
-    /// one metre differs from its linear part by φ²/2 metres.
+    /// A node is linearised anew once it has turned by more than this since \[rad\]. What a turn of
+    /// φ does to a lever of one metre differs from its linear part by φ²/2 metres.
     pub turn_max_rad: f64,
-    /// … or moved by more than this \[m\]. Shifts alone are linear; together with turns they are not.
+    /// … or moved by more than this \[m\]. Shifts alone are linear; together with turns they are
+    /// not.
     pub shift_max_m: f64,
     /// Changes of a node by less than this are not passed on to the nodes that depend on it \[m\].
     pub neglected_m: f64,
     /// … and turns by less than this \[rad\].
     pub neglected_rad: f64,
-    /// Nodes that a step linearises anew at most. When more have moved too far, the newest come first and the others
-    /// in later steps: this bounds the work of an update.
+    /// Nodes that a step linearises anew at most. When more have moved too far, the newest come
+    /// first and the others in later steps: this bounds the work of an update.
     pub relinearised_max: usize,
     /// Steps of an update at most: further ones follow only while nodes are to be linearised anew.
     pub steps_max: usize,
@@ -41,7 +42,7 @@ impl Default for IncrementalSettings {
     }
 }
 
-/// What an update did.
+/// Work of an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Updated {
     /// Nodes that were linearised anew.
@@ -52,15 +53,16 @@ pub struct Updated {
     pub n_solved: usize,
 }
 
-/// Keeps the nodes of a growing map where the links cost least (iSAM2: Kaess et al. 2012).
+/// Keeps the nodes of a growing graph where the links cost least (iSAM2: Kaess et al. 2012).
 ///
-/// The factor of the normal equations is a tree of cliques; new links change the cliques of their nodes and the
-/// ancestors of these, and only those are ordered, linearised and factored anew. Nodes are linearised anew when they
-/// have moved too far from where they last were. The newest nodes are eliminated last, so that the next ones meet few
-/// cliques.
+/// The factor of the normal equations is a tree of cliques; new links change the cliques of their
+/// nodes and the ancestors of these, and only those are ordered, linearised and factored anew.
+/// Nodes are linearised anew when they have moved too far from where they last were. The newest
+/// nodes are eliminated last, so that the next ones meet few cliques.
 ///
-/// A link's kernel is weighed where the link is linearised, and no kernel is graduated: what is doubtful is better left out
-/// until a whole relaxation has judged it. It belongs to one map; after [`PoseGraph::relax`] a new one is to be begun.
+/// A link's kernel is weighed where the link is linearised, and no kernel is graduated: what is
+/// doubtful is better left out until a whole relaxation has judged it. It belongs to one graph;
+/// after [`PoseGraph::relax`] a new one is to be begun.
 #[derive(Clone, Debug)]
 pub struct IncrementalRelaxation {
     settings: IncrementalSettings,
@@ -72,7 +74,7 @@ pub struct IncrementalRelaxation {
     solution: Vec<f64>,
 }
 
-/// What has happened to nodes and cliques.
+/// Changes of nodes and cliques since the last update.
 #[derive(Clone, Debug, Default)]
 struct Progress {
     /// Number of the step, from 1.
@@ -88,7 +90,7 @@ struct Progress {
 }
 
 impl IncrementalRelaxation {
-    /// For a map of which the first [`update`](Self::update) takes all in.
+    /// For a graph of which the first [`update`](Self::update) takes all in.
     pub fn new(settings: IncrementalSettings) -> Self {
         Self {
             settings,
@@ -99,7 +101,8 @@ impl IncrementalRelaxation {
         }
     }
 
-    /// Takes in what has been added to the map or switched since the last update, and moves the nodes.
+    /// Takes in what has been added to the graph or switched since the last update, and moves the
+    /// nodes.
     pub fn update(&mut self, map: &mut PoseGraph) -> Updated {
         let mut updated = Updated::default();
         let mut touched = map.take_touched();
@@ -115,7 +118,8 @@ impl IncrementalRelaxation {
         updated
     }
 
-    /// Covariances of the map's nodes as of the last update. The map must be the one that was updated.
+    /// Covariances of the graph's nodes as of the last update. The graph must be the one that was
+    /// updated.
     pub fn marginals<'a>(&'a self, map: &'a PoseGraph) -> Marginals<'a> {
         Marginals {
             map,

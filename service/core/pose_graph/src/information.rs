@@ -1,13 +1,13 @@
-//! How much a measurement says: the inverse of its covariance.
+//! Information matrices: inverses of the covariances of measurements.
 
 use nalgebra::{Cholesky, Matrix3, Matrix6, SMatrix};
 
 use geometry::PoseCovariance;
 
-/// How far an eigenvalue may be below zero, as a share of the trace: what rounding leaves of zero.
+/// A negative eigenvalue down to here, as a share of the trace, is a zero that was rounded.
 const ROUNDING: f64 = 1e-9;
 
-/// Why a matrix says nothing sensible about a measurement.
+/// Why a matrix is no covariance of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidInformation {
     /// An entry is infinite or not a number.
@@ -21,8 +21,9 @@ pub enum InvalidInformation {
     Singular,
 }
 
-/// Information about a whole relative pose, 6×6, order translation \[1/m²\], rotation \[1/rad²\], of the ξ in
-/// T = T̂ exp(ξ). Symmetric and positive semidefinite: directions of which nothing was measured have zeros.
+/// Information about a whole relative pose, 6×6, order translation \[1/m²\], rotation \[1/rad²\],
+/// of the ξ in T = T̂ exp(ξ). Symmetric and positive semidefinite: directions of which nothing was
+/// measured have zeros.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseInformation(Matrix6<f64>);
 

@@ -1,4 +1,4 @@
-//! How far a measurement is from what a map expects of it.
+//! Innovations: measurements against their predictions by a graph.
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, Vector3, Vector6};
 
@@ -8,7 +8,7 @@ use geometry::{PoseCovariance, log_jacobian, se3, upper_triangle};
 /// Share of the largest information below which a direction counts as not measured.
 const MEASURED: f64 = 1e-9;
 
-/// One pose in the frame of another, as a map expects it.
+/// One pose in the frame of another, as a graph expects it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExpectedPose {
     /// The second pose in the frame of the first.
@@ -17,7 +17,7 @@ pub struct ExpectedPose {
     pub covariance: PoseCovariance,
 }
 
-/// A point in the frame of a pose, as a map expects it.
+/// A point in the frame of a pose, as a graph expects it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExpectedPosition {
     /// Where \[m\].
@@ -28,9 +28,10 @@ pub struct ExpectedPosition {
 
 /// The difference between a measurement and what was expected.
 ///
-/// With the difference r, the expectation's covariance C and the measurement's information Ω its square is
-/// rᵀ (C + Ω⁻¹)⁻¹ r, the normalised innovation squared (NIS). Where both tell the truth it is distributed as χ² with as many
-/// degrees of freedom as directions were measured (Bar-Shalom, Li & Kirubarajan 2001, Sec. 5.4).
+/// With the difference r, the expectation's covariance C and the measurement's information Ω its
+/// square is rᵀ (C + Ω⁻¹)⁻¹ r, the normalised innovation squared (NIS). Where both tell the truth
+/// it is distributed as χ² with as many degrees of freedom as directions were measured (Bar-Shalom,
+/// Li & Kirubarajan 2001, Sec. 5.4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
     /// The square.
@@ -40,8 +41,9 @@ pub struct Innovation {
 }
 
 impl Innovation {
-    /// The square that a true measurement exceeds as seldom as a normal variable exceeds `deviations` standard deviations, to
-    /// the accuracy of Wilson & Hilferty (1931): d (1 − 2/9d + z √(2/9d))³.
+    /// The square that a true measurement exceeds as seldom as a normal variable exceeds
+    /// `deviations` standard deviations, to the accuracy of Wilson & Hilferty (1931): d (1 − 2/9d +
+    /// z √(2/9d))³.
     pub fn limit(degrees: usize, deviations: f64) -> f64 {
         let d = degrees as f64;
         let ninth = 2.0 / (9.0 * d.max(1.0));
@@ -127,7 +129,8 @@ fn innovation<const N: usize>(
 where
     nalgebra::Const<N>: nalgebra::DimMin<nalgebra::Const<N>, Output = nalgebra::Const<N>>,
 {
-    // Scaled by the measurement's own deviations, so that metres and radians are numbers of one size.
+    // Scaled by the measurement's own deviations, so that metres and radians are numbers of one
+    // size.
     let scale = information
         .diagonal()
         .map(|entry| if entry > 0.0 { 1.0 / entry.sqrt() } else { 1.0 });

@@ -1,8 +1,9 @@
 //! How far a link that does not fit may pull.
 
-/// What a link's squared error costs.
+/// Robust kernel ρ: the cost of a link by its squared error.
 ///
-/// With s = rᵀ Ω r, the squared error in standard deviations, a link costs ρ(s) and counts with the weight ρ′(s):
+/// With s = rᵀ Ω r, the squared error in standard deviations, a link costs ρ(s) and counts with the
+/// weight ρ′(s):
 ///
 /// ```text
 /// Gaussian       ρ = s
@@ -48,8 +49,8 @@ impl Scale {
 }
 
 impl Kernel {
-    /// ρ and ρ′ at the squared error `s`, with k² of Geman–McClure multiplied by `widening` ≥ 1: wide kernels
-    /// are convex, which is how a graduated relaxation begins.
+    /// ρ and ρ′ at the squared error `s`, with k² of Geman–McClure multiplied by `widening` ≥ 1:
+    /// wide kernels are convex, which is how a graduated relaxation begins.
     pub(super) fn cost_and_weight(self, s: f64, widening: f64) -> (f64, f64) {
         match self {
             Self::Gaussian => (s, 1.0),

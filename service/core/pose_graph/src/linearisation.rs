@@ -5,7 +5,8 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 use super::link::{Link, SightingTarget};
 use geometry::{log_jacobian, se3};
 
-/// Normal equations of one link at given poses: to second order in the motions δ of its nodes the link costs
+/// Normal equations of one link at given poses: to second order in the motions δ of its nodes the
+/// link costs
 ///
 /// ```text
 /// s + 2 Σ gₐᵀ δₐ + Σ δₐᵀ Hₐᵦ δᵦ

@@ -1,11 +1,11 @@
-//! What was measured between nodes.
+//! Links: measurements between nodes.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::information::{PoseInformation, PositionInformation};
 use super::node::{PointId, PoseId};
 
-/// A link in an experience map.
+/// A link in a pose graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct LinkId(pub(super) u32);
 
@@ -52,7 +52,7 @@ pub enum Link {
     Sighting {
         /// The pose that saw.
         from: PoseId,
-        /// What it saw.
+        /// The target of the sighting.
         target: SightingTarget,
         /// The target in the frame of the pose \[m\].
         position: Vector3<f64>,
@@ -61,14 +61,15 @@ pub enum Link {
     },
 }
 
-/// What was seen.
+/// Target of a sighting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SightingTarget {
     /// A landmark.
     Point(PointId),
     /// Another robot, of which the orientation was not seen.
     Pose(PoseId),
-    /// A point that lies fixed in the frame of another pose \[m\]: where a robot was a little after it was there.
+    /// A point that lies fixed in the frame of another pose \[m\]: where a robot was a little after
+    /// it was there.
     PointOf(PoseId, Vector3<f64>),
 }
 
@@ -91,7 +92,8 @@ impl SightingTarget {
 }
 
 impl Link {
-    /// The node that was measured, and before it the one that measured; twice the same if there is only one.
+    /// The node that was measured, and before it the one that measured; twice the same if there is
+    /// only one.
     pub(super) fn nodes(&self) -> (u32, u32) {
         match *self {
             Self::PosePrior {

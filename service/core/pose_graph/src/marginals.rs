@@ -1,4 +1,4 @@
-//! How sure the map is of its nodes.
+//! Marginal covariances of nodes.
 
 use nalgebra::{Matrix3, Matrix6, SMatrix};
 
@@ -11,9 +11,10 @@ use geometry::{PoseCovariance, se3};
 
 /// Covariances of nodes, given all links.
 ///
-/// They are blocks of the inverse of the normal equations at the places where these were linearised, read from their
-/// factor: the cost of one is that of the way from the node to the root of the elimination, and does not grow with the
-/// map where the map is narrow. A link that a robust kernel has discounted counts as little here as there.
+/// They are blocks of the inverse of the normal equations at the places where these were
+/// linearised, read from their factor: the cost of one is that of the way from the node to the root
+/// of the elimination, and does not grow with the map where the graph is narrow. A link that a
+/// robust kernel has discounted counts as little here as there.
 #[derive(Clone, Debug)]
 pub struct Marginals<'a> {
     pub(super) map: &'a PoseGraph,
@@ -21,7 +22,7 @@ pub struct Marginals<'a> {
 }
 
 impl PoseGraph {
-    /// Covariances about the nodes' present places. Factors the whole map once.
+    /// Covariances about the nodes' present places. Factors the whole graph once.
     pub fn marginals(&self) -> Marginals<'_> {
         let poses: Vec<_> = self.nodes.iter().map(|node| node.pose).collect();
         let equations = NormalEquations {
@@ -39,7 +40,8 @@ impl PoseGraph {
 }
 
 impl Marginals<'_> {
-    /// Covariance of a pose T = T̂ exp(ξ). `None` if the links leave it free, as those do that nothing ties to `map`.
+    /// Covariance of a pose T = T̂ exp(ξ). `None` if the links leave it free, as those do that
+    /// nothing ties to `map`.
     pub fn pose(&self, pose: PoseId) -> Option<PoseCovariance> {
         let half = self.half(pose.0)?;
         let covariance = self.placed(pose.0, pose.0, &half.product(&half));
@@ -54,8 +56,9 @@ impl Marginals<'_> {
         Some((block + block.transpose()) * 0.5)
     }
 
-    /// Covariance of the pose of `to` in the frame of `from`, with what the errors of the two have in common: what a match
-    /// between them is to be judged by. `None` if the links leave one of them free.
+    /// Covariance of the pose of `to` in the frame of `from`, with what the errors of the two have
+    /// in common: what a match between them is to be judged by. `None` if the links leave one of
+    /// them free.
     ///
     /// ```text
     /// ξ = ξ_to − Ad(T_to⁻¹ T_from) ξ_from
@@ -86,7 +89,8 @@ impl Marginals<'_> {
         })
     }
 
-    /// Where a point is expected in the frame of a pose. `None` if the links leave one of them free.
+    /// Where a point is expected in the frame of a pose. `None` if the links leave one of them
+    /// free.
     ///
     /// ```text
     /// d = Rᵀ dp − ρ + seen×φ

@@ -1,38 +1,38 @@
-//! What has a place in the experience map.
+//! Nodes: poses and points.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use geometry::{PLANAR_AXES, se3};
 
-/// A pose in an experience map: a place, an agent's anchor, a landmark with an orientation.
+/// A pose in a pose graph: a place, an agent's keyframe, a landmark with an orientation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PoseId(pub(super) u32);
 
-/// A point in an experience map: a landmark of which only the position is known.
+/// A point in a pose graph: a landmark of which only the position is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PointId(pub(super) u32);
 
 impl PoseId {
-    /// Its number among the nodes of its map, counted from 0.
+    /// Its number among the nodes of its graph, counted from 0.
     pub fn number(self) -> u32 {
         self.0
     }
 }
 
 impl PointId {
-    /// Its number among the nodes of its map, counted from 0.
+    /// Its number among the nodes of its graph, counted from 0.
     pub fn number(self) -> u32 {
         self.0
     }
 }
 
-/// How a node may move when the map is relaxed.
+/// How a node may move when the graph is relaxed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freedom {
     /// Not at all: surveyed, or the origin of the frame.
     Held,
-    /// In the plane: along its own x and y and about its own z. A planar robot's nodes keep height, roll and pitch,
-    /// and cost an eighth of free ones.
+    /// In the plane: along its own x and y and about its own z. A planar robot's nodes keep height,
+    /// roll and pitch, and cost an eighth of free ones.
     Planar,
     /// Every way.
     Full,

@@ -13,23 +13,23 @@ use super::rotation_first;
 pub enum Start {
     /// From the nodes' places.
     Here,
-    /// From the rotations and then the positions that the links agree on to first order, whatever the nodes'
-    /// places are. Every link counts there as if it were right.
+    /// From the rotations and then the positions that the links agree on to first order, whatever
+    /// the nodes' places are. Every link counts there as if it were right.
     RotationFirst,
 }
 
 /// How the kernels of doubtful links are treated on the way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Graduation {
-    /// They are what they are from the first step on: for maps that nearly fit.
+    /// They are what they are from the first step on: for graphs that nearly fit.
     None,
-    /// Geman–McClure kernels begin so wide that χ² has hardly more than one minimum, and are narrowed by a
-    /// factor of 1.4 in each step (Yang et al. 2020, "Graduated non-convexity for robust spatial perception"): for
-    /// maps of whose links many may be false.
+    /// Geman–McClure kernels begin so wide that χ² has hardly more than one minimum, and are
+    /// narrowed by a factor of 1.4 in each step (Yang et al. 2020, "Graduated non-convexity for
+    /// robust spatial perception"): for graphs of whose links many may be false.
     FromWide,
 }
 
-/// How a map is relaxed.
+/// How a graph is relaxed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelaxationSettings {
     /// From where.
@@ -53,7 +53,7 @@ impl Default for RelaxationSettings {
     }
 }
 
-/// What a relaxation did.
+/// Outcome of a relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxed {
     /// Times the normal equations were solved.
@@ -64,7 +64,7 @@ pub struct Relaxed {
     pub chi_squared: f64,
     /// Whether the last step was expected to be of no account.
     pub has_converged: bool,
-    /// Directions in which the links leave the map free, and in which it was not moved.
+    /// Directions in which the links leave the graph free, and in which it was not moved.
     pub n_undetermined: usize,
 }
 
@@ -77,15 +77,16 @@ const NEGLIGIBLE: f64 = 1e-12;
 /// Shorter steps tried in place of one that made things worse.
 const TRIALS_MAX: usize = 16;
 
-/// Share of the expected decrease from which on a step counts as good, and the region of trust grows.
+/// Share of the expected decrease from which on a step counts as good, and the region of trust
+/// grows.
 const GOOD_GAIN: f64 = 0.75;
 
 /// … and below which the region shrinks.
 const POOR_GAIN: f64 = 0.25;
 
 impl PoseGraph {
-    /// Moves all nodes to the nearest places at which χ² is least: Gauss–Newton steps inside a region of trust (Powell's
-    /// dogleg; Nocedal & Wright 2006, Sec. 4.1).
+    /// Moves all nodes to the nearest places at which χ² is least: Gauss–Newton steps inside a
+    /// region of trust (Powell's dogleg; Nocedal & Wright 2006, Sec. 4.1).
     ///
     /// Of a part that nothing ties to `map` the directions that no link determines are not moved.
     pub fn relax(&mut self, settings: &RelaxationSettings) -> Relaxed {
@@ -138,8 +139,8 @@ impl PoseGraph {
         report
     }
 
-    /// How wide Geman–McClure kernels have to be for the costs of all their links to be convex: k²/3 is where a cost
-    /// stops being so.
+    /// How wide Geman–McClure kernels have to be for the costs of all their links to be convex:
+    /// k²/3 is where a cost stops being so.
     fn widening(&self, poses: &[Isometry3<f64>]) -> f64 {
         let mut widening = 1.0_f64;
         for slot in self.links.iter().filter(|slot| slot.is_on) {
@@ -165,7 +166,7 @@ struct Descent<'a> {
     radius: f64,
 }
 
-/// What a step did.
+/// Outcome of a step.
 struct Step {
     /// Cost before.
     cost: f64,
@@ -195,7 +196,8 @@ impl Descent<'_> {
             decrease: 0.0,
             n_undetermined,
         };
-        // Nearly every full step is good; the region of trust costs something only once one was not.
+        // Nearly every full step is good; the region of trust costs something only once one was
+        // not.
         let mut descent = None;
         if self.radius.is_finite() {
             descent = Some(SteepestDescent::new(&equations));

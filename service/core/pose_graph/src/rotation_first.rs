@@ -1,8 +1,9 @@
-//! A start for the relaxation that does not depend on where the nodes are: rotations first, then positions.
+//! A start for the relaxation that does not depend on where the nodes are: rotations first, then
+//! positions.
 //!
-//! Both are linear least squares, so they have one minimum each (Martinec & Pajdla 2007; Carlone et al. 2015,
-//! Sec. IV, "chordal"): first over all 3×3 matrices instead of rotations, then, with the nearest rotations held,
-//! over positions.
+//! Both are linear least squares, so they have one minimum each (Martinec & Pajdla 2007; Carlone et
+//! al. 2015, Sec. IV, "chordal"): first over all 3×3 matrices instead of rotations, then, with the
+//! nearest rotations held, over positions.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3};
 
@@ -98,7 +99,8 @@ fn shifted(node: &Node, position: &Vector3<f64>) -> Vector3<f64> {
 
 /// The rotation with the least Frobenius distance from a matrix.
 fn nearest_rotation(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
-    // Newton's iteration for the orthogonal polar factor (Higham 1986) keeps the determinant's sign.
+    // Newton's iteration for the orthogonal polar factor (Higham 1986) keeps the determinant's
+    // sign.
     let mut factor = *matrix;
     if factor.determinant() > 1e-6 * factor.norm().powi(3) {
         for _ in 0..PROJECTION_STEPS {
@@ -123,7 +125,8 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_rotation_matrix(&rotation)
 }
 
-/// How much a link says about rotations \[1/rad²\], and about positions \[1/m²\]: the sum over the three axes.
+/// How much a link says about rotations \[1/rad²\], and about positions \[1/m²\]: the sum over the
+/// three axes.
 fn rotation_weight(link: &Link) -> f64 {
     match link {
         Link::PosePrior { information, .. } | Link::Between { information, .. } => {
@@ -144,8 +147,8 @@ fn position_weight(link: &Link) -> f64 {
     }
 }
 
-/// For each node the weight with which it is held where it is: of nodes that no prior ties to `map`, even through
-/// others, the oldest.
+/// For each node the weight with which it is held where it is: of nodes that no prior ties to
+/// `map`, even through others, the oldest.
 fn anchors(map: &PoseGraph, weight: impl Fn(&Link) -> f64) -> Vec<f64> {
     let mut parent: Vec<usize> = (0..map.nodes.len()).collect();
     let mut is_held: Vec<bool> = map

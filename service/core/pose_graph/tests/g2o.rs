@@ -135,8 +135,9 @@ fn a_bad_line_is_named() {
     );
 }
 
-/// χ² and positions at the optimum. The constants come from gtsam 4.3.0, with `gtsam.readG2o` on the texts above (each
-/// further node with a `VERTEX` line of its own), a prior of sd 1e-6 at the first pose, and
+/// χ² and positions at the optimum. The constants come from gtsam 4.3.0, with `gtsam.readG2o` on
+/// the texts above (each further node with a `VERTEX` line of its own), a prior of sd 1e-6 at the
+/// first pose, and
 ///
 /// ```python
 /// start = gtsam.InitializePose3.initialize(graph)  # planar: the chain of the odometry edges

@@ -7,8 +7,8 @@ pub use generator::Seeded;
 /// Increment of `SplitMix64`: 2⁶⁴ divided by the golden ratio, made odd.
 const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// One output of `SplitMix64` whose state was `state` before (Steele, Lea & Flood 2014, Fig. 14, with
-/// the constants of Stafford's variant 13).
+/// One output of `SplitMix64` whose state was `state` before (Steele, Lea & Flood 2014, Fig. 14,
+/// with the constants of Stafford's variant 13).
 fn split_mix(state: u64) -> u64 {
     let mut z = state.wrapping_add(GAMMA);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -16,7 +16,8 @@ fn split_mix(state: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Bits as a number in \[0, 1): the upper 53 fill the mantissa, so each result is exactly representable.
+/// Bits as a number in \[0, 1): the upper 53 fill the mantissa, so each result is exactly
+/// representable.
 fn fraction(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1u64 << 53) as f64
 }
@@ -38,7 +39,8 @@ pub fn uniform(seed: u64, keys: [u64; 3]) -> f64 {
 mod tests {
     use super::*;
 
-    /// The published outputs for the seed 1234567 (Rosetta Code, "Pseudo-random numbers/Splitmix64").
+    /// The published outputs for the seed 1234567 (Rosetta Code, "Pseudo-random
+    /// numbers/Splitmix64").
     #[test]
     fn equals_the_published_outputs() {
         let published = [

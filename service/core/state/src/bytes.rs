@@ -106,6 +106,62 @@ macro_rules! state_of_struct {
     };
 }
 
+/// Implements [`State`] for a struct of one unnamed field: the bytes are those of the field.
+///
+/// ```
+/// #[derive(Debug, PartialEq)]
+/// struct Number(u32);
+/// state::state_of_newtype!(Number);
+/// ```
+#[macro_export]
+macro_rules! state_of_newtype {
+    ($($name:ty),+ $(,)?) => {
+        $(impl $crate::State for $name {
+            fn write(&self, out: &mut $crate::StateWriter) {
+                $crate::State::write(&self.0, out);
+            }
+
+            fn read(
+                input: &mut $crate::StateReader<'_>,
+            ) -> Result<Self, $crate::CorruptState> {
+                $crate::State::read(input).map(Self)
+            }
+        })+
+    };
+}
+
+/// Implements [`State`] for an enum without data: one byte, a code for each variant.
+///
+/// ```
+/// enum Colour {
+///     Red,
+///     Green,
+/// }
+/// state::state_of_enum!(Colour { Red = 0, Green = 1 });
+/// ```
+#[macro_export]
+macro_rules! state_of_enum {
+    ($name:ty { $($variant:ident = $code:literal),+ $(,)? }) => {
+        impl $crate::State for $name {
+            fn write(&self, out: &mut $crate::StateWriter) {
+                let code: u8 = match self {
+                    $(Self::$variant => $code,)+
+                };
+                $crate::State::write(&code, out);
+            }
+
+            fn read(
+                input: &mut $crate::StateReader<'_>,
+            ) -> Result<Self, $crate::CorruptState> {
+                match <u8 as $crate::State>::read(input)? {
+                    $($code => Ok(Self::$variant),)+
+                    _ => Err($crate::CorruptState::Invalid),
+                }
+            }
+        }
+    };
+}
+
 /// Implements [`State`] for integers by their little-endian bytes.
 macro_rules! state_of_integer {
     ($($name:ty),+) => {
@@ -269,6 +325,22 @@ mod tests {
         assert_eq!(read(&bytes(&pose)), Ok(pose));
         let nested = (Some([1u64, u64::MAX]), (None::<bool>, i64::MIN));
         assert_eq!(read(&bytes(&nested)), Ok(nested));
+    }
+
+    #[test]
+    fn an_enum_is_one_byte() {
+        #[derive(Debug, PartialEq)]
+        enum Colour {
+            Red,
+            Green,
+        }
+        state_of_enum!(Colour { Red = 0, Green = 7 });
+        assert_eq!(
+            (bytes(&Colour::Red), bytes(&Colour::Green)),
+            (vec![0], vec![7])
+        );
+        assert_eq!(read::<Colour>(&[7]), Ok(Colour::Green));
+        assert_eq!(read::<Colour>(&[1]), Err(CorruptState::Invalid));
     }
 
     #[test]

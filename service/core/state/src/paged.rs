@@ -111,7 +111,8 @@ impl<T: Clone, const N: usize> PagedVec<T, N> {
         self.len += 1;
     }
 
-    /// Removes the last item. The page that it leaves empty stays, and says in a checkpoint that it is.
+    /// Removes the last item. The page that it leaves empty stays, and says in a checkpoint that it
+    /// is.
     pub fn pop(&mut self, revision: u64) -> Option<T> {
         let last = self.len.checked_sub(1)?;
         let page = Arc::make_mut(&mut Arc::make_mut(&mut self.pages)[last / N]);
@@ -220,8 +221,8 @@ mod tests {
     }
 
     proptest! {
-        /// Against a plain vector; `Some(i)` changes an item or, beyond 40, removes the last one, `None`
-        /// appends one, and the snapshot taken on the way must stay as it was.
+        /// Against a plain vector; `Some(i)` changes an item or, beyond 40, removes the last one,
+        /// `None` appends one, and the snapshot taken on the way must stay as it was.
         #[test]
         fn behaves_like_a_vector(
             steps in prop::collection::vec(prop::option::of(0usize..60), 0..60),

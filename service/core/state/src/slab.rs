@@ -6,8 +6,8 @@ use crate::{CorruptState, State, StateReader, StateWriter};
 /// The number of no item.
 pub const NONE: u32 = u32::MAX;
 
-/// Items by number, in copy-on-write pages. The number of a removed one goes to the next that comes, so that memory
-/// does not grow with what has been.
+/// Items by number, in copy-on-write pages. The number of a removed one goes to the next that
+/// comes, so that memory does not grow with what has been.
 #[derive(Clone, Debug)]
 pub struct Slab<T, const N: usize> {
     /// The slots, by number.
@@ -113,7 +113,8 @@ impl<T: Clone, const N: usize> Slab<T, N> {
         })
     }
 
-    /// What a checkpoint's header has to tell: the first vacant number, and how many items there are.
+    /// What a checkpoint's header has to tell: the first vacant number, and how many items there
+    /// are.
     pub fn vacancy(&self) -> (u32, u32) {
         (self.vacant, self.len)
     }

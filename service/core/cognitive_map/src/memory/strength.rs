@@ -5,7 +5,8 @@ use std::cmp::Ordering;
 use crate::settings::Settings;
 use state::state_of_struct;
 
-/// The strength of a memory: each use counts one when it happens and half as much after every half-life.
+/// The strength of a memory: each use counts one when it happens and half as much after every
+/// half-life.
 ///
 /// ```text
 /// strength(t) = Σ 2^(tᵢ − t)       tᵢ the uses, t now, both in half-lives on the space's sample clock

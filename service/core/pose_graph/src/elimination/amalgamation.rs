@@ -2,14 +2,16 @@
 
 use super::ordering::Stage;
 
-/// What a clique costs beside its arithmetic, in multiplications: about a microsecond of bookkeeping.
+/// What a clique costs beside its arithmetic, in multiplications: about a microsecond of
+/// bookkeeping.
 const CLIQUE_COST: f64 = 2000.0;
 
 /// What it costs to hand one entry on to the parent, in multiplications.
 const ENTRY_COST: f64 = 4.0;
 
-/// Joins each stage with its parent where the zeros that are then computed cost less than a clique of its own, and
-/// puts separators in the order of elimination. `dimension` is the number of unknowns of a variable.
+/// Joins each stage with its parent where the zeros that are then computed cost less than a clique
+/// of its own, and puts separators in the order of elimination. `dimension` is the number of
+/// unknowns of a variable.
 pub(super) fn amalgamate(stages: Vec<Stage>, dimension: impl Fn(u32) -> usize) -> Vec<Stage> {
     let rows = |variables: &[u32]| variables.iter().map(|&v| dimension(v)).sum::<usize>() as f64;
     let mut n_pivots: Vec<f64> = stages.iter().map(|stage| rows(&stage.frontal)).collect();

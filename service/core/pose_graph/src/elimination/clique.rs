@@ -8,7 +8,8 @@ use super::dense;
 /// Unknowns that a variable has at most.
 pub(crate) const DIMENSION_MAX: usize = 6;
 
-/// Variables that are eliminated together, the later ones they are tied to, and the dense matrix over both.
+/// Variables that are eliminated together, the later ones they are tied to, and the dense matrix
+/// over both.
 ///
 /// With the frontal variables first, the rows and columns of the front are
 ///
@@ -18,8 +19,9 @@ pub(crate) const DIMENSION_MAX: usize = 6;
 /// | y₁ᵀ  s₂ᵀ       |   right-hand sides, one row each
 /// ```
 ///
-/// L₁₁, L₂₁ and y₁ are the clique's part of the factor and of L⁻¹b; S and s₂ are what its subtree says about the
-/// separator, and stay: when only the clique's ancestors change, its whole subtree is taken from here.
+/// L₁₁, L₂₁ and y₁ are the clique's part of the factor and of L⁻¹b; S and s₂ are what its subtree
+/// says about the separator, and stay: when only the clique's ancestors change, its whole subtree
+/// is taken from here.
 #[derive(Clone, Debug)]
 pub(super) struct Clique {
     pub(super) parent: Option<u32>,
@@ -27,7 +29,8 @@ pub(super) struct Clique {
     /// Frontal variables, then the separator, both in the order of elimination.
     pub(super) variables: Vec<u32>,
     pub(super) n_frontal: usize,
-    /// First row of each variable, and behind the last one the number of rows without right-hand sides.
+    /// First row of each variable, and behind the last one the number of rows without right-hand
+    /// sides.
     pub(super) starts: Vec<usize>,
     /// Column-major, see [`dense`]; empty while there are no numbers.
     pub(super) entries: Vec<f64>,
@@ -145,8 +148,8 @@ impl Clique {
         }
     }
 
-    /// Solves for the frontal unknowns of one right-hand side, with those of the separator in place behind them:
-    /// `x` holds the unknowns row by row.
+    /// Solves for the frontal unknowns of one right-hand side, with those of the separator in place
+    /// behind them: `x` holds the unknowns row by row.
     ///
     /// ```text
     /// L₁₁ᵀ x₁ = y₁ − L₂₁ᵀ x₂
@@ -168,7 +171,8 @@ impl Clique {
             .sum()
     }
 
-    /// Solves L x = b for the frontal unknowns and takes their share from the separator's, in place.
+    /// Solves L x = b for the frontal unknowns and takes their share from the separator's, in
+    /// place.
     pub(super) fn substitute_forward(&self, x: &mut [f64]) {
         let n_rows = self.n_rows();
         for k in 0..self.n_pivots() {
@@ -214,8 +218,9 @@ pub(crate) struct Front<'a> {
 }
 
 impl Front<'_> {
-    /// Adds to the block of the variables `row` and `column` those rows and columns of `block` that are named; one
-    /// for each unknown of the variable. For one variable twice, the lower triangle of `block` counts.
+    /// Adds to the block of the variables `row` and `column` those rows and columns of `block` that
+    /// are named; one for each unknown of the variable. For one variable twice, the lower triangle
+    /// of `block` counts.
     pub(crate) fn add(
         &mut self,
         (row, row_axes): (u32, &[usize]),

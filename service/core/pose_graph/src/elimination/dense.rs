@@ -1,9 +1,10 @@
 //! Dense kernels on the lower triangle of a column-major matrix.
 //!
-//! Column j of a matrix with leading dimension `ld` stands at `j·ld`; what lies above the diagonal is
-//! scratch, and the kernels write there what nobody reads. `ld` is a multiple of [`LANES`] and the rows
-//! between the matrix and `ld` are zero, so that no loop over rows has a remainder. Every entry is
-//! summed in one fixed order, whatever vector width the compiler chooses: the bits do not depend on it.
+//! Column j of a matrix with leading dimension `ld` stands at `j·ld`; what lies above the diagonal
+//! is scratch, and the kernels write there what nobody reads. `ld` is a multiple of [`LANES`] and
+//! the rows between the matrix and `ld` are zero, so that no loop over rows has a remainder. Every
+//! entry is summed in one fixed order, whatever vector width the compiler chooses: the bits do not
+//! depend on it.
 
 use pulp::Arch;
 
@@ -16,8 +17,8 @@ const TILE: usize = 4;
 /// Below this many columns a factor is computed column by column.
 const COLUMNS_MIN: usize = 8;
 
-/// Share of its original diagonal entry below which a pivot counts as rounding noise: the direction is one
-/// about which nothing is known.
+/// Share of its original diagonal entry below which a pivot counts as rounding noise: the direction
+/// is one about which nothing is known.
 const NOISE: f64 = 1e-13;
 
 /// What a pivot that is only noise becomes. The solution then does not move along it.
@@ -28,16 +29,16 @@ pub(super) fn leading_dimension(n_rows: usize) -> usize {
     n_rows.next_multiple_of(LANES)
 }
 
-/// Factors the first `n_pivots` columns of the symmetric `matrix` (leading dimension `ld`) in place and
-/// subtracts what they explain from the columns up to `n_columns`:
+/// Factors the first `n_pivots` columns of the symmetric `matrix` (leading dimension `ld`) in place
+/// and subtracts what they explain from the columns up to `n_columns`:
 ///
 /// ```text
 /// | A  Bᵀ |   | L₁₁ 0 | | L₁₁ᵀ L₂₁ᵀ |
 /// | B  C  | = | L₂₁ I | | 0    C − L₂₁ L₂₁ᵀ |
 /// ```
 ///
-/// A pivot that is not above the noise of its own cancellation is fixed: its unknown gets no correction.
-/// Returns the number of such pivots.
+/// A pivot that is not above the noise of its own cancellation is fixed: its unknown gets no
+/// correction. Returns the number of such pivots.
 pub(super) fn factor(
     arch: Arch,
     matrix: &mut [f64],
@@ -52,8 +53,8 @@ pub(super) fn factor(
     n_fixed
 }
 
-/// Factors the columns `from..to`, into which all earlier ones have been subtracted, by halves: so nearly all
-/// work is done by [`subtract_products`] on columns that are still in the cache.
+/// Factors the columns `from..to`, into which all earlier ones have been subtracted, by halves: so
+/// nearly all work is done by [`subtract_products`] on columns that are still in the cache.
 fn factor_columns(
     arch: Arch,
     matrix: &mut [f64],
@@ -136,7 +137,8 @@ fn subtract_tile<const N: usize>(done: &[f64], tile: &mut [f64], ld: usize, j: u
     for row in (j / LANES * LANES..ld).step_by(LANES) {
         let mut sums = [[0.0; LANES]; N];
         for column in done.chunks_exact(ld) {
-            // Copies and counted loops: with references the compiler does not keep the sums in registers.
+            // Copies and counted loops: with references the compiler does not keep the sums in
+            // registers.
             let rows: [f64; LANES] = column[row..row + LANES].try_into().expect("LANES long");
             let factors: [f64; N] = column[j..j + N].try_into().expect("N long");
             for c in 0..N {

@@ -8,7 +8,8 @@ use super::clique::DIMENSION_MAX;
 use super::dense::FIXED;
 use super::tree::CliqueTree;
 
-/// L⁻¹ E for the unit columns E of one variable: it is zero outside the way from the variable's clique to the root.
+/// L⁻¹ E for the unit columns E of one variable: it is zero outside the way from the variable's
+/// clique to the root.
 ///
 /// H⁻¹ = L⁻ᵀ L⁻¹, so the block of the inverse for two variables is the product of theirs.
 #[derive(Debug)]
@@ -18,8 +19,8 @@ pub(crate) struct HalfSolution {
 }
 
 impl CliqueTree {
-    /// The half solution of a variable with `dimension` unknowns; `None` if the equations leave it free, or
-    /// the tree has no such variable.
+    /// The half solution of a variable with `dimension` unknowns; `None` if the equations leave it
+    /// free, or the tree has no such variable.
     ///
     /// Its cost is that of one column of each clique on the way to the root.
     pub(crate) fn half_solution(&self, variable: u32, dimension: usize) -> Option<HalfSolution> {

@@ -1,16 +1,19 @@
 //! In which order variables are eliminated, and the cliques that this gives.
 //!
-//! Approximate minimum degree on a quotient graph (Amestoy, Davis & Duff 1996): an eliminated variable lives on
-//! as an *element*, the set of variables that its elimination has tied together, so the graph never grows.
-//! What the elimination of a pivot ties together is exactly its column of the factor; the cliques therefore
-//! come out of the ordering itself, without a symbolic factorisation behind it.
+//! Approximate minimum degree on a quotient graph (Amestoy, Davis & Duff 1996): an eliminated
+//! variable lives on as an *element*, the set of variables that its elimination has tied together,
+//! so the graph never grows. What the elimination of a pivot ties together is exactly its column of
+//! the factor; the cliques therefore come out of the ordering itself, without a symbolic
+//! factorisation behind it.
 
 /// What is to be ordered: variables 0, 1, … and what ties them together.
 #[derive(Debug, Default)]
 pub(super) struct Problem {
-    /// For each variable those that share a link with it; repetitions and the variable itself do no harm.
+    /// For each variable those that share a link with it; repetitions and the variable itself do no
+    /// harm.
     pub(super) adjacent: Vec<Vec<u32>>,
-    /// Sets of variables that earlier eliminations have tied together: what stays of a part already factored.
+    /// Sets of variables that earlier eliminations have tied together: what stays of a part already
+    /// factored.
     pub(super) elements: Vec<Vec<u32>>,
     /// Variables that are to come after all others.
     pub(super) last: Vec<bool>,
@@ -58,7 +61,8 @@ pub(super) fn order(problem: Problem) -> Vec<Stage> {
     stages
 }
 
-/// A variable of the quotient graph, standing for all variables that became indistinguishable from it.
+/// A variable of the quotient graph, standing for all variables that became indistinguishable from
+/// it.
 #[derive(Debug, Default)]
 struct Group {
     /// Empty once it is eliminated, or has become part of another group.
@@ -75,11 +79,13 @@ struct Group {
 /// The state of the elimination.
 struct Quotient {
     groups: Vec<Group>,
-    /// Groups of each element, first those of the problem, then one for each pivot; empty once used up.
+    /// Groups of each element, first those of the problem, then one for each pivot; empty once used
+    /// up.
     elements: Vec<Vec<u32>>,
     /// Number of variables of each element.
     sizes: Vec<usize>,
-    /// How many of an element's variables lie outside the newest element, and when that was counted.
+    /// How many of an element's variables lie outside the newest element, and when that was
+    /// counted.
     outside: Vec<(usize, usize)>,
     /// The step at which a group was last seen.
     seen: Vec<usize>,
@@ -171,7 +177,8 @@ impl Quotient {
         }
     }
 
-    /// Replaces a pivot by the element of all that it is tied to. Returns the elements used up by that.
+    /// Replaces a pivot by the element of all that it is tied to. Returns the elements used up by
+    /// that.
     fn eliminate(&mut self, pivot: usize) -> Vec<usize> {
         self.step += 1;
         let step = self.step;
@@ -204,8 +211,9 @@ impl Quotient {
         used_up
     }
 
-    /// Counts for each element that the newest one meets how many of its variables lie outside that one. Those
-    /// without any say nothing that the newest does not say: they are used up too, and returned.
+    /// Counts for each element that the newest one meets how many of its variables lie outside that
+    /// one. Those without any say nothing that the newest does not say: they are used up too, and
+    /// returned.
     fn count_outside(&mut self, newest: &[u32]) -> Vec<usize> {
         let mut met = Vec::new();
         for group in newest.iter().map(|&group| &self.groups[group as usize]) {
@@ -229,7 +237,8 @@ impl Quotient {
         met
     }
 
-    /// Brings a group of the newest element up to date; `size` is that element's number of variables.
+    /// Brings a group of the newest element up to date; `size` is that element's number of
+    /// variables.
     fn update(&mut self, group: usize, size: usize) {
         let mut own = std::mem::take(&mut self.groups[group]);
         own.elements
@@ -255,7 +264,8 @@ impl Quotient {
         self.groups[group] = own;
     }
 
-    /// Merges groups of the newest element that are tied to the same others, and offers what remains.
+    /// Merges groups of the newest element that are tied to the same others, and offers what
+    /// remains.
     fn merge_indistinguishable(&mut self) {
         let newest = self
             .elements

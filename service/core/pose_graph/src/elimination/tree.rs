@@ -17,19 +17,20 @@ pub(crate) trait Equations {
     /// Number of unknowns of a variable, at most [`DIMENSION_MAX`].
     fn dimension(&self, variable: u32) -> usize;
 
-    /// The links of a variable: number of the link and the variable at its other end, which is the variable itself for
-    /// a link that has only one.
+    /// The links of a variable: number of the link and the variable at its other end, which is the
+    /// variable itself for a link that has only one.
     fn links(&self, variable: u32) -> &[(u32, u32)];
 
-    /// Whether a link ties its variables together. One that says nothing would only make the factor denser.
+    /// Whether a link couples its variables. A link without weight would only make the factor
+    /// denser.
     fn ties(&self, _link: u32) -> bool {
         true
     }
 
-    /// Adds what a variable contributes by itself.
+    /// Adds the terms of a variable alone.
     fn add_own(&self, _variable: u32, _front: &mut Front<'_>) {}
 
-    /// Adds what a link contributes.
+    /// Adds the terms of a link.
     fn add(&self, link: u32, front: &mut Front<'_>);
 }
 
@@ -53,11 +54,11 @@ impl Part for Everything {
     fn solved(&mut self, _variable: u32, _unknowns: &[f64]) {}
 }
 
-/// A Cholesky factor as a tree of dense cliques (multifrontal: Duff & Reid 1983; as the Bayes tree of a map: Kaess
-/// et al. 2012).
+/// A Cholesky factor as a tree of dense cliques (multifrontal: Duff & Reid 1983; as the Bayes tree
+/// of a graph: Kaess et al. 2012).
 ///
-/// A clique's separator lies within its parent's variables, so whatever changes in a clique changes its ancestors
-/// and nothing else.
+/// A clique's separator lies within its parent's variables, so whatever changes in a clique changes
+/// its ancestors and nothing else.
 #[derive(Clone, Debug)]
 pub(crate) struct CliqueTree {
     /// Cliques by number; numbers of removed ones are used again.
@@ -66,13 +67,13 @@ pub(crate) struct CliqueTree {
     /// The clique in which a variable is frontal.
     home: Vec<u32>,
     roots: Vec<u32>,
-    /// Scratch: the place of a variable in the clique at hand.
+    /// Scratch: index of a variable in the current clique.
     local: Vec<u32>,
     arch: Arch,
     n_right: usize,
 }
 
-/// What a removal leaves.
+/// The variables and subtrees that a removal leaves.
 #[derive(Debug, Default)]
 pub(crate) struct Gap {
     /// Variables without a clique, in the order in which they were eliminated.
@@ -193,14 +194,42 @@ impl CliqueTree {
         gap
     }
 
-    /// Orders the variables of a gap anew and builds their cliques over the orphans. Returns the new cliques,
-    /// children before parents; they have no numbers yet.
+    /// Orders the variables of a gap anew and builds their cliques over the orphans. Returns the
+    /// new cliques, children before parents; they have no numbers yet.
     pub(crate) fn restructure<E: Equations>(
         &mut self,
         equations: &E,
         gap: &Gap,
         is_last: impl Fn(u32) -> bool,
     ) -> Vec<u32> {
+        let problem = self.ordering_problem(equations, gap, is_last);
+        let stages = amalgamate(ordering::order(problem), |variable| {
+            equations.dimension(gap.variables[variable as usize])
+        });
+        let ids: Vec<u32> = stages.iter().map(|_| self.new_id()).collect();
+        for (stage, &id) in stages.into_iter().zip(&ids) {
+            self.place_stage(equations, gap, stage, id, &ids);
+        }
+        for &id in &ids {
+            if let Some(parent) = self.clique(id).parent {
+                self.cliques[parent as usize]
+                    .as_mut()
+                    .expect("parents live")
+                    .children
+                    .push(id);
+            }
+        }
+        ids
+    }
+
+    /// The elimination graph of a gap: its variables by their index in the gap, coupled by links
+    /// and by the separators of orphans.
+    fn ordering_problem<E: Equations>(
+        &mut self,
+        equations: &E,
+        gap: &Gap,
+        is_last: impl Fn(u32) -> bool,
+    ) -> Problem {
         for (place, &variable) in gap.variables.iter().enumerate() {
             self.local[variable as usize] = number(place);
         }
@@ -231,48 +260,44 @@ impl CliqueTree {
         for &variable in &gap.variables {
             self.local[variable as usize] = NOWHERE;
         }
-        let stages = amalgamate(ordering::order(problem), |variable| {
-            equations.dimension(gap.variables[variable as usize])
-        });
-        let ids: Vec<u32> = stages.iter().map(|_| self.new_id()).collect();
-        for (stage, &id) in stages.into_iter().zip(&ids) {
-            let variables = stage.frontal.iter().chain(&stage.separator);
-            let variables: Vec<u32> = variables
-                .map(|&variable| gap.variables[variable as usize])
-                .collect();
-            for &variable in &variables[..stage.frontal.len()] {
-                self.home[variable as usize] = id;
-            }
-            let dimension = |variable| equations.dimension(variable);
-            let mut clique = Clique::new(variables, stage.frontal.len(), self.n_right, dimension);
-            clique.parent = stage.parent.map(|parent| ids[parent]);
-            for element in stage.elements {
-                let orphan = gap.orphans[element as usize];
-                clique.children.push(orphan);
-                self.cliques[orphan as usize]
-                    .as_mut()
-                    .expect("orphans live")
-                    .parent = Some(id);
-            }
-            if clique.parent.is_none() {
-                self.roots.push(id);
-            }
-            self.cliques[id as usize] = Some(clique);
-        }
-        for &id in &ids {
-            if let Some(parent) = self.clique(id).parent {
-                self.cliques[parent as usize]
-                    .as_mut()
-                    .expect("parents live")
-                    .children
-                    .push(id);
-            }
-        }
-        ids
+        problem
     }
 
-    /// Computes the numbers of these cliques, which come children before parents. Returns the number of directions
-    /// about which the equations say nothing.
+    /// Makes the clique of one stage of an ordering, with the orphans below it.
+    fn place_stage<E: Equations>(
+        &mut self,
+        equations: &E,
+        gap: &Gap,
+        stage: ordering::Stage,
+        id: u32,
+        ids: &[u32],
+    ) {
+        let variables = stage.frontal.iter().chain(&stage.separator);
+        let variables: Vec<u32> = variables
+            .map(|&variable| gap.variables[variable as usize])
+            .collect();
+        for &variable in &variables[..stage.frontal.len()] {
+            self.home[variable as usize] = id;
+        }
+        let dimension = |variable| equations.dimension(variable);
+        let mut clique = Clique::new(variables, stage.frontal.len(), self.n_right, dimension);
+        clique.parent = stage.parent.map(|parent| ids[parent]);
+        for element in stage.elements {
+            let orphan = gap.orphans[element as usize];
+            clique.children.push(orphan);
+            self.cliques[orphan as usize]
+                .as_mut()
+                .expect("orphans live")
+                .parent = Some(id);
+        }
+        if clique.parent.is_none() {
+            self.roots.push(id);
+        }
+        self.cliques[id as usize] = Some(clique);
+    }
+
+    /// Factors these cliques, given children before parents. Returns the number of directions that
+    /// the equations leave free.
     pub(crate) fn refactor<E: Equations>(&mut self, equations: &E, cliques: &[u32]) -> usize {
         let mut n_fixed = 0;
         for &id in cliques {
@@ -292,7 +317,8 @@ impl CliqueTree {
                     },
                 );
                 for &(link, other) in equations.links(variable) {
-                    // A link belongs to the clique of the first of its variables, and to the first of them there.
+                    // A link belongs to the clique of the first of its variables, and to the first
+                    // of them there.
                     let other_place = self.local[other as usize];
                     if other_place != NOWHERE && other_place as usize >= place {
                         equations.add(
@@ -324,7 +350,8 @@ impl CliqueTree {
         solution
     }
 
-    /// Solves from the roots on down for the cliques that `part` wants, and passes by what lies below the others.
+    /// Solves from the roots downwards for the cliques that `part` wants, and skips the subtrees of
+    /// others.
     pub(crate) fn solve_where(&self, solution: &mut [f64], part: &mut impl Part) {
         let mut x = Vec::new();
         let mut open = self.roots.clone();
@@ -352,7 +379,7 @@ impl CliqueTree {
         }
     }
 
-    /// bᵀ H⁻¹ b of the first right-hand side: by how much the solution lowers what the equations describe.
+    /// bᵀ H⁻¹ b of the first right-hand side: the decrease of χ² at the solution.
     pub(crate) fn explained(&self) -> f64 {
         self.all()
             .into_iter()
@@ -387,7 +414,7 @@ pub(crate) fn slot(variable: usize, right: usize, n_right: usize) -> usize {
     (variable * n_right + right) * DIMENSION_MAX
 }
 
-/// Maps stay far below 2³² nodes.
+/// Graphs stay far below 2³² nodes.
 fn number(of: usize) -> u32 {
     u32::try_from(of).expect("fewer than 2³² variables")
 }

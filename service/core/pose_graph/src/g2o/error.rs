@@ -1,4 +1,4 @@
-//! What may be wrong with a pose graph.
+//! Errors of a text in the format g2o.
 
 use crate::InvalidInformation;
 

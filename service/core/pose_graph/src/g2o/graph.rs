@@ -57,8 +57,8 @@ pub struct G2oGraph {
 }
 
 impl G2oGraph {
-    /// Reads a text. A node that has edges and no entry of its own begins where the first edge to it from an earlier
-    /// node puts it, or else at the origin.
+    /// Reads a text. A node that has edges and no entry of its own begins where the first edge to
+    /// it from an earlier node puts it, or else at the origin.
     ///
     /// # Errors
     /// A line is no entry of the format, or there is no edge.
@@ -94,8 +94,8 @@ impl G2oGraph {
         &self.poses
     }
 
-    /// Edges between poses, sorted by the later of their ends: the order in which a robot would have measured them. Those
-    /// with the same later end are in the order of the file.
+    /// Edges between poses, sorted by the later of their ends: the order in which a robot would
+    /// have measured them. Those with the same later end are in the order of the file.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
     }
@@ -125,8 +125,8 @@ impl G2oGraph {
     }
 
     /// The graph to be relaxed, and the numbers that its nodes have there. All edges count as right
-    /// ([`Kernel::Gaussian`]). Held is what the text says, or else the first pose. A point without an entry begins where
-    /// the first edge to it puts it.
+    /// ([`Kernel::Gaussian`]). Held is what the text says, or else the first pose. A point without
+    /// an entry begins where the first edge to it puts it.
     #[expect(
         clippy::missing_panics_doc,
         reason = "edges join two different nodes that are there"

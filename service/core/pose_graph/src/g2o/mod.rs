@@ -14,9 +14,10 @@
 //! | `PARAMS_SE3OFFSET` | sensor, its pose on the body: x, y, z, qx, qy, qz, qw |
 //! | `FIX` | ids of nodes that stay where they are |
 //!
-//! The entries of an information matrix are those on and above the diagonal, row by row; its order is translation,
-//! rotation vector, in the axes of the second pose. Kümmerle et al. 2011, "g2o: a general framework for graph
-//! optimization". A file is planar or spatial, not both. Lines may come in any order, except that a sensor comes before its edges.
+//! The entries of an information matrix are those on and above the diagonal, row by row; its order
+//! is translation, rotation vector, in the axes of the second pose. Kümmerle et al. 2011, "g2o: a
+//! general framework for graph optimization". A file is planar or spatial, not both. Lines may come
+//! in any order, except that a sensor comes before its edges.
 
 mod error;
 mod graph;

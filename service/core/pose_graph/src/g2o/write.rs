@@ -8,8 +8,9 @@ use nalgebra::Isometry3;
 
 const ALL_AXES: [usize; 6] = [0, 1, 2, 3, 4, 5];
 
-/// The poses, points and links of a graph, for other programs. A pose that is held, or tied to the map, is written as one that
-/// stays where it is; a sighting of a place on another pose has no entry in the format, and is left out.
+/// The poses, points and links of a graph, for other programs. A pose that is held, or tied to the
+/// graph, is written as one that stays where it is; a sighting of a place on another pose has no
+/// entry in the format, and is left out.
 pub fn write_g2o(graph: &PoseGraph) -> String {
     let is_planar = graph.is_planar();
     let mut text = String::new();

@@ -142,8 +142,8 @@ fn a_map_that_was_relaxed_as_a_whole_can_grow_on() {
     assert!(distance(&map, &nodes, &batch) < 1e-6);
 }
 
-/// A link that says nothing may join anything, and the map neither moves nor gets denser; once it is switched on it counts as any
-/// other.
+/// A link that says nothing may join anything, and the map neither moves nor gets denser; once it
+/// is switched on it counts as any other.
 #[test]
 fn a_silent_link_costs_nothing_until_it_is_switched_on() {
     let world = Rounds::new(61, Freedom::Planar, 0.05);

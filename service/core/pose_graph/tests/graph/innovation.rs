@@ -12,7 +12,8 @@ fn noise() -> PoseCovariance {
     PoseCovariance::from_sd(&Vector6::new(0.05, 0.02, 0.03, 0.01, 0.005, 0.02))
 }
 
-/// Expecting a pose by a motion that is not in the map is expecting it in the map that has the motion.
+/// Expecting a pose by a motion that is not in the map is expecting it in the map that has the
+/// motion.
 #[test]
 fn a_pose_after_a_motion_is_expected_as_if_the_map_had_it() {
     let world = Rounds::new(51, Freedom::Full, 0.05);
@@ -59,7 +60,8 @@ fn a_pose_after_a_motion_is_expected_as_if_the_map_had_it() {
     assert!(error < 1e-6 * expected.covariance.norm(), "{error}");
 }
 
-/// Along one axis the square is that of the difference over the sum of both variances, and a direction without information adds nothing, whatever is found there.
+/// Along one axis the square is that of the difference over the sum of both variances, and a
+/// direction without information adds nothing, whatever is found there.
 #[test]
 fn an_innovation_is_measured_in_the_deviations_of_both() {
     let sd = Vector6::new(0.3, 0.3, 0.3, 0.0, 0.0, 0.0);

@@ -195,7 +195,8 @@ fn what_nothing_ties_to_the_map_keeps_its_place() {
     assert_eq!(map.pose(alone), &Isometry3::translation(5.0, 6.0, 7.0));
 }
 
-/// The second round begins in a frame of its own, and is carried into that of the first when one step between them is known.
+/// The second round begins in a frame of its own, and is carried into that of the first when one
+/// step between them is known.
 #[test]
 fn frames_merge() {
     let own_frame = Isometry3::new(Vector3::new(50.0, -20.0, 5.0), Vector3::new(1.0, 2.0, -0.5));

@@ -8,7 +8,7 @@ pub(crate) use map::LandmarkMap;
 
 use crate::estimator::Observers;
 use crate::input::Label;
-use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use state::{state_of_newtype, state_of_struct};
 
 /// A position with its covariance, both in `map`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,12 +118,4 @@ impl Landmark {
     }
 }
 
-impl State for LandmarkId {
-    fn write(&self, out: &mut StateWriter) {
-        self.0.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        State::read(input).map(Self)
-    }
-}
+state_of_newtype!(LandmarkId);

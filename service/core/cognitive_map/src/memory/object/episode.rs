@@ -74,7 +74,8 @@ pub(crate) enum News {
         /// The object.
         object: ObjectId,
     },
-    /// An episode that was to teach has taught nothing: it did not become clear how its frame lies in the object's.
+    /// An episode that was to teach has taught nothing: it did not become clear how its frame lies
+    /// in the object's.
     NotLearned,
 }
 
@@ -89,7 +90,8 @@ impl Episode {
         Self::new(Purpose::Learn(name), spacing, orientation, noise)
     }
 
-    /// An episode that is to recognise. `model` is empty, and what it is learned as if it is unknown.
+    /// An episode that is to recognise. `model` is empty, and what it is learned as if it is
+    /// unknown.
     pub(crate) fn identify(
         model: ObjectModel,
         orientation: Orientation,
@@ -168,8 +170,8 @@ impl Episode {
         self.take(contact, memory)
     }
 
-    /// The episode ends. Answers what it brought about, and what its contacts said before anything was
-    /// learned from it, if that was asked.
+    /// The episode ends. Answers what it brought about, and what its contacts said before anything
+    /// was learned from it, if that was asked.
     pub(crate) fn end(
         &mut self,
         memory: &mut ObjectMemory,
@@ -258,7 +260,8 @@ impl Episode {
         }
     }
 
-    /// Learns an object of a new name: one that was learned on the spot, if it is that, or a new one.
+    /// Learns an object of a new name: one that was learned on the spot, if it is that, or a new
+    /// one.
     fn name_or_find(
         &self,
         name: &Label,
@@ -348,8 +351,8 @@ impl Episode {
         news
     }
 
-    /// What the contacts so far say. After a change of the memory all of them are judged anew, so that a restored
-    /// episode goes on like one that was never stored.
+    /// What the contacts so far say. After a change of the memory all of them are judged anew, so
+    /// that a restored episode goes on like one that was never stored.
     fn recognise(&mut self, memory: &ObjectMemory) -> Arc<Recognition> {
         match self.recognition.take() {
             Some((changed, recognition)) if changed == memory.changed() => recognition,

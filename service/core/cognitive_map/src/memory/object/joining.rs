@@ -1,8 +1,9 @@
 //! Objects that turn out to be one, and one that turns out to be two.
 //!
-//! Nothing else than [recognition](object_recognition) decides. Two objects that a visit fits alike are one if what was learned of the
-//! one, felt again, is the other. What was joined last to an object stays in doubt: a visit that fits the object as it was before, or
-//! what was joined to it, better than both together takes them apart again; one that fits both together better settles it.
+//! Nothing else than [recognition](object_recognition) decides. Two objects that a visit fits alike
+//! are one if what was learned of the one, felt again, is the other. What was joined last to an
+//! object stays in doubt: a visit that fits the object as it was before, or what was joined to it,
+//! better than both together takes them apart again; one that fits both together better settles it.
 
 use nalgebra::Isometry3;
 
@@ -14,11 +15,13 @@ use object_recognition::{
     Recognition, Verdict,
 };
 
-/// Contacts by which two objects, or the parts of one, are compared: they tell about as much as a whole visit does.
+/// Contacts by which two objects, or the parts of one, are compared: they tell about as much as a
+/// whole visit does.
 const CONTACTS_MAX: usize = 48;
 /// Most objects of a visit that are compared with one another.
 const ALIKE_MAX: usize = 4;
-/// Fit below which a model is not explained by another one that it would be taken for, in deviations.
+/// Fit below which a model is not explained by another one that it would be taken for, in
+/// deviations.
 const FIT_LEAST: f64 = -3.0;
 
 /// Share of the evidence that such a pose holds.
@@ -91,7 +94,8 @@ impl ObjectMemory {
         self.doubt(id, orientation, contacts, when)
     }
 
-    /// Makes one of the likeliest object and the first that is the same. An object that somebody has named stays what it was said to be.
+    /// Makes one of the likeliest object and the first that is the same. An object that somebody
+    /// has named stays what it was said to be.
     fn unite(
         &mut self,
         alike: &[ObjectId],
@@ -115,8 +119,8 @@ impl ObjectMemory {
         None
     }
 
-    /// Where the frame of one object lies in that of another one, if what was learned of it is that one, and no
-    /// other of those that are alike.
+    /// Where the frame of one object lies in that of another one, if what was learned of it is that
+    /// one, and no other of those that are alike.
     fn lies_in(
         &self,
         part: ObjectId,

@@ -40,7 +40,8 @@ impl KnownObject {
         &self.name
     }
 
-    /// Whether somebody has given it the name; of one that was learned on the spot it follows from its number.
+    /// Whether somebody has given it the name; of one that was learned on the spot it follows from
+    /// its number.
     pub fn is_named(&self) -> bool {
         self.is_named
     }
@@ -169,7 +170,8 @@ impl ObjectMemory {
         self.put(id, known, model, None, revision);
     }
 
-    /// Remembers a new object that an episode felt; answers its number. Without a name it gets one by its number.
+    /// Remembers a new object that an episode felt; answers its number. Without a name it gets one
+    /// by its number.
     pub(crate) fn found(
         &mut self,
         name: Option<Label>,
@@ -197,7 +199,8 @@ impl ObjectMemory {
         Some(id)
     }
 
-    /// Extends an object by what so many visits and contacts felt, whose frame lies in the object's so.
+    /// Extends an object by what so many visits and contacts felt, whose frame lies in the object's
+    /// so.
     pub(crate) fn extend(
         &mut self,
         id: ObjectId,
@@ -264,7 +267,8 @@ impl ObjectMemory {
         }
     }
 
-    /// Which object a visit was to, if its contacts say so, and where its frame lies in the object's.
+    /// Which object a visit was to, if its contacts say so, and where its frame lies in the
+    /// object's.
     pub(super) fn visited(
         &self,
         orientation: &Orientation,
@@ -331,7 +335,8 @@ impl ObjectMemory {
         self.changed = revision;
     }
 
-    /// What was joined last to an object is in doubt no more. What may be recognised stays as it is, and its index with it.
+    /// What was joined last to an object is in doubt no more. What may be recognised stays as it
+    /// is, and its index with it.
     pub(super) fn settle(&mut self, id: ObjectId, revision: u64) {
         let Some(model) = self.library.get(id) else {
             return;

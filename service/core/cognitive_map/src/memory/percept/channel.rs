@@ -6,14 +6,14 @@ use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_str
 /// Least deviation that a level is compared with, as a part of the deviation of its channel's
 /// levels. Without it, two equal values at a place would make every later one a wonder.
 const FLOOR_PER_CHANNEL_SD: f64 = 0.1;
-/// Least deviation as a part of the channel's mean: where all levels were equal, a difference in the
-/// last digits of a sensor is none.
+/// Least deviation as a part of the channel's mean: where all levels were equal, a difference in
+/// the last digits of a sensor is none.
 const FLOOR_PER_MEAN: f64 = 1e-6;
 /// Least deviation of all, in the channel's unit: nothing is divided by zero.
 const FLOOR: f64 = 1e-12;
 
-/// Levels over which the deviation of a channel is taken, about: what was long ago is forgotten, also
-/// if it was a sensor's sentinel.
+/// Levels over which the deviation of a channel is taken, about: what was long ago is forgotten,
+/// also if it was a sensor's sentinel.
 const LEVELS: f64 = 1000.0;
 /// Levels after which one is bounded before it counts.
 const LEVELS_MIN: u64 = 16;

@@ -1,11 +1,12 @@
 //! What places remember of a channel of descriptors, laid out for a scan.
 //!
 //! Directions lie one behind the other in blocks of 16 KiB. A search multiplies the cue with every
-//! one of them: exact, the same on every run, and as fast as memory is read. Where there are so many
-//! that this takes long, the cue is compared with sketches first, and multiplied with the nearest.
+//! one of them: exact, the same on every run, and as fast as memory is read. Where there are so
+//! many that this takes long, the cue is compared with sketches first, and multiplied with the
+//! nearest.
 
 use super::sketch::{Sketcher, Sketches};
-use crate::memory::place::PlaceId;
+use crate::memory::ids::PlaceId;
 use place_recognition::dot;
 use state::PagedVec;
 use state::SparseVec;
@@ -43,8 +44,8 @@ pub(crate) struct Block {
     scales: Vec<f32>,
 }
 
-/// What all places remember of the channel, in the order in which they first did, as long as none is
-/// forgotten: then the last one takes its row.
+/// What all places remember of the channel, in the order in which they first did, as long as none
+/// is forgotten: then the last one takes its row.
 #[derive(Clone, Debug)]
 pub(super) struct DescriptorMemory {
     dimension: usize,
@@ -196,8 +197,8 @@ impl DescriptorMemory {
         })
     }
 
-    /// As [`Self::cosines`], of the `count` places whose sketches are nearest to the cue's, and of those
-    /// that are equally near.
+    /// As [`Self::cosines`], of the `count` places whose sketches are nearest to the cue's, and of
+    /// those that are equally near.
     pub(super) fn cosines_of_nearest<'a>(
         &'a self,
         vector: &'a [f32],

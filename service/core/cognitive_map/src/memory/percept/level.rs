@@ -1,6 +1,6 @@
 //! What places remember of a channel of levels.
 
-use crate::memory::place::PlaceId;
+use crate::memory::ids::PlaceId;
 use state::{CorruptState, Moments, SparseVec};
 
 /// Places per page.
@@ -45,8 +45,8 @@ impl LevelMemory {
         self.traces.remove(place.0 as usize, revision);
     }
 
-    /// How likely each place makes a level: the density of a normal distribution there, as a part of
-    /// the highest that there could be. `sd_floor` is the least deviation.
+    /// How likely each place makes a level: the density of a normal distribution there, as a part
+    /// of the highest that there could be. `sd_floor` is the least deviation.
     ///
     /// ```text
     /// likelihood = (floor / σ) exp(−(x − μ)² / (2 σ²)),   σ = max(deviation, floor)
@@ -75,7 +75,8 @@ impl LevelMemory {
     }
 }
 
-/// The place of an index, which is its identifier; a checkpoint's page index leaves no room for more.
+/// The place of an index, which is its identifier; a checkpoint's page index leaves no room for
+/// more.
 fn id_of(index: usize) -> PlaceId {
     PlaceId(u32::try_from(index).expect("places have identifiers of 32 bits"))
 }

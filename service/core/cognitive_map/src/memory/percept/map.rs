@@ -6,16 +6,16 @@ use super::descriptor::{Block, DescriptorMemory};
 use super::level::{LEVEL_MAX, LevelMemory, surprise};
 use super::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
 use crate::input::{Descriptor, Label};
-use crate::memory::place::PlaceId;
+use crate::memory::ids::PlaceId;
 use state::{CorruptState, Moments, PageItems, PagedVec, StateWriter};
 
 /// Most channels of a space. What is felt on further ones is counted and stays in the journal.
 const CHANNELS_MAX: usize = 64;
 /// Channels per page.
 pub(crate) const CHANNEL_PAGE: usize = 8;
-/// Most pages of a channel's memory: what the index of a checkpoint's page leaves room for. That is a
-/// page for every 64 places that there can ever be, and at least 6·10⁷ places can remember something
-/// of a channel of descriptors.
+/// Most pages of a channel's memory: what the index of a checkpoint's page leaves room for. That is
+/// a page for every 64 places that there can ever be, and at least 6·10⁷ places can remember
+/// something of a channel of descriptors.
 pub(crate) const CHANNEL_PAGES_MAX: u32 = 1 << 26;
 /// Up to so many descriptors of a channel are all compared with a cue.
 const SCAN_MAX: usize = 100_000;
@@ -120,9 +120,9 @@ impl PerceptMap {
     /// The places that remember something of the cue's channel, and how well each fits the cue: for
     /// a level its likelihood, for a descriptor the cosine.
     ///
-    /// Where only the best `few` matter and a channel has more than [`SCAN_MAX`] descriptors, places are
-    /// left out whose sketches are far from the cue's: the answer is then one to count on, and no
-    /// longer a certain one.
+    /// Where only the best `few` matter and a channel has more than [`SCAN_MAX`] descriptors,
+    /// places are left out whose sketches are far from the cue's: the answer is then one to count
+    /// on, and no longer a certain one.
     pub(crate) fn matches(&self, cue: &PerceptCue, few: Option<usize>) -> Vec<(PlaceId, f64)> {
         let (label, kind) = match cue {
             PerceptCue::Level { channel, .. } => (channel, ChannelKind::Level),

@@ -15,7 +15,7 @@ pub use channel::{Channel, ChannelId, ChannelKind};
 pub(crate) use map::{CHANNEL_PAGES_MAX, Compared, PerceptMap};
 
 use crate::input::{Descriptor, Label};
-use crate::memory::place::PlaceId;
+use crate::memory::ids::PlaceId;
 
 /// A percept to recall places by.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Sketches of vectors: 256 bits each, to find the few of very many that may be near a cue.
 //!
-//! A bit is the sign of the vector along a random direction, so two vectors an angle θ apart differ in
-//! 256 θ/π bits on average (Charikar 2002). The directions are those of a randomised Hadamard
+//! A bit is the sign of the vector along a random direction, so two vectors an angle θ apart differ
+//! in 256 θ/π bits on average (Charikar 2002). The directions are those of a randomised Hadamard
 //! transform: signs are flipped at random and the transform taken, twice (Ailon & Chazelle 2009),
 //! which costs n log n and needs no matrix.
 
@@ -24,7 +24,8 @@ pub(super) type Sketch = [u64; WORDS];
 /// How vectors of one length are sketched. The same on every run.
 #[derive(Clone, Debug)]
 pub(super) struct Sketcher {
-    /// −1 or 1, for each round and number of the vector, which is filled up with zeros to a power of two.
+    /// −1 or 1, for each round and number of the vector, which is filled up with zeros to a power
+    /// of two.
     flips: Arc<[Vec<f32>; ROUNDS]>,
 }
 
@@ -80,8 +81,8 @@ impl Sketches {
             + self.0.len() * size_of::<[Sketch; PAGE]>()
     }
 
-    /// The slots, of the first `len`, whose sketches are nearest to a cue's: `count` or, as equally near
-    /// ones are all taken, more; in order.
+    /// The slots, of the first `len`, whose sketches are nearest to a cue's: `count` or, as equally
+    /// near ones are all taken, more; in order.
     pub(super) fn nearest(&self, cue: &Sketch, len: usize, count: usize) -> Vec<usize> {
         let all = || self.0.iter().flat_map(|page| page.iter()).take(len);
         // A first pass counts how many are how near, which says how near the last one is.

@@ -1,14 +1,13 @@
 //! Where to look for places near a point: cells of equal edge, hashed into shards.
 
+use crate::memory::ids::PlaceId;
 use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use super::PlaceId;
-
-/// Bits of the number of shards at first, when they are more, and at most. A place's insertion after a
-/// snapshot copies one shard, which is one in 4096 entries of a large index; a small one with as many
-/// shards would take more memory than its places.
+/// Bits of the number of shards at first, when they are more, and at most. A place's insertion
+/// after a snapshot copies one shard, which is one in 4096 entries of a large index; a small one
+/// with as many shards would take more memory than its places.
 const SHARD_BITS_MIN: u32 = 6;
 const SHARD_BITS_STEP: u32 = 3;
 const SHARD_BITS_MAX: u32 = 12;
@@ -22,8 +21,8 @@ type Cell = [i64; 3];
 
 /// A place in a cell.
 ///
-/// The position is rounded, and tells which places need not be looked at: most of the time of a search
-/// goes into waiting for memory, and the places themselves lie all over it.
+/// The position is rounded, and tells which places need not be looked at: most of the time of a
+/// search goes into waiting for memory, and the places themselves lie all over it.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     /// Which of the cells in the shard, almost surely: bits of the cell's hash.
@@ -86,7 +85,8 @@ impl SpatialIndex {
         }
     }
 
-    /// Splits every shard into eight. That happens twice in the life of an index, while it is small.
+    /// Splits every shard into eight. That happens twice in the life of an index, while it is
+    /// small.
     fn split(&mut self) {
         self.shard_bits += SHARD_BITS_STEP;
         let mut shards = vec![Vec::new(); 1 << self.shard_bits];
@@ -117,10 +117,10 @@ impl SpatialIndex {
         few.then_some((low, high))
     }
 
-    /// Calls `visit` with every place that may lie within a distance of `point`, the squared one given
-    /// as `limit` \[m²\]; `visit` returns the limit for what is left, which must not grow. Places somewhat
-    /// beyond it are visited too, and a place is rarely visited twice. False when the ball is so large
-    /// that a scan over all places is simpler; then none was visited.
+    /// Calls `visit` with every place that may lie within a distance of `point`, the squared one
+    /// given as `limit` \[m²\]; `visit` returns the limit for what is left, which must not grow.
+    /// Places somewhat beyond it are visited too, and a place is rarely visited twice. False when
+    /// the ball is so large that a scan over all places is simpler; then none was visited.
     pub(super) fn search(
         &self,
         point: &Point3<f64>,
@@ -131,8 +131,8 @@ impl SpatialIndex {
             return false;
         };
         let mut limit = limit;
-        // Most often the nearest place lies in the point's own cell, and rules the others out. To look
-        // at a place costs more than to pass over many entries, so the nearest comes first.
+        // Most often the nearest place lies in the point's own cell, and rules the others out. To
+        // look at a place costs more than to pass over many entries, so the nearest comes first.
         let own = self.cell(point.coords.into());
         let entries = self.entries(own);
         let first = entries
@@ -201,8 +201,8 @@ impl SpatialIndex {
         position.map(|x| (x / self.cell_edge_m).floor() as i64)
     }
 
-    /// Lower bound of the squared distance along one axis from a coordinate to anything in the cells of an
-    /// index \[m²\].
+    /// Lower bound of the squared distance along one axis from a coordinate to anything in the
+    /// cells of an index \[m²\].
     fn outside_squared(&self, index: i64, x: f64) -> f64 {
         let low = index as f64 * self.cell_edge_m;
         let outside = (low - x).max(x - (low + self.cell_edge_m)).max(0.0);
@@ -264,8 +264,9 @@ fn rounded(position: &Point3<f64>) -> [f32; 3] {
     [position.x, position.y, position.z].map(|x| x as f32)
 }
 
-/// The tag of a cell: the hash of its block of 2 × 2 × 2 cells, and in the lowest bits which of them it
-/// is. Neighbours are thus often side by side in memory, and a ball seldom touches more than one block.
+/// The tag of a cell: the hash of its block of 2 × 2 × 2 cells, and in the lowest bits which of
+/// them it is. Neighbours are thus often side by side in memory, and a ball seldom touches more
+/// than one block.
 fn tag(cell: Cell) -> u32 {
     // One multiplication per axis, by odd constants of no structure; the upper bits are well mixed.
     let hash = [

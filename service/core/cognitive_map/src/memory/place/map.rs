@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 
-use super::explainer::PlaceExplainer;
+use super::Place;
+use super::code_search::CodeSearch;
 use super::index::SpatialIndex;
 use super::summary::PlaceSummary;
-use super::{Place, PlaceId};
+use crate::memory::ids::{PlaceId, TripId};
 use crate::memory::strength::Clock;
-use crate::memory::trip::TripId;
 use crate::settings::Settings;
 use grid::{GridModules, PartialCode, Search};
 use state::CorruptState;
@@ -28,11 +28,11 @@ pub(crate) struct PlaceMap {
     places: SparseVec<Place, PAGE>,
     index: SpatialIndex,
     reach_m: f64,
-    explainer: PlaceExplainer,
+    code_search: CodeSearch,
     /// Of the places page by page.
     summaries: SummaryTree<PlaceSummary>,
-    /// How many agents hold a place, where any does: at most two places for each agent. Some may have
-    /// been forgotten since.
+    /// How many agents hold a place, where any does: at most two places for each agent. Some may
+    /// have been forgotten since.
     held: Arc<BTreeMap<PlaceId, u32>>,
 }
 
@@ -44,7 +44,7 @@ impl PlaceMap {
             places: SparseVec::default(),
             index: SpatialIndex::new(reach_m),
             reach_m,
-            explainer: PlaceExplainer::new(settings),
+            code_search: CodeSearch::new(settings),
             summaries: SummaryTree::default(),
             held: Arc::default(),
         }
@@ -82,7 +82,7 @@ impl PlaceMap {
         self.index.insert(id, place.position());
         self.places.push(place, revision);
         self.include(id, &alone);
-        self.explainer
+        self.code_search
             .fit(self.summaries.of_all().map(|all| all.extent));
         Some(id)
     }
@@ -92,8 +92,8 @@ impl PlaceMap {
         self.summaries.of_all()?.weakest.map(|(_, id)| id)
     }
 
-    /// The weakest place that some agent holds, without `except`, the lowest identifier of equally weak
-    /// ones. Looks at all that are held.
+    /// The weakest place that some agent holds, without `except`, the lowest identifier of equally
+    /// weak ones. Looks at all that are held.
     pub(crate) fn weakest_held(&self, except: [Option<PlaceId>; 2]) -> Option<PlaceId> {
         let held = self.held.keys().copied();
         let held = held.filter(|id| !except.contains(&Some(*id)));
@@ -107,7 +107,7 @@ impl PlaceMap {
         let place = self.places.remove(id.0 as usize, revision)?;
         self.index.remove(id, place.position());
         self.summarise(id);
-        self.explainer
+        self.code_search
             .fit(self.summaries.of_all().map(|all| all.extent));
         Some(place)
     }
@@ -178,7 +178,7 @@ impl PlaceMap {
             *place = moved;
         }
         self.summarise(id);
-        self.explainer
+        self.code_search
             .fit(self.summaries.of_all().map(|all| all.extent));
     }
 
@@ -214,9 +214,9 @@ impl PlaceMap {
     /// The place that answers strongest at a position, with its distance \[m\]: the nearest one
     /// within two field radii, the lowest id of equally near ones.
     ///
-    /// This is the exact arg max of the codes' cosine (seed Eq. 6) in the limit of many cells: there
-    /// the cosine of two codes of the same reference grid point falls with the distance between
-    /// them, so the most similar place is the nearest one.
+    /// This is the exact arg max of the codes' cosine (seed Eq. 6) in the limit of many cells:
+    /// there the cosine of two codes of the same reference grid point falls with the distance
+    /// between them, so the most similar place is the nearest one.
     pub(crate) fn winner(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
         let mut best: Option<(f64, PlaceId)> = None;
         let mut limit = self.reach_m * self.reach_m;
@@ -231,15 +231,17 @@ impl PlaceMap {
         best.map(|(squared, place)| (place, squared.sqrt()))
     }
 
-    /// Calls `visit` with every place, perhaps more than once, whose code is within tolerance of a code:
+    /// Calls `visit` with every place, perhaps more than once, whose code is within tolerance of a
+    /// code:
     ///
     /// ```text
     /// Σ over known m of dₘ² ≤ tolerance        dₘ torus distance in spacings
     /// ```
     ///
-    /// and with some others. `visit` returns the tolerance for what is left, which must not grow. See
-    /// [`Explainer::explain`]. When the search is given up, some places have been visited and others not.
-    pub(crate) fn explain(
+    /// and with some others. `visit` returns the tolerance for what is left, which must not grow.
+    /// See [`grid::PositionSearch::run`]. When the search is given up, some places have been
+    /// visited and others not.
+    pub(crate) fn matching(
         &self,
         modules: &GridModules,
         code: &PartialCode,
@@ -249,8 +251,8 @@ impl PlaceMap {
     ) -> Search {
         let mut searched = true;
         let search = self
-            .explainer
-            .explain(modules, code, tolerance, steps_max, |ball| {
+            .code_search
+            .run(modules, code, tolerance, steps_max, |ball| {
                 let mut left = ball.tolerance;
                 let squared = ball.squared_radius_m2(left);
                 if squared >= 0.0 {
@@ -273,7 +275,8 @@ impl PlaceMap {
         })
     }
 
-    /// The places within a distance of a position, with their distances \[m\], in no particular order.
+    /// The places within a distance of a position, with their distances \[m\], in no particular
+    /// order.
     pub(crate) fn within(&self, position: &Point3<f64>, radius_m: f64) -> Vec<(PlaceId, f64)> {
         let mut found = Vec::new();
         let mut check = |id| {
@@ -333,7 +336,7 @@ impl PlaceMap {
             self.index.insert(id, place.position());
         }
         self.summarise(PlaceId(u32::try_from(page * PAGE).expect("checked above")));
-        self.explainer
+        self.code_search
             .fit(self.summaries.of_all().map(|all| all.extent));
         Ok(())
     }
@@ -409,8 +412,8 @@ mod tests {
             prop_assert_eq!(within, all.filter(|(_, d)| *d <= radius_m).collect::<Vec<_>>());
         }
 
-        /// Of all places only those of even numbers stay, and then everything is asked again; those that
-        /// are held never count as the weakest.
+        /// Of all places only those of even numbers stay, and then everything is asked again; those
+        /// that are held never count as the weakest.
         #[test]
         fn forgotten_places_answer_nothing(
             positions in prop::collection::vec(point(), 1..150),

@@ -1,27 +1,24 @@
 //! Places: where the team has been.
 
-mod explainer;
+mod code_search;
 mod index;
 mod map;
 mod summary;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
+pub use crate::memory::ids::PlaceId;
 pub(crate) use map::PlaceMap;
 
 use crate::input::AgentId;
+use crate::memory::ids::TripId;
 use crate::memory::strength::{Clock, Strength};
-use crate::memory::trip::TripId;
+
 use grid::{GridCode, GridModules};
-use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use state::state_of_struct;
 
 /// What a place has to move for it to be noted \[m, rad\].
 const NOTICED: (f64, f64) = (0.01, 0.01);
-
-/// A place, counted from 0 in the order of recruitment. The number of a forgotten place is not given
-/// to another one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PlaceId(pub u32);
 
 /// A place cell.
 ///
@@ -150,16 +147,6 @@ impl Place {
 /// This is seed Eq. 8 with σ = `field_radius / √(2 ln 2)`, in a form that is exact at one half.
 pub(crate) fn confidence(distance_m: f64, field_radius_m: f64) -> f64 {
     (-(distance_m / field_radius_m).powi(2)).exp2()
-}
-
-impl State for PlaceId {
-    fn write(&self, out: &mut StateWriter) {
-        self.0.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        State::read(input).map(Self)
-    }
 }
 
 #[cfg(test)]

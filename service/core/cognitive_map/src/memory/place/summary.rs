@@ -1,6 +1,7 @@
 //! What is known of places together: where they lie, and which of them may go first.
 
-use super::{Place, PlaceId};
+use super::Place;
+use crate::memory::ids::PlaceId;
 use crate::memory::strength::Strength;
 use grid::Extent;
 use state::Summary;

@@ -1,6 +1,6 @@
 //! The best few of many scored places.
 
-use crate::memory::place::PlaceId;
+use crate::memory::ids::PlaceId;
 
 /// The best places so far, best first, equally good ones by identifier.
 #[derive(Debug)]

@@ -2,15 +2,17 @@
 
 use super::Asked;
 use super::best::Best;
-use crate::memory::place::{Place, PlaceId, confidence};
+use crate::memory::ids::PlaceId;
+use crate::memory::place::{Place, confidence};
 use grid::similarity::CodeCue;
 use grid::{PartialCode, Search};
 
-/// How much the terms of the known modules may together lack of their number while a search is worth
-/// trying. At one and more a module may be wholly wrong, and the search has no bound.
+/// How much the terms of the known modules may together lack of their number while a search is
+/// worth trying. At one and more a module may be wholly wrong, and the search has no bound.
 const DEFICIT_MAX: f64 = 0.9;
-/// Steps of a search over and above one for every [`PLACES_PER_STEP`] places. One takes about as long as
-/// comparing one place, so a search that is given up adds a little to the scan that follows.
+/// Steps of a search over and above one for every [`PLACES_PER_STEP`] places. One takes about as
+/// long as comparing one place, so a search that is given up adds a little to the scan that
+/// follows.
 const STEPS_MIN: u64 = 400;
 /// See [`STEPS_MIN`].
 const PLACES_PER_STEP: u64 = 8;
@@ -18,12 +20,13 @@ const PLACES_PER_STEP: u64 = 8;
 const SCAN_MAX: usize = 16;
 /// Longer answers are gathered from all places at once.
 const RANKED_MAX: usize = 64;
-/// Another place answers nearly as well when its cosine is at most this much lower. With a phase noise
-/// of 5 % (0.05 turns along each axis) the right place's own cosine varies by about this much.
+/// Another place answers nearly as well when its cosine is at most this much lower. With a phase
+/// noise of 5 % (0.05 turns along each axis) the right place's own cosine varies by about this
+/// much.
 const NEARLY: f64 = 0.05;
 
-/// The places elsewhere that answer nearly as well as the best one: more than a field radius from it,
-/// with a cosine at most 0.05 lower.
+/// The places elsewhere that answer nearly as well as the best one: more than a field radius from
+/// it, with a cosine at most 0.05 lower.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rivals {
     /// How many there are, one at least.
@@ -55,10 +58,11 @@ impl<'a> CodeRecall<'a> {
 
     /// The most similar places, as many as asked for, in order, with their cosines.
     ///
-    /// The answer is that of a scan over all places, to the last bit. A search looks only where the code
-    /// says that a place may be, but leaves out nothing that can be in the answer: it visits every place
-    /// whose cosine is at least that of the last place of the answer so far, and at least a floor. If
-    /// the answer is then full, all others are worse than its last place; if it is not, a scan follows.
+    /// The answer is that of a scan over all places, to the last bit. A search looks only where the
+    /// code says that a place may be, but leaves out nothing that can be in the answer: it visits
+    /// every place whose cosine is at least that of the last place of the answer so far, and at
+    /// least a floor. If the answer is then full, all others are worse than its last place; if it
+    /// is not, a scan follows.
     pub(super) fn best(&self) -> Vec<(PlaceId, f64)> {
         let limit = self.asked.cue.limit;
         let places = self.asked.places.len();
@@ -140,9 +144,9 @@ impl<'a> CodeRecall<'a> {
         }
     }
 
-    /// Calls `visit` with every place whose cosine is `least` or more, and with some others, perhaps
-    /// more than once. `visit` returns the least cosine that is of interest from then on. False when
-    /// not all were visited, as that would have been more work than a scan.
+    /// Calls `visit` with every place whose cosine is `least` or more, and with some others,
+    /// perhaps more than once. `visit` returns the least cosine that is of interest from then on.
+    /// False when not all were visited, as that would have been more work than a scan.
     pub(super) fn search(&self, least: f64, mut visit: impl FnMut(&Place, PlaceId) -> f64) -> bool {
         if self.cue.known() as f64 * (1.0 - least) > DEFICIT_MAX + 1e-9 {
             return false;
@@ -153,7 +157,7 @@ impl<'a> CodeRecall<'a> {
         let places = self.asked.places;
         let steps_max = STEPS_MIN + places.len() as u64 / PLACES_PER_STEP;
         let mut left = (least, tolerance);
-        let search = places.explain(self.asked.modules, self.code, tolerance, steps_max, |id| {
+        let search = places.matching(self.asked.modules, self.code, tolerance, steps_max, |id| {
             if let Some(place) = places.get(id) {
                 let least = visit(place, id);
                 if least > left.0 {
@@ -165,7 +169,8 @@ impl<'a> CodeRecall<'a> {
         search == Search::Complete
     }
 
-    /// Similarity of the cue and a place, if the place passes the filters and it is `least` or more.
+    /// Similarity of the cue and a place, if the place passes the filters and it is `least` or
+    /// more.
     fn cosine(&self, place: &Place, least: f64) -> Option<f64> {
         if self.asked.admits(place) {
             self.cue.kernel_at(place.position(), least)

@@ -2,7 +2,8 @@
 
 use std::cmp::Ordering;
 
-use crate::memory::place::{PlaceId, confidence};
+use crate::memory::ids::PlaceId;
+use crate::memory::place::confidence;
 use grid::PartialCode;
 use grid::similarity::CodeCue;
 
@@ -18,8 +19,8 @@ struct Fit {
 }
 
 impl Asked<'_> {
-    /// How many of the percept's best matches decide the answer; unknown where the best by the percept
-    /// alone may be left out, or beaten by others.
+    /// How many of the percept's best matches decide the answer; unknown where the best by the
+    /// percept alone may be left out, or beaten by others.
     pub(super) fn few_by_percept(&self) -> Option<usize> {
         let RecallCue {
             position: None,

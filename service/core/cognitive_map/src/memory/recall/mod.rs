@@ -11,8 +11,9 @@ use std::cmp::Ordering;
 use nalgebra::Point3;
 
 use crate::input::AgentId;
+use crate::memory::ids::PlaceId;
 use crate::memory::percept::{PerceptCue, PerceptMap};
-use crate::memory::place::{Place, PlaceId, PlaceMap, confidence};
+use crate::memory::place::{Place, PlaceMap, confidence};
 use crate::settings::Settings;
 use grid::similarity::CodeCue;
 use grid::{GridModules, PartialCode};
@@ -20,15 +21,15 @@ use grid::{GridModules, PartialCode};
 use by_code::CodeRecall;
 pub use by_code::Rivals;
 
-/// Balls around a position in which its nearest places are sought before all places are looked at, in
-/// reaches of a place.
+/// Balls around a position in which its nearest places are sought before all places are looked at,
+/// in reaches of a place.
 const BALLS: [f64; 3] = [1.0, 2.0, 3.5];
 
 /// What to recall places by. `position`, `code` and `percept` rank the places; the other fields
 /// filter.
 ///
-/// The answer is exact, but for a descriptor alone among more than 10⁵ of its channel, which asks their
-/// sketches first. Its cost is as follows, where n is the number of places.
+/// The answer is exact, but for a descriptor alone among more than 10⁵ of its channel, which asks
+/// their sketches first. Its cost is as follows, where n is the number of places.
 ///
 /// - By `position`: free of n when the places asked for lie within seven field radii, else O(n).
 /// - By `code`: free of n when the least alike place of the answer is still much like the cue, so that
@@ -67,8 +68,9 @@ pub struct Recalled {
     /// Eq. 5); `None` without a cue. The cue's code is `code`, or else the code of `position`.
     pub cosine: Option<f64>,
     /// Confidence, in \[0, 1\] (seed Eq. 8); `None` without a cue. By position it follows from the
-    /// distance; by code from the distance at which two codes are on average as alike as the cue and
-    /// the place's code; by a percept it is `percept_match`, at least 0; by several the product.
+    /// distance; by code from the distance at which two codes are on average as alike as the cue
+    /// and the place's code; by a percept it is `percept_match`, at least 0; by several the
+    /// product.
     pub confidence: Option<f64>,
     /// Distance from `position` \[m\]; `None` without it.
     pub distance_m: Option<f64>,
@@ -80,9 +82,10 @@ pub struct Recalled {
 
 /// The places that answer a cue, best first, equally good ones by identifier.
 ///
-/// By position the nearest come first, by code the most alike. By both the confidences are multiplied,
-/// as those of two independent witnesses, and so it is with a percept, by which only places answer that
-/// remember something of its channel. Without a cue the place visited last comes first.
+/// By position the nearest come first, by code the most alike. By both the confidences are
+/// multiplied, as those of two independent witnesses, and so it is with a percept, by which only
+/// places answer that remember something of its channel. Without a cue the place visited last comes
+/// first.
 pub(crate) fn recall(
     cue: &RecallCue,
     places: &PlaceMap,
@@ -107,7 +110,8 @@ pub(crate) fn recall(
     }
 }
 
-/// The places elsewhere that answer a cue with a code nearly as well as its best answer does. Exact.
+/// The places elsewhere that answer a cue with a code nearly as well as its best answer does.
+/// Exact.
 ///
 /// `None` when there is no such place, no code in the cue, or a position or a percept in it, which
 /// settles what a code leaves open.
@@ -224,8 +228,8 @@ impl Asked<'_> {
         near
     }
 
-    /// The places that pass the filters with their distances \[m\], the nearest ones at least, as many
-    /// as the answer may hold.
+    /// The places that pass the filters with their distances \[m\], the nearest ones at least, as
+    /// many as the answer may hold.
     fn nearest(&self, position: &Point3<f64>) -> Vec<(PlaceId, f64)> {
         let radius_m = self.cue.radius_m.unwrap_or(f64::INFINITY);
         for reaches in BALLS {

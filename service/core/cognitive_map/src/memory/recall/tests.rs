@@ -130,8 +130,8 @@ impl Seeded {
     }
 }
 
-/// Clouds of places: in a box, on a plane, on a coarse lattice (equal positions and equal distances),
-/// in a far corner of the world, in one heap.
+/// Clouds of places: in a box, on a plane, on a coarse lattice (equal positions and equal
+/// distances), in a far corner of the world, in one heap.
 fn clouds() -> impl Strategy<Value = Vec<Point3<f64>>> {
     let unit = prop::array::uniform3(-1.0..1.0f64);
     let shape = prop::sample::select(vec![

@@ -1,8 +1,8 @@
 //! Legs: from one place to the next.
 
+use crate::memory::ids::PlaceId;
 use nalgebra::{Isometry3, Vector3};
 
-use crate::memory::place::PlaceId;
 use geometry::PoseCovariance;
 use grid::{GridModules, octant};
 use state::state_of_struct;
@@ -49,7 +49,8 @@ impl Leg {
         &self.relative
     }
 
-    /// Covariance of [`Leg::relative`] in the body frame at the end; it counts this leg's motion alone.
+    /// Covariance of [`Leg::relative`] in the body frame at the end; it counts this leg's motion
+    /// alone.
     pub fn covariance(&self) -> &PoseCovariance {
         &self.covariance
     }

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::{Leg, TRIPS_MAX, Trip, TripEnd, TripId};
+use super::{Leg, TRIPS_MAX, Trip, TripEnd};
+use crate::memory::ids::TripId;
 use crate::memory::strength::{Clock, Strength};
 use state::{CorruptState, StateWriter};
 use state::{PageItems, SparseVec};
@@ -11,8 +12,9 @@ use state::{Summary, SummaryTree, merged};
 
 /// Trips per page.
 const PAGE: usize = 16;
-/// Most forgotten trips whose pages of legs a checkpoint can say are gone: far more than are forgotten
-/// between two checkpoints. The legs of others stay where they are stored, and are passed over.
+/// Most forgotten trips whose pages of legs a checkpoint can say are gone: far more than are
+/// forgotten between two checkpoints. The legs of others stay where they are stored, and are passed
+/// over.
 const FORGOTTEN_MAX: usize = 4096;
 
 /// All trips, in the order of recording.

@@ -4,14 +4,14 @@ mod leg;
 mod map;
 mod recorder;
 
+pub use crate::memory::ids::TripId;
 pub use leg::Leg;
 pub(crate) use map::TripMap;
 pub(crate) use recorder::{LegUnderWay, Recorder, interval_s};
 
 use crate::input::AgentId;
 use crate::memory::strength::{Clock, Strength};
-use state::PagedVec;
-use state::{CorruptState, State, StateReader, StateWriter};
+use state::{CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum};
 
 /// Most legs of a trip; a longer way is recorded as several trips. It bounds what one answer holds.
 pub(crate) const LEGS_MAX: usize = 1024;
@@ -24,17 +24,13 @@ pub(crate) const TRIPS_MAX: u32 = u32::MAX / LEG_PAGES_MAX;
 
 const _: () = assert!(LEG_PAGE * LEG_PAGES_MAX as usize == LEGS_MAX);
 
-/// A trip, counted from 0 in the order of recording. The number of a forgotten trip is not given to
-/// another one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct TripId(pub u32);
-
 /// Why a trip ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TripEnd {
     /// The agent stood still.
     Stillness,
-    /// Samples were lost, none came for a long time on the sensor's clock, or the agent turned out to have been carried off.
+    /// Samples were lost, none came for a long time on the sensor's clock, or the agent turned out
+    /// to have been carried off.
     Gap,
     /// The session ended.
     SessionEnd,
@@ -49,8 +45,8 @@ pub enum TripEnd {
 
 /// A trip: legs from place to place, as one agent travelled them.
 ///
-/// A trip is recorded when its first leg is complete, so every trip has at least one leg. Motion that
-/// reaches no second place before the trip ends leaves no trip.
+/// A trip is recorded when its first leg is complete, so every trip has at least one leg. Motion
+/// that reaches no second place before the trip ends leaves no trip.
 #[derive(Clone, Debug)]
 pub struct Trip {
     agent: AgentId,
@@ -189,38 +185,11 @@ impl State for Trip {
     }
 }
 
-impl State for TripId {
-    fn write(&self, out: &mut StateWriter) {
-        self.0.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        State::read(input).map(Self)
-    }
-}
-
-impl State for TripEnd {
-    fn write(&self, out: &mut StateWriter) {
-        let code: u8 = match self {
-            Self::Stillness => 0,
-            Self::Gap => 1,
-            Self::SessionEnd => 2,
-            Self::Marker => 3,
-            Self::Full => 4,
-            Self::StartPose => 5,
-        };
-        code.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(match u8::read(input)? {
-            0 => Self::Stillness,
-            1 => Self::Gap,
-            2 => Self::SessionEnd,
-            3 => Self::Marker,
-            4 => Self::Full,
-            5 => Self::StartPose,
-            _ => return Err(CorruptState::Invalid),
-        })
-    }
-}
+state_of_enum!(TripEnd {
+    Stillness = 0,
+    Gap = 1,
+    SessionEnd = 2,
+    Marker = 3,
+    Full = 4,
+    StartPose = 5
+});

@@ -1,9 +1,9 @@
 //! What an agent keeps of the trip under way.
 
+use crate::memory::ids::{PlaceId, TripId};
 use nalgebra::{Isometry3, Point3, Vector6};
 
-use super::{Leg, TripId};
-use crate::memory::place::PlaceId;
+use super::Leg;
 use geometry::MotionSum;
 use state::state_of_struct;
 

@@ -1,0 +1,190 @@
+//! Cell lists: for each cell of a lattice all places whose field reaches into it.
+
+use grid::Lattice;
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+
+use crate::tuning::LIST_CELLS_MAX;
+
+/// Places by the cell of a face-centred cubic lattice at the model's own scale. One lookup answers,
+/// however many places the model has.
+#[derive(Clone, Debug)]
+pub(crate) struct CellLists {
+    lattice: Lattice,
+    low: [i64; 3],
+    size: [i64; 3],
+    /// Start of each cell's list; one more at the end.
+    starts: Vec<u32>,
+    places: Vec<u32>,
+}
+
+impl CellLists {
+    /// Of places with these positions and reaches \[m\], in cells of about `fineness` mean reaches:
+    /// finer cells list fewer places beyond reach, and take more memory.
+    pub(crate) fn new(positions: &[Point3<f64>], reaches_m: &[f64], fineness: f64) -> Self {
+        let mut low = Vector3::repeat(f64::INFINITY);
+        let mut high = Vector3::repeat(f64::NEG_INFINITY);
+        let mut reach_sum_m = 0.0;
+        for (position, reach_m) in positions.iter().zip(reaches_m) {
+            low = low.inf(&position.coords.add_scalar(-reach_m));
+            high = high.sup(&position.coords.add_scalar(*reach_m));
+            reach_sum_m += reach_m;
+        }
+        if positions.is_empty() {
+            (low, high) = (Vector3::zeros(), Vector3::zeros());
+        }
+        let mut spacing_m = (fineness * reach_sum_m / positions.len().max(1) as f64).max(1e-9);
+        loop {
+            let lattice = Lattice::new(spacing_m, UnitQuaternion::identity());
+            let (low, size) = box_of(&lattice, &low, &high);
+            if size.iter().map(|&size| size as f64).product::<f64>() <= LIST_CELLS_MAX {
+                return Self::filled(lattice, low, size, positions, reaches_m);
+            }
+            spacing_m *= 1.25;
+        }
+    }
+
+    fn filled(
+        lattice: Lattice,
+        low: [i64; 3],
+        size: [i64; 3],
+        positions: &[Point3<f64>],
+        reaches_m: &[f64],
+    ) -> Self {
+        let count = size.iter().product::<i64>();
+        let count = usize::try_from(count).expect("a box has a positive number of cells");
+        let mut cells = Self {
+            lattice,
+            low,
+            size,
+            starts: vec![0; count + 1],
+            places: Vec::new(),
+        };
+        // Two passes over the same cells: the first counts, the second fills the lists.
+        let mut total = 0;
+        cells.each_reached(positions, reaches_m, |starts, cell, _| {
+            starts[cell + 1] += 1;
+            total += 1;
+        });
+        for cell in 0..count {
+            cells.starts[cell + 1] += cells.starts[cell];
+        }
+        let mut places = vec![0; total];
+        let mut filled = vec![0u32; count];
+        cells.each_reached(positions, reaches_m, |starts, cell, place| {
+            places[(starts[cell] + filled[cell]) as usize] = place;
+            filled[cell] += 1;
+        });
+        cells.places = places;
+        cells
+    }
+
+    fn each_reached(
+        &mut self,
+        positions: &[Point3<f64>],
+        reaches_m: &[f64],
+        mut visit: impl FnMut(&mut [u32], usize, u32),
+    ) {
+        // Half the longest diagonal of a cell is 1.225 spacings.
+        let cell_radius_m = 1.225 * self.lattice.spacing_m();
+        for (place, (position, reach_m)) in (0u32..).zip(positions.iter().zip(reaches_m)) {
+            let reach = Vector3::repeat(*reach_m);
+            let (low, size) = box_of(
+                &self.lattice,
+                &(position.coords - reach),
+                &(position.coords + reach),
+            );
+            for i in low[0]..low[0] + size[0] {
+                for j in low[1]..low[1] + size[1] {
+                    for k in low[2]..low[2] + size[2] {
+                        let middle = self.lattice.basis()
+                            * Vector3::new(i as f64 + 0.5, j as f64 + 0.5, k as f64 + 0.5);
+                        let near = (middle - position.coords).norm() <= reach_m + cell_radius_m;
+                        if let (true, Some(cell)) = (near, self.cell([i, j, k])) {
+                            visit(&mut self.starts, cell, place);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn cell(&self, index: [i64; 3]) -> Option<usize> {
+        let mut cell = 0;
+        for ((index, low), size) in index.iter().zip(&self.low).zip(&self.size) {
+            let at = index.saturating_sub(*low);
+            if !(0..*size).contains(&at) {
+                return None;
+            }
+            cell = cell * size + at;
+        }
+        usize::try_from(cell).ok()
+    }
+
+    /// All places whose field reaches a point, and some others near it, in ascending order.
+    pub(crate) fn near(&self, point: &Point3<f64>) -> &[u32] {
+        let turns = self.lattice.phase_displacement(&point.coords);
+        // Points very far away saturate: they are outside all the same.
+        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+        let index = [turns.x, turns.y, turns.z].map(|turns| turns.floor() as i64);
+        match self.cell(index) {
+            Some(cell) => &self.places[self.starts[cell] as usize..self.starts[cell + 1] as usize],
+            None => &[],
+        }
+    }
+}
+
+/// The lattice indices of a box that holds the given one \[m\]: lowest index, and cells along each
+/// axis.
+fn box_of(lattice: &Lattice, low: &Vector3<f64>, high: &Vector3<f64>) -> ([i64; 3], [i64; 3]) {
+    let middle = lattice.phase_displacement(&((low + high) * 0.5));
+    let half = lattice.inverse().abs() * ((high - low) * 0.5);
+    let mut first = [0; 3];
+    let mut size = [0; 3];
+    for axis in 0..3 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a model spans few cells; else it saturates"
+        )]
+        let (from, to) = (
+            (middle[axis] - half[axis]).floor() as i64,
+            (middle[axis] + half[axis]).floor() as i64,
+        );
+        first[axis] = from;
+        size[axis] = to.saturating_sub(from).saturating_add(1);
+    }
+    (first, size)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_place_within_reach_is_missed() {
+        let noise = |k: u64| random::uniform(3, [0, 0, k]) * 0.2 - 0.1;
+        let point = |k: u64| Point3::new(noise(3 * k), noise(3 * k + 1), 0.3 * noise(3 * k + 2));
+        let positions: Vec<_> = (0..300).map(point).collect();
+        let reaches_m: Vec<_> = (0..300)
+            .map(|k| 0.004 + 0.02 * noise(5000 + k).abs())
+            .collect();
+        let cells = CellLists::new(&positions, &reaches_m, 0.33);
+        let mut listed = 0;
+        for k in 1000..3000 {
+            let query = point(k);
+            let near = cells.near(&query);
+            listed += near.len();
+            for (place, (position, reach_m)) in (0u32..).zip(positions.iter().zip(&reaches_m)) {
+                if (position - query).norm() <= *reach_m {
+                    assert!(near.contains(&place));
+                }
+            }
+        }
+        assert!(listed < 2000 * 60, "the lists hold few others: {listed}");
+        assert!(cells.near(&Point3::new(1e300, 0.0, -1e300)).is_empty());
+        assert!(
+            CellLists::new(&[], &[], 1.0)
+                .near(&Point3::origin())
+                .is_empty()
+        );
+    }
+}

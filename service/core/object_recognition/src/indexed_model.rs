@@ -1,0 +1,105 @@
+//! A model with its indexes, ready for recognition.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::index::packed_places::PackedPlaces;
+use crate::indexed_place::IndexedPlace;
+use crate::model::{LevelMemory, ObjectModel};
+use crate::surfels::map::SurfelMap;
+
+use crate::tuning::{FIELD_PER_SPACING, SHARE_BINS, SHARE_SAMPLES};
+
+/// A model ready for recognition: its places, their indexes, and the share of them within a
+/// distance.
+#[derive(Clone, Debug)]
+pub(crate) struct IndexedModel {
+    pub(crate) places: Vec<IndexedPlace>,
+    /// The same places, packed in the order of their index.
+    pub(crate) packed: PackedPlaces,
+    /// Diameter of a ball about the mean of the places that holds all of them \[m\].
+    pub(crate) extent_m: f64,
+    /// Area \[m²\]: one spacing squared per place.
+    pub(crate) area_m2: f64,
+    /// The surface, if the places have normals.
+    pub(crate) surfel_map: Option<SurfelMap>,
+    shares: [f64; SHARE_BINS + 1],
+}
+
+impl IndexedModel {
+    /// Of a model.
+    pub(crate) fn new(model: &ObjectModel) -> Self {
+        let field_m = FIELD_PER_SPACING * model.spacing_m();
+        let places: Vec<_> = model
+            .places()
+            .iter()
+            .map(|place| IndexedPlace {
+                position: place.position_m,
+                normal: place.normal(),
+                variance_m2: field_m * field_m + place.variance_m2 / (place.count * place.count),
+                levels: place.levels.clone(),
+                descriptors: place.descriptors.clone(),
+            })
+            .collect();
+        let noise_m2 = model.places().iter().map(|p| p.variance_m2 / p.count);
+        let noise_m2 = noise_m2.sum::<f64>() / places.len().max(1) as f64;
+        let positions: Vec<_> = places.iter().map(|place| place.position).collect();
+        let middle = positions
+            .iter()
+            .fold(Vector3::zeros(), |sum, p| sum + p.coords)
+            / positions.len().max(1) as f64;
+        let radius_m = positions
+            .iter()
+            .map(|p| (p.coords - middle).norm())
+            .fold(model.spacing_m(), f64::max);
+        let extent_m = 2.0 * radius_m;
+        Self {
+            packed: PackedPlaces::new(&places, model.spacing_m(), extent_m, noise_m2),
+            shares: shares(&positions, extent_m),
+            area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
+            surfel_map: SurfelMap::new(model),
+            extent_m,
+            places,
+        }
+    }
+
+    /// The levels of all places, one of each channel for each place.
+    pub(crate) fn levels(&self) -> impl Iterator<Item = &LevelMemory> {
+        self.places.iter().flat_map(|place| &place.levels)
+    }
+
+    /// Mean share of the model within `reach_m` of one of its places.
+    pub(crate) fn share(&self, reach_m: f64) -> f64 {
+        let at = (reach_m / self.extent_m).clamp(0.0, 1.0) * SHARE_BINS as f64;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0 to SHARE_BINS"
+        )]
+        let below = (at as usize).min(SHARE_BINS - 1);
+        let part = at - below as f64;
+        self.shares[below] * (1.0 - part) + self.shares[below + 1] * part
+    }
+}
+
+fn shares(positions: &[Point3<f64>], extent_m: f64) -> [f64; SHARE_BINS + 1] {
+    let mut counts = [0.0; SHARE_BINS + 1];
+    let step = positions.len().div_ceil(SHARE_SAMPLES).max(1);
+    let mut total = 0.0;
+    for from in positions.iter().step_by(step) {
+        for to in positions {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "0 to SHARE_BINS"
+            )]
+            let bin = ((to - from).norm() / extent_m * SHARE_BINS as f64).ceil() as usize;
+            counts[bin.min(SHARE_BINS)] += 1.0;
+            total += 1.0;
+        }
+    }
+    let mut sum = 0.0;
+    counts.map(|count| {
+        sum += count;
+        if total > 0.0 { sum / total } else { 1.0 }
+    })
+}

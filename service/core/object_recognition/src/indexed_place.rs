@@ -1,0 +1,60 @@
+//! One place of a model, ready for recognition.
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use crate::contact::{Contact, Seen};
+use crate::level_prior::LevelPrior;
+use crate::model::LevelMemory;
+use crate::tuning::{DESCRIPTOR_SCALE, LEVEL_VARIANCE_FLOOR, WRONG_PERCEPT_SHARE};
+
+/// One place of a model.
+#[derive(Clone, Debug)]
+pub(crate) struct IndexedPlace {
+    pub(crate) position: Point3<f64>,
+    pub(crate) normal: Option<Unit<Vector3<f64>>>,
+    /// Variance of a touch of this place about `position`, without the touch's noise, per axis
+    /// \[m²\].
+    pub(crate) variance_m2: f64,
+    pub(crate) levels: Vec<LevelMemory>,
+    pub(crate) descriptors: Vec<Seen>,
+}
+
+impl IndexedPlace {
+    /// Log likelihood ratio of a contact's levels and descriptors: at this place, against anywhere.
+    pub(crate) fn percept_log(&self, contact: &Contact, level_prior: &[LevelPrior]) -> f64 {
+        let mut sum = 0.0;
+        for felt in &contact.levels {
+            let own = self.levels.iter().find(|own| own.channel == felt.channel);
+            let level_prior = level_prior
+                .iter()
+                .find(|level_prior| level_prior.channel == felt.channel);
+            if let (Some(own), Some(level_prior)) = (own, level_prior) {
+                let variance = own.variance()
+                    + felt.sd * felt.sd
+                    + level_prior.variance * LEVEL_VARIANCE_FLOOR;
+                let apart = felt.value - own.mean;
+                let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
+                sum += ((1.0 - WRONG_PERCEPT_SHARE) * here / level_prior.density(felt)
+                    + WRONG_PERCEPT_SHARE)
+                    .ln();
+            }
+        }
+        for seen in &contact.descriptors {
+            let own = self
+                .descriptors
+                .iter()
+                .find(|own| own.channel == seen.channel);
+            if let Some(own) = own {
+                let cos: f64 = seen
+                    .vector
+                    .iter()
+                    .zip(own.vector.iter())
+                    .map(|(a, b)| f64::from(a * b))
+                    .sum();
+                let here = (-(1.0 - cos) / DESCRIPTOR_SCALE).exp() / DESCRIPTOR_SCALE;
+                sum += ((1.0 - WRONG_PERCEPT_SHARE) * here + WRONG_PERCEPT_SHARE).ln();
+            }
+        }
+        sum
+    }
+}

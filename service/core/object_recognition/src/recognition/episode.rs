@@ -1,0 +1,202 @@
+//! An episode of recognition: contacts come in, a posterior comes out.
+
+use crate::contact::{Contact, Reached};
+use crate::indexed_model::IndexedModel;
+use crate::library::{ObjectId, ObjectLibrary};
+use crate::next_touch::{NextTouch, WeightedPose, next_touch};
+use crate::numeric::log_sum;
+use crate::orientation::Orientation;
+use crate::poses::PoseHypotheses;
+use crate::posterior::{Posterior, entropy_nats};
+use crate::recognition::likelihoods::{unknown_fit_log, walk_log};
+use crate::surfels::map::SurfelMap;
+use crate::translations::GaussianSum;
+use crate::tuning::{CONTACTS_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, UNKNOWN_PRIOR};
+
+/// The state of one episode of recognition.
+///
+/// All work is bounded per touch: by the number of places of the library, and by budgets of
+/// hypotheses and of poses tried.
+#[derive(Clone, Debug)]
+pub struct Recognition {
+    pub(super) contacts: Vec<Contact>,
+    pub(super) count: usize,
+    /// Lengths of the steps between contacts of a walk, in ascending order \[m\].
+    pub(super) steps_m: Vec<f64>,
+    /// Contacts that were drawn from the whole model, without the first.
+    pub(super) drawn: usize,
+    /// Contacts that were asked for.
+    pub(super) aimed: usize,
+    pub(super) hypotheses: Hypotheses,
+}
+
+#[derive(Clone, Debug)]
+pub(super) enum Hypotheses {
+    Translations(GaussianSum),
+    Poses(PoseHypotheses),
+}
+
+impl Recognition {
+    /// An episode without contacts.
+    pub fn new(orientation: &Orientation) -> Self {
+        let hypotheses = match orientation.rotations() {
+            Some(rotations) => Hypotheses::Translations(GaussianSum::new(rotations)),
+            None => Hypotheses::Poses(PoseHypotheses::default()),
+        };
+        Self {
+            contacts: Vec::new(),
+            count: 0,
+            steps_m: Vec::new(),
+            drawn: 0,
+            aimed: 0,
+            hypotheses,
+        }
+    }
+
+    /// Updates the hypotheses with one contact.
+    pub fn touch(&mut self, library: &ObjectLibrary, contact: Contact) {
+        match (self.contacts.last(), contact.reached) {
+            (_, Reached::Aimed) => self.aimed += 1,
+            (None, _) => {}
+            (Some(_), Reached::Drawn) => self.drawn += 1,
+            (Some(last), Reached::Found) => {
+                let step_m = (contact.position_m - last.position_m).norm();
+                let at = self.steps_m.partition_point(|other| *other < step_m);
+                self.steps_m.insert(at, step_m);
+            }
+        }
+        self.count += 1;
+        let (steps, reach_m) = (self.steps_m.len(), self.reach_m());
+        let spread = (self.count - self.aimed) as f64;
+        match &mut self.hypotheses {
+            Hypotheses::Translations(translations) => {
+                translations.touch(library, &self.contacts, &contact);
+            }
+            Hypotheses::Poses(poses) => {
+                let size_log = |indexed: &IndexedModel, surfel_map: &SurfelMap| {
+                    walk_log(indexed, steps, reach_m) - spread * surfel_map.area_m2.ln()
+                };
+                poses.touch(library, &contact, CONTACTS_MAX, &size_log);
+            }
+        }
+        if self.contacts.len() >= CONTACTS_MAX {
+            self.contacts.remove(0);
+        }
+        self.contacts.push(contact);
+    }
+
+    /// Contacts so far.
+    pub fn contacts(&self) -> usize {
+        self.count
+    }
+
+    /// The posterior after the contacts so far.
+    pub fn posterior(&self, library: &ObjectLibrary) -> Posterior {
+        let mut objects = self.object_logs(library);
+        // Contacts near one another share the errors of a model, so that a pose fitted to them has
+        // less evidence than independent contacts would give.
+        let best = objects.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let best = best.map(|&(object, _)| object);
+        let evidence_share = match (&self.hypotheses, best) {
+            (Hypotheses::Poses(poses), Some(best)) => poses.evidence_share(library, best),
+            _ => 1.0,
+        };
+        let fit = self.fit(library, best);
+        for (_, log) in &mut objects {
+            *log *= evidence_share;
+        }
+        let prior = (1.0 - UNKNOWN_PRIOR).ln() - (objects.len().max(1) as f64).ln();
+        let mut none = UNKNOWN_PRIOR.ln();
+        if self.is_empty() {
+            // No hypothesis yet: all objects are equally probable.
+            for (_, log) in &mut objects {
+                *log = prior;
+            }
+        } else {
+            none += evidence_share * self.unknown_log(library, best);
+            let most = objects
+                .iter()
+                .map(|object| object.1)
+                .fold(f64::NEG_INFINITY, f64::max);
+            if matches!(self.hypotheses, Hypotheses::Poses(_)) {
+                let strange = unknown_fit_log(fit, self.contacts.len());
+                none = log_sum([none, UNKNOWN_PRIOR.ln() + most + prior + strange].into_iter());
+            }
+            let miss_probability = self.miss_probability();
+            let missed_log = none - UNKNOWN_PRIOR.ln() + miss_probability.ln();
+            for (_, log) in &mut objects {
+                *log =
+                    prior + log_sum([*log + (1.0 - miss_probability).ln(), missed_log].into_iter());
+            }
+        }
+        let total = log_sum(objects.iter().map(|object| object.1).chain([none]));
+        for (_, log) in &mut objects {
+            *log = (*log - total).exp();
+        }
+        let unknown = (none - total).exp();
+        objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let pose = { objects.first() }.and_then(|(object, _)| self.pose(library, *object));
+        Posterior {
+            live_hypotheses: self.live_hypotheses(library),
+            live_objects: objects
+                .iter()
+                .filter(|object| object.1 > LISTED_SHARE_MIN)
+                .count(),
+            entropy_nats: entropy_nats(objects.iter().map(|object| object.1).chain([unknown])),
+            objects,
+            unknown,
+            pose,
+            contacts: self.count,
+            fit,
+        }
+    }
+
+    /// Whether there is no hypothesis yet.
+    fn is_empty(&self) -> bool {
+        match &self.hypotheses {
+            Hypotheses::Translations(translations) => translations.is_empty(),
+            Hypotheses::Poses(poses) => poses.all.is_empty(),
+        }
+    }
+
+    /// Goodness of fit of an object's best hypothesis, as a z-score; 0 where it is not known.
+    fn fit(&self, library: &ObjectLibrary, object: Option<ObjectId>) -> f64 {
+        let Hypotheses::Poses(poses) = &self.hypotheses else {
+            return 0.0;
+        };
+        let own = poses.all.iter().filter(|h| Some(h.object) == object);
+        let best = own.max_by(|a, b| a.score.total_cmp(&b.score));
+        best.and_then(|best| poses.fit(library, best))
+            .unwrap_or(0.0)
+    }
+
+    /// Radius within which a walk's next contact lies \[m\].
+    pub(super) fn reach_m(&self) -> Option<f64> {
+        let steps = self.steps_m.len();
+        (steps > 0).then(|| REACH_PER_STEP * self.steps_m[steps / 2])
+    }
+
+    /// The touch with the largest expected information about which live hypothesis is right. `None`
+    /// if there is only one, or if half of the contacts were asked for already.
+    pub fn next_touch(&self, library: &ObjectLibrary) -> Option<NextTouch> {
+        // Models differ most where one of them errs most: contacts from anywhere keep question and
+        // posterior unbiased, so that no more than every other touch is asked for.
+        if 2 * self.aimed >= self.count {
+            return None;
+        }
+        let mut objects = self.object_logs(library);
+        objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let all = log_sum(objects.iter().map(|object| object.1));
+        let mut rivals = Vec::new();
+        for (object, sum) in objects.into_iter().take(RIVALS_MAX) {
+            let masses = self.masses(library, object, RIVALS_MAX);
+            let own = self.mass_log(library, object);
+            rivals.extend(masses.iter().map(|mass| WeightedPose {
+                object,
+                map_from_episode: mass.map_from_episode,
+                weight: (mass.log - own + sum - all).exp(),
+            }));
+        }
+        next_touch(library, rivals, &self.contacts)
+    }
+}

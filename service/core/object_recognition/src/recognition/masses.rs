@@ -1,0 +1,211 @@
+//! Masses of an episode's hypotheses and objects, in one measure.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use geometry::{PoseCovariance, se3};
+use nalgebra::{Isometry3, Matrix6, Translation3};
+
+use crate::library::{ObjectId, ObjectLibrary};
+use crate::numeric::log_sum;
+use crate::poses::PoseHypothesis;
+use crate::posterior::PoseEstimate;
+use crate::recognition::episode::Hypotheses;
+use crate::recognition::episode::Recognition;
+use crate::recognition::likelihoods::walk_log;
+use crate::translations::TranslationHypothesis;
+use crate::tuning::{LISTED_SHARE_MIN, LIVE_MASS, OTHER_POSES_MAX};
+
+/// One hypothesis of either kind.
+pub(super) struct PoseMass {
+    pub(super) map_from_episode: Isometry3<f64>,
+    covariance: Matrix6<f64>,
+    /// Log of its mass.
+    pub(super) log: f64,
+}
+
+impl Recognition {
+    /// Log of each object's mass, in one measure.
+    pub(super) fn object_logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
+        match &self.hypotheses {
+            Hypotheses::Translations(translations) => {
+                let logs = translations.object_logs();
+                let shares = self.translation_shares(library).into_iter();
+                let log = |(object, share)| {
+                    let own = logs.get(&object).copied();
+                    (object, own.map_or(f64::NEG_INFINITY, |own| own + share))
+                };
+                shares.map(log).collect()
+            }
+            Hypotheses::Poses(_) => sums(library, &self.pose_logs(library)),
+        }
+    }
+
+    /// Logs of the factors that the masses of each object's translations have for its size.
+    pub(super) fn translation_shares(&self, library: &ObjectLibrary) -> BTreeMap<ObjectId, f64> {
+        let reach_m = self.reach_m();
+        let shares = library.indexed_models().map(|(object, indexed)| {
+            let aimed = self.aimed as f64 * indexed.area_m2.ln();
+            (
+                object,
+                aimed + walk_log(indexed, self.steps_m.len(), reach_m),
+            )
+        });
+        shares.collect()
+    }
+
+    /// Log of the mass of each pose, in one measure.
+    pub(super) fn pose_logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
+        let Hypotheses::Poses(poses) = &self.hypotheses else {
+            return Vec::new();
+        };
+        let logs = poses.all.iter().filter_map(|hypothesis| {
+            let log = self.pose_log(library, hypothesis)?;
+            Some((hypothesis.object, log))
+        });
+        logs.collect()
+    }
+
+    /// How many hypotheses hold `LIVE_MASS` of the mass of all.
+    pub(super) fn live_hypotheses(&self, library: &ObjectLibrary) -> usize {
+        if let Hypotheses::Translations(translations) = &self.hypotheses {
+            let shares = self.translation_shares(library);
+            return translations.holding(LIVE_MASS, |object| shares.get(&object).copied());
+        }
+        let mut logs = self.pose_logs(library);
+        logs.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
+        let all = log_sum(logs.iter().map(|(_, log)| *log));
+        let mut sum = 0.0;
+        let live = logs.iter().position(|(_, log)| {
+            sum += (log - all).exp();
+            sum >= LIVE_MASS
+        });
+        live.map_or(logs.len(), |at| at + 1)
+    }
+
+    pub(super) fn pose_log(
+        &self,
+        library: &ObjectLibrary,
+        hypothesis: &PoseHypothesis,
+    ) -> Option<f64> {
+        let indexed = library.indexed(hypothesis.object)?;
+        let surfel_map = indexed.surfel_map.as_ref()?;
+        let count = (self.count - self.aimed) as f64;
+        Some(
+            hypothesis.evidence() - (8.0 * PI * PI).ln()
+                + walk_log(indexed, self.steps_m.len(), self.reach_m())
+                - count * surfel_map.area_m2.ln(),
+        )
+    }
+
+    /// The `most` heaviest hypotheses of an object, heaviest first.
+    pub(super) fn masses(
+        &self,
+        library: &ObjectLibrary,
+        object: ObjectId,
+        most: usize,
+    ) -> Vec<PoseMass> {
+        let Some(indexed) = library.indexed(object) else {
+            return Vec::new();
+        };
+        match &self.hypotheses {
+            Hypotheses::Translations(translations) => {
+                let mass = |hypothesis: TranslationHypothesis| {
+                    let mut covariance = Matrix6::zeros();
+                    let mut corner = covariance.fixed_view_mut::<3, 3>(0, 0);
+                    corner.fill_diagonal(hypothesis.variance_m2);
+                    PoseMass {
+                        map_from_episode: hypothesis.pose(&translations.rotations),
+                        covariance,
+                        log: hypothesis.evidence,
+                    }
+                };
+                { translations.heaviest(object, most).into_iter() }
+                    .map(mass)
+                    .collect()
+            }
+            Hypotheses::Poses(poses) => {
+                let own = poses.all.iter().filter(|pose| pose.object == object);
+                let masses = own.filter_map(|hypothesis| {
+                    let surfel_map = indexed.surfel_map.as_ref()?;
+                    let origin = Translation3::from(-poses.origin().coords);
+                    let middle = Translation3::from(surfel_map.middle);
+                    let lever = se3::adjoint(&middle.into());
+                    Some(PoseMass {
+                        map_from_episode: middle * hypothesis.pose * origin,
+                        covariance: lever
+                            * hypothesis.information.try_inverse()?
+                            * lever.transpose(),
+                        log: self.pose_log(library, hypothesis)?,
+                    })
+                });
+                let mut masses: Vec<_> = masses.collect();
+                masses.sort_by(|a, b| b.log.total_cmp(&a.log));
+                masses.truncate(most);
+                masses
+            }
+        }
+    }
+
+    /// Log of the mass of all hypotheses of an object, in the measure of [`masses`](Self::masses).
+    pub(super) fn mass_log(&self, library: &ObjectLibrary, object: ObjectId) -> f64 {
+        match &self.hypotheses {
+            Hypotheses::Translations(translations) => {
+                let log = translations.object_logs().get(&object).copied();
+                log.unwrap_or(f64::NEG_INFINITY)
+            }
+            Hypotheses::Poses(_) => {
+                let logs = self.pose_logs(library);
+                let own: Vec<f64> = { logs.iter() }
+                    .filter(|(other, _)| *other == object)
+                    .map(|(_, log)| *log)
+                    .collect();
+                log_sum(own.into_iter())
+            }
+        }
+    }
+
+    /// The most likely pose in one object, and the further ones.
+    pub(super) fn pose(&self, library: &ObjectLibrary, object: ObjectId) -> Option<PoseEstimate> {
+        let masses = self.masses(library, object, OTHER_POSES_MAX + 1);
+        let all = self.mass_log(library, object);
+        let (best, others) = masses.split_first()?;
+        let share = |log: f64| (log - all).exp();
+        let others = { others.iter() }
+            .map(|mass| (mass.map_from_episode, share(mass.log)))
+            .filter(|(_, share)| *share > LISTED_SHARE_MIN);
+        // The adjoint takes an error on the left of the pose to one on its right.
+        let back = se3::adjoint(&best.map_from_episode.inverse());
+        let covariance = back * best.covariance * back.transpose();
+        Some(PoseEstimate {
+            object,
+            map_from_episode: best.map_from_episode,
+            covariance: PoseCovariance::from_matrix(&((covariance + covariance.transpose()) * 0.5)),
+            share: share(best.log),
+            others: others.collect(),
+        })
+    }
+}
+
+/// Log of each object's mass.
+fn sums(library: &ObjectLibrary, logs: &[(ObjectId, f64)]) -> Vec<(ObjectId, f64)> {
+    let mut sums: BTreeMap<ObjectId, (f64, f64)> = library
+        .indexed_models()
+        .map(|(object, _)| (object, (f64::NEG_INFINITY, 0.0)))
+        .collect();
+    for (object, log) in logs {
+        if let Some((most, _)) = sums.get_mut(object) {
+            *most = most.max(*log);
+        }
+    }
+    for (object, log) in logs {
+        if let Some((most, sum)) = sums.get_mut(object) {
+            *sum += (log - *most).exp();
+        }
+    }
+    let sum = |(object, (most, sum)): (ObjectId, (f64, f64))| {
+        let is_empty = most == f64::NEG_INFINITY;
+        (object, if is_empty { most } else { most + sum.ln() })
+    };
+    sums.into_iter().map(sum).collect()
+}

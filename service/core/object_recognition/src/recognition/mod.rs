@@ -1,0 +1,8 @@
+//! An episode of recognition and its answers.
+
+mod episode;
+mod likelihoods;
+mod masses;
+mod unknown;
+
+pub use episode::Recognition;

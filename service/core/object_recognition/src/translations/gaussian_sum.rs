@@ -1,0 +1,275 @@
+//! The Gaussian sum: all hypotheses over translations, exact ones and those of the prefilter.
+
+use std::collections::BTreeMap;
+
+use nalgebra::UnitQuaternion;
+
+use crate::contact::{Contact, Reached};
+use crate::library::{ObjectId, ObjectLibrary};
+use crate::numeric::{log_sum, to_f32};
+use crate::percept_likelihood::ContactPercepts;
+use crate::translations::background::BackgroundModel;
+use crate::translations::hypothesis::TranslationHypothesis;
+use crate::translations::mass_histogram::MassHistogram;
+use crate::translations::prefilter::{Prefilter, Seed};
+use crate::translations::split::SplitBuffers;
+use crate::translations::touch_update::TouchUpdate;
+use crate::tuning::{
+    NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN, PROMOTION_SEEDS,
+    PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
+};
+
+/// All hypotheses.
+#[derive(Clone, Debug)]
+pub(crate) struct GaussianSum {
+    pub(crate) rotations: Vec<UnitQuaternion<f64>>,
+    /// The exact hypotheses, by object, rotation and place.
+    all: Vec<TranslationHypothesis>,
+    /// The seeds that were not promoted.
+    prefilter: Prefilter,
+    /// Log-likelihoods of the contacts under an unknown object, without those that were asked for.
+    pub(crate) background: BackgroundModel,
+}
+
+impl GaussianSum {
+    /// Without contacts, for these rotations.
+    pub(crate) fn new(rotations: Vec<UnitQuaternion<f64>>) -> Self {
+        Self {
+            rotations,
+            all: Vec::new(),
+            prefilter: Prefilter::default(),
+            background: BackgroundModel::default(),
+        }
+    }
+
+    /// Whether there is no hypothesis.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.all.is_empty() && self.prefilter.is_empty()
+    }
+
+    /// Updates all hypotheses with a contact; `before` are the earlier ones that are kept.
+    pub(crate) fn touch(&mut self, library: &ObjectLibrary, before: &[Contact], contact: &Contact) {
+        let Some(last) = before.last() else {
+            self.prefilter = Prefilter::new(library, &self.rotations, contact);
+            return;
+        };
+        let touch = TouchUpdate::new(library, last, contact);
+        if contact.reached != Reached::Aimed {
+            let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
+            let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            if let Some(nearest) = nearest {
+                let pair = (nearest, contact);
+                let (rotations, drift_m2) = (&self.rotations, touch.drift_m2);
+                self.background.touch(library, rotations, pair, drift_m2);
+            }
+        }
+        let mut buffers = SplitBuffers::default();
+        let mut parts = Vec::with_capacity(2 * self.all.len());
+        let all = std::mem::take(&mut self.all);
+        for own in all.chunk_by(|a, b| a.object == b.object) {
+            if let Some(indexed) = library.indexed(own[0].object) {
+                for own in own.chunk_by(|a, b| a.rotation == b.rotation) {
+                    let rotation = &self.rotations[usize::from(own[0].rotation)];
+                    let local = touch.percepts.at(indexed, rotation);
+                    for hypothesis in own {
+                        let touch = (&touch, &local);
+                        buffers.split(rotation, indexed, hypothesis, touch, &mut parts);
+                    }
+                }
+            }
+        }
+        if !self.prefilter.is_empty() {
+            self.promote(library, before, &touch, &mut buffers, &mut parts);
+        }
+        self.all = parts;
+        self.merge();
+        self.prune();
+    }
+
+    /// Updates the prefilter, and promotes the heaviest of the seeds that the touch supports: from
+    /// then on they are hypotheses of their own.
+    fn promote(
+        &mut self,
+        library: &ObjectLibrary,
+        before: &[Contact],
+        touch: &TouchUpdate<'_>,
+        buffers: &mut SplitBuffers,
+        parts: &mut Vec<TranslationHypothesis>,
+    ) {
+        let mut prefilter = std::mem::take(&mut self.prefilter);
+        let supported = prefilter.update(library, &self.rotations, touch);
+        let promoted = promoted(&prefilter, &supported, before.len(), parts);
+        let first = ContactPercepts::new(&before[0], library.level_prior());
+        let touches: Vec<TouchUpdate<'_>> = before
+            .windows(2)
+            .map(|two| TouchUpdate::new(library, &two[0], &two[1]))
+            .collect();
+        let touches: Vec<&TouchUpdate<'_>> = touches.iter().chain([touch]).collect();
+        let mut replay = |prefilter: &mut Prefilter, seed: &Seed, parts: &mut Vec<_>| {
+            let (hypothesis, known) = prefilter.take(seed, &self.rotations, &first);
+            let rotation = &self.rotations[usize::from(hypothesis.rotation)];
+            buffers.replay(rotation, &known.indexed, hypothesis, &touches, parts);
+        };
+        for seed in &promoted {
+            replay(&mut prefilter, seed, parts);
+        }
+        let best = parts.iter().map(|part| part.evidence);
+        let best = best.fold(prefilter.best_log(), f64::max);
+        let is_over = before.len() >= PREFILTER_CONTACTS_MAX;
+        let least = if is_over {
+            f64::INFINITY
+        } else {
+            best - PRUNE_NATS
+        };
+        // The last hypothesis of an object stays.
+        let mut held: Vec<ObjectId> = parts.iter().map(|part| part.object).collect();
+        held.sort_unstable();
+        for object in prefilter.exhausted(least) {
+            if held.binary_search(&object).is_ok() {
+                continue;
+            }
+            for seed in prefilter.best_of(object, 1) {
+                replay(&mut prefilter, &seed, parts);
+            }
+        }
+        prefilter.drop_below(least);
+        self.prefilter = prefilter;
+    }
+
+    /// Merges hypotheses of one cell, and sorts by object, rotation and cell.
+    fn merge(&mut self) {
+        let mut keyed: Vec<_> = { self.all.iter() }
+            .zip(0u32..)
+            .map(|(hypothesis, number)| (hypothesis.key(), number))
+            .collect();
+        let evidence = |number: u32| self.all[number as usize].evidence;
+        keyed.sort_unstable_by(|(a, one), (b, other)| {
+            a.cmp(b)
+                .then_with(|| evidence(*other).total_cmp(&evidence(*one)))
+                .then(one.cmp(other))
+        });
+        let mut merged: Vec<TranslationHypothesis> = Vec::with_capacity(keyed.len());
+        let mut last = None;
+        for (key, number) in keyed {
+            let hypothesis = self.all[number as usize];
+            match merged.last_mut() {
+                Some(kept) if last == Some(key) => {
+                    let sum = log_sum([kept.evidence, hypothesis.evidence].into_iter());
+                    let share = (hypothesis.evidence - sum).exp();
+                    kept.translation += (hypothesis.translation - kept.translation) * share;
+                    kept.evidence = sum;
+                }
+                _ => merged.push(hypothesis),
+            }
+            last = Some(key);
+        }
+        self.all = merged;
+    }
+
+    /// Drops hypotheses without evidence, and the lightest beyond the budget; each object keeps its
+    /// best.
+    fn prune(&mut self) {
+        let most = TRANSLATIONS_MAX;
+        let evidences = self.all.iter().map(|hypothesis| hypothesis.evidence);
+        let best = evidences.clone().fold(self.prefilter.best_log(), f64::max);
+        let mut least = best - PRUNE_NATS;
+        let mut evidences: Vec<f64> = evidences.filter(|evidence| *evidence > least).collect();
+        // Room for hypotheses exactly as heavy as the lightest.
+        let mut room = usize::MAX;
+        if evidences.len() > most {
+            let (heavier, lightest, _) =
+                evidences.select_nth_unstable_by(most - 1, |a, b| b.total_cmp(a));
+            least = *lightest;
+            room = most - heavier.iter().filter(|evidence| **evidence > least).count();
+        }
+        let mut kept = Vec::with_capacity(self.all.len().min(most));
+        for own in self.all.chunk_by(|a, b| a.object == b.object) {
+            let before = kept.len();
+            for hypothesis in own {
+                let is_heavy = hypothesis.evidence > least;
+                let is_lightest = !is_heavy && hypothesis.evidence >= least && room > 0;
+                if is_heavy || is_lightest {
+                    room -= usize::from(is_lightest);
+                    kept.push(*hypothesis);
+                }
+            }
+            if kept.len() == before {
+                kept.extend(own.iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence)));
+            }
+        }
+        self.all = kept;
+    }
+
+    /// Log of the mass of each object that has any.
+    pub(crate) fn object_logs(&self) -> BTreeMap<ObjectId, f64> {
+        let own = self.all.chunk_by(|a, b| a.object == b.object).map(|own| {
+            let logs = own.iter().map(|hypothesis| hypothesis.evidence);
+            (own[0].object, log_sum(logs))
+        });
+        let mut sums: BTreeMap<ObjectId, f64> = BTreeMap::new();
+        for (object, log) in own.chain(self.prefilter.masses()) {
+            let sum = sums.entry(object).or_insert(f64::NEG_INFINITY);
+            *sum = log_sum([*sum, log].into_iter());
+        }
+        sums
+    }
+
+    /// Number of hypotheses that hold a share of all mass, each object's multiplied by e^`log`.
+    pub(crate) fn holding(&self, share: f64, log: impl Fn(ObjectId) -> Option<f64>) -> usize {
+        let logs = self.object_logs();
+        let all = logs
+            .iter()
+            .filter_map(|(object, own)| Some(own + log(*object)?));
+        let all = log_sum(all);
+        let log = |object| Some(log(object)? - all);
+        let mut histogram = MassHistogram::new(self.prefilter.len());
+        for own in self.all.chunk_by(|a, b| a.object == b.object) {
+            if let Some(log) = log(own[0].object) {
+                for hypothesis in own {
+                    histogram.add(to_f32((hypothesis.evidence + log).exp()));
+                }
+            }
+        }
+        self.prefilter.count(&mut histogram, log);
+        histogram.holding(share * histogram.sum())
+    }
+
+    /// The `most` heaviest hypotheses of an object, heaviest first.
+    pub(crate) fn heaviest(&self, object: ObjectId, most: usize) -> Vec<TranslationHypothesis> {
+        let own = self
+            .all
+            .iter()
+            .filter(|hypothesis| hypothesis.object == object);
+        let prefilter = self.prefilter.best_of(object, most);
+        let prefilter = prefilter
+            .iter()
+            .filter_map(|seed| self.prefilter.hypothesis(seed, &self.rotations));
+        let mut all: Vec<TranslationHypothesis> = own.copied().chain(prefilter).collect();
+        all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        all.truncate(most);
+        all
+    }
+}
+
+/// The seeds to promote after `contacts` contacts: as many as matter, as soon as they fit the
+/// budget.
+fn promoted(
+    prefilter: &Prefilter,
+    supported: &[f32],
+    contacts: usize,
+    parts: &[TranslationHypothesis],
+) -> Vec<Seed> {
+    let logs: Vec<f64> = { prefilter.masses().map(|(_, log)| log) }
+        .chain(parts.iter().map(|part| part.evidence))
+        .collect();
+    let all = log_sum(logs.into_iter());
+    let room = PROMOTION_SEEDS.saturating_sub(supported.len());
+    let budget = (PROMOTION_MAX * room / PROMOTION_SEEDS).max(PROMOTION_MIN) / contacts;
+    let is_time = contacts >= WAITING_CONTACTS;
+    if is_time || prefilter.holding(supported, all + WAITING_SHARE.ln()) <= budget {
+        let wanted = prefilter.holding(supported, all + NEGLIGIBLE_SHARE.ln());
+        prefilter.heaviest(supported, wanted.min(budget))
+    } else {
+        Vec::new()
+    }
+}

@@ -1,0 +1,14 @@
+//! Hypotheses where the rotation is one of a few: sums of Gaussians over translations.
+
+mod background;
+mod candidates;
+mod gaussian_sum;
+mod hypothesis;
+mod mass_histogram;
+mod prefilter;
+mod prefilter_group;
+mod split;
+mod touch_update;
+
+pub(crate) use gaussian_sum::GaussianSum;
+pub(crate) use hypothesis::TranslationHypothesis;

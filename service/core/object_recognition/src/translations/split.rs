@@ -1,0 +1,111 @@
+//! Update of one hypothesis by a touch: it splits where several places could be the one touched.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Point3, UnitQuaternion};
+
+use crate::indexed_model::IndexedModel;
+use crate::percept_likelihood::PerceptLikelihood;
+use crate::translations::candidates::{Candidate, CandidateSearch};
+use crate::translations::hypothesis::TranslationHypothesis;
+use crate::translations::touch_update::{TouchUpdate, share};
+use crate::tuning::{SPLIT_MAX, SPLIT_SHARE_MIN};
+
+/// Buffers that are used again for every hypothesis.
+#[derive(Debug, Default)]
+pub(crate) struct SplitBuffers {
+    search: CandidateSearch,
+    candidates: Vec<Candidate>,
+    now: Vec<TranslationHypothesis>,
+    next: Vec<TranslationHypothesis>,
+}
+
+impl SplitBuffers {
+    /// Appends the parts of a hypothesis after a touch, each with its place taken for the one
+    /// touched.
+    ///
+    /// A hypothesis of an outlier keeps its translation. The others are conditioned on their place
+    /// by the Kalman gain g = P/(P + R), with the share of its density in the sum of all.
+    pub(crate) fn split(
+        &mut self,
+        rotation: &UnitQuaternion<f64>,
+        indexed: &IndexedModel,
+        hypothesis: &TranslationHypothesis,
+        (touch, local): (&TouchUpdate<'_>, &PerceptLikelihood<'_>),
+        parts: &mut Vec<TranslationHypothesis>,
+    ) {
+        let candidates = &mut self.candidates;
+        let contact = touch.percepts.contact;
+        let prior = hypothesis.variance_m2 + touch.drift_m2;
+        let noise = contact.position_sd_m * contact.position_sd_m;
+        let point = Point3::from(rotation * contact.position_m.coords + hypothesis.translation);
+        let variances = (prior, noise);
+        let densities =
+            (self.search).candidates(&indexed.packed, &point, variances, local, candidates);
+        let one = share(indexed.places.len()) / TAU.powf(1.5);
+        let outlier = touch.outlier / one;
+        let total = outlier + densities;
+        let least = SPLIT_SHARE_MIN * total;
+        candidates.retain(|candidate| candidate.density >= least);
+        if candidates.len() > SPLIT_MAX {
+            candidates.sort_by(|a, b| b.density.total_cmp(&a.density));
+            candidates.truncate(SPLIT_MAX);
+        }
+        let best = candidates.iter().map(|candidate| candidate.density);
+        let evidence = hypothesis.evidence + (one * total).ln();
+        if best.fold(0.0, f64::max) < outlier {
+            parts.push(TranslationHypothesis {
+                variance_m2: prior,
+                evidence,
+                ..*hypothesis
+            });
+            return;
+        }
+        let sum = { candidates.iter() }
+            .map(|candidate| candidate.density)
+            .sum::<f64>();
+        for Candidate {
+            density,
+            apart,
+            variance,
+        } in candidates
+        {
+            let gain = prior / (prior + *variance);
+            parts.push(TranslationHypothesis {
+                translation: hypothesis.translation + gain * *apart,
+                variance_m2: prior - gain * prior,
+                evidence: evidence + (*density / sum).ln(),
+                ..*hypothesis
+            });
+        }
+    }
+
+    /// Appends the parts of a seed after all touches so far.
+    pub(crate) fn replay(
+        &mut self,
+        rotation: &UnitQuaternion<f64>,
+        indexed: &IndexedModel,
+        seed: TranslationHypothesis,
+        touches: &[&TouchUpdate<'_>],
+        parts: &mut Vec<TranslationHypothesis>,
+    ) {
+        let mut now = std::mem::take(&mut self.now);
+        let mut next = std::mem::take(&mut self.next);
+        now.clear();
+        now.push(seed);
+        for touch in touches {
+            next.clear();
+            let local = touch.percepts.at(indexed, rotation);
+            for hypothesis in &now {
+                self.split(rotation, indexed, hypothesis, (*touch, &local), &mut next);
+            }
+            if next.len() > SPLIT_MAX {
+                next.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+                next.truncate(SPLIT_MAX);
+            }
+            std::mem::swap(&mut now, &mut next);
+        }
+        parts.extend_from_slice(&now);
+        (self.now, self.next) = (now, next);
+    }
+}
