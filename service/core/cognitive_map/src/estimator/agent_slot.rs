@@ -14,7 +14,7 @@ pub(super) struct AgentState {
     pub(super) sensor: Sensor,
     /// Sightings refused one after the other.
     pub(super) refused: u32,
-    /// How much its recent sightings contradict the estimate ([`set_aside`](super::set_aside)).
+    /// How much its recent sightings contradict the estimate (see `set_aside`).
     pub(super) doubt: u32,
 }
 

@@ -1,12 +1,13 @@
 //! Merging of a frame into another one: members, landmarks, covariance.
 
+use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::covariance::Block;
-use super::frame::{Frame, LANDMARK_DIM, LandmarkState};
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::frame_alignment::{FrameAlignment, PointPair, point_by_alignment, pose_by_alignment};
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
 use super::measurement_update::point_block;
@@ -80,9 +81,40 @@ impl Frame {
         let tau = self.covariance.grow(6);
         self.covariance
             .set_diagonal::<6>(tau, &alignment.covariance);
-        let rotation = alignment.pose.rotation.to_rotation_matrix().into_inner();
         let newcomers = self.members.len();
-        for mut member in std::mem::take(&mut newer.members) {
+        self.add_members(std::mem::take(&mut newer.members), alignment, start, tau);
+        let landmarks = Arc::unwrap_or_clone(newer.landmarks);
+        let mut duplicates = self.add_landmarks(landmarks, alignment, start, tau);
+        for member in &mut self.members[newcomers..] {
+            let own = self.covariance.block(member.offset, member.offset);
+            *member.state_mut().filter.covariance_mut() = own;
+        }
+        if let Some(parameters) = parameters {
+            for index in 0..duplicates.len() {
+                self.equate(&mut duplicates, index, parameters);
+            }
+        }
+        // From the end, so that the offsets of the others stay as they are.
+        duplicates.sort_by_key(|(_, duplicate)| std::cmp::Reverse(duplicate.offset));
+        self.drop_components(tau, 6);
+        for (_, duplicate) in duplicates {
+            self.drop_components(duplicate.offset, LANDMARK_DIM);
+        }
+        self.take_over(&newer.archive, alignment);
+        self.population += newer.population;
+        self.make_room();
+    }
+
+    /// Adds the members of a newer frame, whose components begin at `start` and those of the
+    /// alignment's error at `tau`.
+    fn add_members(
+        &mut self,
+        members: Vec<Member>,
+        alignment: &FrameAlignment,
+        start: usize,
+        tau: usize,
+    ) {
+        for mut member in members {
             member.offset += start;
             member.used = self.sightings;
             let by_alignment = pose_by_alignment(&member.filter().pose);
@@ -93,9 +125,20 @@ impl Frame {
             state.sensor.latest.clear();
             self.members.push(member);
         }
+    }
+
+    /// Adds the landmarks of a newer frame likewise; answers those that are known here.
+    fn add_landmarks(
+        &mut self,
+        added: BTreeMap<Label, LandmarkState>,
+        alignment: &FrameAlignment,
+        start: usize,
+        tau: usize,
+    ) -> Vec<(Label, LandmarkState)> {
+        let rotation = alignment.pose.rotation.to_rotation_matrix().into_inner();
         let mut duplicates = Vec::new();
         let landmarks = Arc::make_mut(&mut self.landmarks);
-        for (label, mut landmark) in Arc::unwrap_or_clone(newer.landmarks) {
+        for (label, mut landmark) in added {
             landmark.offset += start;
             let by_alignment = point_by_alignment(&landmark.position);
             self.covariance.add(landmark.offset, 3, tau, &by_alignment);
@@ -117,24 +160,7 @@ impl Frame {
                 }
             }
         }
-        for member in &mut self.members[newcomers..] {
-            let own = self.covariance.block(member.offset, member.offset);
-            *member.state_mut().filter.covariance_mut() = own;
-        }
-        if let Some(parameters) = parameters {
-            for index in 0..duplicates.len() {
-                self.equate(&mut duplicates, index, parameters);
-            }
-        }
-        // From the end, so that the offsets of the others stay as they are.
-        duplicates.sort_by_key(|(_, duplicate)| std::cmp::Reverse(duplicate.offset));
-        self.drop_components(tau, 6);
-        for (_, duplicate) in duplicates {
-            self.drop_components(duplicate.offset, LANDMARK_DIM);
-        }
-        self.take_over(&newer.archive, alignment);
-        self.population += newer.population;
-        self.make_room();
+        duplicates
     }
 
     /// Archives the archived landmarks of a newer frame here, unless they are known here.

@@ -12,23 +12,25 @@
 //! sighting   ν = z − h(x̂)     S = H P Hᵀ + R     δx = P Hᵀ S⁻¹ ν     P ← P − P Hᵀ S⁻¹ H P
 //! ```
 //!
-//! - **Consistency.** Errors are carried over to the corrected estimate as those of the right-invariant
-//!   filter.
-//! - **Cost.** Between sightings an agent keeps its own covariance and its transition only, so that a
-//!   motion costs the same in every map. A sighting costs the square of the number of components, which
-//!   is bounded: at most 32 agents and 96 landmarks of a frame are held jointly. Agents that neither see
-//!   nor are seen go on by themselves, and further landmarks are archived, up to 65,536 a frame. A clone
-//!   shares what it holds.
-//! - **Dropped correlations.** A landmark that comes back is fused by covariance intersection; an agent
-//!   that comes back counts for a ninth of what it knew.
-//! - **Doubt.** Components far from what is expected lose weight, sightings farther off are refused; an
-//!   agent whose sightings are refused again and again searches farther around, and a landmark that only
-//!   contradicts is forgotten. The noise of each agent's sensor is learned, upwards from what it states.
+//! - **Consistency.** Errors are carried over to the corrected estimate as those of the
+//!   right-invariant filter.
+//! - **Cost.** Between sightings an agent keeps its own covariance and its transition only, so that
+//!   a motion costs the same in every map. A sighting costs the square of the number of components,
+//!   which is bounded: at most 32 agents and 96 landmarks of a frame are held jointly. Agents that
+//!   neither see nor are seen go on by themselves, and further landmarks are archived, up to 65,536
+//!   a frame. A clone shares what it holds.
+//! - **Dropped correlations.** A landmark that comes back is fused by covariance intersection; an
+//!   agent that comes back counts for a ninth of what it knew.
+//! - **Doubt.** Components far from what is expected lose weight, sightings farther off are
+//!   refused; an agent whose sightings are refused again and again searches farther around, and a
+//!   landmark that only contradicts is forgotten. The noise of each agent's sensor is learned,
+//!   upwards from what it states.
 //! - **Absurd evidence.** What a doubted agent sees corrects itself alone; one that contradicts
-//!   everything for long, or may be
-//!   anywhere, is set aside in a frame of its own, with its landmarks (`aside`).
-//! - **Frames.** Agents whose place in the map is unknown have frames of their own until enough points
-//!   are known in both, or their landmarks lie alike whatever they are called (`registration`).
+//!   everything for long, or may be anywhere, is set aside in a frame of its own, with its
+//!   landmarks (`set_aside`).
+//! - **Frames.** Agents whose place in the map is unknown have frames of their own until enough
+//!   points are known in both, or their landmarks lie alike whatever they are called
+//!   (`registration`).
 
 mod agent_filter;
 mod agent_sighting;

@@ -2,12 +2,14 @@
 //!
 //! An agent's *doubt* counts its refused sightings, less those that fit.
 //!
-//! - From [`DOUBT_MIN`] on the agent is doubted: its sightings correct itself alone, and sightings of it
-//!   correct only it, as in a Schmidt-Kalman filter.
-//! - At [`DOUBT_MAX`] it is *set aside*: it begins anew in a frame of its own, and landmarks that only it
-//!   has seen are hidden from the others. An agent whose pose may be anywhere is set aside at once.
-//! - It returns to the map as a newcomer does: by landmarks that lie as the map has them, or by a start
-//!   pose. It then has the doubt [`DOUBT_ON_RETURN`]; once that is zero, its landmarks count again.
+//! - From [`DOUBT_MIN`] on the agent is doubted: its sightings correct itself alone, and sightings
+//!   of it correct only it, as in a Schmidt-Kalman filter.
+//! - At [`DOUBT_MAX`] it is *set aside*: it begins anew in a frame of its own, and landmarks that
+//!   only it has seen are hidden from the others. An agent whose pose may be anywhere is set aside
+//!   at once.
+//! - It returns to the map as a newcomer does: by landmarks that lie as the map has them, or by a
+//!   start pose. It then has the doubt [`DOUBT_ON_RETURN`]; once that is zero, its landmarks count
+//!   again.
 
 use std::ops::Range;
 use std::sync::Arc;

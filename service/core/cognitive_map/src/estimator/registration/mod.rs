@@ -1,10 +1,10 @@
 //! Registration of two frames that know the same landmarks by other names, by how these lie.
 //!
 //! ```text
-//! hypotheses        rigid motions that take two landmarks of one frame (three in space) to two of the other
-//!                   that are as far apart, within the deviations of both distances
-//! correspondences   landmarks that coincide under a motion within their deviations, one to one; the
-//!                   motion is fitted to the unambiguous ones, and they are sought again
+//! hypotheses        rigid motions that take two landmarks of one frame (three in space) to two of
+//!                   the other that are as far apart, within the deviations of both distances
+//! correspondences   landmarks that coincide under a motion within their deviations, one to one;
+//!                   the motion is fitted to the unambiguous ones, and they are sought again
 //! false alarms      H · m · P(at least k − 2 of m − 2 are so near by chance), the least over k;
 //!                   in space k − 3 of m − 3
 //! ```
