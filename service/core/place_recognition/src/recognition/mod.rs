@@ -15,7 +15,7 @@ use crate::sequences::ViewMemory;
 /// What agents have seen, and the searches of those that do not know where they are.
 ///
 /// It never changes anybody's pose: its answers are values. A clone shares all pages.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct PlaceRecognition {
     /// The revision under which changes are noted; for checkpoints only.
     revision: u64,
@@ -24,6 +24,18 @@ pub struct PlaceRecognition {
     searches: Searches,
     /// Whether what agents of the map see contradicts where they are believed to be.
     kidnap_tests: KidnapTests,
+}
+
+impl Default for PlaceRecognition {
+    /// Without any view, at revision 1: a checkpoint since revision 0 holds everything.
+    fn default() -> Self {
+        Self {
+            revision: 1,
+            views: ViewMemory::default(),
+            searches: Searches::default(),
+            kidnap_tests: KidnapTests::default(),
+        }
+    }
 }
 
 impl PlaceRecognition {

@@ -2,12 +2,12 @@
 //!
 //! A search collects *queries*: views with the pose that motion alone gives. How alike a query is
 //! to a remembered view says how far apart they were taken, so every query is a trilateration.
-//! Poses of the agent in the map are seeded where several queries agree ([`seeding`]), and each is
-//! aligned with all views about it ([`alignment`]). A pose is judged by whether anything along its
+//! Poses of the agent in the map are seeded where several queries agree (`seeding`), and each is
+//! aligned with all views about it (`alignment`). A pose is judged by whether anything along its
 //! way contradicts it, not by how many views resemble the queries: where the map is thin it says
 //! nothing. A candidate is believed when none elsewhere explains the queries about as well. All
 //! queries at once determine the pose within the best candidate, and query by query it must be
-//! known about as well ([`candidates`]).
+//! known about as well (`candidates`).
 
 mod alignment;
 mod candidates;
