@@ -74,7 +74,7 @@ pub fn restore(backup: &Path, to: &Path) -> Result<BackupReport, StoreError> {
 
 /// Copies all spaces, and makes the directory a store when they are there.
 fn copy_store(from: &Path, to: &Path) -> Result<BackupReport, StoreError> {
-    let on_disk = |error: io::Error| files::fault(&error, to);
+    let on_disk = |error: io::Error| StoreError::on_disk(&error, to);
     files::create_directory(to).map_err(on_disk)?;
     let present = files::names(to).map_err(on_disk)?;
     if let Some(name) = present.iter().find(|name| *name != "lost+found") {
@@ -87,7 +87,7 @@ fn copy_store(from: &Path, to: &Path) -> Result<BackupReport, StoreError> {
     let (spaces, copied_spaces) = (from.join(SPACES), to.join(SPACES));
     files::create_directory(&copied_spaces).map_err(on_disk)?;
     let mut report = BackupReport::default();
-    let present = numbers(&spaces).map_err(|error| files::fault(&error, &spaces))?;
+    let present = numbers(&spaces).map_err(|error| StoreError::on_disk(&error, &spaces))?;
     for number in &present {
         let space = SpaceNumber(*number);
         let own = spaces.join(number.to_string());
@@ -132,8 +132,8 @@ impl From<StoreError> for NotCopied {
 
 /// Copies a space, at least up to its mark.
 fn copy_space(from: &Path, to: &Path, space: SpaceNumber) -> Result<Extent, NotCopied> {
-    let on_read = |error: io::Error| NotCopied::Store(files::fault(&error, from));
-    let on_write = |error: io::Error| NotCopied::Store(files::fault(&error, to));
+    let on_read = |error: io::Error| NotCopied::Store(StoreError::on_disk(&error, from));
+    let on_write = |error: io::Error| NotCopied::Store(StoreError::on_disk(&error, to));
     let Found::Contents(contents) = record::read(from, record::SPACE)? else {
         return Err(NotCopied::Damaged("its record cannot be read".to_owned()));
     };

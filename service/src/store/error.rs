@@ -1,5 +1,9 @@
 //! Errors of the store, one variant for each way in which the caller would act differently.
 
+use std::io;
+use std::path::Path;
+
+use super::local::files::disk_full;
 use super::log::{Damage, Extent, Flaw, Survey};
 
 /// Why the store could not do it.
@@ -52,6 +56,17 @@ pub struct DamagedJournal {
     pub lost: Extent,
     /// How far the journal was acknowledged.
     pub acknowledged: Extent,
+}
+
+impl StoreError {
+    /// What an error of the disk on the path of `what` means.
+    pub(super) fn on_disk(error: &io::Error, what: &Path) -> Self {
+        if disk_full(error) {
+            Self::DiskFull
+        } else {
+            Self::Io(format!("{}: {error}", what.display()))
+        }
+    }
 }
 
 impl DamagedJournal {

@@ -110,7 +110,7 @@ impl FjallDerived {
             "checkpoints and trajectories are dropped and made again from the journals"
         );
         metrics::counter!(names::DERIVED_REBUILDS).increment(1);
-        let on_disk = |error| files::fault(&error, directory);
+        let on_disk = |error| StoreError::on_disk(&error, directory);
         files::remove_tree(directory).map_err(on_disk)?;
         files::remove(&marker).map_err(on_disk)?;
         let reopened = Self::try_open(directory, &spaces);

@@ -42,7 +42,7 @@ const UNFINISHED: &str = "format-2.new";
 /// # Errors
 /// The old store is in use or damaged, or there is no room for the new one beside it.
 pub fn migrate(directory: &Path, samples_in: fn(&[u8]) -> u64) -> Result<bool, StoreError> {
-    let on_disk = |error: io::Error| files::fault(&error, directory);
+    let on_disk = |error: io::Error| StoreError::on_disk(&error, directory);
     if directory.join(MARKER).exists() && is_local_store(directory)? {
         remove_old(directory).map_err(on_disk)?;
     }
@@ -155,7 +155,7 @@ impl Old {
         to: &Path,
         samples_in: fn(&[u8]) -> u64,
     ) -> Result<(), StoreError> {
-        let on_disk = |error: io::Error| files::fault(&error, to);
+        let on_disk = |error: io::Error| StoreError::on_disk(&error, to);
         fs::create_dir(to).map_err(on_disk)?;
         let record = SpaceRecord {
             space: space.clone(),

@@ -7,7 +7,6 @@ use std::io::{self, ErrorKind, IoSlice, Read};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-use super::super::StoreError;
 #[cfg(test)]
 use super::disk_model as model;
 
@@ -161,15 +160,6 @@ pub(in crate::store) fn names(directory: &Path) -> io::Result<Vec<String>> {
     }
     names.sort();
     Ok(names)
-}
-
-/// What an error of the disk on the path of `what` means.
-pub(in crate::store) fn fault(error: &io::Error, what: &Path) -> StoreError {
-    if disk_full(error) {
-        StoreError::DiskFull
-    } else {
-        StoreError::Io(format!("{}: {error}", what.display()))
-    }
 }
 
 /// Whether an error says that the disk is full.

@@ -119,7 +119,7 @@ impl LocalJournal {
     /// Its files cannot be opened.
     pub fn survey(&self, space: SpaceNumber) -> Result<Survey, StoreError> {
         let directory = self.space_directory(space);
-        Survey::of(&directory, space).map_err(|error| files::fault(&error, &directory))
+        Survey::of(&directory, space).map_err(|error| StoreError::on_disk(&error, &directory))
     }
 
     /// Passes every readable block of a space to `take`, in order, with its number and samples, and
@@ -133,7 +133,7 @@ impl LocalJournal {
         mut take: impl FnMut(Result<(u64, u64, &[u8]), super::Damage>),
     ) -> Result<(), StoreError> {
         let directory = self.space_directory(space);
-        let fault = |error: io::Error| files::fault(&error, &directory);
+        let fault = |error: io::Error| StoreError::on_disk(&error, &directory);
         let mut reader = LogReader::open(&directory, space, 0).map_err(fault)?;
         while let Some(item) = reader.next().map_err(fault)? {
             match item {
@@ -163,7 +163,7 @@ impl LocalJournal {
         change: impl FnOnce() -> io::Result<T>,
     ) -> Result<T, StoreError> {
         self.refuse_if_broken()?;
-        change().map_err(|error| files::fault(&error, what))
+        change().map_err(|error| StoreError::on_disk(&error, what))
     }
 
     fn refuse_if_broken(&self) -> Result<(), StoreError> {
@@ -216,7 +216,7 @@ impl LocalJournal {
             .directory
             .join(SPACES)
             .join(format!("{}{UNFINISHED}", space.0));
-        let fault = |error: io::Error| files::fault(&error, &directory);
+        let fault = |error: io::Error| StoreError::on_disk(&error, &directory);
         files::remove_tree(&unfinished).map_err(fault)?;
         std::fs::create_dir(&unfinished).map_err(fault)?;
         record::write(&unfinished, record::SPACE, &record.encode()?)?;
@@ -236,7 +236,7 @@ impl Journal for LocalJournal {
     fn spaces(&self) -> Result<Vec<StoredSpace>, StoreError> {
         let parent = self.directory.join(SPACES);
         let mut spaces = Vec::new();
-        for number in numbers(&parent).map_err(|error| files::fault(&error, &parent))? {
+        for number in numbers(&parent).map_err(|error| StoreError::on_disk(&error, &parent))? {
             spaces.push(stored_space(&parent, SpaceNumber(number))?);
         }
         // The placeholder of a lost name must not be another space's name.
@@ -363,7 +363,9 @@ impl Journal for LocalJournal {
                 acknowledged: mark.unwrap_or_default().blocks.min(end),
                 end,
             }),
-            Err(error) => Box::new(std::iter::once(Err(files::fault(&error, &directory)))),
+            Err(error) => Box::new(std::iter::once(Err(StoreError::on_disk(
+                &error, &directory,
+            )))),
         }
     }
 }
@@ -397,7 +399,7 @@ impl Iterator for Reading<'_> {
             Ok(Some(Item::Damage(damage))) if damage.block < self.end => self.damaged().map(Err),
             Ok(None) if self.next < self.acknowledged => self.damaged().map(Err),
             Ok(_) => None,
-            Err(error) => Some(Err(files::fault(&error, &self.journal.directory))),
+            Err(error) => Some(Err(StoreError::on_disk(&error, &self.journal.directory))),
         }
     }
 }

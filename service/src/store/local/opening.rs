@@ -26,7 +26,7 @@ pub(super) struct Opened {
 
 /// Opens the journals in `directory`, which are created where they are absent if `create` says so.
 pub(super) fn open(directory: &Path, create: bool) -> Result<Opened, StoreError> {
-    let on_disk = |error: io::Error| files::fault(&error, directory);
+    let on_disk = |error: io::Error| StoreError::on_disk(&error, directory);
     if !create && !is_store(directory)? {
         return Err(StoreError::Io(format!(
             "there is no store at {}",
@@ -54,7 +54,7 @@ pub(super) fn remove_created(created: Option<&Path>) {
 }
 
 fn open_in(directory: &Path) -> Result<LocalJournal, StoreError> {
-    let on_disk = |error: io::Error| files::fault(&error, directory);
+    let on_disk = |error: io::Error| StoreError::on_disk(&error, directory);
     if !is_store(directory)? {
         refuse_foreign(directory)?;
     }
@@ -103,7 +103,7 @@ pub(in crate::store) fn is_store(directory: &Path) -> Result<bool, StoreError> {
 /// Takes the lock of the directory for as long as the file is open.
 pub(in crate::store) fn lock(directory: &Path) -> Result<File, StoreError> {
     let path = directory.join(LOCK);
-    let on_disk = |error: io::Error| files::fault(&error, &path);
+    let on_disk = |error: io::Error| StoreError::on_disk(&error, &path);
     let mut options = File::options();
     let lock = options.create(true).truncate(false).write(true).open(&path);
     let lock = lock.map_err(on_disk)?;
@@ -116,7 +116,7 @@ pub(in crate::store) fn lock(directory: &Path) -> Result<File, StoreError> {
 
 /// Refuses a directory without a store that holds anything else than an unfinished one.
 pub(in crate::store) fn refuse_foreign(directory: &Path) -> Result<(), StoreError> {
-    let on_disk = |error: io::Error| files::fault(&error, directory);
+    let on_disk = |error: io::Error| StoreError::on_disk(&error, directory);
     let names = files::names(directory).map_err(on_disk)?;
     if super::super::format1::marker::is_store(directory) {
         return Err(StoreError::OlderFormat);
@@ -144,7 +144,7 @@ pub(in crate::store) fn refuse_foreign(directory: &Path) -> Result<(), StoreErro
 /// Finishes what a crash has interrupted.
 fn tidy_up(directory: &Path) -> Result<(), StoreError> {
     let spaces = directory.join(SPACES);
-    let on_disk = |error: io::Error| files::fault(&error, directory);
+    let on_disk = |error: io::Error| StoreError::on_disk(&error, directory);
     files::remove_tree(&directory.join(DELETED)).map_err(on_disk)?;
     for name in files::names(&spaces).map_err(on_disk)? {
         if name.ends_with(UNFINISHED) {
@@ -177,7 +177,7 @@ pub(super) fn set_aside(directory: &Path, space: SpaceNumber) -> Result<PathBuf,
     if from.exists() {
         files::create_directory(&parent)
             .and_then(|_| files::rename(&from, &to))
-            .map_err(|error| files::fault(&error, &from))?;
+            .map_err(|error| StoreError::on_disk(&error, &from))?;
     }
     Ok(to)
 }

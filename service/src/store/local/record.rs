@@ -55,7 +55,7 @@ pub(in crate::store) fn write(
     let bytes = encode(contents)?;
     for name in [format!("{name}{COPY}"), name.to_owned()] {
         let path = directory.join(name);
-        files::replace(&path, &bytes).map_err(|error| files::fault(&error, &path))?;
+        files::replace(&path, &bytes).map_err(|error| StoreError::on_disk(&error, &path))?;
     }
     Ok(())
 }
@@ -72,7 +72,7 @@ pub(in crate::store) fn read(directory: &Path, name: &str) -> Result<Found, Stor
             },
             Err(error) if error.kind() == ErrorKind::NotFound => {}
             Err(error) if files::is_unreadable(&error) => found = Found::Damaged,
-            Err(error) => return Err(files::fault(&error, &path)),
+            Err(error) => return Err(StoreError::on_disk(&error, &path)),
         }
     }
     Ok(found)

@@ -34,7 +34,7 @@ pub fn verify(directory: &Path, space: Option<&str>) -> Result<Vec<SpaceSurvey>,
     }
     let spaces = directory.join(SPACES);
     let mut surveys = Vec::new();
-    for number in numbers(&spaces).map_err(|error| files::fault(&error, &spaces))? {
+    for number in numbers(&spaces).map_err(|error| StoreError::on_disk(&error, &spaces))? {
         let number = SpaceNumber(number);
         let stored = stored_space(&spaces, number)?;
         if space.is_some_and(|wanted| wanted != stored.name) {
@@ -44,7 +44,7 @@ pub fn verify(directory: &Path, space: Option<&str>) -> Result<Vec<SpaceSurvey>,
         let survey = match Survey::of(&own, number) {
             // Deleted meanwhile.
             Err(_) if !own.exists() => continue,
-            survey => survey.map_err(|error| files::fault(&error, &own))?,
+            survey => survey.map_err(|error| StoreError::on_disk(&error, &own))?,
         };
         surveys.push(SpaceSurvey {
             number,

@@ -8,9 +8,6 @@ use crate::{
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::error::G2oError;
-use super::parse::parse;
-
 /// One measured relative pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Edge {
@@ -57,33 +54,6 @@ pub struct G2oGraph {
 }
 
 impl G2oGraph {
-    /// Reads a text. A node that has edges and no entry of its own begins where the first edge to
-    /// it from an earlier node puts it, or else at the origin.
-    ///
-    /// # Errors
-    /// A line is no entry of the format, or there is no edge.
-    pub fn read(text: &str) -> Result<Self, G2oError> {
-        let mut graph = parse(text)?;
-        graph.edges.sort_by_key(|edge| edge.from.max(edge.to));
-        for edge in &graph.edges {
-            let from = *graph
-                .poses
-                .entry(edge.from)
-                .or_insert_with(Isometry3::identity);
-            graph
-                .poses
-                .entry(edge.to)
-                .or_insert_with(|| from * edge.transform);
-        }
-        for edge in &graph.point_edges {
-            graph
-                .poses
-                .entry(edge.pose)
-                .or_insert_with(Isometry3::identity);
-        }
-        Ok(graph)
-    }
-
     /// Whether the graph lies in the plane.
     pub fn is_planar(&self) -> bool {
         self.is_planar

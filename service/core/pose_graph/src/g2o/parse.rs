@@ -25,8 +25,37 @@ struct Reader {
     is_point: BTreeMap<u64, bool>,
 }
 
+impl G2oGraph {
+    /// Reads a text. A node that has edges and no entry of its own begins where the first edge to
+    /// it from an earlier node puts it, or else at the origin.
+    ///
+    /// # Errors
+    /// A line is no entry of the format, or there is no edge.
+    pub fn read(text: &str) -> Result<Self, G2oError> {
+        let mut graph = parse(text)?;
+        graph.edges.sort_by_key(|edge| edge.from.max(edge.to));
+        for edge in &graph.edges {
+            let from = *graph
+                .poses
+                .entry(edge.from)
+                .or_insert_with(Isometry3::identity);
+            graph
+                .poses
+                .entry(edge.to)
+                .or_insert_with(|| from * edge.transform);
+        }
+        for edge in &graph.point_edges {
+            graph
+                .poses
+                .entry(edge.pose)
+                .or_insert_with(Isometry3::identity);
+        }
+        Ok(graph)
+    }
+}
+
 /// The graph of a text, with the nodes and edges that have a line.
-pub(super) fn parse(text: &str) -> Result<G2oGraph, G2oError> {
+fn parse(text: &str) -> Result<G2oGraph, G2oError> {
     let mut reader = Reader::default();
     for (index, line) in text.lines().enumerate() {
         let content = line.split('#').next().unwrap_or_default();
