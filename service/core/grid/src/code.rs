@@ -1,10 +1,23 @@
 //! Grid codes: the phases of all modules, whole or with modules erased.
 
+use nalgebra::Point3;
+
 use super::{GridModules, Phase};
 
 /// The phases of all modules of a space, finest first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridCode(Box<[Phase]>);
+
+impl GridModules {
+    /// The grid code at a position \[m\] in `map`.
+    pub fn code_at(&self, position: &Point3<f64>) -> GridCode {
+        let phases = self
+            .lattices()
+            .iter()
+            .map(|lattice| lattice.locate(position).1);
+        GridCode::new(phases.collect::<Box<[_]>>())
+    }
+}
 
 impl GridCode {
     /// From the phases of all modules, finest first.

@@ -25,6 +25,7 @@ mod position_search;
 mod reduction;
 pub mod similarity;
 mod state;
+mod tuning;
 
 pub use code::{GridCode, InvalidCode, PartialCode};
 pub use decode::{Decoded, decode, unique_range_m};

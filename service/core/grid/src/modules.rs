@@ -1,8 +1,8 @@
 //! The grid modules of a space.
 
-use nalgebra::{Point3, Quaternion, UnitQuaternion};
+use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::{GridCode, GridState, Lattice, ModuleState};
+use super::Lattice;
 
 /// The two turns whose powers are the modules' orientations, before normalising (w, x, y, z).
 const TURNS: [[f64; 4]; 2] = [[5.0, -1.0, 0.0, -1.0], [4.0, 0.0, -1.0, 2.0]];
@@ -68,20 +68,5 @@ impl GridModules {
     /// The lattices, finest first; there is at least one.
     pub fn lattices(&self) -> &[Lattice] {
         &self.0
-    }
-
-    /// The grid state at a position \[m\] in `map`.
-    pub fn locate(&self, position: &Point3<f64>) -> GridState {
-        let state = |lattice: &Lattice| {
-            let (reference, phase) = lattice.locate(position);
-            ModuleState { reference, phase }
-        };
-        GridState::from_modules(self.0.iter().map(state).collect::<Box<[_]>>())
-    }
-
-    /// The grid code at a position \[m\] in `map`.
-    pub fn code_at(&self, position: &Point3<f64>) -> GridCode {
-        let phases = self.0.iter().map(|lattice| lattice.locate(position).1);
-        GridCode::new(phases.collect::<Box<[_]>>())
     }
 }

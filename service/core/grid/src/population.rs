@@ -3,6 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::lattice::shortest_turns;
+pub use super::tuning::TUNING_WIDTH;
+
 use super::similarity::gaussian_confidence;
 use super::{GridCode, GridModules, Lattice, Phase};
 
@@ -11,13 +13,6 @@ pub const CELLS_PER_AXIS: usize = 3;
 
 /// Cells of one module.
 pub const CELLS_PER_MODULE: usize = CELLS_PER_AXIS * CELLS_PER_AXIS * CELLS_PER_AXIS;
-
-/// Tuning width σ of every cell as a share of its module's spacing.
-///
-/// Half the distance between neighbouring preferred phases, so that neighbours' fields overlap and
-/// the activation varies smoothly between them, while a field (full width at half height 2.35 σ =
-/// 0.39 spacings) stays clear of the next one of the same cell.
-pub const TUNING_WIDTH: f64 = 1.0 / 6.0;
 
 /// Preferred phase of a cell: its index counts thirds of a turn along the first lattice axis, then
 /// the second, then the third (the last runs fastest).

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::lattice::{shortest_turns, turns_norm_squared};
-use super::population::TUNING_WIDTH;
+use super::tuning::TUNING_WIDTH;
 use super::{GridCode, GridModules, Lattice, PartialCode};
 
 /// Newton steps at most; from 0 to anywhere that matters takes fewer than ten.

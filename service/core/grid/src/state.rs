@@ -3,11 +3,22 @@
 use nalgebra::{Point3, Vector3};
 use state::{CorruptState, State, StateReader, StateWriter};
 
-use super::{GridCode, GridModules, ModuleState, Phase};
+use super::{GridCode, GridModules, Lattice, ModuleState, Phase};
 
 /// All modules' states, finest first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridState(Box<[ModuleState]>);
+
+impl GridModules {
+    /// The grid state at a position \[m\] in `map`.
+    pub fn locate(&self, position: &Point3<f64>) -> GridState {
+        let state = |lattice: &Lattice| {
+            let (reference, phase) = lattice.locate(position);
+            ModuleState { reference, phase }
+        };
+        GridState::from_modules(self.lattices().iter().map(state).collect::<Box<[_]>>())
+    }
+}
 
 impl GridState {
     /// From the states of all modules of a space, finest first.

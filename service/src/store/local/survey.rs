@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::log::Survey;
 use super::super::{SpaceNumber, StoreError};
-use super::{SPACES, files, numbers, opening, stored_space};
+use super::{SPACES, numbers, opening, stored_space};
 
 /// What verification has found of one space.
 #[derive(Clone, Debug, PartialEq, Eq)]

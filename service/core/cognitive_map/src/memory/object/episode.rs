@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3, Vector6};
 
-use super::joining::{Insight, is_clear};
+use super::joined::is_clear;
+use super::joining::Insight;
 use super::memory::{Identified, ObjectMemory};
 use crate::input::TouchNoise;
 use crate::input::{Descriptor, Label, Level};

@@ -7,12 +7,12 @@
 
 use nalgebra::Isometry3;
 
+use super::joined::is_clear;
 use super::memory::{KnownObject, ObjectMemory};
 use crate::input::Label;
 use crate::memory::strength::Clock;
 use object_recognition::{
-    Contact, ObjectId, ObjectLibrary, ObjectModel, Orientation, PoseEstimate, Posterior,
-    Recognition, Verdict,
+    Contact, ObjectId, ObjectLibrary, Orientation, Posterior, Recognition, Verdict,
 };
 
 /// Contacts by which two objects, or the parts of one, are compared: they tell about as much as a
@@ -24,24 +24,10 @@ const ALIKE_MAX: usize = 4;
 /// deviations.
 const FIT_LEAST: f64 = -3.0;
 
-/// Share of the evidence that such a pose holds.
-const CLEAR_SHARE: f64 = 0.9;
-
 /// Numbers of the parts while they are compared.
 const BEFORE: ObjectId = ObjectId(0);
 const ADDED: ObjectId = ObjectId(1);
 const TOGETHER: ObjectId = ObjectId(2);
-
-/// What was joined to an object last, while that may still prove wrong.
-#[derive(Clone, Debug)]
-pub(super) struct Joining {
-    /// The object as it was.
-    pub(super) before: ObjectModel,
-    /// What was joined to it, in its frame.
-    pub(super) added: ObjectModel,
-    /// Visits and contacts that taught what was joined.
-    pub(super) taught: (u64, u64),
-}
 
 /// Where one object's frame lies in that of another.
 #[derive(Clone, Copy)]
@@ -204,11 +190,6 @@ impl ObjectMemory {
             Verdict::Undecided | Verdict::Unknown => None,
         }
     }
-}
-
-/// Whether a pose is clear enough for something to be laid into an object by it.
-pub(super) fn is_clear(pose: &PoseEstimate) -> bool {
-    pose.share > CLEAR_SHARE
 }
 
 fn recognised(

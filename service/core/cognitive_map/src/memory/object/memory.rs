@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
-use super::joining::{Joining, is_clear};
+use super::joined::{Joining, is_clear};
 use crate::input::Label;
 use crate::input::{Lesson, Touch};
 use crate::memory::strength::{Clock, Strength};

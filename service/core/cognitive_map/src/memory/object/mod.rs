@@ -5,6 +5,7 @@
 //! teaches an object or is to be recognised by [`recognition`](object_recognition).
 
 mod episode;
+mod joined;
 mod joining;
 mod memory;
 mod state;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::episode::{CONTACTS_MAX, Episode, Purpose};
-use super::joining::Joining;
+use super::joined::Joining;
 use super::memory::{KnownObject, ObjectMemory};
 use crate::input::Label;
 use ::state::{
