@@ -90,8 +90,8 @@ pub struct AgentDetail {
     pub lag_samples: u64,
     /// Path travelled in this session \[m\].
     pub travelled_m: f64,
-    /// Sightings of its own earlier samples that were dropped, because those were not remembered, or no longer; over
-    /// all sessions.
+    /// Sightings of its own earlier samples that were dropped, because those were not remembered,
+    /// or no longer; over all sessions.
     pub forgotten_matches: u64,
 }
 
@@ -105,8 +105,9 @@ pub struct Evidence {
     pub refused: u64,
     /// Of those, how many one after the other up to now; from 4 on the agent is not `localized`.
     pub refused_in_a_row: u64,
-    /// Mean of the squared error of the accepted ones' components, each over what was expected of it: 1 where
-    /// the stated noise is honest, more where it is too small. Absent before the first one.
+    /// Mean of the squared error of the accepted ones' components, each over what was expected of
+    /// it: 1 where the stated noise is honest, more where it is too small. Absent before the first
+    /// one.
     pub nis_mean: Option<f64>,
 }
 
@@ -160,8 +161,8 @@ pub struct GridModuleState {
     pub phase: [f64; 3],
     /// Activation of the module's cells, in \[0, 1\].
     pub activation: Vec<f64>,
-    /// Activation by the octant model at the agent's position (seed Algorithm 1), in \[0, 1\]: cells as
-    /// wide, high and deep as the spacing, σ a sixth of it, cut-off radius the spacing.
+    /// Activation by the octant model at the agent's position (seed Algorithm 1), in \[0, 1\]:
+    /// cells as wide, high and deep as the spacing, σ a sixth of it, cut-off radius the spacing.
     pub octant_activation: f64,
 }
 
@@ -175,8 +176,8 @@ pub struct Trajectory {
     pub session: u64,
     /// Frame; always `map`.
     pub frame: String,
-    /// `causal`: each pose as it was known when its sample was applied. `refined`: by all that has been seen
-    /// since.
+    /// `causal`: each pose as it was known when its sample was applied. `refined`: by all that has
+    /// been seen since.
     pub kind: String,
     /// Poses, oldest first.
     pub poses: Vec<StampedPose>,
@@ -202,7 +203,8 @@ pub struct IngestAnswer {
 pub struct Place {
     /// Identifier, counted from 0.
     pub id: u64,
-    /// Position in `map` \[m\]: where its founder stood, by what is known of the founder's way by now.
+    /// Position in `map` \[m\]: where its founder stood, by what is known of the founder's way by
+    /// now.
     pub translation_m: [f64; 3],
     /// Orientation of the founder at the founding, likewise, unit quaternion `[x, y, z, w]`.
     pub rotation_xyzw: [f64; 4],
@@ -218,8 +220,8 @@ pub struct Place {
     pub first_stamp_ns: i64,
     /// Stamp of the latest visit \[ns\].
     pub last_stamp_ns: i64,
-    /// Strength: the founding and each visit count one when they happen, and half as much after every
-    /// half-life. The weakest place goes when there would be more than `places_max`.
+    /// Strength: the founding and each visit count one when they happen, and half as much after
+    /// every half-life. The weakest place goes when there would be more than `places_max`.
     pub strength: f64,
 }
 
@@ -249,14 +251,14 @@ pub struct RecallAnswer {
     pub map_revision: u64,
     /// The places, best first.
     pub places: Vec<RecalledPlace>,
-    /// Other places that answer the code nearly as well as the first one; absent when there are none,
-    /// without a code, or with a position beside it.
+    /// Other places that answer the code nearly as well as the first one; absent when there are
+    /// none, without a code, or with a position beside it.
     #[serde(default)]
     pub rivals: Option<Rivals>,
 }
 
-/// The places that answer a code nearly as well as the best one: more than a field radius from it, with
-/// a cosine at most 0.05 lower.
+/// The places that answer a code nearly as well as the best one: more than a field radius from it,
+/// with a cosine at most 0.05 lower.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Rivals {
@@ -276,7 +278,8 @@ pub struct Rivals {
 pub struct RecalledPlace {
     /// The place.
     pub place: Place,
-    /// Cosine of the cue's and the place's activation (seed Eq. 5); absent without a position or code.
+    /// Cosine of the cue's and the place's activation (seed Eq. 5); absent without a position or
+    /// code.
     pub cosine: Option<f64>,
     /// Confidence (seed Eq. 8), in \[0, 1\]; absent without a cue.
     pub confidence: Option<f64>,
@@ -307,9 +310,9 @@ pub struct Trip {
     pub leg_count: u64,
     /// Length of its path \[m\].
     pub length_m: f64,
-    /// Strength: its recording counts one when it begins, so does travelling all of it again, and each
-    /// half as much after every half-life. The weakest trip goes when there would be more legs than
-    /// `legs_max`.
+    /// Strength: its recording counts one when it begins, so does travelling all of it again, and
+    /// each half as much after every half-life. The weakest trip goes when there would be more legs
+    /// than `legs_max`.
     pub strength: f64,
 }
 

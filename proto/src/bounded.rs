@@ -60,8 +60,8 @@ impl BoundedBatch {
     }
 }
 
-/// The samples of a question where they were taken: one more than there may be stands for all that are
-/// too many, for whoever answers to refuse.
+/// The samples of a question where they were taken: one more than there may be stands for all that
+/// are too many, for whoever answers to refuse.
 pub(crate) fn localize_samples<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Vec<Sample>, D::Error> {

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// Its position in the map is known to within the space's `localized_sd_m`, and what it sees is where
-    /// it should be.
+    /// Its position in the map is known to within the space's `localized_sd_m`, and what it sees is
+    /// where it should be.
     Localized,
     /// It is known less well than that, or its latest sightings contradict it.
     Uncertain,

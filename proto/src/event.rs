@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::watermark::SkipReason;
 
-/// Which event of its space one is. Made of the record that brought it about, so it is the same live,
-/// after a restart and in a replay, and later events have larger ids. As a text
+/// Which event of its space one is. Made of the record that brought it about, so it is the same
+/// live, after a restart and in a replay, and later events have larger ids. As a text
 /// `{map_revision}-{index}`, such as `4711-0`.
 ///
 /// It stands beside the event: as `id` of a server-sent event and of a page, over Zenoh as the
@@ -201,8 +201,8 @@ pub enum EventKind {
         /// Its position in `map` \[m\].
         translation_m: [f64; 3],
     },
-    /// A trip was forgotten: there was no room for the leg recorded next. Its number is not given to
-    /// another one.
+    /// A trip was forgotten: there was no room for the leg recorded next. Its number is not given
+    /// to another one.
     TripForgotten {
         /// The trip.
         trip: u64,
@@ -235,7 +235,8 @@ pub enum EventKind {
         /// Contacts of the episode that taught it.
         contacts: u64,
     },
-    /// An episode was to teach an object and has not: it did not become clear how its frame lies in the object's.
+    /// An episode was to teach an object and has not: it did not become clear how its frame lies in
+    /// the object's.
     ObjectNotLearned {
         /// Contacts of the episode.
         contacts: u64,
@@ -254,8 +255,8 @@ pub enum EventKind {
         /// Name of the other one.
         part: String,
     },
-    /// The agent was removed, by whoever runs the service or to make room. What it did in the map stays; a
-    /// message under its name enrols another agent.
+    /// The agent was removed, by whoever runs the service or to make room. What it did in the map
+    /// stays; a message under its name enrols another agent.
     AgentRemoved {},
 }
 

@@ -14,8 +14,8 @@ pub fn at_field(path: &Path, error: &impl Display) -> String {
     }
 }
 
-/// The path of the field for which a message cannot be read. Reads the message a second time, so that
-/// those that can be read pay nothing for it.
+/// The path of the field for which a message cannot be read. Reads the message a second time, so
+/// that those that can be read pay nothing for it.
 pub(crate) fn refused<'de, T, D>(deserializer: D) -> Option<Path>
 where
     T: Deserialize<'de>,

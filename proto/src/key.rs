@@ -16,8 +16,9 @@ use crate::name::{Name, NameError};
 /// First chunk of every key.
 const ROOT: &str = "cogmap";
 
-/// Parameter of a watermark query's selector (`…/query/watermark?session=7`): the session that a robot asks as. The
-/// answer is then the problem `session-in-future` where that session would not be taken.
+/// Parameter of a watermark query's selector (`…/query/watermark?session=7`): the session that a
+/// robot asks as. The answer is then the problem `session-in-future` where that session would not
+/// be taken.
 pub const SESSION_PARAMETER: &str = "session";
 
 /// Where an agent publishes its samples; `space` and `agent` may be `*`.

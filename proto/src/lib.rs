@@ -4,10 +4,10 @@
 //! for everyone else, with the same field names in both. The Zenoh `Encoding` of a message (or the
 //! `Content-Type` of an HTTP body) says which codec it is in; nothing is guessed.
 //!
-//! **Version rule.** The version stands in the postcard encoding string ([`POSTCARD_V1`]),
-//! because postcard has no field tags: a change there is a new enum variant at the end, or a new
-//! version. CBOR and JSON evolve by addition: a reader ignores sample fields it does not know, and a
-//! field that it does not find takes its documented default.
+//! **Version rule.** The version stands in the postcard encoding string ([`POSTCARD_V1`]), because
+//! postcard has no field tags: a change there is a new enum variant at the end, or a new version.
+//! CBOR and JSON evolve by addition: a reader ignores sample fields it does not know, and a field
+//! that it does not find takes its documented default.
 //!
 //! Units are SI, angles radians, stamps nanoseconds of the sensor's clock. Quaternions are
 //! `[x, y, z, w]` as in ROS.

@@ -6,13 +6,15 @@ use crate::bounded;
 use crate::estimate::Status;
 use crate::sample::Sample;
 
-/// Asks where a sequence of samples was taken. What the map has learned answers; nothing is learned from the question.
+/// Asks where a sequence of samples was taken. What the map has learned answers; nothing is learned
+/// from the question.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LocalizeQuery {
     /// The samples of one robot, in order, as in a batch; at least one, at most
-    /// [`crate::limits::LOCALIZE_SAMPLES_MAX`]. Start poses and episodes with objects are none of them.
+    /// [`crate::limits::LOCALIZE_SAMPLES_MAX`]. Start poses and episodes with objects are none of
+    /// them.
     #[serde(deserialize_with = "bounded::localize_samples")]
     pub samples: Vec<Sample>,
 }

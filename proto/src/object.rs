@@ -4,15 +4,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::percept::Descriptor;
 
-/// Begins or ends an episode with an object. What is felt in between counts in the frame of the body when the episode began.
+/// Begins or ends an episode with an object. What is felt in between counts in the frame of the
+/// body when the episode began.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum ObjectMark {
     /// What is felt from here on teaches an object.
     Learn {
-        /// Its name. One that is known is extended if the episode shows how its frame lies in the object's. Without a name
-        /// it is the object that is recognised, or a new one. Nothing can be called `identify`.
+        /// Its name. One that is known is extended if the episode shows how its frame lies in the
+        /// object's. Without a name it is the object that is recognised, or a new one. Nothing can
+        /// be called `identify`.
         #[serde(default)]
         name: Option<String>,
         /// Contacts within this distance \[m\], 10 µm to 1 km, are of one place of a new object.
@@ -25,7 +27,8 @@ pub enum ObjectMark {
         #[serde(default)]
         noise: TouchNoise,
     },
-    /// What is felt from here on is to be recognised. If it turns out to be unknown, it is learned at the end.
+    /// What is felt from here on is to be recognised. If it turns out to be unknown, it is learned
+    /// at the end.
     Identify {
         /// How the frame may be turned against an object's.
         #[serde(default)]
@@ -47,7 +50,8 @@ pub enum Orientation {
     Known {},
     /// By one of the 24 turns that take a cube into itself.
     Cube {},
-    /// By one of these rotations, all equally likely: from the episode's frame into the object's, at most 1000.
+    /// By one of these rotations, all equally likely: from the episode's frame into the object's,
+    /// at most 1000.
     Finite {
         /// Unit quaternions `[x, y, z, w]`.
         rotations_xyzw: Vec<[f64; 4]>,
@@ -183,7 +187,8 @@ pub struct IdentifyQuery {
     /// How exactly was felt.
     #[serde(default)]
     pub noise: TouchNoise,
-    /// The contacts, in the order in which they were felt, in a frame of their own; at least one, at most 256.
+    /// The contacts, in the order in which they were felt, in a frame of their own; at least one,
+    /// at most 256.
     pub contacts: Vec<Contact>,
 }
 
@@ -275,8 +280,8 @@ pub struct Identification {
     pub entropy_nats: f64,
     /// Contacts that were taken in.
     pub contacts: u64,
-    /// How well the best explanation fits, in standard deviations of what a right one does: about 0 for what was
-    /// learned, far below −3 for what was not.
+    /// How well the best explanation fits, in standard deviations of what a right one does: about 0
+    /// for what was learned, far below −3 for what was not.
     pub fit: f64,
     /// Pose in the most probable object.
     pub pose: Option<ObjectPose>,
@@ -320,7 +325,8 @@ pub struct ObjectPose {
     pub translation_m: [f64; 3],
     /// Its orientation there as a unit quaternion `[x, y, z, w]`.
     pub rotation_xyzw: [f64; 4],
-    /// Covariance of its error along and about its own axes: upper triangle, row by row \[m², m rad, rad²\].
+    /// Covariance of its error along and about its own axes: upper triangle, row by row \[m², m
+    /// rad, rad²\].
     pub covariance: [f64; 21],
     /// Share of the object's evidence that this pose holds.
     pub share: f64,
@@ -364,8 +370,8 @@ pub struct AgentObject {
     pub episode: Option<EpisodeKind>,
     /// What its contacts say; in the frame of the body when the episode began.
     pub identification: Option<Identification>,
-    /// The latest episode that has ended; absent when there was none in which something was felt. Also kept
-    /// when the robot has closed its session, and over a restart of the service.
+    /// The latest episode that has ended; absent when there was none in which something was felt.
+    /// Also kept when the robot has closed its session, and over a restart of the service.
     #[serde(default)]
     pub last: Option<EndedEpisode>,
 }
@@ -380,8 +386,8 @@ pub struct EndedEpisode {
     pub session: u64,
     /// Stamp of the sample that ended it \[ns\].
     pub stamp_ns: i64,
-    /// What its contacts said in the end, before anything was learned from it; absent when it taught an
-    /// object by its name.
+    /// What its contacts said in the end, before anything was learned from it; absent when it
+    /// taught an object by its name.
     pub identification: Option<Identification>,
 }
 

@@ -52,8 +52,9 @@ pub struct PredictAnswer {
     pub rotation_xyzw: [f64; 4],
     /// The place that answers there, if one does.
     pub place: Option<u64>,
-    /// Its confidence, in \[0, 1\]: the mean over the positions to which the motion may lead, by its
-    /// noise. How well the agent is localised when it starts is not in it. 0 where no place answers.
+    /// Its confidence, in \[0, 1\]: the mean over the positions to which the motion may lead, by
+    /// its noise. How well the agent is localised when it starts is not in it. 0 where no place
+    /// answers.
     pub confidence: f64,
     /// What is expected there, in the order of the channels; empty where no place answers.
     pub percepts: Vec<PredictedPercept>,

@@ -41,8 +41,8 @@ pub struct WatermarkQuery {
     pub agent: String,
 }
 
-/// Asks for places. `position_m`, `code` and `percept` are cues, alone or together, and rank them; the
-/// other fields filter. Without a cue the latest places come first.
+/// Asks for places. `position_m`, `code` and `percept` are cues, alone or together, and rank them;
+/// the other fields filter. Without a cue the latest places come first.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields, default)]

@@ -51,8 +51,8 @@ pub enum SampleBody {
     Marker(Marker),
     /// An episode with an object begins or ends.
     Object(ObjectMark),
-    /// The session ends, and the trip under way with it: a robot's last word. Samples that come after it
-    /// all the same go on as before.
+    /// The session ends, and the trip under way with it: a robot's last word. Samples that come
+    /// after it all the same go on as before.
     SessionEnd {},
 }
 

@@ -21,8 +21,9 @@ pub struct SpaceSettings {
     pub recruitment: Recruitment,
     /// Noise of motion samples that carry none, and what odometry gets wrong all the time.
     pub odometry_noise: NoiseSettings,
-    /// Part of a distance by which a seen distance may be off again and again, e.g. of a marker seen at a
-    /// slant. It fades where an agent's sightings show that their errors change from one to the next.
+    /// Part of a distance by which a seen distance may be off again and again, e.g. of a marker
+    /// seen at a slant. It fades where an agent's sightings show that their errors change from one
+    /// to the next.
     pub lasting_range_error: f64,
     /// An agent is `localized` up to this standard deviation of position \[m\].
     pub localized_sd_m: f64,
@@ -36,8 +37,8 @@ pub struct SpaceSettings {
     pub places_max: u32,
     /// Most legs of all trips together, at least 1: for one more, the weakest trip is forgotten.
     pub legs_max: u32,
-    /// Most moments of all agents that are remembered, so that the past can be smoothed, at least 64: for one
-    /// more, one from which next to nothing is lost is left out.
+    /// Most moments of all agents that are remembered, so that the past can be smoothed, at least
+    /// 64: for one more, one from which next to nothing is lost is left out.
     pub anchors_max: u32,
     /// After this many samples of the space, by whichever agent, a use counts half as much for the
     /// strength of a place or trip.
@@ -60,9 +61,9 @@ pub enum Recruitment {
     },
 }
 
-/// What odometry gets wrong, as standard deviations. Noise of motion that carries none grows with the square
-/// root of the path, as independent errors do, so that it does not depend on the sampling rate. Errors
-/// that last are learned for each agent from what it sees.
+/// What odometry gets wrong, as standard deviations. Noise of motion that carries none grows with
+/// the square root of the path, as independent errors do, so that it does not depend on the
+/// sampling rate. Errors that last are learned for each agent from what it sees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields, default)]

@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 /// How far an agent's samples have come. Published on `cogmap/{space}/{agent}/durable` whenever it
 /// moves, when a gap is seen, and on the start of the service.
 ///
-/// A client keeps every sample at or above `durable` and sends it again after a gap, a reconnect or a
-/// silence. A watermark of a larger session than the client's own means that the agent's name has been
-/// taken over.
+/// A client keeps every sample at or above `durable` and sends it again after a gap, a reconnect or
+/// a silence. A watermark of a larger session than the client's own means that the agent's name has
+/// been taken over.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Watermark {
@@ -58,8 +58,8 @@ pub enum SkipReason {
     TimeBackwards,
     /// A descriptor has a wrong length or no direction.
     InvalidDescriptor,
-    /// A channel, landmark, agent, object or marker label is empty, too long or has forbidden characters, or is one that
-    /// nothing can be called.
+    /// A channel, landmark, agent, object or marker label is empty, too long or has forbidden
+    /// characters, or is one that nothing can be called.
     InvalidLabel,
     /// A surface normal is not a unit vector.
     InvalidNormal,

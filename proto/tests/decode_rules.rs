@@ -175,7 +175,8 @@ fn the_largest_session_is_refused_because_none_could_follow() {
     }
 }
 
-/// NaN and infinity are numbers to the codecs; the check of the samples names the one that has them.
+/// NaN and infinity are numbers to the codecs; the check of the samples names the one that has
+/// them.
 #[test]
 fn binary_codecs_carry_numbers_that_are_none() {
     for codec in [Codec::Postcard, Codec::Cbor] {

@@ -1,8 +1,8 @@
 //! Files of a crate import one another in one direction only.
 //!
-//! The test reads `use` declarations and qualified paths as text. A path leads to the file that defines its item, through
-//! any re-export in between; what a test module imports does not count, nor does what a file takes from the one of the
-//! folder around it.
+//! The test reads `use` declarations and qualified paths as text. A path leads to the file that
+//! defines its item, through any re-export in between; what a test module imports does not count,
+//! nor does what a file takes from the one of the folder around it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

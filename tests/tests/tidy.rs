@@ -1,7 +1,8 @@
-//! The house rules that no compiler knows: sizes, walls between the parts, reasons beside dependencies.
+//! The house rules that no compiler knows: sizes, walls between the parts, reasons beside
+//! dependencies.
 //!
-//! Each rule reads the project's own text. A failure lists every place that breaks the rule, and says
-//! what to do about it.
+//! Each rule reads the project's own text. A failure lists every place that breaks the rule, and
+//! says what to do about it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -74,7 +75,8 @@ const MANIFESTS: [&str; 15] = [
     "tests/Cargo.toml",
 ];
 
-/// Crates of the core, each with all that it may depend on: the arrows of the core, and the wall around it.
+/// Crates of the core, each with all that it may depend on: the arrows of the core, and the wall
+/// around it.
 const CORE: [(&str, &[&str]); 9] = [
     ("random", &[]),
     ("state", &["nalgebra", "thiserror"]),

@@ -147,9 +147,9 @@ impl Api {
         self.get(&agent_path(space, agent, "")?)
     }
 
-    /// Removes an agent; returns when that is durable. Its name is free, and what it did in the map stays: places,
-    /// trips, landmarks and the causal trajectories of its sessions. A robot that goes on sending under the name
-    /// comes back as a new agent.
+    /// Removes an agent; returns when that is durable. Its name is free, and what it did in the map
+    /// stays: places, trips, landmarks and the causal trajectories of its sessions. A robot that
+    /// goes on sending under the name comes back as a new agent.
     ///
     /// # Errors
     /// See [`ApiError`].
@@ -343,7 +343,8 @@ impl Api {
         self.send(Method::POST, &path, &json(query))
     }
 
-    /// What an agent's episode with an object says so far, and what the latest one said that has ended.
+    /// What an agent's episode with an object says so far, and what the latest one said that has
+    /// ended.
     ///
     /// # Errors
     /// See [`ApiError`].
@@ -441,8 +442,8 @@ fn done(response: Response<Body>) -> Result<(), ApiError> {
     }
 }
 
-/// A label may have any characters; in a URL all but the unreserved ones are escaped (RFC 3986, section
-/// 2.3).
+/// A label may have any characters; in a URL all but the unreserved ones are escaped (RFC 3986,
+/// section 2.3).
 fn escaped(text: &str) -> String {
     use std::fmt::Write as _;
     text.bytes().fold(String::new(), |mut url, byte| {

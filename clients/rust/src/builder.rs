@@ -47,7 +47,8 @@ impl RobotBuilder {
         self
     }
 
-    /// Shows credentials to the router, and checks who it is; they are ignored with a session that is open already.
+    /// Shows credentials to the router, and checks who it is; they are ignored with a session that
+    /// is open already.
     pub fn credentials(mut self, credentials: Credentials) -> Self {
         self.credentials = credentials;
         self

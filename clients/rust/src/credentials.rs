@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use zenoh::Config;
 
-/// What a robot shows to the Zenoh router, and how it knows the router. `docs/security.md` of the project has an
-/// example with the files of both sides.
+/// What a robot shows to the Zenoh router, and how it knows the router. `docs/security.md` of the
+/// project has an example with the files of both sides.
 #[derive(Clone, Default, PartialEq, Eq)]
 pub struct Credentials {
     user: Option<(String, String)>,
@@ -23,7 +23,8 @@ impl Credentials {
         self
     }
 
-    /// File (PEM) with the certificate of the authority that has signed the router's: for `tls/` endpoints.
+    /// File (PEM) with the certificate of the authority that has signed the router's: for `tls/`
+    /// endpoints.
     #[must_use]
     pub fn root_certificate(mut self, file: impl AsRef<Path>) -> Self {
         self.root_certificate = Some(file.as_ref().to_owned());
@@ -41,7 +42,8 @@ impl Credentials {
         self
     }
 
-    /// A Zenoh configuration file (JSON5) for everything else. The other credentials and the endpoints are put over it.
+    /// A Zenoh configuration file (JSON5) for everything else. The other credentials and the
+    /// endpoints are put over it.
     #[must_use]
     pub fn config_file(mut self, file: impl AsRef<Path>) -> Self {
         self.config_file = Some(file.as_ref().to_owned());

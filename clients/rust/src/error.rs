@@ -82,7 +82,8 @@ pub enum ClientError {
     EstimateTimeout,
 }
 
-/// What may be wrong when the service says nothing at all: Zenoh tells nobody what its access rules drop.
+/// What may be wrong when the service says nothing at all: Zenoh tells nobody what its access rules
+/// drop.
 fn silence(is_heard: bool) -> &'static str {
     if is_heard {
         ""

@@ -347,9 +347,9 @@ impl Robot {
         self.shared.lock().counters
     }
 
-    /// Ends the session, and the trip under way with it, flushes, then ends the robot whether or not
-    /// that worked. The session's end is a sample, the last one; a robot that has sent nothing and one
-    /// whose settings say so send none.
+    /// Ends the session, and the trip under way with it, flushes, then ends the robot whether or
+    /// not that worked. The session's end is a sample, the last one; a robot that has sent nothing
+    /// and one whose settings say so send none.
     ///
     /// # Errors
     /// As [`Robot::flush`]; what was not durable by then may be lost.

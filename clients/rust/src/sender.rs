@@ -23,8 +23,8 @@ const FIRST_ANSWER: Duration = Duration::from_millis(200);
 /// Longest sleep of the thread when nothing is due.
 const IDLE: Duration = Duration::from_secs(60);
 
-/// Most messages written under one lock. A put may wait for a slow link, and until then nothing that
-/// was heard in the meantime can change what goes out.
+/// Most messages written under one lock. A put may wait for a slow link, and until then nothing
+/// that was heard in the meantime can change what goes out.
 const MESSAGES_AT_ONCE: usize = 16;
 
 /// What the thread works with.

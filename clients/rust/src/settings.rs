@@ -40,8 +40,8 @@ pub struct RobotSettings {
     pub match_timeout: Duration,
     /// Codec of samples and queries.
     pub codec: Codec,
-    /// Whether closing the robot ends the session, and the trip under way, by a last sample. Without
-    /// it they end when the agent's next session begins.
+    /// Whether closing the robot ends the session, and the trip under way, by a last sample.
+    /// Without it they end when the agent's next session begins.
     pub ends_session: bool,
 }
 

@@ -166,8 +166,8 @@ impl Shared {
         self.caller_bell.notify_all();
     }
 
-    /// Takes in why a query for the watermark is refused. Only a session in the future ends the run: any other
-    /// reason may pass, as when the service is loading or has not met the agent yet.
+    /// Takes in why a query for the watermark is refused. Only a session in the future ends the
+    /// run: any other reason may pass, as when the service is loading or has not met the agent yet.
     pub(crate) fn hear_refusal(&self, refusal: &ReplyError) {
         let Ok(codec) = Codec::of_encoding(&refusal.encoding().to_string()) else {
             return; // Zenoh says that no answer came

@@ -10,8 +10,8 @@ use std::thread;
 use cogmap_client::{Api, ApiError};
 use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair};
 
-/// Serves `answer` once over TLS, with a certificate of its own authority; hands back the address and
-/// the authority's certificate.
+/// Serves `answer` once over TLS, with a certificate of its own authority; hands back the address
+/// and the authority's certificate.
 fn serve_tls(answer: &'static str) -> (String, String) {
     let mut authority = CertificateParams::default();
     authority.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);

@@ -1,13 +1,14 @@
 //! The joint estimate by itself, without the map around it: errors on a data set or in the room.
 //!
 //! ```text
-//! cargo run --release -p cogmap-experiments --example estimate -- mrclam DIR [no-robots] [unknown] [anonymous=N,N]
-//! cargo run --release -p cogmap-experiments --example estimate -- env2 [STEPS [RUNS [RANGE_M]]] [look]
+//! cargo run --release -p cogmap-lab --example estimate -- mrclam DIR [no-robots] [unknown] [anonymous=N,N]
+//! cargo run --release -p cogmap-lab --example estimate -- env2 [STEPS [RUNS [RANGE_M]]] [look]
 //! ```
 //!
-//! `no-robots` leaves out sightings of robots, `unknown` all start poses but the first robot's; robots that are
-//! `anonymous` have names of their own for landmarks; `look` sights obstacles before the first step, too. An unaligned error of robots with unknown starts counts from
-//! when they came into the map.
+//! `no-robots` leaves out sightings of robots, `unknown` all start poses but the first robot's;
+//! robots that are `anonymous` have names of their own for landmarks; `look` sights obstacles
+//! before the first step, too. An unaligned error of robots with unknown starts counts from when
+//! they came into the map.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 

@@ -1,11 +1,11 @@
 //! A long life: memory and cost of a sample as a team goes on and on.
 //!
 //! ```text
-//! cargo run --release -p cogmap-experiments --example life -- [TICKS] [ROBOTS]
+//! cargo run --release -p cogmap-lab --example life -- [TICKS] [ROBOTS]
 //! ```
 //!
-//! Robots walk in a room with beacons and see these and one another. Each tenth of the run prints a line: samples so far,
-//! memory of the process, and how long the samples of that tenth took.
+//! Robots walk in a room with beacons and see these and one another. Each tenth of the run prints a
+//! line: samples so far, memory of the process, and how long the samples of that tenth took.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 

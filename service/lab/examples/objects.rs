@@ -1,8 +1,8 @@
 //! Objects by touch: the seed paper's third experiment, or a set of touches, from the command line.
 //!
 //! ```sh
-//! cargo run --release -p cogmap-experiments --example objects -- env3 2 none 1000
-//! cargo run --release -p cogmap-experiments --example objects -- touch data/thing_a 2 0.5 20 trials.csv
+//! cargo run --release -p cogmap-lab --example objects -- env3 2 none 1000
+//! cargo run --release -p cogmap-lab --example objects -- touch data/thing_a 2 0.5 20 trials.csv
 //! ```
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]

@@ -2,7 +2,7 @@
 //! figures in the directory that is named, if one is.
 //!
 //! ```sh
-//! cargo run --release -p cogmap-experiments --example paper -- figures
+//! cargo run --release -p cogmap-lab --example paper -- figures
 //! ```
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]

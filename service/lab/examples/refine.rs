@@ -1,13 +1,13 @@
 //! The past, smoothed: causal and refined errors of a data set or of a simulated team.
 //!
 //! ```text
-//! cargo run --release -p cogmap-experiments --example refine -- mrclam DIR [no-robots] [anchors=N]
-//! cargo run --release -p cogmap-experiments --example refine -- team [RUNS]
-//! cargo run --release -p cogmap-experiments --example refine -- matches DIR [false=PERCENT] [g2o=FILE]
+//! cargo run --release -p cogmap-lab --example refine -- mrclam DIR [no-robots] [anchors=N]
+//! cargo run --release -p cogmap-lab --example refine -- team [RUNS]
+//! cargo run --release -p cogmap-lab --example refine -- matches DIR [false=PERCENT] [g2o=FILE]
 //! ```
 //!
-//! `anchors` bounds how much is remembered; `false` adds matches of different places until they make up a share of all, and
-//! `g2o` writes the graph with the matches that are believed.
+//! `anchors` bounds how much is remembered; `false` adds matches of different places until they
+//! make up a share of all, and `g2o` writes the graph with the matches that are believed.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 

@@ -1,10 +1,12 @@
-//! Descriptors alone: how well an agent knows where it is, and was, from views of places where it has been before.
+//! Descriptors alone: how well an agent knows where it is, and was, from views of places where it
+//! has been before.
 //!
 //! ```text
-//! cargo run --release -p cogmap-experiments --example revisits -- [runs=N] [seed=N] [steps=N] [every=N] [noise=PERCENT] [pure] [g2o=FILE]
+//! cargo run --release -p cogmap-lab --example revisits -- [runs=N] [seed=N] [steps=N] [every=N] [noise=PERCENT] [pure] [g2o=FILE]
 //! ```
 //!
-//! `g2o` writes the graph of the first run, with the revisits that are believed, beside its true positions.
+//! `g2o` writes the graph of the first run, with the revisits that are believed, beside its true
+//! positions.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 

@@ -1,15 +1,17 @@
-//! What a touch costs when the orientation is known, or one of a few, by the number of objects learned.
+//! What a touch costs when the orientation is known, or one of a few, by the number of objects
+//! learned.
 //!
 //! ```sh
-//! cargo run --release -p cogmap-experiments --example touch_cost -- 10,30,100,300 coloured
-//! cargo run --release -p cogmap-experiments --example touch_cost -- 100 plain
-//! cargo run --release -p cogmap-experiments --example touch_cost -- 10,100 coloured 24
+//! cargo run --release -p cogmap-lab --example touch_cost -- 10,30,100,300 coloured
+//! cargo run --release -p cogmap-lab --example touch_cost -- 100 plain
+//! cargo run --release -p cogmap-lab --example touch_cost -- 10,100 coloured 24
 //! ```
 //!
-//! Objects are those of environment 3, put together until they have 1,000 places, each learned from five touches; levels are felt with 10 % of
-//! noise, and on `plain` objects not at all. Each of 25 episodes is a random exploration of twelve touches from an unknown start. A touch is
-//! timed with its answer, on one thread; of three runs of the same episode the least time counts, so that other programs on the
-//! machine do so little.
+//! Objects are those of environment 3, put together until they have 1,000 places, each learned from
+//! five touches; levels are felt with 10 % of noise, and on `plain` objects not at all. Each of 25
+//! episodes is a random exploration of twelve touches from an unknown start. A touch is timed with
+//! its answer, on one thread; of three runs of the same episode the least time counts, so that
+//! other programs on the machine do so little.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 

@@ -1,12 +1,12 @@
 //! Robots that wake up in a room that was explored.
 //!
 //! ```text
-//! cargo run --release -p cogmap-experiments --example waking -- [trials=N] [per=N] [rooms=N] [explorer=N] [travel=CM] [seed=N] [cost]
+//! cargo run --release -p cogmap-lab --example waking -- [trials=N] [per=N] [rooms=N] [explorer=N] [travel=CM] [seed=N] [cost]
 //!     [carried] [stay=M] [after=M]
 //! ```
 //!
-//! `cost` tells instead how long a view takes to be taken in. `carried` robots go on for `stay` when they know where they are, are carried off
-//! then, and go on for `after`.
+//! `cost` tells instead how long a view takes to be taken in. `carried` robots go on for `stay`
+//! when they know where they are, are carried off then, and go on for `after`.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 

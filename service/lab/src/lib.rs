@@ -1,4 +1,5 @@
-//! Laboratory of cogmap: data sets, experiments, and figures of both. The program `cogmap-lab` runs them.
+//! Laboratory of cogmap: data sets, experiments, and figures of both. The program `cogmap-lab` runs
+//! them.
 //!
 //! A recording becomes a stream of [`Reading`](cogmap_worlds::Reading)s: plain numbers, as a sensor
 //! gives them. A reading becomes a sample of the core by `cognitive_map::Sample::try_from`, or a

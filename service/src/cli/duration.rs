@@ -3,7 +3,8 @@
 /// Longest duration \[s\]: eleven days.
 const SECONDS_MAX: f64 = 1e6;
 
-/// Reads a duration: a number of seconds, or numbers with their units such as `20s`, `1.5s`, `1m30s`.
+/// Reads a duration: a number of seconds, or numbers with their units such as `20s`, `1.5s`,
+/// `1m30s`.
 ///
 /// # Errors
 /// Says what is wrong with the text.

@@ -1,4 +1,5 @@
-//! Help as a terminal shows it: the texts are written for rustdoc, where a bracket needs a backslash.
+//! Help as a terminal shows it: the texts are written for rustdoc, where a bracket needs a
+//! backslash.
 
 use clap::Command;
 

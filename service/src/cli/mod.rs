@@ -43,7 +43,8 @@ enum Command {
     /// Verify or repair a store.
     #[command(subcommand)]
     Store(store::StoreCommand),
-    /// Copy a store, also while the service runs on it; all that was acknowledged before is in the copy.
+    /// Copy a store, also while the service runs on it; all that was acknowledged before is in the
+    /// copy.
     Backup(store::BackupArgs),
     /// Make a store from a backup, into a directory that is empty or absent.
     Restore(store::BackupArgs),

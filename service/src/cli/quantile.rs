@@ -1,7 +1,7 @@
 //! Quantiles of measured times.
 
-/// The value below which the share `q` of the values lies (nearest rank). Sorts the values; NaN when
-/// there is none.
+/// The value below which the share `q` of the values lies (nearest rank). Sorts the values; NaN
+/// when there is none.
 pub fn quantile(values: &mut [f64], q: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     #[expect(

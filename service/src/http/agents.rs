@@ -67,12 +67,13 @@ pub(crate) async fn get(AgentOfPath(_, view): AgentOfPath, _: NoQuery) -> Respon
 
 /// Remove an agent.
 ///
-/// Its name is free: the next samples under it enrol another agent, whose sessions begin from nothing. What
-/// the agent did in the map stays: places, trips, landmarks, and the causal trajectories of its sessions,
-/// which can still be read by their number. Of one that was never in the map nothing stays.
+/// Its name is free: the next samples under it enrol another agent, whose sessions begin from
+/// nothing. What the agent did in the map stays: places, trips, landmarks, and the causal
+/// trajectories of its sessions, which can still be read by their number. Of one that was never in
+/// the map nothing stays.
 ///
-/// A robot that goes on sending comes back as a new agent, whose earlier samples are missing: they count as
-/// lost after the usual wait, or a new run begins from 0.
+/// A robot that goes on sending comes back as a new agent, whose earlier samples are missing: they
+/// count as lost after the usual wait, or a new run begins from 0.
 #[utoipa::path(delete, path = "/v1/spaces/{space}/agents/{agent}", tag = "agents",
     operation_id = "remove_agent", params(AgentParams),
     responses(

@@ -11,15 +11,16 @@ use super::state::Service;
 
 /// Paths beside those that the description names.
 const PAGES: [&str; 3] = ["/", "/openapi.json", "/docs/"];
-/// How alike a path must be to one that there is, to be named: of ten letters some three may differ.
+/// How alike a path must be to one that there is, to be named: of ten letters some three may
+/// differ.
 const NEAR_MIN: f64 = 0.7;
 /// Most paths that are named.
 const NEAR_MAX: usize = 3;
 /// Longest path that is compared: every one that there is is shorter, with names of a usual length.
 const COMPARED_BYTES_MAX: usize = 256;
 
-/// Answers for a path that is none: by the way to it if it only ends with a slash, otherwise by what
-/// is near it.
+/// Answers for a path that is none: by the way to it if it only ends with a slash, otherwise by
+/// what is near it.
 pub(crate) async fn unknown_path(State(service): State<Service>, uri: Uri) -> Response<Body> {
     let path = uri.path();
     let trimmed = path.trim_end_matches('/');

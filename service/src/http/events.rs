@@ -55,8 +55,8 @@ pub(crate) enum EventFormat {
 pub(crate) struct EventsQuery {
     /// Only events that the agent with this name caused.
     agent: Option<String>,
-    /// Only events after the one with this id; `0-0` for all that are kept. A stream without it begins
-    /// with what happens next.
+    /// Only events after the one with this id; `0-0` for all that are kept. A stream without it
+    /// begins with what happens next.
     #[param(value_type = Option<String>, pattern = "^[0-9]+-[0-9]+$")]
     after: Option<EventId>,
     /// `stream` or `json`; when absent, `json` if `Accept` asks for application/json.
@@ -89,10 +89,10 @@ pub(crate) enum ServerSentEvent {
 /// Follow the events of a space, or page through the latest ones.
 ///
 /// A stream of server-sent events, each with its `id`, `event: message` and an Event as its `data`.
-/// Who comes back names the last one in the header `Last-Event-ID`, as browsers do by themselves, or in
-/// `after`, and gets what happened since. The latest 1024 are kept, also over a restart. Who comes back
-/// later or cannot keep up is told so by `event: missed`, and how many, where that is known. The stream
-/// ends when the service stops or the space is deleted.
+/// Who comes back names the last one in the header `Last-Event-ID`, as browsers do by themselves,
+/// or in `after`, and gets what happened since. The latest 1024 are kept, also over a restart. Who
+/// comes back later or cannot keep up is told so by `event: missed`, and how many, where that is
+/// known. The stream ends when the service stops or the space is deleted.
 #[utoipa::path(get, path = "/v1/spaces/{space}/events", tag = "spaces", operation_id = "follow_events",
     params(SpaceParam, EventsQuery, ("Last-Event-ID" = Option<String>, Header,
         description = "As `after`, and before it", pattern = "^[0-9]+-[0-9]+$")),
@@ -167,8 +167,8 @@ fn last_event_id(headers: &HeaderMap) -> Result<Option<EventId>, Problem> {
     Ok(Some(id))
 }
 
-/// Waits until a space has loaded, not for ever: one that is still loading then is refused as others
-/// that cannot be read.
+/// Waits until a space has loaded, not for ever: one that is still loading then is refused as
+/// others that cannot be read.
 async fn loaded(space: &Space) {
     let loaded = async {
         while space.recovering() {

@@ -51,8 +51,8 @@ pub(crate) enum ExportFormat {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct ExportQuery {
-    /// `json` (the map; when absent), `ply` (the places), `tum` (the trajectory of `agent`) or `g2o` (what agents did
-    /// and saw as a graph of poses and landmarks, relaxed).
+    /// `json` (the map; when absent), `ply` (the places), `tum` (the trajectory of `agent`) or
+    /// `g2o` (what agents did and saw as a graph of poses and landmarks, relaxed).
     #[param(inline)]
     format: Option<ExportFormat>,
     /// Name of the agent, for `tum`.
@@ -78,8 +78,8 @@ pub(crate) struct MapExport {
 
 /// Export the map of a space.
 ///
-/// The map is as it was when the request came, whatever happens while it is sent. For a graph the whole map is
-/// relaxed, which may take seconds; all who ask meanwhile get the same one after it.
+/// The map is as it was when the request came, whatever happens while it is sent. For a graph the
+/// whole map is relaxed, which may take seconds; all who ask meanwhile get the same one after it.
 #[utoipa::path(get, path = "/v1/spaces/{space}/export", tag = "spaces", operation_id = "export_space",
     params(SpaceParam, ExportQuery),
     responses(
@@ -121,7 +121,8 @@ pub(crate) async fn get(
     Ok(response)
 }
 
-/// A list of an export that can be written from any of its items on: their numbers, and them as JSON.
+/// A list of an export that can be written from any of its items on: their numbers, and them as
+/// JSON.
 type Section = fn(&CognitiveMap, &[AgentSummary], u32) -> Vec<(u32, String)>;
 
 async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, Problem> {

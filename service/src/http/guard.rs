@@ -29,8 +29,8 @@ use crate::metrics::{HTTP_REQUEST_SECONDS, HTTP_REQUESTS};
 
 /// Paths that need no token and are answered however much is under way.
 const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
-/// Paths of pages, which hold nothing of any space: a browser has to load them before it can be given
-/// a token.
+/// Paths of pages, which hold nothing of any space: a browser has to load them before it can be
+/// given a token.
 const PAGES: [&str; 3] = ["/", "/openapi.json", "/docs"];
 /// Media type of event streams.
 const EVENT_STREAM: &str = "text/event-stream";
@@ -222,8 +222,8 @@ where
     }
 }
 
-/// The answer, which counts as under way until it has been sent. An event stream, which never ends, has
-/// a bound of its own.
+/// The answer, which counts as under way until it has been sent. An event stream, which never ends,
+/// has a bound of its own.
 fn with_permit(response: Response<Body>, permit: Option<OwnedSemaphorePermit>) -> Response<Body> {
     let streams = response.headers().get(CONTENT_TYPE);
     match permit {

@@ -39,8 +39,8 @@ pub(crate) struct ReadyHealth {
     stopped: Vec<StoppedSpace>,
 }
 
-/// The service can do its work: the store takes writes, and every space is loaded, but for those that
-/// are stopped because their journal is damaged.
+/// The service can do its work: the store takes writes, and every space is loaded, but for those
+/// that are stopped because their journal is damaged.
 #[utoipa::path(get, path = "/readyz", tag = "service", operation_id = "get_readiness",
     responses(
         (status = 200, description = "It can", body = ReadyHealth),

@@ -9,8 +9,8 @@ use http_body::{Frame, SizeHint};
 /// Most bytes of a body that are sent at once: the system takes them whole.
 const SHORT: u64 = 16 << 10;
 
-/// A body that drops `held` when it has been sent, or nobody wants it any more. A short one does not
-/// keep it.
+/// A body that drops `held` when it has been sent, or nobody wants it any more. A short one does
+/// not keep it.
 pub(crate) fn holding<T: Send + Unpin + 'static>(body: Body, held: T) -> Body {
     if body.size_hint().exact().is_some_and(|bytes| bytes <= SHORT) {
         return body;

@@ -1,12 +1,12 @@
 //! Which hosts the service answers as.
 //!
-//! A page of a stranger in a browser of this network can have its own name resolve to the service's address (DNS
-//! rebinding): it could then read and change everything, as if it came from here. Its requests name the
-//! stranger's host. So do those that it sends to the service's true address, in `Origin`, where it could
-//! not read the answer, but would change something.
+//! A page of a stranger in a browser of this network can have its own name resolve to the service's
+//! address (DNS rebinding): it could then read and change everything, as if it came from here. Its
+//! requests name the stranger's host. So do those that it sends to the service's true address, in
+//! `Origin`, where it could not read the answer, but would change something.
 //!
-//! Addresses are always answered: what names one cannot have been rebound. With a token neither is checked, because
-//! such a page does not have it.
+//! Addresses are always answered: what names one cannot have been rebound. With a token neither is
+//! checked, because such a page does not have it.
 
 use std::net::IpAddr;
 
@@ -26,7 +26,8 @@ pub enum HostRule {
 }
 
 impl HostRule {
-    /// The rule for the names of the settings, `*` standing for any. Without names, a token lets any pass.
+    /// The rule for the names of the settings, `*` standing for any. Without names, a token lets
+    /// any pass.
     pub fn new(names: &[String], has_token: bool) -> Self {
         let is_any = names.iter().any(|name| name == "*");
         if is_any || (has_token && names.is_empty()) {

@@ -1,7 +1,7 @@
 //! JSON bodies, read as their schemas say rather than as serde would.
 //!
-//! To JSON Schema `1.0` is an integer, and some languages write integers so; to serde it is not. And
-//! serde takes an array for an object, which no schema here does.
+//! To JSON Schema `1.0` is an integer, and some languages write integers so; to serde it is not.
+//! And serde takes an array for an object, which no schema here does.
 
 use cogmap_proto::{Codec, DecodeError, SampleBatch};
 use serde::Serialize;
@@ -36,8 +36,8 @@ pub(crate) fn message<T: DeserializeOwned + Serialize>(bytes: &[u8]) -> Result<T
     Ok(message)
 }
 
-/// Where an array stands in `given` for an object, innermost part first: serde takes one for the fields
-/// in their order, and an empty one for no fields at all, which nobody means.
+/// Where an array stands in `given` for an object, innermost part first: serde takes one for the
+/// fields in their order, and an empty one for no fields at all, which nobody means.
 fn array_for_object(given: &Value, written: &Value) -> Option<Vec<String>> {
     let within = |part: String, given, written| {
         let mut path = array_for_object(given, written)?;

@@ -40,7 +40,8 @@ pub(crate) struct Connection {
     activity: Arc<Activity>,
     /// When bytes have passed last.
     used: Instant,
-    /// Since when the head of a request is awaited: from its first byte on, or the connection's begin.
+    /// Since when the head of a request is awaited: from its first byte on, or the connection's
+    /// begin.
     head_since: Option<Instant>,
     /// Requests that had begun when this was looked at last.
     requests: u64,
@@ -135,9 +136,9 @@ impl Connection {
         &self.activity
     }
 
-    /// Ends a wait for the other side: when the connection has been sent away, a head has not come in
-    /// its time, or nothing has passed either way in its time. Without it, whoever opens connections
-    /// and says nothing, or hardly anything, keeps all others out.
+    /// Ends a wait for the other side: when the connection has been sent away, a head has not come
+    /// in its time, or nothing has passed either way in its time. Without it, whoever opens
+    /// connections and says nothing, or hardly anything, keeps all others out.
     fn poll_patience(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         let reason = if let Some(reason) = self.closed {
             reason

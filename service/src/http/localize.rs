@@ -12,10 +12,12 @@ use super::state::Service;
 use crate::decode;
 use crate::encode;
 
-/// Find out where a sequence of samples was taken, by what the map knows: its motions, what it saw and the landmarks in it.
+/// Find out where a sequence of samples was taken, by what the map knows: its motions, what it saw
+/// and the landmarks in it.
 ///
-/// The samples need no agent, and change nothing. Of places that look alike none is told as the pose before it
-/// can be told from the others. A few such questions are answered at once; further ones are told to come back.
+/// The samples need no agent, and change nothing. Of places that look alike none is told as the
+/// pose before it can be told from the others. A few such questions are answered at once; further
+/// ones are told to come back.
 #[utoipa::path(post, path = "/v1/spaces/{space}/localize", tag = "memory", operation_id = "localize",
     params(SpaceParam), request_body = LocalizeQuery,
     responses(

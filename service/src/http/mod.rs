@@ -104,8 +104,8 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(health::metrics))
 }
 
-/// The description of the interface (`OpenAPI` 3.1, JSON). With `token`, it says that a bearer token is
-/// asked for.
+/// The description of the interface (`OpenAPI` 3.1, JSON). With `token`, it says that a bearer
+/// token is asked for.
 ///
 /// # Panics
 /// Never: a description is plain data.

@@ -105,7 +105,8 @@ pub(crate) async fn get(
         .ok_or_else(|| unknown("object"))
 }
 
-/// Teach an object at once, by contacts in its own frame, in place of what was known of it. Answers when the lesson is on disk.
+/// Teach an object at once, by contacts in its own frame, in place of what was known of it. Answers
+/// when the lesson is on disk.
 #[utoipa::path(put, path = "/v1/spaces/{space}/objects/{name}", tag = "memory",
     operation_id = "teach_object", params(ObjectParams), request_body = ObjectLesson,
     responses(
@@ -146,7 +147,8 @@ pub(crate) async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Which object a sequence of contacts is of, in which pose, and where the next touch would tell most. Changes nothing.
+/// Which object a sequence of contacts is of, in which pose, and where the next touch would tell
+/// most. Changes nothing.
 ///
 /// A few such questions are answered at once; further ones are told to come back.
 #[utoipa::path(post, path = "/v1/spaces/{space}/objects/identify", tag = "memory",
@@ -195,7 +197,8 @@ fn detail(map: &CognitiveMap, name: &Label) -> Option<ObjectDetail> {
     Some(encode::object_detail(map, known, model))
 }
 
-/// The space that the path names, and the name of an object that may be there or not, or none that an object can have.
+/// The space that the path names, and the name of an object that may be there or not, or none that
+/// an object can have.
 pub(crate) struct ObjectOfPath(Arc<Space>, Result<Label, InvalidSample>);
 
 impl FromRequestParts<Service> for ObjectOfPath {

@@ -125,8 +125,8 @@ fn add_all(operation: &mut Value, statuses: &[(&str, &str)]) {
     }
 }
 
-/// Gives integers the bounds of their type, and those without a sign a format that says so: JSON has
-/// neither of its own.
+/// Gives integers the bounds of their type, and those without a sign a format that says so: JSON
+/// has neither of its own.
 fn bound_integers(value: &mut Value) {
     if let Some(object) = value.as_object_mut() {
         let format = object.get("format").and_then(Value::as_str);
@@ -151,7 +151,8 @@ fn bound_integers(value: &mut Value) {
     }
 }
 
-/// Writes the lengths of arrays into all schemas: the derived ones do not tell `[f64; 3]` from a list.
+/// Writes the lengths of arrays into all schemas: the derived ones do not tell `[f64; 3]` from a
+/// list.
 fn measure_arrays(value: &mut Value) {
     match value {
         Value::Object(object) => {

@@ -45,8 +45,8 @@ pub(crate) struct StoppedSpace {
 
 /// The spaces.
 ///
-/// Those that are still loading are not among them; `/readyz` names them. Those that are stopped because
-/// their journal is damaged are listed apart, each with the reason.
+/// Those that are still loading are not among them; `/readyz` names them. Those that are stopped
+/// because their journal is damaged are listed apart, each with the reason.
 #[utoipa::path(get, path = "/v1/spaces", tag = "spaces", operation_id = "list_spaces",
     responses((status = 200, description = "All spaces, by name", body = ListedSpaces)))]
 pub(crate) async fn list(

@@ -49,8 +49,9 @@ pub(crate) struct TrajectoryQuery {
     /// `json` or `tum`; when absent, `tum` if `Accept` asks for text/plain.
     #[param(inline)]
     format: Option<TrajectoryFormat>,
-    /// `causal` (when absent): each pose as it was known when its sample was applied. `refined`: by all that
-    /// has been seen since; of all sessions, and between two of its poses the agent moved evenly.
+    /// `causal` (when absent): each pose as it was known when its sample was applied. `refined`: by
+    /// all that has been seen since; of all sessions, and between two of its poses the agent moved
+    /// evenly.
     #[param(inline)]
     kind: Option<TrajectoryKind>,
     /// Only poses of this session; of the current one when absent. For causal trajectories only.
@@ -64,8 +65,8 @@ pub(crate) struct TrajectoryQuery {
     limit: Option<u32>,
 }
 
-/// The trajectory of an agent: each pose as it was known when its sample was applied, or by all that has
-/// been seen since.
+/// The trajectory of an agent: each pose as it was known when its sample was applied, or by all
+/// that has been seen since.
 ///
 /// For a refined trajectory the whole map is relaxed, which may take seconds.
 /// The next page begins at `next_from_ns`; in the TUM format the header `Link` names it.
@@ -144,8 +145,8 @@ fn accepted(headers: &HeaderMap) -> TrajectoryFormat {
     }
 }
 
-/// `Link` to the page that begins at `from_ns`. The session of a causal trajectory stays the same even if
-/// the agent begins another one meanwhile.
+/// `Link` to the page that begins at `from_ns`. The session of a causal trajectory stays the same
+/// even if the agent begins another one meanwhile.
 fn next_page(uri: &Uri, session: Option<u64>, from_ns: i64) -> HeaderValue {
     let kept = uri.query().unwrap_or_default().split('&').filter(|pair| {
         !pair.is_empty() && !pair.starts_with("from_ns=") && !pair.starts_with("session=")

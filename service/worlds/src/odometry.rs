@@ -124,8 +124,8 @@ impl Odometer {
         Reading { stamp_ns, body }
     }
 
-    /// The standard deviations that a reading states for a step of a length, along the axes \[m\] and
-    /// about them \[rad\].
+    /// The standard deviations that a reading states for a step of a length, along the axes \[m\]
+    /// and about them \[rad\].
     fn stated(&self, length_m: f64) -> ([f64; 3], [f64; 3]) {
         let noise = &self.noise;
         let with_bias = |white: f64, bias: f64| white.hypot(bias * BIAS_STEPS.sqrt());

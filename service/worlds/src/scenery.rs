@@ -15,8 +15,8 @@ const CORRELATION_M: f64 = 1.0;
 /// A view has cos(wᵢ·x + bᵢ) as its numbers, with wᵢ normal of deviation 1/ℓ along each axis and bᵢ
 /// uniform, so that the cosine of two views is exp(−|Δx|²/2ℓ²) on average over the features: random
 /// Fourier features of a Gaussian kernel (Rahimi & Recht 2007). Views of places far apart are
-/// unrelated, up to a cosine of 1/√n by chance, where n is the number of numbers. They do not depend on the direction of looking, as
-/// those of an eye that looks to every side.
+/// unrelated, up to a cosine of 1/√n by chance, where n is the number of numbers. They do not
+/// depend on the direction of looking, as those of an eye that looks to every side.
 #[derive(Clone, Debug)]
 pub struct Scenery {
     features: Vec<(Vector3<f64>, f64)>,
@@ -37,9 +37,11 @@ impl Scenery {
         }
     }
 
-    /// The view from a position \[m\], with noise of a length that is on average `noise` of the view's.
+    /// The view from a position \[m\], with noise of a length that is on average `noise` of the
+    /// view's.
     pub fn view(&self, from_m: &Vector3<f64>, noise: f64, random: &mut impl Rng) -> Vec<f32> {
-        // Half of the squares of cosines is their mean, so a view of n numbers is about √(n/2) long.
+        // Half of the squares of cosines is their mean, so a view of n numbers is about √(n/2)
+        // long.
         let sd = noise / std::f64::consts::SQRT_2;
         let feature = |(wave, shift): &(Vector3<f64>, f64)| (wave.dot(from_m) + shift).cos();
         let seen = self.features.iter().map(|each| {

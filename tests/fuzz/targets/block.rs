@@ -1,7 +1,7 @@
 //! Arbitrary bytes as a block of the journal, and as a journal of blocks.
 //!
-//! Nothing may panic. What can be read is folded into a map as a start would, and the map stays one whose numbers are
-//! finite and whose checkpoint can be read back.
+//! Nothing may panic. What can be read is folded into a map as a start would, and the map stays one
+//! whose numbers are finite and whose checkpoint can be read back.
 
 #![no_main]
 

@@ -1,7 +1,7 @@
 //! Arbitrary samples of several robots, as messages in postcard, folded into a map.
 //!
-//! Before each message stand its robot (u8) and its length (u16). Whatever robots say, the map's numbers stay finite, and
-//! the same samples give the same map.
+//! Before each message stand its robot (u8) and its length (u16). Whatever robots say, the map's
+//! numbers stay finite, and the same samples give the same map.
 
 #![no_main]
 

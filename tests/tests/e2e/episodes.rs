@@ -1,4 +1,5 @@
-//! What an arm has recognised stays readable when it has closed, whatever ends the service meanwhile.
+//! What an arm has recognised stays readable when it has closed, whatever ends the service
+//! meanwhile.
 
 use std::fs;
 

@@ -71,7 +71,8 @@ fn view(at_m: [f64; 2]) -> SampleBody {
     })
 }
 
-/// Steps from a pose of which each goes ahead and then turns, with a view after each; and where they lead.
+/// Steps from a pose of which each goes ahead and then turns, with a view after each; and where
+/// they lead.
 fn stroll(mut at_m: [f64; 2], mut heading: f64, turns: &[f64]) -> (Vec<SampleBody>, [f64; 2]) {
     let mut bodies = Vec::new();
     for turn in turns {

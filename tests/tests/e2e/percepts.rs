@@ -16,8 +16,8 @@ const WALL_M: f64 = 4.0;
 const STEP_M: f64 = 0.05;
 const NO_TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// A place answers this far at most, and places are at most two field radii apart along a way, so what
-/// it remembers was felt no farther from it than this.
+/// A place answers this far at most, and places are at most two field radii apart along a way, so
+/// what it remembers was felt no farther from it than this.
 const FIELD_M: f64 = 0.5;
 
 fn roughness(value: f64) -> Level {

@@ -34,7 +34,8 @@ fn between(from: u32, to: u32) -> (f64, f64, f64) {
     )
 }
 
-/// The rounds as a graph, in which every measurement is exact: its optimum is the truth, at a cost of nothing.
+/// The rounds as a graph, in which every measurement is exact: its optimum is the truth, at a cost
+/// of nothing.
 fn exact_graph() -> String {
     let information = "100 0 0 100 0 2500";
     let mut graph = String::new();
@@ -244,7 +245,8 @@ fn a_recording_goes_through_the_memory_as_samples() {
 #[test]
 fn trees_correct_a_car() {
     let home = TempDir::new().unwrap();
-    // Two rounds with a motion that is too long; tree 1000 + i stands outside the circle, and is seen by what passes it.
+    // Two rounds with a motion that is too long; tree 1000 + i stands outside the circle, and is
+    // seen by what passes it.
     let mut set = String::new();
     for k in 1..2 * ROUND {
         let (x, y, turn) = between(k - 1, k);

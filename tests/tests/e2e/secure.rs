@@ -1,5 +1,5 @@
-//! The example of docs/security.md as it stands in `docker/secure`, with certificates of its own: who may say and hear
-//! what.
+//! The example of docs/security.md as it stands in `docker/secure`, with certificates of its own:
+//! who may say and hear what.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -195,7 +195,8 @@ fn robots_and_readers_do_what_their_rules_allow_and_nothing_else() {
         ada.zenoh_session().put(key, "here").wait().unwrap();
     }
 
-    // The other one is heard under its own name, by the service and by the reader, and by nobody else.
+    // The other one is heard under its own name, by the service and by the reader, and by nobody
+    // else.
     let bob = Credentials::default().config_file(site.file("robot.json5"));
     let bob = site.robot("bob", bob);
     drive(&bob);

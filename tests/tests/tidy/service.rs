@@ -5,8 +5,8 @@ use super::{assert_none, sources};
 /// Crates of the core whose types decode/ makes and encode/ reads.
 const TRANSLATED: [&str; 4] = ["cognitive_map", "geometry", "grid", "object_recognition"];
 
-/// Files of `service/src` beside decode/ and encode/ that name messages of the wire and types of the core,
-/// each with what it needs both for. None of them makes one from the other.
+/// Files of `service/src` beside decode/ and encode/ that name messages of the wire and types of
+/// the core, each with what it needs both for. None of them makes one from the other.
 const NAMES_BOTH: [(&str, &str); 16] = [
     (
         "answer/mod.rs",

@@ -147,8 +147,8 @@ fn print(
     println!("mean {:.4} m, aligned {:.4} m", sums[0] / n, sums[1] / n);
 }
 
-/// Prints how many names of landmarks were found to be others', and whether they are: `landmark-6-of-robot3` is `landmark-6`, or
-/// what another robot calls so.
+/// Prints how many names of landmarks were found to be others', and whether they are:
+/// `landmark-6-of-robot3` is `landmark-6`, or what another robot calls so.
 fn print_names(estimator: &Estimator) {
     let is_right = |name: &&Label| {
         let plain = |name: &Label| {

@@ -115,7 +115,8 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
     g2o.is_none_or(|file| std::fs::write(file, text(&graph)).is_ok())
 }
 
-/// The set's matches over longer gaps, and false ones until they make up a share; how many are false.
+/// The set's matches over longer gaps, and false ones until they make up a share; how many are
+/// false.
 fn matches_of(set: &Tuc, share: f64) -> (Vec<Match>, usize) {
     let is_true = |found: &Match| {
         let (a, b) = (

@@ -32,8 +32,8 @@ enum Body {
     Persistent(Walker),
 }
 
-/// An agent in its room. Walk, odometry and eyes draw from streams of their own, so that other noise
-/// or other percepts leave the walk as it is.
+/// An agent in its room. Walk, odometry and eyes draw from streams of their own, so that other
+/// noise or other percepts leave the walk as it is.
 #[derive(Clone, Debug)]
 pub(super) struct Agent {
     world: ObstacleWorld,
@@ -88,8 +88,8 @@ impl Agent {
         stamp_ns(self.steps)
     }
 
-    /// Where the agent stands, told before its first step, and what it sees from there: the frame of the
-    /// room is that of the map, and the start is the step of number 0.
+    /// Where the agent stands, told before its first step, and what it sees from there: the frame
+    /// of the room is that of the map, and the start is the step of number 0.
     pub(super) fn start(&mut self) -> Vec<Reading> {
         let pose = self.pose();
         let mut readings = vec![Reading {

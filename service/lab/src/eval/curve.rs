@@ -1,4 +1,5 @@
-//! A quantity over the steps of one run, in bins, so that long walks take no more memory than short.
+//! A quantity over the steps of one run, in bins, so that long walks take no more memory than
+//! short.
 
 /// Most points of a curve.
 const POINTS_MAX: u64 = 500;

@@ -1,11 +1,11 @@
 //! The seed paper's experiments in a room: protocols, measures, tables and figures.
 //!
-//! An [`Experiment`] is several runs of a [`Protocol`]. In each run an agent starts in the middle of a
-//! room, is told where that is, and walks; the core's map learns from its odometry, and after every
-//! step the memory is asked what the agent's grid code reminds it of. [`Quantity`] says exactly what is
-//! measured at a step, [`MEASURES`] lists what becomes of it over a run, a [`Report`] has the mean,
-//! median and largest over the runs, a [`Table`] shows them beside the paper's, and [`figures`] draws
-//! them over the steps.
+//! An [`Experiment`] is several runs of a [`Protocol`]. In each run an agent starts in the middle
+//! of a room, is told where that is, and walks; the core's map learns from its odometry, and after
+//! every step the memory is asked what the agent's grid code reminds it of. [`Quantity`] says
+//! exactly what is measured at a step, [`MEASURES`] lists what becomes of it over a run, a
+//! [`Report`] has the mean, median and largest over the runs, a [`Table`] shows them beside the
+//! paper's, and [`figures`] draws them over the steps.
 //!
 //! # What the paper leaves open, and what is done here
 //!
@@ -21,8 +21,9 @@
 //!
 //! The third experiment, with objects, is in [`object`].
 //!
-//! The room's corner is the origin of the map, and the start is told without error. Sums are taken in a
-//! fixed order, so that equal protocols and seeds give equal reports, on any number of threads.
+//! The room's corner is the origin of the map, and the start is told without error. Sums are taken
+//! in a fixed order, so that equal protocols and seeds give equal reports, on any number of
+//! threads.
 //!
 //! ```
 //! use std::num::NonZeroUsize;

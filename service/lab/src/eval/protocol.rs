@@ -24,17 +24,19 @@ pub enum Walk {
 pub enum Percept {
     /// Nothing.
     None,
-    /// Views of the room ([`cogmap_worlds::Scenery`]). Places remember them, and each recalls a place; a
-    /// stretch of views that are like those of an earlier stretch corrects the pose.
+    /// Views of the room ([`cogmap_worlds::Scenery`]). Places remember them, and each recalls a
+    /// place; a stretch of views that are like those of an earlier stretch corrects the pose.
     Descriptor(ViewSettings),
-    /// The centres of obstacles, as landmarks. The map learns where they are and corrects poses by them.
+    /// The centres of obstacles, as landmarks. The map learns where they are and corrects poses by
+    /// them.
     Sightings(SightingSettings),
 }
 
 /// How the room is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewSettings {
-    /// The room is seen at every step whose number divides by this, and at the start, which is step 0.
+    /// The room is seen at every step whose number divides by this, and at the start, which is step
+    /// 0.
     pub every: u64,
     /// Length of a view's noise, as a share of the view's own.
     pub noise: f64,
@@ -45,8 +47,8 @@ pub struct ViewSettings {
 pub struct SightingSettings {
     /// How far \[m\].
     pub range_max_m: f64,
-    /// All obstacles within range are sighted at every step whose number divides by this, and at the
-    /// start, which is step 0.
+    /// All obstacles within range are sighted at every step whose number divides by this, and at
+    /// the start, which is step 0.
     pub every: u64,
     /// Standard deviation of the distance, as a share of it. Azimuth and elevation have one of a
     /// degree at 0.05, and more or less in proportion.

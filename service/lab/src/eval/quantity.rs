@@ -2,13 +2,14 @@
 
 /// A number that each step of a run has, or has not while the memory holds no place yet.
 ///
-/// *Winner* is the place that the core recalls by the agent's grid code alone, without its position:
-/// the exact arg max of the similarity over all places (seed Section 3.3 B), asked after the step has
-/// been taken in. The true position is written p, and all distances are in the frame of the room.
+/// *Winner* is the place that the core recalls by the agent's grid code alone, without its
+/// position: the exact arg max of the similarity over all places (seed Section 3.3 B), asked after
+/// the step has been taken in. The true position is written p, and all distances are in the frame
+/// of the room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
-    /// Distance of the winner's stored position from p \[m\] (seed Eq. 11, the ATE). A place that was
-    /// recruited at this very step counts; the paper does not say.
+    /// Distance of the winner's stored position from p \[m\] (seed Eq. 11, the ATE). A place that
+    /// was recruited at this very step counts; the paper does not say.
     RecallError,
     /// Distance of the nearest stored place from p \[m\]: no recall of a place can be better.
     OracleError,
@@ -16,12 +17,12 @@ pub enum Quantity {
     /// out \[m\]: how well the memory knew what came (seed Fig. 15, which has the distance of the
     /// winner without saying whether the memory is asked before or after it learns).
     PredictionError,
-    /// Distance from p of the place that answers the live agent \[m\]: what the service publishes. It
-    /// is found by position, asked anew after every eighth of a field radius, and there is none
+    /// Distance from p of the place that answers the live agent \[m\]: what the service publishes.
+    /// It is found by position, asked anew after every eighth of a field radius, and there is none
     /// beyond two field radii from all places.
     LiveError,
-    /// Distance from p of the position decoded from the grid code alone, knowing only that the agent
-    /// is in the room \[m\]. Asked at every tenth step.
+    /// Distance from p of the position decoded from the grid code alone, knowing only that the
+    /// agent is in the room \[m\]. Asked at every tenth step.
     DecodedError,
     /// Distance from p of the pose that is published with the step \[m\].
     CausalError,
@@ -32,8 +33,8 @@ pub enum Quantity {
     /// exp(−(1 − cosine)/σ) (seed Eq. 9). The paper leaves σ open; here it makes 1/2 of a place one
     /// field radius away, averaged over directions, as the map's confidence does.
     PseudoActivation,
-    /// The map's confidence in the winner (seed Eq. 8): 2^−(d/field radius)², where d is the distance
-    /// at which codes are on average as alike as these two.
+    /// The map's confidence in the winner (seed Eq. 8): 2^−(d/field radius)², where d is the
+    /// distance at which codes are on average as alike as these two.
     Confidence,
     /// Cosine of the interference patterns I ∈ R³ now and at the winner (seed Eqs. 4 and 5), in the
     /// frame of the room, whose origin is a corner.

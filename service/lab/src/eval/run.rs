@@ -27,8 +27,8 @@ use trajectory::{StampedPose, Trajectory};
 const AGENT: AgentId = AgentId(0);
 /// Growth is taken over this part of the walk.
 const GROWTH_PARTS: u64 = 10;
-/// Codes are decoded at every step whose number divides by this: to search a whole room costs half a
-/// millisecond, ten times as much as everything else.
+/// Codes are decoded at every step whose number divides by this: to search a whole room costs half
+/// a millisecond, ten times as much as everything else.
 const STEPS_PER_DECODING: u64 = 10;
 /// Progress is told after so many steps.
 const STEPS_PER_REPORT: u64 = 100;
@@ -153,7 +153,8 @@ struct Trial {
     growth_steps: u64,
     /// σ of the pseudo-activation.
     sigma: f64,
-    /// The true positions after each step \[m\], if the agent perceives anything that may refine its own.
+    /// The true positions after each step \[m\], if the agent perceives anything that may refine
+    /// its own.
     truth_m: Vec<Vector3<f64>>,
     perceives: bool,
     /// Radius of the ball around the room's centre in which codes are decoded \[m\].
@@ -401,8 +402,8 @@ fn nothing(limit: usize) -> RecallCue {
     }
 }
 
-/// σ of seed Eq. 9 that makes exp(−d/σ) one half for the cosine distance d that codes a field radius
-/// apart have on average.
+/// σ of seed Eq. 9 that makes exp(−d/σ) one half for the cosine distance d that codes a field
+/// radius apart have on average.
 fn pseudo_activation_sigma(modules: &GridModules, field_radius_m: f64) -> f64 {
     let lattices = modules.lattices();
     let similarity = |spacing_m: f64| {

@@ -27,8 +27,8 @@ impl Statistic {
     }
 }
 
-/// The value below which the share `q` of sorted values lies, linear between neighbours (Hyndman & Fan
-/// 1996, type 7). NaN when there is none.
+/// The value below which the share `q` of sorted values lies, linear between neighbours (Hyndman &
+/// Fan 1996, type 7). NaN when there is none.
 pub(super) fn quantile(sorted: &[f64], q: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else {
         return f64::NAN;

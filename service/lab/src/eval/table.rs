@@ -7,9 +7,9 @@ use super::experiment::Experiment;
 use super::measure::MEASURES;
 use super::report::Report;
 
-/// The other rows of the paper's Table 1, as the paper states them: system, mean ATE and RMSE \[m\].
-/// The first two are of obstacle-rich environments, the third of irregular terrain. They were not
-/// measured here, nor by the paper in this room.
+/// The other rows of the paper's Table 1, as the paper states them: system, mean ATE and RMSE
+/// \[m\]. The first two are of obstacle-rich environments, the third of irregular terrain. They
+/// were not measured here, nor by the paper in this room.
 const PAPER_SLAM: [(&str, &str, &str); 3] = [
     ("ORB-SLAM2", "0.12 – 0.20", "0.15 – 0.25"),
     ("RTAB-Map", "0.18 – 0.30", "0.22 – 0.35"),

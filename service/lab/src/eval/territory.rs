@@ -6,9 +6,9 @@ use nalgebra::Vector3;
 
 /// Locations that lie farther than a threshold from each other (seed paper, Section 5.2 A).
 ///
-/// "A point is said to be unique when the distance to all the previously known points is greater than
-/// epsilon." Known points are the unique ones: if every point of the path were known, no step shorter
-/// than epsilon could ever lead to a new location.
+/// "A point is said to be unique when the distance to all the previously known points is greater
+/// than epsilon." Known points are the unique ones: if every point of the path were known, no step
+/// shorter than epsilon could ever lead to a new location.
 #[derive(Clone, Debug)]
 pub(super) struct Territory {
     epsilon_m: f64,

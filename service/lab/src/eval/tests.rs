@@ -119,7 +119,8 @@ fn bernoulli_recruits_as_often_as_stated_and_novelty_keeps_its_distance() {
         8,
         2,
     ));
-    // 8000 draws at 5 %: 400 expected, with a deviation of 19.5; a few fall where a place is already.
+    // 8000 draws at 5 %: 400 expected, with a deviation of 19.5; a few fall where a place is
+    // already.
     let places = report.mean("places").unwrap() * 8.0;
     assert!((300.0..500.0).contains(&places), "{places}");
 

@@ -1,4 +1,5 @@
-//! Recordings that are pose graphs in the g2o text format, and the positions they are compared with.
+//! Recordings that are pose graphs in the g2o text format, and the positions they are compared
+//! with.
 
 mod recording;
 mod reference;

@@ -9,9 +9,10 @@ use crate::mapping::{Landmark, Matches, Measured, Recording, Step};
 /// Nanoseconds in a second.
 const NS_PER_S: u64 = 1_000_000_000;
 
-/// The graph pose by pose, in the order of their ids. Edges from an id to the next are motion, all others matches; each comes
-/// with the later of its poses. The stamp is the id in seconds, or the number of the pose if an id is too large for that.
-/// Held is what the file says, or else the first pose.
+/// The graph pose by pose, in the order of their ids. Edges from an id to the next are motion, all
+/// others matches; each comes with the later of its poses. The stamp is the id in seconds, or the
+/// number of the pose if an id is too large for that. Held is what the file says, or else the first
+/// pose.
 pub fn recording(graph: &G2oGraph) -> Recording {
     let numbers: BTreeMap<u64, usize> = graph.poses().keys().copied().zip(0..).collect();
     let holds_a_pose = graph.held().iter().any(|id| graph.poses().contains_key(id));

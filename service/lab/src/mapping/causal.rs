@@ -12,19 +12,20 @@ use super::recording::{Matches, Measured, Recording};
 /// Doubtful matches that are judged together at least: fewer agree by chance.
 const JUDGED_TOGETHER_MIN: usize = 16;
 
-/// … and at least this share of all matches so far, so that all judgements together cost a few times the last.
+/// … and at least this share of all matches so far, so that all judgements together cost a few
+/// times the last.
 const JUDGED_TOGETHER_SHARE: f64 = 0.25;
 
-/// As many doubtful measurements for one that was believed make the map itself doubtful: even where every second match is false,
-/// true ones fit a map that is right.
+/// As many doubtful measurements for one that was believed make the map itself doubtful: even where
+/// every second match is false, true ones fit a map that is right.
 const DOUBTFUL_MEASUREMENTS: usize = 3;
 
-/// The same for recognised places. Their matches wait for one another where the map does not know the place, so as many as
-/// were believed are to be judged.
+/// The same for recognised places. Their matches wait for one another where the map does not know
+/// the place, so as many as were believed are to be judged.
 const DOUBTFUL_RECOGNISED: usize = 1;
 
-/// A match of recognised places says nothing by fitting where the map does not know the place this many times better or
-/// as well as the match does: it waits for others to agree with it.
+/// A match of recognised places says nothing by fitting where the map does not know the place this
+/// many times better or as well as the match does: it waits for others to agree with it.
 const UNSHARP: f64 = 2.0;
 
 /// Variance of what motion did not measure \[m², rad²\].
@@ -32,10 +33,11 @@ const UNKNOWN: f64 = 1e6;
 
 /// A recording that arrives pose by pose.
 ///
-/// Motion is believed. Before a match enters the map it is held against what the map expects: one that is farther off than
-/// [`GATE_DEVIATIONS`](super::GATE_DEVIATIONS) allows is left out. When such matches have become many beside those that were let
-/// in, it may be the map that is wrong. All are then judged together, the map is begun anew from what holds, and who was wrong
-/// before comes back in.
+/// Motion is believed. Before a match enters the map it is held against what the map expects: one
+/// that is farther off than [`GATE_DEVIATIONS`](super::GATE_DEVIATIONS) allows is left out. When
+/// such matches have become many beside those that were let in, it may be the map that is wrong.
+/// All are then judged together, the map is begun anew from what holds, and who was wrong before
+/// comes back in.
 #[derive(Debug)]
 pub struct CausalRun<'a> {
     growth: Growth<'a>,
@@ -61,7 +63,8 @@ impl<'a> CausalRun<'a> {
         }
     }
 
-    /// Takes in the next pose and all that comes with it, and returns where the pose is then believed to be.
+    /// Takes in the next pose and all that comes with it, and returns where the pose is then
+    /// believed to be.
     pub fn step(&mut self) -> Option<Isometry3<f64>> {
         let recording = self.growth.recording;
         let index = self.growth.poses.len();
@@ -127,7 +130,8 @@ impl<'a> CausalRun<'a> {
         self.n_judgements
     }
 
-    /// The innovations of all matches that could be expected and were found to hold: by a verdict of the same recording.
+    /// The innovations of all matches that could be expected and were found to hold: by a verdict
+    /// of the same recording.
     pub fn consistency(&self, verdict: &Verdict) -> Consistency {
         let mut consistency = Consistency::default();
         for (innovation, holds) in self.innovations.iter().zip(&verdict.0) {
@@ -144,8 +148,8 @@ impl<'a> CausalRun<'a> {
         self.live.marginals(&self.growth.map).pose(newest)
     }
 
-    /// How far a measurement of the next step is from what the map expects, and whether the map knows enough for that to say
-    /// something. `None` if it expects nothing.
+    /// How far a measurement of the next step is from what the map expects, and whether the map
+    /// knows enough for that to say something. `None` if it expects nothing.
     fn expected(
         &self,
         new: usize,

@@ -19,7 +19,8 @@ impl Consistency {
         self.degrees += innovation.degrees;
     }
 
-    /// The sum over the degrees of freedom: 1 where the map tells the truth, more where it is too sure.
+    /// The sum over the degrees of freedom: 1 where the map tells the truth, more where it is too
+    /// sure.
     pub fn per_degree(&self) -> Option<f64> {
         (self.degrees > 0).then(|| self.sum / self.degrees as f64)
     }

@@ -119,7 +119,8 @@ impl<'a> Growth<'a> {
         lead
     }
 
-    /// Adds a measurement, of which all poses are there. One that is judged counts only if it holds; for it the answer is yes.
+    /// Adds a measurement, of which all poses are there. One that is judged counts only if it
+    /// holds; for it the answer is yes.
     pub(super) fn add(&mut self, measured: &Measured, kernel: Kernel, holds: bool) -> bool {
         let (link, degrees) = match measured {
             Measured::Relative {

@@ -7,14 +7,17 @@ use pose_graph::{Graduation, Innovation, Kernel, PoseGraph, RelaxationSettings, 
 use super::growth::Growth;
 use super::recording::{Matches, Recording};
 
-/// How far off a measurement may be. Of true ones with the errors that they state fewer than one in 10⁸ are farther.
+/// How far off a measurement may be. Of true ones with the errors that they state fewer than one in
+/// 10⁸ are farther.
 pub const GATE_DEVIATIONS: f64 = 6.0;
 
-/// The same for recognised places, whose errors are a rough figure of how far apart two samples of one place are taken.
+/// The same for recognised places, whose errors are a rough figure of how far apart two samples of
+/// one place are taken.
 const GATE_DEVIATIONS_OF_RECOGNISED: f64 = 3.0;
 
-/// Scale of the kernel by which measurements are judged against one another: the gate in one direction is 6, and at 4 a
-/// measurement that is as far off as that pulls with a tenth of its force.
+/// Scale of the kernel by which measurements are judged against one another: the gate in one
+/// direction is 6, and at 4 a measurement that is as far off as that pulls with a tenth of its
+/// force.
 const DOUBT_SCALE: f64 = 4.0;
 
 /// Times that matches are sorted and the map relaxed; hardly any change sides in the third.
@@ -47,7 +50,8 @@ pub struct Refined {
     pub verdict: Verdict,
     /// χ² over motion and the matches that hold.
     pub chi_squared: f64,
-    /// χ² at the best map of all matches, false or not. `None` for recognised places, of which half may be false.
+    /// χ² at the best map of all matches, false or not. `None` for recognised places, of which half
+    /// may be false.
     pub chi_squared_of_all: Option<f64>,
     /// Number of links, those of matches that do not hold among them.
     pub n_links: usize,
@@ -56,12 +60,13 @@ pub struct Refined {
 }
 
 impl Refined {
-    /// Relaxes the whole recording, from rotations first and with all matches. If every match is then nearer than the gate,
-    /// that is the map. Otherwise some are false, and another map is tried, from the matches that `causal` believed; and where
-    /// those are not most of them, or there is no causal verdict, one in which kernels that begin wide let the matches judge one
-    /// another. Of each those matches are kept that fit, the rest
-    /// are left out, and the map is relaxed again, until none changes sides. The map is the one on which Σ min(s, gate)
-    /// is least over all matches.
+    /// Relaxes the whole recording, from rotations first and with all matches. If every match is
+    /// then nearer than the gate, that is the map. Otherwise some are false, and another map is
+    /// tried, from the matches that `causal` believed; and where those are not most of them, or
+    /// there is no causal verdict, one in which kernels that begin wide let the matches judge one
+    /// another. Of each those matches are kept that fit, the rest are left out, and the map is
+    /// relaxed again, until none changes sides. The map is the one on which Σ min(s, gate) is least
+    /// over all matches.
     ///
     /// Recognised places are only judged by one another.
     pub fn of(recording: &Recording, causal: Option<&Verdict>) -> Self {
@@ -84,7 +89,8 @@ impl Refined {
             relax(&mut believed.map, Start::RotationFirst, Graduation::None);
             best = better(best, settled(believed));
         }
-        // Wide kernels keep every false match in the factor, which it makes dense: they are the last resort.
+        // Wide kernels keep every false match in the factor, which it makes dense: they are the
+        // last resort.
         if causal.is_none_or(|causal| causal.n_rejected() > causal.n_accepted()) {
             let (judged, _) = judge(recording, n);
             all.take_places(&judged);
@@ -122,7 +128,8 @@ pub(super) fn gate(matches: Matches, degrees: usize) -> f64 {
     Innovation::limit(degrees, deviations)
 }
 
-/// The map of the first `n` steps, from motion on, in which matches judge one another; and which of them hold there.
+/// The map of the first `n` steps, from motion on, in which matches judge one another; and which of
+/// them hold there.
 pub(super) fn judge(recording: &Recording, n: usize) -> (Growth<'_>, Verdict) {
     let doubt = Kernel::GemanMcClure(Scale::new(DOUBT_SCALE).expect("a positive constant"));
     let kernel = match recording.matches {

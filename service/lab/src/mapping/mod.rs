@@ -1,8 +1,9 @@
 //! Recordings of motion, matches and sightings through the experience map.
 //!
-//! A [`Recording`] is what one robot measured, pose by pose. [`CausalRun`] keeps the map relaxed as the poses arrive, and
-//! judges each match by what the map expects; [`Refined`] is the map that fits best in the end. Neither reads a clock, so that
-//! whoever wants times takes them around [`CausalRun::step`] and [`Refined::of`].
+//! A [`Recording`] is what one robot measured, pose by pose. [`CausalRun`] keeps the map relaxed as
+//! the poses arrive, and judges each match by what the map expects; [`Refined`] is the map that
+//! fits best in the end. Neither reads a clock, so that whoever wants times takes them around
+//! [`CausalRun::step`] and [`Refined::of`].
 
 mod causal;
 mod consistency;

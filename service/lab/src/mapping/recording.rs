@@ -72,9 +72,11 @@ pub enum Measured {
 /// What the recording's matches are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Matches {
-    /// Measurements with Gaussian errors, as their information says. They hold unless they are far from what is expected.
+    /// Measurements with Gaussian errors, as their information says. They hold unless they are far
+    /// from what is expected.
     Measurements,
-    /// Recognised places, of which many may be false: they are doubted by this kernel from beginning to end.
+    /// Recognised places, of which many may be false: they are doubted by this kernel from
+    /// beginning to end.
     Recognised(Kernel),
 }
 

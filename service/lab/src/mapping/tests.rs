@@ -12,8 +12,8 @@ use pose_graph::g2o::G2oGraph;
 /// Poses of one round.
 const ROUND: u64 = 20;
 
-/// Three rounds with steps of 1 m, whose odometry turns too far, and a match with the round before at every pose. Information
-/// is that of 0.1 m and 0.02 rad.
+/// Three rounds with steps of 1 m, whose odometry turns too far, and a match with the round before
+/// at every pose. Information is that of 0.1 m and 0.02 rad.
 fn rounds() -> String {
     let mut text = String::new();
     let turn = std::f64::consts::TAU / ROUND as f64;

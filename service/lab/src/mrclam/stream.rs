@@ -26,8 +26,8 @@ pub struct TeamReading {
 }
 
 impl TeamReading {
-    /// The same reading, of a robot that gives landmarks names of its own, which nobody else uses: `landmark-6` is
-    /// `landmark-6-of-robot3` to robot 3. Other robots it calls as everybody does.
+    /// The same reading, of a robot that gives landmarks names of its own, which nobody else uses:
+    /// `landmark-6` is `landmark-6-of-robot3` to robot 3. Other robots it calls as everybody does.
     #[must_use]
     pub fn with_own_names(mut self) -> Self {
         if let ReadingBody::Sighting {

@@ -15,14 +15,16 @@ const STRIDE_MAX: usize = 3;
 pub struct ExplorationNoise {
     /// Standard deviation of a felt level; levels go from 0 to 1.
     pub value: f64,
-    /// Standard deviation of a move's measured displacement along each axis, as a share of its length.
+    /// Standard deviation of a move's measured displacement along each axis, as a share of its
+    /// length.
     pub motion: f64,
 }
 
 /// A contact as the end effector knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Felt {
-    /// Position by path integration, from where the exploration began, along the object's axes \[m\].
+    /// Position by path integration, from where the exploration began, along the object's axes
+    /// \[m\].
     pub position_m: Vector3<f64>,
     /// Standard deviation that path integration has gathered along each axis \[m\].
     pub drift_sd_m: f64,
@@ -32,7 +34,8 @@ pub struct Felt {
     pub level: f64,
 }
 
-/// A walk over the surface: each move goes one to three faces straight on in a random direction, and ends in a contact.
+/// A walk over the surface: each move goes one to three faces straight on in a random direction,
+/// and ends in a contact.
 #[derive(Debug)]
 pub struct Explorer<'a> {
     object: &'a VoxelObject,

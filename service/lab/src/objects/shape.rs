@@ -45,7 +45,8 @@ impl Body {
     }
 }
 
-/// A solid in one piece: boxes, ellipsoids and cylinders of random extents, the middle of each but the first in a voxel of those before.
+/// A solid in one piece: boxes, ellipsoids and cylinders of random extents, the middle of each but
+/// the first in a voxel of those before.
 pub(super) fn solid(random: &mut ChaCha8Rng) -> BTreeSet<[i32; 3]> {
     let bodies = random.random_range(BODIES);
     solid_of(bodies, random)

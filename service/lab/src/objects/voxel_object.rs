@@ -124,7 +124,8 @@ impl VoxelObject {
         Heading { face, direction }
     }
 
-    /// Over the edge of a face straight onto the next one: around a convex edge, along a flat one, or up a wall.
+    /// Over the edge of a face straight onto the next one: around a convex edge, along a flat one,
+    /// or up a wall.
     pub fn step(&self, heading: Heading) -> Heading {
         let (voxel, out) = self.sides[heading.face];
         let (along, up) = (DIRECTIONS[heading.direction], DIRECTIONS[out]);

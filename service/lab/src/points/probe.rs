@@ -19,8 +19,8 @@ const LINE_M: f64 = 0.004;
 pub enum Exploration {
     /// Anywhere on the surface, each independent of the others.
     Independent,
-    /// Along a blind random walk on the surface: steps of 10 mm whose heading changes by 0.5 rad (one
-    /// standard deviation) from step to step.
+    /// Along a blind random walk on the surface: steps of 10 mm whose heading changes by 0.5 rad
+    /// (one standard deviation) from step to step.
     Walk,
     /// Where the recogniser asks for it, after three independent ones.
     Policy,
@@ -91,8 +91,8 @@ impl<'a> Probe<'a> {
         next
     }
 
-    /// The first point along the line that was asked for, from outside; if nothing lies on it, the nearest
-    /// beside it. `object_from_episode` is the truth.
+    /// The first point along the line that was asked for, from outside; if nothing lies on it, the
+    /// nearest beside it. `object_from_episode` is the truth.
     pub(super) fn asked(
         &mut self,
         next: &NextTouch,

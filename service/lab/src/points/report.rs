@@ -21,8 +21,8 @@ pub struct Report {
     pub false_unknown_after: BTreeMap<usize, f64>,
     /// Error of the rotation, modulo the object's own symmetries, where the object was named right.
     pub rotation_deg: BTreeMap<usize, Rotation>,
-    /// Share of trials with an object that was left out whose fit lies below the threshold that 2 % of the
-    /// trials with learned objects lie below.
+    /// Share of trials with an object that was left out whose fit lies below the threshold that 2 %
+    /// of the trials with learned objects lie below.
     pub unknown_caught: BTreeMap<usize, f64>,
     /// The same with the recogniser's own threshold: share of trials whose most probable answer was
     /// `unknown`.

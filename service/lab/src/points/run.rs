@@ -84,8 +84,8 @@ struct Look {
     rotation_rad: Option<f64>,
 }
 
-/// Learns all clouds and runs the trials, on as many threads as the machine has. `clock` tells the time
-/// since any instant; `progress` is told how many trials of how many are done.
+/// Learns all clouds and runs the trials, on as many threads as the machine has. `clock` tells the
+/// time since any instant; `progress` is told how many trials of how many are done.
 pub fn run(
     clouds: &[Cloud],
     settings: &PointsSettings,
@@ -153,7 +153,8 @@ pub fn run(
     report
 }
 
-/// The trials of these numbers, in order. Each is by itself, so it does not matter which thread runs it.
+/// The trials of these numbers, in order. Each is by itself, so it does not matter which thread
+/// runs it.
 fn all(
     count: usize,
     progress: &mut dyn FnMut(usize),
@@ -439,7 +440,8 @@ fn felt(
 
 fn generator(seed: u64, object: u32, trial: u64) -> ChaCha12Rng {
     let mut rng = ChaCha12Rng::seed_from_u64(seed);
-    // Each trial has a stream of its own, so that neither the number of trials nor of objects changes it.
+    // Each trial has a stream of its own, so that neither the number of trials nor of objects
+    // changes it.
     rng.set_stream((u64::from(object) << 32) | trial);
     rng
 }

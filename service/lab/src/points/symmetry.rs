@@ -11,16 +11,18 @@ const POINTS: usize = 200;
 const TARGETS: usize = 4096;
 /// Steps of refining.
 const STEPS: usize = 12;
-/// A small turn that moves the surface through itself by less than this part of the way that its points go is
-/// about an axis of symmetry: dents and labels do not make a can's turn about its axis one that can be told.
+/// A small turn that moves the surface through itself by less than this part of the way that its
+/// points go is about an axis of symmetry: dents and labels do not make a can's turn about its axis
+/// one that can be told.
 const THROUGH_MIN: f64 = 0.2;
 
-/// The angle \[rad\] between an estimated pose and the true one, or the true one moved by a symmetry of
-/// the object.
+/// The angle \[rad\] between an estimated pose and the true one, or the true one moved by a
+/// symmetry of the object.
 ///
-/// The error D = estimate⁻¹ truth, in the object's frame, is refined to the nearest motion D* that lays
-/// the object upon itself; turns about an axis of symmetry are left as they are. If what is left between the two surfaces is below `tolerance_m`
-/// (root mean square), D* is a symmetry, and the error is D without it; otherwise all of D.
+/// The error D = estimate⁻¹ truth, in the object's frame, is refined to the nearest motion D* that
+/// lays the object upon itself; turns about an axis of symmetry are left as they are. If what is
+/// left between the two surfaces is below `tolerance_m` (root mean square), D* is a symmetry, and
+/// the error is D without it; otherwise all of D.
 pub(super) fn error_rad(
     cloud: &Cloud,
     estimate: &Isometry3<f64>,
@@ -88,8 +90,8 @@ pub(super) fn error_rad(
     }
 }
 
-/// The step that minimises, without turns about axes of symmetry. `ways` are the squared ways of the points per
-/// squared turn.
+/// The step that minimises, without turns about axes of symmetry. `ways` are the squared ways of
+/// the points per squared turn.
 fn step(matrix: &Matrix6<f64>, right: &Vector6<f64>, ways: &Matrix3<f64>) -> Option<Vector6<f64>> {
     // The shift that goes best with each turn is eliminated.
     let shifts = matrix.fixed_view::<3, 3>(0, 0).try_inverse()?;
@@ -127,7 +129,8 @@ mod tests {
     use super::*;
     use nalgebra::{Translation3, Unit};
 
-    /// Points on a cylinder (or, with corners, a prism of four sides) 0.1 m high, 0.06 m wide, with one lid.
+    /// Points on a cylinder (or, with corners, a prism of four sides) 0.1 m high, 0.06 m wide, with
+    /// one lid.
     fn shape(corners: bool) -> Cloud {
         let mut points = Vec::new();
         for k in 0..60 {

@@ -30,9 +30,9 @@ pub struct Episode {
 }
 
 impl Episode {
-    /// Draws an episode of at most `touches_max` touches, no two of the same place. The object is turned as given and moved
-    /// by up to a metre along each axis. Equal seeds and streams give equal episodes, and less noise
-    /// leaves the order of the touches as it is.
+    /// Draws an episode of at most `touches_max` touches, no two of the same place. The object is
+    /// turned as given and moved by up to a metre along each axis. Equal seeds and streams give
+    /// equal episodes, and less noise leaves the order of the touches as it is.
     pub fn draw(
         object: &TouchedObject,
         rotation: UnitQuaternion<f64>,

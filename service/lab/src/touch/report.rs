@@ -30,13 +30,14 @@ pub struct TouchReport {
     pub sure: f64,
     /// Seed.
     pub seed: u64,
-    /// Share of right first choices after each number of touches; ties count by their share, and an exploration that is over
-    /// with its last choice.
+    /// Share of right first choices after each number of touches; ties count by their share, and an
+    /// exploration that is over with its last choice.
     pub top1_after: BTreeMap<usize, f64>,
     /// How the explorations ended.
     #[serde(flatten)]
     pub outcomes: Option<Outcomes>,
-    /// Mean number of hypotheses, each an object and a pose, that hold 99 % of the evidence, after each touch.
+    /// Mean number of hypotheses, each an object and a pose, that hold 99 % of the evidence, after
+    /// each touch.
     pub live_hypotheses: Vec<f64>,
     /// How long touches took.
     #[serde(flatten)]
@@ -73,8 +74,8 @@ impl TouchReport {
 }
 
 impl TouchExperiment {
-    /// All touches of all explorations as CSV, each with what cogmap's first choice after it was worth, for other programs to
-    /// recognise the same.
+    /// All touches of all explorations as CSV, each with what cogmap's first choice after it was
+    /// worth, for other programs to recognise the same.
     pub fn csv(&self) -> String {
         let mut text = "trial,object,touch,x_mm,y_mm,z_mm,level,right\n".to_owned();
         for (number, trial) in self.trials.iter().enumerate() {

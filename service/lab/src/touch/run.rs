@@ -10,9 +10,11 @@ use crate::eval::object::{Ending, GoesOn, Rotate, Trace, in_parallel, object_id}
 
 /// The channel of levels.
 const CHANNEL: u16 = 0;
-/// Touches of one object nearer than this are of one place \[m\]: what a fingertip cannot tell apart.
+/// Touches of one object nearer than this are of one place \[m\]: what a fingertip cannot tell
+/// apart.
 const SPACING_M: f64 = 1e-3;
-/// Least standard deviations that a recogniser is told: touches are written with four decimals of a millimetre, and levels are whole numbers.
+/// Least standard deviations that a recogniser is told: touches are written with four decimals of a
+/// millimetre, and levels are whole numbers.
 const POSITION_SD_MIN_M: f64 = 1e-4;
 const LEVEL_SD_MIN: f64 = 0.1;
 
@@ -88,8 +90,9 @@ impl TouchProtocol {
 }
 
 impl TouchExperiment {
-    /// Learns all objects and recognises each so often, on so many threads; only times depend on their number. `explored` is called
-    /// after each exploration, and `clock` tells seconds from any moment on. Explorations go on after the answer.
+    /// Learns all objects and recognises each so often, on so many threads; only times depend on
+    /// their number. `explored` is called after each exploration, and `clock` tells seconds from
+    /// any moment on. Explorations go on after the answer.
     ///
     /// # Errors
     /// The protocol makes no sense.

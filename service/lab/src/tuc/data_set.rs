@@ -147,7 +147,8 @@ impl Tuc {
         })
     }
 
-    /// Odometry in order of time. The first step has no motion: it says where the robot's clock began.
+    /// Odometry in order of time. The first step has no motion: it says where the robot's clock
+    /// began.
     pub fn steps(&self) -> &[OdometryStep] {
         &self.steps
     }

@@ -15,13 +15,15 @@ const GAP_NS: i64 = 10_000_000_000;
 const DRAWS_MAX: usize = 10_000;
 
 impl Tuc {
-    /// The set's matches whose moments are at least ten seconds apart: nearer ones say nothing that odometry does not.
+    /// The set's matches whose moments are at least ten seconds apart: nearer ones say nothing that
+    /// odometry does not.
     pub fn distant_matches(&self) -> Vec<Match> {
         let is_distant = |found: &&Match| found.later_ns.saturating_sub(found.earlier_ns) > GAP_NS;
         self.matches().iter().filter(is_distant).copied().collect()
     }
 
-    /// Whether the robot was within two metres of the place at both moments of a match; no if the truth does not tell.
+    /// Whether the robot was within two metres of the place at both moments of a match; no if the
+    /// truth does not tell.
     pub fn is_true(&self, found: &Match) -> bool {
         let places = [found.later_ns, found.earlier_ns].map(|moment_ns| self.truth().at(moment_ns));
         let [Some(later), Some(earlier)] = places else {
@@ -30,7 +32,8 @@ impl Tuc {
         (later - earlier).norm() < SAME_PLACE_M
     }
 
-    /// Adds false matches between moments of the given ones, drawn evenly, until they make up this share of all, from 0 to below
+    /// Adds false matches between moments of the given ones, drawn evenly, until they make up this
+    /// share of all, from 0 to below
     /// 1. The order of the recording is kept by [`Tuc::recording`].
     pub fn add_false(&self, matches: &mut Vec<Match>, share: f64, seed: u64) {
         let n_true = matches.iter().filter(|found| self.is_true(found)).count();

@@ -10,9 +10,10 @@
 //! | `point2` | t \[s\], x, y \[m\], 4 entries of a covariance |
 //! | `angle` | t \[s\], heading \[rad\], its variance |
 //!
-//! A velocity belongs to the interval that ends at its stamp. Other lines are skipped. Neubert, Schubert, Protzel, "A
-//! neurologically inspired sequence processing model for mobile robot place recognition", RA-L 2019,
-//! doi 10.1109/LRA.2019.2927096. The sets may not be used commercially, so none is kept here.
+//! A velocity belongs to the interval that ends at its stamp. Other lines are skipped. Neubert,
+//! Schubert, Protzel, "A neurologically inspired sequence processing model for mobile robot place
+//! recognition", RA-L 2019, doi 10.1109/LRA.2019.2927096. The sets may not be used commercially, so
+//! none is kept here.
 
 mod data_set;
 mod false_matches;

@@ -15,9 +15,10 @@ const HEADING_SD_RAD: f64 = 0.2;
 const DOUBT_SCALE: f64 = 3.0;
 
 impl Tuc {
-    /// The set with these matches, which need not be its own: a pose at every step of odometry, the first where the robot
-    /// was, and each match with the later of its moments. A match says that two poses are one, to within what recognition of
-    /// a place is good for. A moment is put at the step next to it.
+    /// The set with these matches, which need not be its own: a pose at every step of odometry, the
+    /// first where the robot was, and each match with the later of its moments. A match says that
+    /// two poses are one, to within what recognition of a place is good for. A moment is put at the
+    /// step next to it.
     pub fn recording(&self, matches: &[Match]) -> Recording {
         let mut variances = Matrix6::zeros();
         for (axis, sd) in [(0, POSITION_SD_M), (1, POSITION_SD_M), (5, HEADING_SD_RAD)] {

@@ -12,7 +12,8 @@ use crate::mapping::{Landmark, Matches, Measured, Recording, Step};
 const NS_PER_S: u64 = 1_000_000_000;
 
 impl Victoria {
-    /// The set pose by pose, in the order of their numbers, from the origin on. The stamp is the pose's number in seconds.
+    /// The set pose by pose, in the order of their numbers, from the origin on. The stamp is the
+    /// pose's number in seconds.
     pub fn recording(&self) -> Recording {
         let of_motion = self.odometry.iter().flat_map(|step| [step.from, step.to]);
         let of_sightings = self.sightings.iter().map(|sighting| sighting.pose);

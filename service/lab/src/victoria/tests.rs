@@ -39,8 +39,9 @@ fn motion_and_sightings_read_as_the_format_says() {
     ));
 }
 
-/// Along x the first pose is held, the motions say 1 and 1.1 and the sightings 2 and 1 before the tree, so the motion between
-/// them is 1.1 by odometry (variance 0.01) and 1 by sight (0.08): at the optimum 1.1 − 0.1 · 0.01/0.09.
+/// Along x the first pose is held, the motions say 1 and 1.1 and the sightings 2 and 1 before the
+/// tree, so the motion between them is 1.1 by odometry (variance 0.01) and 1 by sight (0.08): at
+/// the optimum 1.1 − 0.1 · 0.01/0.09.
 #[test]
 fn a_tree_seen_twice_corrects_the_motion_between() {
     let recording = Victoria::read(TEXT).unwrap().recording();
@@ -55,7 +56,8 @@ fn a_tree_seen_twice_corrects_the_motion_between() {
     }
     let apart = last.unwrap().translation.vector - refined.poses[2].translation.vector;
     assert!(apart.norm() < 1e-3, "{apart}");
-    // The second sighting was 0.1 m off, with a variance of 0.09 along x and less than that of the turn along y.
+    // The second sighting was 0.1 m off, with a variance of 0.09 along x and less than that of the
+    // turn along y.
     let consistency = run.consistency(&run.verdict());
     assert_eq!(consistency.n, 1);
     assert!((0.0..0.2).contains(&consistency.per_degree().unwrap()));

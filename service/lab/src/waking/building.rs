@@ -48,8 +48,8 @@ impl Building {
         }
     }
 
-    /// The view from a position in a room \[m\], with noise of a length that is on average `noise` of the view's; `wrong` says
-    /// with what probability it is one of somewhere else.
+    /// The view from a position in a room \[m\], with noise of a length that is on average `noise`
+    /// of the view's; `wrong` says with what probability it is one of somewhere else.
     pub fn view(
         &self,
         room: usize,

@@ -41,7 +41,8 @@ pub struct CarriedTrial {
     pub back_m: Option<f64>,
     /// How far off it was at the end of `BACK_M`, if it knew \[m\].
     pub error_m: Option<f64>,
-    /// Whether it was taken to know where it is, and was somewhere else, after it had called itself lost.
+    /// Whether it was taken to know where it is, and was somewhere else, after it had called itself
+    /// lost.
     pub is_false: bool,
     /// Whether it was so beyond `BACK_M`, having called itself lost or not.
     pub is_late: bool,
@@ -72,11 +73,13 @@ pub struct CarriedReport {
     pub error_m: Spread,
     /// Robots that called themselves lost, and then localized more than 0.5 m from where they were.
     pub false_claims: u32,
-    /// Robots that called themselves localized more than 0.5 m from where they were when they had gone more than 3 m.
+    /// Robots that called themselves localized more than 0.5 m from where they were when they had
+    /// gone more than 3 m.
     pub late_claims: u32,
 }
 
-/// Follows a protocol, on so many threads. The same protocol gives the same report on any number of them.
+/// Follows a protocol, on so many threads. The same protocol gives the same report on any number of
+/// them.
 ///
 /// # Errors
 /// The protocol makes no sense.

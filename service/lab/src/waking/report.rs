@@ -36,7 +36,8 @@ pub struct WakingReport {
     pub relocalised: f64,
     /// Robots that were ever put more than 0.5 m from where they were.
     pub false_claims: u32,
-    /// Robots that were put into the map before their room could be told from the others that look alike.
+    /// Robots that were put into the map before their room could be told from the others that look
+    /// alike.
     pub early_claims: u32,
     /// Robots that were not put into the map.
     pub uncertain: u32,

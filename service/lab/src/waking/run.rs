@@ -19,8 +19,8 @@ use cogmap_worlds::{Reading, ReadingBody, ReadingTarget};
 const STEP_NS: i64 = 100_000_000;
 /// A robot wakes up so near to where the explorer was, along each axis \[m\].
 const BESIDE_M: f64 = 0.3;
-/// The explorer sights the centres of obstacles within this range \[m\] at every step whose number divides by that, with these
-/// deviations of distance (as a share) and direction \[rad\].
+/// The explorer sights the centres of obstacles within this range \[m\] at every step whose number
+/// divides by that, with these deviations of distance (as a share) and direction \[rad\].
 const SURVEY_RANGE_M: f64 = 8.0;
 const SURVEY_EVERY: u32 = 5;
 const SURVEY_RANGE_SHARE: f64 = 0.05;
@@ -36,7 +36,8 @@ const ODOMETRY: OdometryNoise = OdometryNoise {
     gyro_bias_rad: 0.02 * std::f64::consts::PI / 180.0,
 };
 
-/// Follows a protocol, on so many threads. The same protocol gives the same report on any number of them.
+/// Follows a protocol, on so many threads. The same protocol gives the same report on any number of
+/// them.
 ///
 /// # Errors
 /// The protocol makes no sense.
@@ -78,8 +79,8 @@ pub(super) fn in_buildings<Trial: Send>(
     trials.into_iter().flatten().collect()
 }
 
-/// How long each view of the robots of a protocol takes to be taken in \[ms\], those after which it is asked where they are
-/// included: on one thread, and all of one building.
+/// How long each view of the robots of a protocol takes to be taken in \[ms\], those after which it
+/// is asked where they are included: on one thread, and all of one building.
 ///
 /// # Errors
 /// The protocol makes no sense.
@@ -180,7 +181,8 @@ impl Site {
         self.robot(room, walker, ODOMETRY, stream + 1)
     }
 
-    /// Somebody near to where the explorer was in a room, anywhere or where several rooms look alike.
+    /// Somebody near to where the explorer was in a room, anywhere or where several rooms look
+    /// alike.
     pub(super) fn somewhere(
         &self,
         room: usize,

@@ -108,7 +108,8 @@ async fn a_token_is_asked_for_everywhere_but_for_health_and_pages() {
     for path in ["/healthz", "/readyz", "/", "/docs/", "/openapi.json"] {
         assert_eq!(rig.get(path).await.status, 200, "{path}");
     }
-    // The pages take the token from whoever looks at them, keep it in the tab and send it in the header.
+    // The pages take the token from whoever looks at them, keep it in the tab and send it in the
+    // header.
     let front = rig.get("/").await;
     for part in ["id=\"ask-token\"", "sessionStorage", "\"Bearer \" + token"] {
         assert!(front.text().contains(part), "{part}");

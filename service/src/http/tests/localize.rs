@@ -15,7 +15,8 @@ const POSTS_M: [[f64; 3]; 5] = [
     [6.0, -3.0, 1.5],
 ];
 
-/// A post as it is seen from a body that stands here and is turned by a quarter to the left so many times.
+/// A post as it is seen from a body that stands here and is turned by a quarter to the left so many
+/// times.
 fn post(number: usize, from_m: [f64; 3], quarters: u8) -> SampleBody {
     let [x, y, z] = POSTS_M[number];
     let mut ahead = [x - from_m[0], y - from_m[1], z - from_m[2]];
@@ -50,7 +51,8 @@ async fn explored() -> Rig {
     rig
 }
 
-/// Half a metre, step by step, by a robot that set out here and looks along y; it sees posts after each step.
+/// Half a metre, step by step, by a robot that set out here and looks along y; it sees posts after
+/// each step.
 fn walk(from_m: [f64; 3], posts: &[usize]) -> LocalizeQuery {
     let mut samples = Vec::new();
     for step in steps(1, 0, 5).samples {

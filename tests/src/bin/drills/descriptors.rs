@@ -1,5 +1,5 @@
-//! More silent connections than the system allows open files: the store goes on, and so do those who
-//! were there before.
+//! More silent connections than the system allows open files: the store goes on, and so do those
+//! who were there before.
 
 use std::net::TcpStream;
 use std::time::{Duration, Instant};

@@ -1,4 +1,5 @@
-//! Clients that ask for much, over and over: health is answered at once, and each of them in its turn.
+//! Clients that ask for much, over and over: health is answered at once, and each of them in its
+//! turn.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

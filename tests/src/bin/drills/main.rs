@@ -5,8 +5,8 @@
 //! make drills DRILLS="flood"      # some of them, by name
 //! ```
 //!
-//! Each drill prints one JSON object on standard output, `{"drill", "passed", "figures"}`; progress goes
-//! to standard error. The exit code is 1 if a drill failed, 2 if there is no drill of a name.
+//! Each drill prints one JSON object on standard output, `{"drill", "passed", "figures"}`; progress
+//! goes to standard error. The exit code is 1 if a drill failed, 2 if there is no drill of a name.
 
 #![allow(clippy::print_stdout)] // The report is what it is for.
 

@@ -13,8 +13,8 @@ const LENGTH: f64 = 0.04;
 const ANGLE: f64 = -0.08;
 const BIAS_RAD_S: f64 = 0.01;
 
-/// A walk whose errors are known from one sample on; answers the largest distances between refined poses and truth, before
-/// that sample and after.
+/// A walk whose errors are known from one sample on; answers the largest distances between refined
+/// poses and truth, before that sample and after.
 fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
     let mut chronicle = KeyframeMap::new(KeyframeSettings {
         keyframes_max,

@@ -310,8 +310,8 @@ fn thinning_keeps_the_loops() {
     assert!(thinned_m < 2.0 * whole_m, "{thinned_m} {whole_m}");
 }
 
-/// Anchors may go without a sighting less: when room for sightings ran out first, what was seen from then on was not taken in, and
-/// the way went on by motion alone.
+/// Anchors may go without a sighting less: when room for sightings ran out first, what was seen
+/// from then on was not taken in, and the way went on by motion alone.
 #[test]
 fn what_is_seen_is_taken_in_though_there_is_room_for_anchors_only() {
     let whole = walked(1, 1500, roomy());

@@ -14,8 +14,8 @@ use serde::Serialize;
 use cogmap::cli::output;
 use cogmap::cli::quantile;
 
-/// Distance of neighbouring places \[m\]: they stand on a cubic grid, as close as the rule of novelty lets
-/// them with the field radius of a space's defaults, and see nearly the same.
+/// Distance of neighbouring places \[m\]: they stand on a cubic grid, as close as the rule of
+/// novelty lets them with the field radius of a space's defaults, and see nearly the same.
 const APART_M: f64 = 0.3;
 const CHANNEL: &str = "view";
 

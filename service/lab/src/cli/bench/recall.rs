@@ -47,8 +47,9 @@ pub(in crate::cli) struct RecallArgs {
     /// Seed of places and queries.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Write where the places and the queries of the last round are [m] into this directory, for other
-    /// programs to be asked the same: places-N.csv and queries-N.csv at each number N of places.
+    /// Write where the places and the queries of the last round are [m] into this directory, for
+    /// other programs to be asked the same: places-N.csv and queries-N.csv at each number N of
+    /// places.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object.

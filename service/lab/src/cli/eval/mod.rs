@@ -1,4 +1,5 @@
-//! `cogmap-lab eval`: the seed paper's experiments, ours beside the paper's, and what a grid code tells.
+//! `cogmap-lab eval`: the seed paper's experiments, ours beside the paper's, and what a grid code
+//! tells.
 
 mod code;
 mod object;
@@ -20,9 +21,11 @@ pub(in crate::cli) enum EvalCommand {
     Env2(room::RoomArgs),
     /// The third experiment: which of some objects of coloured voxels an end effector touches.
     Env3(object::ObjectArgs),
-    /// How well a grid code tells places apart: whole, beside the place, noisy, with modules erased.
+    /// How well a grid code tells places apart: whole, beside the place, noisy, with modules
+    /// erased.
     Code(code::CodeArgs),
-    /// Robots that wake up somewhere in a room that a team-mate has explored: are they found, how soon, and how far off?
+    /// Robots that wake up somewhere in a room that a team-mate has explored: are they found, how
+    /// soon, and how far off?
     Waking(waking::WakingArgs),
 }
 

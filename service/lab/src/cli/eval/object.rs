@@ -23,7 +23,8 @@ pub(in crate::cli) struct ObjectArgs {
     /// Standard deviation of a felt level, as a share of the range of levels.
     #[arg(long, default_value_t = ObjectProtocol::of_paper(3).noise.value, value_name = "SHARE")]
     value_noise: f64,
-    /// Standard deviation of a move's measured displacement along each axis, as a share of its length.
+    /// Standard deviation of a move's measured displacement along each axis, as a share of its
+    /// length.
     #[arg(long, default_value_t = ObjectProtocol::of_paper(3).noise.motion, value_name = "SHARE")]
     motion_noise: f64,
     /// Which turns the objects may have made since they were learned.

@@ -87,7 +87,8 @@ pub(in crate::cli) struct RoomArgs {
     /// Write figures, report, and the trajectories of the first run into this directory.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Write what the first run remembers as a graph, with the revisits that are believed, in the g2o format.
+    /// Write what the first run remembers as a graph, with the revisits that are believed, in the
+    /// g2o format.
     #[arg(long, value_name = "FILE")]
     export_g2o: Option<PathBuf>,
     /// Print one JSON object.
@@ -115,7 +116,8 @@ enum WalkKind {
 enum PerceptKind {
     /// Nothing.
     None,
-    /// Views of the room, which places remember and are recalled by. Where they resemble earlier ones they correct poses.
+    /// Views of the room, which places remember and are recalled by. Where they resemble earlier
+    /// ones they correct poses.
     Descriptor,
     /// The centres of obstacles, as landmarks, which correct poses (env2).
     Sightings,

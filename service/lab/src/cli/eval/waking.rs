@@ -17,8 +17,8 @@ pub(in crate::cli) struct WakingArgs {
     /// Of these, in one and the same building; each building is explored anew.
     #[arg(long, default_value_t = WakingProtocol::default().trials_per_building, value_name = "N")]
     trials_per_building: u32,
-    /// Rooms of a building, 1 to 8, which look alike up to three fifths of their height. In several, robots wake
-    /// up below 55 % of it.
+    /// Rooms of a building, 1 to 8, which look alike up to three fifths of their height. In
+    /// several, robots wake up below 55 % of it.
     #[arg(long, default_value_t = WakingProtocol::default().rooms, value_name = "N")]
     rooms: u32,
     /// Steps of 0.1 m that the explorer makes in each room.
@@ -36,11 +36,12 @@ pub(in crate::cli) struct WakingArgs {
     /// Share of views that show something else.
     #[arg(long, default_value_t = WakingProtocol::default().view_wrong, value_name = "SHARE")]
     view_wrong: f64,
-    /// Seed of the first building: of obstacles, walks, views and noise. The next building has the next.
+    /// Seed of the first building: of obstacles, walks, views and noise. The next building has the
+    /// next.
     #[arg(long, default_value_t = WakingProtocol::default().seed)]
     seed: u64,
-    /// Buildings at the same time; as many as the machine has processors when absent. It changes nothing but the time
-    /// that it takes.
+    /// Buildings at the same time; as many as the machine has processors when absent. It changes
+    /// nothing but the time that it takes.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
     /// Print one JSON object.

@@ -12,12 +12,13 @@ use super::recorded::{self, Case, RecordedArgs, Truth};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct G2oArgs {
-    /// The graph. Read are `VERTEX_SE2`, `VERTEX_XY`, `EDGE_SE2` and `EDGE_SE2_XY`, or in space `VERTEX_SE3:QUAT`,
-    /// `VERTEX_TRACKXYZ`, `EDGE_SE3:QUAT`, `EDGE_SE3_TRACKXYZ` and `PARAMS_SE3OFFSET`; and FIX.
+    /// The graph. Read are `VERTEX_SE2`, `VERTEX_XY`, `EDGE_SE2` and `EDGE_SE2_XY`, or in space
+    /// `VERTEX_SE3:QUAT`, `VERTEX_TRACKXYZ`, `EDGE_SE3:QUAT`, `EDGE_SE3_TRACKXYZ` and
+    /// `PARAMS_SE3OFFSET`; and FIX.
     file: PathBuf,
-    /// Where the poses are known to lie: id, x, y and, in space, z in columns. `NAME.opt_xyz.txt` beside
-    /// `NAME.g2o` when absent, if it is there. A reference that begins at the origin is in the frame of its first
-    /// pose, any other in that of the graph.
+    /// Where the poses are known to lie: id, x, y and, in space, z in columns. `NAME.opt_xyz.txt`
+    /// beside `NAME.g2o` when absent, if it is there. A reference that begins at the origin is in
+    /// the frame of its first pose, any other in that of the graph.
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     #[command(flatten)]

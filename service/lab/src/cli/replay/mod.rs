@@ -21,7 +21,8 @@ use clap::Subcommand;
 pub(in crate::cli) enum ReplayCommand {
     /// A set in the format of UTIAS MRCLAM: odometry as motion, measurements as sightings.
     Mrclam(mrclam::MrclamArgs),
-    /// A pose graph: edges from an id to the next as motion, all others as closures that are judged.
+    /// A pose graph: edges from an id to the next as motion, all others as closures that are
+    /// judged.
     G2o(g2o::G2oArgs),
     /// A set in the format of TUC: odometry, and place matches of which many are false.
     Tuc(tuc::TucArgs),

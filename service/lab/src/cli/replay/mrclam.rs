@@ -61,8 +61,8 @@ pub(in crate::cli) struct MrclamArgs {
     /// Tell only the first robot where it starts; the others have to find their place.
     #[arg(long)]
     unknown_starts: bool,
-    /// Robots that call landmarks by names of their own, by number; where they start is then told by geometry, and by what
-    /// robots see of one another.
+    /// Robots that call landmarks by names of their own, by number; where they start is then told
+    /// by geometry, and by what robots see of one another.
     #[arg(long, value_name = "N,N", value_delimiter = ',')]
     anonymous: Vec<u32>,
     /// Print one JSON object.

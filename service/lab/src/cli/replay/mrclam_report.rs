@@ -15,7 +15,8 @@ use super::team_batch::TeamBatch;
 use cogmap::cli::output;
 use cogmap::decode::stamped_pose;
 
-/// What a replay shows. Errors are means over the robots, of those that found their place in the map.
+/// What a replay shows. Errors are means over the robots, of those that found their place in the
+/// map.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     samples: u64,
@@ -41,7 +42,8 @@ pub(super) struct Report {
 }
 
 /// Errors of one robot: RMSE of position on a 10 Hz grid over the common span, in the frame of the
-/// truth, and after the best rigid motion in the plane. None for a robot that never found its place.
+/// truth, and after the best rigid motion in the plane. None for a robot that never found its
+/// place.
 #[derive(Debug, Serialize)]
 struct RobotReport {
     samples: u64,
@@ -61,8 +63,8 @@ struct RobotReport {
 /// How honest the covariances are: both are 1 where they are, and more where they are too small.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Consistency {
-    /// Normalised estimation error squared of the position in the plane, per component, once a second
-    /// (of a replay straight into the core).
+    /// Normalised estimation error squared of the position in the plane, per component, once a
+    /// second (of a replay straight into the core).
     nees_mean: Option<f64>,
     /// Normalised innovation squared of the accepted sightings, per component.
     nis_mean: Option<f64>,

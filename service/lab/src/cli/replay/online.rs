@@ -1,7 +1,7 @@
 //! A replay through a running service: in over Zenoh, out over HTTP.
 //!
-//! One sender keeps the whole team's order, which a robot's own client would not: the order in which
-//! robots meet the shared map is part of what the map becomes.
+//! One sender keeps the whole team's order, which a robot's own client would not: the order in
+//! which robots meet the shared map is part of what the map becomes.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -16,8 +16,8 @@ use zenoh::{Session, Wait};
 use super::outcome::{Outcome, RobotOutcome};
 use super::team_batch::TeamBatch;
 
-/// Bytes under way: so few of a robot wait at the service in the order in which they came, beside those
-/// of other robots. Of who sends more, the service takes some at a time.
+/// Bytes under way: so few of a robot wait at the service in the order in which they came, beside
+/// those of other robots. Of who sends more, the service takes some at a time.
 const BYTES_AHEAD_MAX: usize = 64 << 10;
 /// What a message counts beside its bytes.
 const MESSAGE_BYTES: usize = 64;

@@ -28,8 +28,8 @@ pub(super) struct RobotOutcome {
     /// Its past by all that was seen until the end; between two poses it moved evenly.
     pub(super) refined: Vec<StampedPose>,
     pub(super) evidence: Evidence,
-    /// Of a replay straight into the core: poses in the map with the covariance that they had, a second
-    /// apart.
+    /// Of a replay straight into the core: poses in the map with the covariance that they had, a
+    /// second apart.
     pub(super) beliefs: Vec<(StampedPose, PoseCovariance)>,
 }
 

@@ -35,11 +35,12 @@ pub(in crate::cli) struct PointsArgs {
     /// Explorations of each object.
     #[arg(long, default_value_t = 10)]
     trials: usize,
-    /// Objects that are left out at a time, until each was left out once, to see whether they are called
-    /// unknown; none when 0.
+    /// Objects that are left out at a time, until each was left out once, to see whether they are
+    /// called unknown; none when 0.
     #[arg(long, default_value_t = 0, value_name = "N")]
     leave_out: usize,
-    /// Numbers of contacts after which is looked, with commas between; the last ends an exploration.
+    /// Numbers of contacts after which is looked, with commas between; the last ends an
+    /// exploration.
     #[arg(long, value_delimiter = ',', value_name = "N", default_values_t = PointsSettings::default().looks)]
     looks: Vec<usize>,
     /// Seed of what is learned, contacts, poses and noise.

@@ -18,7 +18,8 @@ use cogmap::cli::output;
 /// What is written and printed.
 #[derive(Debug, Args)]
 pub(super) struct RecordedArgs {
-    /// Leave out the causal run: only the whole map is relaxed, and matches are judged by one another alone.
+    /// Leave out the causal run: only the whole map is relaxed, and matches are judged by one
+    /// another alone.
     #[arg(long)]
     no_causal: bool,
     /// Write `causal.tum` and `refined.tum` into this directory.
@@ -182,7 +183,8 @@ fn report(case: &Case<'_>, causal: Option<&Causal<'_>>, refined: &Refined, batch
     }
 }
 
-/// RMSE of position: over time on a grid of 10 Hz, or over the poses of which the position is known.
+/// RMSE of position: over time on a grid of 10 Hz, or over the poses of which the position is
+/// known.
 fn error_m(case: &Case<'_>, poses: &[Isometry3<f64>], alignment: Alignment) -> Option<f64> {
     let errors = match &case.truth {
         Truth::Unknown => return None,
@@ -204,7 +206,8 @@ fn pairs(case: &Case<'_>, poses: &[Isometry3<f64>]) -> (Vec<Vector3<f64>>, Vec<V
     match &case.truth {
         Truth::Unknown => (Vec::new(), Vec::new()),
         Truth::OfPoses(truth) => {
-            // A reference that begins at its origin is in the frame of its first pose, any other in that of the file.
+            // A reference that begins at its origin is in the frame of its first pose, any other in
+            // that of the file.
             let begins_at_origin = truth[0].is_some_and(|first| first.norm() < 1e-9);
             let frame = if begins_at_origin {
                 poses[0].inverse()
@@ -259,7 +262,8 @@ fn write(
     Ok(())
 }
 
-/// The paths in the frame of the truth, each moved to where it fits best, or as they are where there is none.
+/// The paths in the frame of the truth, each moved to where it fits best, or as they are where
+/// there is none.
 fn figure(
     case: &Case<'_>,
     causal: Option<&[Isometry3<f64>]>,

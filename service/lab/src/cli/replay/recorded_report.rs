@@ -49,7 +49,8 @@ pub(super) struct UpdateMs {
     max: f64,
 }
 
-/// Squared errors in standard deviations over their degrees of freedom; 1 is right, more is too sure.
+/// Squared errors in standard deviations over their degrees of freedom; 1 is right, more is too
+/// sure.
 #[derive(Debug, Serialize)]
 pub(super) struct ConsistencyReport {
     /// Of accepted closures, against what was expected before they came.

@@ -11,9 +11,11 @@ use super::tuc_samples;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct TucArgs {
-    /// Directory of the data set, with files `*_Input.txt` (odom2 and loop lines) and `*_GT.txt` (point2 and angle lines).
+    /// Directory of the data set, with files `*_Input.txt` (odom2 and loop lines) and `*_GT.txt`
+    /// (point2 and angle lines).
     directory: PathBuf,
-    /// Add false matches between random moments until they make up this share of all, from 0 to below 1.
+    /// Add false matches between random moments until they make up this share of all, from 0 to
+    /// below 1.
     #[arg(long, value_name = "SHARE", value_parser = share)]
     add_false: Option<f64>,
     /// Seed of the false matches.

@@ -10,9 +10,10 @@ use super::recorded::{self, Case, RecordedArgs, Truth};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct VictoriaArgs {
-    /// The file `victoria_park.txt` as it comes with GTSAM and iSAM (lines ODOMETRY and LANDMARK, with covariances), or the
-    /// directory that holds it. The original MATLAB files (`aa3_dr.mat`, `aa3_lsr2.mat`, `aa3_gpsx.mat`) are not read, so there
-    /// is no GPS to compare with and no time. A graph in g2o form goes to `cogmap-lab replay g2o`.
+    /// The file `victoria_park.txt` as it comes with GTSAM and iSAM (lines ODOMETRY and LANDMARK,
+    /// with covariances), or the directory that holds it. The original MATLAB files (`aa3_dr.mat`,
+    /// `aa3_lsr2.mat`, `aa3_gpsx.mat`) are not read, so there is no GPS to compare with and no
+    /// time. A graph in g2o form goes to `cogmap-lab replay g2o`.
     path: PathBuf,
     #[command(flatten)]
     recorded: RecordedArgs,

@@ -15,8 +15,8 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// All of them, in the order of the report. With fewer than three modules those that would leave
-    /// none are left out.
+    /// All of them, in the order of the report. With fewer than three modules those that would
+    /// leave none are left out.
     pub const ALL: [Self; 8] = [
         Self::new("whole", false, false, 0),
         Self::new("jittered", true, false, 0),

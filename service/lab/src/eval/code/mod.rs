@@ -1,10 +1,11 @@
 //! What a grid code can tell: measured on a map full of places, beside what theory says.
 //!
-//! A [`CodeProtocol`] names a code (number of modules, finest spacing, ratio), a number of places and
-//! how codes are damaged. A [`CodeReport`] has how often the right place wins by a whole code, by one
-//! of a position beside the place, by a noisy one, without any one or two of its modules, and by codes
-//! damaged twice; and the [`CodeTheory`] of the code. A [`CodeComparison`] sets several codes side by
-//! side, with their errors in the two rooms. The model is described in `docs/recall.md`.
+//! A [`CodeProtocol`] names a code (number of modules, finest spacing, ratio), a number of places
+//! and how codes are damaged. A [`CodeReport`] has how often the right place wins by a whole code,
+//! by one of a position beside the place, by a noisy one, without any one or two of its modules,
+//! and by codes damaged twice; and the [`CodeTheory`] of the code. A [`CodeComparison`] sets
+//! several codes side by side, with their errors in the two rooms. The model is described in
+//! `docs/recall.md`.
 //!
 //! ```
 //! use std::num::NonZeroUsize;

@@ -84,8 +84,8 @@ struct Count {
 
 impl CodeReport {
     /// Builds the map and recalls its places, on so many threads; the outcome does not depend on
-    /// their number. `recalled` is called from any of them with the number of cues since it was last
-    /// called there.
+    /// their number. `recalled` is called from any of them with the number of cues since it was
+    /// last called there.
     ///
     /// # Errors
     /// The protocol makes no sense.

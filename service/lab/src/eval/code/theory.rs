@@ -6,7 +6,8 @@ use cognitive_map::Settings;
 use grid::{GridModules, Lattice, unique_range_m};
 use serde::Serialize;
 
-/// Precision and range of a code with independent Gaussian noise of s turns on each phase component.
+/// Precision and range of a code with independent Gaussian noise of s turns on each phase
+/// component.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CodeTheory {
     /// Spacings of the modules, finest first \[m\].
@@ -48,8 +49,9 @@ impl CodeTheory {
 
 /// The share of far places whose random phases lie closer to a noisy code than the right place's.
 ///
-/// With K known modules a right place has Q = Σ δₘ² ≈ s² χ²₃ₖ; a wrong one has less with a probability
-/// of 2^(K/2) V₃ₖ Q^(3K/2), since the torus of a module has a volume of 1/√2. Averaged over Q:
+/// With K known modules a right place has Q = Σ δₘ² ≈ s² χ²₃ₖ; a wrong one has less with a
+/// probability of 2^(K/2) V₃ₖ Q^(3K/2), since the torus of a module has a volume of 1/√2. Averaged
+/// over Q:
 ///
 /// ```text
 /// 2^(K/2) V₃ₖ s^3K 2^(3K/2) Γ(3K)/Γ(3K/2)          V₃ₖ = π^(3K/2) / Γ(3K/2 + 1)

@@ -21,7 +21,8 @@ struct Chart {
     curve: fn(&ObjectReport) -> &[f64],
 }
 
-/// Fig. 21a, the number of active object representations, and 21b, the confidence, with a line for each experiment; at most four are drawn.
+/// Fig. 21a, the number of active object representations, and 21b, the confidence, with a line for
+/// each experiment; at most four are drawn.
 ///
 /// # Errors
 /// A figure could not be drawn.

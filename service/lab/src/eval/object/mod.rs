@@ -1,7 +1,9 @@
-//! The seed paper's third experiment: which of some objects is this, and how many touches does it take to tell?
+//! The seed paper's third experiment: which of some objects is this, and how many touches does it
+//! take to tell?
 //!
-//! An [`ObjectExperiment`] learns objects of coloured voxels by exploring them ([`crate::objects`]), and then recognises them by exploring them
-//! again from unknown starts. An [`ObjectReport`] has what came out, an [`ObjectTable`] shows it beside the paper's Table 2, and
+//! An [`ObjectExperiment`] learns objects of coloured voxels by exploring them
+//! ([`crate::objects`]), and then recognises them by exploring them again from unknown starts. An
+//! [`ObjectReport`] has what came out, an [`ObjectTable`] shows it beside the paper's Table 2, and
 //! [`object_figures`] draws Fig. 21.
 //!
 //! # What the paper leaves open, and what is done here

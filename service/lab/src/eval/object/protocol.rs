@@ -8,7 +8,8 @@ use crate::objects::ExplorationNoise;
 /// Most objects: what a gigabyte holds.
 const OBJECTS_MAX: u32 = 10_000;
 
-/// The third experiment: objects are learned by exploring them, and recognised by exploring them again.
+/// The third experiment: objects are learned by exploring them, and recognised by exploring them
+/// again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectProtocol {
     /// Number of objects.
@@ -19,7 +20,8 @@ pub struct ObjectProtocol {
     pub rotate: Rotate,
     /// Whether contacts tell the surface's normal.
     pub normals: Normals,
-    /// Explorations of learned objects, which take turns. A quarter as many are of objects that were never learned.
+    /// Explorations of learned objects, which take turns. A quarter as many are of objects that
+    /// were never learned.
     pub trials: u32,
     /// Most touches of an exploration.
     pub touches_max: usize,
@@ -58,7 +60,8 @@ pub enum InvalidObjectProtocol {
 }
 
 impl ObjectProtocol {
-    /// As the paper has it, with 10 % of value noise: one thousand explorations, the objects as they were learned.
+    /// As the paper has it, with 10 % of value noise: one thousand explorations, the objects as
+    /// they were learned.
     pub fn of_paper(objects: u32) -> Self {
         Self {
             objects,
@@ -95,7 +98,8 @@ impl ObjectProtocol {
         Ok(())
     }
 
-    /// Accuracy \[%\], mean steps to convergence and their deviation, as the paper states them for so many objects (Table 2).
+    /// Accuracy \[%\], mean steps to convergence and their deviation, as the paper states them for
+    /// so many objects (Table 2).
     pub fn paper(objects: u32) -> Option<(f64, f64, f64)> {
         match objects {
             2 => Some((98.2, 180.0, 25.0)),

@@ -43,10 +43,11 @@ pub struct ObjectReport {
     pub false_known_rate: Option<f64>,
     /// Share of objects never learned that were called unknown; the rest had no answer.
     pub unknown_caught_rate: Option<f64>,
-    /// Mean number of hypotheses, each an object and a pose, that hold 99 % of the evidence, after each touch. An exploration that is over
-    /// counts with its last number, here and below.
+    /// Mean number of hypotheses, each an object and a pose, that hold 99 % of the evidence, after
+    /// each touch. An exploration that is over counts with its last number, here and below.
     pub live_hypotheses: Vec<f64>,
-    /// Mean number of objects with a probability above one in a hundred, after each touch (Fig. 21a).
+    /// Mean number of objects with a probability above one in a hundred, after each touch (Fig.
+    /// 21a).
     pub live_objects: Vec<f64>,
     /// Mean probability of the first choice, after each touch (Fig. 21b).
     pub confidence: Vec<f64>,

@@ -6,7 +6,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// Which turns an object may have made since it was learned. The recogniser is told which are possible, and not which one it is.
+/// Which turns an object may have made since it was learned. The recogniser is told which are
+/// possible, and not which one it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rotate {
     /// None: only the translation is unknown.

@@ -12,7 +12,8 @@ use super::protocol::{InvalidObjectProtocol, Normals, ObjectProtocol};
 use super::trace::{Ending, GoesOn, Trace};
 use crate::objects::{EDGE_M, ExplorationNoise, Explorer, Felt, VoxelObject};
 
-/// Standard deviation of where a contact is felt, per axis \[m\]: it is at the middle of a face, and the recogniser is not told so.
+/// Standard deviation of where a contact is felt, per axis \[m\]: it is at the middle of a face,
+/// and the recogniser is not told so.
 const CONTACT_SD_M: f64 = 0.05 * EDGE_M;
 /// Standard deviation of a normal's direction \[rad\].
 const NORMAL_SD_RAD: f64 = 0.02;
@@ -20,10 +21,11 @@ const NORMAL_SD_RAD: f64 = 0.02;
 const LEVEL_SD_MIN: f64 = 1e-3;
 /// The channel of levels.
 const CHANNEL: u16 = 0;
-/// Touches of a visit. Each begins at the same face, as a hand begins at the handle, so that the drift of one visit is all there is.
+/// Touches of a visit. Each begins at the same face, as a hand begins at the handle, so that the
+/// drift of one visit is all there is.
 const VISIT_TOUCHES: usize = 100;
-/// Learning is over when so many visits one after the other found no place that was new: one that is missing looks like
-/// another object when it is touched.
+/// Learning is over when so many visits one after the other found no place that was new: one that
+/// is missing looks like another object when it is touched.
 const NOTHING_NEW_VISITS: usize = 3;
 /// One exploration of an object that was never learned comes on so many of learned ones.
 const LEARNED_PER_STRANGER: u32 = 4;
@@ -46,8 +48,9 @@ pub struct ObjectExperiment {
 }
 
 impl ObjectExperiment {
-    /// Learns and recognises, on so many threads; only times depend on their number. `explored` is called after each exploration with the number
-    /// of them, and `clock` tells seconds from any moment on.
+    /// Learns and recognises, on so many threads; only times depend on their number. `explored` is
+    /// called after each exploration with the number of them, and `clock` tells seconds from any
+    /// moment on.
     ///
     /// # Errors
     /// The protocol makes no sense.

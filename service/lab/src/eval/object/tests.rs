@@ -119,7 +119,8 @@ fn a_protocol_without_sense_is_refused_by_name() {
     }
 }
 
-/// A trace whose first choice was worth so much after each touch, with an answer after the last one.
+/// A trace whose first choice was worth so much after each touch, with an answer after the last
+/// one.
 fn trace(right: &[f64], answer: Option<Answer>) -> Trace {
     let step = |right: &f64| TouchStep {
         right: *right,

@@ -26,7 +26,8 @@ pub struct Decision {
 /// What the recogniser said after a touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchStep {
-    /// What its first choice among the objects is worth: 1 if right, a share of it if tied with others.
+    /// What its first choice among the objects is worth: 1 if right, a share of it if tied with
+    /// others.
     pub right: f64,
     /// Probability of the first choice.
     pub confidence: f64,
@@ -68,7 +69,8 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Lets a recogniser take in contacts. `truth` is the object, unless it was never learned; `clock` tells seconds from any moment on.
+    /// Lets a recogniser take in contacts. `truth` is the object, unless it was never learned;
+    /// `clock` tells seconds from any moment on.
     pub fn follow(
         library: &ObjectLibrary,
         orientation: &Orientation,

@@ -32,12 +32,12 @@ const BALLS: [f64; 3] = [1.0, 2.0, 3.5];
 /// their sketches first. Its cost is as follows, where n is the number of places.
 ///
 /// - By `position`: free of n when the places asked for lie within seven field radii, else O(n).
-/// - By `code`: free of n when the least alike place of the answer is still much like the cue, so that
-///   few positions of the world could be meant: the terms of the known modules may together lack 0.9,
-///   which with six known modules is a cosine of 0.85. Else O(n): for a `limit` of many places, a code
-///   of nowhere, or very few modules.
-/// - By a percept: O(n), for a descriptor in the time of one pass over the descriptors of its channel, or
-///   of one over their sketches where there are more than 10⁵.
+/// - By `code`: free of n when the least alike place of the answer is still much like the cue, so
+///   that few positions of the world could be meant: the terms of the known modules may together
+///   lack 0.9, which with six known modules is a cosine of 0.85. Else O(n): for a `limit` of many
+///   places, a code of nowhere, or very few modules.
+/// - By a percept: O(n), for a descriptor in the time of one pass over the descriptors of its
+///   channel, or of one over their sketches where there are more than 10⁵.
 /// - By several, or by none: O(n).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecallCue {
