@@ -165,11 +165,12 @@ impl Recognition {
         }
     }
 
-    /// The most likely pose in one object, and the further ones.
+    /// The most likely pose in one object, and the further ones; none where no hypothesis of the
+    /// object has any mass left.
     pub(super) fn pose(&self, library: &ObjectLibrary, object: ObjectId) -> Option<PoseEstimate> {
         let masses = self.masses(library, object, OTHER_POSES_MAX + 1);
         let all = self.mass_log(library, object);
-        let (best, others) = masses.split_first()?;
+        let (best, others) = masses.split_first().filter(|_| all.is_finite())?;
         let share = |log: f64| (log - all).exp();
         let others = { others.iter() }
             .map(|mass| (mass.map_from_episode, share(mass.log)))
