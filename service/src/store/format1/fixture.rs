@@ -94,6 +94,23 @@ fn a_migration_cut_short_is_begun_again_or_finished() {
     assert_migrated(path);
 }
 
+/// Puts the old store's own files back as they were, where the migration has not been decided. The
+/// engine of format 1 writes to them in threads of its own, so a copy of the running store may hold
+/// half of what it writes, which is no state that a power cut leaves.
+fn restore_old_files(directory: &Path) {
+    if !is_store(directory) || is_local_store(directory).unwrap() {
+        return;
+    }
+    let old = fixture();
+    fs::remove_dir_all(directory.join(KEYSPACES)).unwrap();
+    for name in files::names(directory).unwrap() {
+        if name.ends_with(JOURNAL_ENDING) {
+            fs::remove_file(directory.join(name)).unwrap();
+        }
+    }
+    copy_for_tests(old.path(), directory);
+}
+
 #[test]
 fn whenever_the_power_is_cut_a_migration_is_begun_again_or_finished() {
     let directory = fixture();
@@ -103,6 +120,7 @@ fn whenever_the_power_is_cut_a_migration_is_begun_again_or_finished() {
     let images = model.take_images();
     assert!(images.len() > 10, "{}", images.len());
     for image in images {
+        restore_old_files(image.directory.path());
         let migrated = migrate(image.directory.path(), samples_in);
         assert!(migrated.is_ok(), "{:?}: {migrated:?}", image.cut);
         assert_migrated(image.directory.path());

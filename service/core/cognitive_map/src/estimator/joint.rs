@@ -176,7 +176,7 @@ impl Estimator {
         if let Some(detached) = &slot.detached {
             return Some(&detached.state);
         }
-        let frame = self.frame(slot.frame);
+        let frame = self.frames.get(slot.frame)?;
         Some(&frame.members[frame.member(agent)?].state)
     }
 

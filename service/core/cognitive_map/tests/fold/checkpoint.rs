@@ -215,7 +215,7 @@ fn only_what_changed_is_saved_again() {
         .map(|page| (page.kind, page.index))
         .collect();
     let expected = [(0, 0), (1, 0), (9, 0), (10, 0), (32, 0)];
-    let named = "header, agent's page, estimate, chronicle, head of the objects";
+    let named = "header, agent's page, estimate, keyframes, head of the objects";
     assert_eq!(kinds, expected, "{named}");
 }
 

@@ -16,11 +16,11 @@ const BIAS_RAD_S: f64 = 0.01;
 /// A walk whose errors are known from one sample on; answers the largest distances between refined
 /// poses and truth, before that sample and after.
 fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
-    let mut chronicle = KeyframeMap::new(KeyframeSettings {
+    let mut keyframes = KeyframeMap::new(KeyframeSettings {
         keyframes_max,
         ..KeyframeSettings::default()
     });
-    let agent = chronicle.graph.enrol();
+    let agent = keyframes.graph.enrol();
     let (mut truth, mut told) = (Isometry3::identity(), Isometry3::identity());
     let start = StartPose::new([0.0; 3], [0.0, 0.0, 0.0, 1.0], PoseNoise::none()).unwrap();
     let first = Moment {
@@ -29,7 +29,7 @@ fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
         stamp_ns: 0,
         pose: truth,
     };
-    chronicle.start_pose(&first, &start);
+    keyframes.start_pose(&first, &start);
     let mut path = vec![truth];
     for seq in 1..=600 {
         let phase = seq as f64 / 40.0;
@@ -70,12 +70,12 @@ fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
             pose: told,
         };
         let variance = Vector6::new(1e-6, 1e-6, 0.0, 0.0, 0.0, 1e-6);
-        chronicle
+        keyframes
             .graph
             .motion(&moment, &increment, &variance, &calibrated);
     }
     let mut largest = [0.0_f64; 2];
-    for row in &chronicle.graph.refine().agents[0].poses {
+    for row in &keyframes.graph.refine().agents[0].poses {
         let seq = (row.stamp_ns.cast_unsigned() * RATE_HZ + 500_000_000) / 1_000_000_000;
         let off = (row.pose.translation.vector - path[seq as usize].translation.vector).norm();
         let side = &mut largest[usize::from(seq >= known_from)];

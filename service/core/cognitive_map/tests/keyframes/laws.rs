@@ -1,4 +1,4 @@
-//! Laws of the chronicle.
+//! Laws of the keyframes.
 
 use cognitive_map::estimator::Calibrated;
 use cognitive_map::keyframes::{KeyframeMap, KeyframeSettings, Moment, Refined};
@@ -31,7 +31,7 @@ const SEEN_SD_M: f64 = 0.05;
 
 /// Robots that walk on circles among landmarks, what they tell, and the truth.
 struct Walk {
-    chronicle: KeyframeMap,
+    keyframes: KeyframeMap,
     noise: Noise,
     /// Of each robot: its true pose, and by motion alone.
     truth: Vec<Isometry3<f64>>,
@@ -44,19 +44,19 @@ struct Walk {
 
 impl Walk {
     fn new(robots: usize, settings: KeyframeSettings, frame: &Isometry3<f64>) -> Self {
-        let mut chronicle = KeyframeMap::new(settings);
+        let mut keyframes = KeyframeMap::new(settings);
         let start: Vec<_> = (0..robots)
             .map(|k| frame * Isometry3::translation(0.0, 2.0 * k as f64, 0.0))
             .collect();
         for pose in &start {
-            let agent = chronicle.graph.enrol();
+            let agent = keyframes.graph.enrol();
             let told = StartPose::new(
                 pose.translation.vector.into(),
                 pose.rotation.coords.into(),
                 PoseNoise::none(),
             );
             let moment = moment(agent, 0, pose);
-            chronicle.start_pose(&moment, &told.unwrap());
+            keyframes.start_pose(&moment, &told.unwrap());
         }
         let landmarks = (0..12)
             .map(|k| {
@@ -65,7 +65,7 @@ impl Walk {
             })
             .collect();
         Self {
-            chronicle,
+            keyframes,
             noise: Noise(5),
             truth: start.clone(),
             told: start.clone(),
@@ -92,7 +92,7 @@ impl Walk {
             let (t, r) = STEP_SD;
             let variance = Vector6::new(t * t, t * t, 0.0, 0.0, 0.0, r * r) / 3.0;
             let moment = self.moment(robot);
-            self.chronicle
+            self.keyframes
                 .graph
                 .motion(&moment, &read, &variance, &Calibrated::default());
             self.paths[robot].push(self.truth[robot]);
@@ -113,7 +113,7 @@ impl Walk {
                 let label = Label::new(&format!("landmark {k}")).unwrap();
                 let variance = Vector3::repeat(SEEN_SD_M * SEEN_SD_M / 3.0);
                 let moment = self.moment(robot);
-                self.chronicle
+                self.keyframes
                     .graph
                     .landmark(&moment, &label, &relation, &variance);
             }
@@ -125,7 +125,7 @@ impl Walk {
                 let variance = Vector3::repeat(SEEN_SD_M * SEEN_SD_M / 3.0);
                 let stamp_ns = self.moment(robot).stamp_ns;
                 let [robot, other] = [robot, other].map(|k| u32::try_from(k).unwrap());
-                self.chronicle
+                self.keyframes
                     .graph
                     .sighted(robot, other, stamp_ns, &relation, &variance);
             }
@@ -189,7 +189,7 @@ fn tight() -> KeyframeSettings {
 #[test]
 fn the_refined_past_is_closer_to_the_truth_than_motion_alone() {
     let walk = walked(3, 400, roomy());
-    let refined = walk.chronicle.graph.refine();
+    let refined = walk.keyframes.graph.refine();
     assert!(refined.relaxed.has_converged);
     let motion_m: f64 = (0..3)
         .map(|robot| {
@@ -267,7 +267,7 @@ fn refined_equals_the_batch_of_all_samples() {
         }
     }
     map.relax(&RelaxationSettings::default());
-    let refined = walk.chronicle.graph.refine();
+    let refined = walk.keyframes.graph.refine();
     for row in &refined.agents[0].poses {
         let node = nodes[usize::try_from(row.stamp_ns / 1_000_000_000).unwrap()];
         let off = map.pose(node).inv_mul(&row.pose);
@@ -285,8 +285,8 @@ fn moving_the_starts_moves_everything() {
         there.step();
     }
     let (here, there) = (
-        here.chronicle.graph.refine(),
-        there.chronicle.graph.refine(),
+        here.keyframes.graph.refine(),
+        there.keyframes.graph.refine(),
     );
     for (a, b) in here.agents.iter().zip(&there.agents) {
         assert_eq!(a.poses.len(), b.poses.len());
@@ -301,9 +301,9 @@ fn moving_the_starts_moves_everything() {
 fn thinning_keeps_the_loops() {
     let whole = walked(2, 1500, roomy());
     let thinned = walked(2, 1500, tight());
-    assert!(whole.chronicle.graph.n_keyframes() > 2500);
-    assert!(thinned.chronicle.graph.n_keyframes() <= 150);
-    let rows_at_anchors = |walk: &Walk| walk.error_m(&walk.chronicle.graph.refine());
+    assert!(whole.keyframes.graph.n_keyframes() > 2500);
+    assert!(thinned.keyframes.graph.n_keyframes() <= 150);
+    let rows_at_anchors = |walk: &Walk| walk.error_m(&walk.keyframes.graph.refine());
     let (whole_m, thinned_m) = (rows_at_anchors(&whole), rows_at_anchors(&thinned));
     let motion = whole.told[0].translation.vector - whole.truth[0].translation.vector;
     assert!(motion.norm() > 0.5, "{}", motion.norm());
@@ -320,9 +320,9 @@ fn what_is_seen_is_taken_in_though_there_is_room_for_anchors_only() {
         ..roomy()
     };
     let bounded = walked(1, 1500, bounded);
-    assert!(whole.chronicle.graph.n_sightings() > 1000);
-    assert!(bounded.chronicle.graph.n_sightings() <= 500);
-    let error_m = |walk: &Walk| walk.error_m(&walk.chronicle.graph.refine());
+    assert!(whole.keyframes.graph.n_sightings() > 1000);
+    assert!(bounded.keyframes.graph.n_sightings() <= 500);
+    let error_m = |walk: &Walk| walk.error_m(&walk.keyframes.graph.refine());
     // Without room for what is seen anew it was 0.17 m.
     let (whole_m, bounded_m) = (error_m(&whole), error_m(&bounded));
     assert!(bounded_m < 0.12, "{bounded_m} {whole_m}");
@@ -331,40 +331,40 @@ fn what_is_seen_is_taken_in_though_there_is_room_for_anchors_only() {
 #[test]
 fn memory_stays_flat() {
     let mut walk = walked(2, 2000, tight());
-    let bytes = walk.chronicle.bytes();
+    let bytes = walk.keyframes.bytes();
     for _ in 0..3000 {
         walk.step();
     }
-    assert!(walk.chronicle.bytes() <= bytes + bytes / 4);
-    assert!(walk.chronicle.graph.n_keyframes() <= 150);
+    assert!(walk.keyframes.bytes() <= bytes + bytes / 4);
+    assert!(walk.keyframes.graph.n_keyframes() <= 150);
 }
 
 #[test]
 fn a_checkpoint_goes_on_identically() {
     for settings in [roomy(), tight()] {
         let mut walk = walked(3, 200, settings);
-        let mut pages: Vec<_> = walk.chronicle.checkpoint(0).collect();
-        let snapshot = walk.chronicle.clone();
-        walk.chronicle.set_revision(7);
+        let mut pages: Vec<_> = walk.keyframes.checkpoint(0).collect();
+        let snapshot = walk.keyframes.clone();
+        walk.keyframes.set_revision(7);
         for _ in 0..50 {
             walk.step();
         }
-        pages.extend(walk.chronicle.checkpoint(6));
+        pages.extend(walk.keyframes.checkpoint(6));
         let mut restored = KeyframeMap::restore(settings, 7, pages.clone()).unwrap();
-        assert_eq!(restored.digest(), walk.chronicle.digest());
+        assert_eq!(restored.digest(), walk.keyframes.digest());
         assert_ne!(restored.digest(), snapshot.digest());
-        assert_eq!(restored.graph.refine(), walk.chronicle.graph.refine());
+        assert_eq!(restored.graph.refine(), walk.keyframes.graph.refine());
         for _ in 0..50 {
             walk.step();
         }
         // The same walk once more, which the restored one takes over after the same steps.
         let mut again = walked(3, 250, settings);
-        std::mem::swap(&mut again.chronicle, &mut restored);
+        std::mem::swap(&mut again.keyframes, &mut restored);
         for _ in 0..50 {
             again.step();
         }
-        assert_eq!(again.chronicle.digest(), walk.chronicle.digest());
-        let complete: Vec<_> = again.chronicle.checkpoint(0).collect();
+        assert_eq!(again.keyframes.digest(), walk.keyframes.digest());
+        let complete: Vec<_> = again.keyframes.checkpoint(0).collect();
         for missing in 0..complete.len() {
             let mut pages = complete.clone();
             pages.remove(missing);
@@ -376,33 +376,33 @@ fn a_checkpoint_goes_on_identically() {
 #[test]
 fn an_agent_that_finds_its_place_takes_its_past_along() {
     let tie = Isometry3::new(Vector3::new(3.0, -2.0, 0.0), Vector3::z() * 1.2);
-    let mut chronicle = KeyframeMap::new(roomy());
-    let agent = chronicle.graph.enrol();
+    let mut keyframes = KeyframeMap::new(roomy());
+    let agent = keyframes.graph.enrol();
     let step = Isometry3::new(Vector3::x() * 0.3, Vector3::z() * 0.1);
     let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-4);
     let mut pose = Isometry3::identity();
     for seq in 1..=10 {
         pose *= step;
-        chronicle.graph.motion(
+        keyframes.graph.motion(
             &moment(agent, seq, &pose),
             &step,
             &variance,
             &Calibrated::default(),
         );
     }
-    assert!(!chronicle.graph.refine().agents[0].is_in_map);
+    assert!(!keyframes.graph.refine().agents[0].is_in_map);
     pose = tie * pose;
-    chronicle.graph.placed(agent, &tie);
+    keyframes.graph.placed(agent, &tie);
     for seq in 11..=20 {
         pose *= step;
-        chronicle.graph.motion(
+        keyframes.graph.motion(
             &moment(agent, seq, &pose),
             &step,
             &variance,
             &Calibrated::default(),
         );
     }
-    let refined = &chronicle.graph.refine().agents[0];
+    let refined = &keyframes.graph.refine().agents[0];
     assert!(refined.is_in_map && refined.poses.len() == 20);
     let mut expected = tie;
     for row in &refined.poses {
@@ -417,22 +417,22 @@ fn an_agent_that_finds_its_place_takes_its_past_along() {
 fn a_new_session_may_begin_elsewhere() {
     let mut walk = walked(1, 120, roomy());
     let carried = Isometry3::new(Vector3::new(0.8, -0.5, 0.0), Vector3::z() * 0.3);
-    walk.chronicle
+    walk.keyframes
         .graph
         .restart(0, &Vector6::new(1.0, 1.0, 0.0, 0.0, 0.0, 0.5));
     walk.truth[0] *= carried;
     for _ in 0..120 {
         walk.step();
     }
-    let refined = walk.chronicle.graph.refine();
+    let refined = walk.keyframes.graph.refine();
     assert!(walk.error_m(&refined) < 0.05, "{}", walk.error_m(&refined));
 }
 
 #[test]
 fn rest_is_remembered_as_rest() {
-    let mut chronicle = KeyframeMap::new(roomy());
-    let agent = chronicle.graph.enrol();
-    chronicle.graph.found(agent);
+    let mut keyframes = KeyframeMap::new(roomy());
+    let agent = keyframes.graph.enrol();
+    keyframes.graph.found(agent);
     let step = Isometry3::translation(0.05, 0.0, 0.0);
     let variance = Vector6::new(1e-6, 1e-6, 0.0, 0.0, 0.0, 1e-6);
     let mut pose = Isometry3::identity();
@@ -442,7 +442,7 @@ fn rest_is_remembered_as_rest() {
         let moves = seq <= 30 || (201..=202).contains(&seq) || seq > 300;
         let increment = if moves { step } else { Isometry3::identity() };
         pose *= increment;
-        chronicle.graph.motion(
+        keyframes.graph.motion(
             &moment(agent, seq, &pose),
             &increment,
             &if moves { variance } else { Vector6::zeros() },
@@ -450,7 +450,7 @@ fn rest_is_remembered_as_rest() {
         );
         truth.push(pose);
     }
-    let rows = &chronicle.graph.refine().agents[0].poses;
+    let rows = &keyframes.graph.refine().agents[0].poses;
     assert!(
         rows.windows(2)
             .all(|pair| pair[0].stamp_ns < pair[1].stamp_ns)

@@ -1,4 +1,4 @@
-//! The chronicle through its public door.
+//! The keyframes through its public door.
 
 #![expect(
     clippy::unwrap_used,
@@ -6,6 +6,6 @@
 )]
 
 mod calibration; // what odometry gets wrong all the time
-mod laws; // what holds of every chronicle
+mod laws; // what holds of every keyframes
 mod matches;
 mod revisits; // places taken for one another

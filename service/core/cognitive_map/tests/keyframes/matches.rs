@@ -11,7 +11,7 @@ const STEP_M: f64 = 0.3;
 
 /// A robot on a circle whose gyroscope drifts, so that the round does not close.
 struct Rounds {
-    chronicle: KeyframeMap,
+    keyframes: KeyframeMap,
     told: Isometry3<f64>,
     truth: Vec<Isometry3<f64>>,
     corrections: Vec<Correction>,
@@ -19,17 +19,17 @@ struct Rounds {
 
 impl Rounds {
     fn new(frame: &Isometry3<f64>) -> Self {
-        let mut chronicle = KeyframeMap::new(KeyframeSettings::default());
-        let agent = chronicle.graph.enrol();
+        let mut keyframes = KeyframeMap::new(KeyframeSettings::default());
+        let agent = keyframes.graph.enrol();
         let start = cognitive_map::StartPose::new(
             frame.translation.vector.into(),
             frame.rotation.coords.into(),
             PoseNoise::none(),
         );
-        chronicle.start_pose(&moment(0, frame), &start.unwrap());
+        keyframes.start_pose(&moment(0, frame), &start.unwrap());
         assert_eq!(agent, 0);
         Self {
-            chronicle,
+            keyframes,
             told: *frame,
             truth: vec![*frame],
             corrections: Vec::new(),
@@ -45,14 +45,14 @@ impl Rounds {
             .push(self.truth[self.truth.len() - 1] * true_step);
         self.told *= read;
         let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-4);
-        self.chronicle.graph.motion(
+        self.keyframes.graph.motion(
             &moment(seq, &self.told),
             &read,
             &variance,
             &Calibrated::default(),
         );
-        if self.chronicle.graph.is_due() {
-            self.corrections = self.chronicle.graph.relax();
+        if self.keyframes.graph.is_due() {
+            self.corrections = self.keyframes.graph.relax();
             if let Some(correction) = self.corrections.first() {
                 self.told = correction.pose;
             }
@@ -78,7 +78,7 @@ impl Rounds {
         let told = self.told;
         let relation = Relation::Pose(relation.unwrap());
         assert!(
-            self.chronicle
+            self.keyframes
                 .graph
                 .closure(&moment(seq, &told), earlier, &relation)
         );
@@ -127,7 +127,7 @@ fn true_matches_close_the_loop_whichever_way_the_gyroscope_drifts() {
                 walk.matched(seq - ROUND, &Isometry3::identity());
             }
         });
-        assert!(closed.chronicle.graph.n_matches_believed() > 20);
+        assert!(closed.keyframes.graph.n_matches_believed() > 20);
         assert!(closed.off_m() < 0.35 * alone.off_m(), "{}", closed.off_m());
         let covariance = closed.corrections[0].covariance.unwrap();
         assert!(covariance.position_sd_m() < 0.5);
@@ -141,7 +141,7 @@ fn a_single_match_that_the_map_cannot_judge_waits() {
             walk.matched(2 * ROUND, &Isometry3::identity());
         }
     });
-    assert_eq!(walk.chronicle.graph.n_matches_believed(), 0);
+    assert_eq!(walk.keyframes.graph.n_matches_believed(), 0);
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn corrections_move_with_the_start() {
 }
 
 #[test]
-fn a_restored_chronicle_relaxes_to_the_same_bits() {
+fn restored_keyframes_relaxes_to_the_same_bits() {
     let mut at = |walk: &mut Rounds, seq: u64| {
         if seq > ROUND && seq.is_multiple_of(5) {
             walk.matched(seq - ROUND, &Isometry3::identity());
@@ -192,15 +192,15 @@ fn a_restored_chronicle_relaxes_to_the_same_bits() {
     let live = rounds_in(&Isometry3::identity(), 0.004, &mut at);
     let recovered = rounds_in(&Isometry3::identity(), 0.004, &mut |walk, seq| {
         if seq.is_multiple_of(50) {
-            let pages: Vec<_> = walk.chronicle.checkpoint(0).collect();
-            walk.chronicle = KeyframeMap::restore(KeyframeSettings::default(), 1, pages).unwrap();
+            let pages: Vec<_> = walk.keyframes.checkpoint(0).collect();
+            walk.keyframes = KeyframeMap::restore(KeyframeSettings::default(), 1, pages).unwrap();
         }
         at(walk, seq);
     });
-    assert_eq!(live.chronicle.digest(), recovered.chronicle.digest());
+    assert_eq!(live.keyframes.digest(), recovered.keyframes.digest());
     assert_eq!(live.told, recovered.told);
     assert_eq!(
-        live.chronicle.graph.refine(),
-        recovered.chronicle.graph.refine()
+        live.keyframes.graph.refine(),
+        recovered.keyframes.graph.refine()
     );
 }

@@ -15,7 +15,7 @@ const NUMBERS: usize = 64;
 
 /// A robot that goes round and round, with a gyroscope that drifts.
 struct Round {
-    chronicle: KeyframeMap,
+    keyframes: KeyframeMap,
     scenery: Vec<(Vector3<f64>, f64)>,
     odom: Isometry3<f64>,
     told: Isometry3<f64>,
@@ -31,11 +31,11 @@ impl Round {
             (wave, random.uniform() * std::f64::consts::TAU)
         });
         let scenery = scenery.collect();
-        let mut chronicle = KeyframeMap::new(KeyframeSettings::default());
-        let agent = chronicle.graph.enrol();
-        chronicle.graph.found(agent);
+        let mut keyframes = KeyframeMap::new(KeyframeSettings::default());
+        let agent = keyframes.graph.enrol();
+        keyframes.graph.found(agent);
         Self {
-            chronicle,
+            keyframes,
             scenery,
             odom: Isometry3::identity(),
             told: Isometry3::identity(),
@@ -61,7 +61,7 @@ impl Round {
         };
         // The drift is about what independent errors may add up to in a round.
         let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 5e-4);
-        self.chronicle.graph.motion(
+        self.keyframes.graph.motion(
             &moment(self.told, self.seq),
             &read,
             &variance,
@@ -91,11 +91,11 @@ impl Round {
         let covariance = PoseCovariance::from_sd(&sd);
         let moment = moment(self.told, self.seq);
         let view = self
-            .chronicle
+            .keyframes
             .observe(&moment, &descriptor, self.odom, covariance);
-        self.chronicle.view(&view);
-        if self.chronicle.graph.is_due() {
-            for correction in self.chronicle.graph.relax() {
+        self.keyframes.view(&view);
+        if self.keyframes.graph.is_due() {
+            for correction in self.keyframes.graph.relax() {
                 self.told = correction.pose;
             }
         }
@@ -114,13 +114,13 @@ fn what_was_seen_before_corrects_the_way() {
     }
     let reckoned = (round.odom.translation.vector - round.truth.translation.vector).norm();
     assert!(reckoned > 1.0, "{reckoned}");
-    assert!(round.chronicle.graph.n_matches_believed() > 0);
+    assert!(round.keyframes.graph.n_matches_believed() > 0);
     assert!(
         round.off_m() < 0.5 * reckoned,
         "{} of {reckoned}",
         round.off_m()
     );
-    let refined = round.chronicle.graph.refine();
+    let refined = round.keyframes.graph.refine();
     let last = refined.agents[0].poses.last().unwrap().pose;
     let off = (last.translation.vector - round.truth.translation.vector).norm();
     assert!(off < 0.5 * reckoned, "{off} of {reckoned}");
@@ -132,22 +132,22 @@ fn what_was_never_seen_corrects_nothing() {
     for step in 0..4 * ROUND {
         round.step(Some(step));
     }
-    assert_eq!(round.chronicle.graph.n_matches_believed(), 0);
+    assert_eq!(round.keyframes.graph.n_matches_believed(), 0);
     assert_eq!(round.told, round.odom);
 }
 
 #[test]
-fn a_restored_chronicle_goes_on_like_the_original() {
+fn restored_keyframes_goes_on_like_the_original() {
     // In the middle of a stretch that was walked before.
     let mut round = Round::new();
     for _ in 0..ROUND + 9 {
         round.step(None);
     }
-    let pages: Vec<_> = round.chronicle.checkpoint(0).collect();
+    let pages: Vec<_> = round.keyframes.checkpoint(0).collect();
     let restored = KeyframeMap::restore(KeyframeSettings::default(), 1, pages).unwrap();
-    assert_eq!(restored.digest(), round.chronicle.digest());
+    assert_eq!(restored.digest(), round.keyframes.digest());
     let mut other = Round {
-        chronicle: restored,
+        keyframes: restored,
         scenery: round.scenery.clone(),
         odom: round.odom,
         told: round.told,
@@ -158,9 +158,9 @@ fn a_restored_chronicle_goes_on_like_the_original() {
         round.step(None);
         other.step(None);
     }
-    assert!(round.chronicle.graph.n_matches_believed() > 0);
+    assert!(round.keyframes.graph.n_matches_believed() > 0);
     assert_eq!(other.told, round.told);
-    assert_eq!(other.chronicle.digest(), round.chronicle.digest());
+    assert_eq!(other.keyframes.digest(), round.keyframes.digest());
 }
 
 #[test]
@@ -180,7 +180,7 @@ fn agents_that_were_put_elsewhere_are_not_beside_what_they_saw() {
         stamp_ns: i64::try_from(round.seq).unwrap() * 100_000_000,
         pose: round.truth,
     };
-    round.chronicle.start_pose(&moment, &start.unwrap());
+    round.keyframes.start_pose(&moment, &start.unwrap());
     round.told = round.truth;
     for _ in 0..2 * ROUND {
         round.step(None);

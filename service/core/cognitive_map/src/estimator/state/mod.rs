@@ -358,9 +358,11 @@ impl State for Estimator {
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let mut slots = PagedVec::default();
+        let (mut slots, mut odometry) = (PagedVec::default(), Vec::new());
         for _ in 0..read_count(input, AGENTS_MAX)? {
-            slots.push(read_slot(input)?, 0);
+            let (slot, latest) = read_slot(input)?;
+            slots.push(slot, 0);
+            odometry.push(latest);
         }
         let mut frames = PagedVec::default();
         for _ in 0..read_count(input, AGENTS_MAX + 1)? {
@@ -378,7 +380,7 @@ impl State for Estimator {
                 names: Arc::new(read_map(input, ASSOCIATIONS_MAX)?),
             },
         };
-        if estimator.is_sound() {
+        if estimator.is_sound() && estimator.has_odometry(&odometry) {
             Ok(estimator)
         } else {
             Err(CorruptState::Invalid)
@@ -386,30 +388,48 @@ impl State for Estimator {
     }
 }
 
-/// Reads a slot. The odometry in it repeats the history of the agent's filter, which is read with
-/// that; a checkpoint where the two differ has another digest.
-fn read_slot(input: &mut StateReader<'_>) -> Result<AgentSlot, CorruptState> {
+/// Pose and stamp \[ns\] of an agent's latest odometry.
+type Odometry = (Isometry3<f64>, Option<i64>);
+
+/// Reads a slot, and the odometry beside it, which repeats the history of the agent's filter.
+fn read_slot(input: &mut StateReader<'_>) -> Result<(AgentSlot, Odometry), CorruptState> {
     let frame = read_count(input, AGENTS_MAX)?;
-    let _: (Isometry3<f64>, Option<i64>) = State::read(input)?;
-    Ok(AgentSlot {
+    let odometry = State::read(input)?;
+    let slot = AgentSlot {
         frame,
         evidence: State::read(input)?,
         is_aside: State::read(input)?,
         detached: State::read(input)?,
-    })
+    };
+    Ok((slot, odometry))
 }
 
 impl Estimator {
     /// Writes a slot, with the pose and the stamp of the agent's latest odometry.
     fn write_slot(&self, agent: u32, slot: &AgentSlot, out: &mut StateWriter) {
-        let history = self.filter(agent).map(|filter| &filter.history);
-        let pose = history.map_or_else(Isometry3::identity, OdometryHistory::pose);
         write_count(slot.frame, out);
-        pose.write(out);
-        history.and_then(OdometryHistory::stamp_ns).write(out);
+        self.latest_odometry(agent).write(out);
         slot.evidence.write(out);
         slot.is_aside.write(out);
         slot.detached.write(out);
+    }
+
+    fn latest_odometry(&self, agent: u32) -> Odometry {
+        let history = self.filter(agent).map(|filter| &filter.history);
+        let pose = history.map_or_else(Isometry3::identity, OdometryHistory::pose);
+        (pose, history.and_then(OdometryHistory::stamp_ns))
+    }
+
+    /// Whether the odometry that was read with the slots is that of the agents' filters, to the
+    /// last bit.
+    fn has_odometry(&self, read: &[Odometry]) -> bool {
+        let bytes = |odometry: &Odometry| {
+            let mut out = StateWriter::default();
+            odometry.write(&mut out);
+            out.into_bytes()
+        };
+        let mut agents = read.iter().zip(0..);
+        agents.all(|(read, agent)| bytes(read) == bytes(&self.latest_odometry(agent)))
     }
 
     /// Whether slots, frames and what waits belong together.
