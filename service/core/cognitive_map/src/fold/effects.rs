@@ -127,12 +127,12 @@ impl CognitiveMap {
 
     /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in
     /// the making as [`refined`](Self::refined).
-    pub fn experience_map(&self) -> PoseGraph {
-        self.keyframes.graph.experience_map()
+    pub fn pose_graph(&self) -> PoseGraph {
+        self.keyframes.graph.pose_graph()
     }
 
     /// Number of matches and revisits that are believed.
     pub fn closure_count(&self) -> usize {
-        self.keyframes.graph.n_matches_believed()
+        self.keyframes.graph.n_closures_accepted()
     }
 }

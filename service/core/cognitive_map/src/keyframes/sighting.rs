@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
 
 use super::tuning;
 use crate::input::Relation;
-use geometry::PoseCovariance;
-use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use geometry::{PoseCovariance, symmetric};
+use state::{CorruptState, NONE, State, StateReader, StateWriter, state_of_struct};
 
 /// What a sighting shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,24 +52,6 @@ state_of_struct!(Sighting {
     point
 });
 
-/// A sighting of an agent whose motion has not come up to it yet.
-#[derive(Clone, Debug)]
-pub(super) struct PendingSighting {
-    pub(super) keyframe: u32,
-    pub(super) observer: u32,
-    pub(super) target: u32,
-    pub(super) stamp_ns: i64,
-    pub(super) point: SeenPoint,
-}
-
-state_of_struct!(PendingSighting {
-    keyframe,
-    observer,
-    target,
-    stamp_ns,
-    point
-});
-
 impl State for Seen {
     fn write(&self, out: &mut StateWriter) {
         match self {
@@ -90,6 +72,16 @@ impl State for Seen {
             0 => u32::read(input).map(Self::Landmark),
             1 => Ok(Self::Agent(State::read(input)?, State::read(input)?)),
             _ => Err(CorruptState::Invalid),
+        }
+    }
+}
+
+impl Sighting {
+    /// The keyframe that it shows; [`NONE`] of a landmark.
+    pub(super) fn shown_keyframe(&self) -> u32 {
+        match self.shown {
+            Seen::Agent(keyframe, _) => keyframe,
+            Seen::Landmark(_) => NONE,
         }
     }
 }
@@ -215,8 +207,4 @@ pub(super) fn lever_covariance(point: &Vector3<f64>, covariance: &PoseCovariance
     let lever = -point.cross_matrix();
     jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
     jacobian * covariance.matrix() * jacobian.transpose()
-}
-
-pub(super) fn symmetric(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    (matrix + matrix.transpose()) * 0.5
 }
