@@ -20,7 +20,7 @@ impl Fold<'_> {
             agent,
             seq: self.agent.next_seq.saturating_sub(1),
             stamp_ns: self.stamp_ns,
-            pose: *pose.unwrap_or(self.agent.body.in_map()),
+            pose: *pose.unwrap_or(self.agent.announced.in_map()),
         }
     }
 

@@ -79,7 +79,7 @@ impl Fold<'_> {
         self.agent.entered = None;
         self.hold_places();
         let number = self.agent_id.0;
-        if self.agent.placed || self.estimator.has_been_in_map(number) {
+        if self.agent.placed() || self.estimator.has_been_in_map(number) {
             self.estimator.retire(number);
             self.keyframes.retire(number);
             self.agent.membership = Membership::Removed;

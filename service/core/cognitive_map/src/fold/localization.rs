@@ -57,11 +57,11 @@ impl CognitiveMap {
             };
             map.apply(&record, &mut events);
             events.clear();
-            if since.is_none() && map.agent(agent).is_some_and(|agent| agent.placed) {
+            if since.is_none() && map.agent(agent).is_some_and(|agent| agent.placed()) {
                 since = usize::try_from(seq).ok();
             }
         }
-        let placed = map.agent(agent).filter(|agent| agent.placed);
+        let placed = map.agent(agent).filter(|agent| agent.placed());
         let pose = placed.zip(map.covariance(agent));
         let status = map.status(agent).unwrap_or(Status::Lost);
         let guesses = map.keyframes.guesses(agent.0);
