@@ -104,6 +104,15 @@ impl Parameters {
         sd.component_mul(&sd).component_mul(&renewed) * self.calibration_renewal
     }
 
+    /// Factors of the variances of components whose innovations have these squares: an outlying
+    /// component loses weight.
+    pub(super) fn loss_of_weight<const M: usize>(
+        &self,
+        squares: &SVector<f64, M>,
+    ) -> SVector<f64, M> {
+        squares.map(|square| (square / self.soft.powi(2)).max(1.0))
+    }
+
     /// Standard deviations of a motion's noise \[m, m, m, rad, rad, rad\].
     ///
     /// A random walk in translation and rotation, unless the motion states its own:
