@@ -104,14 +104,7 @@ impl SeenPoint {
                 Vector3::repeat(1.0),
             ),
             Relation::RangeBearing(seen) => {
-                let (sin_azimuth, cos_azimuth) = seen.azimuth_rad().sin_cos();
-                let (sin_elevation, cos_elevation) = seen.elevation_rad().sin_cos();
-                let forward = Vector3::new(
-                    cos_elevation * cos_azimuth,
-                    cos_elevation * sin_azimuth,
-                    sin_elevation,
-                );
-                let left = Vector3::new(-sin_azimuth, cos_azimuth, 0.0);
+                let (forward, left, ..) = seen.directions();
                 let range_m = seen.range_m().max(tuning::DIRECTION_DISTANCE_MIN_M);
                 (
                     forward * range_m,
