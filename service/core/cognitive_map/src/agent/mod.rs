@@ -21,7 +21,7 @@ use state::state_of_struct;
 /// An agent of a space.
 ///
 /// The first agent that moves or sees a landmark in an empty map defines the `map` frame: it starts
-/// at identity. Any later agent is *unplaced* until a start pose tells where it stands, or until
+/// at identity. Any later agent is *unplaced* until a start pose says where it is, or until
 /// enough landmarks and sightings of agents tie it to the map: its pose still counts from identity,
 /// and nothing that it does changes what places, trips and landmarks the map knows.
 #[derive(Clone, Debug)]
@@ -132,7 +132,7 @@ impl Agent {
         self.stamp_ns
     }
 
-    /// Whether it is known where the agent stands in `map`.
+    /// Whether it is known where the agent is in `map`.
     pub fn placed(&self) -> bool {
         self.announced.placed()
     }
@@ -199,7 +199,7 @@ impl Agent {
         self.sightings
     }
 
-    /// Levels and descriptors so far, of all sessions. Those felt where a place answers teach it;
+    /// Levels and descriptors so far, of all sessions. Those sensed where a place answers teach it;
     /// the others are counted and stay in the journal.
     pub fn percepts(&self) -> u64 {
         self.percepts

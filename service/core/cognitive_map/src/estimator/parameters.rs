@@ -73,7 +73,7 @@ impl Parameters {
         SVector::from([self.length_error_sd, self.angle_error_sd, bias, bias, bias])
     }
 
-    /// Largest lasting errors that are believed.
+    /// Largest lasting errors that are accepted.
     pub(super) fn calibration_max(&self) -> SVector<f64, 5> {
         let most = self.calibration_sd() * LASTING_DEVIATIONS_MAX;
         SVector::from_fn(|k, _| {

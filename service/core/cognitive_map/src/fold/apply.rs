@@ -156,7 +156,7 @@ impl Fold<'_> {
     }
 
     /// Lets the first agent that does something define the `map` frame, by the identity at which it
-    /// stands.
+    /// is.
     pub(super) fn define_frame(&mut self) {
         if !*self.is_map_defined {
             *self.is_map_defined = true;

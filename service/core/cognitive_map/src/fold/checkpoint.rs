@@ -44,7 +44,8 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps,
 /// version 3 no joint estimate and no keyframe graph, version 4 no views in it and no objects,
 /// version 5 no searches, version 6 no other names of landmarks, version 7 none of what was joined
-/// into objects, version 8 no moorings and no doubts, version 9 nobody removed or set aside.
+/// into objects, version 8 no attachments and no kidnap tests, version 9 nobody removed or set
+/// aside.
 const VERSION: u16 = 10;
 
 const HEADER: u8 = 0;
@@ -372,14 +373,19 @@ impl CognitiveMap {
                     .trip
                     .is_none_or(|trip| (trip.0 as usize) < recorded)
         });
-        let is_moored = |id: PlaceId, mooring| self.keyframes.graph.is_attached(mooring, id.0);
+        let graph = &self.keyframes.graph;
+        let is_attached = |id: PlaceId, attachment| graph.is_attached(attachment, id.0);
         let places = self.places().all(|(id, place)| {
             is_agent(place.founder())
                 && place.trip.is_none_or(|trip| (trip.0 as usize) < recorded)
-                && place.mooring.is_none_or(|mooring| is_moored(id, mooring))
+                && place
+                    .attachment
+                    .is_none_or(|attachment| is_attached(id, attachment))
         });
-        let moored = self.places().filter(|(_, place)| place.mooring.is_some());
-        let places = places && moored.count() == self.keyframes.graph.n_attachments();
+        let attached = self
+            .places()
+            .filter(|(_, place)| place.attachment.is_some());
+        let places = places && attached.count() == graph.n_attachments();
         let trips = self.trips().all(|(_, trip)| {
             is_agent(trip.agent())
                 && trip

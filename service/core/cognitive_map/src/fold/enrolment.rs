@@ -55,7 +55,7 @@ impl CognitiveMap {
         }
     }
 
-    /// Whether an agent was ever in the map: it stood in its frame, so that something there may be
+    /// Whether an agent was ever in the map: it was in its frame, so that something there may be
     /// its own.
     pub fn has_been_in_map(&self, id: AgentId) -> bool {
         self.agent(id).is_some_and(Agent::placed) || self.estimator.has_been_in_map(id.0)

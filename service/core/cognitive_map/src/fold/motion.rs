@@ -119,7 +119,7 @@ impl Fold<'_> {
         }
     }
 
-    /// Recruits a place cell where the agent stands. None when there is no room for it: other
+    /// Recruits a place cell where the agent is. None when there is no room for it: other
     /// agents hold all places, or there are no more identifiers.
     fn recruit(&mut self, position: &Point3<f64>) -> Option<PlaceId> {
         // The place that answers too weakly is not held any more.
@@ -145,8 +145,9 @@ impl Fold<'_> {
             self.now,
         );
         let place = self.places.recruit(place, self.revision)?;
-        if let Some(mooring) = self.keyframes.graph.attach_place(self.agent_id.0, place.0) {
-            self.places.set_mooring(place, mooring, self.revision);
+        let graph = &mut self.keyframes.graph;
+        if let Some(attachment) = graph.attach_place(self.agent_id.0, place.0) {
+            self.places.set_attachment(place, attachment, self.revision);
         }
         self.emit(EventKind::PlaceRecruited {
             place,
@@ -239,7 +240,7 @@ impl Fold<'_> {
         ASK_PER_FIELD_RADIUS * self.settings.field_radius_m
     }
 
-    /// Whether two positions lie a step of asking apart.
+    /// Whether two positions are a step of asking apart.
     fn is_step_away(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         (to - from).norm_squared() >= self.ask_step_m().powi(2)
     }

@@ -14,7 +14,7 @@ use crate::memory::trip::TripEnd;
 use geometry::PoseCovariance;
 
 impl Fold<'_> {
-    /// A level was felt, where the sensor is.
+    /// A level was sensed, where the sensor is.
     pub(super) fn level(&mut self, level: &Level) {
         self.agent.percepts += 1;
         self.touch(|episode, objects| episode.level(level, objects));
@@ -24,7 +24,7 @@ impl Fold<'_> {
         };
         let compared =
             self.percepts
-                .feel_level(level.channel(), level.value(), place, weight, self.revision);
+                .learn_level(level.channel(), level.value(), place, weight, self.revision);
         self.compared(place, compared);
     }
 
@@ -40,7 +40,7 @@ impl Fold<'_> {
         let revision = self.revision;
         let compared = self
             .percepts
-            .feel_descriptor(descriptor, place, weight, revision);
+            .learn_descriptor(descriptor, place, weight, revision);
         self.compared(place, compared);
     }
 
@@ -88,7 +88,7 @@ impl Fold<'_> {
         Status::of(self.agent, sd_m, is_doubted, self.settings) == Status::Lost
     }
 
-    /// What the agent sees contradicts where it is believed to be: it may be anywhere from now on.
+    /// What the agent sees contradicts its estimate: it may be anywhere from now on.
     fn lose_agent(&mut self) {
         let moment = self.moment();
         self.end_trip(TripEnd::Gap);
@@ -104,7 +104,7 @@ impl Fold<'_> {
         let number = self.agent_id.0;
         let was_placed = self.agent.placed();
         // One that only drifted is where it may have drifted to: its way leads there. One that was
-        // put astray, by looks that could be read in two ways, is put anew.
+        // put in a wrong place, by views of two places that look the same, is put anew.
         let is_refused = was_placed && !found.is_first && !self.fuse(found);
         let is_elsewhere = is_refused || (was_placed && found.is_first && self.is_elsewhere(found));
         if is_elsewhere || !was_placed {

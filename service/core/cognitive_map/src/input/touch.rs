@@ -1,4 +1,4 @@
-//! Contacts as they are told from outside, with the names of their channels.
+//! Contacts as they are stated from outside, with the names of their channels.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use object_recognition::{Contact, Felt, Reached, Seen};
 /// Largest coordinate \[m\].
 const METRES_MAX: f64 = 1e6;
 
-/// A level that was felt at a contact.
+/// A level that was sensed at a contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchLevel {
     channel: Label,
@@ -77,7 +77,7 @@ impl Touch {
         Ok(self)
     }
 
-    /// The same with what was felt.
+    /// The same with what was sensed.
     #[must_use]
     pub fn with_levels(mut self, levels: Vec<TouchLevel>) -> Self {
         self.levels = levels;

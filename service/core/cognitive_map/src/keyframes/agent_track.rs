@@ -13,6 +13,10 @@ use state::state_of_struct;
 
 /// The end of an agent's chain of keyframes, and the motion since.
 #[derive(Clone, Debug)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a state of its own, in any combination"
+)]
 pub(super) struct AgentTrack {
     /// Pose of its own frame in the map, once it is in the map.
     pub(super) own_frame: OwnFrame,

@@ -11,8 +11,8 @@
 //! 6     page   up to 16 views
 //! 7     page   what an agent saw lately
 //! 8     page   what an agent has seen that does not know where it is
-//! 9     page   up to 32 things that lie beside keyframes
-//! 10    page   what an agent has seen that contradicts where it is believed to be
+//! 9     page   up to 32 attachments of places
+//! 10    page   what an agent has seen that contradicts its estimate
 //! ```
 
 use std::collections::BTreeMap;

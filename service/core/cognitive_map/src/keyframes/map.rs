@@ -36,7 +36,7 @@ impl KeyframeMap {
         self.recognition.set_revision(revision);
     }
 
-    /// An agent was told where it stands in the map. If it was in the map already, it has been put
+    /// A start pose of an agent in the map. If the agent was in the map already, it has been put
     /// there: no motion leads there from what it did before.
     pub fn start_pose(&mut self, moment: &Moment, start: &StartPose) {
         self.graph.start_pose(moment, start);
@@ -99,7 +99,7 @@ impl KeyframeMap {
         }
     }
 
-    /// Whether what an agent of the map saw lately contradicts where it is believed to be.
+    /// Whether what an agent of the map saw lately contradicts its estimate.
     /// `accepted` is the number of its sightings so far that agree with that.
     pub fn is_contradicted(&mut self, view: &View<'_>, accepted: u64) -> bool {
         let chains = &self.graph.chains;
@@ -107,7 +107,7 @@ impl KeyframeMap {
     }
 
     /// An agent may be anywhere. What it saw since that is contradicted is forgotten where it was
-    /// believed to be, and a search begins with it.
+    /// estimated to be, and a search begins with it.
     pub fn declare_kidnapped(&mut self, moment: &Moment) {
         self.recognition.declare_kidnapped(self.sample(moment));
         self.graph.begin_stretch(moment.agent, None);
@@ -118,7 +118,7 @@ impl KeyframeMap {
         self.recognition.is_kidnapped(agent)
     }
 
-    /// An agent is where it is believed to be, from a sample on: it was told, or found.
+    /// The estimate of an agent is right from a sample on: by a start pose, or since it was found.
     pub fn confirm_pose(&mut self, agent: u32, seq: u64) {
         self.recognition.confirm_pose(agent, seq);
     }
@@ -135,8 +135,8 @@ impl KeyframeMap {
         self.recognition.is_seeking(agent, session)
     }
 
-    /// An agent was found. `is_elsewhere` says that it was believed to be in the map, but somewhere
-    /// else. A loop closure ties it to what was recognised.
+    /// An agent was found. `is_elsewhere` says that it was estimated to be in the map, but
+    /// somewhere else. A loop closure ties it to what was recognised.
     pub fn relocalised(&mut self, moment: &Moment, found: &Relocalised, is_elsewhere: bool) {
         let agent = moment.agent;
         let Some(similar) = self.recognition.most_similar(agent) else {

@@ -69,7 +69,7 @@ impl Chains {
 
 impl Neighbour {
     /// The motion from the neighbour to the removed keyframe.
-    pub(super) fn to_removed(&self) -> Isometry3<f64> {
+    pub(super) fn motion_to_removed(&self) -> Isometry3<f64> {
         if self.is_previous {
             self.motion
         } else {
@@ -78,7 +78,7 @@ impl Neighbour {
     }
 
     /// The motion from the removed keyframe to the neighbour.
-    fn from_removed(&self) -> Isometry3<f64> {
+    fn motion_from_removed(&self) -> Isometry3<f64> {
         if self.is_previous {
             self.motion.inverse()
         } else {
@@ -89,7 +89,7 @@ impl Neighbour {
 
 impl Sighting {
     /// The sighting as the neighbour of its keyframe would have made it.
-    pub(super) fn to_neighbour_of_observer(&self, neighbour: &Neighbour) -> Self {
+    pub(super) fn seen_from(&self, neighbour: &Neighbour) -> Self {
         let (motion, covariance) = (&neighbour.motion, &neighbour.covariance);
         let point = if neighbour.is_previous {
             self.point.before(motion, covariance)
@@ -105,11 +105,7 @@ impl Sighting {
 
     /// The sighting as one of the neighbour of the keyframe that it shows; `turn` is the rotation
     /// of that keyframe as seen by the observer.
-    pub(super) fn to_neighbour_of_target(
-        &self,
-        neighbour: &Neighbour,
-        turn: &UnitQuaternion<f64>,
-    ) -> Self {
+    pub(super) fn shown_at(&self, neighbour: &Neighbour, turn: &UnitQuaternion<f64>) -> Self {
         let mut moved = self.clone();
         let Seen::Agent(_, lever) = self.shown else {
             return moved;
@@ -135,12 +131,15 @@ impl Sighting {
 
 impl Constraint {
     /// The constraint with the neighbour of a keyframe for that keyframe.
-    pub(super) fn to_neighbour(mut self, number: u32, neighbour: &Neighbour) -> Self {
+    pub(super) fn moved_to(mut self, number: u32, neighbour: &Neighbour) -> Self {
         let (motion, near) = (&neighbour.motion, neighbour.covariance);
         // T_keyframe = T_neighbour · there, both ways with the error of the motion.
         let adjoint = se3::adjoint(motion);
         let far = PoseCovariance::from_matrix(&(adjoint * near.matrix() * adjoint.transpose()));
-        let (there, back) = (neighbour.to_removed(), neighbour.from_removed());
+        let (there, back) = (
+            neighbour.motion_to_removed(),
+            neighbour.motion_from_removed(),
+        );
         let (before, after) = if neighbour.is_previous {
             (near, far)
         } else {

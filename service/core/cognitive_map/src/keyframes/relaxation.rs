@@ -71,8 +71,8 @@ impl RelaxationCopy {
         if self.0.constraints.first_candidate() == NONE {
             return 0;
         }
-        let believed = Problem::new(&self.0, Among::Accepted);
-        let marginals = believed.map.marginals();
+        let accepted_alone = Problem::new(&self.0, Among::Accepted);
+        let marginals = accepted_alone.map.marginals();
         // With kernels that begin wide, all closures together find the map that most of them agree
         // with.
         let mut all = Problem::new(&self.0, Among::All);
@@ -83,7 +83,7 @@ impl RelaxationCopy {
             let Some(squared) = all.squared_error(number) else {
                 continue;
             };
-            if constraint.is_candidate() && agrees_with(constraint, &believed, &marginals) {
+            if constraint.is_candidate() && agrees_with(constraint, &accepted_alone, &marginals) {
                 accepted.push(number);
             } else if squared <= tuning::AGREES_MAX {
                 others.push((number, constraint));

@@ -73,7 +73,7 @@ impl KeyframeGraph {
             let spread = covariance.matrix().fixed_view::<3, 3>(0, 0).trace();
             loss += spread / sighting.point.covariance().trace();
         }
-        let lever = neighbour.to_removed().translation.vector.norm();
+        let lever = neighbour.motion_to_removed().translation.vector.norm();
         for constraint in self.constraints.of(number, keyframe) {
             if constraint.state == ClosureState::Origin {
                 return None;
@@ -114,7 +114,7 @@ impl KeyframeGraph {
         self.attachments
             .move_all(number, neighbour.number, &mut self.chains, revision);
         while let Some(sighting) = self.take_sighting(number, |keyframe| keyframe.sightings) {
-            let moved = sighting.to_neighbour_of_observer(neighbour);
+            let moved = sighting.seen_from(neighbour);
             // A sighting of an agent from its own keyframe says nothing.
             let shows_itself = moved.shown_keyframe() == neighbour.number;
             if (shows_itself || !self.add_sighting(moved))
@@ -130,7 +130,7 @@ impl KeyframeGraph {
                 continue;
             };
             let turn = observer.rotation.inverse() * target.rotation;
-            let moved = sighting.to_neighbour_of_target(neighbour, &turn);
+            let moved = sighting.shown_at(neighbour, &turn);
             if moved.keyframe != neighbour.number {
                 self.add_sighting(moved);
             }
@@ -141,7 +141,7 @@ impl KeyframeGraph {
             let Some(constraint) = self.remove_constraint(first) else {
                 return;
             };
-            self.add_constraint(constraint.to_neighbour(number, neighbour));
+            self.add_constraint(constraint.moved_to(number, neighbour));
         }
     }
 

@@ -73,7 +73,7 @@ pub(super) const UNCERTAINTY_RATIO_MAX: f64 = 2.0;
 /// places lie so close \[m\].
 pub(super) const CERTAIN_SD_M: f64 = 0.5;
 
-/// Fewest other closures that must agree with one that the map cannot tell from a false one.
+/// Fewest other closures that must agree with one that the map cannot distinguish from a false one.
 pub(super) const PARTNERS_MIN: usize = 2;
 
 /// Earlier closures, in the order of time, with which a closure is compared.

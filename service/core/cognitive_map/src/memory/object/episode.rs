@@ -137,7 +137,7 @@ impl Episode {
         self.travel.append(increment, variance);
     }
 
-    /// A level was felt.
+    /// A level was sensed.
     pub(crate) fn level(&mut self, level: &Level, memory: &mut ObjectMemory) -> Vec<News> {
         let at = self.travel.motion() * Point3::from(*level.offset_m());
         let mut contact = self.contact(at);
