@@ -121,7 +121,7 @@ impl ObjectMemory {
         let felt = places
             .iter()
             .step_by(step)
-            .map(|place| place.felt().aimed());
+            .map(|place| place.contact().aimed());
         let posterior = recognised(&others, orientation, felt);
         if posterior.verdict() != Verdict::Object(whole) || posterior.fit < FIT_LEAST {
             return None;
