@@ -122,7 +122,7 @@ impl ObjectMemory {
         let contacts = places
             .iter()
             .step_by(step)
-            .map(|place| place.felt().aimed());
+            .map(|place| place.contact().aimed());
         let posterior = recognised(&others, orientation, contacts);
         if posterior.verdict() != Verdict::Object(whole) || posterior.fit < FIT_LEAST {
             return None;
