@@ -281,10 +281,7 @@ impl AgentFilter {
     /// Corrects the body by an estimated error. Lasting errors of odometry stay within what the
     /// settings allow.
     pub(super) fn correct(&mut self, error: &SVector<f64, BODY_DIM>, parameters: &Parameters) {
-        let linear = error.fixed_rows::<3>(0).into_owned();
-        let angular = error.fixed_rows::<3>(3).into_owned();
-        self.pose *= se3::exp(&linear, &angular);
-        self.pose.rotation.renormalize_fast();
+        self.pose = se3::plus(&self.pose, &error.fixed_rows::<POSE>(0).into_owned());
         let most = parameters.calibration_max();
         let corrected = self.calibration.components() + error.fixed_rows::<CALIBRATION>(POSE);
         let bounded = corrected.zip_map(&most, |error, most| error.clamp(-most, most));

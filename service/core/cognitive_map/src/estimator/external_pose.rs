@@ -122,8 +122,7 @@ struct Intersection {
 impl Intersection {
     fn new(filter: &AgentFilter, external: &ExternalPose<'_>) -> Self {
         let own: Matrix6<f64> = filter.covariance().fixed_view::<6, 6>(0, 0).into_owned();
-        let (linear, angular) = se3::log(&filter.pose.inv_mul(external.pose));
-        let innovation = Vector6::from_fn(|k, _| if k < 3 { linear[k] } else { angular[k - 3] });
+        let innovation = se3::twist(&filter.pose.inv_mul(external.pose));
         let scale = own.diagonal().map(|variance| {
             let is_open = variance.is_normal() && variance > 0.0;
             if is_open {

@@ -120,10 +120,7 @@ pub(super) fn pose_innovation(
 ) -> (SVector<f64, 6>, Matrix6<f64>, Matrix6<f64>, SVector<f64, 6>) {
     // exp(residual) takes the expected relative pose to the seen one.
     let expected = observer.inv_mul(target);
-    let (linear, angular) = se3::log(&expected.inv_mul(seen.pose()));
-    let mut residual = SVector::<f64, 6>::zeros();
-    residual.fixed_rows_mut::<3>(0).copy_from(&linear);
-    residual.fixed_rows_mut::<3>(3).copy_from(&angular);
+    let residual = se3::twist(&expected.inv_mul(seen.pose()));
     let by_observer = -se3::adjoint(&expected.inverse());
     let sd = seen.noise().sd();
     let floor = SVector::<f64, 6>::repeat(SIGHTING_SD_MIN);

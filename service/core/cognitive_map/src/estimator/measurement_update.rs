@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
 
 use super::agent_slot::AgentState;
 use super::covariance::{Block, Projection};
-use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member, point_by_pose};
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::innovation::{PointInnovation, pose_innovation, seen_at};
 use super::landmark_archive::ArchivedLandmark;
 use super::observers::Observers;
@@ -18,7 +18,7 @@ use super::tuning::{
 };
 use super::verdict::{Outcome, Verdict};
 use crate::input::{Label, Relation, RelativePose};
-use geometry::{se3, symmetric};
+use geometry::{beside, se3, seen_by_pose, symmetric};
 
 /// A sighting of a frame's member: who, how it moved since, when, and what it saw.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +55,7 @@ impl Frame {
             .into_inner()
             .transpose();
         let blocks = [
-            past.block(&(innovation.by_point * point_by_pose(&expected))),
+            past.block(&(innovation.by_point * seen_by_pose(&expected))),
             point_block(landmark.offset, &(innovation.by_point * to_body)),
         ];
         let seen = SightingTarget::Landmark(landmark.number);
@@ -108,15 +108,12 @@ impl Frame {
             };
             let relative = past.pose.rotation.inverse() * other.pose.rotation;
             let turn = relative.to_rotation_matrix().into_inner();
-            let mut by_target = SMatrix::<f64, 3, 6>::zeros();
-            by_target
-                .fixed_view_mut::<3, 3>(0, 0)
-                .copy_from(&(innovation.by_point * turn));
+            let by_target = beside(&(innovation.by_point * turn), &Matrix3::zeros());
             let blocks = [
-                past.block(&(innovation.by_point * point_by_pose(&expected))),
+                past.block(&(innovation.by_point * seen_by_pose(&expected))),
                 other.block(&by_target),
             ];
-            let seen = SightingTarget::Agent(self.members[target].agent);
+            let seen = SightingTarget::Agent(self.members[target].agent.into());
             self.update_by_point(measurement, &blocks, &innovation, seen, &scope)
         };
         self.widen_if_refused(measurement.observer);
@@ -146,7 +143,7 @@ impl Frame {
         });
         let world = past.pose.rotation.to_rotation_matrix().into_inner();
         let noise = world * noise.unwrap_or(stated) * world.transpose();
-        let by_pose = -(world * point_by_pose(&point));
+        let by_pose = -(world * seen_by_pose(&point));
         let offset = self
             .covariance
             .append(&[past.block(&by_pose)], &symmetric(&noise));
@@ -415,11 +412,9 @@ impl PastPose {
 
 /// The part of a Jacobian that belongs to a landmark.
 pub(super) fn point_block(offset: usize, jacobian: &Matrix3<f64>) -> Block<3> {
-    let mut wide = SMatrix::<f64, 3, 6>::zeros();
-    wide.fixed_view_mut::<3, 3>(0, 0).copy_from(jacobian);
     Block {
         offset,
         width: LANDMARK_DIM,
-        jacobian: wide,
+        jacobian: beside(jacobian, &Matrix3::zeros()),
     }
 }

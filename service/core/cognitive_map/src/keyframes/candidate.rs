@@ -1,6 +1,6 @@
 //! A loop closure that may be accepted, and what it is compared by.
 
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{Isometry3, Matrix6};
 
 use super::constraint::Constraint;
 use super::keyframe::KeyframeSlab;
@@ -119,8 +119,7 @@ pub(super) fn agrees_with(
     let own = constraint.covariance.matrix();
     let least = tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
     let expected = problem.map.pose(from).inv_mul(problem.map.pose(to));
-    let (linear, angular) = se3::log(&expected.inv_mul(&constraint.transform));
-    let off = Vector6::from_iterator(linear.iter().chain(angular.iter()).copied());
+    let off = se3::twist(&expected.inv_mul(&constraint.transform));
     // One that is too far off in one direction is so for every map that is sure enough: its
     // covariance, which takes long to find, need not be known.
     let least_certain = tuning::UNCERTAINTY_RATIO_MAX * tuning::UNCERTAINTY_RATIO_MAX + 1.0;

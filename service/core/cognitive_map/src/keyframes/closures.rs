@@ -12,7 +12,7 @@ use super::relaxation::{Correction, RelaxationCopy};
 use super::sighting::{SeenPoint, stated_variance};
 use super::tuning;
 use crate::input::Relation;
-use geometry::{PoseCovariance, se3, symmetric, upper_triangle};
+use geometry::{PoseCovariance, se3, symmetric};
 use state::NONE;
 
 impl KeyframeGraph {
@@ -168,6 +168,6 @@ fn seen_pose(relation: &Relation, expected: &Isometry3<f64>) -> (Isometry3<f64>,
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&spread);
     (
         Isometry3::from_parts(point.position.into(), rotation),
-        PoseCovariance::from_upper_triangle(&upper_triangle(&matrix)),
+        PoseCovariance::from_upper_part(&matrix),
     )
 }

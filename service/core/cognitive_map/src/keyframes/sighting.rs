@@ -1,10 +1,10 @@
 //! Sightings from a keyframe.
 
-use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::tuning;
 use crate::input::Relation;
-use geometry::{PoseCovariance, symmetric};
+use geometry::{PoseCovariance, beside, symmetric};
 use state::{CorruptState, NONE, State, StateReader, StateWriter, state_of_struct};
 
 /// What a sighting shows.
@@ -195,9 +195,6 @@ pub(super) fn stated_variance(relation: &Relation) -> Vector3<f64> {
 
 /// Covariance of ρ + φ×p: the effect of a pose error ξ = (ρ, φ) on a point p in its frame.
 pub(super) fn lever_covariance(point: &Vector3<f64>, covariance: &PoseCovariance) -> Matrix3<f64> {
-    let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
-    jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
-    let lever = -point.cross_matrix();
-    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+    let jacobian = beside(&Matrix3::identity(), &-point.cross_matrix());
     jacobian * covariance.matrix() * jacobian.transpose()
 }
