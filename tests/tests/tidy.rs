@@ -80,7 +80,7 @@ const MANIFESTS: [&str; 15] = [
 const CORE: [(&str, &[&str]); 9] = [
     ("random", &[]),
     ("state", &["nalgebra", "thiserror"]),
-    ("trajectory", &["nalgebra", "thiserror"]),
+    ("trajectory", &["geometry", "nalgebra", "thiserror"]),
     ("geometry", &["nalgebra", "state"]),
     ("grid", &["nalgebra", "state", "thiserror"]),
     (

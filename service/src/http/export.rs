@@ -198,7 +198,7 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
 /// The graph, in the memory of its whole text: that of the relaxation is larger.
 async fn graph(long: &LongAnswers, space: &Space) -> Result<Response<Body>, Problem> {
     let room = long.enter()?;
-    let graph = space.graph(|map| write_g2o(&map.experience_map())).await?;
+    let graph = space.graph(|map| write_g2o(&map.pose_graph())).await?;
     let body = Body::from(Bytes::from_owner(graph));
     // Who reads it slowly holds on to all of it.
     Ok(reply::with_type(TUM, holding(body, room)))

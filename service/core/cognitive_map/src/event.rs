@@ -67,7 +67,7 @@ pub enum EventKind {
         /// Why.
         reason: TripEnd,
     },
-    /// It became known where an agent stands in the map, by what it and others saw.
+    /// It became known where an agent is in the map, by what it and others saw.
     AgentPlaced {
         /// Its position in `map` \[m\].
         position: Point3<f64>,
@@ -158,7 +158,7 @@ pub enum EventKind {
         /// Its name.
         part_name: Label,
     },
-    /// An episode with an object ended, in which something was felt.
+    /// An episode with an object ended, in which something was sensed.
     EpisodeEnded {
         /// Session of the agent that it was part of.
         session: u64,
@@ -168,7 +168,7 @@ pub enum EventKind {
         /// taught an object by its name.
         posterior: Option<Box<Posterior>>,
     },
-    /// A percept was felt where a place remembers its channel; before the place learned from it.
+    /// A percept was sensed where a place remembers its channel; before the place learned from it.
     PerceptCompared {
         /// The place.
         place: PlaceId,

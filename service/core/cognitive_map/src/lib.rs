@@ -7,6 +7,7 @@ mod agent;
 mod event;
 mod fold;
 mod input;
+mod label_index;
 mod memory;
 mod settings;
 
@@ -16,9 +17,9 @@ pub use fold::{
     CheckpointPage, CognitiveMap, CorruptCheckpoint, Localization, Predicted, Prediction,
 };
 pub use input::{
-    AgentId, Descriptor, InvalidSample, Label, Lesson, Level, Marker, Motion, ObjectMark,
-    PoseNoise, RangeBearing, Record, Relation, RelativePose, RelativePosition, Sample, SampleBody,
-    Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel, TouchNoise,
+    AgentId, Descriptor, InvalidSample, Label, Lesson, Level, Marker, Motion, NoisyPose,
+    ObjectMark, PoseNoise, RangeBearing, Record, Relation, RelativePose, RelativePosition, Sample,
+    SampleBody, Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel, TouchNoise,
 };
 pub use keyframes::Guess;
 pub use memory::landmark::{Landmark, LandmarkId};

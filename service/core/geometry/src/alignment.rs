@@ -1,6 +1,8 @@
-//! Points laid over points.
+//! Alignment of points with points.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, SVD, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, SVD, Translation3, UnitQuaternion, Vector3};
+
+use super::rotation::rotation_of;
 
 /// Steps of a decomposition, which needs some ten.
 const STEPS_MAX: usize = 200;
@@ -29,10 +31,7 @@ pub fn align(
     } else {
         // Numbers beyond all bounds must not keep it going for ever.
         let svd = SVD::try_new(products, true, true, f64::EPSILON, STEPS_MAX)?;
-        let (u, v_t) = (svd.u?, svd.v_t?);
-        let sign = (u * v_t).determinant().signum();
-        let matrix = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix))
+        rotation_of(&svd)?
     };
     let mut shift = to - rotation * from;
     if is_planar {

@@ -3,7 +3,9 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use state::{CorruptState, State, StateReader, StateWriter};
 
+use super::planar::ALL_AXES;
 use super::positive::positive;
+use super::symmetric::from_upper_triangle;
 
 /// Covariance of a pose T = T̂ exp(ξ), 6×6, order translation \[m²\], rotation \[rad²\] of ξ.
 ///
@@ -29,15 +31,12 @@ impl PoseCovariance {
 
     /// From a stored matrix; its upper triangle counts.
     pub fn from_upper_triangle(entries: &[f64; 21]) -> Self {
-        let mut matrix = Matrix6::zeros();
-        let mut entries = entries.iter();
-        for row in 0..6 {
-            for (column, entry) in (row..6).zip(&mut entries) {
-                matrix[(row, column)] = *entry;
-                matrix[(column, row)] = *entry;
-            }
-        }
-        Self(matrix)
+        Self(from_upper_triangle(&ALL_AXES, entries))
+    }
+
+    /// From the upper triangle of a matrix, which rounding may have left asymmetric.
+    pub fn from_upper_part(matrix: &Matrix6<f64>) -> Self {
+        Self::from_upper_triangle(&upper_triangle(matrix))
     }
 
     /// The covariance of T·Δ, where `increment` = Δ has independent errors on its right with

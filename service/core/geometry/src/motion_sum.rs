@@ -1,16 +1,18 @@
 //! Motions one after the other, and what their errors add up to.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
+use super::blocks::from_blocks;
 use super::covariance::PoseCovariance;
 use super::positive::positive;
 use super::se3;
+use super::symmetric::symmetric;
 use state::state_of_struct;
 
 /// A motion that goes on step by step, with the covariance of its error.
 ///
 /// The errors of the steps are gathered about the axes of the beginning, where they just add up,
-/// and are carried to the end when someone asks:
+/// and are transformed to the end when someone asks:
 ///
 /// ```text
 /// T = Δ₁ Δ₂ … Δ_k      S = Σ Ad(Δ₁ … Δ_i) Q_i Ad(Δ₁ … Δ_i)ᵀ      P = Ad(T⁻¹) S Ad(T⁻¹)ᵀ
@@ -55,7 +57,7 @@ impl MotionSum {
     pub fn covariance(&self) -> PoseCovariance {
         let back = se3::adjoint(&self.motion.inverse());
         let moved = back * self.at_the_beginning() * back.transpose();
-        PoseCovariance::from_matrix(&positive(&((moved + moved.transpose()) * 0.5)))
+        PoseCovariance::from_matrix(&positive(&symmetric(&moved)))
     }
 
     /// Sum of the variances of where it led, about the axes of its beginning \[m²\].
@@ -65,15 +67,12 @@ impl MotionSum {
 
     /// Covariance of the motion's error about the axes of its beginning.
     pub fn at_the_beginning(&self) -> Matrix6<f64> {
-        let mut matrix = Matrix6::zeros();
-        let mut put = |row, column, block: &Matrix3<f64>| {
-            matrix.fixed_view_mut::<3, 3>(row, column).copy_from(block);
-        };
-        put(0, 0, &self.position);
-        put(0, 3, &self.cross);
-        put(3, 0, &self.cross.transpose());
-        put(3, 3, &self.turn);
-        matrix
+        from_blocks(
+            &self.position,
+            &self.cross,
+            &self.cross.transpose(),
+            &self.turn,
+        )
     }
 
     /// Goes on by an increment whose error on its right has independent components of these
@@ -129,8 +128,7 @@ impl MotionSum {
 
 /// R diag(variance) Rᵀ, exactly symmetric.
 fn spread(rotation: &Matrix3<f64>, variance: &Vector3<f64>) -> Matrix3<f64> {
-    let scaled: SMatrix<f64, 3, 3> =
-        Matrix3::from_fn(|row, column| rotation[(row, column)] * variance[column]);
+    let scaled = Matrix3::from_fn(|row, column| rotation[(row, column)] * variance[column]);
     let mut matrix = Matrix3::zeros();
     for row in 0..3 {
         for column in row..3 {

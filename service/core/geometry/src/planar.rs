@@ -7,6 +7,9 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
+/// Components of spatial motion: along x, y and z, and about them.
+pub const ALL_AXES: [usize; 6] = [0, 1, 2, 3, 4, 5];
+
 /// Components of planar motion: along x and y, and about z.
 pub const PLANAR_AXES: [usize; 3] = [0, 1, 5];
 

@@ -11,7 +11,11 @@
 //! Below half a radian the coefficients come from power series, because the closed forms
 //! lose digits to cancellation there; at the seam both agree to about 1e-14 of their value.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{
+    Isometry3, Matrix3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6,
+};
+
+use super::blocks::from_blocks;
 
 /// Angle below which the coefficients come from power series \[rad\].
 pub(super) const SERIES_BELOW_RAD: f64 = 0.5;
@@ -76,6 +80,37 @@ pub fn log(motion: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     )
 }
 
+/// The twist of [`log`] as one vector ξ = (ρ, φ) \[m, rad\].
+pub fn twist(motion: &Isometry3<f64>) -> Vector6<f64> {
+    let (linear, angular) = log(motion);
+    join(&linear, &angular)
+}
+
+/// The twist with this translation part ρ \[m\] and rotation part φ \[rad\].
+pub fn join(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(
+        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+    )
+}
+
+/// Translation part ρ \[m\] and rotation part φ \[rad\] of a twist.
+pub fn split(twist: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    (
+        twist.fixed_rows::<3>(0).into_owned(),
+        twist.fixed_rows::<3>(3).into_owned(),
+    )
+}
+
+/// T ⊕ ξ = T exp(ξ): a pose after a perturbation on its right. The rotation is normalised again,
+/// because products of unit quaternions drift away from length one.
+#[must_use]
+pub fn plus(pose: &Isometry3<f64>, twist: &Vector6<f64>) -> Isometry3<f64> {
+    let (linear, angular) = split(twist);
+    let mut moved = pose * exp(&linear, &angular);
+    moved.rotation.renormalize_fast();
+    moved
+}
+
 /// Ad(T), 6×6, order translation, rotation: `T exp(ξ) T⁻¹ = exp(Ad(T) ξ)`.
 ///
 /// ```text
@@ -84,12 +119,8 @@ pub fn log(motion: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
 /// ```
 pub fn adjoint(motion: &Isometry3<f64>) -> Matrix6<f64> {
     let rotation: Matrix3<f64> = motion.rotation.to_rotation_matrix().into_inner();
-    let mut adjoint = Matrix6::zeros();
-    adjoint.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-    adjoint.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
     let lever = motion.translation.vector.cross_matrix() * rotation;
-    adjoint.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
-    adjoint
+    from_blocks(&rotation, &lever, &Matrix3::zeros(), &rotation)
 }
 
 /// Coefficients of (θ − sin θ)/θ³ in powers of θ²: (−1)ᵏ / (2k + 3)!.

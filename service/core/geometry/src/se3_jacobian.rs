@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
+use super::blocks::from_blocks;
 use super::se3::{HALF_ANGLE_COTANGENT, SERIES_BELOW_RAD, THETA_MINUS_SIN, polynomial};
 
 /// The 6×6 matrix A, order translation, rotation, with `log(exp(ξ) exp(δ)) = ξ + A δ` to first
@@ -48,12 +49,8 @@ pub fn log_jacobian(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Matrix6<f6
         + (turn * turn_shift + shift_turn * turn - turn_shift_turn * 3.0) * e
         + (turn_shift_turn * turn + turn * turn_shift_turn) * f;
     let inverse = Matrix3::identity() - turn * 0.5 + turn_turn * d;
-    let mut jacobian = Matrix6::zeros();
-    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&inverse);
-    jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&inverse);
     let corner = -(inverse * q * inverse);
-    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&corner);
-    jacobian
+    from_blocks(&inverse, &corner, &Matrix3::zeros(), &inverse)
 }
 
 /// Coefficients of (θ² + 2 cos θ − 2)/(2 θ⁴) in powers of θ²: (−1)ᵏ / (2k + 4)!.

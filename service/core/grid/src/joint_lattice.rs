@@ -6,7 +6,9 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::GridModules;
-use crate::reduction::{dot, reduce};
+use crate::inner_product::dot;
+use crate::reduction::reduce;
+use crate::residuals::{BOX_SHARE, Residuals};
 
 /// Most modules that take part: further ones would narrow the search less than they cost.
 const MODULES_MAX: usize = 6;
@@ -16,9 +18,6 @@ pub(crate) const MODULES_MIN: usize = 2;
 const DIMENSIONS_MAX: usize = 3 * MODULES_MAX;
 /// Partial sums of a product, which do not wait for one another.
 const LANES: usize = 4;
-/// The share η of the box in the squared distance. A quarter to a half of a typical tolerance makes
-/// the ball that has to be searched smallest.
-const BOX_SHARE: f64 = 0.006;
 /// Bound of the rounding of phases, lattices and distances \[spacings²\].
 const SLACK: f64 = 1e-6;
 
@@ -91,46 +90,9 @@ impl JointLattice {
         if members.len() < MODULES_MIN {
             return None;
         }
-        let lattices: Vec<_> = members.iter().map(|&m| &modules.lattices()[m]).collect();
-        let finest_m = modules.lattices()[0].spacing_m();
-        let stiffness: f64 = lattices
-            .iter()
-            .map(|lattice| lattice.spacing_m().powi(-2))
-            .sum();
-        let box_weight = Vector3::from(levels).map(|level| {
-            let half_m = finest_m * f64::from(level).exp2();
-            BOX_SHARE / (3.0 * half_m * half_m)
-        });
-        let weights: Vec<Matrix3<f64>> = lattices
-            .iter()
-            .map(|lattice| {
-                let share = box_weight.map(|w| lattice.spacing_m().powi(-2) / (stiffness + w));
-                Matrix3::from_diagonal(&share)
-            })
-            .collect();
-        // What a shift of one module's point by one metre along one axis does to the residuals of
-        // all modules and of the box.
-        let shifted = |module: usize, by: &Vector3<f64>| -> Vec<f64> {
-            let position = weights[module] * by;
-            let mut residuals = Vec::with_capacity(3 * lattices.len() + 3);
-            for (other, lattice) in lattices.iter().enumerate() {
-                let point = if other == module {
-                    *by
-                } else {
-                    Vector3::zeros()
-                };
-                residuals.extend(((point - position) / lattice.spacing_m()).iter());
-            }
-            residuals.extend(position.component_mul(&box_weight.map(f64::sqrt)).iter());
-            residuals
-        };
-        let axes = || (0..members.len()).flat_map(|module| (0..3).map(move |axis| (module, axis)));
-        let given: Vec<Vec<f64>> = axes()
-            .map(|(module, axis)| shifted(module, &lattices[module].basis().column(axis).into()))
-            .collect();
-        let reduced = reduce(&given);
-
-        let n = given.len();
+        let residuals = Residuals::new(modules, &members, levels);
+        let reduced = reduce(&residuals.basis());
+        let n = reduced.vectors.len();
         let mut triangle = Vec::with_capacity(n);
         let mut diagonal_squared = ZEROS;
         let mut coordinates = Vec::with_capacity(n);
@@ -143,22 +105,25 @@ impl JointLattice {
             }
             triangle.push(row);
             let mut row = ZEROS;
-            for (entry, (module, axis)) in row.iter_mut().zip(axes()) {
-                *entry = dot(direction, &shifted(module, &Vector3::ith(axis, 1.0))) / diagonal;
+            for (entry, (module, axis)) in row.iter_mut().zip(residuals.axes()) {
+                let shifted = residuals.shifted(module, &Vector3::ith(axis, 1.0));
+                *entry = dot(direction, &shifted) / diagonal;
             }
             coordinates.push(row);
         }
         let mut moves = [ZEROS; 3];
         for (j, coefficients) in reduced.coefficients.iter().enumerate() {
-            let shifts = axes().zip(coefficients);
-            let shifts = shifts.map(|((module, axis), times)| {
-                weights[module] * lattices[module].basis().column(axis) * *times
-            });
-            let by: Vector3<f64> = shifts.sum();
+            let by = residuals.moved(coefficients);
             for (row, by) in moves.iter_mut().zip(by.iter()) {
                 row[j] = *by;
             }
         }
+        let Residuals {
+            stiffness,
+            box_weight,
+            weights,
+            ..
+        } = residuals;
         Some(Box::new(Self {
             stiffness,
             box_weight,

@@ -1,5 +1,7 @@
 //! Lattice reduction: a basis of short, nearly orthogonal vectors for a given lattice.
 
+use crate::inner_product::dot;
+
 /// A step must shorten by at least this factor in the square, or reduction could go on for ever.
 const LOVASZ: f64 = 0.99;
 /// Rounds of size reduction of one vector; two are enough when nothing is lost to rounding.
@@ -23,28 +25,72 @@ pub(super) struct Reduced {
 /// and the vectors are summed anew from them. Rounding can only make the basis less short.
 pub(super) fn reduce(given: &[Vec<f64>]) -> Reduced {
     let n = given.len();
-    let mut vectors = given.to_vec();
-    let mut coefficients: Vec<Vec<f64>> = (0..n)
-        .map(|j| (0..n).map(|i| f64::from(u8::from(i == j))).collect())
-        .collect();
-    // The parts across all vectors before, and how much of those each vector holds.
-    let mut across = vectors.clone();
-    let mut along = vec![vec![0.0; n]; n];
+    let mut basis = Basis::new(given);
     // Far more steps than reduction takes; the bound is a safeguard against rounding alone.
     let mut steps = 1000 * n * n;
     let mut k = 0;
     while k < n && steps > 0 {
         steps -= 1;
+        basis.reduce_size(k);
+        if basis.is_shorter_before(k) {
+            basis.vectors.swap(k, k - 1);
+            basis.coefficients.swap(k, k - 1);
+            basis.orthogonalise(k - 1);
+            k -= 1;
+        } else {
+            k += 1;
+        }
+    }
+    basis.sum_anew(given);
+    for direction in &mut basis.across {
+        let length = squared(direction).sqrt();
+        for x in direction {
+            *x /= length;
+        }
+    }
+    Reduced {
+        vectors: basis.vectors,
+        coefficients: basis.coefficients,
+        directions: basis.across,
+    }
+}
+
+/// A basis while it is reduced.
+struct Basis {
+    vectors: Vec<Vec<f64>>,
+    /// Each vector as a sum of the given ones: whole numbers.
+    coefficients: Vec<Vec<f64>>,
+    /// The part of each vector across all vectors before.
+    across: Vec<Vec<f64>>,
+    /// How much of the other vectors' parts each vector holds.
+    along: Vec<Vec<f64>>,
+}
+
+impl Basis {
+    fn new(given: &[Vec<f64>]) -> Self {
+        let n = given.len();
+        let unit = |j| (0..n).map(|i| f64::from(u8::from(i == j))).collect();
+        Self {
+            vectors: given.to_vec(),
+            coefficients: (0..n).map(unit).collect(),
+            across: given.to_vec(),
+            along: vec![vec![0.0; n]; n],
+        }
+    }
+
+    /// Takes whole multiples of the vectors before away from vector k, until half of each is left
+    /// at most.
+    fn reduce_size(&mut self, k: usize) {
         for _ in 0..SIZE_ROUNDS {
-            orthogonalise(k, &vectors, &mut across, &mut along);
+            self.orthogonalise(k);
             let mut changed = false;
             for j in (0..k).rev() {
-                let times = along[k][j].round();
+                let times = self.along[k][j].round();
                 if times.abs() >= 1.0 {
                     changed = true;
-                    subtract(&mut vectors, k, j, times);
-                    subtract(&mut coefficients, k, j, times);
-                    let (lower, upper) = along.split_at_mut(k);
+                    subtract(&mut self.vectors, k, j, times);
+                    subtract(&mut self.coefficients, k, j, times);
+                    let (lower, upper) = self.along.split_at_mut(k);
                     for (share, other) in upper[0].iter_mut().zip(&lower[j][..j]) {
                         *share -= times * other;
                     }
@@ -54,54 +100,43 @@ pub(super) fn reduce(given: &[Vec<f64>]) -> Reduced {
                 break;
             }
         }
-        let shortens = k > 0 && {
-            let before = squared(&across[k - 1]);
-            squared(&across[k]) < (LOVASZ - along[k][k - 1].powi(2)) * before
-        };
-        if shortens {
-            vectors.swap(k, k - 1);
-            coefficients.swap(k, k - 1);
-            orthogonalise(k - 1, &vectors, &mut across, &mut along);
-            k -= 1;
-        } else {
-            k += 1;
+    }
+
+    /// Whether vector k is shorter in the place of the one before (Lovász's condition).
+    fn is_shorter_before(&self, k: usize) -> bool {
+        k > 0 && {
+            let before = squared(&self.across[k - 1]);
+            squared(&self.across[k]) < (LOVASZ - self.along[k][k - 1].powi(2)) * before
         }
     }
-    for (vector, coefficients) in vectors.iter_mut().zip(&coefficients) {
-        vector.fill(0.0);
-        for (given, times) in given.iter().zip(coefficients) {
-            for (x, g) in vector.iter_mut().zip(given) {
-                *x += times * g;
+
+    /// Splits vector k into its parts along the vectors before and the part across them.
+    fn orthogonalise(&mut self, k: usize) {
+        let mut rest = self.vectors[k].clone();
+        for j in 0..k {
+            let share = dot(&rest, &self.across[j]) / squared(&self.across[j]);
+            self.along[k][j] = share;
+            for (x, a) in rest.iter_mut().zip(&self.across[j]) {
+                *x -= share * a;
             }
         }
+        self.across[k] = rest;
     }
-    for k in 0..n {
-        orthogonalise(k, &vectors, &mut across, &mut along);
-    }
-    for direction in &mut across {
-        let length = squared(direction).sqrt();
-        for x in direction {
-            *x /= length;
-        }
-    }
-    Reduced {
-        vectors,
-        coefficients,
-        directions: across,
-    }
-}
 
-/// Splits vector k into its parts along the vectors before and the part across them.
-fn orthogonalise(k: usize, vectors: &[Vec<f64>], across: &mut [Vec<f64>], along: &mut [Vec<f64>]) {
-    let mut rest = vectors[k].clone();
-    for j in 0..k {
-        let share = dot(&rest, &across[j]) / squared(&across[j]);
-        along[k][j] = share;
-        for (x, a) in rest.iter_mut().zip(&across[j]) {
-            *x -= share * a;
+    /// Sums the vectors anew from the given ones.
+    fn sum_anew(&mut self, given: &[Vec<f64>]) {
+        for (vector, coefficients) in self.vectors.iter_mut().zip(&self.coefficients) {
+            vector.fill(0.0);
+            for (given, times) in given.iter().zip(coefficients) {
+                for (x, g) in vector.iter_mut().zip(given) {
+                    *x += times * g;
+                }
+            }
+        }
+        for k in 0..given.len() {
+            self.orthogonalise(k);
         }
     }
-    across[k] = rest;
 }
 
 /// Takes vector j away from vector k, which comes after it.
@@ -110,11 +145,6 @@ fn subtract(vectors: &mut [Vec<f64>], k: usize, j: usize, times: f64) {
     for (x, y) in upper[0].iter_mut().zip(&lower[j]) {
         *x -= times * y;
     }
-}
-
-/// Σ aᵢ bᵢ.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Σ aᵢ².

@@ -1,7 +1,8 @@
-//! How alike two grid codes or two populations are.
+//! Similarity of two grid codes, or of two populations.
 
 use nalgebra::{Point3, Vector3};
 
+use super::inner_product::dot;
 use super::lattice::{shortest_turns, turns_norm_squared};
 use super::tuning::TUNING_WIDTH;
 use super::{GridCode, GridModules, Lattice, PartialCode};
@@ -148,7 +149,7 @@ impl<'a> CodeCue<'a> {
         (deficit < 1.0).then(|| -4.0 * TUNING_WIDTH * TUNING_WIDTH * (1.0 - deficit.max(0.0)).ln())
     }
 
-    /// The distance \[m\] at which two codes are on average as alike as `kernel` says, i.e. the d
+    /// The distance \[m\] at which two codes are on average as similar as `kernel` says, i.e. the d
     /// with
     ///
     /// ```text
@@ -180,14 +181,4 @@ impl<'a> CodeCue<'a> {
         }
         squared.min(far).sqrt()
     }
-}
-
-/// Σ aᵢ bᵢ, in order.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    debug_assert_eq!(
-        a.len(),
-        b.len(),
-        "activation vectors of one space have one length"
-    );
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Unit, Vector3};
 
 /// A scalar measured on a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Felt {
+pub struct LevelReading {
     /// Channel, as the caller numbers them.
     pub channel: u16,
     /// Value, in the channel's unit.
@@ -17,14 +17,14 @@ pub struct Felt {
 
 /// A descriptor measured on a channel.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
+pub struct DescriptorReading {
     /// Channel, as the caller numbers them.
     pub channel: u16,
     /// Unit vector.
     pub vector: Arc<[f32]>,
 }
 
-/// How a contact was reached, which decides what its position tells about the object's size.
+/// How a contact was reached, which decides what its position says about the object's size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reached {
     /// By a walk: anywhere on the object, or within a step of the contact before.
@@ -51,9 +51,9 @@ pub struct Contact {
     /// Standard deviation of the normal's direction, per axis \[rad\].
     pub normal_sd_rad: f64,
     /// Levels, at most one per channel.
-    pub levels: Vec<Felt>,
+    pub levels: Vec<LevelReading>,
     /// Descriptors, at most one per channel.
-    pub descriptors: Vec<Seen>,
+    pub descriptors: Vec<DescriptorReading>,
     /// How it was reached.
     pub reached: Reached,
 }
@@ -84,14 +84,7 @@ impl Contact {
     /// The same with a level.
     #[must_use]
     pub fn with_level(mut self, channel: u16, value: f64, sd: f64) -> Self {
-        self.levels.push(Felt { channel, value, sd });
-        self
-    }
-
-    /// The same with a descriptor (a unit vector).
-    #[must_use]
-    pub fn with_descriptor(mut self, channel: u16, vector: Arc<[f32]>) -> Self {
-        self.descriptors.push(Seen { channel, vector });
+        self.levels.push(LevelReading { channel, value, sd });
         self
     }
 

@@ -5,6 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
 use crate::model::{LevelMemory, ObjectModel};
+use crate::numeric::floor_u32;
 use crate::surfels::map::SurfelMap;
 
 use crate::tuning::{FIELD_PER_SPACING, SHARE_BINS, SHARE_SAMPLES};
@@ -70,12 +71,7 @@ impl IndexedModel {
     /// Mean share of the model within `reach_m` of one of its places.
     pub(crate) fn share(&self, reach_m: f64) -> f64 {
         let at = (reach_m / self.extent_m).clamp(0.0, 1.0) * SHARE_BINS as f64;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "0 to SHARE_BINS"
-        )]
-        let below = (at as usize).min(SHARE_BINS - 1);
+        let below = (floor_u32(at) as usize).min(SHARE_BINS - 1);
         let part = at - below as f64;
         self.shares[below] * (1.0 - part) + self.shares[below + 1] * part
     }
@@ -87,13 +83,8 @@ fn shares(positions: &[Point3<f64>], extent_m: f64) -> [f64; SHARE_BINS + 1] {
     let mut total = 0.0;
     for from in positions.iter().step_by(step) {
         for to in positions {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "0 to SHARE_BINS"
-            )]
-            let bin = ((to - from).norm() / extent_m * SHARE_BINS as f64).ceil() as usize;
-            counts[bin.min(SHARE_BINS)] += 1.0;
+            let bin = ((to - from).norm() / extent_m * SHARE_BINS as f64).ceil();
+            counts[(floor_u32(bin) as usize).min(SHARE_BINS)] += 1.0;
             total += 1.0;
         }
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::contact::{Contact, Seen};
+use crate::contact::{Contact, DescriptorReading};
 use crate::level_prior::LevelPrior;
 use crate::model::LevelMemory;
 use crate::tuning::{DESCRIPTOR_SCALE, LEVEL_VARIANCE_FLOOR, WRONG_PERCEPT_SHARE};
@@ -16,36 +16,39 @@ pub(crate) struct IndexedPlace {
     /// \[m²\].
     pub(crate) variance_m2: f64,
     pub(crate) levels: Vec<LevelMemory>,
-    pub(crate) descriptors: Vec<Seen>,
+    pub(crate) descriptors: Vec<DescriptorReading>,
 }
 
 impl IndexedPlace {
     /// Log likelihood ratio of a contact's levels and descriptors: at this place, against anywhere.
     pub(crate) fn percept_log(&self, contact: &Contact, level_prior: &[LevelPrior]) -> f64 {
         let mut sum = 0.0;
-        for felt in &contact.levels {
-            let own = self.levels.iter().find(|own| own.channel == felt.channel);
+        for reading in &contact.levels {
+            let own = self
+                .levels
+                .iter()
+                .find(|own| own.channel == reading.channel);
             let level_prior = level_prior
                 .iter()
-                .find(|level_prior| level_prior.channel == felt.channel);
+                .find(|level_prior| level_prior.channel == reading.channel);
             if let (Some(own), Some(level_prior)) = (own, level_prior) {
                 let variance = own.variance()
-                    + felt.sd * felt.sd
+                    + reading.sd * reading.sd
                     + level_prior.variance * LEVEL_VARIANCE_FLOOR;
-                let apart = felt.value - own.mean;
+                let apart = reading.value - own.mean;
                 let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
-                sum += ((1.0 - WRONG_PERCEPT_SHARE) * here / level_prior.density(felt)
+                sum += ((1.0 - WRONG_PERCEPT_SHARE) * here / level_prior.density(reading)
                     + WRONG_PERCEPT_SHARE)
                     .ln();
             }
         }
-        for seen in &contact.descriptors {
+        for reading in &contact.descriptors {
             let own = self
                 .descriptors
                 .iter()
-                .find(|own| own.channel == seen.channel);
+                .find(|own| own.channel == reading.channel);
             if let Some(own) = own {
-                let cos: f64 = seen
+                let cos: f64 = reading
                     .vector
                     .iter()
                     .zip(own.vector.iter())

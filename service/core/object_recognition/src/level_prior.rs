@@ -1,6 +1,6 @@
 //! Distribution of the levels of a channel over all places of a library.
 
-use crate::contact::Felt;
+use crate::contact::LevelReading;
 use crate::model::LevelMemory;
 use crate::tuning::LEVEL_DENSITY_FLOOR;
 
@@ -14,9 +14,9 @@ pub(crate) struct LevelPrior {
 
 impl LevelPrior {
     /// Density of a level anywhere, times √(2π).
-    pub(crate) fn density(&self, felt: &Felt) -> f64 {
-        let apart = felt.value - self.mean;
-        let variance = self.variance + felt.sd * felt.sd;
+    pub(crate) fn density(&self, reading: &LevelReading) -> f64 {
+        let apart = reading.value - self.mean;
+        let variance = self.variance + reading.sd * reading.sd;
         // The floor takes values far off all others for misreadings.
         ((-0.5 * apart * apart / variance).exp() + LEVEL_DENSITY_FLOOR) / variance.sqrt()
     }

@@ -22,7 +22,7 @@ mod translations;
 mod tuning;
 mod z_score;
 
-pub use contact::{Contact, Felt, Reached, Seen};
+pub use contact::{Contact, DescriptorReading, LevelReading, Reached};
 pub use library::{ObjectId, ObjectLibrary};
 pub use model::{LevelMemory, ModelPlace, ModelSettings, ObjectModel};
 pub use next_touch::NextTouch;

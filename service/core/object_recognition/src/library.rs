@@ -9,6 +9,7 @@ use nalgebra::Point3;
 use crate::indexed_model::IndexedModel;
 use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::ObjectModel;
+use crate::surfels::map::PerceptContext;
 use crate::tuning::BACKGROUND_SAMPLES;
 
 /// Number of an object, chosen by the caller.
@@ -134,6 +135,15 @@ impl ObjectLibrary {
 
     pub(crate) fn indexed(&self, id: ObjectId) -> Option<&IndexedModel> {
         self.objects.get(&id).map(|object| &object.indexed)
+    }
+
+    /// What the densities of contacts with a model depend on beside its surfels.
+    pub(crate) fn percept_context<'a>(&'a self, indexed: &'a IndexedModel) -> PerceptContext<'a> {
+        PerceptContext {
+            places: &indexed.places,
+            level_prior: &self.level_prior,
+            clutter_per_m3: self.clutter_per_m3(),
+        }
     }
 
     /// An even sample of the places of all models, for the background model.

@@ -5,7 +5,6 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use crate::contact::Contact;
 use crate::indexed_model::IndexedModel;
 use crate::library::{ObjectId, ObjectLibrary};
-use crate::surfels::map::PerceptContext;
 use crate::tuning::{GAIN_NATS_MAX, POSE_WORTH, RIVAL_WEIGHT_MIN, RIVALS_MAX, SITES_MAX};
 
 /// A touch with its expected information.
@@ -34,25 +33,11 @@ pub(crate) struct WeightedPose {
 /// of the model are common to all contacts near the touch.
 pub(crate) fn next_touch(
     library: &ObjectLibrary,
-    mut rivals: Vec<WeightedPose>,
+    rivals: Vec<WeightedPose>,
     contacts: &[Contact],
 ) -> Option<NextTouch> {
-    let like = contacts.last()?;
-    rivals.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-    // One pose of every object, then further poses.
-    let mut chosen: Vec<WeightedPose> = Vec::with_capacity(RIVALS_MAX);
-    for first in [true, false] {
-        for rival in rivals
-            .iter()
-            .filter(|rival| rival.weight > RIVAL_WEIGHT_MIN)
-        {
-            let met = chosen.iter().any(|other| other.object == rival.object);
-            let same = |other: &WeightedPose| other.map_from_episode == rival.map_from_episode;
-            if chosen.len() < RIVALS_MAX && met != first && !chosen.iter().any(same) {
-                chosen.push(*rival);
-            }
-        }
-    }
+    let last = contacts.last()?;
+    let chosen = choose(rivals);
     if chosen.len() < 2 {
         return None;
     }
@@ -63,34 +48,8 @@ pub(crate) fn next_touch(
         };
         let back = own.map_from_episode.inverse();
         for site in touch_sites(indexed) {
-            let mut touch = like.clone();
-            touch.position_m = back * site.position;
-            touch.normal = site.normal.map(|normal| back * normal);
-            touch.levels.clear();
-            touch.descriptors.clear();
-            for level in &indexed.places[site.place].levels {
-                let sd = level.variance().sqrt();
-                touch = touch.with_level(level.channel, level.mean, sd);
-            }
-            let here = log(library, indexed, own, &touch);
-            let told = chosen.iter().map(|other| {
-                let worth = if other.object == own.object {
-                    POSE_WORTH
-                } else {
-                    1.0
-                };
-                let there = library
-                    .indexed(other.object)
-                    .map_or(here, |indexed| log(library, indexed, other, &touch));
-                other.weight * worth * (here - there).clamp(0.0, GAIN_NATS_MAX)
-            });
-            let before = indexed.surfel_map.as_ref().map_or(0.0, |surfel_map| {
-                let alike = contacts
-                    .iter()
-                    .map(|before| surfel_map.error_correlation(&touch, before));
-                alike.sum()
-            });
-            let gain_nats = own.weight * told.sum::<f64>() / (1.0 + before);
+            let touch = site.touch(indexed, &back, last);
+            let gain_nats = gain_nats(library, indexed, own, &chosen, &touch, contacts);
             if gain_nats > best.map_or(0.0, |best| best.gain_nats) {
                 best = Some(NextTouch {
                     point_m: touch.position_m,
@@ -103,6 +62,53 @@ pub(crate) fn next_touch(
     best
 }
 
+/// The heaviest hypotheses: one pose of every object, then further poses.
+fn choose(mut rivals: Vec<WeightedPose>) -> Vec<WeightedPose> {
+    rivals.retain(|rival| rival.weight > RIVAL_WEIGHT_MIN);
+    rivals.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    let mut chosen: Vec<WeightedPose> = Vec::with_capacity(RIVALS_MAX);
+    for is_first in [true, false] {
+        for rival in &rivals {
+            let is_known = chosen.iter().any(|other| other.object == rival.object);
+            let same = |other: &WeightedPose| other.map_from_episode == rival.map_from_episode;
+            if chosen.len() < RIVALS_MAX && is_known != is_first && !chosen.iter().any(same) {
+                chosen.push(*rival);
+            }
+        }
+    }
+    chosen
+}
+
+/// Information that is expected of a touch of the hypothesis `own` \[nats\].
+fn gain_nats(
+    library: &ObjectLibrary,
+    indexed: &IndexedModel,
+    own: &WeightedPose,
+    rivals: &[WeightedPose],
+    touch: &Contact,
+    contacts: &[Contact],
+) -> f64 {
+    let here = log(library, indexed, own, touch);
+    let gains = rivals.iter().map(|other| {
+        let worth = if other.object == own.object {
+            POSE_WORTH
+        } else {
+            1.0
+        };
+        let there = library
+            .indexed(other.object)
+            .map_or(here, |indexed| log(library, indexed, other, touch));
+        other.weight * worth * (here - there).clamp(0.0, GAIN_NATS_MAX)
+    });
+    let correlated = indexed.surfel_map.as_ref().map_or(0.0, |surfel_map| {
+        let correlations = contacts
+            .iter()
+            .map(|before| surfel_map.error_correlation(touch, before));
+        correlations.sum()
+    });
+    own.weight * gains.sum::<f64>() / (1.0 + correlated)
+}
+
 /// A point where a model could be touched.
 struct TouchSite {
     position: Point3<f64>,
@@ -110,8 +116,24 @@ struct TouchSite {
     place: usize,
 }
 
+impl TouchSite {
+    /// A touch here with the noise of another, in the frame that `back` leads to.
+    fn touch(&self, indexed: &IndexedModel, back: &Isometry3<f64>, like: &Contact) -> Contact {
+        let mut touch = Contact {
+            position_m: back * self.position,
+            normal: self.normal.map(|normal| back * normal),
+            ..like.bare()
+        };
+        for level in &indexed.places[self.place].levels {
+            let sd = level.variance().sqrt();
+            touch = touch.with_level(level.channel, level.mean, sd);
+        }
+        touch
+    }
+}
+
 /// An even sample of a model's places, on its smoothed surface: of the raw places those with the
-/// largest errors would seem to tell most.
+/// largest errors would seem to be the most informative.
 fn touch_sites(indexed: &IndexedModel) -> Vec<TouchSite> {
     if let Some(surfel_map) = &indexed.surfel_map {
         let step = surfel_map.surfels.len().div_ceil(SITES_MAX).max(1);
@@ -142,11 +164,7 @@ fn log(
 ) -> f64 {
     if let Some(surfel_map) = &indexed.surfel_map {
         let to_middle = nalgebra::Translation3::from(-surfel_map.middle);
-        let context = PerceptContext {
-            places: &indexed.places,
-            level_prior: library.level_prior(),
-            clutter_per_m3: library.clutter_per_m3(),
-        };
+        let context = library.percept_context(indexed);
         return surfel_map.contact_log(&(to_middle * rival.map_from_episode), touch, context);
     }
     let point = rival.map_from_episode * touch.position_m;

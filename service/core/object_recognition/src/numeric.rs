@@ -1,5 +1,7 @@
 //! Small numeric functions of the inner loops.
 
+use nalgebra::Vector3;
+
 /// Rounded to single precision.
 #[inline]
 pub(crate) fn to_f32(x: f64) -> f32 {
@@ -37,6 +39,14 @@ pub(crate) fn exp(x: f32) -> f32 {
                 + f * (0.055_504_11
                     + f * (0.009_618_129 + f * (0.001_333_356 + f * 0.000_154_035)))));
     series * f32::from_bits((shifted.to_bits() << 23).wrapping_add(0x3F80_0000))
+}
+
+/// The least and the largest coordinates of some points; zeros without any.
+pub(crate) fn bounds(points: impl Iterator<Item = Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
+    points
+        .map(|point| (point, point))
+        .reduce(|(low, high), (point, _)| (low.inf(&point), high.sup(&point)))
+        .unwrap_or_default()
 }
 
 /// log Σ exp, without overflow.

@@ -3,7 +3,7 @@
 use nalgebra::UnitQuaternion;
 use pulp::Arch;
 
-use crate::contact::Contact;
+use crate::contact::{Contact, LevelReading};
 use crate::index::packed_places::{PackedPlace, PackedPlaces};
 use crate::indexed_model::IndexedModel;
 use crate::level_prior::LevelPrior;
@@ -63,15 +63,15 @@ struct NormalPercept {
 impl<'a> ContactPercepts<'a> {
     /// Of a contact, with the distribution of levels over the library.
     pub(crate) fn new(contact: &'a Contact, level_prior: &'a [LevelPrior]) -> Self {
-        let level = |felt: &crate::contact::Felt| {
+        let level = |reading: &LevelReading| {
             let level_prior = level_prior
                 .iter()
-                .find(|level_prior| level_prior.channel == felt.channel)?;
+                .find(|level_prior| level_prior.channel == reading.channel)?;
             Some(Level {
-                channel: felt.channel,
-                value: felt.value,
-                noise: felt.sd * felt.sd + level_prior.variance * LEVEL_VARIANCE_FLOOR,
-                scale: (1.0 - WRONG_PERCEPT_SHARE) / level_prior.density(felt),
+                channel: reading.channel,
+                value: reading.value,
+                noise: reading.sd * reading.sd + level_prior.variance * LEVEL_VARIANCE_FLOOR,
+                scale: (1.0 - WRONG_PERCEPT_SHARE) / level_prior.density(reading),
             })
         };
         Self {
@@ -119,7 +119,7 @@ impl PerceptLikelihood<'_> {
     /// Likelihood ratio of the percepts: at a place, against anywhere. It is the exponential of
     /// [`percept_log`](crate::indexed_place::IndexedPlace::percept_log), times that of the normal.
     pub(crate) fn likelihood(&self, number: usize, packed_place: &PackedPlace) -> f32 {
-        let felt = match &self.kind {
+        let likelihood = match &self.kind {
             PerceptForm::Nothing => 1.0,
             PerceptForm::Level {
                 value,
@@ -133,9 +133,9 @@ impl PerceptLikelihood<'_> {
             PerceptForm::Several => self.place_likelihood(number),
         };
         match &self.normal_percept {
-            None => felt,
+            None => likelihood,
             Some(normal_percept) => {
-                felt * normal_percept.likelihood(&self.indexed.packed.normals[number])
+                likelihood * normal_percept.likelihood(&self.indexed.packed.normals[number])
             }
         }
     }
@@ -148,7 +148,7 @@ impl PerceptLikelihood<'_> {
     #[inline(always)]
     pub(crate) fn likelihoods_of(&self, numbers: &[u32; LANES], count: usize) -> [f32; LANES] {
         let packed = &self.indexed.packed.all;
-        let mut felt = [1.0; LANES];
+        let mut likelihoods = [1.0; LANES];
         match (&self.kind, &self.normal_percept) {
             (PerceptForm::Nothing, None) => {}
             (
@@ -164,18 +164,18 @@ impl PerceptLikelihood<'_> {
                     own.map(|packed_place| packed_place.level),
                     own.map(|packed_place| packed_place.level_variance),
                 );
-                felt = std::array::from_fn(|k| {
+                likelihoods = std::array::from_fn(|k| {
                     level_likelihood(value - levels[k], variances[k] + noise, *scale)
                 });
             }
             _ => {
-                for (felt, number) in felt.iter_mut().zip(&numbers[..count]) {
+                for (likelihood, number) in likelihoods.iter_mut().zip(&numbers[..count]) {
                     let number = *number as usize;
-                    *felt = self.likelihood(number, &packed[number]);
+                    *likelihood = self.likelihood(number, &packed[number]);
                 }
             }
         }
-        felt
+        likelihoods
     }
 
     /// The same for all places of the model.
@@ -197,15 +197,17 @@ impl PerceptLikelihood<'_> {
                 Arch::new().dispatch(
                     #[inline(always)]
                     || {
-                        for ((felt, level), variance) in out.iter_mut().zip(levels).zip(variances) {
-                            *felt = level_likelihood(value - level, variance + noise, scale);
+                        for ((likelihood, level), variance) in
+                            out.iter_mut().zip(levels).zip(variances)
+                        {
+                            *likelihood = level_likelihood(value - level, variance + noise, scale);
                         }
                     },
                 );
             }
             PerceptForm::Several => {
-                for (number, felt) in out.iter_mut().enumerate() {
-                    *felt = self.place_likelihood(number);
+                for (number, likelihood) in out.iter_mut().enumerate() {
+                    *likelihood = self.place_likelihood(number);
                 }
             }
         }
@@ -213,8 +215,8 @@ impl PerceptLikelihood<'_> {
             Arch::new().dispatch(
                 #[inline(always)]
                 || {
-                    for (felt, normal) in out.iter_mut().zip(normals) {
-                        *felt *= normal_percept.likelihood(normal);
+                    for (likelihood, normal) in out.iter_mut().zip(normals) {
+                        *likelihood *= normal_percept.likelihood(normal);
                     }
                 },
             );
@@ -277,7 +279,7 @@ mod tests {
     use crate::{ModelSettings, ObjectModel};
 
     #[test]
-    fn a_packed_place_feels_like_the_place_itself() {
+    fn a_packed_place_has_the_likelihood_of_the_place_itself() {
         let level = |channel, mean| LevelMemory {
             channel,
             count: 3.0,
@@ -337,9 +339,9 @@ mod tests {
                     let packed = local.likelihood(number, packed_place);
                     assert!((all[number] / packed - 1.0).abs() < 1e-6);
                     let mut full = place.percept_log(contact, &level_prior);
-                    if let (Some(felt), Some(own)) = (contact.normal, place.normal) {
+                    if let (Some(normal), Some(own)) = (contact.normal, place.normal) {
                         let variance = 0.1 * 0.1 + NORMAL_VARIANCE;
-                        let apart = 2.0 * (1.0 - (turn * felt.into_inner()).dot(&own));
+                        let apart = 2.0 * (1.0 - (turn * normal.into_inner()).dot(&own));
                         let right = 0.9 * 2.0 / variance * (-0.5 * apart / variance).exp();
                         full += (right + 0.1).ln();
                     }

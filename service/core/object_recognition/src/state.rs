@@ -1,14 +1,12 @@
 //! State of contacts and models, for checkpoints.
 
-use nalgebra::{Unit, Vector3};
-
 use crate::{
-    Contact, Felt, LevelMemory, ModelPlace, ModelSettings, ObjectId, ObjectModel, Orientation,
-    Reached, Seen, Verdict,
+    Contact, DescriptorReading, LevelMemory, LevelReading, ModelPlace, ModelSettings, ObjectId,
+    ObjectModel, Orientation, Reached, Verdict,
 };
 use state::{
-    CorruptState, ITEMS_MAX, State, StateReader, StateWriter, read_list, state_of_enum,
-    state_of_newtype, state_of_struct, write_list,
+    CorruptState, Counted, State, StateReader, StateWriter, state_of_enum, state_of_newtype,
+    state_of_struct, write_list,
 };
 
 state_of_struct!(LevelMemory {
@@ -18,7 +16,7 @@ state_of_struct!(LevelMemory {
     squares,
     noise
 });
-state_of_struct!(Felt { channel, value, sd });
+state_of_struct!(LevelReading { channel, value, sd });
 
 state_of_newtype!(ObjectId);
 state_of_enum!(Reached {
@@ -27,72 +25,34 @@ state_of_enum!(Reached {
     Drawn = 2
 });
 
-impl State for Seen {
-    fn write(&self, out: &mut StateWriter) {
-        self.channel.write(out);
-        write_list(self.vector.iter(), out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            channel: State::read(input)?,
-            vector: read_list::<f32>(input, ITEMS_MAX)?.into(),
-        })
-    }
-}
-
-impl State for Contact {
-    fn write(&self, out: &mut StateWriter) {
-        self.position_m.write(out);
-        (self.position_sd_m, self.drift_sd_m).write(out);
-        self.normal.map(Unit::into_inner).write(out);
-        self.normal_sd_rad.write(out);
-        write_list(self.levels.iter(), out);
-        write_list(self.descriptors.iter(), out);
-        self.reached.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let position_m = State::read(input)?;
-        let (position_sd_m, drift_sd_m) = State::read(input)?;
-        // Not normalised again: that might change the last bit.
-        let normal = Option::<Vector3<f64>>::read(input)?.map(Unit::new_unchecked);
-        Ok(Self {
-            position_m,
-            position_sd_m,
-            drift_sd_m,
-            normal,
-            normal_sd_rad: State::read(input)?,
-            levels: read_list(input, ITEMS_MAX)?,
-            descriptors: read_list(input, ITEMS_MAX)?,
-            reached: State::read(input)?,
-        })
-    }
-}
-
-impl State for ModelPlace {
-    fn write(&self, out: &mut StateWriter) {
-        self.position_m.write(out);
-        self.normals.write(out);
-        [self.count, self.variance_m2, self.normal_variance].write(out);
-        write_list(self.levels.iter(), out);
-        write_list(self.descriptors.iter(), out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let (position_m, normals) = State::read(input)?;
-        let [count, variance_m2, normal_variance] = State::read(input)?;
-        Ok(Self {
-            position_m,
-            normals,
-            count,
-            variance_m2,
-            normal_variance,
-            levels: read_list(input, ITEMS_MAX)?,
-            descriptors: read_list(input, ITEMS_MAX)?,
-        })
-    }
-}
+state_of_struct!(DescriptorReading {
+    channel,
+    vector as Counted<u32>,
+});
+state_of_struct!(Contact {
+    position_m,
+    position_sd_m,
+    drift_sd_m,
+    normal,
+    normal_sd_rad,
+    levels,
+    descriptors,
+    reached,
+});
+state_of_struct!(ModelPlace {
+    position_m,
+    normals,
+    count,
+    variance_m2,
+    normal_variance,
+    levels,
+    descriptors,
+});
+state_of_enum!(Orientation {
+    Known = 0,
+    Free = 1,
+    Finite(rotations) = 2,
+});
 
 impl State for ObjectModel {
     fn write(&self, out: &mut StateWriter) {
@@ -109,30 +69,8 @@ impl State for ObjectModel {
             places_max: usize::try_from(places_max).map_err(|_| CorruptState::Invalid)?,
         };
         let spacing_m = State::read(input)?;
-        let places = read_list(input, ITEMS_MAX)?;
+        let places = State::read(input)?;
         Ok(Self::with_places(settings, spacing_m, places))
-    }
-}
-
-impl State for Orientation {
-    fn write(&self, out: &mut StateWriter) {
-        match self {
-            Self::Known => 0u8.write(out),
-            Self::Free => 1u8.write(out),
-            Self::Finite(rotations) => {
-                2u8.write(out);
-                write_list(rotations.iter(), out);
-            }
-        }
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(match u8::read(input)? {
-            0 => Self::Known,
-            1 => Self::Free,
-            2 => Self::Finite(read_list(input, ITEMS_MAX)?),
-            _ => return Err(CorruptState::Invalid),
-        })
     }
 }
 

@@ -141,7 +141,7 @@ pub(crate) const LIST_CELL_PER_REACH: f64 = 0.33;
 
 // Surfels: fitting them to places.
 
-/// Neighbours by which the density of places is told: their number scatters by a third. Chosen.
+/// Neighbours by which the density of places is estimated: their number scatters by a third. Chosen.
 pub(crate) const DENSITY_NEIGHBOURS: usize = 10;
 /// Neighbours to which a surfel is fitted. Chosen.
 pub(crate) const FIT_NEIGHBOURS: usize = 16;
@@ -184,7 +184,7 @@ pub(crate) const REACH_SD: f64 = 2.45;
 pub(crate) const DEPTH_MAX: f64 = 100.0;
 /// Part of the curvature of the coverage that damps a step of the pose. Chosen.
 pub(crate) const EDGE_DAMPING: f64 = 0.25;
-/// Places whose leave-one-out density tells what a right pose explains. Budget.
+/// Places whose leave-one-out density says what a right pose explains. Budget.
 pub(crate) const LEAVE_ONE_OUT_MAX: usize = 256;
 /// Floor of a coarse score \[nats\], so that one outlier does not decide. Chosen.
 pub(crate) const COARSE_MIN: f64 = -12.0;

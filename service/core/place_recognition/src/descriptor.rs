@@ -1,4 +1,4 @@
-//! How alike two descriptors are.
+//! Similarity of two descriptors.
 
 /// Sums of a scalar product that grow side by side, so that the compiler may use vector registers:
 /// a single sum has an order of additions that it has to keep.
@@ -19,7 +19,12 @@ pub fn dot(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum::<f32>() + rest
 }
 
+/// Cosine of two unit vectors, as the sum of their products.
+pub(crate) fn cosine(a: &[f32], b: &[f32]) -> f64 {
+    f64::from(dot(a, b))
+}
+
 /// Angle between two unit vectors \[rad\].
 pub(crate) fn angle_rad(a: &[f32], b: &[f32]) -> f64 {
-    f64::from(dot(a, b)).clamp(-1.0, 1.0).acos()
+    cosine(a, b).clamp(-1.0, 1.0).acos()
 }

@@ -7,9 +7,8 @@
 //! The damping λ falls fivefold with a step that lowers the cost, and rises tenfold with one that
 //! does not (Marquardt 1963).
 
+use geometry::se3::plus;
 use nalgebra::{Isometry3, Matrix6, Vector6};
-
-use crate::twist::moved;
 
 /// Cost of a pose, with its gradient and its Gauss–Newton Hessian (right perturbation).
 pub(crate) struct NormalEquations {
@@ -47,7 +46,7 @@ impl Descent {
             let Some(factor) = hessian.cholesky() else {
                 break;
             };
-            let next = moved(&pose, &-factor.solve(&here.gradient));
+            let next = plus(&pose, &-factor.solve(&here.gradient));
             let there = equations(&next);
             if there.cost < here.cost {
                 let is_done = here.cost - there.cost < self.tolerance * here.cost;

@@ -8,7 +8,6 @@ mod recognition;
 mod relocalisation;
 mod sequences;
 mod tuning;
-mod twist;
 mod view;
 mod views;
 

@@ -20,7 +20,7 @@ pub(crate) mod channel {
     pub(crate) const UNRELATED_MIN: u64 = 64;
     /// Views are similar when their angle is so many standard deviations below that of unrelated
     /// ones.
-    pub(crate) const ALIKE: f64 = 4.0;
+    pub(crate) const SIMILAR_SD: f64 = 4.0;
     /// A pair whose angle is so many standard deviations below the mean is not counted as
     /// unrelated.
     pub(crate) const RELATED: f64 = 3.0;
@@ -30,11 +30,11 @@ pub(crate) mod channel {
     pub(crate) const SD_M_MIN: f64 = 0.02;
     /// Share of the mean angle between unrelated views beyond which a view is new beside another.
     pub(crate) const NEWS: f64 = 0.25;
-    /// Least cosine of a class from which the kernel is fitted: views farther apart may be as alike
-    /// by chance.
-    pub(crate) const KERNEL_LIKENESS_MIN: f64 = 0.5;
+    /// Least cosine of a class from which the kernel is fitted: views farther apart may be as
+    /// similar by chance.
+    pub(crate) const KERNEL_COSINE_MIN: f64 = 0.5;
     /// Largest cosine of two views of one place: views are noisy.
-    pub(crate) const LIKENESS_MAX: f64 = 0.999;
+    pub(crate) const COSINE_MAX: f64 = 0.999;
     /// Width of a class \[rad\].
     pub(crate) const WIDTH_RAD: f64 = FRAC_PI_2 / CLASSES as f64;
 }
@@ -137,7 +137,7 @@ pub(crate) mod alignment {
     /// ε: probability of an outlier.
     pub(crate) const WRONG: f64 = 0.05;
     /// G: largest evidence of a query \[nats\].
-    pub(crate) const TELLS_MAX: f64 = 3.0;
+    pub(crate) const EVIDENCE_MAX: f64 = 3.0;
     /// Largest part τ of the effective dimension.
     pub(crate) const COUNTED_MAX: f64 = 0.5;
     /// Largest evidence of a query for a pose against another one at which it cannot be judged
@@ -272,7 +272,7 @@ pub(crate) mod relocalise {
     /// where they differ by more, the map is thin, and the batch rests on what the map leaves open.
     pub(crate) const ROUGHLY: f64 = 2.0;
     /// Largest factor of the covariance: beyond it the map contradicts the queries, or itself.
-    pub(crate) const WIDER_MAX: f64 = 2.0;
+    pub(crate) const INFLATION_MAX: f64 = 2.0;
     /// Most guesses.
     pub(crate) const GUESSES_MAX: usize = 8;
 }
@@ -286,7 +286,7 @@ pub(crate) mod kidnap {
     /// correlated errors.
     pub(crate) const SPACING: f64 = 0.25;
     /// Factor by which the errors of a pose may exceed their standard deviations.
-    pub(crate) const WIDER: f64 = 2.0;
+    pub(crate) const INFLATION: f64 = 2.0;
     /// A view nearer than this to the one before must be similar to it, in reaches: else one of
     /// them is an outlier.
     pub(crate) const BESIDE: f64 = 0.6;

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector6;
 
-use super::elimination::slot;
+use super::elimination::{dot, slot};
 use super::equations::NormalEquations;
 
 /// The step along the steepest descent, and the scale in which steps are measured.
@@ -106,19 +106,10 @@ fn quadratic_form(equations: &NormalEquations<'_>, step: &[f64]) -> f64 {
     sum
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 impl NormalEquations<'_> {
     /// The unknowns of a node in their places in a twist.
     fn twist(&self, node: u32, step: &[f64]) -> Vector6<f64> {
-        let mut twist = Vector6::zeros();
-        let axes = self.map.nodes[node as usize].axes();
-        for (&axis, unknown) in axes.iter().zip(&step[slot(node as usize, 0, 1)..]) {
-            twist[axis] = *unknown;
-        }
-        twist
+        self.map.nodes[node as usize].twist(&step[slot(node as usize, 0, 1)..])
     }
 
     /// Adds the components that are unknowns of a node to those of all nodes.

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::elimination::{Equations, Front};
+use super::elimination::{Equations, Front, number};
 use super::graph::PoseGraph;
 use super::linearisation::NormalBlocks;
 
@@ -27,7 +27,7 @@ impl Equations for NormalEquations<'_> {
         &self.map.links_of[variable as usize]
     }
 
-    fn ties(&self, link: u32) -> bool {
+    fn couples(&self, link: u32) -> bool {
         self.map.links[link as usize].is_on
     }
 
@@ -62,8 +62,7 @@ impl NormalEquations<'_> {
 
     /// Hands out the nodes and the blocks of every link that is on.
     pub(super) fn for_each_link(&self, mut each: impl FnMut(u32, u32, &NormalBlocks)) {
-        for link in 0..self.map.links.len() {
-            let link = u32::try_from(link).expect("fewer than 2³² links");
+        for link in 0..number(self.map.links.len()) {
             if let Some((from, to, blocks)) = self.blocks(link) {
                 each(from, to, &blocks);
             }

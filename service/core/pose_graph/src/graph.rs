@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use super::elimination::number;
 use super::kernel::Kernel;
 use super::link::{Link, LinkId};
 use super::node::{Freedom, Node, PointId, PoseId};
@@ -137,11 +138,6 @@ impl PoseGraph {
         nodes.map(|(number, node)| (PointId(number), node.pose.translation.vector.into()))
     }
 
-    /// Number of nodes.
-    pub fn n_nodes(&self) -> usize {
-        self.nodes.len()
-    }
-
     /// Number of links, those switched off among them.
     pub fn n_links(&self) -> usize {
         self.links.len()
@@ -233,9 +229,4 @@ impl PoseGraph {
         self.links_of.push(Vec::new());
         id
     }
-}
-
-/// The number of the node or link that comes next. Memory ends long before the numbers do.
-fn number(count: usize) -> u32 {
-    u32::try_from(count).expect("fewer than 2³² nodes and links")
 }

@@ -171,22 +171,22 @@ impl IncrementalRelaxation {
             progress.built_in[clique as usize] = progress.step;
         }
         let (settings, linearised_at) = (&self.settings, &self.linearised_at);
-        let mut news = News {
+        let mut affected = Affected {
             settings,
             map,
             linearised_at,
             progress,
             n_solved: 0,
         };
-        self.tree.solve_where(&mut self.solution, &mut news);
-        updated.n_solved += news.n_solved;
+        self.tree.solve_where(&mut self.solution, &mut affected);
+        updated.n_solved += affected.n_solved;
         progress.drifted.sort_unstable();
         progress.drifted.dedup();
     }
 }
 
 /// The cliques that are new, and all that depend on nodes which have moved.
-struct News<'a> {
+struct Affected<'a> {
     settings: &'a IncrementalSettings,
     map: &'a mut PoseGraph,
     linearised_at: &'a [Isometry3<f64>],
@@ -194,7 +194,7 @@ struct News<'a> {
     n_solved: usize,
 }
 
-impl Part for News<'_> {
+impl Part for Affected<'_> {
     fn wants(&mut self, clique: u32, separator: &[u32]) -> bool {
         let Progress {
             step,
@@ -217,9 +217,9 @@ impl Part for News<'_> {
         }
         let known = &mut progress.passed_on[slot(node as usize, 0, 1)..][..unknowns.len()];
         let (known_shift, known_turn) = place.motion(known);
-        let is_news = (shift - known_shift).norm() > settings.neglected_m
+        let is_passed_on = (shift - known_shift).norm() > settings.neglected_m
             || (turn - known_turn).norm() > settings.neglected_rad;
-        if is_news {
+        if is_passed_on {
             known.copy_from_slice(unknowns);
             progress.moved_in[node as usize] = progress.step;
         }

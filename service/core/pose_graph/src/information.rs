@@ -1,8 +1,8 @@
 //! Information matrices: inverses of the covariances of measurements.
 
-use nalgebra::{Cholesky, Matrix3, Matrix6, SMatrix};
+use nalgebra::{Cholesky, Matrix3, SMatrix};
 
-use geometry::PoseCovariance;
+use geometry::{PoseCovariance, symmetric};
 
 /// A negative eigenvalue down to here, as a share of the trace, is a zero that was rounded.
 const ROUNDING: f64 = 1e-9;
@@ -21,25 +21,34 @@ pub enum InvalidInformation {
     Singular,
 }
 
+/// Information about N components of a measurement, N×N. Symmetric and positive semidefinite:
+/// directions of which nothing was measured have zeros.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Information<const N: usize>(SMatrix<f64, N, N>);
+
 /// Information about a whole relative pose, 6×6, order translation \[1/m²\], rotation \[1/rad²\],
-/// of the ξ in T = T̂ exp(ξ). Symmetric and positive semidefinite: directions of which nothing was
-/// measured have zeros.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseInformation(Matrix6<f64>);
+/// of the ξ in T = T̂ exp(ξ).
+pub type PoseInformation = Information<6>;
 
-/// Information about a position, 3×3 \[1/m²\], symmetric and positive semidefinite.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PositionInformation(Matrix3<f64>);
+/// Information about a position, 3×3 \[1/m²\].
+pub type PositionInformation = Information<3>;
 
-impl PoseInformation {
+impl<const N: usize> Information<N> {
     /// From a matrix, of which the lower triangle counts.
     ///
     /// # Errors
     /// It is not finite, or not positive semidefinite.
-    pub fn new(matrix: &Matrix6<f64>) -> Result<Self, InvalidInformation> {
+    pub fn new(matrix: &SMatrix<f64, N, N>) -> Result<Self, InvalidInformation> {
         checked(matrix).map(Self)
     }
 
+    /// The matrix.
+    pub fn matrix(&self) -> &SMatrix<f64, N, N> {
+        &self.0
+    }
+}
+
+impl PoseInformation {
     /// The inverse of a covariance.
     ///
     /// # Errors
@@ -47,33 +56,15 @@ impl PoseInformation {
     pub fn of_covariance(covariance: &PoseCovariance) -> Result<Self, InvalidInformation> {
         inverse(covariance.matrix()).map(Self)
     }
-
-    /// The matrix.
-    pub fn matrix(&self) -> &Matrix6<f64> {
-        &self.0
-    }
 }
 
 impl PositionInformation {
-    /// From a matrix, of which the lower triangle counts.
-    ///
-    /// # Errors
-    /// It is not finite, or not positive semidefinite.
-    pub fn new(matrix: &Matrix3<f64>) -> Result<Self, InvalidInformation> {
-        checked(matrix).map(Self)
-    }
-
     /// The inverse of a covariance.
     ///
     /// # Errors
     /// It is not finite or has no inverse.
     pub fn of_covariance(covariance: &Matrix3<f64>) -> Result<Self, InvalidInformation> {
         inverse(covariance).map(Self)
-    }
-
-    /// The matrix.
-    pub fn matrix(&self) -> &Matrix3<f64> {
-        &self.0
     }
 }
 
@@ -106,5 +97,5 @@ fn inverse<const N: usize>(
     if !inverse.iter().all(|entry| entry.is_finite()) {
         return Err(InvalidInformation::Singular);
     }
-    Ok((inverse + inverse.transpose()) * 0.5)
+    Ok(symmetric(&inverse))
 }

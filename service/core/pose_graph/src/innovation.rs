@@ -1,9 +1,9 @@
 //! Innovations: measurements against their predictions by a graph.
 
-use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, Vector3};
 
 use super::information::{PoseInformation, PositionInformation};
-use geometry::{PoseCovariance, log_jacobian, se3, upper_triangle};
+use geometry::{PoseCovariance, log_jacobian, se3, seen_by_pose};
 
 /// Share of the largest information below which a direction counts as not measured.
 const MEASURED: f64 = 1e-9;
@@ -59,7 +59,7 @@ impl ExpectedPose {
         let covariance = moved * self.covariance.matrix() * moved.transpose() + noise.matrix();
         Self {
             transform: self.transform * motion,
-            covariance: PoseCovariance::from_upper_triangle(&upper_triangle(&covariance)),
+            covariance: PoseCovariance::from_upper_part(&covariance),
         }
     }
 
@@ -70,7 +70,7 @@ impl ExpectedPose {
         let covariance = moved * self.covariance.matrix() * moved.transpose();
         Self {
             transform: self.transform.inverse(),
-            covariance: PoseCovariance::from_upper_triangle(&upper_triangle(&covariance)),
+            covariance: PoseCovariance::from_upper_part(&covariance),
         }
     }
 
@@ -80,8 +80,8 @@ impl ExpectedPose {
         measured: &Isometry3<f64>,
         information: &PoseInformation,
     ) -> Option<Innovation> {
-        let (linear, angular) = se3::log(&measured.inv_mul(&self.transform));
-        let difference = Vector6::from_iterator(linear.iter().chain(angular.iter()).copied());
+        let difference = se3::twist(&measured.inv_mul(&self.transform));
+        let (linear, angular) = se3::split(&difference);
         let jacobian = log_jacobian(&linear, &angular);
         let covariance = jacobian * self.covariance.matrix() * jacobian.transpose();
         innovation(&difference, &covariance, information.matrix())
@@ -94,14 +94,7 @@ impl ExpectedPosition {
     pub fn seen_after(&self, motion: &Isometry3<f64>, noise: &PoseCovariance) -> Self {
         let position = motion.inverse_transform_point(&self.position.into()).coords;
         let turn = motion.rotation.inverse().to_rotation_matrix().into_inner();
-        // What the pose's own motion does to the point in its frame: −ρ − φ×p.
-        let mut moved = SMatrix::<f64, 3, 6>::zeros();
-        moved
-            .fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(&-Matrix3::identity());
-        moved
-            .fixed_view_mut::<3, 3>(0, 3)
-            .copy_from(&position.cross_matrix());
+        let moved = seen_by_pose(&position);
         let noise = moved * noise.matrix() * moved.transpose();
         Self {
             position,

@@ -19,7 +19,7 @@ mod rotation_first;
 
 pub use graph::{InvalidLink, PoseGraph};
 pub use incremental::{IncrementalRelaxation, IncrementalSettings, Updated};
-pub use information::{InvalidInformation, PoseInformation, PositionInformation};
+pub use information::{Information, InvalidInformation, PoseInformation, PositionInformation};
 pub use innovation::{ExpectedPose, ExpectedPosition, Innovation};
 pub use kernel::{InvalidScale, Kernel, Scale};
 pub use link::{Link, LinkId, SightingTarget};

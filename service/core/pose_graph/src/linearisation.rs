@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use super::link::{Link, SightingTarget};
-use geometry::{log_jacobian, se3};
+use geometry::{from_blocks, log_jacobian, se3};
 
 /// Normal equations of one link at given poses: to second order in the motions δ of its nodes the
 /// link costs
@@ -30,7 +30,7 @@ impl Link {
             Self::PosePrior {
                 at, information, ..
             } => {
-                let residual = pose_residual(&(at.inv_mul(to)));
+                let residual = se3::twist(&at.inv_mul(to));
                 residual.dot(&(information.matrix() * residual))
             }
             Self::Between {
@@ -38,7 +38,7 @@ impl Link {
                 information,
                 ..
             } => {
-                let residual = pose_residual(&transform.inv_mul(&from.inv_mul(to)));
+                let residual = se3::twist(&transform.inv_mul(&from.inv_mul(to)));
                 residual.dot(&(information.matrix() * residual))
             }
             Self::PointPrior {
@@ -70,7 +70,7 @@ impl Link {
             Self::PosePrior {
                 at, information, ..
             } => {
-                let residual = pose_residual(&at.inv_mul(to));
+                let residual = se3::twist(&at.inv_mul(to));
                 let (to_to, to_gradient) = pose_blocks(&residual, information.matrix(), weigh);
                 NormalBlocks {
                     to_to,
@@ -84,7 +84,7 @@ impl Link {
                 ..
             } => {
                 let between = from.inv_mul(to);
-                let residual = pose_residual(&transform.inv_mul(&between));
+                let residual = se3::twist(&transform.inv_mul(&between));
                 let (to_to, to_gradient) = pose_blocks(&residual, information.matrix(), weigh);
                 // r(T_from exp δ) = r(T_to exp(−Ad(T_to⁻¹ T_from) δ)).
                 let moved = -se3::adjoint(&between.inverse());
@@ -141,8 +141,7 @@ fn sighting_blocks(
     let in_target = target.lever();
     let seen = seen(from, to, &in_target);
     let (information, force) = weighted(&(seen - position), information, weigh);
-    // The target's motion in the axes of the pose that saw it, and what that pose's own motion
-    // does to the target in its frame: −ρ − φ×seen.
+    // The target's motion in the axes of the pose that saw it.
     let turn = match target {
         SightingTarget::Point(_) => from.rotation.inverse(),
         SightingTarget::Pose(_) | SightingTarget::PointOf(..) => {
@@ -150,56 +149,55 @@ fn sighting_blocks(
         }
     };
     let turn = turn.to_rotation_matrix().into_inner();
-    let lever = seen.cross_matrix();
     let turned = turn.tr_mul(&information);
+    // What that pose's own motion does to the target in its frame: −ρ − φ×seen.
+    let lever = seen.cross_matrix();
     let with_lever = information * lever;
     let lever_lever = lever.tr_mul(&with_lever);
-    let mut from_from = corner(&information);
-    from_from
-        .fixed_view_mut::<3, 3>(0, 3)
-        .copy_from(&-with_lever);
-    from_from
-        .fixed_view_mut::<3, 3>(3, 0)
-        .copy_from(&-with_lever.transpose());
-    from_from
-        .fixed_view_mut::<3, 3>(3, 3)
-        .copy_from(&lever_lever);
-    let mut to_from = corner(&-turned);
-    to_from
-        .fixed_view_mut::<3, 3>(0, 3)
-        .copy_from(&(turned * lever));
-    let mut to_to = corner(&(turned * turn));
-    let mut to_gradient = top(&turn.tr_mul(&force));
-    // A point beside the target's origin moves by ρ + φ×l.
+    let zeros = Matrix3::zeros();
+    let mut blocks = NormalBlocks {
+        from_from: from_blocks(
+            &information,
+            &-with_lever,
+            &-with_lever.transpose(),
+            &lever_lever,
+        ),
+        to_from: from_blocks(&-turned, &(turned * lever), &zeros, &zeros),
+        to_to: corner(&(turned * turn)),
+        from_gradient: se3::join(&-force, &lever.tr_mul(&force)),
+        to_gradient: top(&turn.tr_mul(&force)),
+    };
     if in_target != Vector3::zeros() {
+        blocks.swing(&in_target, &turned, &turn, &lever, &force);
+    }
+    blocks
+}
+
+impl NormalBlocks {
+    /// Adds the rotation of a target whose point lies beside its origin: it moves by ρ + φ×l, with
+    /// l = `in_target`.
+    fn swing(
+        &mut self,
+        in_target: &Vector3<f64>,
+        turned: &Matrix3<f64>,
+        turn: &Matrix3<f64>,
+        lever: &Matrix3<f64>,
+        force: &Vector3<f64>,
+    ) {
         let swing = in_target.cross_matrix();
         let swung = swing * turned;
-        to_from.fixed_view_mut::<3, 3>(3, 0).copy_from(&-swung);
-        to_from
-            .fixed_view_mut::<3, 3>(3, 3)
-            .copy_from(&(swung * lever));
         let cross = swung * turn;
-        to_to.fixed_view_mut::<3, 3>(3, 0).copy_from(&cross);
-        to_to
-            .fixed_view_mut::<3, 3>(0, 3)
-            .copy_from(&cross.transpose());
-        to_to
-            .fixed_view_mut::<3, 3>(3, 3)
-            .copy_from(&-(cross * swing));
-        to_gradient
+        let put = |matrix: &mut Matrix6<f64>, row, column, block: &Matrix3<f64>| {
+            matrix.fixed_view_mut::<3, 3>(row, column).copy_from(block);
+        };
+        put(&mut self.to_from, 3, 0, &-swung);
+        put(&mut self.to_from, 3, 3, &(swung * lever));
+        put(&mut self.to_to, 3, 0, &cross);
+        put(&mut self.to_to, 0, 3, &cross.transpose());
+        put(&mut self.to_to, 3, 3, &-(cross * swing));
+        self.to_gradient
             .fixed_rows_mut::<3>(3)
-            .copy_from(&(swing * turn.tr_mul(&force)));
-    }
-    let mut from_gradient = top(&-force);
-    from_gradient
-        .fixed_rows_mut::<3>(3)
-        .copy_from(&lever.tr_mul(&force));
-    NormalBlocks {
-        from_from,
-        to_from,
-        to_to,
-        from_gradient,
-        to_gradient,
+            .copy_from(&(swing * turn.tr_mul(force)));
     }
 }
 
@@ -210,13 +208,6 @@ fn seen(from: &Isometry3<f64>, to: &Isometry3<f64>, lever: &Vector3<f64>) -> Vec
         .inverse_transform_vector(&(point - from.translation.vector))
 }
 
-fn pose_residual(error: &Isometry3<f64>) -> Vector6<f64> {
-    let (linear, angular) = se3::log(error);
-    Vector6::new(
-        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
-    )
-}
-
 /// Aᵀ w Ω A and Aᵀ w Ω r with the derivative A of r = log(E exp δ).
 fn pose_blocks(
     residual: &Vector6<f64>,
@@ -225,10 +216,8 @@ fn pose_blocks(
 ) -> (Matrix6<f64>, Vector6<f64>) {
     let force = information * residual;
     let weight = weigh(residual.dot(&force));
-    let jacobian = log_jacobian(
-        &residual.fixed_rows::<3>(0).into_owned(),
-        &residual.fixed_rows::<3>(3).into_owned(),
-    );
+    let (linear, angular) = se3::split(residual);
+    let jacobian = log_jacobian(&linear, &angular);
     let blocks = jacobian.tr_mul(&(information * jacobian)) * weight;
     (blocks, jacobian.tr_mul(&force) * weight)
 }
@@ -245,13 +234,12 @@ fn weighted(
 }
 
 fn corner(block: &Matrix3<f64>) -> Matrix6<f64> {
-    let mut matrix = Matrix6::zeros();
-    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(block);
-    matrix
+    let zeros = Matrix3::zeros();
+    from_blocks(block, &zeros, &zeros, &zeros)
 }
 
 fn top(part: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(part.x, part.y, part.z, 0.0, 0.0, 0.0)
+    se3::join(part, &Vector3::zeros())
 }
 
 #[cfg(test)]

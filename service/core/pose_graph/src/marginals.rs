@@ -1,13 +1,13 @@
 //! Marginal covariances of nodes.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix};
+use nalgebra::{Matrix3, Matrix6};
 
 use super::elimination::{CliqueTree, HalfSolution};
 use super::equations::NormalEquations;
 use super::graph::PoseGraph;
 use super::innovation::{ExpectedPose, ExpectedPosition};
 use super::node::{PointId, PoseId};
-use geometry::{PoseCovariance, se3};
+use geometry::{PoseCovariance, se3, seen_by_pose, symmetric};
 
 /// Covariances of nodes, given all links.
 ///
@@ -41,11 +41,11 @@ impl PoseGraph {
 
 impl Marginals<'_> {
     /// Covariance of a pose T = T̂ exp(ξ). `None` if the links leave it free, as those do that
-    /// nothing ties to `map`.
+    /// nothing connects with `map`.
     pub fn pose(&self, pose: PoseId) -> Option<PoseCovariance> {
         let half = self.half(pose.0)?;
         let covariance = self.placed(pose.0, pose.0, &half.product(&half));
-        Some(symmetric(&covariance))
+        Some(PoseCovariance::from_upper_part(&covariance))
     }
 
     /// Covariance of a point in the axes of `map` \[m²\]. `None` if the links leave it free.
@@ -53,7 +53,7 @@ impl Marginals<'_> {
         let half = self.half(point.0)?;
         let covariance = self.placed(point.0, point.0, &half.product(&half));
         let block = covariance.fixed_view::<3, 3>(0, 0).into_owned();
-        Some((block + block.transpose()) * 0.5)
+        Some(symmetric(&block))
     }
 
     /// Covariance of the pose of `to` in the frame of `from`, with what the errors of the two have
@@ -72,7 +72,7 @@ impl Marginals<'_> {
         let common = to_from * moved.transpose();
         let covariance =
             to_to - common - common.transpose() + moved * from_from * moved.transpose();
-        Some(symmetric(&covariance))
+        Some(PoseCovariance::from_upper_part(&covariance))
     }
 
     /// Where `to` is expected in the frame of `from`. `None` if the links leave one of them free.
@@ -105,13 +105,7 @@ impl Marginals<'_> {
         let pose = self.map.pose(from);
         let position = pose.inverse_transform_point(&self.map.point(point)).coords;
         let turn = pose.rotation.inverse().to_rotation_matrix().into_inner();
-        let mut moved = SMatrix::<f64, 3, 6>::zeros();
-        moved
-            .fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(&-Matrix3::identity());
-        moved
-            .fixed_view_mut::<3, 3>(0, 3)
-            .copy_from(&position.cross_matrix());
+        let moved = seen_by_pose(&position);
         let common = turn * point_from * moved.transpose();
         let covariance = turn * point_point * turn.transpose()
             + common
@@ -119,7 +113,7 @@ impl Marginals<'_> {
             + moved * from_from * moved.transpose();
         Some(ExpectedPosition {
             position,
-            covariance: (covariance + covariance.transpose()) * 0.5,
+            covariance: symmetric(&covariance),
         })
     }
 
@@ -138,8 +132,4 @@ impl Marginals<'_> {
         }
         placed
     }
-}
-
-fn symmetric(covariance: &Matrix6<f64>) -> PoseCovariance {
-    PoseCovariance::from_upper_triangle(&geometry::upper_triangle(covariance))
 }

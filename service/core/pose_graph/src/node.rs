@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 
-use geometry::{PLANAR_AXES, se3};
+use geometry::{ALL_AXES, PLANAR_AXES, se3};
 
 /// A pose in a pose graph: a place, an agent's keyframe, a landmark with an orientation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -52,7 +52,7 @@ impl Node {
         let axes: &[usize] = match freedom {
             Freedom::Held => &[],
             Freedom::Planar => &PLANAR_AXES,
-            Freedom::Full => &[0, 1, 2, 3, 4, 5],
+            Freedom::Full => &ALL_AXES,
         };
         Self {
             pose,
@@ -90,30 +90,27 @@ impl Node {
         self.is_point
     }
 
-    /// The translation part \[m\] and the rotation part \[rad\] of a motion by its unknowns.
-    pub(super) fn motion(&self, unknowns: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
+    /// The unknowns in their places in a twist.
+    pub(super) fn twist(&self, unknowns: &[f64]) -> Vector6<f64> {
         let mut twist = Vector6::zeros();
         for (&axis, unknown) in self.axes.iter().zip(unknowns) {
             twist[axis] = *unknown;
         }
-        (
-            twist.fixed_rows::<3>(0).into_owned(),
-            twist.fixed_rows::<3>(3).into_owned(),
-        )
+        twist
+    }
+
+    /// The translation part \[m\] and the rotation part \[rad\] of a motion by its unknowns.
+    pub(super) fn motion(&self, unknowns: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
+        se3::split(&self.twist(unknowns))
     }
 
     /// The node's pose `from` after a motion by its unknowns: T exp(ξ), or p + ρ for a point.
     pub(super) fn moved(&self, from: &Isometry3<f64>, unknowns: &[f64]) -> Isometry3<f64> {
-        let (linear, angular) = self.motion(unknowns);
         if self.is_point {
-            return Isometry3::from_parts(
-                Translation3::from(from.translation.vector + linear),
-                from.rotation,
-            );
+            let (linear, _) = self.motion(unknowns);
+            let at = Translation3::from(from.translation.vector + linear);
+            return Isometry3::from_parts(at, from.rotation);
         }
-        let mut moved = from * se3::exp(&linear, &angular);
-        // Products of unit quaternions drift away from length one.
-        moved.rotation.renormalize_fast();
-        moved
+        se3::plus(from, &self.twist(unknowns))
     }
 }

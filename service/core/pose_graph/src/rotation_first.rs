@@ -7,6 +7,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3};
 
+use geometry::procrustes;
+
 use super::elimination::{CliqueTree, Equations, Front, slot};
 use super::graph::PoseGraph;
 use super::link::Link;
@@ -23,7 +25,7 @@ pub(super) fn start(map: &PoseGraph, tree: &CliqueTree) -> Vec<Isometry3<f64>> {
     let mut poses: Vec<_> = map.nodes.iter().map(|node| node.pose).collect();
     let rotations = Rotations {
         map,
-        held: anchors(map, rotation_weight),
+        held: held_weights(map, rotation_weight),
         poses: &poses,
     };
     let solution = solve(&rotations, tree);
@@ -42,7 +44,7 @@ pub(super) fn start(map: &PoseGraph, tree: &CliqueTree) -> Vec<Isometry3<f64>> {
     }
     let positions = Positions {
         map,
-        held: anchors(map, position_weight),
+        held: held_weights(map, position_weight),
         poses: &poses,
     };
     let solution = solve(&positions, tree);
@@ -117,12 +119,7 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
             }
         }
     }
-    let svd = matrix.svd(true, true);
-    let (u, v_transposed) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
-    let mut signs = Matrix3::identity();
-    signs[(2, 2)] = (u.determinant() * v_transposed.determinant()).signum();
-    let rotation = Rotation3::from_matrix_unchecked(u * signs * v_transposed);
-    UnitQuaternion::from_rotation_matrix(&rotation)
+    procrustes(matrix)
 }
 
 /// How much a link says about rotations \[1/rad²\], and about positions \[1/m²\]: the sum over the
@@ -147,9 +144,9 @@ fn position_weight(link: &Link) -> f64 {
     }
 }
 
-/// For each node the weight with which it is held where it is: of nodes that no prior ties to
-/// `map`, even through others, the oldest.
-fn anchors(map: &PoseGraph, weight: impl Fn(&Link) -> f64) -> Vec<f64> {
+/// For each node the weight with which it is held where it is: of nodes that no prior connects
+/// with `map`, even through others, the oldest.
+fn held_weights(map: &PoseGraph, weight: impl Fn(&Link) -> f64) -> Vec<f64> {
     let mut parent: Vec<usize> = (0..map.nodes.len()).collect();
     let mut is_held: Vec<bool> = map
         .nodes

@@ -88,19 +88,40 @@ impl<'a> StateReader<'a> {
     }
 }
 
-/// Implements [`State`] for a struct, field by field.
+/// Implements [`State`] for a struct, field by field. A field `as` a [`Codec`](crate::Codec) is
+/// written by that.
+///
+/// ```
+/// struct Survey {
+///     station: u32,
+///     heights_m: Vec<f64>,
+/// }
+/// state::state_of_struct!(Survey { station, heights_m as state::Counted<u8> });
+/// ```
 #[macro_export]
 macro_rules! state_of_struct {
-    ($name:ty { $($field:ident),+ $(,)? }) => {
+    (@write $value:expr, $out:ident) => {
+        $crate::State::write($value, $out)
+    };
+    (@write $value:expr, $out:ident, $codec:ty) => {
+        <$codec as $crate::Codec<_>>::write($value, $out)
+    };
+    (@read $input:ident) => {
+        $crate::State::read($input)?
+    };
+    (@read $input:ident, $codec:ty) => {
+        <$codec as $crate::Codec<_>>::read($input)?
+    };
+    ($name:ty { $($field:ident $(as $codec:ty)?),+ $(,)? }) => {
         impl $crate::State for $name {
             fn write(&self, out: &mut $crate::StateWriter) {
-                $($crate::State::write(&self.$field, out);)+
+                $($crate::state_of_struct!(@write &self.$field, out $(, $codec)?);)+
             }
 
             fn read(
                 input: &mut $crate::StateReader<'_>,
             ) -> Result<Self, $crate::CorruptState> {
-                Ok(Self { $($field: $crate::State::read(input)?),+ })
+                Ok(Self { $($field: $crate::state_of_struct!(@read input $(, $codec)?)),+ })
             }
         }
     };
@@ -130,31 +151,37 @@ macro_rules! state_of_newtype {
     };
 }
 
-/// Implements [`State`] for an enum without data: one byte, a code for each variant.
+/// Implements [`State`] for an enum: one byte, a code for each variant, then the variant's field,
+/// if it has one.
 ///
 /// ```
 /// enum Colour {
 ///     Red,
-///     Green,
+///     Grey(f32),
 /// }
-/// state::state_of_enum!(Colour { Red = 0, Green = 1 });
+/// state::state_of_enum!(Colour { Red = 0, Grey(level) = 1 });
 /// ```
 #[macro_export]
 macro_rules! state_of_enum {
-    ($name:ty { $($variant:ident = $code:literal),+ $(,)? }) => {
+    (@read $field:ident, $input:ident) => {
+        $crate::State::read($input)?
+    };
+    ($name:ty { $($variant:ident $(($field:ident))? = $code:literal),+ $(,)? }) => {
         impl $crate::State for $name {
             fn write(&self, out: &mut $crate::StateWriter) {
-                let code: u8 = match self {
-                    $(Self::$variant => $code,)+
-                };
-                $crate::State::write(&code, out);
+                match self {
+                    $(Self::$variant $(($field))? => {
+                        <u8 as $crate::State>::write(&$code, out);
+                        $($crate::State::write($field, out);)?
+                    })+
+                }
             }
 
             fn read(
                 input: &mut $crate::StateReader<'_>,
             ) -> Result<Self, $crate::CorruptState> {
                 match <u8 as $crate::State>::read(input)? {
-                    $($code => Ok(Self::$variant),)+
+                    $($code => Ok(Self::$variant $(($crate::state_of_enum!(@read $field, input)))?),)+
                     _ => Err($crate::CorruptState::Invalid),
                 }
             }
@@ -210,25 +237,21 @@ pub fn read_list<T: State>(input: &mut StateReader<'_>, most: u32) -> Result<Vec
     (0..count).map(|_| T::read(input)).collect()
 }
 
-impl State for f32 {
-    fn write(&self, out: &mut StateWriter) {
-        self.to_bits().write(out);
-    }
+/// Implements [`State`] for floats by their bits.
+macro_rules! state_of_float {
+    ($($name:ty),+) => {
+        $(impl State for $name {
+            fn write(&self, out: &mut StateWriter) {
+                self.to_bits().write(out);
+            }
 
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self::from_bits(State::read(input)?))
-    }
+            fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+                Ok(Self::from_bits(State::read(input)?))
+            }
+        })+
+    };
 }
-
-impl State for f64 {
-    fn write(&self, out: &mut StateWriter) {
-        self.to_bits().write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self::from_bits(State::read(input)?))
-    }
-}
+state_of_float!(f32, f64);
 
 impl State for bool {
     fn write(&self, out: &mut StateWriter) {
@@ -241,6 +264,17 @@ impl State for bool {
             1 => Ok(true),
             _ => Err(CorruptState::Invalid),
         }
+    }
+}
+
+/// A list of at most [`ITEMS_MAX`] items, as [`write_list`] writes it.
+impl<T: State> State for Vec<T> {
+    fn write(&self, out: &mut StateWriter) {
+        write_list(self.iter(), out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        read_list(input, ITEMS_MAX)
     }
 }
 
@@ -328,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn an_enum_is_one_byte() {
+    fn an_enum_without_fields_is_one_byte() {
         #[derive(Debug, PartialEq)]
         enum Colour {
             Red,
@@ -341,6 +375,20 @@ mod tests {
         );
         assert_eq!(read::<Colour>(&[7]), Ok(Colour::Green));
         assert_eq!(read::<Colour>(&[1]), Err(CorruptState::Invalid));
+    }
+
+    #[test]
+    fn an_enum_with_a_field_is_one_byte_and_the_field() {
+        #[derive(Debug, PartialEq)]
+        enum Shade {
+            None,
+            Grey(u16),
+        }
+        state_of_enum!(Shade { None = 0, Grey(level) = 1 });
+        assert_eq!(bytes(&Shade::Grey(2)), [1, 2, 0]);
+        assert_eq!(read(&[1, 2, 0]), Ok(Shade::Grey(2)));
+        assert_eq!(read(&[0]), Ok(Shade::None));
+        assert_eq!(read::<Shade>(&[1, 2]), Err(CorruptState::Truncated));
     }
 
     #[test]

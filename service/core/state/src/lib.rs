@@ -1,15 +1,18 @@
 #![doc = include_str!("../README.md")]
 
 mod bytes;
+mod codec;
 mod digest;
 mod matrix;
 mod moments;
+mod page_version;
 mod paged;
 mod slab;
 mod sparse;
 mod summary;
 
 pub use bytes::{CorruptState, ITEMS_MAX, State, StateReader, StateWriter, read_list, write_list};
+pub use codec::{Codec, Counted, Unstored};
 pub use digest::{Digest, InvalidDigest};
 pub use moments::Moments;
 pub use paged::{PagedVec, write_page};

@@ -1,6 +1,6 @@
 //! Bytes of vectors, matrices, rotations and rigid motions.
 
-use nalgebra::{Isometry3, Point3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector4};
+use nalgebra::{Isometry3, Point3, SMatrix, Translation3, Unit, UnitQuaternion, Vector3, Vector4};
 
 use crate::{CorruptState, State, StateReader, StateWriter};
 
@@ -27,6 +27,17 @@ impl State for Point3<f64> {
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         Vector3::read(input).map(Self::from)
+    }
+}
+
+impl State for Unit<Vector3<f64>> {
+    fn write(&self, out: &mut StateWriter) {
+        self.as_ref().write(out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        // Not normalised again: that might change the last bit.
+        Vector3::read(input).map(Self::new_unchecked)
     }
 }
 

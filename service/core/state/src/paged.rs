@@ -1,8 +1,8 @@
 //! A vector in copy-on-write pages: a clone is a snapshot, and costs only what changes after it.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
-use crate::Digest;
+use crate::page_version::PageVersion;
 use crate::{CorruptState, State, StateReader, StateWriter};
 
 /// A vector in pages of `N` items.
@@ -17,24 +17,10 @@ pub struct PagedVec<T, const N: usize> {
 }
 
 /// One page.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Page<T> {
     items: Vec<T>,
-    /// Revision of the latest change. It serves checkpoints only and is not part of the digest.
-    changed: u64,
-    /// Digest of the items, once asked for.
-    digest: OnceLock<Digest>,
-}
-
-impl<T: Clone> Clone for Page<T> {
-    fn clone(&self) -> Self {
-        // A page is copied in order to be changed, so its digest is not worth copying.
-        Self {
-            items: self.items.clone(),
-            changed: self.changed,
-            digest: OnceLock::new(),
-        }
-    }
+    version: PageVersion,
 }
 
 impl<T, const N: usize> Default for PagedVec<T, N> {
@@ -89,7 +75,7 @@ impl<T, const N: usize> PagedVec<T, N> {
     pub fn changed_pages(&self, since: u64) -> impl Iterator<Item = (usize, usize, &[T])> {
         let pages = self.pages.iter().enumerate();
         pages
-            .filter(move |(_, page)| page.changed > since)
+            .filter(move |(_, page)| page.version.changed() > since)
             .map(|(index, page)| (index, index * N, page.items.as_slice()))
     }
 }
@@ -101,13 +87,12 @@ impl<T: Clone, const N: usize> PagedVec<T, N> {
         if self.len / N == pages.len() {
             pages.push(Arc::new(Page {
                 items: Vec::new(),
-                changed: 0,
-                digest: OnceLock::new(),
+                version: PageVersion::default(),
             }));
         }
         let page = Arc::make_mut(&mut pages[self.len / N]);
         page.items.push(item);
-        page.touch(revision);
+        page.version.touch(revision);
         self.len += 1;
     }
 
@@ -116,7 +101,7 @@ impl<T: Clone, const N: usize> PagedVec<T, N> {
     pub fn pop(&mut self, revision: u64) -> Option<T> {
         let last = self.len.checked_sub(1)?;
         let page = Arc::make_mut(&mut Arc::make_mut(&mut self.pages)[last / N]);
-        page.touch(revision);
+        page.version.touch(revision);
         self.len = last;
         let item = page.items.pop();
         if page.items.is_empty() {
@@ -132,7 +117,7 @@ impl<T: Clone, const N: usize> PagedVec<T, N> {
         }
         let page = Arc::make_mut(&mut self.pages).get_mut(index / N)?;
         let page = Arc::make_mut(page);
-        page.touch(revision);
+        page.version.touch(revision);
         page.items.get_mut(index % N)
     }
 }
@@ -142,7 +127,8 @@ impl<T: State, const N: usize> PagedVec<T, N> {
     pub fn write_digests(&self, out: &mut StateWriter) {
         (self.len as u64).write(out);
         for page in &self.pages[..self.len.div_ceil(N)] {
-            page.digest().0.write(out);
+            let digest = page.version.digest(|out| write_page(&page.items, out));
+            digest.0.write(out);
         }
     }
 }
@@ -165,25 +151,6 @@ impl<T: State + Clone, const N: usize> PagedVec<T, N> {
     }
 }
 
-impl<T> Page<T> {
-    /// Notes that the items are about to change.
-    fn touch(&mut self, revision: u64) {
-        self.changed = revision;
-        self.digest.take();
-    }
-}
-
-impl<T: State> Page<T> {
-    /// Digest of the items.
-    fn digest(&self) -> Digest {
-        *self.digest.get_or_init(|| {
-            let mut out = StateWriter::default();
-            write_page(&self.items, &mut out);
-            out.digest()
-        })
-    }
-}
-
 /// Writes the items of a page; nothing if there are none.
 ///
 /// # Panics
@@ -203,6 +170,7 @@ pub fn write_page<T: State>(items: &[T], out: &mut StateWriter) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Digest;
     use proptest::prelude::*;
 
     type Numbers = PagedVec<u64, 4>;

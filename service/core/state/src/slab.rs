@@ -113,13 +113,13 @@ impl<T: Clone, const N: usize> Slab<T, N> {
         })
     }
 
-    /// What a checkpoint's header has to tell: the first vacant number, and how many items there
+    /// What a checkpoint's header holds: the first vacant number, and how many items there
     /// are.
     pub fn vacancy(&self) -> (u32, u32) {
         (self.vacant, self.len)
     }
 
-    /// Takes over what a checkpoint's header told.
+    /// Sets what a checkpoint's header held.
     pub fn set_vacancy(&mut self, (vacant, len): (u32, u32)) {
         self.vacant = vacant;
         self.len = len;

@@ -3,9 +3,9 @@
 #[cfg(test)]
 mod tests;
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
-use crate::Digest;
+use crate::page_version::PageVersion;
 use crate::{CorruptState, State, StateReader, StateWriter};
 
 /// Pages per chunk.
@@ -35,15 +35,12 @@ enum Slot<T> {
 }
 
 /// One page, with an item at least.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Page<T> {
     /// Bit i is set where there is an item at index i of the page.
     mask: u64,
     items: Vec<T>,
-    /// Revision of the latest change. It serves checkpoints only and is not part of the digest.
-    changed: u64,
-    /// Digest of the items, once asked for.
-    digest: OnceLock<Digest>,
+    version: PageVersion,
 }
 
 /// What a page holds, for a checkpoint.
@@ -58,18 +55,6 @@ impl<T> Clone for Slot<T> {
         match self {
             Self::Live(live) => Self::Live(Arc::clone(live)),
             Self::Gone(changed) => Self::Gone(*changed),
-        }
-    }
-}
-
-impl<T: Clone> Clone for Page<T> {
-    fn clone(&self) -> Self {
-        // A page is copied in order to be changed, so its digest is not worth copying.
-        Self {
-            mask: self.mask,
-            items: self.items.clone(),
-            changed: self.changed,
-            digest: OnceLock::new(),
         }
     }
 }
@@ -93,12 +78,6 @@ impl<T> Page<T> {
     /// Whether there is an item at an index of the page.
     fn holds(&self, index: usize) -> bool {
         (self.mask >> index) & 1 == 1
-    }
-
-    /// Notes that the items are about to change.
-    fn touch(&mut self, revision: u64) {
-        self.changed = revision;
-        self.digest.take();
     }
 
     /// The items with their indices, the first index of the page being `first`.
@@ -184,7 +163,7 @@ impl<T, const N: usize> SparseVec<T, N> {
             };
             let first = at * CHUNK;
             let live = (first..).zip(pages).map(|(page, slot)| match slot {
-                Slot::Live(items) => (page, items.changed, Some(items)),
+                Slot::Live(items) => (page, items.version.changed(), Some(items)),
                 Slot::Gone(changed) => (page, *changed, None),
             });
             let emptied = if gone == 0 { 0 } else { CHUNK };
@@ -261,13 +240,12 @@ impl<T: Clone, const N: usize> SparseVec<T, N> {
             *slot = Slot::Live(Arc::new(Page {
                 mask: 0,
                 items: Vec::new(),
-                changed: 0,
-                digest: OnceLock::new(),
+                version: PageVersion::default(),
             }));
         }
         let Slot::Live(page) = slot else { return };
         let page = Arc::make_mut(page);
-        page.touch(revision);
+        page.version.touch(revision);
         let rank = page.rank(within);
         if page.holds(within) {
             page.items[rank] = item;
@@ -289,7 +267,7 @@ impl<T: Clone, const N: usize> SparseVec<T, N> {
             return None;
         };
         let page = Arc::make_mut(page);
-        page.touch(revision);
+        page.version.touch(revision);
         let rank = page.rank(within);
         page.items.get_mut(rank)
     }
@@ -307,7 +285,7 @@ impl<T: Clone, const N: usize> SparseVec<T, N> {
             return None;
         };
         let page = Arc::make_mut(page);
-        page.touch(revision);
+        page.version.touch(revision);
         let item = page.items.remove(page.rank(within));
         page.mask &= !(1 << within);
         self.len -= 1;
@@ -335,7 +313,11 @@ impl<T: State, const N: usize> SparseVec<T, N> {
         (self.len as u64).write(out);
         for (at, page) in self.pages() {
             (at as u64).write(out);
-            page.digest().0.write(out);
+            let (mask, items) = (page.mask, &page.items[..]);
+            let digest = page
+                .version
+                .digest(|out| PageItems { mask, items }.write(out));
+            digest.0.write(out);
         }
     }
 }
@@ -361,18 +343,6 @@ impl<T: State + Clone, const N: usize> SparseVec<T, N> {
             self.insert(page * N + within, T::read(&mut input)?, revision);
         }
         input.end()
-    }
-}
-
-impl<T: State> Page<T> {
-    /// Digest of the items.
-    fn digest(&self) -> Digest {
-        *self.digest.get_or_init(|| {
-            let (mask, items) = (self.mask, &self.items[..]);
-            let mut out = StateWriter::default();
-            PageItems { mask, items }.write(&mut out);
-            out.digest()
-        })
     }
 }
 

@@ -1,6 +1,7 @@
 //! The rigid motion which brings an estimate nearest to the truth.
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use geometry::procrustes;
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 /// What is fitted before an error is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,21 +47,6 @@ impl Alignment {
         }
         Isometry3::from_parts(Translation3::from(shift), rotation)
     }
-}
-
-/// The rotation `R` which maximises `tr(Rᵀ covariance)`.
-fn procrustes(covariance: &Matrix3<f64>) -> UnitQuaternion<f64> {
-    let svd = covariance.svd(true, true);
-    let (u, v_transposed) = (
-        svd.u.expect("u was asked for"),
-        svd.v_t.expect("v was asked for"),
-    );
-    // Singular values come sorted, so the last axis is the one which a reflection costs least.
-    let mut signs = Matrix3::identity();
-    signs[(2, 2)] = (u.determinant() * v_transposed.determinant()).signum();
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
-        u * signs * v_transposed,
-    ))
 }
 
 /// The mean position.

@@ -8,7 +8,7 @@ use super::trajectory::{GRID_STEP_NS, Span, Trajectory};
 /// Fewest pairs to which a rigid motion is fitted; fewer always fit.
 const PAIRS_TO_ALIGN_MIN: usize = 3;
 
-/// Why there is no error to tell.
+/// Why an error cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AteError {
     /// No instant is covered by both trajectories.
@@ -39,7 +39,7 @@ pub struct AteSummary {
 }
 
 /// Positions which belong together.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pairs {
     estimate_m: Vec<Vector3<f64>>,
     truth_m: Vec<Vector3<f64>>,
@@ -67,11 +67,7 @@ impl Pairs {
 
     /// On the 10 Hz grid `start + k · 0.1 s < end` over `span`, both interpolated linearly.
     pub fn on_grid(estimate: &Trajectory, truth: &Trajectory, span: Span) -> Self {
-        let mut pairs = Self {
-            estimate_m: Vec::new(),
-            truth_m: Vec::new(),
-            n_unmatched: 0,
-        };
+        let mut pairs = Self::default();
         let start = i128::from(span.start_ns);
         let step = i128::from(GRID_STEP_NS);
         let n_instants = (i128::from(span.end_ns) - start + step - 1)
@@ -106,11 +102,7 @@ impl Pairs {
         } else {
             (estimate, truth)
         };
-        let mut pairs = Self {
-            estimate_m: Vec::new(),
-            truth_m: Vec::new(),
-            n_unmatched: 0,
-        };
+        let mut pairs = Self::default();
         for position in short.positions() {
             let after = long
                 .positions()

@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use geometry::rotation_from_xyzw;
+use nalgebra::{Isometry3, Translation3};
 
 use crate::StampedPose;
 use crate::{InvalidStamp, format_seconds, parse_seconds};
@@ -96,9 +97,7 @@ fn parse(columns: &[&str]) -> Result<StampedPose, TumReason> {
         numbers[index] = number.ok_or(TumReason::NotANumber(index + 1))?;
     }
     let [_, x, y, z, i, j, k, w] = numbers;
-    let rotation = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), f64::MIN_POSITIVE)
-        .filter(|rotation| (rotation.coords.norm() - 1.0).abs() < 1e-6) // the norm may overflow
-        .ok_or(TumReason::NoDirection)?;
+    let rotation = rotation_from_xyzw([i, j, k, w]).ok_or(TumReason::NoDirection)?;
     Ok(StampedPose {
         stamp_ns,
         pose: Isometry3::from_parts(Translation3::new(x, y, z), rotation),

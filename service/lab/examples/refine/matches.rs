@@ -104,7 +104,7 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
     println!(
         "{} matches, {n_false} false; {} believed; aligned: odometry {odometry_m:.3} m, causal {causal_m:.3} m, refined {refined_m:.3} m",
         matches.len(),
-        graph.n_matches_believed(),
+        graph.n_closures_accepted(),
     );
     println!(
         "{} anchors; {} relaxations in {relaxed_s:.2} s, the longest {:.0} ms; refined in {seconds:.2} s",
@@ -153,7 +153,7 @@ fn matches_of(set: &Tuc, share: f64) -> (Vec<Match>, usize) {
 fn text(graph: &KeyframeGraph) -> String {
     use std::fmt::Write as _;
 
-    let map = graph.experience_map();
+    let map = graph.pose_graph();
     let planar = |pose: &Isometry3<f64>| {
         let (_, _, heading) = pose.rotation.euler_angles();
         format!("{} {} {heading}", pose.translation.x, pose.translation.y)

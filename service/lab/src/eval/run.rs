@@ -122,7 +122,7 @@ impl Run {
         run.refined_rmse_m = trial.refined_rmse_m();
         run.closures = trial.map.closure_count();
         if let Some(path) = &mut run.path {
-            path.experience = trial.map.experience_map();
+            path.experience = trial.map.pose_graph();
             let places = trial.map.places();
             path.places_m = places.map(|(_, place)| place.position().coords).collect();
             path.cubes = trial.agent.world().cubes().to_vec();

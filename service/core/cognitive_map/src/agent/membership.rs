@@ -1,6 +1,6 @@
 //! Whether an agent belongs to the space.
 
-use state::{CorruptState, State, StateReader, StateWriter};
+use state::state_of_enum;
 
 /// Whether an agent belongs to the space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,17 +13,8 @@ pub(crate) enum Membership {
     Vacant,
 }
 
-impl State for Membership {
-    fn write(&self, out: &mut StateWriter) {
-        (*self as u8).write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        match u8::read(input)? {
-            0 => Ok(Self::Enrolled),
-            1 => Ok(Self::Removed),
-            2 => Ok(Self::Vacant),
-            _ => Err(CorruptState::Invalid),
-        }
-    }
-}
+state_of_enum!(Membership {
+    Enrolled = 0,
+    Removed = 1,
+    Vacant = 2,
+});

@@ -1,12 +1,12 @@
 //! Agents: who samples the space, and where each of them is.
 
-mod body;
+mod announced;
 mod membership;
 mod status;
 
 use nalgebra::{Isometry3, Point3};
 
-pub(crate) use body::Body;
+pub(crate) use announced::Announced;
 pub(crate) use membership::Membership;
 pub use status::Status;
 
@@ -21,7 +21,7 @@ use state::state_of_struct;
 /// An agent of a space.
 ///
 /// The first agent that moves or sees a landmark in an empty map defines the `map` frame: it starts
-/// at identity. Any later agent is *unplaced* until a start pose tells where it stands, or until
+/// at identity. Any later agent is *unplaced* until a start pose says where it is, or until
 /// enough landmarks and sightings of agents tie it to the map: its pose still counts from identity,
 /// and nothing that it does changes what places, trips and landmarks the map knows.
 #[derive(Clone, Debug)]
@@ -32,12 +32,7 @@ pub struct Agent {
     pub(crate) session: Option<u64>,
     pub(crate) next_seq: u64,
     pub(crate) stamp_ns: Option<i64>,
-    /// Whether the agent was in the map as of its latest record. The estimator may have placed it
-    /// since, by what others saw: its next record says so, with an event and a trip of its own.
-    pub(crate) placed: bool,
-    pub(crate) body: Body,
-    /// What became of its sightings, as of its latest record.
-    pub(crate) evidence: Evidence,
+    pub(crate) announced: Announced,
     /// Where the places were last asked who answers; `None` asks at the next motion.
     pub(crate) asked_at: Option<Point3<f64>>,
     /// Where and since when \[ns\] the agent has stayed within an eighth of a field radius.
@@ -60,9 +55,7 @@ state_of_struct!(Agent {
     session,
     next_seq,
     stamp_ns,
-    placed,
-    body,
-    evidence,
+    announced,
     asked_at,
     still_since,
     place,
@@ -83,9 +76,7 @@ impl Agent {
             session: None,
             next_seq: 0,
             stamp_ns: None,
-            placed: false,
-            body: Body::new(modules),
-            evidence: Evidence::default(),
+            announced: Announced::new(modules),
             asked_at: None,
             still_since: None,
             place: None,
@@ -141,24 +132,24 @@ impl Agent {
         self.stamp_ns
     }
 
-    /// Whether it is known where the agent stands in `map`.
+    /// Whether it is known where the agent is in `map`.
     pub fn placed(&self) -> bool {
-        self.placed
+        self.announced.placed()
     }
 
     /// Pose in `map`; counted from identity while the agent is not placed.
     pub fn pose(&self) -> &Isometry3<f64> {
-        &self.body.in_map
+        &self.announced.in_map
     }
 
     /// Pose in `odom`: by motion alone since the session began.
     pub fn odometry(&self) -> &Isometry3<f64> {
-        &self.body.in_odom
+        &self.announced.in_odom
     }
 
     /// What became of its sightings, of all sessions.
     pub fn evidence(&self) -> &Evidence {
-        &self.evidence
+        self.announced.evidence()
     }
 
     /// The place cell that answers strongest, with its confidence in \[0, 1\], as of the last time
@@ -169,23 +160,25 @@ impl Agent {
 
     /// Grid state.
     pub fn grid(&self) -> &GridState {
-        &self.body.grid
+        &self.announced.grid
     }
 
     /// Length of the session's latest movement \[m\] (seed Eq. 2); 0 before the first one.
     pub fn displacement_m(&self) -> f64 {
-        self.body.latest.map_or(0.0, |latest| latest.norm())
+        self.announced.latest.map_or(0.0, |latest| latest.norm())
     }
 
     /// Octant of the session's latest movement in `map`, 1 to 8.
     pub fn octant(&self) -> Option<u8> {
-        self.body.latest.map(|latest| octant::octant_of(&latest))
+        self.announced
+            .latest
+            .map(|latest| octant::octant_of(&latest))
     }
 
     /// Angle between the session's latest two movements \[rad\], in \[0, π\] (seed Eq. 3); 0 before
     /// the second one.
     pub fn turning_rad(&self) -> f64 {
-        let movements = self.body.before_latest.zip(self.body.latest);
+        let movements = self.announced.before_latest.zip(self.announced.latest);
         movements.map_or(0.0, |(before, latest)| {
             octant::turning_angle_rad(&before, &latest)
         })
@@ -193,7 +186,7 @@ impl Agent {
 
     /// Path travelled in this session \[m\].
     pub fn travelled_m(&self) -> f64 {
-        self.body.travelled_m
+        self.announced.travelled_m
     }
 
     /// The trip under way, once its first leg is complete.
@@ -206,7 +199,7 @@ impl Agent {
         self.sightings
     }
 
-    /// Levels and descriptors so far, of all sessions. Those felt where a place answers teach it;
+    /// Levels and descriptors so far, of all sessions. Those sensed where a place answers teach it;
     /// the others are counted and stay in the journal.
     pub fn percepts(&self) -> u64 {
         self.percepts

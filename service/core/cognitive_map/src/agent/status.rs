@@ -29,8 +29,8 @@ impl Status {
         is_doubted: bool,
         settings: &Settings,
     ) -> Self {
-        let is_contradicted = is_doubted || agent.evidence.refused_in_a_row >= REFUSED_MAX;
-        let placed = agent.placed;
+        let is_contradicted = is_doubted || agent.evidence().refused_in_a_row >= REFUSED_MAX;
+        let placed = agent.placed();
         // A deviation that is not a number fails both comparisons, and so is lost.
         if placed && position_sd_m <= settings.localized_sd_m && !is_contradicted {
             Self::Localized

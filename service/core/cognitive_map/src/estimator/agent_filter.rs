@@ -2,7 +2,7 @@
 
 use std::ops::SubAssign;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 
 use super::calibration::{Calibrated, Calibration};
 use super::frame_alignment::{FrameAlignment, pose_by_alignment};
@@ -161,63 +161,16 @@ impl AgentFilter {
         duration_s: f64,
         parameters: &Parameters,
     ) -> Step {
-        let read = motion.increment();
-        let lengths = read.translation.vector;
-        let angles = rotation_vector(&read.rotation);
-        let is_rest = lengths == Vector3::zeros() && angles == Vector3::zeros();
-        // A robot in the plane has no bias out of it.
-        let is_planar = lengths.z == 0.0 && angles.x == 0.0 && angles.y == 0.0;
-        self.is_planar &= is_planar;
-        let free = if is_rest {
-            Vector3::zeros()
-        } else if is_planar {
-            Vector3::z()
-        } else {
-            Vector3::repeat(1.0)
-        };
-        let time = free * duration_s;
-        let correction =
-            -(angles * self.calibration.angle + time.component_mul(&self.calibration.bias_rad_s));
-        let rotation = read.rotation * UnitQuaternion::from_scaled_axis(correction);
-        let corrected = lengths * (1.0 - self.calibration.length);
-        let increment = Isometry3::from_parts(corrected.into(), rotation);
-
+        let reading = OdometryReading::new(motion, duration_s);
+        self.is_planar &= reading.is_planar();
+        let increment = reading.corrected_by(&self.calibration);
         let noise_sd = parameters.motion_noise_sd(motion);
         let variance = noise_sd.component_mul(&noise_sd);
-        let ahead = self.run.motion.motion().rotation * lengths;
-        let axes = self.run.motion.append(&increment, &variance);
-        let lever = self.run.motion.motion().translation.vector;
-        let mut turn = |column: usize, axis: &Vector3<f64>| {
-            let mut tail = self.run.tail.column_mut(column);
-            tail.fixed_rows_mut::<3>(0).sub_assign(&lever.cross(axis));
-            tail.fixed_rows_mut::<3>(3).sub_assign(axis);
-        };
-        turn(1, &(axes * angles));
-        for axis in 0..3 {
-            if time[axis] > 0.0 {
-                turn(2 + axis, &(axes.column(axis) * time[axis]));
-            }
-        }
-        let mut lengths_tail = self.run.tail.fixed_view_mut::<3, 1>(0, 0);
-        lengths_tail -= ahead;
-        let wander = parameters.calibration_wander(
-            lengths.norm(),
-            angles.norm(),
-            if is_rest { 0.0 } else { duration_s },
-        );
-        // Out of the plane a planar robot learns nothing, and so forgets nothing.
-        let learns = SVector::<f64, CALIBRATION>::from([1.0, 1.0, free.x, free.y, free.z]);
-        let mut wander = wander.component_mul(&learns);
-        let most = parameters.calibration_variance_max();
-        for k in 0..CALIBRATION {
-            let left = most[k] - self.at_run_start[(POSE + k, POSE + k)] - self.run.wander[k];
-            wander[k] = wander[k].min(left.max(0.0));
-        }
+        self.run.append(&reading, &increment, &variance);
+        let wander = self.wander(&reading, parameters);
         self.run.wander += wander;
         self.run.steps += 1;
-        if self.run.steps >= RUN_STEPS_MAX
-            || lever.norm_squared() > RUN_LENGTH_MAX_M * RUN_LENGTH_MAX_M
-        {
+        if self.run.is_long() {
             self.carry_over_run();
         }
         let displacement = self.pose.rotation * increment.translation.vector;
@@ -232,9 +185,31 @@ impl AgentFilter {
                 calibration: self.calibration,
                 variance: SVector::from_fn(|k, _| self.at_run_start[(POSE + k, POSE + k)]),
                 wander,
-                moving_s: if is_rest { 0.0 } else { duration_s },
+                moving_s: reading.moving_s(),
             },
         }
+    }
+
+    /// What the variances of the calibration gain with a motion, up to where the settings bound
+    /// them.
+    #[inline]
+    fn wander(
+        &self,
+        reading: &OdometryReading,
+        parameters: &Parameters,
+    ) -> SVector<f64, CALIBRATION> {
+        let (length_m, angle_rad) = (reading.lengths.norm(), reading.angles.norm());
+        let wander = parameters.calibration_wander(length_m, angle_rad, reading.moving_s());
+        // Out of the plane a planar robot learns nothing, and so forgets nothing.
+        let free = &reading.free;
+        let learns = SVector::<f64, CALIBRATION>::from([1.0, 1.0, free.x, free.y, free.z]);
+        let mut wander = wander.component_mul(&learns);
+        let most = parameters.calibration_variance_max();
+        for k in 0..CALIBRATION {
+            let left = most[k] - self.at_run_start[(POSE + k, POSE + k)] - self.run.wander[k];
+            wander[k] = wander[k].min(left.max(0.0));
+        }
+        wander
     }
 
     /// The covariance after the run under way, and how the error of the pose then depends on that
@@ -306,10 +281,7 @@ impl AgentFilter {
     /// Corrects the body by an estimated error. Lasting errors of odometry stay within what the
     /// settings allow.
     pub(super) fn correct(&mut self, error: &SVector<f64, BODY_DIM>, parameters: &Parameters) {
-        let linear = error.fixed_rows::<3>(0).into_owned();
-        let angular = error.fixed_rows::<3>(3).into_owned();
-        self.pose *= se3::exp(&linear, &angular);
-        self.pose.rotation.renormalize_fast();
+        self.pose = se3::plus(&self.pose, &error.fixed_rows::<POSE>(0).into_owned());
         let most = parameters.calibration_max();
         let corrected = self.calibration.components() + error.fixed_rows::<CALIBRATION>(POSE);
         let bounded = corrected.zip_map(&most, |error, most| error.clamp(-most, most));
@@ -326,6 +298,106 @@ impl AgentFilter {
         let variance = before_run + self.run.motion.position_variance();
         // A number that is none fails all comparisons.
         !(is_somewhere(&self.pose.translation.vector) && variance <= POSITION_SD_MAX_M.powi(2))
+    }
+}
+
+impl Run {
+    /// Gathers a motion, and how its error depends on that of the calibration.
+    #[inline]
+    fn append(
+        &mut self,
+        reading: &OdometryReading,
+        increment: &Isometry3<f64>,
+        variance: &Vector6<f64>,
+    ) {
+        let ahead = self.motion.motion().rotation * reading.lengths;
+        let axes = self.motion.append(increment, variance);
+        let lever = self.motion.motion().translation.vector;
+        let mut turn = |column: usize, axis: &Vector3<f64>| {
+            let mut tail = self.tail.column_mut(column);
+            tail.fixed_rows_mut::<3>(0).sub_assign(&lever.cross(axis));
+            tail.fixed_rows_mut::<3>(3).sub_assign(axis);
+        };
+        turn(1, &(axes * reading.angles));
+        for axis in 0..3 {
+            let time_s = reading.time_s[axis];
+            if time_s > 0.0 {
+                turn(2 + axis, &(axes.column(axis) * time_s));
+            }
+        }
+        let mut lengths_tail = self.tail.fixed_view_mut::<3, 1>(0, 0);
+        lengths_tail -= ahead;
+    }
+
+    /// Whether it is so long that it is to be carried over.
+    #[inline]
+    fn is_long(&self) -> bool {
+        let lever = &self.motion.motion().translation.vector;
+        self.steps >= RUN_STEPS_MAX || lever.norm_squared() > RUN_LENGTH_MAX_M * RUN_LENGTH_MAX_M
+    }
+}
+
+/// A motion as odometry read it.
+struct OdometryReading {
+    rotation: UnitQuaternion<f64>,
+    /// Translation \[m\].
+    lengths: Vector3<f64>,
+    /// Rotation vector \[rad\].
+    angles: Vector3<f64>,
+    /// The axes about which odometry has a bias, as ones: none at rest, and in the plane z alone.
+    free: Vector3<f64>,
+    duration_s: f64,
+    /// How long it turned about each free axis \[s\].
+    time_s: Vector3<f64>,
+}
+
+impl OdometryReading {
+    #[inline]
+    fn new(motion: &Motion, duration_s: f64) -> Self {
+        let read = motion.increment();
+        let lengths = read.translation.vector;
+        let angles = rotation_vector(&read.rotation);
+        let mut reading = Self {
+            rotation: read.rotation,
+            lengths,
+            angles,
+            free: Vector3::repeat(1.0),
+            duration_s,
+            time_s: Vector3::zeros(),
+        };
+        if reading.is_rest() {
+            reading.free = Vector3::zeros();
+        } else if reading.is_planar() {
+            reading.free = Vector3::z();
+        }
+        reading.time_s = reading.free * duration_s;
+        reading
+    }
+
+    #[inline]
+    fn is_rest(&self) -> bool {
+        self.lengths == Vector3::zeros() && self.angles == Vector3::zeros()
+    }
+
+    #[inline]
+    fn is_planar(&self) -> bool {
+        self.lengths.z == 0.0 && self.angles.x == 0.0 && self.angles.y == 0.0
+    }
+
+    /// How long it moved \[s\].
+    #[inline]
+    fn moving_s(&self) -> f64 {
+        if self.is_rest() { 0.0 } else { self.duration_s }
+    }
+
+    /// The motion without the lasting errors of odometry.
+    #[inline]
+    fn corrected_by(&self, calibration: &Calibration) -> Isometry3<f64> {
+        let by_bias = self.time_s.component_mul(&calibration.bias_rad_s);
+        let correction = -(self.angles * calibration.angle + by_bias);
+        let rotation = self.rotation * UnitQuaternion::from_scaled_axis(correction);
+        let lengths = self.lengths * (1.0 - calibration.length);
+        Isometry3::from_parts(lengths.into(), rotation)
     }
 }
 

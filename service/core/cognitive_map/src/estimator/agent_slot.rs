@@ -12,7 +12,8 @@ use super::tuning::RETURN_WIDENING;
 pub(super) struct AgentState {
     pub(super) filter: AgentFilter,
     pub(super) sensor: Sensor,
-    /// Sightings refused one after the other.
+    /// Sightings refused one after the other since it was put somewhere or widened last. The
+    /// published [`Evidence::refused_in_a_row`] is this number as of its latest sighting.
     pub(super) refused: u32,
     /// How much its recent sightings contradict the estimate (see `set_aside`).
     pub(super) doubt: u32,

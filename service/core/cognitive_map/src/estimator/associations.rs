@@ -7,7 +7,7 @@ use super::tuning::{ASSOCIATIONS_MAX, REFUSED_TO_DISSOCIATE};
 use super::verdict::Verdict;
 use crate::input::Label;
 
-/// What a name stands for.
+/// The landmark that a name is associated with.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Association {
     /// The landmark's name.
@@ -16,21 +16,21 @@ pub(super) struct Association {
     pub(super) refused: u32,
 }
 
-/// The names that stand for others. A clone shares them.
+/// The names that are associated with others. A clone shares them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Associations {
     pub(super) names: Arc<BTreeMap<Label, Association>>,
 }
 
 impl Associations {
-    /// The landmark's name, of a name that may stand for another.
+    /// The landmark's name, of a name that may be associated with another.
     pub(super) fn name_of<'a>(&'a self, label: &'a Label) -> &'a Label {
         self.names
             .get(label)
             .map_or(label, |association| &association.name)
     }
 
-    /// The names that others stand for, in order.
+    /// The names that others are associated with, in order.
     pub(super) fn names_of_others(&self) -> Vec<&Label> {
         let mut names: Vec<&Label> = self
             .names
@@ -47,7 +47,7 @@ impl Associations {
         self.names.len() + n <= ASSOCIATIONS_MAX
     }
 
-    /// A name stands for another one from now on, and so does what stood for it.
+    /// Associates a name with another one, and with that the names associated with it.
     pub(super) fn insert(&mut self, label: &Label, name: &Label) {
         let names = Arc::make_mut(&mut self.names);
         for association in names
@@ -64,8 +64,8 @@ impl Associations {
         names.remove(name);
     }
 
-    /// A landmark was seen under a name. One that contradicts the landmark it stands for is its own
-    /// again.
+    /// A landmark was seen under a name. One that contradicts the landmark it is associated with is
+    /// its own again.
     ///
     /// `observer_refused` counts the observer's sightings refused one after the other: of an agent
     /// that contradicts everything, the name is not to blame.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6, SMatrix, Vector6};
 
+use super::agent_filter::AgentFilter;
 use super::covariance::Block;
 use super::effect::Effect;
 use super::frame::Frame;
@@ -86,69 +87,13 @@ impl Frame {
     ) -> bool {
         self.flush();
         let member = &self.members[index];
-        let filter = member.filter();
-        let own: Matrix6<f64> = filter.covariance().fixed_view::<6, 6>(0, 0).into_owned();
-        let (linear, angular) = se3::log(&filter.pose.inv_mul(external.pose));
-        let innovation = Vector6::from_fn(|k, _| if k < 3 { linear[k] } else { angular[k - 3] });
-        // What is known without error is left alone, e.g. the height of a robot on a floor.
-        let scale = own.diagonal().map(|variance| {
-            let is_open = variance.is_normal() && variance > 0.0;
-            if is_open {
-                variance.sqrt().recip()
-            } else {
-                0.0
-            }
-        });
-        let unit = |matrix: &Matrix6<f64>, floor: f64| {
-            Matrix6::from_fn(|row, column| {
-                let entry = matrix[(row, column)] * scale[row] * scale[column];
-                match (row == column, scale[row] == 0.0) {
-                    (true, true) => 1.0,
-                    (true, false) => entry + floor,
-                    _ => entry,
-                }
-            })
-        };
-        let (own, others) = (
-            unit(&own, INTERSECTION_VARIANCE_MIN),
-            unit(external.covariance.matrix(), INTERSECTION_VARIANCE_MIN),
-        );
-        let innovation = innovation.component_mul(&scale);
-        // Of two errors that may be correlated in any way, the variances' sum counts twice.
-        let is_near = (0..6).all(|k| {
-            let expected = 2.0 * (own[(k, k)] + others[(k, k)]);
-            innovation[k].powi(2) <= parameters.gate.powi(2) * expected
-        });
-        let inverses = own.cholesky().zip(others.cholesky());
-        let Some((own, others)) = inverses.map(|(own, others)| (own.inverse(), others.inverse()))
-        else {
-            return false;
-        };
-        let weights =
-            (0..=INTERSECTION_STEPS).map(|step| f64::from(step) / f64::from(INTERSECTION_STEPS));
-        let known = |weight: f64| (own * weight + others * (1.0 - weight)).determinant();
-        // Of equal ones the last, so that what adds nothing moves nothing.
-        let weight = weights.max_by(|a, b| known(*a).total_cmp(&known(*b)));
-        let share = 1.0 - weight.unwrap_or(1.0);
-        let gain = (others - own) * share;
-        let gain = symmetric(&gain);
-        if !is_near || !gain.iter().all(|entry| entry.is_finite()) {
+        let intersection = Intersection::new(member.filter(), external);
+        if !intersection.is_near(parameters.gate) {
             return false;
         }
-        let gain = gain.symmetric_eigen();
-        let axes = gain.eigenvectors.transpose();
-        let pull = axes * others * innovation * share;
-        let mut jacobian = axes * Matrix6::from_diagonal(&scale);
-        let mut residual = Vector6::zeros();
-        let mut variance = Vector6::repeat(1.0);
-        for (k, &information) in gain.eigenvalues.iter().enumerate() {
-            if information < INTERSECTION_GAIN_MIN {
-                jacobian.row_mut(k).fill(0.0);
-            } else {
-                residual[k] = pull[k] / information;
-                variance[k] = 1.0 / information.min(INTERSECTION_GAIN_MAX);
-            }
-        }
+        let Some((jacobian, residual, variance)) = intersection.measurement() else {
+            return false;
+        };
         let block = Block {
             offset: member.offset,
             width: 6,
@@ -161,5 +106,87 @@ impl Frame {
             self.correct(index, &correction, parameters);
         }
         true
+    }
+}
+
+/// Covariance intersection of an own and an external pose, in units of the own deviations.
+struct Intersection {
+    /// Inverse of each own deviation; zero for what is known without error and so is left alone,
+    /// e.g. the height of a robot on a floor.
+    scale: Vector6<f64>,
+    own: Matrix6<f64>,
+    external: Matrix6<f64>,
+    innovation: Vector6<f64>,
+}
+
+impl Intersection {
+    fn new(filter: &AgentFilter, external: &ExternalPose<'_>) -> Self {
+        let own: Matrix6<f64> = filter.covariance().fixed_view::<6, 6>(0, 0).into_owned();
+        let innovation = se3::twist(&filter.pose.inv_mul(external.pose));
+        let scale = own.diagonal().map(|variance| {
+            let is_open = variance.is_normal() && variance > 0.0;
+            if is_open {
+                variance.sqrt().recip()
+            } else {
+                0.0
+            }
+        });
+        let scaled = |matrix: &Matrix6<f64>| {
+            Matrix6::from_fn(|row, column| {
+                let entry = matrix[(row, column)] * scale[row] * scale[column];
+                match (row == column, scale[row] == 0.0) {
+                    (true, true) => 1.0,
+                    (true, false) => entry + INTERSECTION_VARIANCE_MIN,
+                    _ => entry,
+                }
+            })
+        };
+        Self {
+            own: scaled(&own),
+            external: scaled(external.covariance.matrix()),
+            innovation: innovation.component_mul(&scale),
+            scale,
+        }
+    }
+
+    /// Whether the innovation is within so many deviations.
+    fn is_near(&self, gate: f64) -> bool {
+        (0..6).all(|k| {
+            // Of two errors that may be correlated in any way, the variances' sum counts twice.
+            let expected = 2.0 * (self.own[(k, k)] + self.external[(k, k)]);
+            self.innovation[k].powi(2) <= gate.powi(2) * expected
+        })
+    }
+
+    /// The measurement that brings the own pose to the intersection: Jacobian, residual and
+    /// variances.
+    fn measurement(&self) -> Option<(Matrix6<f64>, Vector6<f64>, Vector6<f64>)> {
+        let own = self.own.cholesky()?.inverse();
+        let external = self.external.cholesky()?.inverse();
+        let weights =
+            (0..=INTERSECTION_STEPS).map(|step| f64::from(step) / f64::from(INTERSECTION_STEPS));
+        let known = |weight: f64| (own * weight + external * (1.0 - weight)).determinant();
+        // Of equal ones the last, so that what adds nothing moves nothing.
+        let weight = weights.max_by(|a, b| known(*a).total_cmp(&known(*b)));
+        let share = 1.0 - weight.unwrap_or(1.0);
+        let gain = symmetric(&((external - own) * share));
+        if !gain.iter().all(|entry| entry.is_finite()) {
+            return None;
+        }
+        let gain = gain.symmetric_eigen();
+        let axes = gain.eigenvectors.transpose();
+        let pull = axes * external * self.innovation * share;
+        let mut jacobian = axes * Matrix6::from_diagonal(&self.scale);
+        let mut residual = Vector6::zeros();
+        let mut variance = Vector6::repeat(1.0);
+        for (k, &information) in gain.eigenvalues.iter().enumerate() {
+            if information < INTERSECTION_GAIN_MIN {
+                jacobian.row_mut(k).fill(0.0);
+            } else {
+                residual[k] = pull[k] / information;
+                variance[k] = 1.0 / information.min(INTERSECTION_GAIN_MAX);
+            }
+        }
+        Some((jacobian, residual, variance))
     }
 }

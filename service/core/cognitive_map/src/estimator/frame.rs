@@ -14,7 +14,7 @@ use super::observers::Observers;
 use super::parameters::Parameters;
 use super::tuning::{ANY_TURN_SD_RAD, ANY_TURN_SLACK, LANDMARKS_MAX};
 use crate::input::Label;
-use geometry::{OUT_OF_PLANE, positive, se3};
+use geometry::{OUT_OF_PLANE, from_blocks, positive, se3};
 
 /// Components of a landmark.
 pub(super) const LANDMARK_DIM: usize = 3;
@@ -327,9 +327,7 @@ impl Frame {
         // Errors of a body are stated along its axes, which a correction has turned.
         for (member, turn) in self.members.iter_mut().zip(turns) {
             let turn = turn.to_rotation_matrix().into_inner();
-            let mut axes = SMatrix::<f64, 6, 6>::zeros();
-            axes.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-            axes.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+            let axes = from_blocks(&turn, &Matrix3::zeros(), &Matrix3::zeros(), &turn);
             let own = self.covariance.block(member.offset, member.offset);
             let mut own = axes * own * axes.transpose();
             let position = (0..3).map(|k| own[(k, k)]).sum();
@@ -340,16 +338,4 @@ impl Frame {
         self.tell_members();
         arc
     }
-}
-
-/// Derivative of d = Rᵀ (p − x) by the error of the observer's pose: | −I  d× |.
-pub(super) fn point_by_pose(point: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
-    let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
-    jacobian
-        .fixed_view_mut::<3, 3>(0, 0)
-        .copy_from(&-Matrix3::identity());
-    jacobian
-        .fixed_view_mut::<3, 3>(0, 3)
-        .copy_from(&point.cross_matrix());
-    jacobian
 }

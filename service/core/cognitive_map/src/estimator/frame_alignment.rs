@@ -6,7 +6,7 @@ use super::tuning::{
     ALIGNMENT_AGREEING_MIN, ALIGNMENT_POINTS_MIN, ALIGNMENT_ROTATION_SD_MAX_RAD, ALIGNMENT_ROUNDS,
     ALIGNMENT_SOFT, ALIGNMENT_WIDENING,
 };
-use geometry::{align, centre, se3};
+use geometry::{align, centre, from_blocks, se3};
 
 /// A point known in two frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,16 +79,9 @@ pub(super) fn align_frames(pairs: &[PointPair], is_planar: bool) -> Option<Frame
     let height = if is_planar { 0.0 } else { across };
     let position = Matrix3::from_diagonal(&Vector3::new(across, across, height));
     let lever = centre.cross_matrix();
-    let mut covariance = Matrix6::zeros();
     let mixed = lever * rotation;
-    covariance
-        .fixed_view_mut::<3, 3>(0, 0)
-        .copy_from(&(position + mixed * lever.transpose()));
-    covariance.fixed_view_mut::<3, 3>(0, 3).copy_from(&mixed);
-    covariance
-        .fixed_view_mut::<3, 3>(3, 0)
-        .copy_from(&mixed.transpose());
-    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
+    let position = position + mixed * lever.transpose();
+    let covariance = from_blocks(&position, &mixed, &mixed.transpose(), &rotation);
     let covariance =
         (covariance + covariance.transpose()) * (0.5 * ALIGNMENT_WIDENING * ALIGNMENT_WIDENING);
     Some(FrameAlignment { pose, covariance })
@@ -97,14 +90,8 @@ pub(super) fn align_frames(pairs: &[PointPair], is_planar: bool) -> Option<Frame
 /// Jacobian of the error of a point of the newer frame with respect to the error τ of the
 /// alignment, in three rows: | I  −l× |.
 pub(super) fn point_by_alignment(point: &Point3<f64>) -> Matrix6<f64> {
-    let mut by_alignment = Matrix6::zeros();
-    by_alignment
-        .fixed_view_mut::<3, 3>(0, 0)
-        .copy_from(&Matrix3::identity());
-    by_alignment
-        .fixed_view_mut::<3, 3>(0, 3)
-        .copy_from(&-point.coords.cross_matrix());
-    by_alignment
+    let (one, zero) = (Matrix3::identity(), Matrix3::zeros());
+    from_blocks(&one, &-point.coords.cross_matrix(), &zero, &zero)
 }
 
 /// Jacobian of the error of a pose of the newer frame with respect to τ: `Ad(T_b⁻¹)`.

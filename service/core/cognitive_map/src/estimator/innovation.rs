@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3};
 
 use super::tuning::{DIRECTION_DISTANCE_MIN_M, SIGHTING_SD_MIN};
-use crate::input::{RangeBearing, Relation, RelativePosition};
+use crate::input::{RangeBearing, Relation, RelativePose, RelativePosition};
 use geometry::se3;
 
 /// A sighting of a point, linearised about where the observer and the point are thought to be.
@@ -61,7 +61,7 @@ impl PointInnovation {
     /// α = atan2(e_α·d, e_r·d)      ε = atan2(e_ε·d, h)      h = hypot(e_r·d, e_α·d)
     /// ```
     fn of_range_and_bearing(seen: &RangeBearing, expected: &Vector3<f64>) -> Option<Self> {
-        let (forward, left, up, cos_elevation) = directions(seen);
+        let (forward, left, up, cos_elevation) = seen.directions();
         let distance_m = expected.norm();
         let (ahead, aside, above) = (forward.dot(expected), left.dot(expected), up.dot(expected));
         let level = ahead.hypot(aside);
@@ -100,7 +100,7 @@ pub(super) fn seen_at(relation: &Relation) -> (Vector3<f64>, Matrix3<f64>) {
     let point = match relation {
         Relation::Position(seen) => *seen.translation_m(),
         Relation::RangeBearing(seen) => {
-            directions(seen).0 * seen.range_m().max(DIRECTION_DISTANCE_MIN_M)
+            seen.directions().0 * seen.range_m().max(DIRECTION_DISTANCE_MIN_M)
         }
         Relation::Pose(seen) => seen.pose().translation.vector,
     };
@@ -114,39 +114,18 @@ pub(super) fn seen_at(relation: &Relation) -> (Vector3<f64>, Matrix3<f64>) {
 /// A sighting of a full pose, linearised: residual of the target's pose, derivatives by the errors
 /// of the observer's and of the target's pose, and variances.
 pub(super) fn pose_innovation(
-    seen: &crate::input::RelativePose,
+    seen: &RelativePose,
     observer: &Isometry3<f64>,
     target: &Isometry3<f64>,
 ) -> (SVector<f64, 6>, Matrix6<f64>, Matrix6<f64>, SVector<f64, 6>) {
     // exp(residual) takes the expected relative pose to the seen one.
     let expected = observer.inv_mul(target);
-    let (linear, angular) = se3::log(&expected.inv_mul(seen.pose()));
-    let mut residual = SVector::<f64, 6>::zeros();
-    residual.fixed_rows_mut::<3>(0).copy_from(&linear);
-    residual.fixed_rows_mut::<3>(3).copy_from(&angular);
+    let residual = se3::twist(&expected.inv_mul(seen.pose()));
     let by_observer = -se3::adjoint(&expected.inverse());
     let sd = seen.noise().sd();
     let floor = SVector::<f64, 6>::repeat(SIGHTING_SD_MIN);
     let variance = sd.component_mul(sd) + floor.component_mul(&floor);
     (residual, by_observer, SMatrix::identity(), variance)
-}
-
-/// The unit vectors along growing range, azimuth and elevation, and the cosine of the elevation.
-fn directions(seen: &RangeBearing) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>, f64) {
-    let (sin_azimuth, cos_azimuth) = seen.azimuth_rad().sin_cos();
-    let (sin_elevation, cos_elevation) = seen.elevation_rad().sin_cos();
-    let forward = Vector3::new(
-        cos_elevation * cos_azimuth,
-        cos_elevation * sin_azimuth,
-        sin_elevation,
-    );
-    let left = Vector3::new(-sin_azimuth, cos_azimuth, 0.0);
-    let up = Vector3::new(
-        -sin_elevation * cos_azimuth,
-        -sin_elevation * sin_azimuth,
-        cos_elevation,
-    );
-    (forward, left, up, cos_elevation.abs())
 }
 
 /// Squares, never quite zero.

@@ -22,7 +22,7 @@ use geometry::PoseCovariance;
 /// Every agent begins in a frame of its own. The first frame is that of the map: an agent enters it
 /// by [`Estimator::found`] or by a start pose. Frames are laid into one another as soon as enough
 /// points are known in both: landmarks, and places where one agent saw the other, or when the
-/// landmarks of both lie alike under other names. The older frame prevails.
+/// landmarks of both have one arrangement under other names. The older frame prevails.
 ///
 /// An agent takes part in the joint estimate of its frame from its first sighting on, or from when
 /// it is first seen; of more than 32, the one whose latest sighting is longest ago goes on by
@@ -201,7 +201,7 @@ impl Estimator {
         Some(self.slot(agent)?.frame)
     }
 
-    /// Whether it is known where an agent stands in the map.
+    /// Whether it is known where an agent is in the map.
     pub fn is_in_map(&self, agent: u32) -> bool {
         self.frame_of(agent) == Some(MAP)
     }

@@ -95,22 +95,28 @@ impl Estimator {
                 (label.clone(), (*name).clone())
             });
         }
-        let largest = chances.iter().copied().fold(0.0, f64::max);
         let agreeing = found.len() + n_proven;
-        let is_proven =
-            log10_at_least(agreeing, n_sought + n_proven, largest) < ASSOCIATION_LOG10_CHANCE_MAX;
-        let mut names: Vec<&Label> = found
-            .iter()
-            .flat_map(|(label, name)| [label, name])
-            .collect();
-        names.sort_unstable();
-        let are_pairs = names.windows(2).all(|two| two[0] != two[1]);
-        if is_proven && are_pairs {
+        if is_beyond_chance(agreeing, n_sought + n_proven, &chances) && are_pairs(&found) {
             found
         } else {
             Vec::new()
         }
     }
+}
+
+/// Whether chance brings so many landmarks together seldom enough; `chances` are those of each one
+/// alone.
+fn is_beyond_chance(agreeing: usize, sought: usize, chances: &[f64]) -> bool {
+    let largest = chances.iter().copied().fold(0.0, f64::max);
+    log10_at_least(agreeing, sought, largest) < ASSOCIATION_LOG10_CHANCE_MAX
+}
+
+/// Whether no name is in more than one of the pairs.
+fn are_pairs(found: &[(Label, Label)]) -> bool {
+    let names = found.iter().flat_map(|(label, name)| [label, name]);
+    let mut names: Vec<&Label> = names.collect();
+    names.sort_unstable();
+    names.windows(2).all(|two| two[0] != two[1])
 }
 
 /// How far two landmarks are estimated to be from one another.

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
 
 use super::agent_slot::AgentState;
-use super::covariance::Block;
-use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member, point_by_pose};
+use super::covariance::{Block, Projection};
+use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::innovation::{PointInnovation, pose_innovation, seen_at};
 use super::landmark_archive::ArchivedLandmark;
 use super::observers::Observers;
@@ -18,7 +18,7 @@ use super::tuning::{
 };
 use super::verdict::{Outcome, Verdict};
 use crate::input::{Label, Relation, RelativePose};
-use geometry::{se3, symmetric};
+use geometry::{beside, se3, seen_by_pose, symmetric};
 
 /// A sighting of a frame's member: who, how it moved since, when, and what it saw.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +55,7 @@ impl Frame {
             .into_inner()
             .transpose();
         let blocks = [
-            past.block(&(innovation.by_point * point_by_pose(&expected))),
+            past.block(&(innovation.by_point * seen_by_pose(&expected))),
             point_block(landmark.offset, &(innovation.by_point * to_body)),
         ];
         let seen = SightingTarget::Landmark(landmark.number);
@@ -108,15 +108,12 @@ impl Frame {
             };
             let relative = past.pose.rotation.inverse() * other.pose.rotation;
             let turn = relative.to_rotation_matrix().into_inner();
-            let mut by_target = SMatrix::<f64, 3, 6>::zeros();
-            by_target
-                .fixed_view_mut::<3, 3>(0, 0)
-                .copy_from(&(innovation.by_point * turn));
+            let by_target = beside(&(innovation.by_point * turn), &Matrix3::zeros());
             let blocks = [
-                past.block(&(innovation.by_point * point_by_pose(&expected))),
+                past.block(&(innovation.by_point * seen_by_pose(&expected))),
                 other.block(&by_target),
             ];
-            let seen = SightingTarget::Agent(self.members[target].agent);
+            let seen = SightingTarget::Agent(self.members[target].agent.into());
             self.update_by_point(measurement, &blocks, &innovation, seen, &scope)
         };
         self.widen_if_refused(measurement.observer);
@@ -146,7 +143,7 @@ impl Frame {
         });
         let world = past.pose.rotation.to_rotation_matrix().into_inner();
         let noise = world * noise.unwrap_or(stated) * world.transpose();
-        let by_pose = -(world * point_by_pose(&point));
+        let by_pose = -(world * seen_by_pose(&point));
         let offset = self
             .covariance
             .append(&[past.block(&by_pose)], &symmetric(&noise));
@@ -157,16 +154,8 @@ impl Frame {
             Observers::default()
         };
         observers.note(self.members[measurement.observer].agent);
-        let landmark = LandmarkState {
-            number: self.numbered,
-            position: past.pose * Point3::from(point),
-            offset,
-            used: self.sightings,
-            refused: 0,
-            observers,
-        };
-        self.numbered += 1;
-        Arc::make_mut(&mut self.landmarks).insert(label.clone(), landmark);
+        let position = past.pose * Point3::from(point);
+        self.insert_landmark(label, position, offset, observers);
         let verdict = match self.archive.remove(label) {
             None => Verdict::Learned,
             Some(archived) => self.fuse_archived(measurement, offset, &archived),
@@ -183,9 +172,20 @@ impl Frame {
             Some(agent) => observers.note(agent),
             None => observers = Observers::unknown(),
         }
+        self.insert_landmark(label, archived.position, offset, observers);
+    }
+
+    /// Numbers a landmark whose error begins at an offset.
+    fn insert_landmark(
+        &mut self,
+        label: &Label,
+        position: Point3<f64>,
+        offset: usize,
+        observers: Observers,
+    ) {
         let landmark = LandmarkState {
             number: self.numbered,
-            position: archived.position,
+            position,
             offset,
             used: self.sightings,
             refused: 0,
@@ -269,40 +269,30 @@ impl Frame {
         let mut outcome = Outcome::nothing();
         outcome.variance.fixed_rows_mut::<3>(0).copy_from(&variance);
         let spread = projection.spread.diagonal();
-        let squares = innovation
-            .residual
-            .component_mul(&innovation.residual)
-            .component_div(&(spread + variance));
-        // A square that is not a number is refused, too.
-        if !squares
-            .iter()
-            .all(|square| square.sqrt() <= parameters.gate)
-        {
-            scope.weigh(member, true, false);
+        let Some(squares) = scope.judge(
+            &innovation.residual,
+            &(spread + variance),
+            member,
+            parameters,
+        ) else {
             return outcome;
-        }
-        let fits = squares
-            .iter()
-            .all(|square| square.sqrt() <= parameters.soft);
-        scope.weigh(member, false, fits);
+        };
         member
             .sensor
             .note(seen, measurement.stamp_ns, innovation, &spread, &variance);
         // A planar robot's elevations are no measurements.
         let is_flat =
             member.filter.is_planar && innovation.is_polar && innovation.residual[2] == 0.0;
-        let components: usize = if is_flat { 2 } else { 3 };
-        let nis = squares.iter().take(components).sum();
-        for (variance, square) in variance.iter_mut().zip(squares.iter()) {
-            *variance *= (square / parameters.soft.powi(2)).max(1.0);
-        }
-        let s = projection.spread + Matrix3::from_diagonal(&variance);
-        let (joint, corrected) = (&mut self.covariance, &scope.corrected);
-        let update = joint.update(projection, &innovation.residual, &s, corrected);
-        if let Some(correction) = update {
-            self.correct(measurement.observer, &correction, parameters);
-        }
-        let components = if is_flat { 2 } else { 3 };
+        let components: u32 = if is_flat { 2 } else { 3 };
+        let nis = squares.iter().take(components as usize).sum();
+        variance.component_mul_assign(&parameters.loss_of_weight(&squares));
+        self.take_in(
+            measurement,
+            projection,
+            &innovation.residual,
+            &variance,
+            scope,
+        );
         outcome.verdict = Verdict::Accepted { nis, components };
         outcome
     }
@@ -320,39 +310,39 @@ impl Frame {
         let blocks = [past.block(&by_observer), other.block(&by_target)];
         let projection = self.covariance.project(&blocks);
         let spread: SVector<f64, 6> = projection.spread.diagonal();
-        let squares = residual
-            .component_mul(&residual)
-            .component_div(&(spread + variance));
         let parameters = measurement.parameters;
         let member = self.members[measurement.observer].state_mut();
         let mut outcome = Outcome {
             verdict: Verdict::Refused,
             variance,
         };
-        if !squares
-            .iter()
-            .all(|square| square.sqrt() <= parameters.gate)
-        {
-            scope.weigh(member, true, false);
+        let Some(squares) = scope.judge(&residual, &(spread + variance), member, parameters) else {
             return outcome;
-        }
-        let fits = squares
-            .iter()
-            .all(|square| square.sqrt() <= parameters.soft);
-        scope.weigh(member, false, fits);
-        let factors = squares.map(|square| (square / parameters.soft.powi(2)).max(1.0));
-        let weighted = variance.component_mul(&factors);
-        let s = projection.spread + SMatrix::from_diagonal(&weighted);
-        let (joint, corrected) = (&mut self.covariance, &scope.corrected);
-        let update = joint.update(projection, &residual, &s, corrected);
-        if let Some(correction) = update {
-            self.correct(measurement.observer, &correction, parameters);
-        }
+        };
+        let loss = parameters.loss_of_weight(&squares);
+        let weighted = variance.component_mul(&loss);
+        self.take_in(measurement, projection, &residual, &weighted, scope);
         outcome.verdict = Verdict::Accepted {
             nis: squares.sum(),
             components: 6,
         };
         outcome
+    }
+
+    /// Corrects what a sighting may correct, with these variances of its components.
+    fn take_in<const M: usize>(
+        &mut self,
+        measurement: &Measurement<'_>,
+        projection: Projection<M>,
+        residual: &SVector<f64, M>,
+        variance: &SVector<f64, M>,
+        scope: &CorrectionScope,
+    ) {
+        let s = projection.spread + SMatrix::from_diagonal(variance);
+        let (joint, corrected) = (&mut self.covariance, &scope.corrected);
+        if let Some(correction) = joint.update(projection, residual, &s, corrected) {
+            self.correct(measurement.observer, &correction, measurement.parameters);
+        }
     }
 
     /// Lets an agent whose sightings contradict the estimate search farther around.
@@ -374,10 +364,22 @@ struct CorrectionScope {
 }
 
 impl CorrectionScope {
-    fn weigh(&self, observer: &mut AgentState, is_refused: bool, fits: bool) {
+    /// The squared innovations in units of their variances, if none is beyond the gate: one that is
+    /// not a number is, too. Counts for or against the observer.
+    fn judge<const M: usize>(
+        &self,
+        residual: &SVector<f64, M>,
+        expected: &SVector<f64, M>,
+        observer: &mut AgentState,
+        parameters: &Parameters,
+    ) -> Option<SVector<f64, M>> {
+        let squares = residual.component_mul(residual).component_div(expected);
+        let are_within = |most: f64| squares.iter().all(|square| square.sqrt() <= most);
+        let is_accepted = are_within(parameters.gate);
         if self.counts {
-            observer.weigh(is_refused, fits);
+            observer.weigh(!is_accepted, is_accepted && are_within(parameters.soft));
         }
+        is_accepted.then_some(squares)
     }
 }
 
@@ -410,11 +412,9 @@ impl PastPose {
 
 /// The part of a Jacobian that belongs to a landmark.
 pub(super) fn point_block(offset: usize, jacobian: &Matrix3<f64>) -> Block<3> {
-    let mut wide = SMatrix::<f64, 3, 6>::zeros();
-    wide.fixed_view_mut::<3, 3>(0, 0).copy_from(jacobian);
     Block {
         offset,
         width: LANDMARK_DIM,
-        jacobian: wide,
+        jacobian: beside(jacobian, &Matrix3::zeros()),
     }
 }

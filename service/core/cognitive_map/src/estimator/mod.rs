@@ -29,7 +29,7 @@
 //!   everything for long, or may be anywhere, is set aside in a frame of its own, with its
 //!   landmarks (`set_aside`).
 //! - **Frames.** Agents whose place in the map is unknown have frames of their own until enough
-//!   points are known in both, or their landmarks lie alike whatever they are called
+//!   points are known in both, or their landmarks have one arrangement, whatever their names
 //!   (`registration`).
 
 mod agent_filter;

@@ -42,7 +42,7 @@ impl Observers {
         }
     }
 
-    /// An agent's number stands for another one from now on: who it was is forgotten.
+    /// An agent's number is another agent's from now on: who it was is forgotten.
     pub(super) fn forget(&mut self, agent: u32) {
         if let Ok(at) = self.agents.binary_search(&agent) {
             self.agents.remove(at);

@@ -73,7 +73,7 @@ impl Parameters {
         SVector::from([self.length_error_sd, self.angle_error_sd, bias, bias, bias])
     }
 
-    /// Largest lasting errors that are believed.
+    /// Largest lasting errors that are accepted.
     pub(super) fn calibration_max(&self) -> SVector<f64, 5> {
         let most = self.calibration_sd() * LASTING_DEVIATIONS_MAX;
         SVector::from_fn(|k, _| {
@@ -102,6 +102,15 @@ impl Parameters {
         let time = duration_s / 1000.0;
         let renewed = SVector::from([path_m / 100.0, angle_rad / 100.0, time, time, time]);
         sd.component_mul(&sd).component_mul(&renewed) * self.calibration_renewal
+    }
+
+    /// Factors of the variances of components whose innovations have these squares: an outlying
+    /// component loses weight.
+    pub(super) fn loss_of_weight<const M: usize>(
+        &self,
+        squares: &SVector<f64, M>,
+    ) -> SVector<f64, M> {
+        squares.map(|square| (square / self.soft.powi(2)).max(1.0))
     }
 
     /// Standard deviations of a motion's noise \[m, m, m, rad, rad, rad\].

@@ -91,7 +91,7 @@ impl Estimator {
         self.merge(MAP, own, &alignment, effects);
     }
 
-    /// An agent of the map may be anywhere, about `sd_m` from where it was believed to be along
+    /// An agent of the map may be anywhere, about `sd_m` from where it was estimated to be along
     /// each axis and turned in any way. One that moves in a plane stays there.
     pub fn lose(&mut self, agent: u32, sd_m: f64) {
         let Some(filter) = self.filter(agent).filter(|_| self.is_in_map(agent)) else {

@@ -16,7 +16,7 @@ pub(super) enum SightingTarget {
     /// A landmark, by its number within the frame.
     Landmark(u64),
     /// An agent, by its number.
-    Agent(u32),
+    Agent(u64),
 }
 
 /// How far to trust an agent's sensor.

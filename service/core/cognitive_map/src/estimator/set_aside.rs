@@ -250,18 +250,18 @@ mod tests {
     }
 
     #[test]
-    fn what_slept_is_not_moved_by_who_is_doubted() {
+    fn an_archived_landmark_is_not_moved_by_a_doubted_agent() {
         let (mut estimator, honest, liar) = two(100);
         lie(&mut estimator, liar, 50, DOUBT_MIN);
         assert!(estimator.is_doubted(liar) && !estimator.is_doubted(honest));
-        let slept = *estimator.frame(MAP).archive.get(&label(0)).unwrap();
+        let archived = *estimator.frame(MAP).archive.get(&label(0)).unwrap();
         let beside = post(0) + nalgebra::Vector3::new(0.7, 0.0, 0.0);
         see(&mut estimator, liar, 0, &beside);
         let frame = estimator.frame(MAP);
-        let awake = &frame.landmarks[&label(0)];
-        assert!((awake.position - slept.position).norm() < 1e-9);
-        let lost = slept.covariance - frame.landmark_covariance(awake);
-        assert!(lost.amax() < 1e-6 * slept.covariance.amax(), "{lost}");
+        let restored = &frame.landmarks[&label(0)];
+        assert!((restored.position - archived.position).norm() < 1e-9);
+        let lost = archived.covariance - frame.landmark_covariance(restored);
+        assert!(lost.amax() < 1e-6 * archived.covariance.amax(), "{lost}");
         let pose = estimator.in_frame(honest).unwrap();
         assert!(pose.translation.vector.norm() < 1e-9);
     }
@@ -286,7 +286,7 @@ mod tests {
             see(&mut estimator, liar, number % 10, &post(number % 10));
         }
         assert!(!estimator.is_doubted(liar) && !estimator.is_aside(liar));
-        // Told where it stands, it is doubted no less.
+        // After a start pose it is doubted no less.
         lie(&mut estimator, liar, 5, 2 * DOUBT_MAX);
         assert!(estimator.is_aside(liar));
         estimator.start_pose(liar, &start(&Isometry3::identity(), 0.1), &mut Vec::new());
@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_is_given_anew_has_seen_no_landmark_that_sleeps() {
+    fn a_number_that_is_given_anew_has_seen_no_archived_landmark() {
         let mut estimator = Estimator::new(Parameters::default());
         let (one, other) = (estimator.enrol(), estimator.enrol());
         for number in 0..100 {

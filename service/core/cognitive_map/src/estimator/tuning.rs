@@ -33,7 +33,7 @@ pub(super) const FRAME_MATCHES_MAX: usize = 64;
 pub(super) const FRAMES_COMPARED_MAX: usize = 16;
 /// Frames among which the next one to register with is sought.
 pub(super) const FRAMES_SCANNED_MAX: usize = 16;
-/// Labels that stand for another one. Beyond that no landmarks are associated.
+/// Labels that are associated with another one. Beyond that no landmarks are associated.
 pub(super) const ASSOCIATIONS_MAX: usize = 4096;
 /// Targets of which a sensor keeps the latest sighting.
 pub(super) const SENSOR_TARGETS_MAX: usize = 128;
@@ -61,7 +61,7 @@ pub(super) const ANY_TURN_SLACK: f64 = 1.001;
 /// Standard deviation of a position from which on it says nothing \[m\]. Source: the largest
 /// `lost_sd_m` that settings may state.
 pub(super) const POSITION_SD_MAX_M: f64 = 1e6;
-/// Largest lasting error of odometry that is believed, in the deviations that the settings state.
+/// Largest lasting error of odometry that is accepted, in the deviations that the settings state.
 /// Source: *liars* (`docs/decisions/0027-covariances-stay-positive.md`).
 pub(super) const LASTING_DEVIATIONS_MAX: f64 = 8.0;
 /// Largest lasting error of lengths and of angles, as a ratio. Source: with more, readings would
@@ -107,7 +107,7 @@ pub(super) const WIDENED_SD: (f64, f64) = (1.0, 0.5);
 /// Refused sightings in a row after which a landmark is forgotten: it was moved or was never there.
 /// Source: *hall*, a post that is moved.
 pub(super) const REFUSED_TO_FORGET: u32 = 8;
-/// Refused sightings in a row after which a label stands for a landmark of its own again. Source:
+/// Refused sightings in a row after which a label is that of a landmark of its own again. Source:
 /// less than [`REFUSED_TO_FORGET`], so that the landmark itself stays.
 pub(super) const REFUSED_TO_DISSOCIATE: u32 = 6;
 /// Doubt from which on an agent corrects nobody but itself. Source: what it takes to search farther
@@ -179,8 +179,8 @@ pub(super) const SWAP_ROUNDS: usize = 3;
 /// Landmarks of the older frame that are registered, in the plane and in space, where a motion
 /// takes three. Source: work.
 pub(super) const REGISTERED_MAX: (usize, usize) = (64, 32);
-/// Factor of the landmarks' variances. Source: sensors err alike for a while, so that the estimate
-/// is too sure of itself.
+/// Factor of the landmarks' variances. Source: sensors keep their errors for a while, so that the
+/// estimate is too sure of itself.
 pub(super) const LANDMARK_WIDENING: f64 = 4.0;
 /// Variance of the distance between two estimates of one landmark, beside their own \[m²\]: 1 cm.
 pub(super) const SAME_LANDMARK_VARIANCE_M2: f64 = 1e-4;

@@ -77,7 +77,7 @@ impl Fold<'_> {
         self.agent.next_seq = 0;
         self.agent.stamp_ns = None;
         self.agent.still_since = None;
-        self.agent.body.restart();
+        self.agent.announced.restart();
         if before.is_some() {
             let sd = Vector6::from(RESTART_SD);
             self.estimator.restart(self.agent_id.0, &sd);
@@ -156,13 +156,13 @@ impl Fold<'_> {
     }
 
     /// Lets the first agent that does something define the `map` frame, by the identity at which it
-    /// stands.
+    /// is.
     pub(super) fn define_frame(&mut self) {
         if !*self.is_map_defined {
             *self.is_map_defined = true;
             self.estimator.found(self.agent_id.0);
             self.keyframes.graph.found(self.agent_id.0);
-            self.agent.placed = true;
+            self.agent.announced.set_placed(true);
         }
     }
 
@@ -197,36 +197,35 @@ impl Fold<'_> {
     /// there anew.
     pub(super) fn update_pose(&mut self) {
         let number = self.agent_id.0;
-        if !self.estimator.is_in_map(number) && self.agent.placed {
+        if !self.estimator.is_in_map(number) && self.agent.placed() {
             self.unplace();
         }
-        if self.estimator.is_in_map(number) && !self.agent.placed {
+        if self.estimator.is_in_map(number) && !self.agent.placed() {
             self.end_trip(TripEnd::StartPose);
             self.place_agent();
-            let position = Point3::from(self.agent.body.in_map().translation.vector);
+            let position = Point3::from(self.agent.announced.in_map().translation.vector);
             self.emit(EventKind::AgentPlaced { position });
             return;
         }
         let Some(pose) = self.estimator.in_frame(number) else {
             return;
         };
-        let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
+        let (placed, agent, stamp_ns) = (self.agent.placed(), self.agent_id, self.stamp_ns);
         let events = &mut *self.events;
         let entered = |module, reference| {
             events.extend(cell_entered(placed, agent, stamp_ns, module, reference));
         };
-        self.agent.body.follow(pose, self.modules, entered);
-        if let Some(evidence) = self.estimator.evidence(number) {
-            self.agent.evidence = *evidence;
-        }
+        let evidence = self.estimator.evidence(number);
+        let announced = &mut self.agent.announced;
+        announced.follow(pose, evidence, self.modules, entered);
     }
 
     /// Puts the agent where the estimate has it, without a way there.
     pub(super) fn place_agent(&mut self) {
         if let Some(pose) = self.estimator.in_frame(self.agent_id.0) {
-            self.agent.body.place(pose, self.modules);
+            self.agent.announced.place(pose, self.modules);
         }
-        self.agent.placed = true;
+        self.agent.announced.set_placed(true);
         self.agent.place = None;
         self.agent.entered = None;
         self.agent.still_since = None;
@@ -238,7 +237,7 @@ impl Fold<'_> {
         self.end_trip(TripEnd::Gap);
         self.end_episode();
         self.place_agent();
-        self.agent.placed = false;
+        self.agent.announced.set_placed(false);
     }
 
     /// Holds the places that the agent needs now, and releases those that it no longer does.

@@ -44,7 +44,8 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps,
 /// version 3 no joint estimate and no keyframe graph, version 4 no views in it and no objects,
 /// version 5 no searches, version 6 no other names of landmarks, version 7 none of what was joined
-/// into objects, version 8 no moorings and no doubts, version 9 nobody removed or set aside.
+/// into objects, version 8 no attachments and no kidnap tests, version 9 nobody removed or set
+/// aside.
 const VERSION: u16 = 10;
 
 const HEADER: u8 = 0;
@@ -167,22 +168,38 @@ impl CognitiveMap {
         map.trips.skip_to(count(header.trips));
         let objects = pages.split_off(&(OBJECTS, 0));
         map.restore_objects(objects)?;
-        let lived = pages.split_off(&(KEYFRAMES, 0));
-        map.restore_keyframes(lived)?;
+        let keyframes = pages.split_off(&(KEYFRAMES, 0));
+        map.restore_keyframes(keyframes)?;
+        let trips = map.restore_memories(pages)?;
+        // A trip's page repeats the digests of its legs, which are read from their own pages.
+        let again = map.trips.changed_pages(0);
+        let again = again.map(|(page, items)| of_sparse(TRIPS, page, &items).bytes);
+        if !again.eq(trips) || !map.refers_to_what_is_there() || map.digest() != digest {
+            return Err(CorruptCheckpoint::DigestMismatch);
+        }
+        map.derive_indices();
+        Ok(map)
+    }
+
+    /// Reads agents, places, trips, landmarks, percepts and the estimate; answers the pages of
+    /// trips.
+    fn restore_memories(
+        &mut self,
+        pages: BTreeMap<(u8, u32), Vec<u8>>,
+    ) -> Result<Vec<Vec<u8>>, CorruptCheckpoint> {
         let mut trips = Vec::new();
         let mut expected = 0;
         for ((kind, index), bytes) in pages {
             // Pages of a kind without gaps must follow one another; those of legs begin anew with
             // each trip, those of descriptors with each channel.
-            let first = match kind {
+            let is_first = match kind {
                 PLACES | TRIPS | LEVELS => true,
                 LEGS => index % LEG_PAGES_MAX == 0,
                 DESCRIPTORS => index % CHANNEL_PAGES_MAX == 0,
                 _ => index == 0,
             };
-            let next = if first { index } else { expected };
-            let restored = if index == next {
-                map.restore_page(kind, index, &bytes)
+            let restored = if is_first || index == expected {
+                self.restore_page(kind, index, &bytes)
             } else {
                 Err(CorruptState::Invalid)
             };
@@ -192,25 +209,20 @@ impl CognitiveMap {
                 trips.push(bytes);
             }
         }
-        // A trip's page repeats the digests of its legs, which are read from their own pages.
-        let again = map.trips.changed_pages(0);
-        let again = again.map(|(page, items)| of_sparse(TRIPS, page, &items).bytes);
-        if !again.eq(trips) {
-            return Err(CorruptCheckpoint::DigestMismatch);
-        }
-        if !map.refers_to_what_is_there() || map.digest() != digest {
-            return Err(CorruptCheckpoint::DigestMismatch);
-        }
-        map.trips.summarise_all();
+        Ok(trips)
+    }
+
+    /// Derives what a checkpoint does not hold: summaries of trips, names, which places are held.
+    fn derive_indices(&mut self) {
+        self.trips.summarise_all();
         let mut names = BTreeMap::new();
-        for (id, agent) in map.agents() {
+        for (id, agent) in self.agents() {
             names.entry(agent.name().clone()).or_insert(id);
         }
-        map.names = Arc::new(names);
-        for place in map.agents.iter().flat_map(Agent::holds).flatten() {
-            map.places.hold(place);
+        self.names = Arc::new(names);
+        for place in self.agents.iter().flat_map(Agent::holds).flatten() {
+            self.places.hold(place);
         }
-        Ok(map)
     }
 
     /// The header, with the map's digest after it.
@@ -353,7 +365,7 @@ impl CognitiveMap {
         let was_there = |place: PlaceId| (place.0 as usize) < recruited;
         let is_agent = |agent: AgentId| (agent.0 as usize) < self.agents.len();
         let agents = self.agents.iter().all(|agent| {
-            agent.body.fits(&self.modules)
+            agent.announced.fits(&self.modules)
                 && agent.holds().into_iter().flatten().all(was_there)
                 && agent.entered.is_none_or(was_there)
                 && agent
@@ -361,14 +373,19 @@ impl CognitiveMap {
                     .trip
                     .is_none_or(|trip| (trip.0 as usize) < recorded)
         });
-        let is_moored = |id: PlaceId, mooring| self.keyframes.graph.is_attached(mooring, id.0);
+        let graph = &self.keyframes.graph;
+        let is_attached = |id: PlaceId, attachment| graph.is_attached(attachment, id.0);
         let places = self.places().all(|(id, place)| {
             is_agent(place.founder())
                 && place.trip.is_none_or(|trip| (trip.0 as usize) < recorded)
-                && place.mooring.is_none_or(|mooring| is_moored(id, mooring))
+                && place
+                    .attachment
+                    .is_none_or(|attachment| is_attached(id, attachment))
         });
-        let moored = self.places().filter(|(_, place)| place.mooring.is_some());
-        let places = places && moored.count() == self.keyframes.graph.n_attachments();
+        let attached = self
+            .places()
+            .filter(|(_, place)| place.attachment.is_some());
+        let places = places && attached.count() == graph.n_attachments();
         let trips = self.trips().all(|(_, trip)| {
             is_agent(trip.agent())
                 && trip

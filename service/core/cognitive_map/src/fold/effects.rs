@@ -20,12 +20,12 @@ impl Fold<'_> {
             agent,
             seq: self.agent.next_seq.saturating_sub(1),
             stamp_ns: self.stamp_ns,
-            pose: *pose.unwrap_or(self.agent.body.in_map()),
+            pose: *pose.unwrap_or(self.agent.announced.in_map()),
         }
     }
 
-    /// Tells the keyframe graph, the landmark map and the agent's body what the latest call of the
-    /// estimator brought about.
+    /// Applies what the latest call of the estimator brought about to the keyframe graph and the
+    /// landmark map.
     pub(super) fn apply_effects(&mut self) {
         let mut effects = std::mem::take(&mut self.effects);
         effects.sort_by_key(Effect::order);
@@ -87,7 +87,7 @@ impl Fold<'_> {
 
 impl Fold<'_> {
     /// Relaxes the past when enough has come since the last time to pay for it and matches wait,
-    /// and tells the estimate where the agents are by those that are believed.
+    /// and fuses the poses of the agents by those that are accepted.
     ///
     /// When that is depends on the records alone.
     pub(super) fn relax_matches(&mut self) {
@@ -109,7 +109,7 @@ impl Fold<'_> {
 }
 
 impl Fold<'_> {
-    /// Moves some of the places that turned out to lie elsewhere.
+    /// Moves some of the places that turned out to be elsewhere.
     pub(super) fn move_places(&mut self) {
         for (place, at) in self.keyframes.graph.moved_places() {
             self.places.put(PlaceId(place), &at, self.revision);
@@ -127,12 +127,12 @@ impl CognitiveMap {
 
     /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in
     /// the making as [`refined`](Self::refined).
-    pub fn experience_map(&self) -> PoseGraph {
-        self.keyframes.graph.experience_map()
+    pub fn pose_graph(&self) -> PoseGraph {
+        self.keyframes.graph.pose_graph()
     }
 
-    /// Number of matches and revisits that are believed.
+    /// Number of loop closures that are accepted.
     pub fn closure_count(&self) -> usize {
-        self.keyframes.graph.n_matches_believed()
+        self.keyframes.graph.n_closures_accepted()
     }
 }

@@ -55,7 +55,7 @@ impl CognitiveMap {
         }
     }
 
-    /// Whether an agent was ever in the map: it stood in its frame, so that something there may be
+    /// Whether an agent was ever in the map: it was in its frame, so that something there may be
     /// its own.
     pub fn has_been_in_map(&self, id: AgentId) -> bool {
         self.agent(id).is_some_and(Agent::placed) || self.estimator.has_been_in_map(id.0)
@@ -79,7 +79,7 @@ impl Fold<'_> {
         self.agent.entered = None;
         self.hold_places();
         let number = self.agent_id.0;
-        if self.agent.placed || self.estimator.has_been_in_map(number) {
+        if self.agent.placed() || self.estimator.has_been_in_map(number) {
             self.estimator.retire(number);
             self.keyframes.retire(number);
             self.agent.membership = Membership::Removed;

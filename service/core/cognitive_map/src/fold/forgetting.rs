@@ -24,8 +24,8 @@ impl Fold<'_> {
             return false;
         };
         self.percepts.forget(place, self.revision);
-        if let Some(mooring) = forgotten.mooring {
-            self.keyframes.graph.detach_place(mooring);
+        if let Some(attachment) = forgotten.attachment {
+            self.keyframes.graph.detach_place(attachment);
         }
         let position = *forgotten.position();
         self.emit(EventKind::PlaceForgotten { place, position });

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::CognitiveMap;
-use crate::agent::Status;
+use crate::agent::{Agent, Status};
 use crate::input::{AgentId, Record};
 use crate::input::{Label, Sample};
 use crate::keyframes::Guess;
@@ -27,8 +27,8 @@ impl CognitiveMap {
     /// them, in a map that does not change. Motions say how the moments of the sequence lie to one
     /// another; descriptors and labelled landmarks say where.
     ///
-    /// Nothing is told that is not believed: where the map does not know what was seen, or knows it
-    /// of several places, the status is not [`Status::Localized`].
+    /// No pose is answered that is not accepted: where the map does not know what was seen, or
+    /// knows it of several places, the status is not [`Status::Localized`].
     pub fn localize<'a>(&self, samples: impl IntoIterator<Item = &'a Sample>) -> Localization {
         let nowhere = Localization {
             status: Status::Lost,
@@ -57,11 +57,11 @@ impl CognitiveMap {
             };
             map.apply(&record, &mut events);
             events.clear();
-            if since.is_none() && map.agent(agent).is_some_and(|agent| agent.placed) {
+            if since.is_none() && map.agent(agent).is_some_and(Agent::placed) {
                 since = usize::try_from(seq).ok();
             }
         }
-        let placed = map.agent(agent).filter(|agent| agent.placed);
+        let placed = map.agent(agent).filter(|agent| agent.placed());
         let pose = placed.zip(map.covariance(agent));
         let status = map.status(agent).unwrap_or(Status::Lost);
         let guesses = map.keyframes.guesses(agent.0);

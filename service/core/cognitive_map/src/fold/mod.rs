@@ -54,7 +54,9 @@ pub struct CognitiveMap {
     modules: Arc<GridModules>,
     /// Number of records that had an effect.
     revision: u64,
-    /// Whether some agent has defined the `map` frame.
+    /// Whether some agent has defined the `map` frame. The estimator cannot tell: its frame of the
+    /// map is empty again once all agents in it were set aside, and a start pose without bounds
+    /// passes through it without defining anything.
     is_map_defined: bool,
     agents: PagedVec<Agent, AGENT_PAGE>,
     /// The agents by name.

@@ -14,7 +14,7 @@ impl Fold<'_> {
     /// The body moved.
     pub(super) fn motion(&mut self, seq: u64, motion: &Motion) {
         self.define_frame();
-        let (placed, agent, stamp_ns) = (self.agent.placed, self.agent_id, self.stamp_ns);
+        let (placed, agent, stamp_ns) = (self.agent.placed(), self.agent_id, self.stamp_ns);
         let increment = motion.increment();
         let step = self
             .estimator
@@ -31,10 +31,10 @@ impl Fold<'_> {
         let path_m = increment.translation.vector.norm();
         let displacement = &step.displacement;
         self.agent
-            .body
+            .announced
             .step(&in_odom, path_m, displacement, self.modules, entered);
         self.update_pose();
-        if !self.agent.placed {
+        if !self.agent.placed() {
             return;
         }
         if let Some(leg) = &mut self.agent.recorder.leg {
@@ -61,7 +61,7 @@ impl Fold<'_> {
 
     /// Ends the trip of an agent that has stayed where it is for long; answers whether it has.
     pub(super) fn rest(&mut self) -> bool {
-        if !self.agent.placed {
+        if !self.agent.placed() {
             return false;
         }
         let position = self.position();
@@ -119,7 +119,7 @@ impl Fold<'_> {
         }
     }
 
-    /// Recruits a place cell where the agent stands. None when there is no room for it: other
+    /// Recruits a place cell where the agent is. None when there is no room for it: other
     /// agents hold all places, or there are no more identifiers.
     fn recruit(&mut self, position: &Point3<f64>) -> Option<PlaceId> {
         // The place that answers too weakly is not held any more.
@@ -128,7 +128,7 @@ impl Fold<'_> {
         if !self.make_room_for_place() {
             return None;
         }
-        let rotation = self.agent.body.in_map().rotation;
+        let rotation = self.agent.announced.in_map().rotation;
         let covariance = self.estimator.covariance(self.agent_id.0)?;
         let position_sd_m = covariance
             .in_map_axes(&rotation)
@@ -145,8 +145,9 @@ impl Fold<'_> {
             self.now,
         );
         let place = self.places.recruit(place, self.revision)?;
-        if let Some(mooring) = self.keyframes.graph.attach_place(self.agent_id.0, place.0) {
-            self.places.set_mooring(place, mooring, self.revision);
+        let graph = &mut self.keyframes.graph;
+        if let Some(attachment) = graph.attach_place(self.agent_id.0, place.0) {
+            self.places.set_attachment(place, attachment, self.revision);
         }
         self.emit(EventKind::PlaceRecruited {
             place,
@@ -161,15 +162,15 @@ impl Fold<'_> {
         match &self.agent.recorder.leg {
             Some(leg) if leg.from() == place => return,
             Some(leg) => {
-                let body = &self.agent.body;
-                let done = leg.finish(place, self.stamp_ns, body.in_map());
+                let announced = &self.agent.announced;
+                let done = leg.finish(place, self.stamp_ns, announced.in_map());
                 let start_stamp_ns = leg.start_stamp_ns();
                 self.record(done, start_stamp_ns);
             }
             None => {}
         }
-        let body = &self.agent.body;
-        let leg = LegUnderWay::start(place, self.stamp_ns, body.in_map());
+        let announced = &self.agent.announced;
+        let leg = LegUnderWay::start(place, self.stamp_ns, announced.in_map());
         self.agent.recorder.leg = Some(leg);
     }
 
@@ -226,7 +227,7 @@ impl Fold<'_> {
 
     /// Where the agent is in `map`.
     fn position(&self) -> Point3<f64> {
-        self.agent.body.in_map().translation.vector.into()
+        self.agent.announced.in_map().translation.vector.into()
     }
 
     /// Confidence of a place at a distance.
@@ -239,7 +240,7 @@ impl Fold<'_> {
         ASK_PER_FIELD_RADIUS * self.settings.field_radius_m
     }
 
-    /// Whether two positions lie a step of asking apart.
+    /// Whether two positions are a step of asking apart.
     fn is_step_away(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         (to - from).norm_squared() >= self.ask_step_m().powi(2)
     }

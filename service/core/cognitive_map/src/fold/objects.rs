@@ -31,13 +31,13 @@ impl Fold<'_> {
         };
     }
 
-    /// Something was felt, in an episode if one is under way.
+    /// Something was sensed, in an episode if one is under way.
     pub(super) fn touch(
         &mut self,
-        feel: impl FnOnce(&mut Episode, &mut ObjectMemory) -> Vec<News>,
+        extend: impl FnOnce(&mut Episode, &mut ObjectMemory) -> Vec<News>,
     ) {
         if let Some(episode) = &mut self.agent.episode {
-            let news = feel(episode, self.objects);
+            let news = extend(episode, self.objects);
             let contacts = episode.count();
             self.emit_object_news(news, contacts);
         }
@@ -135,13 +135,13 @@ impl CognitiveMap {
         self.objects.places(object)
     }
 
-    /// Name of a channel on which objects are felt.
+    /// Name of a channel on which objects are sensed.
     pub fn object_channel(&self, channel: u16) -> Option<&Label> {
         self.objects.channel_name(channel)
     }
 
-    /// Which object explains a sequence of contacts, in which pose, and what would tell more.
-    /// Levels and descriptors of channels on which no object was felt do not count.
+    /// Which object explains a sequence of contacts, in which pose, and which touch would tell
+    /// most. Levels and descriptors of channels on which no object was sensed do not count.
     pub fn identify(&self, orientation: &Orientation, touches: &[Touch]) -> Identified {
         self.objects.identify(orientation, touches)
     }

@@ -14,17 +14,17 @@ use crate::memory::trip::TripEnd;
 use geometry::PoseCovariance;
 
 impl Fold<'_> {
-    /// A level was felt, where the sensor is.
+    /// A level was sensed, where the sensor is.
     pub(super) fn level(&mut self, level: &Level) {
         self.agent.percepts += 1;
         self.touch(|episode, objects| episode.level(level, objects));
-        let sensor = self.agent.body.in_map() * Point3::from(*level.offset_m());
+        let sensor = self.agent.announced.in_map() * Point3::from(*level.offset_m());
         let Some((place, weight)) = self.answering(&sensor) else {
             return;
         };
         let compared =
             self.percepts
-                .feel_level(level.channel(), level.value(), place, weight, self.revision);
+                .learn_level(level.channel(), level.value(), place, weight, self.revision);
         self.compared(place, compared);
     }
 
@@ -33,14 +33,14 @@ impl Fold<'_> {
         self.agent.percepts += 1;
         self.touch(|episode, objects| episode.descriptor(descriptor, objects));
         self.recognise_place(descriptor);
-        let body = self.agent.body.in_map().translation.vector.into();
+        let body = self.agent.announced.in_map().translation.vector.into();
         let Some((place, weight)) = self.answering(&body) else {
             return;
         };
         let revision = self.revision;
         let compared = self
             .percepts
-            .feel_descriptor(descriptor, place, weight, revision);
+            .learn_descriptor(descriptor, place, weight, revision);
         self.compared(place, compared);
     }
 
@@ -59,14 +59,14 @@ impl Fold<'_> {
             .keyframes
             .observe(&moment, descriptor, in_odom, covariance);
         let is_lost = self.is_lost(&covariance);
-        if self.agent.placed && !is_lost {
-            let accepted = self.agent.evidence.accepted;
+        if self.agent.placed() && !is_lost {
+            let accepted = self.agent.evidence().accepted;
             if self.keyframes.is_contradicted(&view, accepted) {
                 return self.lose_agent();
             }
         }
         let is_sought = self.keyframes.is_seeking(number);
-        if self.agent.placed && !is_sought {
+        if self.agent.placed() && !is_sought {
             // Where a kidnapped agent sees it is not known.
             if !(is_lost && self.keyframes.is_kidnapped(number)) {
                 self.keyframes.view(&view);
@@ -88,7 +88,7 @@ impl Fold<'_> {
         Status::of(self.agent, sd_m, is_doubted, self.settings) == Status::Lost
     }
 
-    /// What the agent sees contradicts where it is believed to be: it may be anywhere from now on.
+    /// What the agent sees contradicts its estimate: it may be anywhere from now on.
     fn lose_agent(&mut self) {
         let moment = self.moment();
         self.end_trip(TripEnd::Gap);
@@ -102,9 +102,9 @@ impl Fold<'_> {
     /// The agent recognised where it is.
     fn relocalised(&mut self, found: &Relocalised) {
         let number = self.agent_id.0;
-        let was_placed = self.agent.placed;
+        let was_placed = self.agent.placed();
         // One that only drifted is where it may have drifted to: its way leads there. One that was
-        // put astray, by looks that could be read in two ways, is put anew.
+        // put in a wrong place, by views of two places that look the same, is put anew.
         let is_refused = was_placed && !found.is_first && !self.fuse(found);
         let is_elsewhere = is_refused || (was_placed && found.is_first && self.is_elsewhere(found));
         if is_elsewhere || !was_placed {
@@ -163,7 +163,7 @@ impl Fold<'_> {
     /// The place that answers at a position, with its confidence; none for an agent that is not
     /// placed, whose positions are those of no map.
     fn answering(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
-        if !self.agent.placed {
+        if !self.agent.placed() {
             return None;
         }
         let (place, distance_m) = self.places.winner(position)?;

@@ -1,4 +1,4 @@
-//! Prediction: what will be felt after a motion.
+//! Prediction: what will be sensed after a motion.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
@@ -24,14 +24,14 @@ pub struct Prediction {
 /// A percept that is expected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Predicted {
-    /// What the place remembers that answers where the percept will be felt.
+    /// What the place remembers that answers where the percept will be sensed.
     pub remembered: Remembered,
     /// That place's confidence, in \[0, 1\]: the mean over the positions to which the motion may
     /// have led. How well the agent is localised when it starts is not in it; its status says that.
     pub confidence: f64,
 }
 
-/// A point where something will be felt.
+/// A point where something will be sensed.
 struct Point {
     position: Point3<f64>,
     /// Covariance of the position by the motion alone, along the axes of `map` \[m²\].
@@ -39,12 +39,12 @@ struct Point {
 }
 
 impl CognitiveMap {
-    /// What an agent would feel if it moved so: the motion is integrated from its pose, as
+    /// What an agent would sense after a motion: the motion is integrated from its pose, as
     /// [`CognitiveMap::apply`] would do it, the place asked that answers there, and its memory
     /// read.
     ///
     /// Levels are those of a sensor at `offset_m` in the body frame, descriptors those at the body.
-    /// With a `channel` only what is felt on that one. None for an agent that is not there or not
+    /// With a `channel` only what is sensed on that one. None for an agent that is not there or not
     /// placed.
     pub fn predict(
         &self,

@@ -160,7 +160,7 @@ impl CognitiveMap {
     /// The places that answer a cue, best first, equally good ones by identifier. Exact where
     /// [`RecallCue`] says so.
     ///
-    /// By position the nearest come first, by code the most alike, by a percept the places whose
+    /// By position the nearest come first, by code the most similar, by a percept the places whose
     /// memory it fits best, and no others answer. By several of them the confidences are
     /// multiplied. Without a cue the place visited last comes first. The cost is said at
     /// [`RecallCue`].
@@ -184,7 +184,7 @@ impl CognitiveMap {
         self.percepts.channels().get(channel.0.into())
     }
 
-    /// What a place remembers of what was felt and seen there, channel by channel.
+    /// What a place remembers of what was sensed and seen there, channel by channel.
     pub fn remembered(&self, place: PlaceId) -> impl Iterator<Item = Remembered> {
         self.percepts.of_place(place)
     }

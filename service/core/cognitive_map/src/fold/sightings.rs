@@ -27,7 +27,7 @@ impl Fold<'_> {
             }
         }
         self.update_pose();
-        if self.agent.placed {
+        if self.agent.placed() {
             self.place_landmarks();
         }
     }
@@ -43,7 +43,7 @@ impl Fold<'_> {
         // The label may just have turned out to be another name of a landmark.
         let name = self.estimator.name_of(label);
         if outcome.accepted
-            && self.agent.placed
+            && self.agent.placed()
             && let Some(landmark) = self.landmarks.by_label(name.as_str())
         {
             self.landmarks

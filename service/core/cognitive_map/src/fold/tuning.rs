@@ -8,7 +8,7 @@ pub(super) const RESTART_SD: [f64; 6] = [1.0, 1.0, 1.0, 0.5, 0.5, 0.5];
 pub(super) const ASK_PER_FIELD_RADIUS: f64 = 0.125;
 /// Confidence from which on a place answers. Source: that at one field radius.
 pub(super) const ANSWER_MIN: f64 = 0.5;
-/// Distance from where an agent was believed to be from which on it did not drift there, in
+/// Distance from where an agent was estimated to be from which on it did not drift there, in
 /// standard deviations of both poses. Source: three deviations.
 pub(super) const DRIFT_MAX: f64 = 3.0;
 /// Standard deviation of the position of an agent that was carried off, in the space's `lost_sd_m`.

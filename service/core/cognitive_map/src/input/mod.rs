@@ -6,6 +6,7 @@
 mod invalid;
 mod label;
 mod motion;
+mod noisy_pose;
 mod object_mark;
 mod percept;
 mod record;
@@ -15,7 +16,8 @@ mod touch;
 
 pub use invalid::InvalidSample;
 pub use label::Label;
-pub use motion::{Motion, PoseNoise, StartPose};
+pub use motion::{Motion, StartPose};
+pub use noisy_pose::{NoisyPose, PoseNoise};
 pub use object_mark::{ObjectMark, Spacing, TouchNoise};
 pub use percept::{Descriptor, Level};
 pub use record::{AgentId, Record, SkipReason};

@@ -1,43 +1,15 @@
-//! Motion: displacements of the body, their noise, and where an agent starts.
+//! Motion: displacements of the body, and where an agent starts.
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Isometry3;
 
-use super::InvalidSample;
-use super::invalid::{METRES_MAX, bounded, deviations, pose};
+use super::invalid::{METRES_MAX, bounded, pose};
+use super::{InvalidSample, NoisyPose, PoseNoise};
 use geometry::se3;
 
 /// Largest angular rate \[rad/s\].
 const RADIANS_PER_SECOND_MAX: f64 = 1e3;
 /// Longest interval of one velocity sample \[s\].
 const DURATION_S_MAX: f64 = 3600.0;
-
-/// Standard deviations of a relative pose in right-perturbation coordinates (translation along,
-/// then rotation about, the body axes x, y, z at its end) \[m, rad\]. Finite and not negative.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseNoise(Vector6<f64>);
-
-impl PoseNoise {
-    /// # Errors
-    /// A number is not finite, too large or negative.
-    pub fn new(
-        translation_sd_m: [f64; 3],
-        rotation_sd_rad: [f64; 3],
-    ) -> Result<Self, InvalidSample> {
-        let [a, b, c] = deviations(translation_sd_m)?.into();
-        let [d, e, f] = deviations(rotation_sd_rad)?.into();
-        Ok(Self(Vector6::new(a, b, c, d, e, f)))
-    }
-
-    /// No noise at all.
-    pub fn none() -> Self {
-        Self(Vector6::zeros())
-    }
-
-    /// The standard deviations.
-    pub fn sd(&self) -> &Vector6<f64> {
-        &self.0
-    }
-}
 
 /// A displacement of the body, in the body frame at its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,34 +64,5 @@ impl Motion {
     }
 }
 
-/// Where the agent stands in `map`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StartPose {
-    pose: Isometry3<f64>,
-    noise: PoseNoise,
-}
-
-impl StartPose {
-    /// # Errors
-    /// A number is out of range or the quaternion is not of unit norm.
-    pub fn new(
-        translation_m: [f64; 3],
-        rotation_xyzw: [f64; 4],
-        noise: PoseNoise,
-    ) -> Result<Self, InvalidSample> {
-        Ok(Self {
-            pose: pose(translation_m, rotation_xyzw)?,
-            noise,
-        })
-    }
-
-    /// The pose.
-    pub fn pose(&self) -> &Isometry3<f64> {
-        &self.pose
-    }
-
-    /// Its noise, along and about the body axes.
-    pub fn noise(&self) -> &PoseNoise {
-        &self.noise
-    }
-}
+/// Pose of an agent in `map`, with its noise along and about the body axes.
+pub type StartPose = NoisyPose;

@@ -45,7 +45,7 @@ impl Default for Spacing {
     }
 }
 
-/// How exactly an episode's contacts are felt.
+/// How exactly an episode's contacts are sensed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchNoise {
     position_sd_m: f64,
@@ -98,7 +98,7 @@ impl TouchNoise {
 /// Begins or ends an episode with an object.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ObjectMark {
-    /// What is felt from here on teaches an object.
+    /// What is sensed from here on teaches an object.
     Learn {
         /// Its name. One that is known is extended if the episode shows how its frame lies in the
         /// object's; without a name it is the object that is recognised, or a new one.
@@ -107,15 +107,15 @@ pub enum ObjectMark {
         spacing: Spacing,
         /// How the frame may be turned against that of an object known before.
         orientation: Orientation,
-        /// How exactly is felt.
+        /// How exactly is sensed.
         noise: TouchNoise,
     },
-    /// What is felt from here on is to be recognised. If it turns out to be unknown, it is learned
-    /// at the end.
+    /// What is sensed from here on is to be recognised. If it turns out to be unknown, it is
+    /// learned at the end.
     Identify {
         /// How the frame may be turned against an object's.
         orientation: Orientation,
-        /// How exactly is felt.
+        /// How exactly is sensed.
         noise: TouchNoise,
     },
     /// The episode ends.

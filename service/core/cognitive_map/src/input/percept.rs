@@ -1,4 +1,4 @@
-//! Percepts: levels that are felt, descriptors that are seen.
+//! Percepts: levels that are sensed, descriptors that are seen.
 
 use nalgebra::{Unit, Vector3};
 

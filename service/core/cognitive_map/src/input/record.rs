@@ -1,7 +1,7 @@
 //! Records: the journal's entries, in the order in which the fold meets them.
 
 use super::{InvalidSample, Label, Lesson, Sample};
-use state::{CorruptState, State, StateReader, StateWriter};
+use state::state_of_newtype;
 
 /// An agent of a space, counted from 0 in the order of enrolment. The number of a removed agent
 /// that was never in the map goes to a later one.
@@ -76,12 +76,4 @@ pub enum SkipReason {
     Lost,
 }
 
-impl State for AgentId {
-    fn write(&self, out: &mut StateWriter) {
-        self.0.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        State::read(input).map(Self)
-    }
-}
+state_of_newtype!(AgentId);

@@ -16,13 +16,13 @@ pub struct Sample {
 pub enum SampleBody {
     /// A displacement of the body since the previous motion sample.
     Motion(Motion),
-    /// A scalar felt on a channel.
+    /// A scalar sensed on a channel.
     Level(Level),
     /// A unit vector seen on a channel.
     Descriptor(Descriptor),
     /// A target seen relative to the body.
     Sighting(Sighting),
-    /// Where the agent stands in `map`, told from outside.
+    /// Pose of the agent in `map`, stated from outside.
     StartPose(StartPose),
     /// A named moment.
     Marker(Marker),

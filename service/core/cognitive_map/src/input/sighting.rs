@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::invalid::{METRES_MAX, bounded, deviations, pose};
-use super::{InvalidSample, Label, PoseNoise};
+use super::invalid::{METRES_MAX, bounded, deviations};
+use super::{InvalidSample, Label, NoisyPose, PoseNoise};
 use state::{CorruptState, State, StateReader, StateWriter};
 
 /// A target seen from the body.
@@ -125,45 +125,29 @@ impl RangeBearing {
     pub fn bearing_sd_rad(&self) -> f64 {
         self.bearing_sd_rad
     }
-}
 
-/// A full pose relative to the body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RelativePose {
-    pose: Isometry3<f64>,
-    noise: PoseNoise,
-}
-
-impl RelativePose {
-    /// # Errors
-    /// A number is out of range or the quaternion is not of unit norm.
-    pub fn new(
-        translation_m: [f64; 3],
-        rotation_xyzw: [f64; 4],
-        noise: PoseNoise,
-    ) -> Result<Self, InvalidSample> {
-        Ok(Self {
-            pose: pose(translation_m, rotation_xyzw)?,
-            noise,
-        })
-    }
-
-    /// The same with a pose that was read back as it was: normalising anew might change its last
-    /// bit.
-    fn exactly(self, pose: Isometry3<f64>) -> Self {
-        Self { pose, ..self }
-    }
-
-    /// Pose of the target in the body frame.
-    pub fn pose(&self) -> &Isometry3<f64> {
-        &self.pose
-    }
-
-    /// Its noise, in the target's frame.
-    pub fn noise(&self) -> &PoseNoise {
-        &self.noise
+    /// The unit vectors along growing range, azimuth and elevation, and the cosine of the
+    /// elevation.
+    pub(crate) fn directions(&self) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>, f64) {
+        let (sin_azimuth, cos_azimuth) = self.azimuth_rad.sin_cos();
+        let (sin_elevation, cos_elevation) = self.elevation_rad.sin_cos();
+        let forward = Vector3::new(
+            cos_elevation * cos_azimuth,
+            cos_elevation * sin_azimuth,
+            sin_elevation,
+        );
+        let left = Vector3::new(-sin_azimuth, cos_azimuth, 0.0);
+        let up = Vector3::new(
+            -sin_elevation * cos_azimuth,
+            -sin_elevation * sin_azimuth,
+            cos_elevation,
+        );
+        (forward, left, up, cos_elevation.abs())
     }
 }
+
+/// Pose of a target in the body frame, with its noise in the target's frame.
+pub type RelativePose = NoisyPose;
 
 impl State for Relation {
     fn write(&self, out: &mut StateWriter) {

@@ -1,16 +1,16 @@
-//! Contacts as they are told from outside, with the names of their channels.
+//! Contacts as they are stated from outside, with the names of their channels.
 
 use std::sync::Arc;
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::{Descriptor, InvalidSample, Label, Level, Spacing, TouchNoise};
-use object_recognition::{Contact, Felt, Reached, Seen};
+use object_recognition::{Contact, DescriptorReading, LevelReading, Reached};
 
 /// Largest coordinate \[m\].
 const METRES_MAX: f64 = 1e6;
 
-/// A level that was felt at a contact.
+/// A level that was sensed at a contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchLevel {
     channel: Label,
@@ -77,7 +77,7 @@ impl Touch {
         Ok(self)
     }
 
-    /// The same with what was felt.
+    /// The same with what was sensed.
     #[must_use]
     pub fn with_levels(mut self, levels: Vec<TouchLevel>) -> Self {
         self.levels = levels;
@@ -116,22 +116,23 @@ impl Touch {
         contact.normal_sd_rad = self.noise.normal_sd_rad();
         contact.reached = self.reached;
         for level in &self.levels {
-            let felt = number(&level.channel).map(|channel| Felt {
+            let felt = number(&level.channel).map(|channel| LevelReading {
                 channel,
                 value: level.value,
                 sd: level.sd,
             });
-            let is_new = |felt: &Felt| contact.levels.iter().all(|l| l.channel != felt.channel);
+            let is_new =
+                |felt: &LevelReading| contact.levels.iter().all(|l| l.channel != felt.channel);
             if let Some(felt) = felt.filter(is_new) {
                 contact.levels.push(felt);
             }
         }
         for descriptor in &self.descriptors {
-            let seen = number(descriptor.channel()).map(|channel| Seen {
+            let seen = number(descriptor.channel()).map(|channel| DescriptorReading {
                 channel,
                 vector: Arc::from(descriptor.vector()),
             });
-            let is_new = |seen: &Seen| {
+            let is_new = |seen: &DescriptorReading| {
                 contact
                     .descriptors
                     .iter()

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector4};
 
-use state::{CorruptState, Slab, State, StateReader, StateWriter};
+use state::{CorruptState, State, StateReader, StateWriter};
 
 /// A place with its pose relative to a keyframe.
 #[derive(Clone, Debug)]
@@ -14,16 +14,6 @@ pub(super) struct Attachment {
     pub(super) place: u32,
     /// Its pose relative to the keyframe: for a few metres single precision suffices.
     pub(super) offset: Isometry3<f32>,
-}
-
-/// The attachments, and how far they have been checked.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Attachments {
-    pub(super) slab: Slab<Attachment, 32>,
-    /// The latest one that was checked.
-    pub(super) cursor: u32,
-    /// How many are to be checked, since keyframes were moved.
-    pub(super) n_unchecked: u32,
 }
 
 impl State for Attachment {

@@ -2,11 +2,11 @@
 
 use nalgebra::{Isometry3, SVector};
 
-use super::graph::KeyframeGraph;
+use super::chains::Chains;
 use super::keyframe::Keyframe;
 use crate::estimator::Calibration;
 
-impl KeyframeGraph {
+impl Chains {
     /// The motions to all keyframes, by number, corrected by odometry's lasting errors as they are
     /// known now.
     ///
@@ -23,15 +23,13 @@ impl KeyframeGraph {
         for track in self.tracks.iter() {
             let mut later = track.calibrated.calibration.components();
             let mut wander = track.calibrated.wander;
-            let mut number = track.newest;
-            while let Some(keyframe) = self.keyframes.get(number) {
+            for (number, keyframe) in self.back_from(track.newest) {
                 later = smoothed(keyframe, &later, &wander);
                 let calibration = Calibration::of_components(&later);
                 motions[number as usize] = keyframe
                     .calibrated
                     .corrected_by(&keyframe.motion, &calibration);
                 wander = keyframe.calibrated.wander;
-                number = keyframe.previous;
             }
         }
         motions

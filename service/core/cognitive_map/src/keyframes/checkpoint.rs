@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! part  index  bytes
-//! 0     0      what is waiting, where the search for what may go goes on, vacant numbers
+//! 0     0      what is new, the sweep cursor, vacant numbers
 //! 1     page   up to 4 agents
 //! 2     page   up to 32 keyframes
 //! 3     page   up to 64 sightings
@@ -11,15 +11,14 @@
 //! 6     page   up to 16 views
 //! 7     page   what an agent saw lately
 //! 8     page   what an agent has seen that does not know where it is
-//! 9     page   up to 32 things that lie beside keyframes
-//! 10    page   what an agent has seen that contradicts where it is believed to be
+//! 9     page   up to 32 attachments of places
+//! 10    page   what an agent has seen that contradicts its estimate
 //! ```
 
 use std::collections::BTreeMap;
 
 use super::map::KeyframeMap;
 use super::settings::KeyframeSettings;
-use super::sighting::PendingSighting;
 use place_recognition::Part;
 use state::Digest;
 use state::{CorruptState, State, StateReader, StateWriter};
@@ -36,6 +35,9 @@ const TRACKS: u8 = 7;
 const SEARCHES: u8 = 8;
 const ATTACHMENTS: u8 = 9;
 const KIDNAP_TESTS: u8 = 10;
+
+/// Number of pending sightings at the end of the head: they are the estimator's.
+const N_PENDING: u64 = 0;
 
 /// One page of a checkpoint. A later page of the same part and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -59,11 +61,15 @@ impl KeyframeMap {
         let since = since_revision;
         let (graph, seen) = (&self.graph, &self.recognition);
         std::iter::once(self.head())
-            .chain(pages_of(TRACKS_OF_AGENTS, &graph.tracks, since))
-            .chain(pages_of(KEYFRAMES, &graph.keyframes.pages, since))
-            .chain(pages_of(SIGHTINGS, &graph.sightings.pages, since))
-            .chain(pages_of(CONSTRAINTS, &graph.constraints.pages, since))
-            .chain(pages_of(LANDMARKS, &graph.landmarks.slots.pages, since))
+            .chain(pages_of(TRACKS_OF_AGENTS, &graph.chains.tracks, since))
+            .chain(pages_of(KEYFRAMES, &graph.chains.keyframes.pages, since))
+            .chain(pages_of(SIGHTINGS, &graph.sightings.slab.pages, since))
+            .chain(pages_of(CONSTRAINTS, &graph.constraints.slab.pages, since))
+            .chain(pages_of(
+                LANDMARKS,
+                &graph.sightings.landmarks.slots.pages,
+                since,
+            ))
             .chain(seen_pages(VIEWS, seen.pages(Part::Views, since)))
             .chain(seen_pages(TRACKS, seen.pages(Part::Tracks, since)))
             .chain(seen_pages(SEARCHES, seen.pages(Part::Searches, since)))
@@ -102,10 +108,13 @@ impl KeyframeMap {
         }
         map.read_head(&head).map_err(|_| CorruptKeyframes)?;
         let (graph, seen) = (&mut map.graph, &map.recognition);
-        if !graph.landmarks.sort() || !graph.is_sound() || !seen.is_sound(graph.tracks.len()) {
+        if !graph.sightings.landmarks.sort()
+            || !graph.is_sound()
+            || !seen.is_sound(graph.chains.tracks.len())
+        {
             return Err(CorruptKeyframes);
         }
-        graph.rebuild_index();
+        graph.chains.rebuild_index();
         Ok(map)
     }
 
@@ -113,11 +122,16 @@ impl KeyframeMap {
         let (graph, seen) = (&mut self.graph, &mut self.recognition);
         let revision = graph.revision;
         match part {
-            TRACKS_OF_AGENTS => graph.tracks.push_page(bytes, revision),
-            KEYFRAMES => graph.keyframes.pages.push_page(bytes, revision),
-            SIGHTINGS => graph.sightings.pages.push_page(bytes, revision),
-            CONSTRAINTS => graph.constraints.pages.push_page(bytes, revision),
-            LANDMARKS => graph.landmarks.slots.pages.push_page(bytes, revision),
+            TRACKS_OF_AGENTS => graph.chains.tracks.push_page(bytes, revision),
+            KEYFRAMES => graph.chains.keyframes.pages.push_page(bytes, revision),
+            SIGHTINGS => graph.sightings.slab.pages.push_page(bytes, revision),
+            CONSTRAINTS => graph.constraints.slab.pages.push_page(bytes, revision),
+            LANDMARKS => graph
+                .sightings
+                .landmarks
+                .slots
+                .pages
+                .push_page(bytes, revision),
             VIEWS => seen.push_page(Part::Views, bytes),
             TRACKS => seen.push_page(Part::Tracks, bytes),
             SEARCHES => seen.push_page(Part::Searches, bytes),
@@ -132,11 +146,16 @@ impl KeyframeMap {
         let mut out = StateWriter::default();
         let (graph, seen) = (&self.graph, &self.recognition);
         self.write_head(&mut out);
-        graph.tracks.write_digests(&mut out);
-        graph.keyframes.pages.write_digests(&mut out);
-        graph.sightings.pages.write_digests(&mut out);
-        graph.constraints.pages.write_digests(&mut out);
-        graph.landmarks.slots.pages.write_digests(&mut out);
+        graph.chains.tracks.write_digests(&mut out);
+        graph.chains.keyframes.pages.write_digests(&mut out);
+        graph.sightings.slab.pages.write_digests(&mut out);
+        graph.constraints.slab.pages.write_digests(&mut out);
+        graph
+            .sightings
+            .landmarks
+            .slots
+            .pages
+            .write_digests(&mut out);
         seen.write_digests(Part::Views, &mut out);
         seen.write_digests(Part::Tracks, &mut out);
         seen.write_digests(Part::Searches, &mut out);
@@ -148,11 +167,11 @@ impl KeyframeMap {
     /// Bytes of memory that it takes, without labels.
     pub fn bytes(&self) -> usize {
         let graph = &self.graph;
-        graph.tracks.bytes()
-            + graph.keyframes.pages.bytes()
-            + graph.sightings.pages.bytes()
-            + graph.constraints.pages.bytes()
-            + graph.landmarks.slots.pages.bytes()
+        graph.chains.tracks.bytes()
+            + graph.chains.keyframes.pages.bytes()
+            + graph.sightings.slab.pages.bytes()
+            + graph.constraints.slab.pages.bytes()
+            + graph.sightings.landmarks.slots.pages.bytes()
             + graph.attachments.slab.pages.bytes()
             + self.recognition.bytes()
     }
@@ -169,37 +188,36 @@ impl KeyframeMap {
 
     fn write_head(&self, out: &mut StateWriter) {
         let graph = &self.graph;
-        graph.sweep.write(out);
-        (graph.schedule.records, graph.schedule.new_closures).write(out);
-        graph.schedule.accepted.write(out);
+        graph.chains.sweep.write(out);
+        graph.constraints.schedule.write(out);
         self.recognition.write_head(out);
-        graph.keyframes.vacancy().write(out);
-        graph.sightings.vacancy().write(out);
-        graph.constraints.vacancy().write(out);
-        graph.landmarks.slots.vacancy().write(out);
+        graph.chains.keyframes.vacancy().write(out);
+        graph.sightings.slab.vacancy().write(out);
+        graph.constraints.slab.vacancy().write(out);
+        graph.sightings.landmarks.slots.vacancy().write(out);
         graph.attachments.slab.vacancy().write(out);
         (graph.attachments.cursor, graph.attachments.n_unchecked).write(out);
-        (graph.pending.len() as u64).write(out);
-        for pending in &graph.pending {
-            pending.write(out);
-        }
+        N_PENDING.write(out);
     }
 
     fn read_head(&mut self, bytes: &[u8]) -> Result<(), CorruptState> {
         let mut input = StateReader::new(bytes);
         let graph = &mut self.graph;
-        graph.sweep = State::read(&mut input)?;
-        (graph.schedule.records, graph.schedule.new_closures) = State::read(&mut input)?;
-        graph.schedule.accepted = State::read(&mut input)?;
+        graph.chains.sweep = State::read(&mut input)?;
+        graph.constraints.schedule = State::read(&mut input)?;
         self.recognition.read_head(&mut input)?;
-        graph.keyframes.set_vacancy(State::read(&mut input)?);
-        graph.sightings.set_vacancy(State::read(&mut input)?);
-        graph.constraints.set_vacancy(State::read(&mut input)?);
-        graph.landmarks.slots.set_vacancy(State::read(&mut input)?);
+        graph.chains.keyframes.set_vacancy(State::read(&mut input)?);
+        graph.sightings.slab.set_vacancy(State::read(&mut input)?);
+        graph.constraints.slab.set_vacancy(State::read(&mut input)?);
+        graph
+            .sightings
+            .landmarks
+            .slots
+            .set_vacancy(State::read(&mut input)?);
         graph.attachments.slab.set_vacancy(State::read(&mut input)?);
         (graph.attachments.cursor, graph.attachments.n_unchecked) = State::read(&mut input)?;
-        for _ in 0..u64::read(&mut input)? {
-            graph.pending.push(PendingSighting::read(&mut input)?);
+        if u64::read(&mut input)? != N_PENDING {
+            return Err(CorruptState::Invalid);
         }
         input.end()
     }

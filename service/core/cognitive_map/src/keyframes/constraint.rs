@@ -1,9 +1,9 @@
 //! Constraints of a keyframe's pose, by the map or by another keyframe.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector6};
 
 use geometry::PoseCovariance;
-use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use state::{NONE, state_of_enum, state_of_struct};
 
 /// How a constraint counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub(super) enum ClosureState {
 /// A relative pose between two keyframes, or between the map and a keyframe.
 #[derive(Clone, Debug)]
 pub(super) struct Constraint {
-    /// The keyframe in whose frame the other one lies; [`NONE`](state::NONE) for the map.
+    /// The keyframe in whose frame the other one lies; [`NONE`] for the map.
     pub(super) from: u32,
     pub(super) to: u32,
     /// The next constraints that end at these keyframes.
@@ -36,12 +36,41 @@ pub(super) struct Constraint {
 }
 
 impl Constraint {
+    /// Of a keyframe's pose to the map.
+    pub(super) fn to_map(
+        keyframe: u32,
+        at: Isometry3<f64>,
+        covariance: &PoseCovariance,
+        state: ClosureState,
+    ) -> Self {
+        Self {
+            from: NONE,
+            to: keyframe,
+            next_from: NONE,
+            next_to: NONE,
+            transform: at,
+            covariance: *covariance,
+            state,
+        }
+    }
+
     /// Whether it is a loop closure.
-    pub(super) fn is_match(&self) -> bool {
-        matches!(
-            self.state,
-            ClosureState::Pending | ClosureState::Accepted | ClosureState::Refuted
-        )
+    pub(super) fn is_closure(&self) -> bool {
+        self.is_candidate() || self.state == ClosureState::Accepted
+    }
+
+    /// Whether it is a loop closure that is pending, or was rejected and may be accepted again.
+    pub(super) fn is_candidate(&self) -> bool {
+        matches!(self.state, ClosureState::Pending | ClosureState::Refuted)
+    }
+
+    /// The number of the constraint after it in the list of a keyframe.
+    pub(super) fn next_of(&self, keyframe: u32) -> u32 {
+        if self.from == keyframe {
+            self.next_from
+        } else {
+            self.next_to
+        }
     }
 }
 
@@ -55,19 +84,20 @@ state_of_struct!(Constraint {
     state
 });
 
-impl State for ClosureState {
-    fn write(&self, out: &mut StateWriter) {
-        (*self as u8).write(out);
-    }
+state_of_enum!(ClosureState {
+    Origin = 0,
+    Stated = 1,
+    Pending = 2,
+    Accepted = 3,
+    Refuted = 4,
+});
 
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(match u8::read(input)? {
-            0 => Self::Origin,
-            1 => Self::Stated,
-            2 => Self::Pending,
-            3 => Self::Accepted,
-            4 => Self::Refuted,
-            _ => return Err(CorruptState::Invalid),
-        })
-    }
+/// The covariance of a motion after another one.
+pub(super) fn composed(
+    first: &PoseCovariance,
+    second_motion: &Isometry3<f64>,
+    second: &PoseCovariance,
+) -> PoseCovariance {
+    let moved = first.after_motion(second_motion, &Vector6::zeros());
+    PoseCovariance::from_matrix(&(moved.matrix() + second.matrix()))
 }

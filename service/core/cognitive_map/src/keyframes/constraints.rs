@@ -1,56 +1,81 @@
 //! The constraints of the keyframe graph, each in the lists of its two keyframes.
 
-use geometry::PoseCovariance;
-use nalgebra::Isometry3;
-use state::NONE;
+use state::{NONE, Slab, state_of_struct};
 
 use super::constraint::{ClosureState, Constraint};
-use super::graph::KeyframeGraph;
+use super::keyframe::{Keyframe, KeyframeSlab};
+use super::list::unlink;
 
-impl KeyframeGraph {
-    /// Constrains a keyframe to the map.
-    pub(super) fn constrain_to_map(
-        &mut self,
-        keyframe: u32,
-        at: Isometry3<f64>,
-        covariance: &PoseCovariance,
-        state: ClosureState,
-    ) {
-        let constraint = Constraint {
-            from: NONE,
-            to: keyframe,
-            next_from: NONE,
-            next_to: NONE,
-            transform: at,
-            covariance: *covariance,
-            state,
-        };
-        self.add_constraint(constraint);
+/// The constraints, and when the closures among them are judged next.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Constraints {
+    pub(super) slab: Slab<Constraint, 32>,
+    pub(super) schedule: Schedule,
+}
+
+/// What has come in since the last relaxation.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Schedule {
+    /// Motions.
+    pub(super) records: u32,
+    /// Loop closures that were kept.
+    pub(super) new_closures: u32,
+    /// Those of them that were accepted at once.
+    pub(super) accepted: u32,
+}
+
+state_of_struct!(Schedule {
+    records,
+    new_closures,
+    accepted
+});
+
+impl Constraints {
+    /// The constraints that end at a keyframe.
+    pub(super) fn of(&self, number: u32, keyframe: &Keyframe) -> impl Iterator<Item = &Constraint> {
+        let first = self.slab.get(keyframe.constraints);
+        std::iter::successors(first, move |constraint| {
+            self.slab.get(constraint.next_of(number))
+        })
     }
 
-    /// Adds a constraint; answers its number, or [`NONE`] if memory is full or an end is gone.
-    pub(super) fn add_constraint(&mut self, mut constraint: Constraint) -> u32 {
-        let revision = self.revision;
+    /// The first candidate by number; [`NONE`] without any.
+    pub(super) fn first_candidate(&self) -> u32 {
+        let mut all = self.slab.iter();
+        let first = all.find(|(_, constraint)| constraint.is_candidate());
+        first.map_or(NONE, |(number, _)| number)
+    }
+
+    /// Number of constraints in a state.
+    pub(super) fn count(&self, state: ClosureState) -> usize {
+        let all = self.slab.iter();
+        all.filter(|(_, constraint)| constraint.state == state)
+            .count()
+    }
+
+    /// Adds a constraint, of at most `most`; answers its number, or [`NONE`] if memory is full or
+    /// an end is gone.
+    pub(super) fn add(
+        &mut self,
+        mut constraint: Constraint,
+        keyframes: &mut KeyframeSlab,
+        most: u32,
+        revision: u64,
+    ) -> u32 {
         let (from, to) = (constraint.from, constraint.to);
-        let is_there = |number: u32| self.keyframes.get(number).is_some();
-        if self.constraints.len() >= self.settings.constraints_max as usize
-            || !is_there(to)
-            || (from != NONE && !is_there(from))
-            || from == to
+        let first = |end: u32| keyframes.get(end).map(|keyframe| keyframe.constraints);
+        let Some(next_to) = first(to) else {
+            return NONE;
+        };
+        if self.slab.len() >= most as usize || (from != NONE && first(from).is_none()) || from == to
         {
             return NONE;
         }
-        constraint.next_to = self
-            .keyframes
-            .get(to)
-            .map_or(NONE, |keyframe| keyframe.constraints);
-        constraint.next_from = self
-            .keyframes
-            .get(from)
-            .map_or(NONE, |keyframe| keyframe.constraints);
-        let number = self.constraints.insert(constraint, revision);
+        constraint.next_to = next_to;
+        constraint.next_from = first(from).unwrap_or(NONE);
+        let number = self.slab.insert(constraint, revision);
         for end in [from, to] {
-            if let Some(keyframe) = self.keyframes.get_mut(end, revision) {
+            if let Some(keyframe) = keyframes.get_mut(end, revision) {
                 keyframe.constraints = number;
             }
         }
@@ -58,45 +83,82 @@ impl KeyframeGraph {
     }
 
     /// Removes a constraint; answers it.
-    pub(super) fn remove_constraint(&mut self, number: u32) -> Option<Constraint> {
-        let revision = self.revision;
-        let constraint = self.constraints.get(number)?.clone();
+    pub(super) fn remove(
+        &mut self,
+        number: u32,
+        keyframes: &mut KeyframeSlab,
+        revision: u64,
+    ) -> Option<Constraint> {
+        let constraint = self.slab.get(number)?.clone();
         for (end, next) in [
             (constraint.from, constraint.next_from),
             (constraint.to, constraint.next_to),
         ] {
-            let Some(keyframe) = self.keyframes.get_mut(end, revision) else {
+            let Some(keyframe) = keyframes.get_mut(end, revision) else {
                 continue;
             };
-            if keyframe.constraints == number {
-                keyframe.constraints = next;
-                continue;
-            }
-            let mut at = keyframe.constraints;
-            while let Some(other) = self.constraints.get_mut(at, revision) {
-                let follower = if other.from == end {
-                    &mut other.next_from
+            let set_next = |other: &mut Constraint, number| {
+                if other.from == end {
+                    other.next_from = number;
                 } else {
-                    &mut other.next_to
-                };
-                if *follower == number {
-                    *follower = next;
-                    break;
+                    other.next_to = number;
                 }
-                at = *follower;
-            }
+            };
+            let (head, next_of) = (&mut keyframe.constraints, |other: &Constraint| {
+                other.next_of(end)
+            });
+            unlink(
+                &mut self.slab,
+                head,
+                number,
+                next,
+                revision,
+                next_of,
+                set_next,
+            );
         }
-        self.constraints.remove(number, revision)
+        self.slab.remove(number, revision)
     }
 
-    /// The number of the constraint after another one in the list of a keyframe.
-    pub(super) fn next_constraint(&self, number: u32, keyframe: u32) -> u32 {
-        self.constraints.get(number).map_or(NONE, |constraint| {
-            if constraint.from == keyframe {
-                constraint.next_from
-            } else {
-                constraint.next_to
+    /// Adopts the states that the same constraints have in a copy.
+    pub(super) fn adopt(&mut self, copy: &Self, revision: u64) {
+        let changed = |(number, constraint): (u32, &Constraint)| {
+            let state = copy.slab.get(number)?.state;
+            (state != constraint.state).then_some((number, state))
+        };
+        let changed: Vec<_> = self.slab.iter().filter_map(changed).collect();
+        for (number, state) in changed {
+            if let Some(constraint) = self.slab.get_mut(number, revision) {
+                constraint.state = state;
             }
-        })
+        }
+    }
+
+    /// Whether all numbers lead somewhere, and each constraint is in the lists of its keyframes.
+    pub(super) fn is_sound(&self, keyframes: &KeyframeSlab) -> bool {
+        if !self.slab.is_sound() {
+            return false;
+        }
+        let mut ends = 0;
+        for (number, keyframe) in keyframes.iter() {
+            let mut at = keyframe.constraints;
+            while at != NONE {
+                let Some(constraint) = self.slab.get(at) else {
+                    return false;
+                };
+                ends += 1;
+                if (constraint.from != number && constraint.to != number)
+                    || ends > 2 * self.slab.len()
+                {
+                    return false;
+                }
+                at = constraint.next_of(number);
+            }
+        }
+        let n_ends = |constraint: &Constraint| if constraint.from == NONE { 1 } else { 2 };
+        let expected: usize = { self.slab.iter() }
+            .map(|(_, constraint)| n_ends(constraint))
+            .sum();
+        ends == expected
     }
 }

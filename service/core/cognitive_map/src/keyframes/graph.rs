@@ -2,34 +2,20 @@
 
 use nalgebra::{Isometry3, Vector6};
 
-use super::agent_track::AgentTrack;
-use super::attachment::Attachments;
+use super::agent_track::{AgentTrack, is_level};
+use super::attachments::Attachments;
+use super::chains::Chains;
 use super::constraint::{ClosureState, Constraint};
-use super::keyframe::Keyframe;
-use super::keyframe_index::KeyframeIndex;
-use super::landmarks::Landmarks;
+use super::constraints::Constraints;
+use super::moment::Moment;
+use super::own_frame::OwnFrame;
 use super::settings::KeyframeSettings;
-use super::sighting::{PendingSighting, Sighting};
+use super::sightings::Sightings;
 use super::tuning;
 use crate::estimator::Calibrated;
 use crate::input::StartPose;
-use geometry::{PoseCovariance, is_within};
-use state::PagedVec;
-use state::{NONE, Slab};
-
-/// A moment of an agent.
-#[derive(Clone, Copy, Debug)]
-pub struct Moment {
-    /// Number of the agent.
-    pub agent: u32,
-    /// Number of the sample within the agent's session.
-    pub seq: u64,
-    /// Its stamp \[ns\].
-    pub stamp_ns: i64,
-    /// Pose of the agent after it, in the frame in which it is estimated: the initial value of
-    /// relaxations.
-    pub pose: Isometry3<f64>,
-}
+use geometry::PoseCovariance;
+use state::NONE;
 
 /// The keyframe graph: the past motions and sightings of all agents, to be smoothed.
 ///
@@ -40,31 +26,14 @@ pub struct KeyframeGraph {
     pub(super) settings: KeyframeSettings,
     /// The revision under which changes are noted; for checkpoints only.
     pub(super) revision: u64,
-    pub(super) tracks: PagedVec<AgentTrack, 4>,
-    pub(super) keyframes: Slab<Keyframe, 32>,
-    pub(super) sightings: Slab<Sighting, 64>,
-    pub(super) constraints: Slab<Constraint, 32>,
-    pub(super) landmarks: Landmarks,
+    /// The keyframes, and where the agents are now.
+    pub(super) chains: Chains,
+    /// Sightings from keyframes.
+    pub(super) sightings: Sightings,
+    /// Start poses and loop closures.
+    pub(super) constraints: Constraints,
     /// Places that keep their pose relative to a keyframe.
     pub(super) attachments: Attachments,
-    /// Sightings of agents whose motion has not come up to them yet.
-    pub(super) pending: Vec<PendingSighting>,
-    /// Sweep cursor: the number of the keyframe at which sparsification goes on.
-    pub(super) sweep: u32,
-    /// When to relax.
-    pub(super) schedule: Schedule,
-    pub(super) index: KeyframeIndex,
-}
-
-/// What has come in since the last relaxation.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Schedule {
-    /// Motions.
-    pub(super) records: u32,
-    /// Loop closures that were kept.
-    pub(super) new_closures: u32,
-    /// Those of them that were accepted at once.
-    pub(super) accepted: u32,
 }
 
 impl KeyframeGraph {
@@ -73,16 +42,10 @@ impl KeyframeGraph {
         Self {
             settings,
             revision: 1,
-            tracks: PagedVec::default(),
-            keyframes: Slab::default(),
-            sightings: Slab::default(),
-            constraints: Slab::default(),
-            landmarks: Landmarks::default(),
+            chains: Chains::default(),
+            sightings: Sightings::default(),
+            constraints: Constraints::default(),
             attachments: Attachments::default(),
-            pending: Vec::new(),
-            sweep: 0,
-            schedule: Schedule::default(),
-            index: KeyframeIndex::default(),
         }
     }
 
@@ -94,48 +57,51 @@ impl KeyframeGraph {
 
     /// Number of keyframes.
     pub fn n_keyframes(&self) -> usize {
-        self.keyframes.len()
+        self.chains.keyframes.len()
     }
 
     /// Number of sightings, those joined into one counted once.
     pub fn n_sightings(&self) -> usize {
-        self.sightings.len()
+        self.sightings.slab.len()
     }
 
     /// Adds an agent in a frame of its own; answers its number, counted from 0.
     pub fn enrol(&mut self) -> u32 {
-        let agent = u32::try_from(self.tracks.len()).unwrap_or(NONE);
-        self.tracks.push(AgentTrack::new(), self.revision);
+        let agent = u32::try_from(self.chains.tracks.len()).unwrap_or(NONE);
+        self.chains.tracks.push(AgentTrack::new(), self.revision);
         agent
+    }
+
+    /// The end of an agent's chain, to be changed.
+    pub(super) fn track_mut(&mut self, agent: u32) -> Option<&mut AgentTrack> {
+        self.chains.track_mut(agent, self.revision)
     }
 
     /// The frame of an agent becomes that of the map: its first keyframe is the origin.
     pub fn found(&mut self, agent: u32) {
-        let Some(track) = self.tracks.get(agent as usize) else {
+        let Some(track) = self.chains.track(agent) else {
             return;
         };
-        if track.is_in_map {
+        if track.is_in_map() {
             return;
         }
         self.placed(agent, &Isometry3::identity());
-        let first = self.first_keyframe(agent);
-        if let Some(keyframe) = self.keyframes.get(first) {
-            let at = keyframe.pose;
-            self.constrain_to_map(first, at, &PoseCovariance::zero(), ClosureState::Origin);
-        } else if let Some(track) = self.tracks.get_mut(agent as usize, self.revision) {
+        let first = self.chains.first(agent);
+        if let Some(keyframe) = self.chains.keyframes.get(first) {
+            let (at, known) = (keyframe.pose, PoseCovariance::zero());
+            self.add_constraint(Constraint::to_map(first, at, &known, ClosureState::Origin));
+        } else if let Some(track) = self.track_mut(agent) {
             track.is_origin = true;
         }
     }
 
     /// Aligns the frame of an agent with the map. All its keyframes move with it.
     pub fn placed(&mut self, agent: u32, frame: &Isometry3<f64>) {
-        let revision = self.revision;
-        let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
+        let Some(track) = self.track_mut(agent) else {
             return;
         };
-        if !track.is_in_map {
-            track.own_frame = Some(*frame);
-            track.is_in_map = true;
+        if !track.is_in_map() {
+            track.own_frame = OwnFrame(Some(*frame));
             track.pose = frame * track.pose;
         }
     }
@@ -144,15 +110,15 @@ impl KeyframeGraph {
     /// Walks the whole chain of the agent; keyframes from before it was detached stay in the map.
     pub fn transformed(&mut self, agent: u32, frame: &Isometry3<f64>) {
         let revision = self.revision;
-        let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
+        let Some(track) = self.track_mut(agent) else {
             return;
         };
-        if track.is_in_map {
+        if track.is_in_map() {
             return;
         }
         track.pose = frame * track.pose;
         let mut number = track.newest;
-        while let Some(keyframe) = self.keyframes.get_mut(number, revision) {
+        while let Some(keyframe) = self.chains.keyframes.get_mut(number, revision) {
             if !keyframe.is_in_map {
                 keyframe.pose = frame * keyframe.pose;
             }
@@ -160,18 +126,32 @@ impl KeyframeGraph {
         }
     }
 
+    /// Detaches an agent: it begins anew in a frame of its own, and what it did in the map no
+    /// longer counts there.
+    pub fn set_aside(&mut self, agent: u32) {
+        let Some(track) = self.track_mut(agent) else {
+            return;
+        };
+        track.own_frame = OwnFrame(None);
+        track.is_origin = false;
+        track.begins_anew = true;
+        track.pose = Isometry3::identity();
+        if !track.needs_keyframe {
+            self.add_keyframe(agent);
+        }
+    }
+
     /// Sets the pose of an agent in the map. If it was in the map already, no motion leads there
     /// from what it did before.
     pub fn start_pose(&mut self, moment: &Moment, start: &StartPose) {
-        let Some(track) = self.tracks.get(moment.agent as usize) else {
+        let Some(track) = self.chains.track(moment.agent) else {
             return;
         };
-        let was_in_map = track.is_in_map;
+        let was_in_map = track.is_in_map();
         let own_frame = start.pose() * track.pose.inverse();
         self.placed(moment.agent, &own_frame);
         self.note(moment);
-        let revision = self.revision;
-        let Some(track) = self.tracks.get_mut(moment.agent as usize, revision) else {
+        let Some(track) = self.track_mut(moment.agent) else {
             return;
         };
         track.pose = *start.pose();
@@ -180,27 +160,40 @@ impl KeyframeGraph {
         track.is_planar &= is_level(start.pose());
         let keyframe = self.add_keyframe(moment.agent);
         let covariance = PoseCovariance::from_sd(start.noise().sd());
-        self.constrain_to_map(keyframe, *start.pose(), &covariance, ClosureState::Stated);
+        let (at, state) = (*start.pose(), ClosureState::Stated);
+        self.add_constraint(Constraint::to_map(keyframe, at, &covariance, state));
     }
 
     /// Begins a session of an agent, which may have been moved by about `sd` \[m, m, m, rad, rad,
     /// rad\] since its latest sample.
     pub fn restart(&mut self, agent: u32, sd: &Vector6<f64>) {
-        let revision = self.revision;
-        let Some(track) = self.tracks.get(agent as usize) else {
+        let Some(track) = self.chains.track(agent) else {
             return;
         };
         if track.newest != NONE && *track.since.motion() != Isometry3::identity() {
             self.add_keyframe(agent);
         }
-        let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
-            return;
-        };
-        track.session += 1;
-        track.needs_keyframe = true;
-        track.since.inflate(&sd.component_mul(sd));
-        self.pending
-            .retain(|pending| pending.observer != agent && pending.target != agent);
+        if let Some(track) = self.track_mut(agent) {
+            track.session += 1;
+            track.needs_keyframe = true;
+            track.since.inflate(&sd.component_mul(sd));
+        }
+    }
+
+    /// A new stretch of an agent, there if a pose is given: no motion leads to it.
+    pub(super) fn begin_stretch(&mut self, agent: u32, at: Option<&Isometry3<f64>>) {
+        if let Some(track) = self.track_mut(agent) {
+            track.begins_anew = true;
+            track.pose = at.copied().unwrap_or(track.pose);
+        }
+        self.add_keyframe(agent);
+    }
+
+    /// Notes the present sample and pose of an agent that has not moved.
+    pub(super) fn note(&mut self, moment: &Moment) {
+        if let Some(track) = self.track_mut(moment.agent) {
+            track.note(moment);
+        }
     }
 
     /// Adds a motion of an agent, in its frame before, with the variances of the error on its right
@@ -213,8 +206,9 @@ impl KeyframeGraph {
         calibrated: &Calibrated,
     ) {
         let agent = moment.agent;
-        self.schedule.records = self.schedule.records.saturating_add(1);
-        let Some(track) = self.tracks.get(agent as usize) else {
+        let schedule = &mut self.constraints.schedule;
+        schedule.records = schedule.records.saturating_add(1);
+        let Some(track) = self.chains.track(agent) else {
             return;
         };
         if track.needs_keyframe {
@@ -225,52 +219,59 @@ impl KeyframeGraph {
             });
             self.add_keyframe(agent);
         }
-        let revision = self.revision;
-        let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
+        let Some(track) = self.track_mut(agent) else {
             return;
         };
-        track.go(increment, variance, calibrated);
-        track.is_planar &= is_level(increment);
-        track.pose = moment.pose;
-        (track.seq, track.stamp_ns) = (moment.seq, moment.stamp_ns);
-        if is_within(
-            track.since.motion(),
-            tuning::REST_WITHIN.0,
-            tuning::REST_WITHIN.1,
-        ) {
-            (track.until_seq, track.until_ns) = (moment.seq, moment.stamp_ns);
-        }
-        let is_step = !is_within(
-            track.since.motion(),
-            tuning::KEYFRAME_STEP.0,
-            tuning::KEYFRAME_STEP.1,
-        );
-        let mut rests = false;
-        if is_within(
-            &track.rest.inv_mul(track.since.motion()),
-            tuning::REST_WITHIN.0,
-            tuning::REST_WITHIN.1,
-        ) {
-            rests = !is_within(
-                track.since.motion(),
-                tuning::ATTACHED_WITHIN.0,
-                tuning::ATTACHED_WITHIN.1,
-            ) && moment.stamp_ns.saturating_sub(track.rest_ns) >= tuning::REST_NS;
-        } else {
-            track.rest = *track.since.motion();
-            (track.rest_seq, track.rest_ns) = (moment.seq, moment.stamp_ns);
-        }
+        track.go(moment, increment, variance, calibrated);
+        let is_step = !track.is_near(tuning::KEYFRAME_STEP);
+        let rests = track.rests_elsewhere(moment);
         if is_step || rests {
             self.add_keyframe(agent);
         }
-        if !self.pending.is_empty() {
-            self.resolve_pending();
-        }
     }
-}
 
-/// Whether a motion keeps the plane.
-fn is_level(motion: &Isometry3<f64>) -> bool {
-    let axis = motion.rotation.imag();
-    motion.translation.z == 0.0 && axis.x == 0.0 && axis.y == 0.0
+    /// Adds a keyframe where an agent is; answers its number, or that of the latest one if memory
+    /// is full.
+    pub(super) fn add_keyframe(&mut self, agent: u32) -> u32 {
+        let is_full = |this: &Self| this.n_keyframes() >= this.settings.keyframes_max as usize;
+        if is_full(self) {
+            self.sparsify();
+        }
+        let Some(track) = self.chains.track(agent) else {
+            return NONE;
+        };
+        if is_full(self) {
+            return track.newest;
+        }
+        let (pose, is_origin) = (track.pose, track.is_origin);
+        let number = self.chains.append(agent, self.revision);
+        if is_origin {
+            let (known, state) = (PoseCovariance::zero(), ClosureState::Origin);
+            self.add_constraint(Constraint::to_map(number, pose, &known, state));
+        }
+        number
+    }
+
+    /// Adds a constraint; answers its number, or [`NONE`] if memory is full or an end is gone.
+    pub(super) fn add_constraint(&mut self, constraint: Constraint) -> u32 {
+        let (keyframes, most) = (&mut self.chains.keyframes, self.settings.constraints_max);
+        self.constraints
+            .add(constraint, keyframes, most, self.revision)
+    }
+
+    /// Removes a constraint; answers it.
+    pub(super) fn remove_constraint(&mut self, number: u32) -> Option<Constraint> {
+        let keyframes = &mut self.chains.keyframes;
+        self.constraints.remove(number, keyframes, self.revision)
+    }
+
+    /// Whether a graph that was read from a checkpoint is sound: damaged bytes must not pass for
+    /// one. All numbers lead somewhere, and all lists come to an end.
+    pub(super) fn is_sound(&self) -> bool {
+        let keyframes = &self.chains.keyframes;
+        self.chains.is_sound()
+            && self.sightings.is_sound(keyframes)
+            && self.constraints.is_sound(keyframes)
+            && self.attachments.is_sound(keyframes)
+    }
 }

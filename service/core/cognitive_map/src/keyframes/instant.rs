@@ -1,10 +1,10 @@
 //! Instants of an agent, between keyframes.
 
-use geometry::{PoseCovariance, is_within, se3};
+use geometry::{PoseCovariance, se3};
 use nalgebra::Isometry3;
 use place_recognition::SampleKey;
 
-use super::graph::{KeyframeGraph, Moment};
+use super::chains::Chains;
 use super::tuning;
 
 /// An instant between keyframes: a keyframe, the motion from there, and the covariance of its
@@ -15,60 +15,10 @@ pub(super) struct KeyframeOffset {
     pub(super) covariance: PoseCovariance,
 }
 
-impl KeyframeGraph {
-    /// Notes the present sample and pose of an agent that has not moved.
-    pub(super) fn note(&mut self, moment: &Moment) {
-        let revision = self.revision;
-        let Some(track) = self.tracks.get_mut(moment.agent as usize, revision) else {
-            return;
-        };
-        track.pose = moment.pose;
-        track.seq = moment.seq;
-        track.stamp_ns = track.stamp_ns.max(moment.stamp_ns);
-        if !track.needs_keyframe
-            && is_within(
-                track.since.motion(),
-                tuning::REST_WITHIN.0,
-                tuning::REST_WITHIN.1,
-            )
-        {
-            (track.until_seq, track.until_ns) = (track.seq, track.stamp_ns);
-        }
-    }
-
-    /// The present instant of an agent: at its latest keyframe if that is near, or at a new one.
-    pub(super) fn here(&mut self, agent: u32) -> Option<KeyframeOffset> {
-        let track = self.tracks.get(agent as usize)?;
-        if track.needs_keyframe
-            || !is_within(
-                track.since.motion(),
-                tuning::ATTACHED_WITHIN.0,
-                tuning::ATTACHED_WITHIN.1,
-            )
-        {
-            self.add_keyframe(agent);
-        }
-        let revision = self.revision;
-        let track = self.tracks.get(agent as usize)?;
-        let at = track.pose * track.since.motion().inverse();
-        let (newest, is_in_map) = (track.newest, track.is_in_map);
-        let here = KeyframeOffset {
-            keyframe: newest,
-            motion: *track.since.motion(),
-            covariance: track.since.covariance(),
-        };
-        // The estimator has corrected the pose since.
-        let keyframe = self.keyframes.get_mut(newest, revision)?;
-        (keyframe.pose, keyframe.is_in_map) = (at, is_in_map);
-        Some(here)
-    }
-
-    /// An instant of an agent, if it was not long ago.
-    pub(super) fn at_stamp(&mut self, agent: u32, stamp_ns: i64) -> Option<KeyframeOffset> {
-        let track = self.tracks.get(agent as usize)?;
-        if stamp_ns >= track.stamp_ns {
-            return self.here(agent);
-        }
+impl Chains {
+    /// An instant of an agent that is over, if it was not long ago.
+    pub(super) fn at_past_stamp(&self, agent: u32, stamp_ns: i64) -> Option<KeyframeOffset> {
+        let track = self.track(agent)?;
         let mut later = (
             track.stamp_ns,
             *track.since.motion(),
@@ -92,7 +42,7 @@ impl KeyframeGraph {
 
     /// Where an agent was at a sample of a session. Walks back to it from the next index entry.
     pub(super) fn at_seq(&self, agent: u32, session: u32, seq: u64) -> Option<KeyframeOffset> {
-        let track = self.tracks.get(agent as usize)?;
+        let track = self.track(agent)?;
         if session > track.session || (session == track.session && seq > track.seq) {
             return None;
         }
@@ -129,25 +79,29 @@ impl KeyframeGraph {
         }
     }
 
+    /// Where an agent was at a sample.
     pub(super) fn at_sample(&self, sample: SampleKey) -> Option<KeyframeOffset> {
         self.at_seq(sample.agent, sample.session, sample.seq)
     }
 
-    /// Pose in the map of a place beside a keyframe; `None` if it lies in no map.
+    /// Pose of an instant as its keyframe has it: in the map, or in the agent's own frame.
+    pub(super) fn own_pose_of(&self, offset: &KeyframeOffset) -> Option<Isometry3<f64>> {
+        Some(self.keyframes.get(offset.keyframe)?.pose * offset.motion)
+    }
+
+    /// Pose of an instant in the map; `None` if it lies in no map.
     pub(super) fn pose_of(&self, offset: &KeyframeOffset) -> Option<Isometry3<f64>> {
         let keyframe = self.keyframes.get(offset.keyframe)?;
-        let track = self.tracks.get(keyframe.agent as usize)?;
-        let pose = keyframe.pose * offset.motion;
+        let pose = self.own_pose_of(offset)?;
         if keyframe.is_in_map {
-            Some(pose)
-        } else {
-            Some(track.own_frame? * pose)
+            return Some(pose);
         }
+        Some(self.track(keyframe.agent)?.own_frame.0? * pose)
     }
 }
 
 /// The instant after a share of the motion that begins at a keyframe.
-pub(super) fn offset(
+fn offset(
     keyframe: u32,
     motion: &Isometry3<f64>,
     covariance: &PoseCovariance,

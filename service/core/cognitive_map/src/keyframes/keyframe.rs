@@ -4,7 +4,10 @@ use nalgebra::Isometry3;
 
 use crate::estimator::Calibrated;
 use geometry::PoseCovariance;
-use state::state_of_struct;
+use state::{Slab, state_of_struct};
+
+/// Keyframes by number.
+pub(super) type KeyframeSlab = Slab<Keyframe, 32>;
 
 /// A remembered pose of an agent, and the motion that led there.
 #[derive(Clone, Debug)]

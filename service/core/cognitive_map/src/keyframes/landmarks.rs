@@ -1,15 +1,12 @@
 //! The landmarks of sightings, by number and by label.
 
-use std::sync::Arc;
-
 use crate::input::Label;
+use crate::label_index::LabelIndex;
 use state::state_of_struct;
 use state::{NONE, Slab};
 
-/// Landmarks per page.
-pub(super) const PAGE: usize = 64;
-/// Most landmarks in a run of the order by label; a longer run is halved.
-const RUN_MAX: usize = 256;
+/// Landmarks by number.
+pub(super) type LandmarkSlab = Slab<Landmark, 64>;
 
 /// A landmark.
 #[derive(Clone, Debug)]
@@ -24,21 +21,16 @@ state_of_struct!(Landmark { label, sightings });
 /// The landmarks, each kept as long as its sightings.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Landmarks {
-    pub(super) slots: Slab<Landmark, PAGE>,
-    /// The numbers in the order of the labels, in runs, none of them empty; not part of a
-    /// checkpoint.
-    by_label: Arc<Vec<Arc<Vec<u32>>>>,
+    pub(super) slots: LandmarkSlab,
+    /// Not part of a checkpoint.
+    by_label: LabelIndex,
 }
 
 impl Landmarks {
     /// Counts a sighting of a landmark; answers its number.
     pub(super) fn show(&mut self, label: &Label, revision: u64) -> Option<u32> {
-        let run = self.run_of(label);
-        let members = self.by_label.get(run).map_or(&[][..], |run| &run[..]);
-        let place = members.partition_point(|&number| self.label(number) < Some(label));
-        if let Some(&number) = members.get(place)
-            && self.label(number) == Some(label)
-        {
+        let label_of = |number| label_in(&self.slots, number);
+        if let Some(number) = self.by_label.find(label.as_str(), label_of) {
             self.count(number, revision);
             return Some(number);
         }
@@ -70,69 +62,36 @@ impl Landmarks {
         if landmark.sightings > 0 {
             return;
         }
-        let label = landmark.label.clone();
-        let run = self.run_of(&label);
-        let runs = Arc::make_mut(&mut self.by_label);
-        if let Some(members) = runs.get_mut(run) {
-            let members = Arc::make_mut(members);
-            members.retain(|&member| member != number);
-            if members.is_empty() {
-                runs.remove(run);
-            }
-        }
+        let slots = &self.slots;
+        self.by_label
+            .remove(number, |number| label_in(slots, number));
         self.slots.remove(number, revision);
     }
 
     /// Builds the order by label of what a checkpoint held; answers whether no label comes twice.
     pub(super) fn sort(&mut self) -> bool {
-        self.by_label = Arc::default();
+        self.by_label = LabelIndex::default();
         let numbers: Vec<u32> = self.slots.iter().map(|(number, _)| number).collect();
         for number in numbers {
             self.sort_in(number);
         }
-        let all: Vec<u32> = self
-            .by_label
-            .iter()
-            .flat_map(|run| run.iter().copied())
-            .collect();
-        all.windows(2)
-            .all(|pair| self.label(pair[0]) < self.label(pair[1]))
-    }
-
-    fn label(&self, number: u32) -> Option<&Label> {
-        self.slots.get(number).map(|landmark| &landmark.label)
-    }
-
-    /// The run in which a label belongs: the last one that does not start after it.
-    fn run_of(&self, label: &Label) -> usize {
-        let starts_up_to = |run: &Arc<Vec<u32>>| {
-            run.first()
-                .is_some_and(|&first| self.label(first) <= Some(label))
-        };
-        self.by_label
-            .partition_point(starts_up_to)
-            .saturating_sub(1)
+        let label_of = |number| label_in(&self.slots, number);
+        let labels = self.by_label.after(None, label_of).map(label_of);
+        labels.is_sorted_by(|one, next| one < next)
     }
 
     /// Puts a landmark where its label belongs.
     fn sort_in(&mut self, number: u32) {
-        let Some(label) = self.label(number) else {
-            return;
-        };
-        let run = self.run_of(label);
-        if self.by_label.is_empty() {
-            Arc::make_mut(&mut self.by_label).push(Arc::new(vec![number]));
-            return;
-        }
-        let place = self.by_label[run].partition_point(|&other| self.label(other) < Some(label));
-        let runs = Arc::make_mut(&mut self.by_label);
-        let members = Arc::make_mut(&mut runs[run]);
-        members.insert(place, number);
-        if members.len() > RUN_MAX {
-            let upper = members.split_off(members.len() / 2);
-            runs.insert(run + 1, Arc::new(upper));
-        }
+        let slots = &self.slots;
+        self.by_label
+            .insert(number, |number| label_in(slots, number));
     }
+}
+
+/// The label of a landmark.
+fn label_in(slots: &LandmarkSlab, number: u32) -> &str {
+    let landmark = slots.get(number);
+    landmark.map_or("", |landmark| landmark.label.as_str())
 }
 
 #[cfg(test)]

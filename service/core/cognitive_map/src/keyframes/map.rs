@@ -4,7 +4,8 @@ use geometry::PoseCovariance;
 use nalgebra::Isometry3;
 use place_recognition::{Guess, PlaceRecognition, Relocalised, SampleKey, View};
 
-use super::graph::{KeyframeGraph, Moment};
+use super::graph::KeyframeGraph;
+use super::moment::Moment;
 use super::settings::KeyframeSettings;
 use crate::input::{Descriptor, StartPose};
 
@@ -35,7 +36,7 @@ impl KeyframeMap {
         self.recognition.set_revision(revision);
     }
 
-    /// An agent was told where it stands in the map. If it was in the map already, it has been put
+    /// A start pose of an agent in the map. If the agent was in the map already, it has been put
     /// there: no motion leads there from what it did before.
     pub fn start_pose(&mut self, moment: &Moment, start: &StartPose) {
         self.graph.start_pose(moment, start);
@@ -52,7 +53,6 @@ impl KeyframeMap {
     /// An agent of the map has left. What it did stays part of the past.
     pub fn retire(&mut self, agent: u32) {
         self.forget_searches(agent);
-        self.graph.retire(agent);
     }
 
     /// Forgets an agent that was never in the map: its number is as it was when it enrolled. Walks
@@ -64,7 +64,7 @@ impl KeyframeMap {
 
     fn forget_searches(&mut self, agent: u32) {
         self.recognition.end_search(agent);
-        let latest = self.graph.latest_seq(agent);
+        let latest = self.graph.chains.track(agent).map_or(0, |track| track.seq);
         self.recognition.confirm_pose(agent, latest);
     }
 
@@ -90,23 +90,24 @@ impl KeyframeMap {
 
     /// Remembers a view of an agent in the map, and closes the loops that end with it.
     pub fn view(&mut self, view: &View<'_>) {
-        if !self.graph.has_keyframe_in_map(view.sample.agent) {
+        let track = self.graph.chains.track(view.sample.agent);
+        if !track.is_some_and(|track| track.is_in_map() && !track.needs_keyframe) {
             return;
         }
-        for revisit in self.recognition.view(view, &self.graph) {
+        for revisit in self.recognition.view(view, &self.graph.chains) {
             self.graph.close(&revisit);
         }
     }
 
-    /// Whether what an agent of the map saw lately contradicts where it is believed to be.
+    /// Whether what an agent of the map saw lately contradicts its estimate.
     /// `accepted` is the number of its sightings so far that agree with that.
     pub fn is_contradicted(&mut self, view: &View<'_>, accepted: u64) -> bool {
-        let (recognition, graph) = (&mut self.recognition, &self.graph);
-        recognition.is_contradicted(view, accepted, graph)
+        let chains = &self.graph.chains;
+        self.recognition.is_contradicted(view, accepted, chains)
     }
 
     /// An agent may be anywhere. What it saw since that is contradicted is forgotten where it was
-    /// believed to be, and a search begins with it.
+    /// estimated to be, and a search begins with it.
     pub fn declare_kidnapped(&mut self, moment: &Moment) {
         self.recognition.declare_kidnapped(self.sample(moment));
         self.graph.begin_stretch(moment.agent, None);
@@ -117,7 +118,7 @@ impl KeyframeMap {
         self.recognition.is_kidnapped(agent)
     }
 
-    /// An agent is where it is believed to be, from a sample on: it was told, or found.
+    /// The estimate of an agent is right from a sample on: by a start pose, or since it was found.
     pub fn confirm_pose(&mut self, agent: u32, seq: u64) {
         self.recognition.confirm_pose(agent, seq);
     }
@@ -125,17 +126,17 @@ impl KeyframeMap {
     /// An agent that does not know where it is sees something. Answers where it is, once that is
     /// known to better than `sd_max_m`.
     pub fn seek(&mut self, view: &View<'_>, sd_max_m: f64) -> Option<Relocalised> {
-        self.recognition.seek(view, sd_max_m, &self.graph)
+        self.recognition.seek(view, sd_max_m, &self.graph.chains)
     }
 
     /// Whether an agent that was found still searches for its heading.
     pub fn is_seeking(&self, agent: u32) -> bool {
-        let session = self.graph.session(agent);
+        let session = self.graph.chains.session(agent);
         self.recognition.is_seeking(agent, session)
     }
 
-    /// An agent was found. `is_elsewhere` says that it was believed to be in the map, but somewhere
-    /// else. A loop closure ties it to what was recognised.
+    /// An agent was found. `is_elsewhere` says that it was estimated to be in the map, but
+    /// somewhere else. A loop closure ties it to what was recognised.
     pub fn relocalised(&mut self, moment: &Moment, found: &Relocalised, is_elsewhere: bool) {
         let agent = moment.agent;
         let Some(similar) = self.recognition.most_similar(agent) else {
@@ -158,13 +159,13 @@ impl KeyframeMap {
 
     /// Where an agent may be that searches, the most probable first.
     pub fn guesses(&self, agent: u32) -> Vec<Guess> {
-        self.recognition.guesses(agent, &self.graph)
+        self.recognition.guesses(agent, &self.graph.chains)
     }
 
     fn sample(&self, moment: &Moment) -> SampleKey {
         SampleKey {
             agent: moment.agent,
-            session: self.graph.session(moment.agent),
+            session: self.graph.chains.session(moment.agent),
             seq: moment.seq,
         }
     }

@@ -1,31 +1,24 @@
-//! Agents that leave the space.
+//! Removal of an agent from the keyframe graph.
 
 use super::agent_track::AgentTrack;
 use super::graph::KeyframeGraph;
 use state::NONE;
 
 impl KeyframeGraph {
-    /// An agent of the map has left. What it did stays part of the past.
-    pub fn retire(&mut self, agent: u32) {
-        self.pending
-            .retain(|pending| pending.observer != agent && pending.target != agent);
-    }
-
     /// Forgets an agent that was never in the map: its number is as it was when it enrolled. Walks
     /// the whole chain of the agent.
     pub fn clear(&mut self, agent: u32) {
-        self.retire(agent);
-        let Some(track) = self.tracks.get(agent as usize) else {
+        let Some(track) = self.chains.track(agent) else {
             return;
         };
         let (mut number, session) = (track.newest, track.session + 1);
-        while let Some(keyframe) = self.keyframes.get(number) {
+        while let Some(keyframe) = self.chains.keyframes.get(number) {
             let previous = keyframe.previous;
             self.strip(number);
-            self.keyframes.remove(number, self.revision);
+            self.chains.keyframes.remove(number, self.revision);
             number = previous;
         }
-        if let Some(track) = self.tracks.get_mut(agent as usize, self.revision) {
+        if let Some(track) = self.track_mut(agent) {
             // The session numbers go on: index entries and searches of earlier ones must not pass
             // for the next agent's.
             *track = AgentTrack {
@@ -37,13 +30,11 @@ impl KeyframeGraph {
 
     /// Removes all sightings and constraints of a keyframe.
     fn strip(&mut self, number: u32) {
-        let first = |this: &Self| {
-            let keyframe = this.keyframes.get(number)?;
-            Some((keyframe.sightings, keyframe.shown, keyframe.constraints))
-        };
-        while let Some((sighting, shown, constraint)) = first(self) {
-            if sighting != NONE {
-                self.remove_sighting(sighting);
+        while let Some(keyframe) = self.chains.keyframes.get(number) {
+            let (made, shown) = (keyframe.sightings, keyframe.shown);
+            let constraint = keyframe.constraints;
+            if made != NONE {
+                self.remove_sighting(made);
             } else if shown != NONE {
                 self.remove_sighting(shown);
             } else if constraint != NONE {

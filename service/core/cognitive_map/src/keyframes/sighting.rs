@@ -1,11 +1,11 @@
 //! Sightings from a keyframe.
 
-use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::tuning;
 use crate::input::Relation;
-use geometry::PoseCovariance;
-use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use geometry::{PoseCovariance, beside, symmetric};
+use state::{CorruptState, NONE, State, StateReader, StateWriter, state_of_struct};
 
 /// What a sighting shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,24 +52,6 @@ state_of_struct!(Sighting {
     point
 });
 
-/// A sighting of an agent whose motion has not come up to it yet.
-#[derive(Clone, Debug)]
-pub(super) struct PendingSighting {
-    pub(super) keyframe: u32,
-    pub(super) observer: u32,
-    pub(super) target: u32,
-    pub(super) stamp_ns: i64,
-    pub(super) point: SeenPoint,
-}
-
-state_of_struct!(PendingSighting {
-    keyframe,
-    observer,
-    target,
-    stamp_ns,
-    point
-});
-
 impl State for Seen {
     fn write(&self, out: &mut StateWriter) {
         match self {
@@ -94,6 +76,16 @@ impl State for Seen {
     }
 }
 
+impl Sighting {
+    /// The keyframe that it shows; [`NONE`] of a landmark.
+    pub(super) fn shown_keyframe(&self) -> u32 {
+        match self.shown {
+            Seen::Agent(keyframe, _) => keyframe,
+            Seen::Landmark(_) => NONE,
+        }
+    }
+}
+
 impl SeenPoint {
     /// Of a relation, with the variances of its components: along the axes \[m²\], or of the
     /// distance \[m²\] and of the two angles about the seen direction, along growing azimuth and
@@ -112,14 +104,7 @@ impl SeenPoint {
                 Vector3::repeat(1.0),
             ),
             Relation::RangeBearing(seen) => {
-                let (sin_azimuth, cos_azimuth) = seen.azimuth_rad().sin_cos();
-                let (sin_elevation, cos_elevation) = seen.elevation_rad().sin_cos();
-                let forward = Vector3::new(
-                    cos_elevation * cos_azimuth,
-                    cos_elevation * sin_azimuth,
-                    sin_elevation,
-                );
-                let left = Vector3::new(-sin_azimuth, cos_azimuth, 0.0);
+                let (forward, left, ..) = seen.directions();
                 let range_m = seen.range_m().max(tuning::DIRECTION_DISTANCE_MIN_M);
                 (
                     forward * range_m,
@@ -210,13 +195,6 @@ pub(super) fn stated_variance(relation: &Relation) -> Vector3<f64> {
 
 /// Covariance of ρ + φ×p: the effect of a pose error ξ = (ρ, φ) on a point p in its frame.
 pub(super) fn lever_covariance(point: &Vector3<f64>, covariance: &PoseCovariance) -> Matrix3<f64> {
-    let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
-    jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
-    let lever = -point.cross_matrix();
-    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+    let jacobian = beside(&Matrix3::identity(), &-point.cross_matrix());
     jacobian * covariance.matrix() * jacobian.transpose()
-}
-
-pub(super) fn symmetric(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    (matrix + matrix.transpose()) * 0.5
 }

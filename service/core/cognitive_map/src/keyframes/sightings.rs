@@ -1,230 +1,220 @@
-//! Sightings of the keyframe graph: those of landmarks, and those of other agents, which wait until
-//! both have moved up to them.
+//! The sightings of the keyframe graph, each in the lists of its keyframe and of the one that it
+//! shows, and the landmarks that they show.
 
-use nalgebra::Vector3;
+use state::{NONE, Slab};
 
-use super::graph::{KeyframeGraph, Moment};
+use super::keyframe::{Keyframe, KeyframeSlab};
+use super::landmarks::Landmarks;
 use super::list::unlink;
-use super::sighting::{PendingSighting, Seen, SeenPoint, Sighting};
+use super::sighting::{Seen, Sighting};
 use super::tuning;
-use crate::input::{Label, Relation};
-use state::NONE;
+use crate::input::Label;
 
-impl KeyframeGraph {
-    /// Adds a sighting of a landmark. `variance` is that of the relation's components: along the
-    /// axes, or of distance, azimuth and elevation; the angles are those by which the seen
-    /// direction is off.
-    pub fn landmark(
-        &mut self,
-        moment: &Moment,
-        label: &Label,
-        relation: &Relation,
-        variance: &Vector3<f64>,
-    ) {
-        self.note(moment);
-        let Some(here) = self.here(moment.agent) else {
-            return;
-        };
-        let point = SeenPoint::new(relation, variance).before(&here.motion, &here.covariance);
-        if let Some(landmark) = self.landmarks.show(label, self.revision) {
-            self.remember_sighting(here.keyframe, Seen::Landmark(landmark), point);
-        }
+/// The sightings, and the landmarks that they show.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sightings {
+    pub(super) slab: Slab<Sighting, 64>,
+    pub(super) landmarks: Landmarks,
+}
+
+/// How many sightings a keyframe has, and which of them is the least certain.
+pub(super) struct Crowd {
+    pub(super) count: u32,
+    /// Trace of its covariance \[m²\].
+    spread: f64,
+    /// Its number; [`NONE`] without any.
+    pub(super) least_certain: u32,
+}
+
+impl Sightings {
+    /// The sightings made at a keyframe, with their numbers.
+    pub(super) fn made_at(&self, keyframe: &Keyframe) -> impl Iterator<Item = (u32, &Sighting)> {
+        let item = |number: u32| Some((number, self.slab.get(number)?));
+        std::iter::successors(item(keyframe.sightings), move |(_, sighting)| {
+            item(sighting.next)
+        })
     }
 
-    /// Adds a sighting of another agent, perhaps at an instant that is over. It takes effect once
-    /// both have moved up to it.
-    pub fn sighted(
-        &mut self,
-        observer: u32,
-        target: u32,
-        stamp_ns: i64,
-        relation: &Relation,
-        variance: &Vector3<f64>,
-    ) {
-        if observer == target || target as usize >= self.tracks.len() {
-            return;
-        }
-        let Some(here) = self.at_stamp(observer, stamp_ns) else {
-            return; // too long ago
-        };
-        if self.pending.len() >= tuning::PENDING_MAX {
-            self.pending.remove(0);
-        }
-        self.pending.push(PendingSighting {
-            keyframe: here.keyframe,
-            observer,
-            target,
-            stamp_ns,
-            point: SeenPoint::new(relation, variance).before(&here.motion, &here.covariance),
-        });
-        self.resolve_pending();
+    /// The sightings that show a keyframe.
+    pub(super) fn showing(&self, keyframe: &Keyframe) -> impl Iterator<Item = &Sighting> {
+        let first = self.slab.get(keyframe.shown);
+        std::iter::successors(first, |sighting| self.slab.get(sighting.next_shown))
     }
 
-    /// Resolves the pending sightings whose time has come.
-    pub(super) fn resolve_pending(&mut self) {
-        for pending in std::mem::take(&mut self.pending) {
-            let stamp_ns = |agent: u32| {
-                let track = self.tracks.get(agent as usize);
-                track
-                    .filter(|track| track.newest != NONE)
-                    .map(|track| track.stamp_ns)
-            };
-            if stamp_ns(pending.target).is_some_and(|stamp| stamp >= pending.stamp_ns) {
-                self.resolve(&pending);
-            } else if stamp_ns(pending.observer)
-                .is_none_or(|stamp| stamp.saturating_sub(pending.stamp_ns) < tuning::PENDING_NS)
-            {
-                self.pending.push(pending);
+    /// The sightings of a keyframe, counted.
+    pub(super) fn crowd(&self, keyframe: &Keyframe) -> Crowd {
+        let mut crowd = Crowd {
+            count: 0,
+            spread: 0.0,
+            least_certain: NONE,
+        };
+        for (number, sighting) in self.made_at(keyframe) {
+            let spread = sighting.point.covariance().trace();
+            if spread > crowd.spread {
+                (crowd.spread, crowd.least_certain) = (spread, number);
             }
+            crowd.count += 1;
         }
+        crowd
     }
 
-    /// Resolves a sighting of an agent.
-    fn resolve(&mut self, pending: &PendingSighting) {
-        let Some(there) = self.at_stamp(pending.target, pending.stamp_ns) else {
-            return; // too long ago
-        };
-        let (Some(observer), Some(target)) = (
-            self.keyframes.get(pending.keyframe),
-            self.keyframes.get(there.keyframe),
-        ) else {
-            return;
-        };
-        // Noise of the motion from the keyframe, in the frame of the observer.
-        let turn = observer.pose.rotation.inverse() * target.pose.rotation * there.motion.rotation;
-        let turn = turn.to_rotation_matrix().into_inner();
-        let spread = there
-            .covariance
-            .matrix()
-            .fixed_view::<3, 3>(0, 0)
-            .into_owned();
-        let point = SeenPoint {
-            fresh: pending.point.fresh + turn * spread * turn.transpose(),
-            ..pending.point
-        };
-        let lever = there.motion.translation.vector;
-        self.remember_sighting(pending.keyframe, Seen::Agent(there.keyframe, lever), point);
-    }
-
-    /// Adds a sighting; where memory is full, another one makes room for it.
-    fn remember_sighting(&mut self, keyframe: u32, shown: Seen, point: SeenPoint) {
-        let is_full = |this: &Self| this.sightings.len() >= this.settings.sightings_max as usize;
-        if is_full(self) {
-            self.sparsify();
-        }
-        if is_full(self) {
-            self.forget_least_certain();
-        }
-        let sighting = Sighting {
-            keyframe,
-            next: NONE,
-            shown,
-            next_shown: NONE,
-            point,
-        };
-        if !self.add_sighting(sighting)
-            && let Seen::Landmark(landmark) = shown
-        {
-            self.landmarks.release(landmark, self.revision);
-        }
-    }
-
-    /// Adds a sighting to the lists of its keyframe and of the one that it shows. It is merged with
-    /// one of the same landmark; in a full list it replaces the least certain one. Answers whether
-    /// there is one more.
-    pub(super) fn add_sighting(&mut self, mut sighting: Sighting) -> bool {
-        let revision = self.revision;
-        let Some(keyframe) = self.keyframes.get(sighting.keyframe) else {
+    /// Adds a sighting, of at most `most`, to the lists of its keyframe and of the one that it
+    /// shows. It is merged with one of the same landmark; in a full list it replaces the least
+    /// certain one. Answers whether there is one more.
+    pub(super) fn add(
+        &mut self,
+        sighting: Sighting,
+        keyframes: &mut KeyframeSlab,
+        most: u32,
+        revision: u64,
+    ) -> bool {
+        let Some(keyframe) = keyframes.get(sighting.keyframe) else {
             return false;
         };
-        let (mut number, first) = (keyframe.sightings, keyframe.sightings);
-        let (mut count, mut least_certain) = (0, (0.0, NONE));
-        while let Some(other) = self.sightings.get(number) {
-            let is_same = matches!(other.shown, Seen::Landmark(_)) && other.shown == sighting.shown;
-            if is_same {
-                let joined = other.point.mean(&sighting.point);
-                if let (Some(point), Some(other)) =
-                    (joined, self.sightings.get_mut(number, revision))
-                {
-                    other.point = point;
-                }
+        let is_same = |other: &Sighting| {
+            matches!(other.shown, Seen::Landmark(_)) && other.shown == sighting.shown
+        };
+        let same = self.made_at(keyframe).find(|(_, other)| is_same(other));
+        if let Some((number, other)) = same {
+            let mean = other.point.mean(&sighting.point);
+            if let (Some(point), Some(other)) = (mean, self.slab.get_mut(number, revision)) {
+                other.point = point;
+            }
+            return false;
+        }
+        let crowd = self.crowd(keyframe);
+        let is_full = crowd.count as usize >= tuning::SIGHTINGS_PER_KEYFRAME_MAX
+            || self.slab.len() >= most as usize;
+        if is_full {
+            let spread = sighting.point.covariance().trace();
+            if crowd.least_certain == NONE || spread >= crowd.spread {
                 return false;
             }
-            let spread = other.point.covariance().trace();
-            if spread > least_certain.0 {
-                least_certain = (spread, number);
-            }
-            count += 1;
-            number = other.next;
+            self.remove(crowd.least_certain, keyframes, revision);
         }
-        let is_crowded = count >= tuning::SIGHTINGS_PER_KEYFRAME_MAX
-            || self.sightings.len() >= self.settings.sightings_max as usize;
-        if is_crowded
-            && (least_certain.1 == NONE || sighting.point.covariance().trace() >= least_certain.0)
-        {
-            return false;
-        }
-        if is_crowded {
-            self.remove_sighting(least_certain.1);
-        }
-        let first = if first == least_certain.1 && is_crowded {
-            self.keyframes
-                .get(sighting.keyframe)
-                .map_or(NONE, |keyframe| keyframe.sightings)
-        } else {
-            first
-        };
-        sighting.next = first;
-        let shown = match sighting.shown {
-            Seen::Agent(target, _) => target,
-            Seen::Landmark(_) => NONE,
-        };
-        sighting.next_shown = self
-            .keyframes
-            .get(shown)
-            .map_or(NONE, |keyframe| keyframe.shown);
-        let at = sighting.keyframe;
-        let number = self.sightings.insert(sighting, revision);
-        if let Some(keyframe) = self.keyframes.get_mut(at, revision) {
-            keyframe.sightings = number;
-        }
-        if let Some(keyframe) = self.keyframes.get_mut(shown, revision) {
-            keyframe.shown = number;
-        }
+        self.link(sighting, keyframes, revision);
         true
     }
 
+    /// Puts a sighting at the head of its lists.
+    fn link(&mut self, mut sighting: Sighting, keyframes: &mut KeyframeSlab, revision: u64) {
+        let (at, shown) = (sighting.keyframe, sighting.shown_keyframe());
+        sighting.next = { keyframes.get(at) }.map_or(NONE, |keyframe| keyframe.sightings);
+        sighting.next_shown = { keyframes.get(shown) }.map_or(NONE, |keyframe| keyframe.shown);
+        let number = self.slab.insert(sighting, revision);
+        if let Some(keyframe) = keyframes.get_mut(at, revision) {
+            keyframe.sightings = number;
+        }
+        if let Some(keyframe) = keyframes.get_mut(shown, revision) {
+            keyframe.shown = number;
+        }
+    }
+
     /// Removes a sighting; answers it.
-    pub(super) fn remove_sighting(&mut self, number: u32) -> Option<Sighting> {
-        let sighting = self.sightings.get(number)?.clone();
-        let revision = self.revision;
-        let slab = &mut self.sightings;
-        if let Some(keyframe) = self.keyframes.get_mut(sighting.keyframe, revision) {
+    pub(super) fn remove(
+        &mut self,
+        number: u32,
+        keyframes: &mut KeyframeSlab,
+        revision: u64,
+    ) -> Option<Sighting> {
+        let sighting = self.slab.get(number)?.clone();
+        let slab = &mut self.slab;
+        if let Some(keyframe) = keyframes.get_mut(sighting.keyframe, revision) {
             let next = |sighting: &Sighting| sighting.next;
             let set_next = |sighting: &mut Sighting, number| sighting.next = number;
-            let head = &mut keyframe.sightings;
-            unlink(slab, head, number, sighting.next, revision, next, set_next);
+            let (head, after) = (&mut keyframe.sightings, sighting.next);
+            unlink(slab, head, number, after, revision, next, set_next);
         }
-        if let Seen::Agent(target, _) = sighting.shown
-            && let Some(keyframe) = self.keyframes.get_mut(target, revision)
-        {
+        if let Some(keyframe) = keyframes.get_mut(sighting.shown_keyframe(), revision) {
             let next = |sighting: &Sighting| sighting.next_shown;
             let set_next = |sighting: &mut Sighting, number| sighting.next_shown = number;
-            let head = &mut keyframe.shown;
-            unlink(
-                slab,
-                head,
-                number,
-                sighting.next_shown,
-                revision,
-                next,
-                set_next,
-            );
+            let (head, after) = (&mut keyframe.shown, sighting.next_shown);
+            unlink(slab, head, number, after, revision, next, set_next);
         }
-        self.sightings.remove(number, self.revision);
+        self.slab.remove(number, revision);
         if let Seen::Landmark(landmark) = sighting.shown {
-            self.landmarks.release(landmark, self.revision);
+            self.landmarks.release(landmark, revision);
         }
         Some(sighting)
+    }
+
+    /// Takes a sighting out to move it: its landmark stays in memory.
+    pub(super) fn take(
+        &mut self,
+        number: u32,
+        keyframes: &mut KeyframeSlab,
+        revision: u64,
+    ) -> Option<Sighting> {
+        if let Seen::Landmark(landmark) = self.slab.get(number)?.shown {
+            self.landmarks.count(landmark, revision);
+        }
+        self.remove(number, keyframes, revision)
+    }
+
+    /// Merges landmarks: of each pair of names the first is given up. Walks all sightings.
+    pub(super) fn merge_landmarks(&mut self, names: &[(Label, Label)], revision: u64) {
+        let renamed = |shown: &Seen| {
+            let Seen::Landmark(number) = shown else {
+                return None;
+            };
+            let label = &self.landmarks.slots.get(*number)?.label;
+            let (_, name) = names.iter().find(|(other, _)| other == label)?;
+            Some((*number, name))
+        };
+        let moved = self.slab.iter();
+        let moved = moved.filter_map(|(at, one)| Some((at, renamed(&one.shown)?)));
+        let moved: Vec<(u32, (u32, &Label))> = moved.collect();
+        for (at, (before, name)) in moved {
+            let Some(after) = self.landmarks.show(name, revision) else {
+                return;
+            };
+            if let Some(sighting) = self.slab.get_mut(at, revision) {
+                sighting.shown = Seen::Landmark(after);
+            }
+            self.landmarks.release(before, revision);
+        }
+    }
+
+    /// Whether all numbers lead somewhere, and each sighting is in its lists.
+    pub(super) fn is_sound(&self, keyframes: &KeyframeSlab) -> bool {
+        self.slab.is_sound()
+            && self.landmarks.slots.is_sound()
+            && self.lists_are_sound(keyframes) == Some(true)
+    }
+
+    /// `None` where a number leads nowhere, or a list has no end.
+    fn lists_are_sound(&self, keyframes: &KeyframeSlab) -> Option<bool> {
+        let (mut made, mut shown, mut agents_shown) = (0, 0, 0);
+        let mut of_landmark = vec![0; self.landmarks.slots.numbers() as usize];
+        for (number, keyframe) in keyframes.iter() {
+            let mut at = keyframe.sightings;
+            while at != NONE {
+                let sighting = self.slab.get(at);
+                let sighting = sighting.filter(|sighting| sighting.keyframe == number)?;
+                match sighting.shown {
+                    Seen::Agent(..) => agents_shown += 1,
+                    Seen::Landmark(landmark) => *of_landmark.get_mut(landmark as usize)? += 1,
+                }
+                made += 1;
+                if made > self.slab.len() {
+                    return None;
+                }
+                at = sighting.next;
+            }
+            let mut at = keyframe.shown;
+            while at != NONE {
+                let shows = |sighting: &&Sighting| sighting.shown_keyframe() == number;
+                let sighting = self.slab.get(at).filter(shows)?;
+                shown += 1;
+                if shown > self.slab.len() {
+                    return None;
+                }
+                at = sighting.next_shown;
+            }
+        }
+        let mut landmarks = self.landmarks.slots.iter();
+        let are_counted =
+            landmarks.all(|(number, landmark)| of_landmark[number as usize] == landmark.sightings);
+        Some(made == self.slab.len() && shown == agents_shown && are_counted)
     }
 }

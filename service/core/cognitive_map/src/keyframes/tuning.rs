@@ -18,12 +18,6 @@ pub(super) const REST_WITHIN: (f64, f64) = (0.005, 0.005);
 /// Rest after which a keyframe is added \[ns\].
 pub(super) const REST_NS: i64 = 1_000_000_000;
 
-/// Most sightings that wait for the motion of the agent that was seen.
-pub(super) const PENDING_MAX: usize = 64;
-
-/// Longest time that they wait, by the observer's clock \[ns\].
-pub(super) const PENDING_NS: i64 = 2_000_000_000;
-
 /// Keyframes searched back for the instant of a sighting.
 pub(super) const LOOK_BACK_MAX: usize = 256;
 
@@ -79,7 +73,7 @@ pub(super) const UNCERTAINTY_RATIO_MAX: f64 = 2.0;
 /// places lie so close \[m\].
 pub(super) const CERTAIN_SD_M: f64 = 0.5;
 
-/// Fewest other closures that must agree with one that the map cannot tell from a false one.
+/// Fewest other closures that must agree with one that the map cannot distinguish from a false one.
 pub(super) const PARTNERS_MIN: usize = 2;
 
 /// Earlier closures, in the order of time, with which a closure is compared.

@@ -127,7 +127,7 @@ fn true_matches_close_the_loop_whichever_way_the_gyroscope_drifts() {
                 walk.matched(seq - ROUND, &Isometry3::identity());
             }
         });
-        assert!(closed.keyframes.graph.n_matches_believed() > 20);
+        assert!(closed.keyframes.graph.n_closures_accepted() > 20);
         assert!(closed.off_m() < 0.35 * alone.off_m(), "{}", closed.off_m());
         let covariance = closed.corrections[0].covariance.unwrap();
         assert!(covariance.position_sd_m() < 0.5);
@@ -141,7 +141,7 @@ fn a_single_match_that_the_map_cannot_judge_waits() {
             walk.matched(2 * ROUND, &Isometry3::identity());
         }
     });
-    assert_eq!(walk.keyframes.graph.n_matches_believed(), 0);
+    assert_eq!(walk.keyframes.graph.n_closures_accepted(), 0);
 }
 
 #[test]

@@ -3,6 +3,8 @@
 use grid::Lattice;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
+use crate::index::buckets::Buckets;
+use crate::numeric::bounds;
 use crate::tuning::LIST_CELLS_MAX;
 
 /// Places by the cell of a face-centred cubic lattice at the model's own scale. One lookup answers,
@@ -12,26 +14,19 @@ pub(crate) struct CellLists {
     lattice: Lattice,
     low: [i64; 3],
     size: [i64; 3],
-    /// Start of each cell's list; one more at the end.
-    starts: Vec<u32>,
-    places: Vec<u32>,
+    places: Buckets<u32>,
 }
 
 impl CellLists {
     /// Of places with these positions and reaches \[m\], in cells of about `fineness` mean reaches:
     /// finer cells list fewer places beyond reach, and take more memory.
     pub(crate) fn new(positions: &[Point3<f64>], reaches_m: &[f64], fineness: f64) -> Self {
-        let mut low = Vector3::repeat(f64::INFINITY);
-        let mut high = Vector3::repeat(f64::NEG_INFINITY);
-        let mut reach_sum_m = 0.0;
-        for (position, reach_m) in positions.iter().zip(reaches_m) {
-            low = low.inf(&position.coords.add_scalar(-reach_m));
-            high = high.sup(&position.coords.add_scalar(*reach_m));
-            reach_sum_m += reach_m;
-        }
-        if positions.is_empty() {
-            (low, high) = (Vector3::zeros(), Vector3::zeros());
-        }
+        let places = positions.iter().zip(reaches_m);
+        let ends = places.flat_map(|(position, reach_m)| {
+            [-reach_m, *reach_m].map(|reach_m| position.coords.add_scalar(reach_m))
+        });
+        let (low, high) = bounds(ends);
+        let reach_sum_m: f64 = reaches_m.iter().sum();
         let mut spacing_m = (fineness * reach_sum_m / positions.len().max(1) as f64).max(1e-9);
         loop {
             let lattice = Lattice::new(spacing_m, UnitQuaternion::identity());
@@ -52,72 +47,19 @@ impl CellLists {
     ) -> Self {
         let count = size.iter().product::<i64>();
         let count = usize::try_from(count).expect("a box has a positive number of cells");
-        let mut cells = Self {
+        let places = (0u32..).zip(positions.iter().zip(reaches_m));
+        let reached = places.flat_map(|(place, (position, reach_m))| {
+            let indices = reached_cells(&lattice, position, *reach_m);
+            let cells = indices.filter_map(|index| cell(low, size, index));
+            cells.map(move |cell| (cell, place))
+        });
+        let places = Buckets::new(count, reached);
+        Self {
             lattice,
             low,
             size,
-            starts: vec![0; count + 1],
-            places: Vec::new(),
-        };
-        // Two passes over the same cells: the first counts, the second fills the lists.
-        let mut total = 0;
-        cells.each_reached(positions, reaches_m, |starts, cell, _| {
-            starts[cell + 1] += 1;
-            total += 1;
-        });
-        for cell in 0..count {
-            cells.starts[cell + 1] += cells.starts[cell];
+            places,
         }
-        let mut places = vec![0; total];
-        let mut filled = vec![0u32; count];
-        cells.each_reached(positions, reaches_m, |starts, cell, place| {
-            places[(starts[cell] + filled[cell]) as usize] = place;
-            filled[cell] += 1;
-        });
-        cells.places = places;
-        cells
-    }
-
-    fn each_reached(
-        &mut self,
-        positions: &[Point3<f64>],
-        reaches_m: &[f64],
-        mut visit: impl FnMut(&mut [u32], usize, u32),
-    ) {
-        // Half the longest diagonal of a cell is 1.225 spacings.
-        let cell_radius_m = 1.225 * self.lattice.spacing_m();
-        for (place, (position, reach_m)) in (0u32..).zip(positions.iter().zip(reaches_m)) {
-            let reach = Vector3::repeat(*reach_m);
-            let (low, size) = box_of(
-                &self.lattice,
-                &(position.coords - reach),
-                &(position.coords + reach),
-            );
-            for i in low[0]..low[0] + size[0] {
-                for j in low[1]..low[1] + size[1] {
-                    for k in low[2]..low[2] + size[2] {
-                        let middle = self.lattice.basis()
-                            * Vector3::new(i as f64 + 0.5, j as f64 + 0.5, k as f64 + 0.5);
-                        let near = (middle - position.coords).norm() <= reach_m + cell_radius_m;
-                        if let (true, Some(cell)) = (near, self.cell([i, j, k])) {
-                            visit(&mut self.starts, cell, place);
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    fn cell(&self, index: [i64; 3]) -> Option<usize> {
-        let mut cell = 0;
-        for ((index, low), size) in index.iter().zip(&self.low).zip(&self.size) {
-            let at = index.saturating_sub(*low);
-            if !(0..*size).contains(&at) {
-                return None;
-            }
-            cell = cell * size + at;
-        }
-        usize::try_from(cell).ok()
     }
 
     /// All places whose field reaches a point, and some others near it, in ascending order.
@@ -126,11 +68,45 @@ impl CellLists {
         // Points very far away saturate: they are outside all the same.
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         let index = [turns.x, turns.y, turns.z].map(|turns| turns.floor() as i64);
-        match self.cell(index) {
-            Some(cell) => &self.places[self.starts[cell] as usize..self.starts[cell + 1] as usize],
-            None => &[],
-        }
+        cell(self.low, self.size, index).map_or(&[], |cell| self.places.get(cell))
     }
+}
+
+/// Lattice indices of the cells that a ball about a position may touch.
+fn reached_cells(
+    lattice: &Lattice,
+    position: &Point3<f64>,
+    reach_m: f64,
+) -> impl Iterator<Item = [i64; 3]> + Clone {
+    // Half the longest diagonal of a cell is 1.225 spacings.
+    let far_m = reach_m + 1.225 * lattice.spacing_m();
+    let reach = Vector3::repeat(reach_m);
+    let (low, size) = box_of(
+        lattice,
+        &(position.coords - reach),
+        &(position.coords + reach),
+    );
+    let along = move |axis: usize| low[axis]..low[axis] + size[axis];
+    let rows = along(0).flat_map(move |i| along(1).map(move |j| (i, j)));
+    let cells = rows.flat_map(move |(i, j)| along(2).map(move |k| [i, j, k]));
+    let (basis, position) = (*lattice.basis(), position.coords);
+    cells.filter(move |index| {
+        let middle = basis * Vector3::from(index.map(|index| index as f64 + 0.5));
+        (middle - position).norm() <= far_m
+    })
+}
+
+/// Number of the cell with a lattice index in a box; `None` outside the box.
+fn cell(low: [i64; 3], size: [i64; 3], index: [i64; 3]) -> Option<usize> {
+    let mut cell = 0;
+    for ((index, low), size) in index.iter().zip(low).zip(size) {
+        let at = index.saturating_sub(low);
+        if !(0..size).contains(&at) {
+            return None;
+        }
+        cell = cell * size + at;
+    }
+    usize::try_from(cell).ok()
 }
 
 /// The lattice indices of a box that holds the given one \[m\]: lowest index, and cells along each

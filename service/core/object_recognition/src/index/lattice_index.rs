@@ -5,7 +5,8 @@ use std::ops::Range;
 use grid::Lattice;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-use crate::numeric::floor_u32;
+use crate::index::buckets::Buckets;
+use crate::numeric::{bounds, floor_u32};
 use crate::tuning::{LATTICE_CELLS_MAX, PLACES_PER_CELL};
 
 /// Norm of each row of the lattice's inverse, times its spacing: √(3/2).
@@ -27,15 +28,7 @@ pub(crate) struct LatticeIndex {
 impl LatticeIndex {
     /// Of places at these positions \[m\]; also the order, as indices of the positions.
     pub(crate) fn new(positions: &[Point3<f64>]) -> (Self, Vec<u32>) {
-        let mut low_m = Vector3::repeat(f64::INFINITY);
-        let mut high_m = Vector3::repeat(f64::NEG_INFINITY);
-        for position in positions {
-            low_m = low_m.inf(&position.coords);
-            high_m = high_m.sup(&position.coords);
-        }
-        if positions.is_empty() {
-            (low_m, high_m) = (Vector3::zeros(), Vector3::zeros());
-        }
+        let (low_m, high_m) = bounds(positions.iter().map(|position| position.coords));
         let extent_m = (high_m - low_m).add_scalar(1e-9);
         // A flat or straight model has a box of no volume: each edge counts a twentieth of the
         // longest.
@@ -51,40 +44,24 @@ impl LatticeIndex {
             let phase = lattice.phase_displacement(&position.coords);
             phase.map(f64::floor)
         };
-        let mut low = Vector3::repeat(f64::INFINITY);
-        let mut high = Vector3::repeat(f64::NEG_INFINITY);
-        for position in positions {
-            let index = index(position);
-            (low, high) = (low.inf(&index), high.sup(&index));
-        }
-        if positions.is_empty() {
-            (low, high) = (Vector3::zeros(), Vector3::zeros());
-        }
+        let (low, high) = bounds(positions.iter().map(index));
         let cell = |index: f64| floor_u32(index) as usize;
         let size = (high - low).map(cell);
         let size = [size.x + 1, size.y + 1, size.z + 1];
-        let cells: Vec<usize> = { positions.iter() }
-            .map(|position| {
-                let [i, j, k] = (index(position) - low).map(cell).into();
-                (i * size[1] + j) * size[2] + k
-            })
-            .collect();
-        let mut lattice_index = Self {
+        let places = positions.iter().zip(0u32..).map(|(position, place)| {
+            let [i, j, k] = (index(position) - low).map(cell).into();
+            ((i * size[1] + j) * size[2] + k, place)
+        });
+        let cells: Vec<_> = places.collect();
+        let count = size.iter().product();
+        let Buckets { starts, items } = Buckets::new(count, cells.into_iter());
+        let lattice_index = Self {
             lattice,
             low,
             size,
-            starts: vec![0; size.iter().product::<usize>() + 1],
+            starts,
         };
-        for &cell in &cells {
-            lattice_index.starts[cell + 1] += 1;
-        }
-        for cell in 1..lattice_index.starts.len() {
-            lattice_index.starts[cell] += lattice_index.starts[cell - 1];
-        }
-        let count = u32::try_from(positions.len()).expect("a model has few places");
-        let mut order: Vec<u32> = (0..count).collect();
-        order.sort_by_key(|&place| cells[place as usize]);
-        (lattice_index, order)
+        (lattice_index, items)
     }
 
     /// Lists runs of the order that hold all places within `reach_m` of a point, and some others.

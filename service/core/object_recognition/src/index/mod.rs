@@ -1,6 +1,7 @@
 //! Search structures over the places of one model.
 
 pub(crate) mod block_grid;
+pub(crate) mod buckets;
 pub(crate) mod cell_lists;
 pub(crate) mod lattice_index;
 pub(crate) mod nearest_grid;

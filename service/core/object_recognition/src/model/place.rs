@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::contact::{Contact, Felt, Seen};
+use crate::contact::{Contact, DescriptorReading, LevelReading};
 use crate::tuning::SAME_SIDE_COS;
 
 /// Moments of the levels of one channel at a place.
@@ -59,7 +59,7 @@ pub struct ModelPlace {
     /// Levels by channel.
     pub levels: Vec<LevelMemory>,
     /// Descriptors by channel: the first one seen.
-    pub descriptors: Vec<Seen>,
+    pub descriptors: Vec<DescriptorReading>,
 }
 
 impl ModelPlace {
@@ -69,28 +69,30 @@ impl ModelPlace {
     }
 
     /// A contact with this place, with the mean noise of those it was learned from.
-    pub fn felt(&self) -> Contact {
+    pub fn contact(&self) -> Contact {
         let mut contact = Contact::at(self.position_m, (self.variance_m2 / self.count).sqrt());
         if let Some(normal) = self.normal() {
             contact = contact.with_normal(normal, (self.normal_variance / self.count).sqrt());
         }
-        contact.levels.extend(self.levels.iter().map(|level| Felt {
-            channel: level.channel,
-            value: level.mean,
-            sd: (level.noise / level.count).sqrt(),
-        }));
+        contact
+            .levels
+            .extend(self.levels.iter().map(|level| LevelReading {
+                channel: level.channel,
+                value: level.mean,
+                sd: (level.noise / level.count).sqrt(),
+            }));
         contact.descriptors.clone_from(&self.descriptors);
         contact
     }
 
     pub(crate) fn of(contact: &Contact) -> Self {
         let normals = contact.normal.map_or(Vector3::zeros(), Unit::into_inner);
-        let level = |felt: &Felt| LevelMemory {
-            channel: felt.channel,
+        let level = |reading: &LevelReading| LevelMemory {
+            channel: reading.channel,
             count: 1.0,
-            mean: felt.value,
+            mean: reading.value,
             squares: 0.0,
-            noise: felt.sd * felt.sd,
+            noise: reading.sd * reading.sd,
         };
         Self {
             position_m: contact.position_m,
@@ -128,13 +130,13 @@ impl ModelPlace {
                 None => self.levels.push(*level),
             }
         }
-        for seen in &other.descriptors {
+        for reading in &other.descriptors {
             if self
                 .descriptors
                 .iter()
-                .all(|own| own.channel != seen.channel)
+                .all(|own| own.channel != reading.channel)
             {
-                self.descriptors.push(seen.clone());
+                self.descriptors.push(reading.clone());
             }
         }
     }

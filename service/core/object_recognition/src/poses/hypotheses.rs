@@ -60,7 +60,7 @@ impl PoseHypotheses {
         self.count += 1;
         for hypothesis in &mut self.all {
             if let Some((indexed, surfel_map)) = surfel_map(library, hypothesis.object) {
-                let context = context(library, indexed);
+                let context = library.percept_context(indexed);
                 hypothesis.score += surfel_map.contact_log(&hypothesis.pose, &contact, context);
             }
         }
@@ -92,7 +92,7 @@ impl PoseHypotheses {
         library.indexed_models().map(score).collect()
     }
 
-    /// Refines the heavier hypotheses of each model, looks for new ones, and keeps the best.
+    /// Refines the heavier hypotheses of each model, searches for new ones, and keeps the best.
     fn refine_and_search(&mut self, library: &ObjectLibrary, scores: &[ModelScore]) {
         let logs = scores.iter().map(|score| score.log);
         let best = logs.fold(f64::NEG_INFINITY, f64::max);
@@ -109,7 +109,7 @@ impl PoseHypotheses {
                 .into_iter()
                 .partition(|hypothesis| hypothesis.object == object);
             all = others;
-            let context = context(library, indexed);
+            let context = library.percept_context(indexed);
             for (rank, hypothesis) in own.iter_mut().enumerate() {
                 let is_due =
                     rank < REFINED_ALWAYS || (self.count + rank).is_multiple_of(REFINE_EVERY);
@@ -162,7 +162,7 @@ impl PoseHypotheses {
     /// others.
     pub(crate) fn fit(&self, library: &ObjectLibrary, hypothesis: &PoseHypothesis) -> Option<f64> {
         let (indexed, surfel_map) = surfel_map(library, hypothesis.object)?;
-        let context = context(library, indexed);
+        let context = library.percept_context(indexed);
         let z = goodness_of_fit::z_score(surfel_map, context, &hypothesis.pose, &self.contacts);
         Some(z)
     }
@@ -173,14 +173,6 @@ impl PoseHypotheses {
         surfel_map(library, object).map_or(1.0, |(_, surfel_map)| {
             1.0 / goodness_of_fit::variance_inflation(surfel_map, &self.contacts)
         })
-    }
-}
-
-fn context<'a>(library: &'a ObjectLibrary, indexed: &'a IndexedModel) -> PerceptContext<'a> {
-    PerceptContext {
-        places: &indexed.places,
-        level_prior: library.level_prior(),
-        clutter_per_m3: library.clutter_per_m3(),
     }
 }
 

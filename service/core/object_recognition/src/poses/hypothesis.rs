@@ -1,7 +1,7 @@
 //! One hypothesis where the rotation is free: a pose with its evidence.
 
 use geometry::se3;
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{Isometry3, Matrix6};
 
 use crate::library::ObjectId;
 use crate::tuning::{NEAR_EXTENT, NEAR_RAD, SAME_POSE};
@@ -41,10 +41,7 @@ impl PoseHypothesis {
 
     /// Whether a pose lies within the information of this one.
     fn holds(&self, other: &Isometry3<f64>) -> bool {
-        let (linear, angular) = se3::log(&(other * self.pose.inverse()));
-        let twist = Vector6::new(
-            linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
-        );
+        let twist = se3::twist(&(other * self.pose.inverse()));
         twist.dot(&(self.information * twist)) < SAME_POSE
     }
 }

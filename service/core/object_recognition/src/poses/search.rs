@@ -1,4 +1,4 @@
-//! Search for poses of one model: pairs of contacts are laid upon pairs of surfels like them.
+//! Search for poses of one model: pairs of contacts are aligned with pairs of surfels like them.
 //!
 //! Of the poses that point pairs give (Drost et al. 2010, "Model globally, match locally") the best
 //! by a coarse score on few contacts, then on more, are begun, and the best of these refined.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use geometry::{PoseCovariance, se3};
+use geometry::{PoseCovariance, se3, symmetric};
 use nalgebra::{Isometry3, Matrix6, Translation3};
 
 use crate::library::{ObjectId, ObjectLibrary};
@@ -181,7 +181,7 @@ impl Recognition {
         Some(PoseEstimate {
             object,
             map_from_episode: best.map_from_episode,
-            covariance: PoseCovariance::from_matrix(&((covariance + covariance.transpose()) * 0.5)),
+            covariance: PoseCovariance::from_matrix(&symmetric(&covariance)),
             share: share(best.log),
             others: others.collect(),
         })

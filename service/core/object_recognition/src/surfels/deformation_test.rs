@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn another_size_or_shape_is_told_and_another_pose_is_none() {
+    fn another_size_or_shape_is_noticed_and_another_pose_is_none() {
         let many = |differs_m: &dyn Fn(&Vector3<f64>) -> f64| -> (f64, f64) {
             let all: Vec<f64> = (0..100).map(|trial| deviation(trial, differs_m)).collect();
             let mean = all.iter().sum::<f64>() / 100.0;
@@ -172,7 +172,7 @@ mod tests {
         // A ball that is moved is the same ball.
         let (moved, _) = many(&|normal| 0.003 * normal.x);
         assert!((moved - mean).abs() < 0.1, "{moved}");
-        // One of 83 mm, and one that is 4 mm longer than wide; each contact tells 0.75 deviations,
+        // One of 83 mm, and one that is 4 mm longer than wide; each contact differs by 0.75 deviations,
         // or less.
         let (larger, _) = many(&|_| 0.0015);
         let (longer, _) = many(&|normal| 0.002 * (2.0 * normal.z * normal.z - 1.0));
@@ -203,12 +203,15 @@ mod tests {
             });
             deviations.sum::<f64>() / 100.0
         };
-        let (told, untold) = (mean(8.0), mean(1.0));
-        assert!(told.abs() < 0.5 && untold < -1.5, "{told} {untold}");
+        let (correlated, independent) = (mean(8.0), mean(1.0));
+        assert!(
+            correlated.abs() < 0.5 && independent < -1.5,
+            "{correlated} {independent}"
+        );
     }
 
     #[test]
-    fn contacts_that_the_map_does_not_explain_tell_nothing_of_its_shape() {
+    fn contacts_that_the_map_does_not_explain_fix_no_deformation() {
         assert!(
             DeformationTest::new(0.08, 0.004)
                 .z_score(1000, 1.0)

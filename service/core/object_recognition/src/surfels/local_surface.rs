@@ -2,7 +2,8 @@
 
 use std::f64::consts::{FRAC_1_PI, TAU};
 
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, Vector3, Vector6};
+use geometry::{beside, from_blocks, se3};
+use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::surfels::deformation_test::Height;
 use crate::surfels::surfel::{ContactNoise, Surfel};
@@ -34,7 +35,7 @@ pub(crate) struct LocalSurface {
     /// Variance of the normal about the surface's, per axis \[rad²\].
     angle: f64,
     /// Likelihood ratio of the percepts: there, against anywhere.
-    felt: f64,
+    percept_ratio: f64,
     /// Density of a contact about an edge or seam, times that of its percepts.
     rough: f64,
 }
@@ -51,7 +52,7 @@ struct Sums {
     normal: Vector3<f64>,
     bend: Matrix3<f64>,
     angle: f64,
-    felt: f64,
+    percept_ratio: f64,
     rough: f64,
 }
 
@@ -103,10 +104,10 @@ impl LocalSurface {
             if agreement < 0.0 || along > ALONG_MAX || squared > DEPTH_MAX {
                 continue;
             }
-            let felt = percept(surfel);
+            let ratio = percept(surfel);
             let cover = surfel.area_m2 / (tangent * TAU) * (-along).exp();
             let off = normal.map(|normal| (normal - surfel.place_normal).norm_squared());
-            sums.rough += cover * felt * edge_density(squared, off, depth, noise);
+            sums.rough += cover * ratio * edge_density(squared, off, depth, noise);
             if agreement < SAME_SIDE_COS {
                 continue;
             }
@@ -122,7 +123,7 @@ impl LocalSurface {
             sums.normal += against.normal * weight;
             sums.bend += surfel.bend * weight;
             sums.angle += weight * surfel.angle;
-            sums.felt += weight * felt;
+            sums.percept_ratio += weight * ratio;
         }
         (sums.weight > 0.0).then(|| sums.surface())
     }
@@ -135,7 +136,7 @@ impl LocalSurface {
     ) -> Densities {
         let depth_m2 = (self.depth_m2 + noise.position_m2) * noise.widen;
         let squared = self.depth_m * self.depth_m / depth_m2;
-        let weight = SMOOTH_SHARE * self.coverage * self.felt / (depth_m2 * TAU).sqrt();
+        let weight = SMOOTH_SHARE * self.coverage * self.percept_ratio / (depth_m2 * TAU).sqrt();
         let mut densities = Densities {
             smooth: weight * (-0.5 * squared).exp() * 0.25 * FRAC_1_PI,
             edge: (1.0 - SMOOTH_SHARE) * self.rough,
@@ -180,40 +181,26 @@ impl LocalSurface {
         share: f64,
     ) -> MotionTerms {
         let [smooth, edge] = densities.shares().map(|own| own * share);
-        let six = |linear: &Vector3<f64>, angular: &Vector3<f64>| {
-            let mut six = Vector6::zeros();
-            six.fixed_rows_mut::<3>(0).copy_from(linear);
-            six.fixed_rows_mut::<3>(3).copy_from(angular);
-            six
-        };
-        let row = six(&self.normal, &point.coords.cross(&self.normal));
+        let row = se3::join(&self.normal, &point.coords.cross(&self.normal));
         let weight = (smooth + edge / (EDGE_DEPTH * EDGE_DEPTH)) / densities.depth_m2;
         let mut information = row * row.transpose() * weight;
         let mut gradient = row * (-weight * self.depth_m);
         let lever = point.coords.cross_matrix();
         if let Some(normal) = normal {
             // A motion turns the contact's normal, and moves it to another normal of the surface.
-            let mut jacobian = Matrix3x6::zeros();
             let turn = self.bend * lever - normal.cross_matrix();
-            jacobian.fixed_columns_mut::<3>(0).copy_from(&-self.bend);
-            jacobian.fixed_columns_mut::<3>(3).copy_from(&turn);
+            let jacobian = beside(&-self.bend, &turn);
             let [own, wide] = densities.precisions;
             let weighed = (own * smooth + wide * edge) * jacobian;
             information += jacobian.transpose() * weighed;
             gradient -= weighed.transpose() * (normal - self.normal);
         }
         // Beyond an edge all surfels pull the same way; within the surface their pulls cancel.
-        gradient += six(
+        gradient += se3::join(
             &self.coverage_gradient,
             &point.coords.cross(&self.coverage_gradient),
         ) * share;
-        let mut damping = Matrix6::zeros();
-        damping.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(1.0);
-        damping
-            .fixed_view_mut::<3, 3>(3, 3)
-            .copy_from(&-(lever * lever));
-        damping.fixed_view_mut::<3, 3>(0, 3).copy_from(&-lever);
-        damping.fixed_view_mut::<3, 3>(3, 0).copy_from(&lever);
+        let damping = from_blocks(&Matrix3::identity(), &-lever, &lever, &-(lever * lever));
         MotionTerms {
             information,
             damping: damping * (share * self.coverage_curvature),
@@ -246,7 +233,7 @@ impl Sums {
             normal: (self.normal * share).normalize(),
             bend: self.bend * share,
             angle: self.angle * share,
-            felt: self.felt * share,
+            percept_ratio: self.percept_ratio * share,
             rough: self.rough,
         }
     }

@@ -10,7 +10,7 @@ use crate::indexed_place::IndexedPlace;
 use crate::level_prior::LevelPrior;
 use crate::surfels::coverage_test::CoverageTest;
 use crate::surfels::deformation_test::Height;
-use crate::surfels::local_surface::LocalSurface;
+use crate::surfels::local_surface::{Densities, LocalSurface};
 use crate::surfels::point_pairs::PointPairTable;
 use crate::surfels::pose_fit::PoseFit;
 use crate::surfels::surfel::{ContactNoise, Surfel};
@@ -59,6 +59,18 @@ pub(crate) struct ContactFit {
     pub(crate) height: Option<Height>,
 }
 
+/// A contact where a pose puts it.
+struct ContactAt {
+    point: Point3<f64>,
+    normal: Option<Unit<Vector3<f64>>>,
+    /// Density per metre of depth and steradian, times the model's area.
+    density: f64,
+    /// Probability that it is one with this model, and no outlier.
+    share: f64,
+    /// The surface there, with the densities of the contact.
+    surface: Option<(LocalSurface, Densities)>,
+}
+
 impl SurfelMap {
     /// Mean and standard deviation of the log density of a contact in the right pose.
     pub(crate) fn expected(&self) -> (f64, f64) {
@@ -66,7 +78,7 @@ impl SurfelMap {
     }
 
     /// Correlation of the errors that this map makes at two contacts, exp(−d²/4ℓ²): surfels that
-    /// share places err alike. It has fallen to 1/e where their discs of radius ℓ part.
+    /// share places have the same errors. It has fallen to 1/e where their discs of radius ℓ part.
     pub(crate) fn error_correlation(&self, one: &Contact, other: &Contact) -> f64 {
         let is_one_side = match (one.normal, other.normal) {
             (Some(one), Some(other)) => one.dot(&other) > SMOOTH_COS,
@@ -101,28 +113,13 @@ impl SurfelMap {
         contact: &Contact,
         context: PerceptContext<'_>,
     ) -> ContactFit {
-        let point = pose * contact.position_m;
-        let normal = contact.normal.map(|normal| pose * normal);
-        let normal = normal.as_ref().map(Unit::as_ref);
-        let noise = ContactNoise::of(contact, 1.0);
-        let percept = |surfel: &Surfel| percept(surfel, contact, context);
-        let outlier = self.outlier(context);
-        let surface = LocalSurface::new(&point, normal, &noise, self.near(&point), percept);
-        let Some(surface) = surface else {
-            return ContactFit {
-                log: outlier.ln(),
-                share: 0.0,
-                height: None,
-            };
-        };
-        let densities = surface.densities(normal, &noise);
-        let total = (1.0 - OUTLIER_SHARE) * densities.sum();
-        let all = total + outlier;
-        let share = total / all;
+        let seen = self.contact_at(pose, contact, 1.0, context);
+        let surface = seen.surface.as_ref();
         ContactFit {
-            log: all.ln(),
-            share,
-            height: Some(surface.height(&point, &densities, share)),
+            log: seen.density.ln(),
+            share: seen.share,
+            height: surface
+                .map(|(surface, densities)| surface.height(&seen.point, densities, seen.share)),
         }
     }
 
@@ -165,35 +162,43 @@ impl SurfelMap {
     ) -> PoseFit {
         let mut fit = PoseFit::new();
         for contact in contacts {
-            self.add_contact(pose, contact, widen, context, &mut fit);
+            let seen = self.contact_at(pose, contact, widen, context);
+            fit.score += seen.density.ln();
+            if let Some((surface, densities)) = &seen.surface {
+                let normal = seen.normal.as_ref().map(Unit::as_ref);
+                fit.add(&surface.motion(&seen.point, normal, densities, seen.share));
+            }
         }
         fit.add_prior(self.extent_m);
         fit
     }
 
-    fn add_contact(
+    /// One contact from a pose, with all its variances multiplied by `widen`.
+    fn contact_at(
         &self,
         pose: &Isometry3<f64>,
         contact: &Contact,
         widen: f64,
         context: PerceptContext<'_>,
-        fit: &mut PoseFit,
-    ) {
+    ) -> ContactAt {
         let point = pose * contact.position_m;
         let turned = contact.normal.map(|normal| pose * normal);
         let normal = turned.as_ref().map(Unit::as_ref);
         let noise = ContactNoise::of(contact, widen);
         let percept = |surfel: &Surfel| percept(surfel, contact, context);
         let surface = LocalSurface::new(&point, normal, &noise, self.near(&point), percept);
-        let Some(surface) = surface else {
-            fit.score += self.outlier(context).ln();
-            return;
-        };
-        let densities = surface.densities(normal, &noise);
-        let total = (1.0 - OUTLIER_SHARE) * densities.sum();
-        let all = total + self.outlier(context);
-        fit.score += all.ln();
-        fit.add(&surface.motion(&point, normal, &densities, total / all));
+        let surface = surface.map(|surface| (surface, surface.densities(normal, &noise)));
+        let on_surface = surface.as_ref().map_or(0.0, |(_, densities)| {
+            (1.0 - OUTLIER_SHARE) * densities.sum()
+        });
+        let density = on_surface + self.outlier(context);
+        ContactAt {
+            point,
+            normal: turned,
+            density,
+            share: on_surface / density,
+            surface,
+        }
     }
 
     /// The surfels within whose reach a point may lie.

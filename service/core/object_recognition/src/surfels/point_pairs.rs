@@ -4,6 +4,8 @@ use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
+use crate::index::buckets::Buckets;
+use crate::numeric::floor_u32;
 use crate::surfels::surfel::Surfel;
 use crate::tuning::{PAIR_ACROSS_MIN, PAIR_ANGLES, PAIR_DISTANCES, PAIR_SURFELS_MAX};
 
@@ -78,8 +80,7 @@ impl PointPair {
 #[derive(Clone, Debug)]
 pub(crate) struct PointPairTable {
     width_m: f64,
-    starts: Vec<u32>,
-    surfels: Vec<[u16; 2]>,
+    pairs: Buckets<[u16; 2]>,
 }
 
 impl PointPairTable {
@@ -99,36 +100,15 @@ impl PointPairTable {
                 }
             }
         }
-        let mut starts = vec![0u32; bins + 1];
-        for (bin, _) in &keyed {
-            starts[*bin as usize + 1] += 1;
-        }
-        for bin in 0..bins {
-            starts[bin + 1] += starts[bin];
-        }
-        let mut filled = starts.clone();
-        let mut surfels = vec![[0; 2]; keyed.len()];
-        for (bin, pair) in keyed {
-            let at = &mut filled[bin as usize];
-            surfels[*at as usize] = pair;
-            *at += 1;
-        }
         Self {
             width_m,
-            starts,
-            surfels,
+            pairs: Buckets::new(bins, keyed.into_iter()),
         }
     }
 
     /// The pairs like this one.
     pub(crate) fn like(&self, pair: &PointPair) -> &[[u16; 2]] {
-        match bin(pair, self.width_m) {
-            Some(bin) => {
-                let bin = bin as usize;
-                &self.surfels[self.starts[bin] as usize..self.starts[bin + 1] as usize]
-            }
-            None => &[],
-        }
+        bin(pair, self.width_m).map_or(&[], |bin| self.pairs.get(bin))
     }
 
     /// Two surfels as a pair.
@@ -141,22 +121,18 @@ impl PointPairTable {
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "bins are few and not negative"
-)]
-fn bin(pair: &PointPair, width_m: f64) -> Option<u32> {
+fn bin(pair: &PointPair, width_m: f64) -> Option<usize> {
     let (distance_m, angles) = pair.feature();
-    let distance = (distance_m / width_m) as usize;
+    let distance = floor_u32(distance_m / width_m) as usize;
     if distance >= PAIR_DISTANCES {
         return None;
     }
     let mut bin = distance;
     for angle in angles {
-        bin = bin * PAIR_ANGLES + ((angle / PI * PAIR_ANGLES as f64) as usize).min(PAIR_ANGLES - 1);
+        let angle = floor_u32(angle / PI * PAIR_ANGLES as f64) as usize;
+        bin = bin * PAIR_ANGLES + angle.min(PAIR_ANGLES - 1);
     }
-    Some(bin as u32)
+    Some(bin)
 }
 
 /// Farthest-point sampling: each surfel is the farthest from those before it.

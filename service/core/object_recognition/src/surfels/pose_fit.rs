@@ -1,7 +1,7 @@
 //! How well contacts fit a model from one pose, and which way the pose should move.
 
 use geometry::se3;
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use crate::surfels::local_surface::MotionTerms;
 use crate::tuning::STEP_RAD_MAX;
@@ -50,9 +50,7 @@ impl PoseFit {
         let Some(cholesky) = self.normal_matrix.cholesky() else {
             return *pose;
         };
-        let step = cholesky.solve(&self.gradient);
-        let linear = Vector3::new(step[0], step[1], step[2]);
-        let angular = Vector3::new(step[3], step[4], step[5]);
+        let (linear, angular) = se3::split(&cholesky.solve(&self.gradient));
         let scale = (STEP_RAD_MAX / angular.norm().max(1e-12)).min(1.0);
         se3::exp(&(linear * scale), &(angular * scale)) * pose
     }

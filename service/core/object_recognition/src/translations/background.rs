@@ -52,7 +52,7 @@ impl BackgroundModel {
 ///
 /// Evidence for a model thus begins where it explains more than a typical surface does. A uniform
 /// density would be no rival: a step along any surface ends on most others, and neighbouring places
-/// are alike on most.
+/// are similar on most.
 ///
 /// The second number is the same without percepts.
 fn background_logs(
@@ -83,11 +83,11 @@ fn background_logs(
                 .likelihood(number, packed_place);
             f64::from(likelihood)
         });
-        let [felt, bare] = now
+        let [whole, bare] = now
             .each_ref()
             .map(|percepts| percepts.at(indexed, rotation));
         let point = sample.position + rotation * step;
-        let densities = nearby.densities(&indexed.packed, &point, noise, [&felt, &bare]);
+        let densities = nearby.densities(&indexed.packed, &point, noise, [&whole, &bare]);
         let sums = sums.entry(sample.object).or_default();
         for ((sums, weight), density) in sums.iter_mut().zip(weights).zip(densities) {
             let density = density / TAU.powf(1.5);
@@ -154,7 +154,7 @@ mod tests {
         Contact::at(at, 0.001).with_level(0, level, 0.2)
     }
 
-    /// Rods of one shape: three that feel alike, and one that feels otherwise.
+    /// Rods of one shape: three with similar levels, and one with others.
     fn rods() -> ObjectLibrary {
         let mut library = ObjectLibrary::default();
         for (id, factor, offset) in [(0, 1, 0.0), (1, 5, 0.0), (2, 7, 0.0), (3, 5, 20.0)] {
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_known_shape_that_feels_like_nothing_known_is_unknown() {
+    fn a_known_shape_with_unknown_levels_is_unknown() {
         let library = rods();
         for offset in [-40.0, 20.0, 40.0, 1000.0] {
             let mut recognition = Recognition::new(&Orientation::Known);

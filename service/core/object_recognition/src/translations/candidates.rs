@@ -68,7 +68,7 @@ impl CandidateSearch {
     }
 
     /// Density of a touch that should be at `point`, with this variance per axis \[m²\], for each
-    /// of several percepts: as [`candidates`](Self::answers) has it.
+    /// of several percepts: as [`candidates`](Self::candidates) has it.
     pub(crate) fn densities<const N: usize>(
         &mut self,
         packed: &PackedPlaces,
@@ -87,7 +87,7 @@ impl CandidateSearch {
         locals: [&PerceptLikelihood<'_>; N],
         mut visit: impl FnMut(&NearPlace, [f64; N]),
     ) -> [f64; N] {
-        let count = self.look(packed, point, variance_m2);
+        let count = self.gather(packed, point, variance_m2);
         let all = &self.all[..count];
         self.arch.dispatch(
             #[inline(always)]
@@ -106,10 +106,11 @@ impl CandidateSearch {
                         let per = 1.0 / variances[k];
                         exp(-0.5 * squares[k] * per) * per * per.sqrt()
                     });
-                    let felt = locals.map(|local| local.likelihoods_of(&numbers, some.len()));
+                    let likelihoods =
+                        locals.map(|local| local.likelihoods_of(&numbers, some.len()));
                     for (k, near) in some.iter().enumerate() {
                         let fall = f64::from(falls[k]);
-                        let densities = felt.map(|felt| fall * f64::from(felt[k]));
+                        let densities = likelihoods.map(|own| fall * f64::from(own[k]));
                         for (total, density) in totals.iter_mut().zip(densities) {
                             *total += density;
                         }
@@ -123,7 +124,7 @@ impl CandidateSearch {
 
     /// Fills `all` with the places within the gate, and returns their number; what follows is
     /// stale.
-    fn look(&mut self, packed: &PackedPlaces, point: &Point3<f64>, variance_m2: f64) -> usize {
+    fn gather(&mut self, packed: &PackedPlaces, point: &Point3<f64>, variance_m2: f64) -> usize {
         let Self { runs, all, .. } = self;
         let reach_m = (GATE_SQUARED * (variance_m2 + packed.variance_max_m2)).sqrt();
         packed.lattice_index.runs(point, reach_m, runs);

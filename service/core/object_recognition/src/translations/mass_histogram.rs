@@ -1,5 +1,6 @@
 //! Histogram of masses on a logarithmic scale: quantiles without sorting.
 
+use crate::numeric::floor_u32;
 use crate::tuning::COUNTED_MAX;
 
 /// Bits of the fraction that are kept: masses within 1/32 of one another share a bin.
@@ -67,13 +68,7 @@ impl MassHistogram {
         for (_, count, middle) in self.masses() {
             let missing = (mass - held) / middle;
             if missing <= f64::from(count) {
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "from nothing to the count"
-                )]
-                let some = missing.max(0.0).ceil() as usize;
-                return heaviest + some;
+                return heaviest + floor_u32(missing.ceil()) as usize;
             }
             held += f64::from(count) * middle;
             heaviest += count as usize;

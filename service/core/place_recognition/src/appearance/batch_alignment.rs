@@ -1,7 +1,7 @@
 //! Batch alignment: a pose by all queries at once.
 //!
 //! Consecutive queries have correlated errors: the views about them leave the same part open, and
-//! odometry errs alike. The correlations follow from the Gaussian process. With queries Y (rows)
+//! odometry errs in the same way. The correlations follow from the Gaussian process. With queries Y (rows)
 //! from points x along the way, views U from points p, and the kernel K between views, k between
 //! views and queries, κ between queries:
 //!
@@ -15,13 +15,14 @@
 //! 2001), is large: it may be anything. Where all residuals are larger than expected, the
 //! covariance grows by the same factor.
 
-use nalgebra::{DMatrix, Isometry3, Matrix3x6, Matrix6, Point3, Vector6};
+use geometry::se3::{plus, twist};
+use geometry::{carried_by_pose, symmetric};
+use nalgebra::{DMatrix, Isometry3, Matrix6, Point3, Vector6};
 
-use super::descriptor_process::{ReferenceView, ReferenceViews};
+use super::descriptor_process::{ReferenceView, ReferenceViews, kernel_matrices, nearest};
 use super::view_alignment::{LocalQuery, Prior, ViewAlignment};
-use crate::descriptor::dot;
+use crate::descriptor::cosine;
 use crate::tuning::batch as tuning;
-use crate::twist::{moved, twist};
 use crate::views::Kernel;
 
 /// The queries of a channel, and the views about them.
@@ -34,7 +35,7 @@ struct ChannelBatch<'a> {
     /// `UUᵀ`.
     gram: DMatrix<f64>,
     /// `UYᵀ`.
-    likeness: DMatrix<f64>,
+    cross: DMatrix<f64>,
     /// `YYᵀ`.
     own: DMatrix<f64>,
 }
@@ -66,7 +67,7 @@ pub(crate) struct BatchPose {
     /// \[nats\].
     pub(crate) cost: f64,
     /// Factor of the covariance by which residuals are larger than expected; at least 1.
-    pub(crate) wider: f64,
+    pub(crate) inflation: f64,
 }
 
 impl<'a> ChannelBatch<'a> {
@@ -84,45 +85,28 @@ impl<'a> ChannelBatch<'a> {
             .collect();
         let kernel = queries.first()?.kernel?;
         let way: Vec<Point3<f64>> = queries.iter().map(|query| pose * query.at).collect();
-        let nearest = |seen: &ReferenceView<'_>| {
+        let distance_squared = |seen: &ReferenceView<'_>| {
             let squared = way.iter().map(|at| (seen.at - at).norm_squared());
             squared.fold(f64::INFINITY, f64::min)
         };
-        let mut near: Vec<(f64, &ReferenceView<'a>)> = views
+        let views = views
             .iter()
             .filter(|(of, _)| *of == channel)
-            .map(|(_, seen)| (nearest(seen), seen))
-            .filter(|(squared, _)| *squared <= 4.0 * kernel.length_m.powi(2))
-            .collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        near.truncate(tuning::VIEWS_MAX);
-        let count = near.len();
-        if count == 0 {
-            return None;
-        }
-        let matrix = DMatrix::from_fn(count, count, |row, column| {
-            if row == column {
-                1.0 + crate::tuning::process::OPEN_MIN
-            } else {
-                kernel.at((near[row].1.at - near[column].1.at).norm_squared())
-            }
-        });
-        let cosine = |a: &[f32], b: &[f32]| f64::from(dot(a, b));
-        let gram = DMatrix::from_fn(count, count, |row, column| {
-            cosine(near[row].1.vector, near[column].1.vector)
-        });
-        let likeness = DMatrix::from_fn(count, queries.len(), |row, column| {
-            cosine(near[row].1.vector, queries[column].vector)
+            .map(|(_, seen)| (distance_squared(seen), seen));
+        let near = nearest(views, kernel, tuning::VIEWS_MAX);
+        let (inverse, gram) = kernel_matrices(&near, kernel)?;
+        let cross = DMatrix::from_fn(near.len(), queries.len(), |row, column| {
+            cosine(near[row].vector, queries[column].vector)
         });
         let own = DMatrix::from_fn(queries.len(), queries.len(), |row, column| {
             cosine(queries[row].vector, queries[column].vector)
         });
         Some(Self {
             kernel,
-            points: near.iter().map(|(_, seen)| seen.at).collect(),
-            inverse: matrix.cholesky()?.inverse(),
+            points: near.iter().map(|seen| seen.at).collect(),
+            inverse,
             gram,
-            likeness,
+            cross,
             own,
             queries,
         })
@@ -148,7 +132,7 @@ impl<'a> ChannelBatch<'a> {
             let drift_m = self.queries[row].drift_m.min(self.queries[column].drift_m);
             between - known[(row, column)] + (drift_m / self.kernel.length_m).powi(2)
         });
-        let expected = weights.transpose() * &self.likeness;
+        let expected = weights.transpose() * &self.cross;
         let off = &self.own - &expected - expected.transpose()
             + weights.transpose() * (&self.gram * &weights);
         let factor = open.cholesky()?;
@@ -178,10 +162,7 @@ impl<'a> ChannelBatch<'a> {
         let mut slopes = DMatrix::zeros(views, 6 * queries);
         for (number, query) in self.queries.iter().enumerate() {
             let at = pose * query.at;
-            let mut lever = Matrix3x6::zeros();
-            lever.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-            let across = -(rotation * query.at.coords.cross_matrix());
-            lever.fixed_view_mut::<3, 3>(0, 3).copy_from(&across);
+            let lever = carried_by_pose(&rotation, &query.at.coords);
             for (row, point) in self.points.iter().enumerate() {
                 let apart = at - point;
                 let slope = -self.kernel.at(apart.norm_squared()) / length_squared;
@@ -192,7 +173,7 @@ impl<'a> ChannelBatch<'a> {
             }
         }
         let numbers = self.kernel.numbers;
-        let log_odds = &self.inverse * (&self.likeness - &self.gram * &fit.weights);
+        let log_odds = &self.inverse * (&self.cross - &self.gram * &fit.weights);
         let log_odds = log_odds * &fit.precision;
         let spread = &self.inverse * (&self.gram * (&self.inverse * &slopes));
         let (mut gradient, mut hessian) = (Vector6::zeros(), Matrix6::zeros());
@@ -205,7 +186,7 @@ impl<'a> ChannelBatch<'a> {
             }
             hessian += own.transpose() * shared * numbers;
         }
-        (gradient, (hessian + hessian.transpose()) * 0.5)
+        (gradient, symmetric(&hessian))
     }
 
     /// Additional variance of each query at a pose: that of outliers.
@@ -266,7 +247,7 @@ impl BatchAlignment<'_> {
             let mut step = -hessian.cholesky()?.solve(&gradient);
             let mut is_better = false;
             for _ in 0..tuning::HALVED_MAX {
-                let there = moved(&pose, &step);
+                let there = plus(&pose, &step);
                 if let Some(found) = self.fits(&there, &outliers)
                     && cost(&found) < cost(&fits)
                 {
@@ -279,7 +260,7 @@ impl BatchAlignment<'_> {
                 break;
             }
         }
-        self.laid(pose, &fits, prior)
+        self.solution(pose, &fits, prior)
     }
 
     /// Gradient and Hessian with the prior; out of the plane nothing moves.
@@ -304,7 +285,7 @@ impl BatchAlignment<'_> {
     }
 
     /// The pose with its covariance and cost.
-    fn laid(&self, pose: Isometry3<f64>, fits: &[Fit], prior: &Prior) -> Option<BatchPose> {
+    fn solution(&self, pose: Isometry3<f64>, fits: &[Fit], prior: &Prior) -> Option<BatchPose> {
         let mut hessian = Matrix6::zeros();
         let (mut off, mut count) = (0.0, 0.0);
         for (batch, fit) in self.batches.iter().zip(fits) {
@@ -312,17 +293,17 @@ impl BatchAlignment<'_> {
             off += fit.precision.dot(&fit.off);
             count += batch.queries.len() as f64;
         }
-        let wider = (off / count).max(1.0);
-        let mut covariance = (hessian / wider + prior.open).try_inverse()?;
+        let inflation = (off / count).max(1.0);
+        let mut covariance = (hessian / inflation + prior.open).try_inverse()?;
         if self.is_planar {
             geometry::clear_out_of_plane(&mut covariance);
         }
         let is_sound = pose.translation.vector.iter().all(|x| x.is_finite());
         is_sound.then_some(BatchPose {
             pose,
-            covariance: (covariance + covariance.transpose()) * 0.5,
+            covariance: symmetric(&covariance),
             cost: cost(fits),
-            wider,
+            inflation,
         })
     }
 
@@ -352,7 +333,7 @@ mod tests {
 
     const NUMBERS: usize = 64;
     const KERNEL: Kernel = Kernel {
-        likeness: 0.99,
+        cosine: 0.99,
         length_m: 1.0,
         numbers: 64.0,
     };
@@ -396,7 +377,7 @@ mod tests {
     }
 
     /// Aligns the way from beside the truth; some of its queries show something else.
-    fn laid(outliers: &[usize]) -> BatchPose {
+    fn aligned(outliers: &[usize]) -> BatchPose {
         let points: Vec<Point3<f64>> = (0..120)
             .map(|k| Point3::from(Vector3::from_fn(|axis, _| 1.8 * hash(5000 + 3 * k + axis))))
             .collect();
@@ -406,8 +387,8 @@ mod tests {
             .enumerate()
             .map(|(k, at)| {
                 let elsewhere = Point3::new(40.0 + 7.0 * k as f64, 90.0, 3.0);
-                let is_stray = outliers.contains(&k);
-                view(&if is_stray { elsewhere } else { truth() * at })
+                let is_outlier = outliers.contains(&k);
+                view(&if is_outlier { elsewhere } else { truth() * at })
             })
             .collect();
         let queries = way()
@@ -446,20 +427,20 @@ mod tests {
 
     #[test]
     fn a_way_comes_to_rest_where_it_was_gone() {
-        let laid = laid(&[]);
-        let off = twist(&truth().inv_mul(&laid.pose));
+        let aligned = aligned(&[]);
+        let off = twist(&truth().inv_mul(&aligned.pose));
         assert!(off.rows(0, 3).norm() < 0.03, "{off}");
         assert!(off.rows(3, 3).norm() < 0.1, "{off}");
-        let squared = off.dot(&(laid.covariance.try_inverse().unwrap() * off));
+        let squared = off.dot(&(aligned.covariance.try_inverse().unwrap() * off));
         assert!(squared < 33.0, "{squared}");
     }
 
     #[test]
-    fn looks_at_something_else_move_it_by_little() {
-        let (clean, strayed) = (laid(&[]), laid(&[3, 9]));
-        let off = twist(&clean.pose.inv_mul(&strayed.pose));
+    fn views_of_something_else_move_it_by_little() {
+        let (clean, with_outliers) = (aligned(&[]), aligned(&[3, 9]));
+        let off = twist(&clean.pose.inv_mul(&with_outliers.pose));
         assert!(off.norm() < 0.05, "{off}");
-        assert!(strayed.wider < 1.5, "{}", strayed.wider);
-        assert!(strayed.covariance.trace() > clean.covariance.trace());
+        assert!(with_outliers.inflation < 1.5, "{}", with_outliers.inflation);
+        assert!(with_outliers.covariance.trace() > clean.covariance.trace());
     }
 }

@@ -15,7 +15,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
 
-use crate::descriptor::dot;
+use crate::descriptor::cosine;
 use crate::tuning::process as tuning;
 use crate::views::Kernel;
 
@@ -39,7 +39,7 @@ pub(crate) struct DescriptorProcess {
     /// K⁻¹ G K⁻¹.
     gram: DMatrix<f64>,
     /// K⁻¹ b.
-    likeness: DVector<f64>,
+    cross: DVector<f64>,
     /// Mean squared leave-one-out residual of the views; at least 1.
     misfit: f64,
 }
@@ -66,6 +66,43 @@ pub(crate) struct Prediction {
     pub(crate) off: f64,
 }
 
+/// The `most` nearest of some views, given with their squared distances \[m²\], within two lengths
+/// of the kernel; the nearest first.
+pub(super) fn nearest<'a, 'v: 'a>(
+    views: impl Iterator<Item = (f64, &'a ReferenceView<'v>)>,
+    kernel: Kernel,
+    most: usize,
+) -> Vec<&'a ReferenceView<'v>> {
+    let mut near: Vec<_> = views
+        .filter(|(squared, _)| *squared <= 4.0 * kernel.length_m.powi(2))
+        .collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    near.truncate(most);
+    near.into_iter().map(|(_, seen)| seen).collect()
+}
+
+/// K⁻¹ and G = U Uᵀ of some views; `None` if there are none.
+pub(super) fn kernel_matrices(
+    near: &[&ReferenceView<'_>],
+    kernel: Kernel,
+) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let count = near.len();
+    if count == 0 {
+        return None;
+    }
+    let matrix = DMatrix::from_fn(count, count, |row, column| {
+        if row == column {
+            1.0 + tuning::OPEN_MIN
+        } else {
+            kernel.at((near[row].at - near[column].at).norm_squared())
+        }
+    });
+    let gram = DMatrix::from_fn(count, count, |row, column| {
+        cosine(near[row].vector, near[column].vector)
+    });
+    Some((matrix.cholesky()?.inverse(), gram))
+}
+
 impl DescriptorProcess {
     /// The process of the views about a point, for a query; `None` if there are none.
     pub(crate) fn of(
@@ -74,37 +111,20 @@ impl DescriptorProcess {
         views: &[ReferenceView<'_>],
         kernel: Kernel,
     ) -> Option<Self> {
-        let mut near: Vec<(f64, &ReferenceView<'_>)> = views
+        let views = views
             .iter()
-            .map(|seen| ((seen.at - about).norm_squared(), seen))
-            .filter(|(squared, _)| *squared <= 4.0 * kernel.length_m.powi(2))
-            .collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        near.truncate(tuning::NEAR_MAX);
-        if near.is_empty() {
-            return None;
-        }
+            .map(|seen| ((seen.at - about).norm_squared(), seen));
+        let near = nearest(views, kernel, tuning::NEAR_MAX);
         let count = near.len();
-        let matrix = DMatrix::from_fn(count, count, |row, column| {
-            if row == column {
-                1.0 + tuning::OPEN_MIN
-            } else {
-                kernel.at((near[row].1.at - near[column].1.at).norm_squared())
-            }
-        });
-        let inverse = matrix.cholesky()?.inverse();
-        let cosine = |a: &[f32], b: &[f32]| f64::from(dot(a, b));
-        let gram = DMatrix::from_fn(count, count, |row, column| {
-            cosine(near[row].1.vector, near[column].1.vector)
-        });
-        let likeness = DVector::from_fn(count, |row, _| cosine(near[row].1.vector, query));
+        let (inverse, gram) = kernel_matrices(&near, kernel)?;
+        let cross = DVector::from_fn(count, |row, _| cosine(near[row].vector, query));
         let gram = &inverse * gram * &inverse;
         let each = (0..count).map(|k| gram[(k, k)] / inverse[(k, k)]);
         let misfit = (each.sum::<f64>() / count as f64).max(1.0);
         Some(Self {
             kernel,
-            points: near.iter().map(|(_, seen)| seen.at).collect(),
-            likeness: &inverse * likeness,
+            points: near.iter().map(|seen| seen.at).collect(),
+            cross: &inverse * cross,
             inverse,
             gram,
             misfit,
@@ -134,7 +154,7 @@ impl DescriptorProcess {
         let share = (length_squared.powi(3) / factor.determinant()).sqrt();
         let kernel = DVector::from_fn(self.points.len(), |row, _| {
             let apart = self.points[row] - at;
-            self.kernel.likeness * share * (-0.5 * apart.dot(&factor.solve(&apart))).exp()
+            self.kernel.cosine * share * (-0.5 * apart.dot(&factor.solve(&apart))).exp()
         });
         let open =
             (1.0 - kernel.dot(&(&self.inverse * &kernel))).max(tuning::OPEN_MIN) * self.misfit;
@@ -142,7 +162,7 @@ impl DescriptorProcess {
             return None;
         }
         let expected = kernel.dot(&(&self.gram * &kernel));
-        let squared = (1.0 - 2.0 * kernel.dot(&self.likeness) + expected).max(0.0);
+        let squared = (1.0 - 2.0 * kernel.dot(&self.cross) + expected).max(0.0);
         let off = squared / open;
         Some(Prediction { open, off })
     }
@@ -161,12 +181,12 @@ impl DescriptorProcess {
         let open =
             (open.max(tuning::OPEN_MIN) + spread_m.powi(2) / length_squared).min(1.0) * self.misfit;
         let expected = &self.gram * &kernel;
-        let squared = (1.0 - 2.0 * kernel.dot(&self.likeness) + kernel.dot(&expected)).max(0.0);
+        let squared = (1.0 - 2.0 * kernel.dot(&self.cross) + kernel.dot(&expected)).max(0.0);
         // ∂k/∂x = −k (x − p) / ℓ²
         let slopes = DMatrix::from_fn(count, 3, |row, axis| {
             -kernel[row] * (at[axis] - self.points[row][axis]) / length_squared
         });
-        let normal_equations = slopes.transpose() * (&expected - &self.likeness) / open;
+        let normal_equations = slopes.transpose() * (&expected - &self.cross) / open;
         let stiff = slopes.transpose() * &self.gram * &slopes / open;
         Some(Expectation {
             open,
@@ -179,7 +199,7 @@ impl DescriptorProcess {
 
 impl Kernel {
     pub(super) fn at(&self, distance_squared: f64) -> f64 {
-        self.likeness * (-0.5 * distance_squared / self.length_m.powi(2)).exp()
+        self.cosine * (-0.5 * distance_squared / self.length_m.powi(2)).exp()
     }
 }
 
@@ -189,7 +209,7 @@ mod tests {
 
     const NUMBERS: usize = 48;
     const KERNEL: Kernel = Kernel {
-        likeness: 0.99,
+        cosine: 0.99,
         length_m: 1.0,
         numbers: 48.0,
     };
@@ -279,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_look_is_expected_where_it_was_made_and_nowhere_else() {
+    fn a_view_is_expected_where_it_was_made_and_nowhere_else() {
         let at = Point3::new(0.1, 0.2, -0.1);
         let near = neighbourhood(&view(&at), &points());
         let off = |at: &Point3<f64>| near.expect(at, 0.0).unwrap().off;

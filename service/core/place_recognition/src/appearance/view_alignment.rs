@@ -12,11 +12,12 @@
 //! query. Where the map is thin the log odds are 0, so a pose does not gain by how well its
 //! surroundings are known.
 
-use nalgebra::{Isometry3, Matrix3x6, Matrix6, Point3, Vector6};
+use geometry::se3::{plus, twist};
+use geometry::{carried_by_pose, symmetric};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 use super::descriptor_process::{DescriptorProcess, ReferenceView, ReferenceViews};
-use crate::tuning::alignment as tuning;
-use crate::twist::{moved, twist};
+use crate::tuning::{alignment as tuning, ranges};
 use crate::views::Kernel;
 
 /// A query along a way.
@@ -48,6 +49,26 @@ pub(crate) struct Prior {
     /// Information of an unknown pose. The covariance of an aligned pose counts this and the views
     /// only.
     pub(crate) open: Matrix6<f64>,
+}
+
+impl Prior {
+    /// Inverse variances of a pose, the same for all shifts \[m⁻²\] and for all turns \[rad⁻²\].
+    pub(crate) fn diagonal(shift: f64, turn: f64) -> Vector6<f64> {
+        Vector6::new(shift, shift, shift, turn, turn, turn)
+    }
+
+    /// Inverse variances of a pose by its standard deviations \[m, rad\].
+    pub(crate) fn inverse_variances([shift, turn]: [f64; 2]) -> Vector6<f64> {
+        let inverse = |sd: f64| 1.0 / (sd * sd).max(1e-12);
+        Self::diagonal(inverse(shift), inverse(turn))
+    }
+
+    /// Information of an unknown pose within some distances of this length \[m\].
+    pub(crate) fn unknown(distance_m: f64) -> Matrix6<f64> {
+        let shift = 1.0 / (ranges::OPEN_DISTANCES * distance_m).powi(2);
+        let turn = 1.0 / ranges::OPEN_RAD.powi(2);
+        Matrix6::from_diagonal(&Self::diagonal(shift, turn))
+    }
 }
 
 /// An aligned pose.
@@ -110,7 +131,7 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
                 let Some(factor) = hessian.cholesky() else {
                     break;
                 };
-                pose = moved(&pose, &-factor.solve(&gradient));
+                pose = plus(&pose, &-factor.solve(&gradient));
             }
             if twist(&begun.inv_mul(&pose)).norm() < tuning::AT_REST {
                 break;
@@ -125,7 +146,7 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
         let is_sound = pose.translation.vector.iter().all(|x| x.is_finite());
         is_sound.then(|| AlignedPose {
             pose,
-            covariance: (covariance + covariance.transpose()) * 0.5,
+            covariance: symmetric(&covariance),
             evidence: self.evidence(&pose, &about),
         })
     }
@@ -149,11 +170,7 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
                 continue;
             };
             let weight = query.numbers(spacing_m) / (1.0 + (expected.off / tuning::SOFT).powi(2));
-            // ∂x/∂(ρ, φ) = R | I  −y× |
-            let mut lever = Matrix3x6::zeros();
-            lever.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-            let across = -(rotation * query.at.coords.cross_matrix());
-            lever.fixed_view_mut::<3, 3>(0, 3).copy_from(&across);
+            let lever = carried_by_pose(&rotation, &query.at.coords);
             gradient += lever.transpose() * expected.gradient * weight;
             hessian += lever.transpose() * expected.hessian * lever * weight;
         }
@@ -182,8 +199,8 @@ impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, Abou
 /// Log odds of a query at a point against a place that nobody has seen \[nats\], by its effective
 /// dimension, the variance, and the squared residual.
 pub(crate) fn log_odds(numbers: f64, open: f64, off: f64) -> f64 {
-    let tells = 0.5 * numbers * (1.0 - off - open.ln());
-    ((1.0 - tuning::WRONG) * tells.min(tuning::TELLS_MAX).exp() + tuning::WRONG).ln()
+    let evidence = 0.5 * numbers * (1.0 - off - open.ln());
+    ((1.0 - tuning::WRONG) * evidence.min(tuning::EVIDENCE_MAX).exp() + tuning::WRONG).ln()
 }
 
 impl Evidence {
@@ -225,8 +242,5 @@ pub(crate) fn mixture(
         second += (covariance + off * off.transpose()) * (*weight / whole);
     }
     let covariance = second - mean * mean.transpose();
-    (
-        moved(&base, &mean),
-        (covariance + covariance.transpose()) * 0.5,
-    )
+    (plus(&base, &mean), symmetric(&covariance))
 }

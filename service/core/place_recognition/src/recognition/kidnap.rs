@@ -5,6 +5,7 @@
 //! decides whether all queries together are aligned: only if they contradict every pose where the
 //! agent may be does it count as kidnapped.
 
+use geometry::se3::twist;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
 
 use super::PlaceRecognition;
@@ -12,7 +13,6 @@ use crate::appearance::{DescriptorProcess, LocalQuery, Prior, ReferenceView, log
 use crate::keyframes::{Keyframes, SampleKey};
 use crate::relocalisation::{KidnapTest, Positions, Problem, QueryView, Search, alignment};
 use crate::tuning::kidnap as tuning;
-use crate::twist::twist;
 use crate::view::View;
 use crate::views::Kernel;
 
@@ -35,15 +35,8 @@ impl PlaceRecognition {
         let Some(test) = self.kidnap_tests.get(number) else {
             return false;
         };
-        let has_moved = test.latest.as_ref().is_none_or(|latest| {
-            let way = latest.in_odom.inv_mul(&view.in_odom);
-            !geometry::is_within(
-                &way,
-                crate::tuning::relocalise::MOVED.0,
-                crate::tuning::relocalise::MOVED.1,
-            )
-        });
-        if !has_moved {
+        let latest = test.latest.as_ref();
+        if latest.is_some_and(|latest| latest.is_beside(&view.in_odom)) {
             return false;
         }
         let query = QueryView {
@@ -51,41 +44,20 @@ impl PlaceRecognition {
             travelled_m: 0.0,
             channel,
             vector: view.vector.into(),
-            alike: Vec::new(),
+            similar: Vec::new(),
         };
-        let is_borne_out = self.is_borne_out(test, &query);
+        let is_consistent = self.is_consistent(test, &query);
         let spacing_m = test.weighed_at.map_or(f64::INFINITY, |at| {
             (at.translation.vector - query.in_odom.translation.vector).norm()
         });
-        let says = (is_borne_out && spacing_m >= tuning::SPACING * kernel.length_m)
-            .then(|| self.says(test, view, &query, kernel, spacing_m, keyframes))
+        let evidence = (is_consistent && spacing_m >= tuning::SPACING * kernel.length_m)
+            .then(|| self.evidence(test, view, &query, kernel, spacing_m, keyframes))
             .flatten();
         let revision = self.revision;
         let Some(test) = self.kidnap_tests.get_mut(number, revision) else {
             return false;
         };
-        test.latest = Some(query.clone());
-        // An agent that is not lost any more was brought back by its sightings.
-        test.is_kidnapped = false;
-        if test.accepted != accepted {
-            // An accepted sighting confirms the pose.
-            test.accepted = accepted;
-            test.reset(view.sample.seq);
-            return false;
-        }
-        if let Some(says) = says {
-            test.weighed_at = Some(query.in_odom);
-            test.against = (test.against - says).max(0.0);
-        }
-        if test.against == 0.0 {
-            test.reset(view.sample.seq);
-            return false;
-        }
-        if is_borne_out {
-            test.run
-                .push(query.in_odom, channel, &query.vector, Vec::new());
-        }
-        let is_much = says.is_some() && test.against >= tuning::SURE;
+        let is_much = test.add(&query, is_consistent, evidence, accepted, view.sample.seq);
         let Some(test) = self.kidnap_tests.get(number).filter(|_| is_much) else {
             return false;
         };
@@ -93,7 +65,7 @@ impl PlaceRecognition {
     }
 
     /// Whether a query is similar to the view before, if that was near enough.
-    fn is_borne_out(&self, test: &KidnapTest, query: &QueryView) -> bool {
+    fn is_consistent(&self, test: &KidnapTest, query: &QueryView) -> bool {
         let before = test.latest.as_ref();
         let Some(before) = before.filter(|before| before.channel == query.channel) else {
             return false;
@@ -103,12 +75,12 @@ impl PlaceRecognition {
         apart.norm() >= tuning::BESIDE * reach_m
             || self
                 .views
-                .is_alike(query.channel, &before.vector, &query.vector)
+                .is_similar(query.channel, &before.vector, &query.vector)
     }
 
     /// Log odds of the believed pose by a query, against anywhere else \[nats\]; `None` where
     /// little is known.
-    fn says(
+    fn evidence(
         &self,
         test: &KidnapTest,
         view: &View<'_>,
@@ -152,7 +124,7 @@ impl PlaceRecognition {
         // The views' positions are no more certain than their agents were then.
         let unsure_m2 = unsure_m2 / (3.0 * near.len() as f64);
         let own: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
-        let covariance = (own + Matrix3::identity() * unsure_m2) * tuning::WIDER.powi(2);
+        let covariance = (own + Matrix3::identity() * unsure_m2) * tuning::INFLATION.powi(2);
         let about = DescriptorProcess::of(&query.vector, &at, &seen, kernel)?;
         let predicted = about.predict(&at, &covariance)?;
         let query = LocalQuery {
@@ -162,8 +134,8 @@ impl PlaceRecognition {
             kernel: Some(kernel),
             vector: &query.vector,
         };
-        let says = log_odds(query.numbers(spacing_m), predicted.open, predicted.off);
-        Some(says)
+        let numbers = query.numbers(spacing_m);
+        Some(log_odds(numbers, predicted.open, predicted.off))
     }
 
     /// Whether the queries of a run, all together, contradict every pose where the agent may be.
@@ -194,7 +166,7 @@ impl PlaceRecognition {
             return false;
         };
         let open = problem.prior().open;
-        let stated = view.covariance.matrix() * tuning::WIDER.powi(2);
+        let stated = view.covariance.matrix() * tuning::INFLATION.powi(2);
         // A floor, so that a component without error, such as the height of a robot on a floor, is
         // held.
         let floor = Matrix6::identity() * 1e-6;

@@ -49,18 +49,15 @@ impl PlaceRecognition {
         let revision = self.revision;
         let channel = self.views.known_channel(view)?;
         let search = self.searches.get_mut(number, revision)?;
-        let has_moved = search.queries.last().is_none_or(|last| {
-            let way = last.in_odom.inv_mul(&view.in_odom);
-            !geometry::is_within(&way, tuning::MOVED.0, tuning::MOVED.1)
-        });
-        if !has_moved {
+        let last = search.queries.last();
+        if last.is_some_and(|last| last.is_beside(&view.in_odom)) {
             return None;
         }
         search.catch_up(&self.views);
-        let alike = self
+        let similar = self
             .views
-            .likes(channel, view.vector, 0, |stored| search.is_own(stored));
-        search.push(view.in_odom, channel, view.vector, alike);
+            .similar_views(channel, view.vector, 0, |stored| search.is_own(stored));
+        search.push(view.in_odom, channel, view.vector, similar);
         let queries = search.queries.len();
         let fresh = if search.found_m.is_some() {
             tuning::FRESH.1
@@ -87,8 +84,9 @@ impl PlaceRecognition {
         let is_rough = search.found_m.is_none()
             && (best.rough_sd_m > tuning::ROUGHLY * sd_max_m
                 || turn_sd_rad > tuning::HEADING_SD_MAX_RAD);
-        let is_known =
-            covariance.position_sd_m() <= sd_max_m && best.wider <= tuning::WIDER_MAX && !is_rough;
+        let is_known = covariance.position_sd_m() <= sd_max_m
+            && best.inflation <= tuning::INFLATION_MAX
+            && !is_rough;
         if !is_sure || !is_known {
             return None;
         }
@@ -119,7 +117,7 @@ impl PlaceRecognition {
     /// an agent without a search.
     pub fn most_similar(&self, agent: u32) -> Option<Option<SampleKey>> {
         let search = self.searches.get(self.search_number(agent)?)?;
-        let mut newest = search.queries.iter().rev().flat_map(|query| &query.alike);
+        let mut newest = search.queries.iter().rev().flat_map(|query| &query.similar);
         Some(newest.next().map(|similar| similar.sample))
     }
 

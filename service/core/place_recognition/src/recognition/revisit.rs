@@ -1,18 +1,17 @@
 //! Revisits: an agent has come where it, or another one, has been before.
 
-use geometry::{PoseCovariance, se3};
-use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+use geometry::{PoseCovariance, se3, symmetric};
+use nalgebra::{Isometry3, Matrix6, Point3};
 
 use super::PlaceRecognition;
 use crate::appearance::{
-    AlignedPose, LocalQuery, Prior, ReferenceView, ViewAlignment, mixture, weighted,
+    AlignedPose, LocalQuery, Prior, ReferenceView, ReferenceViews, ViewAlignment, mixture, weighted,
 };
 use crate::keyframes::{Keyframes, SampleKey};
 use crate::sequences::{SequenceMatch, align_roughly};
-use crate::tuning::revisit as tuning;
-use crate::twist::twist;
+use crate::tuning::{ranges, revisit as tuning};
 use crate::view::{View, spread};
-use crate::views::StoredView;
+use crate::views::Kernel;
 
 /// Two samples of one place, with their relative pose.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +47,7 @@ impl PlaceRecognition {
         let (now, then) = (matched.now.sample, matched.then.sample);
         let expected = keyframes.motion_between(now, then)?;
         let either = [0, 1].map(|k| matched.now.spread[k].hypot(matched.then.spread[k]));
-        // A place far away that only looks alike is dismissed before the alignment, which costs
+        // A place far away that only looks similar is dismissed before the alignment, which costs
         // more.
         let reach_m = self.views.reach_m(matched.channel()).unwrap_or(0.0);
         if expected.translation.vector.norm() > tuning::AWAY * either[0] + 2.0 * reach_m {
@@ -77,64 +76,24 @@ impl PlaceRecognition {
         spread: [f64; 2],
         is_planar: bool,
     ) -> Option<(Isometry3<f64>, PoseCovariance)> {
-        let (now, then) = (
-            matched.now.in_odom.inverse(),
-            matched.then.in_odom.inverse(),
-        );
-        let earlier: Vec<&StoredView> = self
-            .views
-            .stored
-            .iter()
-            .filter(|view| matched.is_beside(view))
-            .collect();
-        let channel = matched.channel();
-        let kernel = self.views.kernel(channel)?;
-        let reach = crate::tuning::ranges::OPEN_DISTANCES * kernel.length_m;
-        let views: Vec<(u8, ReferenceView<'_>)> = earlier
-            .iter()
-            .map(|view| {
-                let at = then * Point3::from(view.in_odom.translation.vector);
-                let vector = &*view.vector;
-                (view.channel, ReferenceView { at, vector })
-            })
-            .collect();
-        let queries = matched.queries.iter().map(|query| LocalQuery {
-            at: now * Point3::from(query.in_odom.translation.vector),
-            drift_m: 0.0,
-            channel,
-            kernel: Some(kernel),
-            vector: &query.vector,
-        });
-        let alignment = ViewAlignment {
-            queries: queries.collect(),
-            views: |_: &[Point3<f64>]| views.clone(),
-            is_planar,
-        };
-        let inverse = |sd: f64| 1.0 / (sd * sd).max(1e-12);
-        let (shift, turn) = (inverse(spread[0]), inverse(spread[1]));
-        let information = Vector6::new(shift, shift, shift, turn, turn, turn);
+        let kernel = self.views.kernel(matched.channel())?;
+        let alignment = self.stretch_alignment(matched, kernel, is_planar);
+        let information = Prior::inverse_variances(spread);
         let prior = Prior {
             pose: Some(expected.inverse()),
             information: Matrix6::from_diagonal(&information),
-            open: Matrix6::from_diagonal(&Vector6::new(
-                1.0 / reach.powi(2),
-                1.0 / reach.powi(2),
-                1.0 / reach.powi(2),
-                1.0 / crate::tuning::ranges::OPEN_RAD.powi(2),
-                1.0 / crate::tuning::ranges::OPEN_RAD.powi(2),
-                1.0 / crate::tuning::ranges::OPEN_RAD.powi(2),
-            )),
+            open: Prior::unknown(kernel.length_m),
         };
         let mut aligned: Vec<(AlignedPose, f64)> = align_roughly(matched, expected, spread)
             .iter()
             .filter_map(|start| alignment.align(&start.inverse(), &prior))
             .map(|aligned| {
-                let off = twist(&(expected * aligned.pose));
+                let off = se3::twist(&(expected * aligned.pose));
                 let cost = off.dot(&information.component_mul(&off));
                 (aligned, cost)
             })
             .filter(|(aligned, cost)| {
-                aligned.evidence.total() > tuning::AGREE && *cost < crate::tuning::ranges::NEAR
+                aligned.evidence.total() > tuning::AGREE && *cost < ranges::NEAR
             })
             .collect();
         let best = aligned
@@ -147,8 +106,42 @@ impl PlaceRecognition {
         let (pose, covariance) = mixture(&weighted(&aligned));
         // The error ξ of T = T̂ exp(ξ) is −Ad(T̂) ξ of its inverse.
         let adjoint = se3::adjoint(&pose);
-        let covariance = adjoint * covariance * adjoint.transpose();
-        let covariance = (covariance + covariance.transpose()) * 0.5;
+        let covariance = symmetric(&(adjoint * covariance * adjoint.transpose()));
         Some((pose.inverse(), PoseCovariance::from_matrix(&covariance)))
+    }
+
+    /// The views of the present stretch among those of the earlier one, each stretch in its own
+    /// frame.
+    fn stretch_alignment<'a>(
+        &'a self,
+        matched: &'a SequenceMatch,
+        kernel: Kernel,
+        is_planar: bool,
+    ) -> ViewAlignment<'a, impl Fn(&[Point3<f64>]) -> ReferenceViews<'a>> {
+        let (now, then) = (
+            matched.now.in_odom.inverse(),
+            matched.then.in_odom.inverse(),
+        );
+        let earlier = self.views.stored.iter();
+        let views: ReferenceViews<'a> = earlier
+            .filter(|view| matched.is_beside(view))
+            .map(|view| {
+                let at = then * Point3::from(view.in_odom.translation.vector);
+                let vector = &*view.vector;
+                (view.channel, ReferenceView { at, vector })
+            })
+            .collect();
+        let queries = matched.queries.iter().map(|query| LocalQuery {
+            at: now * Point3::from(query.in_odom.translation.vector),
+            drift_m: 0.0,
+            channel: matched.channel(),
+            kernel: Some(kernel),
+            vector: &query.vector,
+        });
+        ViewAlignment {
+            queries: queries.collect(),
+            views: move |_: &[Point3<f64>]| views.clone(),
+            is_planar,
+        }
     }
 }

@@ -28,7 +28,7 @@ pub(crate) struct Candidate {
     pub(crate) rough_sd_m: f64,
     /// Factor of the covariance by which all queries at once are farther off than expected; at
     /// least 1.
-    pub(crate) wider: f64,
+    pub(crate) inflation: f64,
 }
 
 /// The candidates of a search, the best first.
@@ -77,13 +77,14 @@ pub(crate) fn candidates(
             let apart = rough.0.translation.vector - fine.0.translation.vector;
             apart.norm() < tuning::PLACE * problem.reach_m
         };
-        let (mean, covariance, wider) = fine.filter(is_there).unwrap_or((rough.0, rough.1, 1.0));
+        let (mean, covariance, inflation) =
+            fine.filter(is_there).unwrap_or((rough.0, rough.1, 1.0));
         Candidate {
             evidence: poses[0].0.evidence.clone(),
             mean,
             covariance,
             rough_sd_m: PoseCovariance::from_matrix(&rough.1).position_sd_m(),
-            wider,
+            inflation,
         }
     });
     places.collect()
@@ -104,17 +105,17 @@ fn whole<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>>(
     if is_turn_open {
         starts.extend(turns(problem, &best.pose));
     }
-    let mut laid: Vec<BatchPose> = Vec::new();
+    let mut aligned: Vec<BatchPose> = Vec::new();
     for steps in WHOLE_STEPS {
-        laid = starts
+        aligned = starts
             .iter()
             .filter_map(|start| whole.align(start, &prior, steps))
             .collect();
-        laid.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        let (least, wider) = (laid.first()?.cost, laid.first()?.wider);
-        laid.retain(|each| each.cost - least < tuning::RIVAL * wider);
+        aligned.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let (least, inflation) = (aligned.first()?.cost, aligned.first()?.inflation);
+        aligned.retain(|each| each.cost - least < tuning::RIVAL * inflation);
         starts.clear();
-        laid.retain(|each| {
+        aligned.retain(|each| {
             let is_new = !starts
                 .iter()
                 .any(|known| is_same(problem, known, &each.pose));
@@ -125,13 +126,13 @@ fn whole<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>>(
             is_kept
         });
     }
-    let best = *laid.first()?;
-    let each = laid.iter().map(|each| {
-        let weight = ((best.cost - each.cost) / best.wider).exp();
+    let best = *aligned.first()?;
+    let each = aligned.iter().map(|each| {
+        let weight = ((best.cost - each.cost) / best.inflation).exp();
         (each.pose, each.covariance, weight)
     });
     let (mean, covariance) = mixture(&each.collect::<Vec<_>>());
-    Some((mean, covariance, best.wider))
+    Some((mean, covariance, best.inflation))
 }
 
 /// Largest standard deviation of the rotation in a covariance \[rad\].

@@ -4,6 +4,7 @@ use nalgebra::Isometry3;
 
 use super::search::{QueryView, Search};
 use crate::keyframes::SampleKey;
+use crate::tuning::kidnap as tuning;
 use state::PagedVec;
 use state::state_of_struct;
 
@@ -42,6 +43,40 @@ impl KidnapTest {
             weighed_at: None,
             run: Search::new(since),
         }
+    }
+
+    /// Adds a query with its evidence for the believed pose \[nats\], if it was weighed. `accepted`
+    /// is the number of accepted sightings so far. Answers whether this query makes the sum large.
+    pub(crate) fn add(
+        &mut self,
+        query: &QueryView,
+        is_consistent: bool,
+        evidence: Option<f64>,
+        accepted: u64,
+        seq: u64,
+    ) -> bool {
+        self.latest = Some(query.clone());
+        // An agent that is not lost any more was brought back by its sightings.
+        self.is_kidnapped = false;
+        if self.accepted != accepted {
+            // An accepted sighting confirms the pose.
+            self.accepted = accepted;
+            self.reset(seq);
+            return false;
+        }
+        if let Some(evidence) = evidence {
+            self.weighed_at = Some(query.in_odom);
+            self.against = (self.against - evidence).max(0.0);
+        }
+        if self.against == 0.0 {
+            self.reset(seq);
+            return false;
+        }
+        if is_consistent {
+            let (in_odom, channel) = (query.in_odom, query.channel);
+            self.run.push(in_odom, channel, &query.vector, Vec::new());
+        }
+        evidence.is_some() && self.against >= tuning::SURE
     }
 
     /// Sets the sum to zero: nothing contradicts the believed pose at a sample.

@@ -1,6 +1,6 @@
 //! A search as points and ranges.
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+use nalgebra::{Isometry3, Point3};
 
 use super::positions::Positions;
 use super::search::Search;
@@ -22,7 +22,7 @@ pub(super) struct QueryPoint {
     pub(super) cues: Vec<RangeCue>,
 }
 
-/// The range from a query to a remembered view, by their likeness.
+/// The range from a query to a remembered view, by their similarity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RangeCue {
     /// Position of the remembered view in the map.
@@ -38,7 +38,7 @@ pub(crate) struct Problem {
     pub(super) points: Vec<QueryPoint>,
     /// Whether the agent and the map move in one plane.
     pub(super) is_planar: bool,
-    /// Distance from which on two views are no more alike than any \[m\].
+    /// Distance from which on two views are no more similar than any \[m\].
     pub(super) reach_m: f64,
 }
 
@@ -60,7 +60,7 @@ impl Problem {
                 at: back * Point3::from(each.in_odom.translation.vector),
                 drift_m: tuning::ODOMETRY_SHARE * (newest.travelled_m - each.travelled_m),
                 cues: each
-                    .alike
+                    .similar
                     .iter()
                     .filter_map(|similar| RangeCue::of(similar, positions))
                     .collect(),
@@ -75,9 +75,7 @@ impl Problem {
 
     /// A weak prior \[m⁻², rad⁻²\]: a pose lies within some reaches of its seed.
     pub(crate) fn prior(&self) -> Prior {
-        let shift = 1.0 / (crate::tuning::ranges::OPEN_DISTANCES * self.reach_m).powi(2);
-        let turn = 1.0 / (crate::tuning::ranges::OPEN_RAD * crate::tuning::ranges::OPEN_RAD);
-        let open = Matrix6::from_diagonal(&Vector6::new(shift, shift, shift, turn, turn, turn));
+        let open = Prior::unknown(self.reach_m);
         Prior {
             pose: None,
             information: open,

@@ -4,10 +4,9 @@ use nalgebra::Isometry3;
 
 use crate::keyframes::SampleKey;
 use crate::sequences::ViewMemory;
-use crate::tuning::search as tuning;
-use crate::views::{SimilarView, StoredView, read_all, read_vector, write_all, write_vector};
-use state::PagedVec;
-use state::{CorruptState, State, StateReader, StateWriter};
+use crate::tuning::{relocalise, search as tuning};
+use crate::views::{SimilarView, StoredView};
+use state::{Counted, PagedVec, state_of_struct};
 
 /// A query: a view of an agent that does not know where it is, with the remembered views that are
 /// similar.
@@ -22,7 +21,15 @@ pub(crate) struct QueryView {
     /// The descriptor, a unit vector.
     pub(crate) vector: Box<[f32]>,
     /// The remembered views that are similar, the most similar first.
-    pub(crate) alike: Vec<SimilarView>,
+    pub(crate) similar: Vec<SimilarView>,
+}
+
+impl QueryView {
+    /// Whether a pose by motion alone is too near for another query.
+    pub(crate) fn is_beside(&self, in_odom: &Isometry3<f64>) -> bool {
+        let (length_m, angle_rad) = relocalise::MOVED;
+        geometry::is_within(&self.in_odom.inv_mul(in_odom), length_m, angle_rad)
+    }
 }
 
 /// A search under way.
@@ -67,7 +74,7 @@ impl Search {
         in_odom: Isometry3<f64>,
         channel: u8,
         vector: &[f32],
-        alike: Vec<SimilarView>,
+        similar: Vec<SimilarView>,
     ) {
         let travelled_m = self.queries.last().map_or(0.0, |last| {
             last.travelled_m + (in_odom.translation.vector - last.in_odom.translation.vector).norm()
@@ -77,7 +84,7 @@ impl Search {
             travelled_m,
             channel,
             vector: vector.into(),
-            alike,
+            similar,
         });
         let mut numbers: usize = self.queries.iter().map(|query| query.vector.len()).sum();
         while self.queries.len() > tuning::QUERIES_MAX
@@ -131,12 +138,12 @@ impl Search {
         let since = self.since();
         for query in &mut self.queries {
             let is_own = |view: &StoredView| view.is_since(since);
-            let fresh = memory.likes(query.channel, &query.vector, from, is_own);
-            query.alike.extend(fresh);
+            let fresh = memory.similar_views(query.channel, &query.vector, from, is_own);
+            query.similar.extend(fresh);
             query
-                .alike
+                .similar
                 .sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
-            query.alike.truncate(crate::tuning::memory::SIMILAR_MAX);
+            query.similar.truncate(crate::tuning::memory::SIMILAR_MAX);
         }
     }
 
@@ -165,48 +172,21 @@ impl Search {
     }
 }
 
-impl State for QueryView {
-    fn write(&self, out: &mut StateWriter) {
-        self.in_odom.write(out);
-        self.travelled_m.write(out);
-        self.channel.write(out);
-        write_vector(&self.vector, out);
-        write_all(&self.alike, out);
-    }
+state_of_struct!(QueryView {
+    in_odom,
+    travelled_m,
+    channel,
+    vector as Counted<u16>,
+    similar as Counted<u64>,
+});
 
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            in_odom: State::read(input)?,
-            travelled_m: State::read(input)?,
-            channel: State::read(input)?,
-            vector: read_vector(input)?,
-            alike: read_all(input)?,
-        })
-    }
-}
-
-impl State for Search {
-    fn write(&self, out: &mut StateWriter) {
-        self.agent.write(out);
-        self.since_seq.write(out);
-        self.session.write(out);
-        self.compared.write(out);
-        self.thinnings.write(out);
-        self.found_m.write(out);
-        self.fresh.write(out);
-        write_all(&self.queries, out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            agent: State::read(input)?,
-            since_seq: State::read(input)?,
-            session: State::read(input)?,
-            compared: State::read(input)?,
-            thinnings: State::read(input)?,
-            found_m: State::read(input)?,
-            fresh: State::read(input)?,
-            queries: read_all(input)?,
-        })
-    }
-}
+state_of_struct!(Search {
+    agent,
+    since_seq,
+    session,
+    compared,
+    thinnings,
+    found_m,
+    fresh,
+    queries as Counted<u64>,
+});

@@ -8,9 +8,8 @@ use crate::descriptor::angle_rad;
 use crate::keyframes::SampleKey;
 use crate::tuning::memory as tuning;
 use crate::view::View;
-use crate::views::{ChannelModel, Distance, Kernel, SimilarView, StoredView, read_all, write_all};
-use state::PagedVec;
-use state::{CorruptState, State, StateReader, StateWriter};
+use crate::views::{ChannelModel, Distance, Kernel, SimilarView, StoredView};
+use state::{Codec, CorruptState, Counted, PagedVec, State, StateReader, StateWriter};
 
 /// The remembered views of all agents.
 #[derive(Clone, Debug, Default)]
@@ -74,8 +73,8 @@ impl ViewMemory {
             vector: vector.into(),
         };
         track.next = track.next.saturating_add(1);
-        let (alike, is_known) = self.alike(&stored);
-        let over = self.extend_matches(at, &stored, &alike, revision);
+        let (similar, is_known) = self.similar_earlier(&stored);
+        let over = self.extend_matches(at, &stored, &similar, revision);
         if !is_known {
             self.remember(stored, revision);
         }
@@ -102,9 +101,9 @@ impl ViewMemory {
 
     /// The similar earlier views, by number, with their distances; and whether one of them makes
     /// the view redundant.
-    fn alike(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
+    fn similar_earlier(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
         let model = &mut self.channels[usize::from(view.channel)];
-        let mut alike = Vec::new();
+        let mut similar = Vec::new();
         let mut is_known = false;
         for (number, other) in self.stored.iter().enumerate() {
             let is_recent = other.sample.agent == view.sample.agent
@@ -120,15 +119,15 @@ impl ViewMemory {
                 let apart_m = (other.in_map - view.in_map).norm();
                 let unsure_m = tuning::APART_SD * other.spread[0].hypot(view.spread[0]);
                 is_known |= angle_rad < model.news_rad() && apart_m <= distance.mean_m + unsure_m;
-                alike.push((number, distance));
+                similar.push((number, distance));
             }
         }
-        if alike.len() > tuning::SIMILAR_MAX {
-            alike.sort_by(|a, b| a.1.mean_m.total_cmp(&b.1.mean_m).then(a.0.cmp(&b.0)));
-            alike.truncate(tuning::SIMILAR_MAX);
-            alike.sort_by_key(|(number, _)| *number);
+        if similar.len() > tuning::SIMILAR_MAX {
+            similar.sort_by(|a, b| a.1.mean_m.total_cmp(&b.1.mean_m).then(a.0.cmp(&b.0)));
+            similar.truncate(tuning::SIMILAR_MAX);
+            similar.sort_by_key(|(number, _)| *number);
         }
-        (alike, is_known)
+        (similar, is_known)
     }
 
     /// Adds a view and its similar views to the sequence matches of a track; answers those that are
@@ -137,14 +136,14 @@ impl ViewMemory {
         &mut self,
         track: usize,
         view: &StoredView,
-        alike: &[(usize, Distance)],
+        similar: &[(usize, Distance)],
         revision: u64,
     ) -> Vec<SequenceMatch> {
         let Some(track) = self.tracks.get_mut(track, revision) else {
             return Vec::new();
         };
         let mut is_met = vec![false; track.matches.len()];
-        for &(number, distance) in alike {
+        for &(number, distance) in similar {
             let Some(other) = self.stored.get(number) else {
                 continue;
             };
@@ -194,27 +193,12 @@ impl ViewMemory {
         if self.stored.len() <= tuning::VIEWS_MAX && self.numbers <= tuning::NUMBERS_MAX as u64 {
             return;
         }
-        let mut kept = 0;
-        self.thinnings += 1;
-        self.numbers = 0;
-        for number in 0..self.stored.len() {
-            let Some(mut view) = self.stored.get(number).cloned() else {
-                continue;
-            };
-            if !view.ordinal.is_multiple_of(2) {
-                continue;
-            }
+        self.compact(0, revision, |mut view| {
             // Neighbours still have consecutive ordinals.
+            let is_kept = view.ordinal.is_multiple_of(2);
             view.ordinal /= 2;
-            self.numbers += view.vector.len() as u64;
-            if let Some(slot) = self.stored.get_mut(kept, revision) {
-                *slot = view;
-            }
-            kept += 1;
-        }
-        while self.stored.len() > kept {
-            self.stored.pop(revision);
-        }
+            is_kept.then_some(view)
+        });
         for number in 0..self.tracks.len() {
             if let Some(track) = self.tracks.get_mut(number, revision) {
                 track.next = track.next.div_ceil(2);
@@ -229,26 +213,39 @@ impl ViewMemory {
         let Some(first) = self.stored.iter().position(is_gone) else {
             return;
         };
-        // Later views change their numbers.
-        self.thinnings += 1;
-        let mut kept = first;
+        self.compact(first, revision, |view| (!is_gone(&view)).then_some(view));
+    }
+
+    /// Replaces the views from a number on by what `kept` makes of each, and closes the gaps that
+    /// it leaves.
+    fn compact(
+        &mut self,
+        first: usize,
+        revision: u64,
+        kept: impl Fn(StoredView) -> Option<StoredView>,
+    ) {
+        let mut next = first;
         for number in first..self.stored.len() {
-            let Some(view) = self.stored.get(number) else {
+            let view = self.stored.get(number).cloned();
+            let Some(view) = view.and_then(&kept) else {
                 continue;
             };
-            if is_gone(view) {
-                self.numbers -= view.vector.len() as u64;
-                continue;
-            }
-            let view = view.clone();
-            if let Some(slot) = self.stored.get_mut(kept, revision) {
+            if let Some(slot) = self.stored.get_mut(next, revision) {
                 *slot = view;
             }
-            kept += 1;
+            next += 1;
         }
-        while self.stored.len() > kept {
+        while self.stored.len() > next {
             self.stored.pop(revision);
         }
+        // Later views have changed their numbers.
+        self.thinnings += 1;
+        self.count_numbers();
+    }
+
+    fn count_numbers(&mut self) {
+        let views = self.stored.iter();
+        self.numbers = views.map(|view| view.vector.len() as u64).sum();
     }
 
     /// The number of a descriptor's channel; a new one if there is room for it.
@@ -297,23 +294,19 @@ impl ViewMemory {
     }
 
     pub(crate) fn write_head(&self, out: &mut StateWriter) {
-        write_all(&self.channels, out);
+        Counted::<u64>::write(&self.channels, out);
         self.thinnings.write(out);
     }
 
     pub(crate) fn read_head(&mut self, input: &mut StateReader<'_>) -> Result<(), CorruptState> {
-        self.channels = read_all(input)?;
+        self.channels = Counted::<u64>::read(input)?;
         self.thinnings = State::read(input)?;
-        self.numbers = self
-            .stored
-            .iter()
-            .map(|view| view.vector.len() as u64)
-            .sum();
+        self.count_numbers();
         Ok(())
     }
 
     /// The similar views from a number on, the most similar first.
-    pub(crate) fn likes(
+    pub(crate) fn similar_views(
         &self,
         channel: u8,
         vector: &[f32],
@@ -321,7 +314,7 @@ impl ViewMemory {
         is_left_out: impl Fn(&StoredView) -> bool,
     ) -> Vec<SimilarView> {
         let views = self.stored.iter_from(from);
-        let mut likes: Vec<SimilarView> = views
+        let mut similar: Vec<SimilarView> = views
             .filter(|view| view.channel == channel && !is_left_out(view))
             .filter_map(|view| {
                 Some(SimilarView {
@@ -330,13 +323,13 @@ impl ViewMemory {
                 })
             })
             .collect();
-        likes.sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
-        likes.truncate(tuning::SIMILAR_MAX);
-        likes
+        similar.sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
+        similar.truncate(tuning::SIMILAR_MAX);
+        similar
     }
 
     /// Whether two views of a channel are more similar than unrelated ones.
-    pub(crate) fn is_alike(&self, channel: u8, one: &[f32], other: &[f32]) -> bool {
+    pub(crate) fn is_similar(&self, channel: u8, one: &[f32], other: &[f32]) -> bool {
         self.distance(channel, angle_rad(one, other)).is_some()
     }
 

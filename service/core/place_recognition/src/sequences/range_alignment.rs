@@ -1,14 +1,15 @@
 //! The relative pose of two stretches, from ranges between their views.
 
+use geometry::se3::twist;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
 use super::sequence_match::SequenceMatch;
+use crate::appearance::Prior;
 use crate::levenberg_marquardt::NormalEquations;
 use crate::tuning::ranges as tuning;
-use crate::twist::twist;
 
 /// The expected pose.
-struct Prior {
+struct PosePrior {
     pose: Isometry3<f64>,
     /// Inverse variances \[m⁻², rad⁻²\].
     information: Vector6<f64>,
@@ -53,11 +54,9 @@ pub(crate) fn align_roughly(
         })
         .collect();
     let mean_m = ranges.iter().map(|range| range.mean_m).sum::<f64>() / ranges.len() as f64;
-    let inverse = |sd: f64| 1.0 / (sd * sd).max(1e-12);
-    let (shift, turn) = (inverse(spread[0]), inverse(spread[1]));
-    let prior = Prior {
+    let prior = PosePrior {
         pose: *expected,
-        information: Vector6::new(shift, shift, shift, turn, turn, turn),
+        information: Prior::inverse_variances(spread),
     };
     let mut solutions = solutions(&ranges, &prior, mean_m);
     solutions.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -76,7 +75,7 @@ pub(crate) fn align_roughly(
 }
 
 /// Minima of the descents from the expected pose, and from its six sides.
-fn solutions(ranges: &[Range], prior: &Prior, mean_m: f64) -> Vec<Solution> {
+fn solutions(ranges: &[Range], prior: &PosePrior, mean_m: f64) -> Vec<Solution> {
     let count = ranges.len() as f64;
     let now = ranges.iter().map(|range| range.now).sum::<Vector3<f64>>() / count;
     let then = ranges
@@ -105,7 +104,7 @@ fn solutions(ranges: &[Range], prior: &Prior, mean_m: f64) -> Vec<Solution> {
 }
 
 /// Descends to the next minimum.
-fn descend(ranges: &[Range], prior: &Prior, start: &Isometry3<f64>) -> Solution {
+fn descend(ranges: &[Range], prior: &PosePrior, start: &Isometry3<f64>) -> Solution {
     let (pose, cost) = tuning::DESCENT.run(start, |pose| {
         let mut sum = equations(ranges, pose);
         let off = twist(&prior.pose.inv_mul(pose));
@@ -121,7 +120,7 @@ fn descend(ranges: &[Range], prior: &Prior, start: &Isometry3<f64>) -> Solution 
     }
 }
 
-impl Prior {
+impl PosePrior {
     fn cost(&self, pose: &Isometry3<f64>) -> f64 {
         let off = twist(&self.pose.inv_mul(pose));
         off.dot(&self.information.component_mul(&off))

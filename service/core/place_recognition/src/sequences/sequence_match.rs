@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::keyframes::SampleKey;
 use crate::tuning::sequence as tuning;
-use crate::views::{Distance, RecentView, StoredView, read_all, write_all};
-use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use crate::views::{Distance, RecentView, StoredView};
+use state::{Counted, Unstored, state_of_struct};
 
 /// A view of the present stretch and a similar one of the earlier stretch, with their distance.
 #[derive(Clone, Debug)]
@@ -155,27 +155,13 @@ impl SequenceMatch {
     }
 }
 
-impl State for SequenceMatch {
-    fn write(&self, out: &mut StateWriter) {
-        self.now.write(out);
-        self.then.write(out);
-        self.low.write(out);
-        self.high.write(out);
-        self.misses.write(out);
-        self.channel.write(out);
-        write_all(&self.pairs, out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            now: State::read(input)?,
-            then: State::read(input)?,
-            low: State::read(input)?,
-            high: State::read(input)?,
-            misses: State::read(input)?,
-            channel: State::read(input)?,
-            pairs: read_all(input)?,
-            queries: Vec::new(),
-        })
-    }
-}
+state_of_struct!(SequenceMatch {
+    now,
+    then,
+    low,
+    high,
+    misses,
+    channel,
+    pairs as Counted<u64>,
+    queries as Unstored,
+});

@@ -4,8 +4,8 @@ use nalgebra::Isometry3;
 
 use super::sequence_match::SequenceMatch;
 use crate::tuning::track as tuning;
-use crate::views::{RecentView, read_all, write_all};
-use state::{CorruptState, State, StateReader, StateWriter};
+use crate::views::RecentView;
+use state::{Counted, state_of_struct};
 
 /// An agent's latest views of a channel.
 #[derive(Clone, Debug)]
@@ -48,26 +48,12 @@ impl ViewTrack {
     }
 }
 
-impl State for ViewTrack {
-    fn write(&self, out: &mut StateWriter) {
-        self.agent.write(out);
-        self.channel.write(out);
-        self.session.write(out);
-        self.next.write(out);
-        self.last.write(out);
-        write_all(&self.recent, out);
-        write_all(&self.matches, out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            agent: State::read(input)?,
-            channel: State::read(input)?,
-            session: State::read(input)?,
-            next: State::read(input)?,
-            last: State::read(input)?,
-            recent: read_all(input)?,
-            matches: read_all(input)?,
-        })
-    }
-}
+state_of_struct!(ViewTrack {
+    agent,
+    channel,
+    session,
+    next,
+    last,
+    recent as Counted<u64>,
+    matches as Counted<u64>,
+});

@@ -1,15 +1,15 @@
-//! What the likeness of two views says of the distance between them.
+//! What the similarity of two views says of the distance between them.
 
 use std::f64::consts::FRAC_PI_2;
 
 use crate::tuning::channel as tuning;
-use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
+use state::{Codec, CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
 
 /// Kernel of a channel: the expected cosine of two views at a distance d is c exp(−d² / 2ℓ²).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Kernel {
     /// c: cosine of two views of one place.
-    pub(crate) likeness: f64,
+    pub(crate) cosine: f64,
     /// ℓ: length scale \[m\].
     pub(crate) length_m: f64,
     /// Effective dimension n: the cosines of unrelated views have standard deviation 1/√n.
@@ -22,7 +22,7 @@ pub(crate) struct ChannelModel {
     pub(crate) name: Box<str>,
     pub(crate) dimension: u16,
     /// Distances of the pairs of each class \[m\].
-    distances_m: Vec<Moments>,
+    distances_m: [Moments; tuning::CLASSES],
     /// Angles between unrelated views \[rad\].
     unrelated: Moments,
 }
@@ -40,7 +40,7 @@ impl ChannelModel {
         Self {
             name,
             dimension,
-            distances_m: vec![Moments::default(); tuning::CLASSES],
+            distances_m: [Moments::default(); tuning::CLASSES],
             unrelated: Moments::default(),
         }
     }
@@ -82,17 +82,17 @@ impl ChannelModel {
         // Least squares of ln cos = ln c − d² / 2ℓ², over the classes that say something.
         let (mut weights, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for (class, known) in self.distances_m.iter().enumerate() {
-            let likeness = ((class as f64 + 0.5) * tuning::WIDTH_RAD).cos();
-            if known.count() < tuning::PAIRS_MIN || likeness < tuning::KERNEL_LIKENESS_MIN {
+            let cosine = ((class as f64 + 0.5) * tuning::WIDTH_RAD).cos();
+            if known.count() < tuning::PAIRS_MIN || cosine < tuning::KERNEL_COSINE_MIN {
                 continue;
             }
             let squared = known.mean().powi(2);
-            let weight = known.weight() * likeness * likeness;
+            let weight = known.weight() * cosine * cosine;
             weights += weight;
             x += weight * squared;
-            y += weight * likeness.ln();
+            y += weight * cosine.ln();
             xx += weight * squared * squared;
-            xy += weight * squared * likeness.ln();
+            xy += weight * squared * cosine.ln();
         }
         let spread = weights * xx - x * x;
         let slope = (weights * xy - x * y) / spread;
@@ -100,9 +100,9 @@ impl ChannelModel {
             return None;
         }
         Some(Kernel {
-            likeness: ((y - slope * x) / weights)
+            cosine: ((y - slope * x) / weights)
                 .exp()
-                .clamp(0.5, tuning::LIKENESS_MAX),
+                .clamp(0.5, tuning::COSINE_MAX),
             length_m: (-0.5 / slope).sqrt(),
             numbers: (1.0 / (sd * sd)).max(1.0),
         })
@@ -115,8 +115,8 @@ impl ChannelModel {
         if unrelated.count() < tuning::UNRELATED_MIN {
             return None;
         }
-        let limit =
-            class_of(unrelated.mean() - tuning::ALIKE * unrelated.sd()).min(tuning::CLASSES - 1);
+        let limit = class_of(unrelated.mean() - tuning::SIMILAR_SD * unrelated.sd())
+            .min(tuning::CLASSES - 1);
         let known = (0..=limit)
             .rev()
             .filter_map(|class| self.distances_m.get(class));
@@ -132,7 +132,7 @@ impl ChannelModel {
     pub(crate) fn distance(&self, angle_rad: f64) -> Option<Distance> {
         let unrelated = &self.unrelated;
         let is_known = unrelated.count() >= tuning::UNRELATED_MIN;
-        if !is_known || angle_rad > unrelated.mean() - tuning::ALIKE * unrelated.sd() {
+        if !is_known || angle_rad > unrelated.mean() - tuning::SIMILAR_SD * unrelated.sd() {
             return None;
         }
         let known = |class: usize| {
@@ -186,31 +186,30 @@ fn class_of(angle_rad: f64) -> usize {
     (angle_rad / tuning::WIDTH_RAD) as usize
 }
 
-impl State for ChannelModel {
-    fn write(&self, out: &mut StateWriter) {
-        u8::try_from(self.name.len())
+/// A name of at most 255 bytes.
+struct ShortText;
+
+impl Codec<Box<str>> for ShortText {
+    fn write(name: &Box<str>, out: &mut StateWriter) {
+        u8::try_from(name.len())
             .expect("a channel's name fits a byte")
             .write(out);
-        out.extend(self.name.as_bytes());
-        self.dimension.write(out);
-        for class in &self.distances_m {
-            class.write(out);
-        }
-        self.unrelated.write(out);
+        out.extend(name.as_bytes());
     }
 
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+    fn read(input: &mut StateReader<'_>) -> Result<Box<str>, CorruptState> {
         let length = u8::read(input)?;
         let name = std::str::from_utf8(input.take(length.into())?);
-        let name = name.map_err(|_| CorruptState::Invalid)?;
-        let mut model = Self::new(name.into(), State::read(input)?);
-        for class in &mut model.distances_m {
-            *class = State::read(input)?;
-        }
-        model.unrelated = State::read(input)?;
-        Ok(model)
+        name.map(Into::into).map_err(|_| CorruptState::Invalid)
     }
 }
+
+state_of_struct!(ChannelModel {
+    name as ShortText,
+    dimension,
+    distances_m,
+    unrelated,
+});
 
 #[cfg(test)]
 mod tests {
@@ -228,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_learned_is_told() {
+    fn the_distance_is_the_learned_one() {
         let model = learned();
         for angle_rad in [0.1, 0.33, 0.5, 0.77, 1.0] {
             let found = model.distance(angle_rad).unwrap();
@@ -240,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_told_before_chance_is_known() {
+    fn there_is_no_distance_before_unrelated_views_are_known() {
         let mut model = ChannelModel::new("view".into(), 64);
         for _ in 0..100 {
             model.learn(0.2, 0.2);

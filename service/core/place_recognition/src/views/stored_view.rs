@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::channel_model::Distance;
 use crate::keyframes::SampleKey;
-use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use state::{Counted, state_of_struct};
 
 /// A view as it is remembered.
 #[derive(Clone, Debug)]
@@ -39,43 +39,15 @@ state_of_struct!(SampleKey {
     seq
 });
 
-impl State for StoredView {
-    fn write(&self, out: &mut StateWriter) {
-        self.channel.write(out);
-        self.sample.write(out);
-        self.ordinal.write(out);
-        self.in_odom.write(out);
-        self.in_map.write(out);
-        self.spread.write(out);
-        write_vector(&self.vector, out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            channel: State::read(input)?,
-            sample: State::read(input)?,
-            ordinal: State::read(input)?,
-            in_odom: State::read(input)?,
-            in_map: State::read(input)?,
-            spread: State::read(input)?,
-            vector: read_vector(input)?,
-        })
-    }
-}
-
-pub(crate) fn write_vector(vector: &[f32], out: &mut StateWriter) {
-    // A descriptor has at most 4096 numbers.
-    u16::try_from(vector.len())
-        .expect("a descriptor's length fits 16 bits")
-        .write(out);
-    for number in vector {
-        number.write(out);
-    }
-}
-
-pub(crate) fn read_vector(input: &mut StateReader<'_>) -> Result<Box<[f32]>, CorruptState> {
-    (0..u16::read(input)?).map(|_| f32::read(input)).collect()
-}
+state_of_struct!(StoredView {
+    channel,
+    sample,
+    ordinal,
+    in_odom,
+    in_map,
+    spread,
+    vector as Counted<u16>,
+});
 
 /// A remembered view that is similar to a query, and their distance.
 #[derive(Clone, Copy, Debug)]
@@ -93,27 +65,7 @@ pub(crate) struct RecentView {
     pub(crate) vector: Box<[f32]>,
 }
 
-impl State for RecentView {
-    fn write(&self, out: &mut StateWriter) {
-        self.in_odom.write(out);
-        write_vector(&self.vector, out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            in_odom: State::read(input)?,
-            vector: read_vector(input)?,
-        })
-    }
-}
-
-pub(crate) fn write_all<T: State>(items: &[T], out: &mut StateWriter) {
-    (items.len() as u64).write(out);
-    for item in items {
-        item.write(out);
-    }
-}
-
-pub(crate) fn read_all<T: State>(input: &mut StateReader<'_>) -> Result<Vec<T>, CorruptState> {
-    (0..u64::read(input)?).map(|_| T::read(input)).collect()
-}
+state_of_struct!(RecentView {
+    in_odom,
+    vector as Counted<u16>,
+});

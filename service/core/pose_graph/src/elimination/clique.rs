@@ -8,7 +8,7 @@ use super::dense;
 /// Unknowns that a variable has at most.
 pub(crate) const DIMENSION_MAX: usize = 6;
 
-/// Variables that are eliminated together, the later ones they are tied to, and the dense matrix
+/// Variables that are eliminated together, the later ones that are coupled with them, and the dense matrix
 /// over both.
 ///
 /// With the frontal variables first, the rows and columns of the front are
@@ -158,7 +158,7 @@ impl Clique {
         let n_rows = self.n_rows();
         for k in (0..self.n_pivots()).rev() {
             let column = &self.entries[k * self.ld..][..self.ld];
-            let known = dot(&column[k + 1..n_rows], &x[k + 1..n_rows]);
+            let known = interleaved_dot(&column[k + 1..n_rows], &x[k + 1..n_rows]);
             x[k] = (column[n_rows + right] - known) / column[k];
         }
     }
@@ -196,7 +196,7 @@ struct Run {
 }
 
 /// The inner product, in four interleaved sums: one would wait for itself.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn interleaved_dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a_chunks, b_chunks) = (a.chunks_exact(4), b.chunks_exact(4));
     let (a_rest, b_rest) = (a_chunks.remainder(), b_chunks.remainder());

@@ -24,6 +24,11 @@ const NOISE: f64 = 1e-13;
 /// What a pivot that is only noise becomes. The solution then does not move along it.
 pub(super) const FIXED: f64 = 1e150;
 
+/// The inner product, in order.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// The leading dimension for this many rows.
 pub(super) fn leading_dimension(n_rows: usize) -> usize {
     n_rows.next_multiple_of(LANES)

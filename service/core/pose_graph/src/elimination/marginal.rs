@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Matrix6;
 
 use super::clique::DIMENSION_MAX;
-use super::dense::FIXED;
+use super::dense::{FIXED, dot};
 use super::tree::CliqueTree;
 
 /// L⁻¹ E for the unit columns E of one variable: it is zero outside the way from the variable's
@@ -70,7 +70,7 @@ impl HalfSolution {
             };
             for (r, a) in columns.iter().enumerate() {
                 for (c, b) in other_columns.iter().enumerate() {
-                    product[(r, c)] += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+                    product[(r, c)] += dot(a, b);
                 }
             }
         }

@@ -8,8 +8,14 @@ mod ordering;
 mod tree;
 
 pub(crate) use clique::Front;
+pub(crate) use dense::dot;
 pub(crate) use marginal::HalfSolution;
 pub(crate) use tree::{CliqueTree, Equations, Part, slot};
+
+/// The number of what has this index: variables, nodes and links stay far below 2³².
+pub(crate) fn number(index: usize) -> u32 {
+    u32::try_from(index).expect("fewer than 2³² variables, nodes and links")
+}
 
 #[cfg(test)]
 mod tests;

@@ -1,18 +1,20 @@
 //! In which order variables are eliminated, and the cliques that this gives.
 //!
 //! Approximate minimum degree on a quotient graph (Amestoy, Davis & Duff 1996): an eliminated
-//! variable lives on as an *element*, the set of variables that its elimination has tied together,
-//! so the graph never grows. What the elimination of a pivot ties together is exactly its column of
+//! variable lives on as an *element*, the set of variables that its elimination has coupled, so the
+//! graph never grows. What the elimination of a pivot couples is exactly its column of
 //! the factor; the cliques therefore come out of the ordering itself, without a symbolic
 //! factorisation behind it.
 
-/// What is to be ordered: variables 0, 1, … and what ties them together.
+use super::number;
+
+/// What is to be ordered: variables 0, 1, … and what couples them.
 #[derive(Debug, Default)]
 pub(super) struct Problem {
     /// For each variable those that share a link with it; repetitions and the variable itself do no
     /// harm.
     pub(super) adjacent: Vec<Vec<u32>>,
-    /// Sets of variables that earlier eliminations have tied together: what stays of a part already
+    /// Sets of variables that earlier eliminations have coupled: what stays of a part already
     /// factored.
     pub(super) elements: Vec<Vec<u32>>,
     /// Variables that are to come after all others.
@@ -24,7 +26,7 @@ pub(super) struct Problem {
 pub(super) struct Stage {
     /// The variables, in the order of their elimination.
     pub(super) frontal: Vec<u32>,
-    /// Later variables that they are tied to.
+    /// Later variables that are coupled with them.
     pub(super) separator: Vec<u32>,
     /// Elements of the problem that are used up here.
     pub(super) elements: Vec<u32>,
@@ -41,7 +43,7 @@ pub(super) fn order(problem: Problem) -> Vec<Stage> {
         let mut stage = Stage::default();
         for element in quotient.eliminate(pivot) {
             match element.checked_sub(n_given) {
-                None => stage.elements.push(index(element)),
+                None => stage.elements.push(number(element)),
                 Some(child) => stages[child].parent = Some(stages.len()),
             }
         }
@@ -67,11 +69,11 @@ pub(super) fn order(problem: Problem) -> Vec<Stage> {
 struct Group {
     /// Empty once it is eliminated, or has become part of another group.
     members: Vec<u32>,
-    /// Other groups tied to it by a link, ascending; those gone are removed now and then.
+    /// Other groups coupled with it by a link, ascending; those gone are removed now and then.
     variables: Vec<u32>,
     /// Elements that it belongs to, ascending.
     elements: Vec<usize>,
-    /// An upper bound of the number of variables tied to it.
+    /// An upper bound of the number of variables coupled with it.
     degree: usize,
     is_last: bool,
 }
@@ -146,7 +148,7 @@ impl Quotient {
             degree, is_last, ..
         } = self.groups[group];
         if !is_last || self.last_are_open {
-            self.buckets[degree].push(index(group));
+            self.buckets[degree].push(number(group));
             self.least_degree = self.least_degree.min(degree);
         }
     }
@@ -177,7 +179,7 @@ impl Quotient {
         }
     }
 
-    /// Replaces a pivot by the element of all that it is tied to. Returns the elements used up by
+    /// Replaces a pivot by the element of all that is coupled with it. Returns the elements used up by
     /// that.
     fn eliminate(&mut self, pivot: usize) -> Vec<usize> {
         self.step += 1;
@@ -186,7 +188,7 @@ impl Quotient {
         let variables = std::mem::take(&mut self.groups[pivot].variables);
         let mut used_up = std::mem::take(&mut self.groups[pivot].elements);
         used_up.retain(|&element| !self.elements[element].is_empty());
-        let mut tied = Vec::new();
+        let mut coupled = Vec::new();
         let parts = used_up
             .iter()
             .map(|&element| std::mem::take(&mut self.elements[element]));
@@ -194,18 +196,18 @@ impl Quotient {
             let is_alive = !self.groups[group as usize].members.is_empty();
             if is_alive && self.seen[group as usize] != step {
                 self.seen[group as usize] = step;
-                tied.push(group);
+                coupled.push(group);
             }
         }
-        used_up.extend(self.count_outside(&tied));
-        let size = tied
+        used_up.extend(self.count_outside(&coupled));
+        let size = coupled
             .iter()
             .map(|&group| self.groups[group as usize].members.len())
             .sum();
-        for &group in &tied {
+        for &group in &coupled {
             self.update(group as usize, size);
         }
-        self.elements.push(tied);
+        self.elements.push(coupled);
         self.sizes.push(size);
         self.outside.push((0, 0));
         used_up
@@ -264,7 +266,7 @@ impl Quotient {
         self.groups[group] = own;
     }
 
-    /// Merges groups of the newest element that are tied to the same others, and offers what
+    /// Merges groups of the newest element that are coupled with the same others, and offers what
     /// remains.
     fn merge_indistinguishable(&mut self) {
         let newest = self
@@ -272,7 +274,7 @@ impl Quotient {
             .last()
             .expect("called after an elimination")
             .clone();
-        let mut by_ties: Vec<(usize, u32)> = Vec::with_capacity(newest.len());
+        let mut by_sum: Vec<(usize, u32)> = Vec::with_capacity(newest.len());
         for &group in &newest {
             let Group {
                 variables,
@@ -284,15 +286,15 @@ impl Quotient {
                 .map(|&v| v as usize)
                 .chain(elements.iter().copied())
                 .sum();
-            by_ties.push((sum, group));
+            by_sum.push((sum, group));
         }
-        by_ties.sort_unstable();
-        for i in 0..by_ties.len() {
-            let (sum, kept) = by_ties[i];
+        by_sum.sort_unstable();
+        for i in 0..by_sum.len() {
+            let (sum, kept) = by_sum[i];
             if self.groups[kept as usize].members.is_empty() {
                 continue;
             }
-            for &(_, other) in by_ties[i + 1..]
+            for &(_, other) in by_sum[i + 1..]
                 .iter()
                 .take_while(|(other, _)| *other == sum)
             {
@@ -315,9 +317,4 @@ impl Quotient {
             }
         }
     }
-}
-
-/// Sizes of problems stay far below 2³².
-fn index(of: usize) -> u32 {
-    u32::try_from(of).expect("fewer than 2³² variables")
 }

@@ -4,6 +4,7 @@ use pulp::Arch;
 
 use super::amalgamation::amalgamate;
 use super::clique::{Clique, DIMENSION_MAX, Front};
+use super::number;
 use super::ordering::{self, Problem};
 
 /// No place in a clique.
@@ -23,7 +24,7 @@ pub(crate) trait Equations {
 
     /// Whether a link couples its variables. A link without weight would only make the factor
     /// denser.
-    fn ties(&self, _link: u32) -> bool {
+    fn couples(&self, _link: u32) -> bool {
         true
     }
 
@@ -235,8 +236,9 @@ impl CliqueTree {
         }
         let adjacent = |&variable: &u32| {
             let links = equations.links(variable).iter();
-            let ties = links.filter(|&&(link, _)| equations.ties(link));
-            ties.map(|&(_, other)| other)
+            let couplings = links.filter(|&&(link, _)| equations.couples(link));
+            couplings
+                .map(|&(_, other)| other)
                 .map(|other| self.local[other as usize])
                 .filter(|&place| place != NOWHERE)
                 .collect()
@@ -412,9 +414,4 @@ impl CliqueTree {
 /// Where in a solution the unknowns of a variable stand for one of `n_right` right-hand sides.
 pub(crate) fn slot(variable: usize, right: usize, n_right: usize) -> usize {
     (variable * n_right + right) * DIMENSION_MAX
-}
-
-/// Graphs stay far below 2³² nodes.
-fn number(of: usize) -> u32 {
-    u32::try_from(of).expect("fewer than 2³² variables")
 }

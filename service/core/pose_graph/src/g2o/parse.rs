@@ -3,10 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{PoseInformation, PositionInformation};
-use geometry::PLANAR_AXES;
-use nalgebra::{
-    Isometry3, Matrix3, Matrix6, Point3, Quaternion, Translation3, UnitQuaternion, Vector3,
-};
+use geometry::{ALL_AXES, PLANAR_AXES, from_upper_triangle, rotation_from_xyzw};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::error::{G2oError, LineReason};
 use super::graph::{Edge, G2oGraph, PointEdge};
@@ -87,6 +85,27 @@ fn parse(text: &str) -> Result<G2oGraph, G2oError> {
 impl Reader {
     fn line(&mut self, columns: &[&str]) -> Result<(), LineReason> {
         match columns[0] {
+            kind if kind.starts_with("VERTEX_") => self.vertex(kind, columns)?,
+            kind if kind.starts_with("EDGE_") => self.edge(kind, columns)?,
+            "PARAMS_SE3OFFSET" => {
+                self.planar(false)?;
+                let numbers = numbers::<7>(columns, 2)?;
+                self.sensors
+                    .insert(id(columns, 1)?, spatial_pose(&numbers)?);
+            }
+            "FIX" => {
+                for column in 1..columns.len() {
+                    self.held.insert(id(columns, column)?);
+                }
+            }
+            other => return Err(LineReason::Kind(other.to_owned())),
+        }
+        Ok(())
+    }
+
+    /// A pose or a point.
+    fn vertex(&mut self, kind: &str, columns: &[&str]) -> Result<(), LineReason> {
+        match kind {
             "VERTEX_SE2" => {
                 self.planar(true)?;
                 let numbers = numbers::<3>(columns, 2)?;
@@ -111,24 +130,32 @@ impl Reader {
                 let id = self.node(columns, 1, true)?;
                 self.points.insert(id, Point3::from(numbers));
             }
+            other => return Err(LineReason::Kind(other.to_owned())),
+        }
+        Ok(())
+    }
+
+    /// A relative pose, or a sighting of a point.
+    fn edge(&mut self, kind: &str, columns: &[&str]) -> Result<(), LineReason> {
+        match kind {
             "EDGE_SE2" => {
                 self.planar(true)?;
                 let numbers = numbers::<9>(columns, 3)?;
-                let transform = planar_pose(&numbers);
-                self.edge(columns, transform, &PLANAR_AXES, &numbers[3..])?;
+                let information = from_upper_triangle(&PLANAR_AXES, &numbers[3..]);
+                self.pose_edge(columns, planar_pose(&numbers), &information)
             }
             "EDGE_SE3:QUAT" => {
                 self.planar(false)?;
                 let numbers = numbers::<28>(columns, 3)?;
-                let transform = spatial_pose(&numbers)?;
-                self.edge(columns, transform, &[0, 1, 2, 3, 4, 5], &numbers[7..])?;
+                let information = from_upper_triangle(&ALL_AXES, &numbers[7..]);
+                self.pose_edge(columns, spatial_pose(&numbers)?, &information)
             }
             "EDGE_SE2_XY" => {
                 self.planar(true)?;
                 let numbers = numbers::<5>(columns, 3)?;
                 let position = Vector3::new(numbers[0], numbers[1], 0.0);
-                let information = symmetric(&[0, 1], &numbers[2..]);
-                self.point_edge(columns, position, &information)?;
+                let information = from_upper_triangle(&[0, 1], &numbers[2..]);
+                self.point_edge(columns, position, &information)
             }
             "EDGE_SE3_TRACKXYZ" => {
                 self.planar(false)?;
@@ -138,23 +165,12 @@ impl Reader {
                 let on_body = *on_body.ok_or(LineReason::UnknownSensor(sensor))?;
                 let seen = on_body * Point3::new(numbers[0], numbers[1], numbers[2]);
                 let turn = on_body.rotation.to_rotation_matrix().into_inner();
-                let information = turn * symmetric(&[0, 1, 2], &numbers[3..]) * turn.transpose();
-                self.point_edge(columns, seen.coords, &information)?;
+                let information = from_upper_triangle(&[0, 1, 2], &numbers[3..]);
+                let information = turn * information * turn.transpose();
+                self.point_edge(columns, seen.coords, &information)
             }
-            "PARAMS_SE3OFFSET" => {
-                self.planar(false)?;
-                let numbers = numbers::<7>(columns, 2)?;
-                self.sensors
-                    .insert(id(columns, 1)?, spatial_pose(&numbers)?);
-            }
-            "FIX" => {
-                for column in 1..columns.len() {
-                    self.held.insert(id(columns, column)?);
-                }
-            }
-            other => return Err(LineReason::Kind(other.to_owned())),
+            other => Err(LineReason::Kind(other.to_owned())),
         }
-        Ok(())
     }
 
     /// Says whether a line is planar: all are, or none.
@@ -177,30 +193,21 @@ impl Reader {
         }
     }
 
-    fn edge(
+    fn pose_edge(
         &mut self,
         columns: &[&str],
         transform: Isometry3<f64>,
-        axes: &[usize],
-        upper_triangle: &[f64],
+        information: &Matrix6<f64>,
     ) -> Result<(), LineReason> {
         let (from, to) = (self.node(columns, 1, false)?, self.node(columns, 2, false)?);
         if from == to {
             return Err(LineReason::Loop);
         }
-        let mut matrix = Matrix6::zeros();
-        let mut entries = upper_triangle.iter();
-        for (k, &row) in axes.iter().enumerate() {
-            for (&column, entry) in axes[k..].iter().zip(&mut entries) {
-                matrix[(row, column)] = *entry;
-                matrix[(column, row)] = *entry;
-            }
-        }
         self.edges.push(Edge {
             from,
             to,
             transform,
-            information: PoseInformation::new(&matrix)?,
+            information: PoseInformation::new(information)?,
         });
         Ok(())
     }
@@ -220,19 +227,6 @@ impl Reader {
         self.point_edges.push(edge);
         Ok(())
     }
-}
-
-/// The matrix with these entries on and above the diagonal of the named axes.
-fn symmetric(axes: &[usize], upper_triangle: &[f64]) -> Matrix3<f64> {
-    let mut matrix = Matrix3::zeros();
-    let mut entries = upper_triangle.iter();
-    for (k, &row) in axes.iter().enumerate() {
-        for (&column, entry) in axes[k..].iter().zip(&mut entries) {
-            matrix[(row, column)] = *entry;
-            matrix[(column, row)] = *entry;
-        }
-    }
-    matrix
 }
 
 /// The `N` numbers from column `first` on, which end the line.
@@ -270,10 +264,8 @@ fn planar_pose(numbers: &[f64]) -> Isometry3<f64> {
 
 /// x, y, z, qx, qy, qz, qw.
 fn spatial_pose(numbers: &[f64]) -> Result<Isometry3<f64>, LineReason> {
-    let quaternion = Quaternion::new(numbers[6], numbers[3], numbers[4], numbers[5]);
-    let rotation = UnitQuaternion::try_new(quaternion, f64::MIN_POSITIVE)
-        .filter(|rotation| (rotation.coords.norm() - 1.0).abs() < 1e-6) // the norm may overflow
-        .ok_or(LineReason::NoDirection)?;
+    let quaternion = [numbers[3], numbers[4], numbers[5], numbers[6]];
+    let rotation = rotation_from_xyzw(quaternion).ok_or(LineReason::NoDirection)?;
     let shift = Translation3::new(numbers[0], numbers[1], numbers[2]);
     Ok(Isometry3::from_parts(shift, rotation))
 }

@@ -3,13 +3,11 @@
 use std::fmt::Write as _;
 
 use crate::{Link, PoseGraph, SightingTarget};
-use geometry::PLANAR_AXES;
+use geometry::{ALL_AXES, PLANAR_AXES};
 use nalgebra::Isometry3;
 
-const ALL_AXES: [usize; 6] = [0, 1, 2, 3, 4, 5];
-
-/// The poses, points and links of a graph, for other programs. A pose that is held, or tied to the
-/// graph, is written as one that stays where it is; a sighting of a place on another pose has no
+/// The poses, points and links of a graph, for other programs. A pose that is held, or has a
+/// prior, is written as one that stays where it is; a sighting of a place on another pose has no
 /// entry in the format, and is left out.
 pub fn write_g2o(graph: &PoseGraph) -> String {
     let is_planar = graph.is_planar();

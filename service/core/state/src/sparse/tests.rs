@@ -1,6 +1,7 @@
 //! A vector with gaps against an ordered map.
 
 use super::*;
+use crate::Digest;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -45,7 +46,7 @@ fn step() -> impl Strategy<Value = Step> {
 
 proptest! {
     /// Against an ordered map. The snapshot taken on the way stays as it was, and what was stored
-    /// page by page, laid over one another, is always the whole.
+    /// page by page, put over one another, is always the whole.
     #[test]
     fn behaves_like_a_map(
         filled in prop::sample::select(vec![0u64, 3, 250, 520]),

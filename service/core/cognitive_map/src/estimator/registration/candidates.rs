@@ -75,7 +75,7 @@ fn propose(candidates: &mut Vec<Candidate>, new: Candidate, is_same: impl Fn(&Ca
     candidates.truncate(CANDIDATES_MAX);
 }
 
-/// Three landmarks far from one another: two motions that lay these alike are one.
+/// Three landmarks far from one another: two motions that map these to the same points are one.
 fn corners(points: &[UncertainPoint]) -> Vec<UncertainPoint> {
     let mut corners: Vec<UncertainPoint> = Vec::new();
     while corners.len() < points.len().min(3) {

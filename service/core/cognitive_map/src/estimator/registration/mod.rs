@@ -121,7 +121,7 @@ fn mirrored(point: &UncertainPoint) -> UncertainPoint {
     point
 }
 
-/// The motions that are nearest to being believed, the best first.
+/// The motions that are nearest to being accepted, the best first.
 fn motions(
     older: &[UncertainPoint],
     newer: &[UncertainPoint],
@@ -187,7 +187,7 @@ pub(super) fn mean_variance(points: &[UncertainPoint]) -> f64 {
 }
 
 /// Whether most landmarks that lie among the correspondences are correspondences: where one frame
-/// knows many that the other does not, the rest is alike by chance.
+/// knows many that the other does not, the rest agrees by chance.
 fn is_agreed(
     pose: &Isometry3<f64>,
     correspondences: &[Correspondence],
@@ -225,7 +225,7 @@ pub(super) fn apart_m(
 
 /// Fits a motion to its correspondences and seeks them again, until nothing changes. Those in which
 /// another landmark may be meant are left out of the fit as long as the others alone are enough for
-/// a motion to be believed.
+/// a motion to be accepted.
 fn refine(
     mut pose: Isometry3<f64>,
     index: &PointIndex<'_>,

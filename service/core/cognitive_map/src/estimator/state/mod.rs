@@ -2,13 +2,11 @@
 //!
 //! The parameters are constant and not written.
 
-mod lists;
-
-use std::sync::Arc;
+mod codecs;
 
 use nalgebra::Isometry3;
 
-use lists::{read_all, read_count, read_map, write_all, write_count, write_map, write_pairs};
+use codecs::{ListUpTo, MapUpTo, Shared, SortedUpTo, UpTo};
 
 use super::agent_filter::{AgentFilter, BODY_DIM, Run};
 use super::agent_slot::{AgentSlot, AgentState, Detached};
@@ -28,13 +26,18 @@ use super::tuning::{
     ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
     HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, OBSERVERS_MAX, PENDING_MAX, SENSOR_TARGETS_MAX,
 };
-use ::state::PagedVec;
-use ::state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
+use ::state::{
+    Codec, CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum, state_of_struct,
+};
 
 /// Most components of a joint covariance.
 const DIM_MAX: usize = MEMBERS_MAX * BODY_DIM + LANDMARKS_MAX * LANDMARK_DIM;
 /// Most agents of a space, against counts that no bytes can follow.
 const AGENTS_MAX: usize = 1 << 24;
+/// Most frames: the map's, and one for each agent.
+const FRAMES_MAX: usize = AGENTS_MAX + 1;
+/// Most archived landmarks of a frame.
+const ARCHIVED_MAX: usize = ARCHIVE_PARTS * ARCHIVE_PART_MAX;
 
 state_of_struct!(Evidence {
     accepted,
@@ -73,136 +76,83 @@ state_of_struct!(ArchivedLandmark {
     only
 });
 
-impl State for OdometryHistory {
-    fn write(&self, out: &mut StateWriter) {
-        write_all(self.instants.len(), &self.instants, out);
-        self.latest.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let instants = read_all(input, HISTORY_LEN)?.into();
-        let latest = State::read(input)?;
-        Ok(Self { instants, latest })
-    }
-}
-
-impl State for SightingTarget {
-    fn write(&self, out: &mut StateWriter) {
-        match self {
-            Self::Landmark(number) => (0u8, *number).write(out),
-            Self::Agent(number) => (1u8, u64::from(*number)).write(out),
-        }
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        match State::read(input)? {
-            (0u8, number) => Ok(Self::Landmark(number)),
-            (1u8, number) => u32::try_from(number)
-                .map(Self::Agent)
-                .map_err(|_| CorruptState::Invalid),
-            _ => Err(CorruptState::Invalid),
-        }
-    }
-}
-
-impl State for Sensor {
-    fn write(&self, out: &mut StateWriter) {
-        self.scales.write(out);
-        self.counts.write(out);
-        self.product.write(out);
-        self.square.write(out);
-        write_map(&self.latest, out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            scales: State::read(input)?,
-            counts: State::read(input)?,
-            product: State::read(input)?,
-            square: State::read(input)?,
-            latest: read_map(input, SENSOR_TARGETS_MAX)?,
-        })
-    }
-}
-
-impl State for Detached {
-    fn write(&self, out: &mut StateWriter) {
-        self.was_joint.write(out);
-        self.state.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            was_joint: State::read(input)?,
-            state: Arc::new(State::read(input)?),
-        })
-    }
-}
-
-impl State for Member {
-    fn write(&self, out: &mut StateWriter) {
-        self.agent.write(out);
-        write_count(self.offset, out);
-        self.used.write(out);
-        self.state.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            agent: State::read(input)?,
-            offset: read_count(input, DIM_MAX)?,
-            used: State::read(input)?,
-            state: Arc::new(State::read(input)?),
-        })
-    }
-}
-
-impl State for Observers {
-    fn write(&self, out: &mut StateWriter) {
-        write_all(self.agents.len(), &self.agents, out);
-        self.are_more.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let observers = Self {
-            agents: read_all(input, OBSERVERS_MAX)?,
-            are_more: State::read(input)?,
-        };
-        let are_sorted = observers.agents.is_sorted_by(|one, next| one < next);
-        are_sorted.then_some(observers).ok_or(CorruptState::Invalid)
-    }
-}
-
-impl State for LandmarkState {
-    fn write(&self, out: &mut StateWriter) {
-        self.number.write(out);
-        self.position.write(out);
-        write_count(self.offset, out);
-        self.used.write(out);
-        self.refused.write(out);
-        self.observers.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        Ok(Self {
-            number: State::read(input)?,
-            position: State::read(input)?,
-            offset: read_count(input, DIM_MAX)?,
-            used: State::read(input)?,
-            refused: State::read(input)?,
-            observers: State::read(input)?,
-        })
-    }
-}
+state_of_struct!(OdometryHistory {
+    instants as ListUpTo<HISTORY_LEN>,
+    latest
+});
+state_of_enum!(SightingTarget {
+    Landmark(number) = 0,
+    Agent(number) = 1
+});
+state_of_struct!(Sensor {
+    scales,
+    counts,
+    product,
+    square,
+    latest as MapUpTo<SENSOR_TARGETS_MAX>
+});
+state_of_struct!(Detached {
+    was_joint,
+    state as Shared
+});
+state_of_struct!(Member {
+    agent,
+    offset as UpTo<DIM_MAX>,
+    used,
+    state as Shared
+});
+state_of_struct!(Observers {
+    agents as SortedUpTo<OBSERVERS_MAX>,
+    are_more
+});
+state_of_struct!(LandmarkState {
+    number,
+    position,
+    offset as UpTo<DIM_MAX>,
+    used,
+    refused,
+    observers
+});
+state_of_struct!(Frame {
+    population,
+    members as ListUpTo<MEMBERS_MAX>,
+    landmarks as MapUpTo<LANDMARKS_MAX>,
+    archive,
+    covariance,
+    numbered,
+    sightings
+});
+state_of_struct!(PendingSighting {
+    observer,
+    target,
+    stamp_ns,
+    relation
+});
+state_of_struct!(CrossFrameSighting {
+    frames as UpTo<AGENTS_MAX>,
+    points,
+    variance
+});
+state_of_struct!(FrameMatch {
+    frames as UpTo<AGENTS_MAX>,
+    pose,
+    n_found
+});
+state_of_struct!(Association { name, refused });
 
 impl State for LandmarkArchive {
     fn write(&self, out: &mut StateWriter) {
-        write_pairs(self.len(), self.iter(), out);
+        UpTo::<ARCHIVED_MAX>::write(&self.len(), out);
+        for (label, landmark) in self.iter() {
+            label.write(out);
+            landmark.write(out);
+        }
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         let mut landmarks = Self::default();
-        for _ in 0..read_count(input, ARCHIVE_PARTS * ARCHIVE_PART_MAX)? {
+        let count: usize = UpTo::<ARCHIVED_MAX>::read(input)?;
+        for _ in 0..count {
             let (label, landmark) = State::read(input)?;
             // In their own order, none twice, and none that drives out another.
             if !landmarks.append(label, landmark) {
@@ -220,7 +170,7 @@ impl State for JointCovariance {
         let mirror = |at: usize| entries[at % dim * dim + at / dim];
         let is_symmetric =
             (0..entries.len()).all(|at| entries[at].to_bits() == mirror(at).to_bits());
-        write_count(dim, out);
+        UpTo::<DIM_MAX>::write(&dim, out);
         is_symmetric.write(out);
         for row in 0..dim {
             let first = if is_symmetric { row } else { 0 };
@@ -231,7 +181,7 @@ impl State for JointCovariance {
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let dim = read_count(input, DIM_MAX)?;
+        let dim: usize = UpTo::<DIM_MAX>::read(input)?;
         let is_symmetric = bool::read(input)?;
         let mut entries = vec![0.0; dim * dim];
         for row in 0..dim {
@@ -248,136 +198,46 @@ impl State for JointCovariance {
     }
 }
 
-impl State for Frame {
-    fn write(&self, out: &mut StateWriter) {
-        self.population.write(out);
-        write_all(self.members.len(), &self.members, out);
-        write_map(&self.landmarks, out);
-        self.archive.write(out);
-        self.covariance.write(out);
-        self.numbered.write(out);
-        self.sightings.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let frame = Self {
-            population: State::read(input)?,
-            members: read_all(input, MEMBERS_MAX)?,
-            landmarks: Arc::new(read_map(input, LANDMARKS_MAX)?),
-            archive: State::read(input)?,
-            covariance: State::read(input)?,
-            numbered: State::read(input)?,
-            sightings: State::read(input)?,
-        };
-        // Everybody has components of his own, and there are no others.
-        let bodies = frame.members.iter().map(|member| (member.offset, BODY_DIM));
-        let landmarks = frame
-            .landmarks
-            .values()
-            .map(|landmark| (landmark.offset, LANDMARK_DIM));
-        let mut parts: Vec<(usize, usize)> = bodies.chain(landmarks).collect();
-        parts.sort_unstable();
-        let end = parts.iter().try_fold(0, |end, &(offset, width)| {
-            (offset == end).then_some(end + width)
-        });
-        if end == Some(frame.covariance.dim()) {
-            Ok(frame)
-        } else {
-            Err(CorruptState::Invalid)
-        }
-    }
-}
-
-state_of_struct!(PendingSighting {
-    observer,
-    target,
-    stamp_ns,
-    relation
-});
-
-impl State for CrossFrameSighting {
-    fn write(&self, out: &mut StateWriter) {
-        let [from, to] = self.frames;
-        write_count(from, out);
-        write_count(to, out);
-        let [a, b] = self.points;
-        (a, b).write(out);
-        self.variance.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let frames = [
-            read_count(input, AGENTS_MAX)?,
-            read_count(input, AGENTS_MAX)?,
-        ];
-        let (a, b) = State::read(input)?;
-        Ok(Self {
-            frames,
-            points: [a, b],
-            variance: State::read(input)?,
-        })
-    }
-}
-
-impl State for FrameMatch {
-    fn write(&self, out: &mut StateWriter) {
-        let [older, newer] = self.frames;
-        write_count(older, out);
-        write_count(newer, out);
-        self.pose.write(out);
-        self.n_found.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let frames = [
-            read_count(input, AGENTS_MAX)?,
-            read_count(input, AGENTS_MAX)?,
-        ];
-        Ok(Self {
-            frames,
-            pose: State::read(input)?,
-            n_found: State::read(input)?,
-        })
-    }
-}
-
-state_of_struct!(Association { name, refused });
-
 impl State for Estimator {
     fn write(&self, out: &mut StateWriter) {
-        write_count(self.slots.len(), out);
+        UpTo::<AGENTS_MAX>::write(&self.slots.len(), out);
         for (slot, agent) in self.slots.iter().zip(0..) {
             self.write_slot(agent, slot, out);
         }
-        write_all(self.frames.len(), self.frames.iter(), out);
-        write_all(self.pending.len(), &self.pending, out);
-        write_all(self.cross_sightings.len(), &self.cross_sightings, out);
-        write_count(self.turn, out);
-        write_all(self.frame_matches.len(), &self.frame_matches, out);
-        write_map(&self.associations.names, out);
+        UpTo::<FRAMES_MAX>::write(&self.frames.len(), out);
+        for frame in self.frames.iter() {
+            frame.write(out);
+        }
+        ListUpTo::<PENDING_MAX>::write(&self.pending, out);
+        ListUpTo::<CROSS_SIGHTINGS_MAX>::write(&self.cross_sightings, out);
+        UpTo::<AGENTS_MAX>::write(&self.turn, out);
+        ListUpTo::<FRAME_MATCHES_MAX>::write(&self.frame_matches, out);
+        MapUpTo::<ASSOCIATIONS_MAX>::write(&self.associations.names, out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         let (mut slots, mut odometry) = (PagedVec::default(), Vec::new());
-        for _ in 0..read_count(input, AGENTS_MAX)? {
+        let n_agents: usize = UpTo::<AGENTS_MAX>::read(input)?;
+        for _ in 0..n_agents {
             let (slot, latest) = read_slot(input)?;
             slots.push(slot, 0);
             odometry.push(latest);
         }
         let mut frames = PagedVec::default();
-        for _ in 0..read_count(input, AGENTS_MAX + 1)? {
+        let n_frames: usize = UpTo::<FRAMES_MAX>::read(input)?;
+        for _ in 0..n_frames {
             frames.push(Frame::read(input)?, 0);
         }
         let estimator = Self {
             parameters: Parameters::default(),
             frames,
             slots,
-            pending: read_all(input, PENDING_MAX)?,
-            cross_sightings: read_all(input, CROSS_SIGHTINGS_MAX)?,
-            turn: read_count(input, AGENTS_MAX)?,
-            frame_matches: read_all(input, FRAME_MATCHES_MAX)?,
+            pending: ListUpTo::<PENDING_MAX>::read(input)?,
+            cross_sightings: ListUpTo::<CROSS_SIGHTINGS_MAX>::read(input)?,
+            turn: UpTo::<AGENTS_MAX>::read(input)?,
+            frame_matches: ListUpTo::<FRAME_MATCHES_MAX>::read(input)?,
             associations: Associations {
-                names: Arc::new(read_map(input, ASSOCIATIONS_MAX)?),
+                names: MapUpTo::<ASSOCIATIONS_MAX>::read(input)?,
             },
         };
         if estimator.is_sound() && estimator.has_odometry(&odometry) {
@@ -393,7 +253,7 @@ type Odometry = (Isometry3<f64>, Option<i64>);
 
 /// Reads a slot, and the odometry beside it, which repeats the history of the agent's filter.
 fn read_slot(input: &mut StateReader<'_>) -> Result<(AgentSlot, Odometry), CorruptState> {
-    let frame = read_count(input, AGENTS_MAX)?;
+    let frame = UpTo::<AGENTS_MAX>::read(input)?;
     let odometry = State::read(input)?;
     let slot = AgentSlot {
         frame,
@@ -407,7 +267,7 @@ fn read_slot(input: &mut StateReader<'_>) -> Result<(AgentSlot, Odometry), Corru
 impl Estimator {
     /// Writes a slot, with the pose and the stamp of the agent's latest odometry.
     fn write_slot(&self, agent: u32, slot: &AgentSlot, out: &mut StateWriter) {
-        write_count(slot.frame, out);
+        UpTo::<AGENTS_MAX>::write(&slot.frame, out);
         self.latest_odometry(agent).write(out);
         slot.evidence.write(out);
         slot.is_aside.write(out);
@@ -451,7 +311,9 @@ impl Estimator {
             }
         }
         let is_whole = |(frame, &(population, members)): (&Frame, &(u32, usize))| {
-            frame.population == population && frame.members.len() == members
+            frame.population == population
+                && frame.members.len() == members
+                && components_are_sound(frame)
         };
         let mut pending = self.pending.iter();
         let mut cross_sightings = self.cross_sightings.iter();
@@ -468,6 +330,19 @@ impl Estimator {
                 .values()
                 .all(|association| !names.contains_key(&association.name))
     }
+}
+
+/// Whether each member and landmark of a frame has components of its own, and there are no others.
+fn components_are_sound(frame: &Frame) -> bool {
+    let bodies = frame.members.iter().map(|member| (member.offset, BODY_DIM));
+    let landmarks = frame.landmarks.values();
+    let landmarks = landmarks.map(|landmark| (landmark.offset, LANDMARK_DIM));
+    let mut parts: Vec<(usize, usize)> = bodies.chain(landmarks).collect();
+    parts.sort_unstable();
+    let end = parts.iter().try_fold(0, |end, &(offset, width)| {
+        (offset == end).then_some(end + width)
+    });
+    end == Some(frame.covariance.dim())
 }
 
 #[cfg(test)]

@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Vector3, Vector6};
 use proptest::prelude::*;
 

@@ -1,24 +1,19 @@
 //! The landmarks of a space, by number and by label.
 
-use std::sync::Arc;
-
 use super::{Landmark, LandmarkId, PositionEstimate};
 use crate::input::Label;
+use crate::label_index::LabelIndex;
 use state::CorruptState;
 use state::PagedVec;
 
 /// Landmarks per page.
 const PAGE: usize = 64;
-/// Most landmarks in a run of the order by label; a longer run is halved.
-const RUN_MAX: usize = 256;
 
 /// All landmarks, in the order of learning.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LandmarkMap {
     landmarks: PagedVec<Landmark, PAGE>,
-    /// The landmarks in the order of their labels, in runs, none of them empty. A clone shares all
-    /// runs; learning a landmark after that copies one run and the list of runs.
-    by_label: Arc<Vec<Arc<Vec<LandmarkId>>>>,
+    by_label: LabelIndex,
 }
 
 impl LandmarkMap {
@@ -34,25 +29,21 @@ impl LandmarkMap {
 
     /// The landmark with a label.
     pub(crate) fn by_label(&self, label: &str) -> Option<LandmarkId> {
-        let run = self.by_label.get(self.run_of(label)?)?;
-        let slot = run.partition_point(|&id| self.label(id) < label);
-        run.get(slot).copied().filter(|&id| self.label(id) == label)
+        let label_of = |number| label_in(&self.landmarks, number);
+        self.by_label.find(label, label_of).map(LandmarkId)
     }
 
     /// The landmarks in the order of their labels, from the first one whose label is larger.
     pub(crate) fn after(&self, label: Option<&str>) -> impl Iterator<Item = LandmarkId> {
-        let run = label.and_then(|label| self.run_of(label)).unwrap_or(0);
-        let ids = self.by_label[run..]
-            .iter()
-            .flat_map(|run| run.iter().copied());
-        ids.skip_while(move |&id| label.is_some_and(|label| self.label(id) <= label))
+        let label_of = |number| label_in(&self.landmarks, number);
+        self.by_label.after(label, label_of).map(LandmarkId)
     }
 
     /// Learns a landmark whose label is not known yet. None when there are 2³² already.
     pub(crate) fn learn(&mut self, landmark: Landmark, revision: u64) -> Option<LandmarkId> {
         let id = LandmarkId(u32::try_from(self.landmarks.len()).ok()?);
         self.landmarks.push(landmark, revision);
-        self.sort_in(id);
+        self.sort_in(id.0);
         Some(id)
     }
 
@@ -96,52 +87,27 @@ impl LandmarkMap {
         let start = self.landmarks.len();
         self.landmarks.push_page(bytes, revision)?;
         for index in start..self.landmarks.len() {
-            let id = LandmarkId(u32::try_from(index).map_err(|_| CorruptState::Invalid)?);
-            let label: Label = self
-                .landmarks
-                .get(index)
-                .ok_or(CorruptState::Invalid)?
-                .label()
-                .clone();
-            if self.by_label(label.as_str()).is_some() {
+            let number = u32::try_from(index).map_err(|_| CorruptState::Invalid)?;
+            if self.by_label(label_in(&self.landmarks, number)).is_some() {
                 return Err(CorruptState::Invalid);
             }
-            self.sort_in(id);
+            self.sort_in(number);
         }
         Ok(())
     }
 
     /// Puts a landmark where its label belongs.
-    fn sort_in(&mut self, id: LandmarkId) {
-        let label = self.label(id);
-        let Some(run) = self.run_of(label) else {
-            Arc::make_mut(&mut self.by_label).push(Arc::new(vec![id]));
-            return;
-        };
-        let slot = self.by_label[run].partition_point(|&other| self.label(other) < label);
-        let runs = Arc::make_mut(&mut self.by_label);
-        let members = Arc::make_mut(&mut runs[run]);
-        members.insert(slot, id);
-        if members.len() > RUN_MAX {
-            let upper = members.split_off(members.len() / 2);
-            runs.insert(run + 1, Arc::new(upper));
-        }
+    fn sort_in(&mut self, number: u32) {
+        let landmarks = &self.landmarks;
+        self.by_label
+            .insert(number, |number| label_in(landmarks, number));
     }
+}
 
-    /// The run in which a label belongs: the last one that does not start after it.
-    fn run_of(&self, label: &str) -> Option<usize> {
-        let starts_up_to = |run: &Arc<Vec<LandmarkId>>| {
-            run.first().is_some_and(|&first| self.label(first) <= label)
-        };
-        let after = self.by_label.partition_point(starts_up_to);
-        (!self.by_label.is_empty()).then(|| after.saturating_sub(1))
-    }
-
-    /// The label of a landmark.
-    fn label(&self, id: LandmarkId) -> &str {
-        self.get(id)
-            .map_or("", |landmark| landmark.label().as_str())
-    }
+/// The label of a landmark.
+fn label_in(landmarks: &PagedVec<Landmark, PAGE>, number: u32) -> &str {
+    let landmark = landmarks.get(number as usize);
+    landmark.map_or("", |landmark| landmark.label().as_str())
 }
 
 #[cfg(test)]

@@ -12,7 +12,8 @@ use crate::input::{Descriptor, Label, Level};
 use crate::memory::strength::Clock;
 use geometry::MotionSum;
 use object_recognition::{
-    Contact, Felt, ObjectId, ObjectModel, Orientation, Posterior, Recognition, Seen, Verdict,
+    Contact, DescriptorReading, LevelReading, ObjectId, ObjectModel, Orientation, Posterior,
+    Recognition, Verdict,
 };
 
 /// Contacts by which an episode recognises; further ones only teach.
@@ -137,7 +138,7 @@ impl Episode {
         self.travel.append(increment, variance);
     }
 
-    /// A level was felt.
+    /// A level was sensed.
     pub(crate) fn level(&mut self, level: &Level, memory: &mut ObjectMemory) -> Vec<News> {
         let at = self.travel.motion() * Point3::from(*level.offset_m());
         let mut contact = self.contact(at);
@@ -146,7 +147,7 @@ impl Episode {
             contact = contact.with_normal(Unit::new_normalize(normal), self.noise.normal_sd_rad());
         }
         if let Some(channel) = memory.open_channel(level.channel()) {
-            contact.levels.push(Felt {
+            contact.levels.push(LevelReading {
                 channel,
                 value: level.value(),
                 sd: self.noise.level_sd(),
@@ -163,7 +164,7 @@ impl Episode {
     ) -> Vec<News> {
         let mut contact = self.contact(self.travel.motion().translation.vector.into());
         if let Some(channel) = memory.open_channel(descriptor.channel()) {
-            contact.descriptors.push(Seen {
+            contact.descriptors.push(DescriptorReading {
                 channel,
                 vector: Arc::from(descriptor.vector()),
             });

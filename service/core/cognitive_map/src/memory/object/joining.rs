@@ -1,9 +1,10 @@
 //! Objects that turn out to be one, and one that turns out to be two.
 //!
-//! Nothing else than [recognition](object_recognition) decides. Two objects that a visit fits alike
-//! are one if what was learned of the one, felt again, is the other. What was joined last to an
-//! object stays in doubt: a visit that fits the object as it was before, or what was joined to it,
-//! better than both together takes them apart again; one that fits both together better settles it.
+//! Nothing else than [recognition](object_recognition) decides. Two objects that a visit fits
+//! equally well are one if what was learned of the one, touched again, is the other. What was
+//! joined last to an object stays in doubt: a visit that fits the object as it was before, or what
+//! was joined to it, better than both together takes them apart again; one that fits both together
+//! better settles it.
 
 use nalgebra::Isometry3;
 
@@ -19,7 +20,7 @@ use object_recognition::{
 /// whole visit does.
 const CONTACTS_MAX: usize = 48;
 /// Most objects of a visit that are compared with one another.
-const ALIKE_MAX: usize = 4;
+const COMPARED_MAX: usize = 4;
 /// Fit below which a model is not explained by another one that it would be taken for, in
 /// deviations.
 const FIT_LEAST: f64 = -3.0;
@@ -29,20 +30,20 @@ const BEFORE: ObjectId = ObjectId(0);
 const ADDED: ObjectId = ObjectId(1);
 const TOGETHER: ObjectId = ObjectId(2);
 
-/// Where one object's frame lies in that of another.
+/// Pose of one object's frame in that of another.
 #[derive(Clone, Copy)]
-enum Lies {
-    So(Isometry3<f64>),
+enum FramePose {
+    Unique(Isometry3<f64>),
     /// Something symmetric, which is explained in each of several poses.
-    InSeveralWays,
+    Ambiguous,
 }
 
-impl Lies {
-    /// The other's frame in the one's.
-    fn back(self) -> Self {
+impl FramePose {
+    /// Pose of the other frame in the one.
+    fn inverse(self) -> Self {
         match self {
-            Self::So(pose) => Self::So(pose.inverse()),
-            Self::InSeveralWays => Self::InSeveralWays,
+            Self::Unique(pose) => Self::Unique(pose.inverse()),
+            Self::Ambiguous => Self::Ambiguous,
         }
     }
 }
@@ -72,7 +73,7 @@ impl ObjectMemory {
     ) -> Option<Insight> {
         if posterior.verdict() == Verdict::Undecided {
             let live = { posterior.objects.iter() }.filter(|(_, probability)| *probability > 0.01);
-            let live: Vec<ObjectId> = live.map(|&(id, _)| id).take(ALIKE_MAX).collect();
+            let live: Vec<ObjectId> = live.map(|&(id, _)| id).take(COMPARED_MAX).collect();
             return self.unite(&live, orientation, when);
         }
         // What was mixed up may explain a visit so badly that it passes for something new.
@@ -84,11 +85,11 @@ impl ObjectMemory {
     /// has named stays what it was said to be.
     fn unite(
         &mut self,
-        alike: &[ObjectId],
+        similar: &[ObjectId],
         orientation: &Orientation,
         when: (Clock, u64),
     ) -> Option<Insight> {
-        let (&one, others) = alike.split_first()?;
+        let (&one, others) = similar.split_first()?;
         for &other in others {
             let (kept, absorbed) = match (self.get(one)?.is_named(), self.get(other)?.is_named()) {
                 (true, true) => continue,
@@ -96,39 +97,39 @@ impl ObjectMemory {
                 (false, true) => (other, one),
                 (false, false) => (one.min(other), one.max(other)),
             };
-            let lies = |part, whole| self.lies_in(part, whole, alike, orientation);
-            let lies = lies(absorbed, kept).or_else(|| Some(lies(kept, absorbed)?.back()));
-            if let Some(lies) = lies {
-                return self.merge(kept, absorbed, lies, when);
+            let pose = |part, whole| self.frame_pose(part, whole, similar, orientation);
+            let pose = pose(absorbed, kept).or_else(|| Some(pose(kept, absorbed)?.inverse()));
+            if let Some(pose) = pose {
+                return self.merge(kept, absorbed, pose, when);
             }
         }
         None
     }
 
-    /// Where the frame of one object lies in that of another one, if what was learned of it is that
-    /// one, and no other of those that are alike.
-    fn lies_in(
+    /// Pose of one object's frame in that of another one, if what was learned of it is that one,
+    /// and no other of those that are similar.
+    fn frame_pose(
         &self,
         part: ObjectId,
         whole: ObjectId,
-        alike: &[ObjectId],
+        similar: &[ObjectId],
         orientation: &Orientation,
-    ) -> Option<Lies> {
-        let others = alike.iter().filter(|&&other| other != part);
+    ) -> Option<FramePose> {
+        let others = similar.iter().filter(|&&other| other != part);
         let others = self.library.select(others.map(|&other| (other, other)));
         let places = self.places(part);
         let step = places.len().div_ceil(CONTACTS_MAX).max(1);
-        let felt = places
+        let contacts = places
             .iter()
             .step_by(step)
-            .map(|place| place.felt().aimed());
-        let posterior = recognised(&others, orientation, felt);
+            .map(|place| place.contact().aimed());
+        let posterior = recognised(&others, orientation, contacts);
         if posterior.verdict() != Verdict::Object(whole) || posterior.fit < FIT_LEAST {
             return None;
         }
         match posterior.pose {
-            Some(pose) if is_clear(&pose) => Some(Lies::So(pose.map_from_episode)),
-            Some(_) if *orientation == Orientation::Free => Some(Lies::InSeveralWays),
+            Some(pose) if is_clear(&pose) => Some(FramePose::Unique(pose.map_from_episode)),
+            Some(_) if *orientation == Orientation::Free => Some(FramePose::Ambiguous),
             _ => None,
         }
     }
@@ -137,18 +138,18 @@ impl ObjectMemory {
         &mut self,
         kept: ObjectId,
         absorbed: ObjectId,
-        kept_from_absorbed: Lies,
+        kept_from_absorbed: FramePose,
         (now, revision): (Clock, u64),
     ) -> Option<Insight> {
         let other = self.get(absorbed)?.clone();
         let added = self.library.get(absorbed)?.clone();
         self.remove(absorbed, revision);
         match kept_from_absorbed {
-            Lies::So(pose) => {
+            FramePose::Unique(pose) => {
                 let taught = (other.visits, other.contacts);
                 self.extend(kept, &added, taught, &pose, (now, revision));
             }
-            Lies::InSeveralWays => self.used(kept, now, revision),
+            FramePose::Ambiguous => self.used(kept, now, revision),
         }
         Some(Insight::Merged {
             object: kept,
@@ -156,7 +157,7 @@ impl ObjectMemory {
         })
     }
 
-    /// Settles or undoes what was joined to an object last, if a visit to it tells.
+    /// Settles or undoes what was joined to an object last, if a visit to it decides.
     fn doubt(
         &mut self,
         id: ObjectId,
@@ -170,8 +171,8 @@ impl ObjectMemory {
         parts.put(ADDED, joining.added.clone());
         let step = contacts.len().div_ceil(CONTACTS_MAX).max(1);
         // Which of them it is should not depend on how far a visit went.
-        let felt = { contacts.iter().step_by(step) }.map(|contact| contact.clone().aimed());
-        let verdict = recognised(&parts, orientation, felt).verdict();
+        let aimed = { contacts.iter().step_by(step) }.map(|contact| contact.clone().aimed());
+        let verdict = recognised(&parts, orientation, aimed).verdict();
         match verdict {
             Verdict::Object(TOGETHER) => {
                 self.settle(id, revision);
@@ -195,10 +196,10 @@ impl ObjectMemory {
 fn recognised(
     library: &ObjectLibrary,
     orientation: &Orientation,
-    felt: impl Iterator<Item = Contact>,
+    contacts: impl Iterator<Item = Contact>,
 ) -> Posterior {
     let mut recognition = Recognition::new(orientation);
-    for contact in felt {
+    for contact in contacts {
         recognition.touch(library, contact);
     }
     recognition.posterior(library)

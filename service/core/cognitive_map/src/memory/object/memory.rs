@@ -17,7 +17,7 @@ use object_recognition::{
 
 /// Most objects; of more, the weakest is forgotten.
 const OBJECTS_MAX: usize = 1024;
-/// Most channels that objects are felt on. What is felt on further ones does not count.
+/// Most channels that objects are sensed on. What is sensed on further ones does not count.
 const CHANNELS_MAX: usize = 256;
 
 /// What is known of an object beside its places.
@@ -35,6 +35,19 @@ pub struct KnownObject {
 }
 
 impl KnownObject {
+    /// An object after its first visit.
+    fn new(name: Label, is_named: bool, contacts: u64, now: Clock, revision: u64) -> Self {
+        Self {
+            name,
+            is_named,
+            visits: 1,
+            contacts,
+            strength: Strength::new(now),
+            revision,
+            digest: 0,
+        }
+    }
+
     /// Its name.
     pub fn name(&self) -> &Label {
         &self.name
@@ -102,7 +115,7 @@ impl ObjectMemory {
         number == self.lessons
     }
 
-    /// Whether nothing was ever felt of any object.
+    /// Whether no object was ever touched.
     pub(crate) fn is_untouched(&self) -> bool {
         self.next == 0 && self.lessons == 0 && self.channels.is_empty()
     }
@@ -158,20 +171,12 @@ impl ObjectMemory {
         let contacts = lesson.touches.len() as u64;
         let id = self.by_name(name);
         let id = id.unwrap_or_else(|| self.number(revision));
-        let known = KnownObject {
-            name: name.clone(),
-            is_named: true,
-            visits: 1,
-            contacts,
-            strength: Strength::new(now),
-            revision,
-            digest: 0,
-        };
+        let known = KnownObject::new(name.clone(), true, contacts, now, revision);
         self.put(id, known, model, None, revision);
     }
 
-    /// Remembers a new object that an episode felt; answers its number. Without a name it gets one
-    /// by its number.
+    /// Remembers a new object that an episode sensed; answers its number. Without a name it gets
+    /// one by its number.
     pub(crate) fn found(
         &mut self,
         name: Option<Label>,
@@ -186,21 +191,13 @@ impl ObjectMemory {
             Some(name) => name,
             None => self.unused_name(id)?,
         };
-        let known = KnownObject {
-            name,
-            is_named,
-            visits: 1,
-            contacts,
-            strength: Strength::new(now),
-            revision,
-            digest: 0,
-        };
+        let known = KnownObject::new(name, is_named, contacts, now, revision);
         self.put(id, known, model, None, revision);
         Some(id)
     }
 
-    /// Extends an object by what so many visits and contacts felt, whose frame lies in the object's
-    /// so.
+    /// Extends an object by what so many visits and contacts sensed, whose frame lies in the
+    /// object's so.
     pub(crate) fn extend(
         &mut self,
         id: ObjectId,
@@ -254,7 +251,7 @@ impl ObjectMemory {
         }
     }
 
-    /// What a sequence of contacts says that no agent felt.
+    /// What a sequence of contacts says that no agent sensed.
     pub(crate) fn identify(&self, orientation: &Orientation, touches: &[Touch]) -> Identified {
         let mut recognition = Recognition::new(orientation);
         for touch in touches {
@@ -393,7 +390,7 @@ fn digest_of(model: &ObjectModel, joining: Option<&Joining>) -> u128 {
     out.digest().0
 }
 
-/// What contacts say, and what would tell more.
+/// What contacts say, and which touch would tell most.
 #[derive(Clone, Debug)]
 pub struct Identified {
     /// What they say.

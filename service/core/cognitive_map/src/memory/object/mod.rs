@@ -1,8 +1,8 @@
 //! Objects: what agents have touched, and know again.
 //!
-//! An *episode* of an agent begins and ends with an [`ObjectMark`](crate::ObjectMark). What is felt
-//! in between counts in the frame of the sensor's body when it began, by path integration, and
-//! teaches an object or is to be recognised by [`recognition`](object_recognition).
+//! An *episode* of an agent begins and ends with an [`ObjectMark`](crate::ObjectMark). What is
+//! sensed in between counts in the frame of the sensor's body when it began, by path integration,
+//! and teaches an object or is to be recognised by [`recognition`](object_recognition).
 
 mod episode;
 mod joined;

@@ -1,4 +1,4 @@
-//! Channels: what percepts are felt on.
+//! Channels: what percepts are sensed on.
 
 use crate::input::Label;
 use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
@@ -53,7 +53,7 @@ state_of_struct!(Channel {
 });
 
 impl Channel {
-    /// A channel on which nothing was felt yet.
+    /// A channel on which nothing was sensed yet.
     pub(super) fn new(label: Label, kind: ChannelKind) -> Self {
         let levels = Moments::default();
         Self {

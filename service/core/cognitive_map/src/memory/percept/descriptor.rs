@@ -38,7 +38,7 @@ pub(crate) struct Block {
     traces: Vec<DescriptorTrace>,
     /// Weighted sums of the descriptors, one behind the other.
     ///
-    /// A sum of 10⁷ descriptors no longer feels the next one in f32; by then it has settled.
+    /// A sum of 10⁷ descriptors does not change by the next one in f32; by then it has settled.
     sums: Vec<f32>,
     /// One over the length of each sum; 0 where the sum is zero. Follows from the sums.
     scales: Vec<f32>,

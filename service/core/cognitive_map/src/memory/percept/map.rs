@@ -9,7 +9,7 @@ use crate::input::{Descriptor, Label};
 use crate::memory::ids::PlaceId;
 use state::{CorruptState, Moments, PageItems, PagedVec, StateWriter};
 
-/// Most channels of a space. What is felt on further ones is counted and stays in the journal.
+/// Most channels of a space. What is sensed on further ones is counted and stays in the journal.
 const CHANNELS_MAX: usize = 64;
 /// Channels per page.
 pub(crate) const CHANNEL_PAGE: usize = 8;
@@ -24,7 +24,7 @@ const CANDIDATES_PER_ANSWER: usize = 64;
 /// See [`CANDIDATES_PER_ANSWER`].
 const CANDIDATES_MIN: usize = 2048;
 
-/// What places remember of what was felt and seen. A clone shares all pages.
+/// What places remember of what was sensed and seen. A clone shares all pages.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PerceptMap {
     channels: PagedVec<Channel, CHANNEL_PAGE>,
@@ -56,9 +56,9 @@ impl PerceptMap {
         &self.channels
     }
 
-    /// A place that answers with confidence `weight` feels a level: compares, then strengthens the
+    /// A place that answers with confidence `weight` senses a level: compares, then strengthens the
     /// association. Nothing to compare the first time.
-    pub(crate) fn feel_level(
+    pub(crate) fn learn_level(
         &mut self,
         label: &Label,
         value: f64,
@@ -87,7 +87,7 @@ impl PerceptMap {
 
     /// A place that answers with confidence `weight` sees a descriptor: compares, then strengthens
     /// the association. Nothing to compare the first time.
-    pub(crate) fn feel_descriptor(
+    pub(crate) fn learn_descriptor(
         &mut self,
         descriptor: &Descriptor,
         place: PlaceId,

@@ -1,9 +1,9 @@
-//! Percepts: what places remember of what was felt and seen there.
+//! Percepts: what places remember of what was sensed and seen there.
 //!
-//! A percept and the place that answers where it was felt are active together, and that strengthens
-//! the association between the two in proportion to the place's confidence there: the Hebbian rule
-//! with the percept's activity at one. It is read both ways: a percept recalls places, and a place
-//! (so a position, a grid code or the end of a motion) recalls percepts.
+//! A percept and the place that answers where it was sensed are active together, and that
+//! strengthens the association between the two in proportion to the place's confidence there: the
+//! Hebbian rule with the percept's activity at one. It is read both ways: a percept recalls places,
+//! and a place (so a position, a grid code or the end of a motion) recalls percepts.
 
 mod channel;
 mod descriptor;
@@ -40,7 +40,7 @@ pub struct Remembered {
     pub channel: ChannelId,
     /// Number of percepts that taught it.
     pub percepts: u64,
-    /// Strength of the association: the sum of the place's confidences when they were felt.
+    /// Strength of the association: the sum of the place's confidences when they were sensed.
     pub strength: f64,
     /// What they were like.
     pub expected: Expected,

@@ -161,9 +161,9 @@ impl PlaceMap {
     }
 
     /// Notes by what a place goes with the past of its founder.
-    pub(crate) fn set_mooring(&mut self, id: PlaceId, mooring: u32, revision: u64) {
+    pub(crate) fn set_attachment(&mut self, id: PlaceId, attachment: u32, revision: u64) {
         if let Some(place) = self.places.get_mut(id.0 as usize, revision) {
-            place.mooring = Some(mooring);
+            place.attachment = Some(attachment);
         }
     }
 

@@ -36,7 +36,7 @@ pub struct Place {
     /// The first trip with a leg from or to here, or a later one if that has been forgotten.
     pub(crate) trip: Option<TripId>,
     /// By what it goes with the past of its founder.
-    pub(crate) mooring: Option<u32>,
+    pub(crate) attachment: Option<u32>,
     pub(crate) strength: Strength,
 }
 
@@ -49,12 +49,12 @@ state_of_struct!(Place {
     last_stamp_ns,
     founder,
     trip,
-    mooring,
+    attachment,
     strength,
 });
 
 impl Place {
-    /// A place that `founder` has just recruited where it stands.
+    /// A place that `founder` has just recruited where it is.
     pub(crate) fn found(
         position: Point3<f64>,
         rotation: UnitQuaternion<f64>,
@@ -72,7 +72,7 @@ impl Place {
             last_stamp_ns: stamp_ns,
             founder,
             trip: None,
-            mooring: None,
+            attachment: None,
             strength: Strength::new(now),
         }
     }
@@ -97,7 +97,7 @@ impl Place {
         })
     }
 
-    /// Position in `map` \[m\]: where its founder stood, by what is known of its way since.
+    /// Position in `map` \[m\]: where its founder was, by what is known of its way since.
     pub fn position(&self) -> &Point3<f64> {
         &self.position
     }

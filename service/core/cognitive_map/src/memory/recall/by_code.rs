@@ -131,7 +131,8 @@ impl<'a> CodeRecall<'a> {
         })
     }
 
-    /// Confidence of a similarity: that of the distance at which two codes are on average so alike.
+    /// Confidence of a similarity: that of the distance at which two codes are on average so
+    /// similar.
     pub(super) fn confidence(&self, cosine: f64) -> f64 {
         let field_radius_m = self.asked.settings.field_radius_m;
         // Beyond five field radii the confidence is below 1e-7: as good as none.

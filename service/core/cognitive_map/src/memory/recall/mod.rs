@@ -32,7 +32,7 @@ const BALLS: [f64; 3] = [1.0, 2.0, 3.5];
 /// their sketches first. Its cost is as follows, where n is the number of places.
 ///
 /// - By `position`: free of n when the places asked for lie within seven field radii, else O(n).
-/// - By `code`: free of n when the least alike place of the answer is still much like the cue, so
+/// - By `code`: free of n when the least similar place of the answer is still much like the cue, so
 ///   that few positions of the world could be meant: the terms of the known modules may together
 ///   lack 0.9, which with six known modules is a cosine of 0.85. Else O(n): for a `limit` of many
 ///   places, a code of nowhere, or very few modules.
@@ -68,7 +68,7 @@ pub struct Recalled {
     /// Eq. 5); `None` without a cue. The cue's code is `code`, or else the code of `position`.
     pub cosine: Option<f64>,
     /// Confidence, in \[0, 1\] (seed Eq. 8); `None` without a cue. By position it follows from the
-    /// distance; by code from the distance at which two codes are on average as alike as the cue
+    /// distance; by code from the distance at which two codes are on average as similar as the cue
     /// and the place's code; by a percept it is `percept_match`, at least 0; by several the
     /// product.
     pub confidence: Option<f64>,
@@ -82,7 +82,7 @@ pub struct Recalled {
 
 /// The places that answer a cue, best first, equally good ones by identifier.
 ///
-/// By position the nearest come first, by code the most alike. By both the confidences are
+/// By position the nearest come first, by code the most similar. By both the confidences are
 /// multiplied, as those of two independent witnesses, and so it is with a percept, by which only
 /// places answer that remember something of its channel. Without a cue the place visited last comes
 /// first.

@@ -39,7 +39,7 @@ pub enum TripEnd {
     /// The trip reached the longest allowed number of legs, or trips under way filled the space's
     /// budget of legs; the next one goes on from there.
     Full,
-    /// The agent was told where it stands, which breaks the thread of motion.
+    /// A start pose put the agent elsewhere: no motion leads there.
     StartPose,
 }
 

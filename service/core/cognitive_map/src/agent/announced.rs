@@ -1,16 +1,21 @@
-//! An agent's body: its pose as of its latest record, its grid state, and its latest movements.
+//! What an agent's latest record announced: where it is, its grid state, and its latest movements.
 
 use nalgebra::{Isometry3, Vector3};
 
+use crate::estimator::Evidence;
 use grid::{GridModules, GridState};
 use state::state_of_struct;
 
-/// Poses as of the agent's latest record, and the grid state that goes with them.
+/// The estimate of an agent as of its latest record, and the grid state that goes with it.
 ///
-/// The estimator holds the poses and goes on correcting them with the samples of other agents; the
-/// agent's next record brings these copies up to date. Grid state and events follow the copies.
+/// The estimator owns the estimate, and goes on correcting it with the samples of other agents.
+/// Grid state, events, trips and answers follow these copies: the agent's next record brings them
+/// up to date, with an event for whatever has changed, so that each change has a record of the
+/// agent that it belongs to.
 #[derive(Clone, Debug)]
-pub(crate) struct Body {
+pub(crate) struct Announced {
+    /// Whether the agent is in the map.
+    placed: bool,
     /// Pose by motion alone since the session began.
     pub(super) in_odom: Isometry3<f64>,
     /// Pose in `map`.
@@ -21,29 +26,45 @@ pub(crate) struct Body {
     /// The movement before it.
     pub(super) before_latest: Option<Vector3<f64>>,
     pub(super) travelled_m: f64,
+    /// What became of its sightings.
+    evidence: Evidence,
 }
 
-state_of_struct!(Body {
+state_of_struct!(Announced {
+    placed,
     in_odom,
     in_map,
     grid,
     latest,
     before_latest,
     travelled_m,
+    evidence,
 });
 
-impl Body {
-    /// A body at identity.
+impl Announced {
+    /// Of a new agent: at identity, in no map.
     pub(crate) fn new(modules: &GridModules) -> Self {
         let in_map = Isometry3::identity();
         Self {
+            placed: false,
             in_odom: Isometry3::identity(),
             in_map,
             grid: modules.locate(&in_map.translation.vector.into()),
             latest: None,
             before_latest: None,
             travelled_m: 0.0,
+            evidence: Evidence::default(),
         }
+    }
+
+    /// Whether the agent is in the map.
+    pub(crate) fn placed(&self) -> bool {
+        self.placed
+    }
+
+    /// What became of its sightings.
+    pub(crate) fn evidence(&self) -> &Evidence {
+        &self.evidence
     }
 
     /// Pose in `map`.
@@ -56,7 +77,7 @@ impl Body {
         self.grid.modules().len() == modules.lattices().len()
     }
 
-    /// Moves the body to where odometry has it now, after a path of `path_m` by odometry and a
+    /// Moves the agent to where odometry has it now, after a path of `path_m` by odometry and a
     /// displacement along the axes of its frame by the estimate. Calls `entered` with each grid
     /// module that came into a new lattice cell.
     ///
@@ -80,11 +101,12 @@ impl Body {
         }
     }
 
-    /// Goes to where the estimate has the body now, and the grid with it. Without a correction
+    /// Goes to where the estimate has the agent now, and the grid with it. Without a correction
     /// since the latest step the position is the same to the last bit.
     pub(crate) fn follow(
         &mut self,
         pose: &Isometry3<f64>,
+        evidence: Option<&Evidence>,
         modules: &GridModules,
         entered: impl FnMut(usize, [i64; 3]),
     ) {
@@ -93,12 +115,18 @@ impl Body {
         if correction != Vector3::zeros() {
             self.grid.advance(modules, &correction, entered);
         }
+        self.evidence = evidence.copied().unwrap_or(self.evidence);
     }
 
-    /// Puts the body where it turned out to stand.
+    /// Puts the agent where it turned out to be, without a way there.
     pub(crate) fn place(&mut self, pose: &Isometry3<f64>, modules: &GridModules) {
         self.in_map = *pose;
         self.grid = modules.locate(&self.in_map.translation.vector.into());
+    }
+
+    /// The agent is in the map from now on, or in it no more.
+    pub(crate) fn set_placed(&mut self, placed: bool) {
+        self.placed = placed;
     }
 
     /// Starts a session where the one before ended.

@@ -1,0 +1,214 @@
+//! The keyframe graph as a problem of nonlinear least squares.
+
+use nalgebra::{Isometry3, Matrix6, Point3};
+
+use super::constraint::{ClosureState, Constraint};
+use super::graph::KeyframeGraph;
+use super::keyframe::Keyframe;
+use super::sighting::{Seen, Sighting};
+use super::tuning;
+use geometry::{PoseCovariance, from_planar_part, planar_part};
+use pose_graph::{
+    Freedom, Kernel, Link, LinkId, PointId, PoseGraph, PoseId, PoseInformation,
+    PositionInformation, Scale, SightingTarget,
+};
+use state::NONE;
+
+/// The loop closures that count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Among {
+    /// The accepted ones.
+    Accepted,
+    /// All, as far as they agree.
+    All,
+}
+
+/// The keyframe graph as a pose graph.
+#[derive(Debug)]
+pub(super) struct Problem {
+    pub(super) map: PoseGraph,
+    /// The node of each keyframe.
+    poses: Vec<Option<PoseId>>,
+    /// The node of each landmark.
+    points: Vec<Option<PointId>>,
+    /// The link of each constraint.
+    links: Vec<Option<LinkId>>,
+}
+
+impl Problem {
+    /// The graph of all agents that are in the map.
+    pub(super) fn new(graph: &KeyframeGraph, among: Among) -> Self {
+        let (chains, constraints) = (&graph.chains, &graph.constraints.slab);
+        let landmarks = &graph.sightings.landmarks.slots;
+        let mut problem = Self {
+            map: PoseGraph::new(),
+            poses: vec![None; chains.keyframes.numbers() as usize],
+            points: vec![None; landmarks.numbers() as usize],
+            links: vec![None; constraints.numbers() as usize],
+        };
+        for (number, keyframe) in chains.keyframes.iter() {
+            problem.poses[number as usize] = problem.add_pose(graph, number, keyframe);
+        }
+        let motions = chains.recalibrated();
+        for (number, keyframe) in chains.keyframes.iter() {
+            problem.add_motion(graph, number, keyframe, motions[number as usize]);
+        }
+        for (number, constraint) in constraints.iter() {
+            problem.links[number as usize] = problem.add_constraint(graph, constraint, among);
+        }
+        for (_, sighting) in graph.sightings.slab.iter() {
+            problem.add_sighting(sighting);
+        }
+        problem
+    }
+
+    /// The node of a keyframe, if its agent is in the map.
+    pub(super) fn node(&self, keyframe: u32) -> Option<PoseId> {
+        self.poses.get(keyframe as usize).copied().flatten()
+    }
+
+    /// The pose of a keyframe, if its agent is in the map.
+    pub(super) fn pose(&self, keyframe: u32) -> Option<&Isometry3<f64>> {
+        Some(self.map.pose(self.node(keyframe)?))
+    }
+
+    /// The node of a landmark, if an agent of the map has seen it.
+    pub(super) fn point(&self, landmark: u32) -> Option<PointId> {
+        self.points.get(landmark as usize).copied().flatten()
+    }
+
+    /// Squared error of a constraint, if it counts.
+    pub(super) fn squared_error(&self, constraint: u32) -> Option<f64> {
+        let link = self.links.get(constraint as usize).copied().flatten()?;
+        Some(self.map.squared_error(link))
+    }
+
+    /// Adds a node for a keyframe in the map.
+    fn add_pose(
+        &mut self,
+        graph: &KeyframeGraph,
+        number: u32,
+        keyframe: &Keyframe,
+    ) -> Option<PoseId> {
+        let track = graph.chains.track(keyframe.agent)?;
+        if !track.is_in_map() {
+            return None;
+        }
+        let pose = graph.chains.in_map(number)?;
+        let mut constraints = graph.constraints.of(number, keyframe);
+        let freedom = if constraints.any(|one| one.state == ClosureState::Origin) {
+            Freedom::Held
+        } else if track.is_planar {
+            Freedom::Planar
+        } else {
+            Freedom::Full
+        };
+        Some(self.map.add_pose(pose, freedom))
+    }
+
+    /// Adds a link for the motion to a keyframe.
+    fn add_motion(
+        &mut self,
+        graph: &KeyframeGraph,
+        number: u32,
+        keyframe: &Keyframe,
+        transform: Isometry3<f64>,
+    ) {
+        let Some(track) = graph.chains.track(keyframe.agent) else {
+            return;
+        };
+        let ends = self.node(keyframe.previous).zip(self.node(number));
+        let Some((from, to)) = ends.filter(|_| !keyframe.begins) else {
+            return;
+        };
+        let link = Link::Between {
+            from,
+            to,
+            transform,
+            information: information(&keyframe.covariance, track.is_planar),
+        };
+        self.map.add_link(link, Kernel::Gaussian).ok();
+    }
+
+    fn add_constraint(
+        &mut self,
+        graph: &KeyframeGraph,
+        constraint: &Constraint,
+        among: Among,
+    ) -> Option<LinkId> {
+        let to = self.node(constraint.to)?;
+        let agent = graph.chains.keyframes.get(constraint.to)?.agent;
+        let is_planar = graph.chains.track(agent)?.is_planar;
+        let is_left_out = constraint.state == ClosureState::Origin
+            || (constraint.is_candidate() && among == Among::Accepted);
+        if is_left_out {
+            return None;
+        }
+        let information = information(&constraint.covariance, is_planar);
+        let link = if constraint.from == NONE {
+            Link::PosePrior {
+                pose: to,
+                at: constraint.transform,
+                information,
+            }
+        } else {
+            Link::Between {
+                from: self.node(constraint.from)?,
+                to,
+                transform: constraint.transform,
+                information,
+            }
+        };
+        let kernel = if constraint.is_closure() {
+            Kernel::GemanMcClure(Scale::new(tuning::CLOSURE_SCALE).expect("a positive constant"))
+        } else {
+            Kernel::Gaussian
+        };
+        self.map.add_link(link, kernel).ok()
+    }
+
+    fn add_sighting(&mut self, sighting: &Sighting) -> Option<LinkId> {
+        let from = self.node(sighting.keyframe)?;
+        let position = sighting.point.position;
+        let target = match sighting.shown {
+            Seen::Agent(target, lever) => SightingTarget::PointOf(self.node(target)?, lever),
+            Seen::Landmark(number) => {
+                let point = &mut self.points[number as usize];
+                let at = self.map.pose(from) * Point3::from(position);
+                let add = || self.map.add_point(at, Freedom::Full);
+                SightingTarget::Point(*point.get_or_insert_with(add))
+            }
+        };
+        let information = PositionInformation::of_covariance(&sighting.point.covariance()).ok()?;
+        let link = Link::Sighting {
+            from,
+            target,
+            position,
+            information,
+        };
+        let kernel =
+            Kernel::Cauchy(Scale::new(tuning::SIGHTING_SCALE).expect("a positive constant"));
+        self.map.add_link(link, kernel).ok()
+    }
+}
+
+/// The information of a covariance, of its planar part for planar motion.
+fn information(covariance: &PoseCovariance, is_planar: bool) -> PoseInformation {
+    let floor = tuning::MOTION_SD_MIN * tuning::MOTION_SD_MIN;
+    let mut matrix = *covariance.matrix();
+    for k in 0..6 {
+        matrix[(k, k)] += floor;
+    }
+    let mut inverse = Matrix6::zeros();
+    if is_planar {
+        if let Some(planar) = planar_part(&matrix).try_inverse() {
+            inverse = from_planar_part(&planar);
+        }
+    } else if let Some(whole) = matrix.try_inverse() {
+        inverse = whole;
+    }
+    // A matrix too far from positive definite gives no information.
+    PoseInformation::new(&inverse).unwrap_or_else(|_| {
+        PoseInformation::new(&Matrix6::zeros()).expect("no information is no less than none")
+    })
+}

@@ -1,0 +1,256 @@
+//! A copy of the keyframe graph in which closures are judged and keyframes are moved.
+
+use nalgebra::Isometry3;
+
+use super::candidate::{Candidate, agrees_with};
+use super::constraint::{ClosureState, Constraint, composed};
+use super::graph::KeyframeGraph;
+use super::problem::{Among, Problem};
+use super::tuning;
+use geometry::{PoseCovariance, is_somewhere, is_within};
+use pose_graph::{Graduation, RelaxationSettings, Relaxed};
+use state::{NONE, Slab};
+
+/// The pose of an agent after a relaxation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correction {
+    /// Number of the agent.
+    pub agent: u32,
+    /// Its pose now, in the map.
+    pub pose: Isometry3<f64>,
+    /// Covariance of that pose; `None` where nothing determines it.
+    pub covariance: Option<PoseCovariance>,
+}
+
+/// A copy of the keyframe graph, which shares all pages that do not change.
+pub(super) struct RelaxationCopy(KeyframeGraph);
+
+impl RelaxationCopy {
+    /// Of the whole graph.
+    pub(super) fn whole(graph: &KeyframeGraph) -> Self {
+        Self(graph.clone())
+    }
+
+    /// The coarse graph, which is relaxed while samples come in: one keyframe a step, and those
+    /// with sightings, at the begin of a stretch, and the latest ones. Keyframes and constraints
+    /// keep their numbers.
+    pub(super) fn coarse(graph: &KeyframeGraph) -> Self {
+        let mut coarse = graph.clone();
+        // Attachments move with the keyframes afterwards.
+        coarse.attachments.slab = Slab::default();
+        for track in graph.chains.tracks.iter() {
+            let mut way = Isometry3::identity();
+            let mut number = track.newest;
+            while let Some(keyframe) = coarse.chains.keyframes.get(number) {
+                let (motion, previous) = (keyframe.motion, keyframe.previous);
+                // The chain is walked from its end, since removals change the neighbours.
+                if number == track.newest
+                    || must_stay(&coarse, number)
+                    || !is_within(&way, tuning::COARSE_STEP.0, tuning::COARSE_STEP.1)
+                {
+                    way = motion;
+                } else {
+                    coarse.dissolve(number);
+                    way = motion * way;
+                }
+                number = previous;
+            }
+        }
+        drop_old_candidates(&mut coarse);
+        Self(coarse)
+    }
+
+    /// The copy as it is now.
+    pub(super) fn graph(&self) -> &KeyframeGraph {
+        &self.0
+    }
+
+    /// Accepts pending closures that agree with the map or with one another; answers their number.
+    /// Moves the keyframes to where all accepted closures have them.
+    pub(super) fn accept_consistent(&mut self) -> usize {
+        if self.0.constraints.first_candidate() == NONE {
+            return 0;
+        }
+        let accepted_alone = Problem::new(&self.0, Among::Accepted);
+        let marginals = accepted_alone.map.marginals();
+        // With kernels that begin wide, all closures together find the map that most of them agree
+        // with.
+        let mut all = Problem::new(&self.0, Among::All);
+        all.map.relax(&from_wide());
+        let mut accepted = Vec::new();
+        let mut others = Vec::new();
+        for (number, constraint) in self.closures() {
+            let Some(squared) = all.squared_error(number) else {
+                continue;
+            };
+            if constraint.is_candidate() && agrees_with(constraint, &accepted_alone, &marginals) {
+                accepted.push(number);
+            } else if squared <= tuning::AGREES_MAX {
+                others.push((number, constraint));
+            }
+        }
+        accepted.extend(self.supported(&others, &all));
+        for &number in &accepted {
+            self.set_state(number, ClosureState::Accepted);
+        }
+        if self.fits(&all) {
+            self.move_keyframes(&all);
+        }
+        accepted.len()
+    }
+
+    /// The candidates among closures with which enough of the closures agree.
+    fn supported(&self, closures: &[(u32, &Constraint)], problem: &Problem) -> Vec<u32> {
+        let chains = &self.0.chains;
+        let path_variances = chains.path_variances();
+        let candidate = |&(number, constraint): &(u32, &Constraint)| {
+            Candidate::new(
+                number,
+                constraint,
+                &chains.keyframes,
+                problem,
+                &path_variances,
+            )
+        };
+        let mut candidates: Vec<_> = closures.iter().filter_map(candidate).collect();
+        let partners = Candidate::count_partners(&mut candidates);
+        let is_supported = |(candidate, n_partners): &(&Candidate, usize)| {
+            let constraint = self.0.constraints.slab.get(candidate.constraint);
+            *n_partners >= tuning::PARTNERS_MIN && constraint.is_some_and(Constraint::is_candidate)
+        };
+        let supported = candidates.iter().zip(partners).filter(is_supported);
+        supported
+            .map(|(candidate, _)| candidate.constraint)
+            .collect()
+    }
+
+    /// The relaxed graph, after closures that do not fit into it were rejected; and their number.
+    /// Moves the keyframes.
+    pub(super) fn relax(&mut self) -> (Problem, Relaxed, usize) {
+        let mut n_rejected = 0;
+        let mut rounds = 0;
+        loop {
+            rounds += 1;
+            let mut problem = Problem::new(&self.0, Among::Accepted);
+            let mut settings = from_wide();
+            if self.fits(&problem) {
+                settings.graduation = Graduation::None;
+            }
+            let relaxed = problem.map.relax(&settings);
+            let is_too_far = |number: u32| {
+                let squared = problem.squared_error(number);
+                squared.is_some_and(|squared| squared > tuning::REJECTED_MIN)
+            };
+            let accepted = self.accepted().map(|(number, _)| number);
+            let refuted: Vec<u32> = accepted.filter(|&number| is_too_far(number)).collect();
+            for &number in &refuted {
+                self.set_state(number, ClosureState::Refuted);
+            }
+            n_rejected += refuted.len();
+            if refuted.is_empty() || rounds >= tuning::RELAXATION_ROUNDS_MAX {
+                return (problem, relaxed, n_rejected);
+            }
+            self.move_keyframes(&problem);
+        }
+    }
+
+    /// The poses of the agents in the map in a relaxed graph.
+    pub(super) fn corrections(&self, problem: &Problem) -> Vec<Correction> {
+        let marginals = problem.map.marginals();
+        let mut corrections = Vec::new();
+        for (agent, track) in (0..).zip(self.0.chains.tracks.iter()) {
+            let node = problem.node(track.newest);
+            let Some(node) = node.filter(|_| !track.needs_keyframe) else {
+                continue;
+            };
+            let covariance = marginals.pose(node).map(|covariance| {
+                composed(&covariance, track.since.motion(), &track.since.covariance())
+            });
+            corrections.push(Correction {
+                agent,
+                pose: problem.map.pose(node) * track.since.motion(),
+                covariance,
+            });
+        }
+        corrections
+    }
+
+    /// Moves the keyframes to their poses in a relaxed graph.
+    pub(super) fn move_keyframes(&mut self, problem: &Problem) {
+        let (keyframes, revision) = (&mut self.0.chains.keyframes, self.0.revision);
+        for number in 0..keyframes.numbers() {
+            let pose = problem.pose(number);
+            let Some(pose) = pose.filter(|pose| is_somewhere(&pose.translation.vector)) else {
+                continue;
+            };
+            if let Some(keyframe) = keyframes.get_mut(number, revision) {
+                keyframe.pose = *pose;
+                keyframe.is_in_map = true;
+            }
+        }
+    }
+
+    /// Whether all accepted closures are within the range of their kernels.
+    fn fits(&self, problem: &Problem) -> bool {
+        self.accepted().all(|(number, _)| {
+            let squared = problem.squared_error(number);
+            squared.is_none_or(|squared| squared <= tuning::REJECTED_MIN)
+        })
+    }
+
+    fn closures(&self) -> impl Iterator<Item = (u32, &Constraint)> {
+        let all = self.0.constraints.slab.iter();
+        all.filter(|(_, constraint)| constraint.is_closure())
+    }
+
+    fn accepted(&self) -> impl Iterator<Item = (u32, &Constraint)> {
+        self.closures()
+            .filter(|(_, constraint)| constraint.state == ClosureState::Accepted)
+    }
+
+    fn set_state(&mut self, number: u32, state: ClosureState) {
+        let (constraints, revision) = (&mut self.0.constraints.slab, self.0.revision);
+        if let Some(constraint) = constraints.get_mut(number, revision) {
+            constraint.state = state;
+        }
+    }
+}
+
+/// Settings of a relaxation with closures.
+fn from_wide() -> RelaxationSettings {
+    RelaxationSettings {
+        graduation: Graduation::FromWide,
+        ..RelaxationSettings::default()
+    }
+}
+
+/// Whether a keyframe must stay in the coarse graph.
+fn must_stay(graph: &KeyframeGraph, number: u32) -> bool {
+    let keyframes = &graph.chains.keyframes;
+    let Some(keyframe) = keyframes.get(number) else {
+        return true;
+    };
+    let next = keyframes.get(keyframe.next);
+    let goes_on = next.is_some_and(|next| !next.begins);
+    if keyframe.begins || !goes_on || keyframe.sightings != NONE || keyframe.shown != NONE {
+        return true;
+    }
+    let mut constraints = graph.constraints.of(number, keyframe);
+    constraints.any(|constraint| !constraint.is_closure())
+}
+
+/// Removes candidates but the latest ones.
+fn drop_old_candidates(graph: &mut KeyframeGraph) {
+    let stamped = |(number, constraint): (u32, &Constraint)| {
+        let from = graph.chains.keyframes.get(constraint.from)?;
+        constraint.is_candidate().then_some((from.stamp_ns, number))
+    };
+    let mut pending: Vec<(i64, u32)> = { graph.constraints.slab.iter() }
+        .filter_map(stamped)
+        .collect();
+    pending.sort_unstable();
+    let n_old = pending.len().saturating_sub(tuning::COARSE_PENDING_MAX);
+    for &(_, number) in &pending[..n_old] {
+        graph.remove_constraint(number);
+    }
+}
