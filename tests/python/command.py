@@ -67,6 +67,11 @@ def _targets() -> Dict[str, FrozenSet[str]]:
     }
 
 
+def library_names() -> FrozenSet[str]:
+    """The names of the packages, as Rust writes them."""
+    return frozenset(package.replace("-", "_") for package in _targets())
+
+
 def commands_in(line: str) -> Iterator[List[str]]:
     """The commands of a line of a shell, each in words, without assignments before it."""
     lexer = shlex.shlex(line.replace("[", " ").replace("]", " "), posix=True, punctuation_chars=True)
