@@ -74,7 +74,9 @@ def library_names() -> FrozenSet[str]:
 
 def commands_in(line: str) -> Iterator[List[str]]:
     """The commands of a line of a shell, each in words, without assignments before it."""
-    lexer = shlex.shlex(line.replace("[", " ").replace("]", " "), posix=True, punctuation_chars=True)
+    # What may be left out stands in brackets.
+    whole = re.sub(r"\[(-[^]]*)\]", r"\1", line)
+    lexer = shlex.shlex(whole, posix=True, punctuation_chars=True)
     lexer.whitespace_split = True
     words: List[str] = []
     for word in [*lexer, ";"]:
@@ -135,6 +137,13 @@ def _faults_of_binary(program: str, words: List[str]) -> Iterator[str]:
             takes = _help(program, *path)
         elif takes.subcommands and flag is None and not before.startswith("--"):
             yield f"no command {word}"
+            break
+    chosen = [word for flag, word in zip(words, words[1:]) if flag == "--set" and "…" not in word]
+    if chosen:
+        try:
+            run("check-config", *(part for setting in chosen for part in ("--set", setting)))
+        except AssertionError as error:
+            yield str(error)
 
 
 def _known_to_set(word: str) -> FrozenSet[str]:

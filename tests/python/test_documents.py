@@ -8,7 +8,7 @@ import configparser
 import re
 from collections import Counter
 from pathlib import Path
-from typing import List
+from typing import Dict, List
 
 import pytest
 import yaml  # type: ignore[import-untyped]  # schemathesis brings it
@@ -19,7 +19,16 @@ from command import faults_of_block, faults_of_prose, library_names
 from conftest import MakeServer
 from document import ROOT, Block, blocks_of, documents, text_of
 from server import Server
-from walk import RUN, Walk, compiled, is_documentation, is_output, is_walked, read_json
+from walk import (
+    RUN,
+    Walk,
+    compiled,
+    is_documentation,
+    is_output,
+    is_walked,
+    other_than_shown,
+    read_json,
+)
 
 #: Languages of blocks that are read.
 READ = frozenset(("ini", "json", "json5", "jsonc", "toml", "yaml"))
@@ -120,6 +129,41 @@ def test_commands_and_settings_of_a_document_are_there(document: str) -> None:
         if block.language == "sh":
             found += faults_of_block(block)
     assert found == []
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ("cogmap serve --no-such-flag", "no flag --no-such-flag"),
+        ("cogmap bake DIR", "no command bake"),
+        ("cogmap serve --set http.port=80", "no setting http.port=80"),
+        ("cogmap serve --set http.listen=nowhere", "http.listen"),
+        ("cogmap-lab bench nothing", "no command nothing"),
+        ("make test nothing", "no target nothing"),
+        ("make scorecard DATUM=DIR", "no variable DATUM"),
+        ("cargo test -p cogmap-nothing", "no package cogmap-nothing"),
+        ("cargo run --example nothing", "no example nothing"),
+        ("python tests/nothing.py | sort", "no file tests/nothing.py"),
+    ],
+)
+def test_a_command_that_is_not_there_is_found(line: str, fault: str) -> None:
+    found = faults_of_block(Block("page.md", 1, "sh", line, None, False))
+    assert fault in found[0]
+
+
+def test_an_answer_that_differs_from_the_one_shown_is_found() -> None:
+    shown: Dict[str, object] = {"at": [1.25, None], "name": "ada", "stamp_ns": 5, "list": [1]}
+    same: Dict[str, object] = {"at": [1.2549, None], "name": "ada", "stamp_ns": 7, "list": [1, 2]}
+    assert not list(other_than_shown(shown, same))
+    others: List[Dict[str, object]] = [
+        {"at": [1.26, None]},
+        {"name": "bob"},
+        {"stamp_ns": "7"},
+        {"list": []},
+    ]
+    for other in others:
+        assert len(list(other_than_shown(shown, {**same, **other}))) == 1, other
+    assert list(other_than_shown(shown, {**same, "further": 1}))
 
 
 def test_series_of_the_documents_are_those_of_the_service() -> None:
