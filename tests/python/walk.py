@@ -127,9 +127,11 @@ def compiled(block: Block, text: str, directory: Path) -> Path:
     source = directory / f"line_{block.line}.rs"
     source.write_text(text)
     built = Path(binary()).parent
+    client = built / "libcogmap_client.rlib"
+    assert client.is_file(), f"no {client}: run `cargo build --workspace --all-targets` first"
     compiler = ["rustc", "--edition", "2024", "-C", "debuginfo=0", "-D", "warnings"]
     compiler += ["-A", "unused_variables", "-L", f"dependency={built / 'deps'}"]
-    compiler += ["--extern", f"cogmap_client={built / 'libcogmap_client.rlib'}"]
+    compiler += ["--extern", f"cogmap_client={client}"]
     program = source.with_suffix("")
     done = subprocess.run(
         [*compiler, "-o", str(program), str(source)],
