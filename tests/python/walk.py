@@ -127,11 +127,9 @@ def compiled(block: Block, text: str, directory: Path) -> Path:
     source = directory / f"line_{block.line}.rs"
     source.write_text(text)
     built = Path(binary()).parent
-    client = built / "libcogmap_client.rlib"
-    assert client.is_file(), f"no {client}: run `cargo build --workspace --all-targets` first"
     compiler = ["rustc", "--edition", "2024", "-C", "debuginfo=0", "-D", "warnings"]
     compiler += ["-A", "unused_variables", "-L", f"dependency={built / 'deps'}"]
-    compiler += ["--extern", f"cogmap_client={client}"]
+    compiler += ["--extern", f"cogmap_client={built / 'libcogmap_client.rlib'}"]
     program = source.with_suffix("")
     done = subprocess.run(
         [*compiler, "-o", str(program), str(source)],
@@ -139,7 +137,9 @@ def compiled(block: Block, text: str, directory: Path) -> Path:
         text=True,
         timeout=LONG_S,
     )
-    assert done.returncode == 0, f"{block}: {done.stderr}"
+    # A client that is absent, or older than what it is made of, is no crate to the compiler.
+    advice = "cargo build --workspace --all-targets, if it finds no crate"
+    assert done.returncode == 0, f"{block}: {done.stderr}\n{advice}"
     return program
 
 
