@@ -1,5 +1,5 @@
 # What can be done with the project from a shell. `make test` is the whole gate: it needs Rust with
-# rustfmt and clippy, Python 3.9 or later, and the package indices of both; nothing else.
+# rustfmt and clippy, Python 3.9 or later, the package indices of both, and curl; nothing else.
 
 SHELL := bash
 .SHELLFLAGS := -euo pipefail -c

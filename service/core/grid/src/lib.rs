@@ -1,14 +1,4 @@
-//! Grid cells: the position of a body as phases of periodic lattices of several spacings.
-//!
-//! Each module is a face-centred cubic lattice ([`Lattice`]) with its own spacing and orientation;
-//! all of them together are the [`GridModules`] of a space. Motion moves every module's phase and
-//! reference grid point ([`GridState`]); the phases alone are the [`GridCode`]. A code can be
-//! materialised as the activations of cells ([`population`]), compared ([`similarity`]) and turned
-//! back into a position ([`mod@decode`]). [`octant`] is the seed paper's Algorithm 1, [`heading`]
-//! reads out head-direction cells.
-//!
-//! Equation numbers are those of the seed paper, "A Novel Computational Modeling for Grid and Place
-//! Neurons in Spatial Mapping and Navigation in 3-D Environment".
+#![doc = include_str!("../README.md")]
 
 mod code;
 pub mod decode;
