@@ -84,6 +84,9 @@ pub(crate) struct IntakeCounters {
 
 impl IntakeCounters {
     pub(crate) fn new() -> Self {
+        for kind in UNDECODABLE {
+            let _at_zero = counter!(names::DECODE_ERRORS, "kind" => kind);
+        }
         let codecs = [Codec::Postcard, Codec::Cbor, Codec::Json];
         Self {
             messages: codecs
@@ -143,6 +146,7 @@ pub(crate) struct SpaceCounters {
 impl SpaceCounters {
     pub(crate) fn new(space: &str) -> Self {
         let label = || space.to_owned();
+        at_zero(space);
         Self {
             space: space.to_owned(),
             dropped: dropped(),
@@ -178,17 +182,7 @@ impl SpaceCounters {
 
     /// Counts samples refused for good, or lost.
     pub(crate) fn skipped(&self, samples: u64, reason: SkipReason) {
-        let reason = match reason {
-            SkipReason::Lost => "lost",
-            SkipReason::NumberOutOfRange => "number_out_of_range",
-            SkipReason::NonUnitQuaternion => "non_unit_quaternion",
-            SkipReason::NegativeNoise => "negative_noise",
-            SkipReason::TimeBackwards => "time_backwards",
-            SkipReason::InvalidDescriptor => "invalid_descriptor",
-            SkipReason::InvalidLabel => "invalid_label",
-            SkipReason::InvalidNormal => "invalid_normal",
-            SkipReason::SequenceLeap => "sequence_leap",
-        };
+        let reason = skip_name(reason);
         let space = self.space.clone();
         counter!(names::SKIPPED_SAMPLES, "space" => space, "reason" => reason).increment(samples);
     }
@@ -343,6 +337,58 @@ pub(crate) fn undecodable(key: &str, error: &DecodeError) {
         DecodeError::LastSession => "last_session",
     };
     counter!(names::DECODE_ERRORS, "kind" => kind).increment(1);
+}
+
+/// Names of the ways in which a message cannot be read.
+const UNDECODABLE: [&str; 8] = [
+    "unknown_encoding",
+    "unsupported_version",
+    "too_long",
+    "malformed",
+    "empty_batch",
+    "too_many_samples",
+    "sequence_overflow",
+    "last_session",
+];
+
+/// The reasons for which samples are skipped.
+const SKIPS: [SkipReason; 9] = [
+    SkipReason::Lost,
+    SkipReason::NumberOutOfRange,
+    SkipReason::NonUnitQuaternion,
+    SkipReason::NegativeNoise,
+    SkipReason::TimeBackwards,
+    SkipReason::InvalidDescriptor,
+    SkipReason::InvalidLabel,
+    SkipReason::InvalidNormal,
+    SkipReason::SequenceLeap,
+];
+
+fn skip_name(reason: SkipReason) -> &'static str {
+    match reason {
+        SkipReason::Lost => "lost",
+        SkipReason::NumberOutOfRange => "number_out_of_range",
+        SkipReason::NonUnitQuaternion => "non_unit_quaternion",
+        SkipReason::NegativeNoise => "negative_noise",
+        SkipReason::TimeBackwards => "time_backwards",
+        SkipReason::InvalidDescriptor => "invalid_descriptor",
+        SkipReason::InvalidLabel => "invalid_label",
+        SkipReason::InvalidNormal => "invalid_normal",
+        SkipReason::SequenceLeap => "sequence_leap",
+    }
+}
+
+/// Lets the series of a space's faults begin at zero. Prometheus sees no increase in a series that
+/// appears with its first fault.
+fn at_zero(space: &str) {
+    let label = || space.to_owned();
+    for reason in SKIPS {
+        let _at_zero =
+            counter!(names::SKIPPED_SAMPLES, "space" => label(), "reason" => skip_name(reason));
+    }
+    let _at_zero = counter!(names::TORN_TAILS, "space" => label());
+    let _at_zero = counter!(names::LOST_MARKS, "space" => label());
+    let _at_zero = gauge!(names::SPACE_STOPPED, "space" => label());
 }
 
 fn dropped() -> [Counter; Drop::ALL.len()] {
