@@ -53,6 +53,7 @@ test-python: $(VENV)/installed ## types and tests of the Python client, then the
 	cd $(CLIENT) && $(VENV)/bin/mypy --strict
 	cd tests/python && $(VENV)/bin/mypy --strict .
 	cd tests/scorecard && $(VENV)/bin/mypy --strict .
+	cd tests/wheels && $(VENV)/bin/mypy --strict .
 	cd $(CLIENT) && $(VENV)/bin/pytest
 	$(VENV)/bin/pytest tests/scorecard
 	$(VENV)/bin/pytest tests/python
@@ -136,6 +137,19 @@ release: ## the service, optimised
 .PHONY: release-lab
 release-lab: ## the service and its laboratory, optimised
 	cargo build --release --locked --package cogmap --package cogmap-lab --bins
+
+# Beside the gate: the binary in the wheel is an optimised one, which takes minutes.
+.PHONY: wheels
+wheels: release $(VENV)/installed ## wheels of the Python client and of the service, in target/wheels
+	rm -rf $(TARGET)/wheels
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
+	$(VENV)/bin/pip wheel --quiet --disable-pip-version-check --no-deps \
+	    --wheel-dir $(TARGET)/wheels ./$(CLIENT)
+	cd service/wheel && $(VENV)/bin/maturin build --release --out $(TARGET)/wheels
+
+.PHONY: wheels-check
+wheels-check: wheels ## installs the wheels on a machine without Rust, runs the demo and a robot
+	COGMAP_WHEELS=$(TARGET)/wheels $(VENV)/bin/pytest tests/wheels
 
 .PHONY: docs
 docs: ## documentation of the crates, in target/doc
