@@ -54,6 +54,7 @@ test-python: $(VENV)/installed ## types and tests of the Python client, then the
 	cd tests/python && $(VENV)/bin/mypy --strict .
 	cd tests/scorecard && $(VENV)/bin/mypy --strict .
 	cd tests/wheels && $(VENV)/bin/mypy --strict .
+	cd tests/image && $(VENV)/bin/mypy --strict .
 	cd $(CLIENT) && $(VENV)/bin/pytest
 	$(VENV)/bin/pytest tests/scorecard
 	$(VENV)/bin/pytest tests/python
@@ -150,6 +151,17 @@ wheels: release $(VENV)/installed ## wheels of the Python client and of the serv
 .PHONY: wheels-check
 wheels-check: wheels ## installs the wheels on a machine without Rust, runs the demo and a robot
 	COGMAP_WHEELS=$(TARGET)/wheels $(VENV)/bin/pytest tests/wheels
+
+# Beside the gate: it needs an engine, and builds Zenoh in the image. BASES=local makes the images
+# that it begins with where no registry can be reached.
+ENGINE ?= docker
+.PHONY: docker-check
+docker-check: $(VENV)/installed ## builds and tries the image; ENGINE=podman, BASES=local
+ifeq ($(BASES),local)
+	ENGINE='$(ENGINE)' docker/bases.sh $$(sed -nE 's/^FROM ([^ ]+).*/\1/p' docker/Dockerfile)
+endif
+	BUILDAH_FORMAT=docker $(ENGINE) build --file docker/Dockerfile --tag cogmap $(BUILD_ARGS) .
+	ENGINE='$(ENGINE)' IMAGE=cogmap $(VENV)/bin/pytest tests/image
 
 .PHONY: docs
 docs: ## documentation of the crates, in target/doc
