@@ -1,5 +1,6 @@
 //! A space, as everyone but its writer sees it.
 
+mod live;
 mod loading;
 mod questions;
 mod refined;
@@ -12,6 +13,8 @@ use std::thread::{Builder, JoinHandle};
 use cogmap_proto::{Codec, EventId, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings};
 use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
 use tokio::sync::oneshot;
+
+pub use live::LiveFollower;
 
 use super::agent_view::AgentView;
 use super::events::EventFollower;

@@ -19,6 +19,7 @@ mod index;
 mod json;
 mod landmarks;
 mod listener;
+mod live;
 mod localize;
 mod long;
 mod objects;
@@ -33,6 +34,7 @@ mod samples;
 mod settings;
 mod spaces;
 mod state;
+mod streams;
 mod token;
 mod tracking;
 mod trajectory;
@@ -98,6 +100,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(objects::identify))
         .routes(routes!(objects::of_agent))
         .routes(routes!(events::get))
+        .routes(routes!(live::get))
         .routes(routes!(export::get))
         .routes(routes!(health::healthz))
         .routes(routes!(health::readyz))

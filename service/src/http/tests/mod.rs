@@ -3,6 +3,7 @@
 mod events;
 mod forgetting;
 mod guarding;
+mod live;
 mod localize;
 mod objects;
 mod problems;
