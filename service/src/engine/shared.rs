@@ -44,6 +44,9 @@ pub(crate) struct Shared {
     pub(crate) live: Arc<Live>,
     /// Revision of the map at the end of the latest round.
     pub(crate) revision: AtomicU64,
+    /// Revision of the checkpoint that the map was restored from: of what changed before it, only
+    /// what is left is known.
+    pub(super) restored: AtomicU64,
     /// Set once: the writer takes what is queued and ends.
     pub(crate) closing: AtomicBool,
     /// Set once the map is loaded, or could not be.
@@ -97,6 +100,7 @@ impl Shared {
             events: EventLog::new(),
             live: Arc::default(),
             revision: AtomicU64::new(0),
+            restored: AtomicU64::new(0),
             closing: AtomicBool::new(false),
             loaded: OnceLock::new(),
             agents: RwLock::default(),

@@ -137,6 +137,13 @@ impl Space {
         })
     }
 
+    /// Whether a map of this space knows all that changed after a revision: it came to the revision
+    /// after it was loaded.
+    pub fn knows_changes_since(&self, revision: u64, map: &CognitiveMap) -> bool {
+        let restored = self.shared.restored.load(Ordering::Acquire);
+        (restored..=map.revision()).contains(&revision)
+    }
+
     /// An agent, by name.
     pub fn agent(&self, name: &str) -> Option<Arc<AgentView>> {
         self.shared.agents().get(name).cloned()

@@ -5,6 +5,7 @@
 
 mod activity;
 mod agents;
+mod cloud;
 mod docs;
 mod elsewhere;
 mod events;

@@ -1,5 +1,6 @@
 //! The interface, request by request, over a real engine on a store of its own.
 
+mod cloud;
 mod events;
 mod forgetting;
 mod guarding;
