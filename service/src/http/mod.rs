@@ -6,6 +6,7 @@
 mod activity;
 mod agents;
 mod cloud;
+mod dashboard;
 mod docs;
 mod elsewhere;
 mod events;
@@ -131,6 +132,7 @@ pub fn router(
     let guard = Guard::new(settings, paths.iter().cloned());
     described
         .merge(docs::routes(&openapi(settings.token.is_some())))
+        .merge(dashboard::routes::<_, dashboard::Built>())
         .fallback(elsewhere::unknown_path)
         .method_not_allowed_fallback(elsewhere::other_method)
         .layer(guard)

@@ -1,6 +1,7 @@
 //! The interface, request by request, over a real engine on a store of its own.
 
 mod cloud;
+mod dashboard;
 mod events;
 mod forgetting;
 mod guarding;
