@@ -1,0 +1,17 @@
+import { defineConfig } from "vite";
+
+/** The service that `npm run dev` shows. */
+const service = process.env["COGMAP_URL"] ?? "http://127.0.0.1:8080";
+
+export default defineConfig({
+  build: {
+    outDir: "../../target/dashboard",
+    emptyOutDir: true,
+    target: "es2022",
+    // The page is served under `default-src 'self'`: nothing may be written into it as data.
+    assetsInlineLimit: 0,
+    modulePreload: { polyfill: false },
+    chunkSizeWarningLimit: 1000,
+  },
+  server: { proxy: { "/v1": service, "/metrics": service, "/readyz": service } },
+});
