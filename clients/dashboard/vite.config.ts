@@ -1,7 +1,10 @@
-import { defineConfig } from "vite";
+import { defineConfig, type ProxyOptions } from "vite";
 
 /** The service that `npm run dev` shows. */
 const service = process.env["COGMAP_URL"] ?? "http://127.0.0.1:8080";
+
+/** The service takes changes from its own pages only, and this one comes from elsewhere. */
+const proxy: ProxyOptions = { target: service, headers: { origin: service } };
 
 export default defineConfig({
   build: {
@@ -13,5 +16,5 @@ export default defineConfig({
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 1000,
   },
-  server: { proxy: { "/v1": service, "/metrics": service, "/readyz": service } },
+  server: { proxy: { "/v1": proxy, "/metrics": proxy, "/readyz": proxy } },
 });

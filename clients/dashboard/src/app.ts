@@ -35,7 +35,7 @@ const SPACES_MS = 5000;
 const RECALLED = 8;
 /** Firing fields are shown within this many spacings, and are this wide (σ of their cells). */
 const FIELDS_SPACINGS = 2.1;
-const FIELD_WIDTH = 0.32;
+const FIELD_WIDTH = 0.24;
 
 export class App {
   readonly stage: Stage;

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bytes, degrees, deviation, exact, metres, span, time } from "../src/panel/format";
+import { bytes, degrees, deviation, exact, metres, percent, span, time } from "../src/panel/format";
 import { roundStep } from "../src/scene/bounds";
 
 test("numbers are short and have their units", () => {
@@ -10,6 +10,7 @@ test("numbers are short and have their units", () => {
   assert.equal(deviation(0.5), "50 cm");
   assert.equal(deviation(5.2), "5.20 m");
   assert.equal(degrees(-Math.PI / 2), "−90°");
+  assert.deepEqual([0, 0.42, 0.9999999, 1].map(percent), ["0 %", "42 %", "99.9 %", "100 %"]);
   assert.equal(bytes(61_000_000), "61 MB");
   assert.equal(bytes(512), "512 B");
   assert.equal(span(4.04), "4.0 s");

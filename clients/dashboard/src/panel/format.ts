@@ -35,8 +35,10 @@ export function degrees(rad: number): string {
   return `${((rad * 180) / Math.PI).toFixed(Math.abs(rad) < 0.17 ? 1 : 0).replace("-", "−")}°`;
 }
 
+/** A probability; what is not quite sure is never said to be 100 %. */
 export function percent(part: number): string {
-  return `${(100 * part).toFixed(part > 0.995 && part < 1 ? 1 : 0)} %`;
+  const isNearlySure = part > 0.995 && part < 1;
+  return isNearlySure ? `${(Math.floor(1000 * part) / 10).toFixed(1)} %` : `${(100 * part).toFixed(0)} %`;
 }
 
 export function bytes(n: number): string {

@@ -115,17 +115,17 @@ export class Timeline {
     const { clientWidth: width, clientHeight: height } = this.marks;
     const heights: Record<string, number> = {
       agent_placed: 1, object_recognised: 1, objects_merged: 1, object_learned: 0.8,
-      landmark_learned: 0.55, percept_surprising: 0.5, place_entered: 0.22, place_recruited: 0.22,
+      object_split: 0.8, agent_enrolled: 0.4, landmark_learned: 0.45, percept_surprising: 0.4,
     };
     for (const event of memory.events) {
       const tall = heights[event.kind];
       if (tall === undefined || event.s < this.begin) {
         continue;
       }
-      context.globalAlpha = tall < 0.3 ? 0.35 : 0.95;
+      context.globalAlpha = 0.85;
       context.fillStyle = palette.flash[event.kind] ?? palette.label;
       const x = ((event.s - this.begin) / length) * width;
-      context.fillRect(x - 0.5, (height - tall * height) / 2, tall < 0.3 ? 1 : 1.6, tall * height);
+      context.fillRect(x - 0.5, (height - tall * height) / 2, 1.6, tall * height);
     }
     context.globalAlpha = 1;
   }

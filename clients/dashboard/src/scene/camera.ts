@@ -81,10 +81,10 @@ export class Eye {
     const { azimuth, height } = VIEWS[view];
     const free = Math.min(this.free.width, this.free.height);
     const fit = Math.tan((this.camera.fov * Math.PI) / 360) * free;
-    const distance = (bounds.radius * 1.04) / fit;
+    const distance = (bounds.radius * 1.08) / fit;
     // The floor lies below the map, and is to be seen too.
     const target = new Vector3(...bounds.centre);
-    target.z -= 0.07 * bounds.radius;
+    target.z -= 0.12 * bounds.radius;
     const across = distance * Math.cos(height);
     const eye = new Vector3(
       target.x + across * Math.cos(azimuth),

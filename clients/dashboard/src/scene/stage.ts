@@ -386,7 +386,7 @@ export class Stage {
         }
       }
       if (this.selected?.kind === "agent" && this.selected.name === name) {
-        rings.add(mark(position, rgb(palette.label), 20));
+        rings.add({ ...mark(position, rgb(palette.label), 19), alpha: 0.7 });
       }
     }
     if (this.selected?.kind === "place") {
