@@ -156,7 +156,7 @@ release-lab: dashboard ## the service and its laboratory, optimised
 
 # Beside the gate: the binary in the wheel is an optimised one, which takes minutes.
 .PHONY: wheels
-wheels: release $(VENV)/installed ## wheels of the Python client and of the service, in target/wheels
+wheels: dashboard $(VENV)/installed ## wheels of the Python client and of the service, in target/wheels
 	rm -rf $(TARGET)/wheels
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
 	$(VENV)/bin/pip wheel --quiet --disable-pip-version-check --no-deps \
