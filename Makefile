@@ -12,6 +12,8 @@ VENV := $(CURDIR)/.venv
 TARGET := $(abspath $(or $(CARGO_TARGET_DIR),target))
 CLIENT := clients/python
 PEERS := tests/peers
+DASHBOARD := clients/dashboard
+PAGE := target/dashboard/index.html
 
 # The end-to-end tests of both languages start this binary.
 export COGMAP_BIN := $(TARGET)/debug/cogmap
@@ -53,6 +55,8 @@ test-python: $(VENV)/installed ## types and tests of the Python client, then the
 	cd $(CLIENT) && $(VENV)/bin/mypy --strict
 	cd tests/python && $(VENV)/bin/mypy --strict .
 	cd tests/scorecard && $(VENV)/bin/mypy --strict .
+	cd tests/wheels && $(VENV)/bin/mypy --strict .
+	cd tests/image && $(VENV)/bin/mypy --strict .
 	cd $(CLIENT) && $(VENV)/bin/pytest
 	$(VENV)/bin/pytest tests/scorecard
 	$(VENV)/bin/pytest tests/python
@@ -129,13 +133,50 @@ $(PEERS)/.venv/installed: $(PEERS)/requirements.txt $(PEERS)/judge.txt $(CLIENT)
 	    --no-deps --requirement $(PEERS)/judge.txt
 	touch $@
 
+# The versions of Node that the page's build tool runs on; empty where there is no such Node.
+NODE_FITS := $(shell node -p '(([a, b]) => a > 22 || a == 22 && b >= 12 || a == 20 && b >= 19 ? 1 : "") \
+    (process.versions.node.split(".").map(Number))' 2>/dev/null)
+BUILDS_PAGE := $(and $(wildcard $(DASHBOARD)/package-lock.json),$(NODE_FITS))
+
+.PHONY: dashboard
+dashboard: $(if $(BUILDS_PAGE),$(PAGE)) ## the page that the service shows at /; needs Node 20.19, 22.12 or later
+	$(if $(BUILDS_PAGE),,@echo 'The page is not built, and the service shows a plain one: that needs $(DASHBOARD) and Node 20.19, 22.12 or later.')
+
+$(PAGE): $(shell find $(DASHBOARD) -name node_modules -prune -o -type f -print 2>/dev/null)
+	cd $(DASHBOARD) && npm ci --no-audit --no-fund && npm run build
+	touch $@
+
 .PHONY: release
-release: ## the service, optimised
+release: dashboard ## the service, optimised, with its page
 	cargo build --release --locked --package cogmap --bin cogmap
 
 .PHONY: release-lab
-release-lab: ## the service and its laboratory, optimised
+release-lab: dashboard ## the service and its laboratory, optimised
 	cargo build --release --locked --package cogmap --package cogmap-lab --bins
+
+# Beside the gate: the binary in the wheel is an optimised one, which takes minutes.
+.PHONY: wheels
+wheels: dashboard $(VENV)/installed ## wheels of the Python client and of the service, in target/wheels
+	rm -rf $(TARGET)/wheels
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
+	$(VENV)/bin/pip wheel --quiet --disable-pip-version-check --no-deps \
+	    --wheel-dir $(TARGET)/wheels ./$(CLIENT)
+	cd service/wheel && $(VENV)/bin/maturin build --release --out $(TARGET)/wheels
+
+.PHONY: wheels-check
+wheels-check: wheels ## installs the wheels on a machine without Rust, runs the demo and a robot
+	COGMAP_WHEELS=$(TARGET)/wheels $(VENV)/bin/pytest tests/wheels
+
+# Beside the gate: it needs an engine, and builds Zenoh in the image. BASES=local makes the images
+# that it begins with where no registry can be reached.
+ENGINE ?= docker
+.PHONY: docker-check
+docker-check: $(VENV)/installed ## builds and tries the image; ENGINE=podman, BASES=local
+ifeq ($(BASES),local)
+	ENGINE='$(ENGINE)' docker/bases.sh $$(sed -nE 's/^FROM ([^ ]+).*/\1/p' docker/Dockerfile)
+endif
+	BUILDAH_FORMAT=docker $(ENGINE) build --file docker/Dockerfile --tag cogmap $(BUILD_ARGS) .
+	ENGINE='$(ENGINE)' IMAGE=cogmap $(VENV)/bin/pytest tests/image
 
 .PHONY: docs
 docs: ## documentation of the crates, in target/doc

@@ -2,10 +2,12 @@
 
 mod process;
 
+pub(crate) use process::resident_bytes;
+
 use std::path::PathBuf;
 use std::time::Duration;
 
-use metrics::{Unit, describe_counter, describe_gauge, describe_histogram};
+use metrics::{Unit, counter, describe_counter, describe_gauge, describe_histogram, gauge};
 use metrics_exporter_prometheus::{BuildError, Matcher, PrometheusBuilder, PrometheusHandle};
 use tokio::time::MissedTickBehavior;
 
@@ -124,7 +126,17 @@ const DISTANCES: [f64; 9] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0];
 pub fn install() -> Result<PrometheusHandle, BuildError> {
     let handle = builder()?.install_recorder()?;
     describe();
+    at_zero();
     Ok(handle)
+}
+
+/// Lets series without labels begin at zero: Prometheus sees no increase in one that appears with
+/// its first fault. Those with labels begin where their labels are known.
+fn at_zero() {
+    for counter in [DERIVED_FAILURES, DERIVED_REBUILDS] {
+        let _at_zero = counter!(counter);
+    }
+    let _at_zero = gauge!(HTTP_STREAMS);
 }
 
 /// Moves what histograms have recorded into their buckets from time to time. A scrape does that

@@ -1,13 +1,15 @@
 //! What the engine counts. Handles are taken once, so that counting costs one atomic addition.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use cogmap_proto::{Codec, DecodeError, SkipReason, Status};
 use cognitive_map::{ChannelKind, CognitiveMap, Event, EventKind};
 use metrics::{Counter, Gauge, Histogram, counter, gauge, histogram};
 
+use super::live::Live;
 use super::sequencer::Offered;
+use crate::encode;
 use crate::metrics as names;
 
 /// Least time between two log lines about the same kind of fault of a sender.
@@ -84,6 +86,9 @@ pub(crate) struct IntakeCounters {
 
 impl IntakeCounters {
     pub(crate) fn new() -> Self {
+        for kind in UNDECODABLE {
+            let _at_zero = counter!(names::DECODE_ERRORS, "kind" => kind);
+        }
         let codecs = [Codec::Postcard, Codec::Cbor, Codec::Json];
         Self {
             messages: codecs
@@ -116,6 +121,7 @@ impl IntakeCounters {
 /// Counters of one space's writer.
 pub(crate) struct SpaceCounters {
     space: String,
+    live: Arc<Live>,
     dropped: [Counter; Drop::ALL.len()],
     applied: Counter,
     duplicates: Counter,
@@ -141,10 +147,13 @@ pub(crate) struct SpaceCounters {
 }
 
 impl SpaceCounters {
-    pub(crate) fn new(space: &str) -> Self {
+    /// Counters of the space of a name. Totals and sizes go to those who watch it, too.
+    pub(crate) fn new(space: &str, live: &Arc<Live>) -> Self {
         let label = || space.to_owned();
+        at_zero(space);
         Self {
             space: space.to_owned(),
+            live: Arc::clone(live),
             dropped: dropped(),
             applied: counter!(names::APPLIED_SAMPLES, "space" => label()),
             duplicates: counter!(names::DUPLICATE_SAMPLES, "space" => label()),
@@ -173,27 +182,20 @@ impl SpaceCounters {
     }
 
     pub(crate) fn dropped(&self, reason: Drop) {
+        self.live.totals.dropped.add(1);
         self.dropped[reason as usize].increment(1);
     }
 
     /// Counts samples refused for good, or lost.
     pub(crate) fn skipped(&self, samples: u64, reason: SkipReason) {
-        let reason = match reason {
-            SkipReason::Lost => "lost",
-            SkipReason::NumberOutOfRange => "number_out_of_range",
-            SkipReason::NonUnitQuaternion => "non_unit_quaternion",
-            SkipReason::NegativeNoise => "negative_noise",
-            SkipReason::TimeBackwards => "time_backwards",
-            SkipReason::InvalidDescriptor => "invalid_descriptor",
-            SkipReason::InvalidLabel => "invalid_label",
-            SkipReason::InvalidNormal => "invalid_normal",
-            SkipReason::SequenceLeap => "sequence_leap",
-        };
+        let reason = skip_name(reason);
+        self.live.totals.skipped.add(samples);
         let space = self.space.clone();
         counter!(names::SKIPPED_SAMPLES, "space" => space, "reason" => reason).increment(samples);
     }
 
     pub(crate) fn offered(&self, offered: &Offered) {
+        self.live.totals.duplicates.add(offered.duplicates);
         self.duplicates.increment(offered.duplicates);
         self.reordered.increment(offered.reordered);
         self.beyond_window.increment(offered.beyond_window);
@@ -228,6 +230,7 @@ impl SpaceCounters {
     /// Counts a round that applied samples.
     pub(crate) fn round(&self, samples: u64, estimates: u64) {
         if samples > 0 {
+            self.live.totals.applied.add(samples);
             self.applied.increment(samples);
             self.round_samples.record(samples as f64);
             self.published.increment(estimates);
@@ -265,6 +268,7 @@ impl SpaceCounters {
         self.places.set(map.place_count() as f64);
         self.trips.set(map.trip_count() as f64);
         self.landmarks.set(map.landmark_count() as f64);
+        self.live.note_counts(encode::live_counts(map));
     }
 
     /// Records how the agents stand.
@@ -343,6 +347,58 @@ pub(crate) fn undecodable(key: &str, error: &DecodeError) {
         DecodeError::LastSession => "last_session",
     };
     counter!(names::DECODE_ERRORS, "kind" => kind).increment(1);
+}
+
+/// Names of the ways in which a message cannot be read.
+const UNDECODABLE: [&str; 8] = [
+    "unknown_encoding",
+    "unsupported_version",
+    "too_long",
+    "malformed",
+    "empty_batch",
+    "too_many_samples",
+    "sequence_overflow",
+    "last_session",
+];
+
+/// The reasons for which samples are skipped.
+const SKIPS: [SkipReason; 9] = [
+    SkipReason::Lost,
+    SkipReason::NumberOutOfRange,
+    SkipReason::NonUnitQuaternion,
+    SkipReason::NegativeNoise,
+    SkipReason::TimeBackwards,
+    SkipReason::InvalidDescriptor,
+    SkipReason::InvalidLabel,
+    SkipReason::InvalidNormal,
+    SkipReason::SequenceLeap,
+];
+
+fn skip_name(reason: SkipReason) -> &'static str {
+    match reason {
+        SkipReason::Lost => "lost",
+        SkipReason::NumberOutOfRange => "number_out_of_range",
+        SkipReason::NonUnitQuaternion => "non_unit_quaternion",
+        SkipReason::NegativeNoise => "negative_noise",
+        SkipReason::TimeBackwards => "time_backwards",
+        SkipReason::InvalidDescriptor => "invalid_descriptor",
+        SkipReason::InvalidLabel => "invalid_label",
+        SkipReason::InvalidNormal => "invalid_normal",
+        SkipReason::SequenceLeap => "sequence_leap",
+    }
+}
+
+/// Lets the series of a space's faults begin at zero. Prometheus sees no increase in a series that
+/// appears with its first fault.
+fn at_zero(space: &str) {
+    let label = || space.to_owned();
+    for reason in SKIPS {
+        let _at_zero =
+            counter!(names::SKIPPED_SAMPLES, "space" => label(), "reason" => skip_name(reason));
+    }
+    let _at_zero = counter!(names::TORN_TAILS, "space" => label());
+    let _at_zero = counter!(names::LOST_MARKS, "space" => label());
+    let _at_zero = gauge!(names::SPACE_STOPPED, "space" => label());
 }
 
 fn dropped() -> [Counter; Drop::ALL.len()] {

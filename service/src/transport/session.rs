@@ -1,6 +1,8 @@
 //! The Zenoh session and its settings.
 
-use std::path::PathBuf;
+use std::fmt::Display;
+use std::fs::File;
+use std::path::{Path, PathBuf};
 
 use zenoh::{Config, Session};
 
@@ -84,7 +86,7 @@ pub async fn open(settings: &TransportSettings) -> Result<Session, TransportErro
 
 fn config(settings: &TransportSettings) -> Result<Config, TransportError> {
     let mut config = match &settings.config_file {
-        Some(file) => Config::from_file(file)?,
+        Some(file) => read(file)?,
         None => Config::default(),
     };
     let quoted = |value: &[String]| serde_json::json!(value).to_string();
@@ -107,9 +109,27 @@ fn config(settings: &TransportSettings) -> Result<Config, TransportError> {
     Ok(config)
 }
 
+/// Reads a configuration file. An error names it, where Zenoh's names a line of Zenoh's source.
+fn read(file: &Path) -> Result<Config, TransportError> {
+    let of_file =
+        |error: &dyn Display| TransportError(format!("config_file {}: {error}", file.display()));
+    File::open(file).map_err(|error| of_file(&error))?;
+    Config::from_file(file).map_err(|error| of_file(&error))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_that_cannot_be_read_is_named() {
+        let file = Path::new("/absent/zenoh.json5");
+        let error = read(file).expect_err("there is no such file").to_string();
+        assert_eq!(
+            error,
+            "zenoh: config_file /absent/zenoh.json5: No such file or directory (os error 2)"
+        );
+    }
 
     fn of_file(text: &str) -> Config {
         let file = tempfile::NamedTempFile::with_suffix(".json5").expect("a file");

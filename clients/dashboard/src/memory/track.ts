@@ -1,0 +1,106 @@
+/** Where an agent was: poses by time, in columns. */
+
+import type { Quat, Vec3 } from "../wire";
+
+/** Poses that a track keeps; an hour at ten poses a second. Beyond, the older half goes. */
+const POSES_MAX = 36_000;
+/** Numbers of a pose: time, position, rotation. */
+const STRIDE = 8;
+/** Two poses farther apart than this are not joined by a line [s]. */
+const GAP_S = 3;
+/** Nor are those between which the agent would have moved faster than this [m/s]. */
+const SPEED_MAX_M_S = 60;
+
+export interface TrackPose {
+  position: Vec3;
+  rotation: Quat;
+}
+
+export class Track {
+  private rows = new Float64Array(STRIDE * 256);
+  /** Number of poses. */
+  n = 0;
+  /** Grows with each change other than poses added at the end. */
+  rewrites = 0;
+
+  push(s: number, position: Vec3, rotation: Quat): void {
+    if (this.n > 0 && s <= this.time(this.n - 1)) {
+      return;
+    }
+    if (this.n === POSES_MAX) {
+      this.rows.copyWithin(0, (STRIDE * POSES_MAX) / 2);
+      this.n = POSES_MAX / 2;
+      this.rewrites += 1;
+    }
+    if (STRIDE * (this.n + 1) > this.rows.length) {
+      const larger = new Float64Array(this.rows.length * 2);
+      larger.set(this.rows);
+      this.rows = larger;
+    }
+    this.rows.set([s, ...position, ...rotation], STRIDE * this.n);
+    this.n += 1;
+  }
+
+  /** Puts older poses before those that are there. */
+  prepend(older: { s: number; position: Vec3; rotation: Quat }[]): void {
+    const own = this.rows.slice(0, STRIDE * this.n);
+    const begin = this.n > 0 ? this.time(0) : Infinity;
+    this.n = 0;
+    for (const { s, position, rotation } of older) {
+      if (s < begin) {
+        this.push(s, position, rotation);
+      }
+    }
+    for (let at = 0; at < own.length; at += STRIDE) {
+      const row = own.subarray(at, at + STRIDE);
+      this.push(row[0]!, [row[1]!, row[2]!, row[3]!], [row[4]!, row[5]!, row[6]!, row[7]!]);
+    }
+    this.rewrites += 1;
+  }
+
+  time(i: number): number {
+    return this.rows[STRIDE * i]!;
+  }
+
+  /** Coordinate of a pose [m]. */
+  at(i: number, axis: number): number {
+    return this.rows[STRIDE * i + 1 + axis]!;
+  }
+
+  pose(i: number): TrackPose {
+    const r = this.rows.subarray(STRIDE * i, STRIDE * (i + 1));
+    return { position: [r[1]!, r[2]!, r[3]!], rotation: [r[4]!, r[5]!, r[6]!, r[7]!] };
+  }
+
+  /** Whether pose `i` follows the one before without a break: no gap, no leap. */
+  isJoined(i: number): boolean {
+    if (i === 0) {
+      return false;
+    }
+    const s = this.time(i) - this.time(i - 1);
+    const step = (axis: number): number => this.at(i, axis) - this.at(i - 1, axis);
+    const m = Math.hypot(step(0), step(1), step(2));
+    return s < GAP_S && m < Math.max(0.75, SPEED_MAX_M_S * s);
+  }
+
+  /** Number of poses up to a time. */
+  countUntil(s: number): number {
+    let low = 0;
+    let high = this.n;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.time(middle) <= s) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    return low;
+  }
+
+  /** The latest pose up to a time; none before the first one. */
+  before(s: number): TrackPose | null {
+    const n = this.countUntil(s);
+    return n === 0 ? null : this.pose(n - 1);
+  }
+}

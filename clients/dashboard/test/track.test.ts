@@ -1,0 +1,47 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { Track } from "../src/memory/track";
+import type { Quat } from "../src/wire";
+
+const AHEAD: Quat = [0, 0, 0, 1];
+
+function track(times: number[]): Track {
+  const made = new Track();
+  times.forEach((s) => made.push(s, [s, 0, 0], AHEAD));
+  return made;
+}
+
+test("a pose is found by its time", () => {
+  const made = track([1, 2, 4]);
+  assert.equal(made.before(0.5), null);
+  assert.deepEqual(made.before(1)?.position, [1, 0, 0]);
+  assert.deepEqual(made.before(3.9)?.position, [2, 0, 0]);
+  assert.deepEqual(made.before(99)?.position, [4, 0, 0]);
+});
+
+test("poses that are older than the latest one are left out", () => {
+  assert.equal(track([1, 2, 2, 1.5, 3]).n, 3);
+});
+
+test("the past is put before what came live, without what is there already", () => {
+  const made = track([10, 11]);
+  made.prepend([8, 9, 10, 11].map((s) => ({ s, position: [s, 0, 0], rotation: AHEAD })));
+  assert.deepEqual([0, 1, 2, 3].map((i) => made.time(i)), [8, 9, 10, 11]);
+  assert.equal(made.n, 4);
+});
+
+test("no line joins what a gap or a leap parts", () => {
+  const made = track([0, 0.1, 9]);
+  made.push(9.1, [90, 0, 0], AHEAD);
+  assert.deepEqual([0, 1, 2, 3].map((i) => made.isJoined(i)), [false, true, false, false]);
+});
+
+test("a long track keeps its later half", () => {
+  const made = new Track();
+  for (let i = 0; i < 40_000; i += 1) {
+    made.push(i, [i, 0, 0], AHEAD);
+  }
+  assert.ok(made.n <= 36_000);
+  assert.equal(made.time(made.n - 1), 39_999);
+  assert.deepEqual(made.before(39_000)?.position, [39_000, 0, 0]);
+});
