@@ -12,6 +12,8 @@ VENV := $(CURDIR)/.venv
 TARGET := $(abspath $(or $(CARGO_TARGET_DIR),target))
 CLIENT := clients/python
 PEERS := tests/peers
+DASHBOARD := clients/dashboard
+PAGE := target/dashboard/index.html
 
 # The end-to-end tests of both languages start this binary.
 export COGMAP_BIN := $(TARGET)/debug/cogmap
@@ -129,12 +131,25 @@ $(PEERS)/.venv/installed: $(PEERS)/requirements.txt $(PEERS)/judge.txt $(CLIENT)
 	    --no-deps --requirement $(PEERS)/judge.txt
 	touch $@
 
+# The versions of Node that the page's build tool runs on; empty where there is no such Node.
+NODE_FITS := $(shell node -p '(([a, b]) => a > 22 || a == 22 && b >= 12 || a == 20 && b >= 19 ? 1 : "") \
+    (process.versions.node.split(".").map(Number))' 2>/dev/null)
+BUILDS_PAGE := $(and $(wildcard $(DASHBOARD)/package-lock.json),$(NODE_FITS))
+
+.PHONY: dashboard
+dashboard: $(if $(BUILDS_PAGE),$(PAGE)) ## the page that the service shows at /; needs Node 20.19, 22.12 or later
+	$(if $(BUILDS_PAGE),,@echo 'The page is not built, and the service shows a plain one: that needs $(DASHBOARD) and Node 20.19, 22.12 or later.')
+
+$(PAGE): $(shell find $(DASHBOARD) -name node_modules -prune -o -type f -print 2>/dev/null)
+	cd $(DASHBOARD) && npm ci --no-audit --no-fund && npm run build
+	touch $@
+
 .PHONY: release
-release: ## the service, optimised
+release: dashboard ## the service, optimised, with its page
 	cargo build --release --locked --package cogmap --bin cogmap
 
 .PHONY: release-lab
-release-lab: ## the service and its laboratory, optimised
+release-lab: dashboard ## the service and its laboratory, optimised
 	cargo build --release --locked --package cogmap --package cogmap-lab --bins
 
 .PHONY: docs

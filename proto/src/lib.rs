@@ -23,6 +23,7 @@ mod event;
 mod field;
 mod key;
 pub mod limits;
+mod live;
 mod localize;
 mod name;
 mod narrow;
@@ -52,6 +53,7 @@ pub use key::{
     AgentKey, KeyError, SESSION_PARAMETER, durable_key, estimate_key, events_key, json_key,
     query_key, samples_key,
 };
+pub use live::{LiveAgent, LiveCounts, LiveHealth, LiveSighting, LiveTick};
 pub use localize::{Localization, LocalizationHypothesis, LocalizeQuery, LocalizedPose};
 pub use name::{Name, NameError};
 pub use object::{

@@ -2,6 +2,8 @@
 
 mod process;
 
+pub(crate) use process::resident_bytes;
+
 use std::path::PathBuf;
 use std::time::Duration;
 

@@ -37,8 +37,19 @@ pub(crate) struct Readout {
     pub(crate) evidence: Evidence,
     pub(crate) travelled_m: f64,
     pub(crate) forgotten_matches: u64,
+    /// Contacts of the episode with an object that is under way.
+    pub(crate) contacts: Option<u64>,
     /// Its part of the agent's JSON, once someone has asked for it.
     json: OnceLock<Vec<u8>>,
+}
+
+/// How far an agent's samples are behind.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lag {
+    /// How many wait for earlier ones.
+    pub(super) waiting: u64,
+    /// How many are applied and not durable yet.
+    pub(super) not_durable: u64,
 }
 
 /// The first fields of an [`AgentDetail`], which change with the readout only.
@@ -118,9 +129,22 @@ impl AgentView {
     pub(crate) fn stand(&self, standing: &mut Standing) {
         let readout = self.readout.load();
         let status = readout.as_ref().map(|readout| readout.estimate.status);
+        let lag = self.lag();
+        standing.note(status, lag.not_durable, lag.waiting);
+    }
+
+    /// Its latest readout.
+    pub(super) fn readout(&self) -> Option<Arc<Readout>> {
+        self.readout.load_full()
+    }
+
+    /// How far its samples are behind.
+    pub(super) fn lag(&self) -> Lag {
         let marks = self.marks();
-        let not_durable = marks.applied.saturating_sub(marks.durable);
-        standing.note(status, not_durable, marks.waiting);
+        Lag {
+            waiting: marks.waiting,
+            not_durable: marks.applied.saturating_sub(marks.durable),
+        }
     }
 
     /// Passes its latest estimate to `read`, if there is one.
@@ -249,6 +273,7 @@ impl Readout {
             evidence: encode::evidence(agent),
             travelled_m: agent.travelled_m(),
             forgotten_matches: agent.forgotten_matches(),
+            contacts: agent.episode_contacts(),
             json: OnceLock::new(),
         })
     }

@@ -1,13 +1,15 @@
 //! What the engine counts. Handles are taken once, so that counting costs one atomic addition.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use cogmap_proto::{Codec, DecodeError, SkipReason, Status};
 use cognitive_map::{ChannelKind, CognitiveMap, Event, EventKind};
 use metrics::{Counter, Gauge, Histogram, counter, gauge, histogram};
 
+use super::live::Live;
 use super::sequencer::Offered;
+use crate::encode;
 use crate::metrics as names;
 
 /// Least time between two log lines about the same kind of fault of a sender.
@@ -116,6 +118,7 @@ impl IntakeCounters {
 /// Counters of one space's writer.
 pub(crate) struct SpaceCounters {
     space: String,
+    live: Arc<Live>,
     dropped: [Counter; Drop::ALL.len()],
     applied: Counter,
     duplicates: Counter,
@@ -141,10 +144,12 @@ pub(crate) struct SpaceCounters {
 }
 
 impl SpaceCounters {
-    pub(crate) fn new(space: &str) -> Self {
+    /// Counters of the space of a name. Totals and sizes go to those who watch it, too.
+    pub(crate) fn new(space: &str, live: &Arc<Live>) -> Self {
         let label = || space.to_owned();
         Self {
             space: space.to_owned(),
+            live: Arc::clone(live),
             dropped: dropped(),
             applied: counter!(names::APPLIED_SAMPLES, "space" => label()),
             duplicates: counter!(names::DUPLICATE_SAMPLES, "space" => label()),
@@ -173,6 +178,7 @@ impl SpaceCounters {
     }
 
     pub(crate) fn dropped(&self, reason: Drop) {
+        self.live.totals.dropped.add(1);
         self.dropped[reason as usize].increment(1);
     }
 
@@ -189,11 +195,13 @@ impl SpaceCounters {
             SkipReason::InvalidNormal => "invalid_normal",
             SkipReason::SequenceLeap => "sequence_leap",
         };
+        self.live.totals.skipped.add(samples);
         let space = self.space.clone();
         counter!(names::SKIPPED_SAMPLES, "space" => space, "reason" => reason).increment(samples);
     }
 
     pub(crate) fn offered(&self, offered: &Offered) {
+        self.live.totals.duplicates.add(offered.duplicates);
         self.duplicates.increment(offered.duplicates);
         self.reordered.increment(offered.reordered);
         self.beyond_window.increment(offered.beyond_window);
@@ -228,6 +236,7 @@ impl SpaceCounters {
     /// Counts a round that applied samples.
     pub(crate) fn round(&self, samples: u64, estimates: u64) {
         if samples > 0 {
+            self.live.totals.applied.add(samples);
             self.applied.increment(samples);
             self.round_samples.record(samples as f64);
             self.published.increment(estimates);
@@ -265,6 +274,7 @@ impl SpaceCounters {
         self.places.set(map.place_count() as f64);
         self.trips.set(map.trip_count() as f64);
         self.landmarks.set(map.landmark_count() as f64);
+        self.live.note_counts(encode::live_counts(map));
     }
 
     /// Records how the agents stand.

@@ -182,6 +182,12 @@ impl EventFollower {
         Followed { missed, events }
     }
 
+    /// Returns when the space is gone.
+    pub(super) async fn gone(&mut self) {
+        // There is no number that it waits for, so it ends with the sender.
+        let _ = self.count.wait_for(|_| false).await;
+    }
+
     /// Waits until there is something to take. False when there will be nothing any more: the space
     /// is gone.
     pub async fn wait(&mut self) -> bool {

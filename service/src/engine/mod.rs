@@ -17,6 +17,7 @@ mod due;
 mod episodes;
 mod events;
 mod health;
+mod live;
 mod message;
 mod publisher;
 mod question;
@@ -57,7 +58,7 @@ pub use question::QuestionError;
 pub use refinement::{SharedText, refined_trajectories};
 pub use repair::{AgentLoss, LostBlocks, MissingSamples, RepairReport, repair};
 pub use settings::EngineSettings;
-pub use space::Space;
+pub use space::{LiveFollower, Space};
 pub use trajectory::{Chunk, Recorder, TrajectoryPage};
 pub use unavailable::{TrajectoryError, Unavailable};
 
@@ -316,12 +317,15 @@ impl Engine {
         let Some(space) = spaces.get(space) else {
             return intake.unknown_space(space);
         };
-        match space.offer(agent, codec, payload) {
-            Ok(()) => {}
-            Err(NotQueued::Full) => intake.dropped(Drop::QueueFull),
-            Err(NotQueued::LaneFull) => intake.dropped(Drop::AgentQueueFull),
-            Err(NotQueued::Closed) => intake.dropped(Drop::SpaceClosed),
-        }
+        let Err(refusal) = space.offer(agent, codec, payload) else {
+            return;
+        };
+        space.shared().live.totals.dropped.add(1);
+        intake.dropped(match refusal {
+            NotQueued::Full => Drop::QueueFull,
+            NotQueued::LaneFull => Drop::AgentQueueFull,
+            NotQueued::Closed => Drop::SpaceClosed,
+        });
     }
 
     /// Counts a message whose key is not a samples key with valid names.

@@ -15,6 +15,7 @@ use super::checkpointer::Job;
 use super::committer::Commit;
 use super::events::EventLog;
 use super::health::Health;
+use super::live::Live;
 use super::publisher::Publisher;
 use super::question::QuestionRoom;
 use super::refinement::Refinements;
@@ -39,8 +40,13 @@ pub(crate) struct Shared {
     pub(crate) health: Arc<Health>,
     /// What happened of late.
     pub(crate) events: EventLog,
+    /// What is left for those who watch.
+    pub(crate) live: Arc<Live>,
     /// Revision of the map at the end of the latest round.
     pub(crate) revision: AtomicU64,
+    /// Revision of the checkpoint that the map was restored from: of what changed before it, only
+    /// what is left is known.
+    pub(super) restored: AtomicU64,
     /// Set once: the writer takes what is queued and ends.
     pub(crate) closing: AtomicBool,
     /// Set once the map is loaded, or could not be.
@@ -92,7 +98,9 @@ impl Shared {
             publisher: Arc::clone(&around.publisher),
             health: Arc::clone(&around.health),
             events: EventLog::new(),
+            live: Arc::default(),
             revision: AtomicU64::new(0),
+            restored: AtomicU64::new(0),
             closing: AtomicBool::new(false),
             loaded: OnceLock::new(),
             agents: RwLock::default(),

@@ -1,5 +1,6 @@
 //! A space, as everyone but its writer sees it.
 
+mod live;
 mod loading;
 mod questions;
 mod refined;
@@ -12,6 +13,8 @@ use std::thread::{Builder, JoinHandle};
 use cogmap_proto::{Codec, EventId, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings};
 use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
 use tokio::sync::oneshot;
+
+pub use live::LiveFollower;
 
 use super::agent_view::AgentView;
 use super::events::EventFollower;
@@ -132,6 +135,13 @@ impl Space {
             let detail = self.failure();
             detail.map_or(Unavailable::Closing, Unavailable::Failed)
         })
+    }
+
+    /// Whether a map of this space knows all that changed after a revision: it came to the revision
+    /// after it was loaded.
+    pub fn knows_changes_since(&self, revision: u64, map: &CognitiveMap) -> bool {
+        let restored = self.shared.restored.load(Ordering::Acquire);
+        (restored..=map.revision()).contains(&revision)
     }
 
     /// An agent, by name.

@@ -1,4 +1,4 @@
-//! The front page, the description of the interface, and the page that shows it.
+//! The description of the interface, and the page that shows it.
 
 use std::sync::Arc;
 
@@ -12,9 +12,6 @@ use utoipa_swagger_ui::{Config, serve};
 
 use super::problem::{Kind, Problem};
 use super::reply;
-
-/// The front page: self-contained, so that it works without any other host.
-const FRONT_PAGE: &str = include_str!("front_page.html");
 
 /// What these routes share.
 #[derive(Clone)]
@@ -30,7 +27,6 @@ pub(crate) fn routes<S>(openapi: &serde_json::Value) -> Router<S> {
         swagger: Arc::new(Config::from("/openapi.json")),
     };
     Router::new()
-        .route("/", get(front_page))
         .route("/openapi.json", get(description))
         .route("/docs", get(|| async { Redirect::to("/docs/") }))
         .route(
@@ -39,10 +35,6 @@ pub(crate) fn routes<S>(openapi: &serde_json::Value) -> Router<S> {
         )
         .route("/docs/{*file}", get(swagger_file))
         .with_state(docs)
-}
-
-async fn front_page() -> Response<Body> {
-    reply::with_type("text/html; charset=utf-8", Body::from(FRONT_PAGE))
 }
 
 async fn description(State(docs): State<Docs>) -> Response<Body> {

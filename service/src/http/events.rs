@@ -3,18 +3,16 @@
 use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::header::ACCEPT;
 use axum::http::{HeaderMap, Response};
 use axum::response::IntoResponse;
-use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::sse::{Event, Sse};
 use cogmap_proto::{EventId, EventPage, EventRecord, MissedEvents};
 use futures_util::{Stream, StreamExt, stream};
 use serde::{Deserialize, Serialize};
-use tokio::sync::OwnedSemaphorePermit;
 use utoipa::ToSchema;
 
 use super::extract::{Query, SpaceOfPath, SpaceParam};
@@ -22,21 +20,14 @@ use super::page;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
+use super::streams::{OpenStream, keep_alive, loaded, stopped};
 use crate::answer::agent_once_named;
-use crate::engine::{EVENTS_KEPT, EventFollower, Space};
-use crate::metrics::HTTP_STREAMS;
+use crate::engine::{EVENTS_KEPT, EventFollower};
 
-/// A comment goes out after this long without an event: proxies cut silent connections after a
-/// minute or so.
-const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// Events that are taken at once.
 const TAKEN_AT_ONCE: usize = 64;
 /// By this header a browser says which event it had last.
 const LAST_EVENT_ID: &str = "last-event-id";
-/// How long a stream waits for its space to load, and how often it looks: a browser that is refused
-/// does not come back by itself.
-const LOADING_MAX: Duration = Duration::from_secs(5);
-const LOADING_POLL: Duration = Duration::from_millis(20);
 
 /// Form of events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, ToSchema)]
@@ -124,23 +115,14 @@ pub(crate) async fn get(
         let detail = "`limit` is for format=json only";
         return Err(Problem::new(Kind::InvalidQuery, detail));
     }
-    let permit = service.streams.clone().try_acquire_owned();
-    let permit = permit.map_err(|_| Problem::new(Kind::Busy, "too many event streams are open"))?;
-    let open = OpenStream::new(permit);
+    let open = OpenStream::open(&service)?;
     let follower = space.follow(after)?;
-    let mut stopping = service.stopping.clone();
-    let stopped = async move {
-        // A dropped sender means the same as a sent stop.
-        let _ = stopping.wait_for(|stopping| *stopping).await;
-    };
-    let events = lines(follower, query.agent).take_until(Box::pin(stopped));
+    let events = lines(follower, query.agent).take_until(Box::pin(stopped(&service)));
     let events = events.map(move |event| {
         let _ = &open;
         Ok::<_, Infallible>(event)
     });
-    Ok(Sse::new(events)
-        .keep_alive(KeepAlive::new().interval(KEEP_ALIVE))
-        .into_response())
+    Ok(Sse::new(events).keep_alive(keep_alive()).into_response())
 }
 
 /// The form that `Accept` asks for; a stream if it asks for none, or for both.
@@ -165,17 +147,6 @@ fn last_event_id(headers: &HeaderMap) -> Result<Option<EventId>, Problem> {
         Problem::new(Kind::InvalidParameter, detail)
     })?;
     Ok(Some(id))
-}
-
-/// Waits until a space has loaded, not for ever: one that is still loading then is refused as
-/// others that cannot be read.
-async fn loaded(space: &Space) {
-    let loaded = async {
-        while space.recovering() {
-            tokio::time::sleep(LOADING_POLL).await;
-        }
-    };
-    let _ = tokio::time::timeout(LOADING_MAX, loaded).await;
 }
 
 /// Up to `limit` events, those of one agent or of all.
@@ -235,22 +206,4 @@ fn line(record: &EventRecord) -> Event {
 fn missed_line(missed: &MissedEvents) -> Event {
     let data = serde_json::to_string(missed).expect("plain data encodes");
     Event::default().event("missed").data(data)
-}
-
-/// Counts a stream as long as it lives.
-struct OpenStream {
-    _permit: OwnedSemaphorePermit,
-}
-
-impl OpenStream {
-    fn new(permit: OwnedSemaphorePermit) -> Self {
-        metrics::gauge!(HTTP_STREAMS).increment(1.0);
-        Self { _permit: permit }
-    }
-}
-
-impl Drop for OpenStream {
-    fn drop(&mut self) {
-        metrics::gauge!(HTTP_STREAMS).decrement(1.0);
-    }
 }

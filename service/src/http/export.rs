@@ -1,6 +1,5 @@
 //! Export of a space's map.
 
-use std::fmt::Write;
 use std::io;
 use std::sync::Arc;
 
@@ -17,6 +16,7 @@ use pose_graph::g2o::write_g2o;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::cloud::{self, CloudForm, PlyEncoding};
 use super::extract::{Query, SpaceOfPath, SpaceParam};
 use super::held::holding;
 use super::long::LongAnswers;
@@ -59,6 +59,12 @@ pub(crate) struct ExportQuery {
     agent: Option<String>,
     /// Session of the agent, for `tum`; the current one when absent.
     session: Option<u64>,
+    /// `ascii` (when absent) or `binary` (little-endian, with strength and stamps), for `ply`.
+    #[param(inline)]
+    encoding: Option<PlyEncoding>,
+    /// Only places that were recruited, moved, visited or forgotten after this revision of the map,
+    /// for binary `ply`; others may be among them.
+    since_revision: Option<u64>,
 }
 
 /// A whole map.
@@ -80,14 +86,21 @@ pub(crate) struct MapExport {
 ///
 /// The map is as it was when the request came, whatever happens while it is sent. For a graph the
 /// whole map is relaxed, which may take seconds; all who ask meanwhile get the same one after it.
+///
+/// A binary point cloud has the vertex properties `id`, `x`, `y`, `z` \[m\], `strength`, `visits`,
+/// `first_s` and `last_s` (stamps \[s\]), and names its `revision` in a comment. Who asks again with
+/// `since_revision` gets the places that changed since, and the numbers of forgotten ones as a
+/// second element `forgotten`. Where the comment `since_revision` says 0, these are all places: the
+/// service does not know what changed, or that would be more.
 #[utoipa::path(get, path = "/v1/spaces/{space}/export", tag = "spaces", operation_id = "export_space",
     params(SpaceParam, ExportQuery),
     responses(
         (status = 200, description = "The map", content(
-            (MapExport = "application/json"), (String = "text/plain"))),
+            (MapExport = "application/json"), (String = "text/plain"),
+            (Vec<u8> = "application/octet-stream"))),
         (status = 404, description = "There is no such space or agent"),
         (status = 410, description = "The agent has been removed: name one of its sessions"),
-        (status = 422, description = "A trajectory was asked for and no agent named, or the other way round")))]
+        (status = 422, description = "Parameters do not go together, such as `agent` with another format than `tum`")))]
 pub(crate) async fn get(
     State(service): State<Service>,
     SpaceOfPath(space): SpaceOfPath,
@@ -98,11 +111,15 @@ pub(crate) async fn get(
         let detail = "`agent` and `session` are for format=tum only";
         return Err(Problem::new(Kind::InvalidQuery, detail));
     }
+    let form = cloud_form(&query, format)?;
     let long = &service.long;
     let (mut response, file) = match format {
         ExportFormat::Json => (map(long, &space).await?, format!("{}.json", space.name())),
         ExportFormat::G2o => (graph(long, &space).await?, format!("{}.g2o", space.name())),
-        ExportFormat::Ply => (cloud(long, &space).await?, format!("{}.ply", space.name())),
+        ExportFormat::Ply => {
+            let cloud = cloud::body(long, &space, form).await?;
+            (cloud, format!("{}.ply", space.name()))
+        }
         ExportFormat::Tum => {
             let detail = "format=tum needs agent";
             let agent = query
@@ -119,6 +136,21 @@ pub(crate) async fn get(
             .insert(CONTENT_DISPOSITION, disposition);
     }
     Ok(response)
+}
+
+/// The form of a point cloud that a query asks for.
+fn cloud_form(query: &ExportQuery, format: ExportFormat) -> Result<CloudForm, Problem> {
+    let refused = |detail| Err(Problem::new(Kind::InvalidQuery, detail));
+    match (query.encoding, query.since_revision) {
+        (Some(_), _) | (_, Some(_)) if format != ExportFormat::Ply => {
+            refused("`encoding` and `since_revision` are for format=ply only")
+        }
+        (Some(PlyEncoding::Binary), since) => Ok(CloudForm::Binary {
+            since_revision: since.unwrap_or(0),
+        }),
+        (_, Some(_)) => refused("`since_revision` is for encoding=binary only"),
+        (_, None) => Ok(CloudForm::Ascii),
+    }
 }
 
 /// A list of an export that can be written from any of its items on: their numbers, and them as
@@ -202,31 +234,6 @@ async fn graph(long: &LongAnswers, space: &Space) -> Result<Response<Body>, Prob
     let body = Body::from(Bytes::from_owner(graph));
     // Who reads it slowly holds on to all of it.
     Ok(reply::with_type(TUM, holding(body, room)))
-}
-
-async fn cloud(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, Problem> {
-    let room = long.enter()?;
-    let map = space.snapshot().await?;
-    let head = format!(
-        "ply\nformat ascii 1.0\ncomment places of the cogmap space {}\nelement vertex {}\n\
-         property double x\nproperty double y\nproperty double z\n\
-         property uint id\nproperty uint visits\nend_header\n",
-        space.name(),
-        map.place_count()
-    );
-    let mut first = 0;
-    let lines = std::iter::from_fn(move || {
-        let mut lines = String::new();
-        for (id, place) in map.places_from(PlaceId(first)).take(CHUNK_ITEMS) {
-            let (at, visits) = (place.position(), place.visits().min(u32::MAX.into()));
-            writeln!(lines, "{} {} {} {} {visits}", at.x, at.y, at.z, id.0)
-                .expect("a text takes what fits into memory");
-            first = id.0.checked_add(1)?;
-        }
-        (!lines.is_empty()).then_some(lines)
-    });
-    let texts = std::iter::once(head).chain(lines);
-    Ok(reply::with_type(TUM, long.body(room, texts)))
 }
 
 async fn trajectory(

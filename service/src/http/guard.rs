@@ -37,9 +37,9 @@ const EVENT_STREAM: &str = "text/event-stream";
 /// Label of requests that no route matches.
 const UNMATCHED: &str = "unmatched";
 /// Statuses that have counters of their own.
-const STATUSES: [u16; 21] = [
-    200, 201, 204, 303, 308, 400, 401, 403, 404, 405, 409, 410, 413, 415, 421, 422, 500, 503, 504,
-    507, 0,
+const STATUSES: [u16; 22] = [
+    200, 201, 204, 303, 304, 308, 400, 401, 403, 404, 405, 409, 410, 413, 415, 421, 422, 500, 503,
+    504, 507, 0,
 ];
 
 /// What stands before every handler.
@@ -234,10 +234,10 @@ fn with_permit(response: Response<Body>, permit: Option<OwnedSemaphorePermit>) -
     }
 }
 
-/// Whether a request is for one of the [`PAGES`], or what a page below `/docs/` needs.
+/// Whether a request is for one of the [`PAGES`], or for what one of them needs.
 fn is_page(request: &Request) -> bool {
     let path = request.uri().path();
-    PAGES.contains(&path) || path.starts_with("/docs/")
+    PAGES.contains(&path) || path.starts_with("/docs/") || path.starts_with("/assets/")
 }
 
 fn words(panic: &(dyn Any + Send)) -> &str {

@@ -62,30 +62,30 @@ impl LongAnswers {
         })
     }
 
-    /// A body of texts, a few at a time: further ones are made when those before have been taken.
-    pub(crate) fn body(
+    /// A body of parts, a few at a time: further ones are made when those before have been taken.
+    pub(crate) fn body<T: AsRef<[u8]>>(
         &self,
         room: OwnedSemaphorePermit,
-        texts: impl Iterator<Item = String> + Send + 'static,
+        parts: impl Iterator<Item = T> + Send + 'static,
     ) -> Body {
-        let begin = (self.clone(), room, texts);
-        let made = stream::try_unfold(begin, |(long, room, texts)| async move {
-            let made = long.make(move || piece(texts)).await;
-            let (piece, texts) = made.map_err(|_| io::ErrorKind::Interrupted)?;
+        let begin = (self.clone(), room, parts);
+        let made = stream::try_unfold(begin, |(long, room, parts)| async move {
+            let made = long.make(move || piece(parts)).await;
+            let (piece, parts) = made.map_err(|_| io::ErrorKind::Interrupted)?;
             let more = !piece.is_empty();
-            Ok::<_, io::Error>(more.then(|| (Bytes::from(piece), (long, room, texts))))
+            Ok::<_, io::Error>(more.then(|| (Bytes::from(piece), (long, room, parts))))
         });
         Body::from_stream(made)
     }
 }
 
-/// The next piece, empty at the end, and the texts after it.
-fn piece<T: Iterator<Item = String>>(mut texts: T) -> (String, T) {
-    let mut piece = String::new();
+/// The next piece, empty at the end, and the parts after it.
+fn piece<T: AsRef<[u8]>, I: Iterator<Item = T>>(mut parts: I) -> (Vec<u8>, I) {
+    let mut piece = Vec::new();
     while piece.len() < PIECE_BYTES
-        && let Some(text) = texts.next()
+        && let Some(part) = parts.next()
     {
-        piece.push_str(&text);
+        piece.extend_from_slice(part.as_ref());
     }
-    (piece, texts)
+    (piece, parts)
 }

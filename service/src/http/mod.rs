@@ -5,6 +5,8 @@
 
 mod activity;
 mod agents;
+mod cloud;
+mod dashboard;
 mod docs;
 mod elsewhere;
 mod events;
@@ -19,6 +21,7 @@ mod index;
 mod json;
 mod landmarks;
 mod listener;
+mod live;
 mod localize;
 mod long;
 mod objects;
@@ -33,6 +36,7 @@ mod samples;
 mod settings;
 mod spaces;
 mod state;
+mod streams;
 mod token;
 mod tracking;
 mod trajectory;
@@ -98,6 +102,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(objects::identify))
         .routes(routes!(objects::of_agent))
         .routes(routes!(events::get))
+        .routes(routes!(live::get))
         .routes(routes!(export::get))
         .routes(routes!(health::healthz))
         .routes(routes!(health::readyz))
@@ -127,6 +132,7 @@ pub fn router(
     let guard = Guard::new(settings, paths.iter().cloned());
     described
         .merge(docs::routes(&openapi(settings.token.is_some())))
+        .merge(dashboard::routes::<_, dashboard::Built>())
         .fallback(elsewhere::unknown_path)
         .method_not_allowed_fallback(elsewhere::other_method)
         .layer(guard)

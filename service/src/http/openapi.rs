@@ -39,7 +39,7 @@ const OF_AGENT: [(&str, &str); 1] = [("410", "The agent has been removed")];
 const CHANGING: [(&str, &str); 1] = [("403", "The request comes from a page of another host")];
 
 /// Lengths of arrays, by the names of the fields that hold them.
-const LENGTHS: [(&str, usize); 21] = [
+const LENGTHS: [(&str, usize); 24] = [
     ("translation_m", 3),
     ("rotation_xyzw", 4),
     ("translation_sd_m", 3),
@@ -58,6 +58,9 @@ const LENGTHS: [(&str, usize); 21] = [
     ("decoded_m", 3),
     ("interference_m", 3),
     ("covariance", 21),
+    ("position_covariance_m2", 6),
+    ("from_m", 3),
+    ("to_m", 3),
     ("min_m", 3),
     ("max_m", 3),
     ("activation", 27),

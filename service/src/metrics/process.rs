@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+use std::str::FromStr;
 
 use metrics::gauge;
 
@@ -17,20 +18,25 @@ const TOP: &str = "top";
 /// Records memory and descriptors, as the system's books have them now. Where the system keeps no
 /// such books, nothing is recorded.
 pub(super) fn record() {
-    if let Ok(status) = fs::read_to_string("/proc/self/status")
-        && let Some(kibibytes) = field(&status, "VmRSS:")
-    {
-        gauge!(PROCESS_MEMORY).set(kibibytes * 1024.0);
+    if let Some(bytes) = resident_bytes() {
+        gauge!(PROCESS_MEMORY).set(bytes as f64);
     }
     if let Ok(open) = fs::read_dir("/proc/self/fd") {
         // One of them reads this list.
         gauge!(PROCESS_FDS).set(open.count().saturating_sub(1) as f64);
     }
     if let Ok(limits) = fs::read_to_string("/proc/self/limits")
-        && let Some(limit) = field(&limits, "Max open files")
+        && let Some(limit) = field::<f64>(&limits, "Max open files")
     {
         gauge!(PROCESS_FDS_MAX).set(limit);
     }
+}
+
+/// Memory of the process that is in use \[bytes\], where the system keeps books of it.
+pub(crate) fn resident_bytes() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let kibibytes: u64 = field(&status, "VmRSS:")?;
+    Some(kibibytes * 1024)
 }
 
 /// Records what the store takes on its disk, each directory in it by itself.
@@ -65,7 +71,7 @@ fn bytes_on_disk(path: &Path) -> io::Result<u64> {
 }
 
 /// The first number after a name at the beginning of a line.
-fn field(text: &str, name: &str) -> Option<f64> {
+fn field<T: FromStr>(text: &str, name: &str) -> Option<T> {
     let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     line.split_whitespace().next()?.parse().ok()
 }
@@ -88,9 +94,9 @@ mod tests {
     #[test]
     fn numbers_are_found_by_their_names() {
         let status = "Name:\tcogmap\nVmRSS:\t   1234 kB\n";
-        assert_eq!(field(status, "VmRSS:"), Some(1234.0));
+        assert_eq!(field(status, "VmRSS:"), Some(1234));
         let limits = "Max open files            1024                 524288               files\n";
-        assert_eq!(field(limits, "Max open files"), Some(1024.0));
-        assert_eq!(field(limits, "Max open files unlimited"), None);
+        assert_eq!(field(limits, "Max open files"), Some(1024.0_f64));
+        assert_eq!(field::<f64>(limits, "Max open files unlimited"), None);
     }
 }

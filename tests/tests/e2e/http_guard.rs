@@ -8,7 +8,7 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 26] = [
+const ROUTES: [(&str, &[&str]); 27] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
@@ -26,6 +26,7 @@ const ROUTES: [(&str, &[&str]); 26] = [
     ("/v1/spaces/{space}/export", &["get"]),
     ("/v1/spaces/{space}/landmarks", &["get"]),
     ("/v1/spaces/{space}/landmarks/{id}", &["get"]),
+    ("/v1/spaces/{space}/live", &["get"]),
     ("/v1/spaces/{space}/localize", &["post"]),
     ("/v1/spaces/{space}/objects", &["get"]),
     ("/v1/spaces/{space}/objects/identify", &["post"]),

@@ -62,6 +62,8 @@ pub(super) fn load_and_run(
                 Checkpointer::new(shared.number, store, health, jobs, interval, progress);
             let space = &*shared.name;
             tracing::info!(space, revision = recovered.map.revision(), "space loaded");
+            let restored = recovered.checkpoint_revision;
+            shared.restored.store(restored, Ordering::Release);
             shared
                 .revision
                 .store(recovered.map.revision(), Ordering::Release);

@@ -115,7 +115,7 @@ impl Writer {
             next_block,
             ..
         } = recovered;
-        let counters = SpaceCounters::new(&shared.name);
+        let counters = SpaceCounters::new(&shared.name, &shared.live);
         let interval_ns = shared.interval_ns;
         let next_lesson = map.lessons();
         let mut writer = Self {
@@ -221,8 +221,15 @@ impl Writer {
 
     /// Applies the round's records: from here on they are part of the map.
     fn apply(&mut self) {
+        let is_watched = self.shared.live.is_watched();
         for record in &self.records {
             self.map.apply(record, &mut self.events);
+            if is_watched
+                && let Record::Sample { agent, sample, .. } = record
+                && let Some(sighting) = encode::live_sighting(&self.map, *agent, sample)
+            {
+                self.shared.live.note_sighting(sighting);
+            }
             for event in &self.events {
                 self.counters.event(&self.map, event);
                 let change = encode::ended_episode(&self.shared.name, &self.map, event);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::{AgentSlot, Writer};
+use crate::encode;
 use crate::engine::agent_view::Readout;
 use crate::engine::committer::{Commit, Mark};
 use crate::engine::counters::Standing;
@@ -81,6 +82,9 @@ impl Writer {
             if remind {
                 self.shared.publisher.watermark(space, &slot.view);
             }
+        }
+        if self.shared.live.is_watched() {
+            self.shared.live.note_counts(encode::live_counts(&self.map));
         }
         self.counters
             .round(commit.samples, commit.marks.len() as u64);

@@ -1,8 +1,11 @@
 //! The interface, request by request, over a real engine on a store of its own.
 
+mod cloud;
+mod dashboard;
 mod events;
 mod forgetting;
 mod guarding;
+mod live;
 mod localize;
 mod objects;
 mod problems;

@@ -444,6 +444,7 @@ async fn the_description_lists_every_route_with_every_status() {
         "GET /v1/spaces/{space}/export",
         "GET /v1/spaces/{space}/landmarks",
         "GET /v1/spaces/{space}/landmarks/{id}",
+        "GET /v1/spaces/{space}/live",
         "GET /v1/spaces/{space}/objects",
         "GET /v1/spaces/{space}/objects/{name}",
         "GET /v1/spaces/{space}/places",

@@ -288,6 +288,11 @@ async fn parameters_of_another_form_are_refused_and_not_ignored() {
         "agent=rover",
         "format=ply&agent=rover",
         "format=g2o&session=1",
+        "encoding=binary",
+        "format=tum&agent=rover&encoding=ascii",
+        "format=g2o&since_revision=3",
+        "format=ply&since_revision=3",
+        "format=ply&encoding=ascii&since_revision=3",
     ] {
         let answer = rig.get(&format!("/v1/spaces/lab/export?{query}")).await;
         answer.problem(422, "invalid-query");
