@@ -1,5 +1,6 @@
 # What can be done with the project from a shell. `make test` is the whole gate: it needs Rust with
-# rustfmt and clippy, Python 3.9 or later, the package indices of both, and curl; nothing else.
+# rustfmt and clippy, Python 3.9 or later, Node 20.19, 22.12 or later, Chromium, curl, and the
+# package indices; nothing else.
 
 SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
@@ -14,6 +15,9 @@ CLIENT := clients/python
 PEERS := tests/peers
 DASHBOARD := clients/dashboard
 PAGE := target/dashboard/index.html
+BROWSER := tests/browser
+# Debian's, or another one that is named here.
+export CHROMIUM ?= chromium
 
 # The end-to-end tests of both languages start this binary.
 export COGMAP_BIN := $(TARGET)/debug/cogmap
@@ -37,11 +41,11 @@ help: ## list the targets
 # The steps are lines of one recipe, because their order matters: what fails fastest comes first,
 # and the summaries of the test runners come last.
 .PHONY: test
-test: ## the whole gate: format, lints, documentation, tests of Rust and Python
+test: ## the whole gate: format, lints, documentation, tests of Rust, of Python and in a browser
 	cargo fmt --all --check
 	cargo clippy $(ALL) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps --lib --examples
-	$(MAKE) --no-print-directory test-rust test-python
+	$(MAKE) --no-print-directory test-page test-rust test-python test-browser
 
 .PHONY: test-rust
 test-rust: ## tests of Rust, the end-to-end tests among them
@@ -60,6 +64,32 @@ test-python: $(VENV)/installed ## types and tests of the Python client, then the
 	cd $(CLIENT) && $(VENV)/bin/pytest
 	$(VENV)/bin/pytest tests/scorecard
 	$(VENV)/bin/pytest tests/python
+
+.PHONY: test-page
+test-page: needs-node ## types, format, unit tests and size of the page
+	$(MAKE) --no-print-directory dashboard
+	cd $(DASHBOARD) && npm run check && npm test && npm run size
+
+.PHONY: test-browser
+test-browser: needs-node needs-chromium $(BROWSER)/.venv/installed ## the page in Chromium, of services that the tests start
+	$(MAKE) --no-print-directory dashboard
+	cargo build $(ALL)
+	cd $(BROWSER) && .venv/bin/mypy --strict .
+	$(BROWSER)/.venv/bin/pytest $(BROWSER)
+
+.PHONY: needs-node
+needs-node:
+	@test -n '$(NODE_FITS)' || { echo 'The page is built with Node 20.19, 22.12 or later: install it (nodejs.org, or your distribution).' >&2; exit 1; }
+
+.PHONY: needs-chromium
+needs-chromium:
+	@command -v $(CHROMIUM) >/dev/null || { echo 'There is no Chromium: apt-get install chromium, or name one: CHROMIUM=/path/to/it.' >&2; exit 1; }
+
+$(BROWSER)/.venv/installed: $(BROWSER)/requirements.txt $(CLIENT)/pyproject.toml
+	$(PYTHON) -m venv --clear $(BROWSER)/.venv
+	$(BROWSER)/.venv/bin/pip install --quiet --disable-pip-version-check \
+	    --requirement $(BROWSER)/requirements.txt --editable $(CLIENT)
+	touch $@
 
 # A venv is made anew when what it has to hold changes.
 $(VENV)/installed: $(CLIENT)/pyproject.toml
@@ -146,6 +176,11 @@ $(PAGE): $(shell find $(DASHBOARD) -name node_modules -prune -o -type f -print 2
 	cd $(DASHBOARD) && npm ci --no-audit --no-fund && npm run build
 	touch $@
 
+.PHONY: screenshot
+screenshot: release needs-chromium $(BROWSER)/.venv/installed ## docs/images/dashboard.png, of the page of a demo
+	$(BROWSER)/.venv/bin/python $(BROWSER)/screenshot.py --binary $(TARGET)/release/cogmap \
+	    --out docs/images/dashboard.png $(ARGS)
+
 .PHONY: release
 release: dashboard ## the service, optimised, with its page
 	cargo build --release --locked --package cogmap --bin cogmap
@@ -189,4 +224,4 @@ fmt: ## format the Rust code
 .PHONY: clean
 clean: ## remove what was built
 	cargo clean
-	rm -rf $(VENV) $(PEERS)/.venv $(PEERS)/.mypy_cache $(CLIENT)/.mypy_cache $(CLIENT)/.pytest_cache
+	rm -rf $(VENV) $(PEERS)/.venv $(BROWSER)/.venv $(DASHBOARD)/node_modules $(PEERS)/.mypy_cache $(CLIENT)/.mypy_cache $(CLIENT)/.pytest_cache

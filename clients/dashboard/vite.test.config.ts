@@ -1,7 +1,9 @@
 import { readdirSync } from "node:fs";
 import { defineConfig } from "vite";
 
-const tests = readdirSync(new URL("test", import.meta.url)).filter((name) => /\.test\.ts$/.test(name));
+const tests = readdirSync(new URL("test", import.meta.url)).filter((name) =>
+  /\.test\.ts$/.test(name),
+);
 
 /** Makes JavaScript of the unit tests, which Node's own test runner runs. */
 export default defineConfig({

@@ -17,7 +17,7 @@ MakeServer = Callable[..., Server]
 Open = Callable[..., Dashboard]
 
 #: WebGL without a graphics card.
-_ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 
 
 def chromium() -> str:
@@ -32,7 +32,7 @@ def chromium() -> str:
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """A headless browser. Root may not have a sandbox in a container."""
-    arguments = _ARGUMENTS + (["--no-sandbox"] if os.geteuid() == 0 else [])
+    arguments = ARGUMENTS + (["--no-sandbox"] if os.geteuid() == 0 else [])
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium(), args=arguments)
         yield browser

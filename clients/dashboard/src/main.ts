@@ -1,4 +1,4 @@
-import "./style.css";
+import "./style/index.css";
 import { App } from "./app";
 import { figures } from "./figures";
 

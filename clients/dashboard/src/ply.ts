@@ -18,7 +18,8 @@ export interface CloudFile {
 
 const END = "end_header\n";
 const PLACE_BYTES = 40;
-const VERTEX = "uint id, float x, float y, float z, float strength, uint visits, double first_s, double last_s";
+const VERTEX =
+  "uint id, float x, float y, float z, float strength, uint visits, double first_s, double last_s";
 /** A header is a few hundred bytes; more is no cloud. */
 const HEADER_BYTES_MAX = 4096;
 

@@ -5,8 +5,22 @@ import { Problem } from "./problem";
 import { readCloud, type CloudFile } from "./ply";
 import { token } from "./token";
 import type {
-  AgentDetail, AgentObject, EventRecord, GridState, Landmark, Leg, ObjectDetail, ObjectSummary, Place,
-  Prediction, Quat, RecalledPlace, SpaceInfo, Trajectory, Trip, Vec3,
+  AgentDetail,
+  AgentObject,
+  EventRecord,
+  GridState,
+  Landmark,
+  Leg,
+  ObjectDetail,
+  ObjectSummary,
+  Place,
+  Prediction,
+  Quat,
+  RecalledPlace,
+  SpaceInfo,
+  Trajectory,
+  Trip,
+  Vec3,
 } from "./wire";
 
 /** Most pages of one list that the page asks for. */

@@ -9,7 +9,7 @@ import type { Tick } from "./wire";
 /** Waits before another try: the first one, and the longest [ms]. */
 const RETRY_MS = 500;
 const RETRY_MS_MAX = 5000;
-/** The service says something at least every fifteen seconds; silence beyond this is a break [ms]. */
+/** The service says something every fifteen seconds; silence beyond this is a break [ms]. */
 const SILENCE_MS = 20_000;
 
 export type Connection =

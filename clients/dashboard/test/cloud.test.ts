@@ -7,7 +7,9 @@ import type { CloudFile } from "../src/ply";
 function file(ids: number[], sinceRevision: bigint, forgotten: number[] = []): CloudFile {
   const n = ids.length;
   return {
-    revision: 9n, sinceRevision, n,
+    revision: 9n,
+    sinceRevision,
+    n,
     id: Uint32Array.from(ids),
     position: Float32Array.from(ids.flatMap((id) => [id, 0, 0])),
     strength: new Float32Array(n).fill(1),

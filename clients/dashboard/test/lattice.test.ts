@@ -24,7 +24,12 @@ test("the lattices are those of the service", () => {
 test("firing fields are one spacing apart, twelve around the first", () => {
   const [spacing_m, reference, reference_m] = ANSWERED[1]!;
   const module: GridModule = {
-    spacing_m, reference, reference_m, phase: [0, 0, 0], activation: [], octant_activation: 0,
+    spacing_m,
+    reference,
+    reference_m,
+    phase: [0, 0, 0],
+    activation: [],
+    octant_activation: 0,
   };
   const around: Vec3 = [1, 2, 3];
   const fields = firingFields(1, module, around, 1.01 * spacing_m);
@@ -38,7 +43,11 @@ test("firing fields are one spacing apart, twelve around the first", () => {
 
 test("fields of another lattice than the service's are not drawn", () => {
   const module: GridModule = {
-    spacing_m: 1.2, reference: [1, 0, 0], reference_m: [0, 1.2, 0], phase: [0, 0, 0], activation: [],
+    spacing_m: 1.2,
+    reference: [1, 0, 0],
+    reference_m: [0, 1.2, 0],
+    phase: [0, 0, 0],
+    activation: [],
     octant_activation: 0,
   };
   assert.deepEqual(firingFields(0, module, [0, 0, 0], 3), []);
@@ -54,7 +63,14 @@ test("turning there and back leads home", () => {
 
 test("octants have the signs of the seed paper", () => {
   const signs: Vec3[] = [
-    [1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1], [1, 1, -1], [-1, 1, -1], [-1, -1, -1], [1, -1, -1],
+    [1, 1, 1],
+    [-1, 1, 1],
+    [-1, -1, 1],
+    [1, -1, 1],
+    [1, 1, -1],
+    [-1, 1, -1],
+    [-1, -1, -1],
+    [1, -1, -1],
   ];
   assert.deepEqual([1, 2, 3, 4, 5, 6, 7, 8].map(octantSides), signs);
   assert.equal(octantSides(null), null);

@@ -2,20 +2,45 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { readCloud } from "../src/ply";
 
-const PROPERTIES = ["uint id", "float x", "float y", "float z", "float strength", "uint visits",
-  "double first_s", "double last_s"];
+const PROPERTIES = [
+  "uint id",
+  "float x",
+  "float y",
+  "float z",
+  "float strength",
+  "uint visits",
+  "double first_s",
+  "double last_s",
+];
 
 function file(places: number[][], forgotten: number[], properties = PROPERTIES): ArrayBuffer {
-  const head = ["ply", "format binary_little_endian 1.0", "comment places of the cogmap space den",
-    "comment revision 18446744073709551615", "comment since_revision 12",
-    `element vertex ${places.length}`, ...properties.map((property) => `property ${property}`),
-    `element forgotten ${forgotten.length}`, "property uint id", "end_header", ""].join("\n");
+  const head = [
+    "ply",
+    "format binary_little_endian 1.0",
+    "comment places of the cogmap space den",
+    "comment revision 18446744073709551615",
+    "comment since_revision 12",
+    `element vertex ${places.length}`,
+    ...properties.map((property) => `property ${property}`),
+    `element forgotten ${forgotten.length}`,
+    "property uint id",
+    "end_header",
+    "",
+  ].join("\n");
   const bytes = new Uint8Array(head.length + 40 * places.length + 4 * forgotten.length);
   bytes.set(new TextEncoder().encode(head));
   const view = new DataView(bytes.buffer);
   let at = head.length;
   for (const [id, x, y, z, strength, visits, first, last] of places as [
-    number, number, number, number, number, number, number, number][]) {
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+  ][]) {
     view.setUint32(at, id, true);
     [x, y, z, strength].forEach((value, i) => view.setFloat32(at + 4 + 4 * i, value, true));
     view.setUint32(at + 20, visits, true);
@@ -28,7 +53,15 @@ function file(places: number[][], forgotten: number[], properties = PROPERTIES):
 }
 
 test("a cloud is read field by field", () => {
-  const cloud = readCloud(file([[7, 1, -2, 3.5, 0.25, 9, 1.7e9 + 0.125, 1.7e9 + 0.5], [8, 0, 0, 0, 1, 1, 2, 3]], [4, 5]));
+  const cloud = readCloud(
+    file(
+      [
+        [7, 1, -2, 3.5, 0.25, 9, 1.7e9 + 0.125, 1.7e9 + 0.5],
+        [8, 0, 0, 0, 1, 1, 2, 3],
+      ],
+      [4, 5],
+    ),
+  );
   assert.equal(cloud.revision, 18446744073709551615n);
   assert.equal(cloud.sinceRevision, 12n);
   assert.deepEqual([...cloud.id], [7, 8]);
@@ -43,7 +76,9 @@ test("an empty cloud is a cloud", () => {
 });
 
 test("another file, another order and a short one are refused", () => {
-  assert.throws(() => readCloud(new TextEncoder().encode("ply\nformat ascii 1.0\n").buffer as ArrayBuffer));
+  assert.throws(() =>
+    readCloud(new TextEncoder().encode("ply\nformat ascii 1.0\n").buffer as ArrayBuffer),
+  );
   const swapped = [PROPERTIES[0]!, PROPERTIES[2]!, PROPERTIES[1]!, ...PROPERTIES.slice(3)];
   assert.throws(() => readCloud(file([[1, 0, 0, 0, 1, 1, 0, 0]], [], swapped)), /other properties/);
   const whole = file([[1, 0, 0, 0, 1, 1, 0, 0]], []);

@@ -2,7 +2,8 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { EventParser } from "../src/sse";
 
-const STREAM = ': hello\n\nevent: tick\ndata: {"a":1}\n\nevent: lagged\r\ndata: x\r\ndata: y\r\n\r\n\ndata:z\n\n';
+const STREAM =
+  ': hello\n\nevent: tick\ndata: {"a":1}\n\nevent: lagged\r\ndata: x\r\ndata: y\r\n\r\n\ndata:z\n\n';
 const EVENTS = [
   { event: "tick", data: '{"a":1}' },
   { event: "lagged", data: "x\ny" },

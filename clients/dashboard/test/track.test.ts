@@ -26,14 +26,20 @@ test("poses that are older than the latest one are left out", () => {
 test("the past is put before what came live, without what is there already", () => {
   const made = track([10, 11]);
   made.prepend([8, 9, 10, 11].map((s) => ({ s, position: [s, 0, 0], rotation: AHEAD })));
-  assert.deepEqual([0, 1, 2, 3].map((i) => made.time(i)), [8, 9, 10, 11]);
+  assert.deepEqual(
+    [0, 1, 2, 3].map((i) => made.time(i)),
+    [8, 9, 10, 11],
+  );
   assert.equal(made.n, 4);
 });
 
 test("no line joins what a gap or a leap parts", () => {
   const made = track([0, 0.1, 9]);
   made.push(9.1, [90, 0, 0], AHEAD);
-  assert.deepEqual([0, 1, 2, 3].map((i) => made.isJoined(i)), [false, true, false, false]);
+  assert.deepEqual(
+    [0, 1, 2, 3].map((i) => made.isJoined(i)),
+    [false, true, false, false],
+  );
 });
 
 test("a long track keeps its later half", () => {

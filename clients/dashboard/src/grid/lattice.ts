@@ -64,7 +64,10 @@ export function combine(axes: [Vec3, Vec3, Vec3], turns: ArrayLike<number>): Vec
  * are active now [m]. None where the service's lattice is another than this page knows.
  */
 export function firingFields(
-  number: number, module: GridModule, around: Vec3, radiusM: number,
+  number: number,
+  module: GridModule,
+  around: Vec3,
+  radiusM: number,
 ): Vec3[] {
   const axes = basis(number, module.spacing_m);
   const reference = combine(axes, module.reference);

@@ -11,7 +11,7 @@ export class Cloud {
   /** Number of the place of each row. */
   id = new Uint32Array(1024);
   position = new Float32Array(3 * 1024);
-  /** Strength, visits, first and last second of the view's clock. A forgotten place has strength −1. */
+  /** Strength (−1 of a forgotten place), visits, first and last second of the view's clock. */
   facts = new Float32Array(4 * 1024);
   /** Rows that changed since the last look, as a range; and whether the columns were replaced. */
   dirty: { from: number; to: number; isReplaced: boolean } | null = null;
@@ -83,7 +83,12 @@ export class Cloud {
   }
 
   private put(
-    id: number, position: Vec3, strength: number, visits: number, firstS: number, lastS: number,
+    id: number,
+    position: Vec3,
+    strength: number,
+    visits: number,
+    firstS: number,
+    lastS: number,
   ): void {
     let row = this.rows.get(id);
     if (row === undefined) {

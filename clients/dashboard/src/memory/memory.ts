@@ -1,4 +1,4 @@
-/** What the page knows of a space: it follows the live stream and asks for what a tick leaves out. */
+/** What the page knows of a space: the live stream, and what it asks for beside that. */
 
 import type { Int64 } from "../json";
 import type { Connection } from "../stream";
@@ -6,12 +6,20 @@ import { LiveStream } from "../stream";
 import { Problem } from "../problem";
 import type { Space } from "../service";
 import type {
-  Counts, EventRecord, Health, Landmark, Leg, LiveSighting, ObjectSummary, Tick, Trip,
+  Counts,
+  EventRecord,
+  Health,
+  Landmark,
+  LiveSighting,
+  ObjectSummary,
+  Tick,
 } from "../wire";
 import { Agent } from "./agent";
 import { Clock } from "./clock";
 import { Cloud } from "./cloud";
+import { TripLog } from "./trip_log";
 
+const BY_NAME = new Intl.Collator("en", { numeric: true }).compare;
 /** Ticks a second: estimates come in groups of some tens of milliseconds. */
 const RATE_HZ = 10;
 /** How much of the past is asked for when the page opens [s], and pages of it for one agent. */
@@ -21,19 +29,11 @@ const PAST_PAGES_MAX = 8;
 const PAST_STEP_S = 0.08;
 /** Agents whose past is asked for. */
 const PAST_AGENTS_MAX = 64;
-/** Legs that are asked for when the page opens: those of the latest trips. */
-const LEGS_MAX = 6000;
 /** Events that the page keeps. */
 const EVENTS_MAX = 1500;
 /** How often it asks for what ticks leave out [ms]. */
 const REFRESH_MS = 2000;
 const TOUCH_MS = 400;
-
-/** A trip: what the service said of it, and what events have added since. */
-export interface ShownTrip {
-  trip: Trip;
-  legs: Leg[];
-}
 
 export interface ShownEvent extends EventRecord {
   /** Time on the view's clock [s]; 0 for events without a stamp. */
@@ -47,7 +47,7 @@ export interface MemoryListener {
   /** A tick was taken in. */
   ticked(tick: Tick, events: ShownEvent[]): void;
   /** Events from before the page was opened were read. */
-  recounted(events: ShownEvent[]): void;
+  recounted(): void;
   sighted(sightings: LiveSighting[]): void;
   /** Places, trips, landmarks, objects or the past of an agent were read. */
   refreshed(): void;
@@ -59,7 +59,7 @@ export class Memory {
   readonly clock = new Clock();
   readonly agents = new Map<string, Agent>();
   readonly cloud = new Cloud(this.clock);
-  readonly trips = new Map<number, ShownTrip>();
+  readonly trips = new TripLog(this.clock);
   landmarks: Landmark[] = [];
   objects: ObjectSummary[] = [];
   readonly events: ShownEvent[] = [];
@@ -79,8 +79,6 @@ export class Memory {
   private cloudRevision: bigint | null = null;
   private seenCounts = "";
   private nColours = 0;
-  /** For each agent its trip, the place where its latest leg ended, and when. */
-  private readonly underWay = new Map<string, { id: number; place: number | null; s: number }>();
   private isRefreshing = false;
   private hasTrips = false;
   private hasEvents = false;
@@ -114,6 +112,11 @@ export class Memory {
     this.isClosed = true;
     this.stream.close();
     this.timers.forEach((timer) => window.clearInterval(timer));
+  }
+
+  /** Names of the agents, those with numbers in the order of these. */
+  agentNames(): string[] {
+    return [...this.agents.keys()].sort(BY_NAME);
   }
 
   /** Reads an agent's past by all that has been seen since. */
@@ -151,8 +154,7 @@ export class Memory {
     }
     tick.removed.forEach((name) => this.agents.delete(name));
     if (tick.missed !== null) {
-      // What happened in between is not known: no leg joins what is on either side.
-      this.underWay.clear();
+      this.trips.interrupt();
     }
     const events = tick.events.map((record) => this.shown(record));
     for (const event of events) {
@@ -179,7 +181,7 @@ export class Memory {
     const earlier = (await this.space.events()).map((record) => this.shown(record));
     const fresh = earlier.filter(({ id }) => !known.has(id));
     this.events.unshift(...fresh);
-    this.listener.recounted(fresh);
+    this.listener.recounted();
   }
 
   /** What an event says of the map is shown at once; the next reading of the map makes it exact. */
@@ -190,44 +192,11 @@ export class Memory {
     } else if (kind === "place_forgotten") {
       this.cloud.forget(place);
     } else if (kind === "trip_started") {
-      this.startTrip(fields["trip"] as number, event.agent, event.stamp_ns);
+      this.trips.start(fields["trip"] as number, event.agent, event.stamp_ns);
     }
     if (kind === "place_recruited" || kind === "place_entered") {
-      this.extendTrip(event.agent, place, s);
+      this.trips.extend(event.agent, place, s);
     }
-  }
-
-  private startTrip(id: number, agent: string, stampNs: Int64): void {
-    const trip: Trip = {
-      id, agent, start_stamp_ns: stampNs, end_stamp_ns: stampNs, ended: null, leg_count: 0,
-      length_m: 0, strength: 1,
-    };
-    this.trips.set(id, { trip, legs: [] });
-    this.underWay.set(agent, { id, place: null, s: this.clock.seconds(stampNs) });
-  }
-
-  /** A leg ends where the agent comes to another place. */
-  private extendTrip(agent: string, place: number, s: number): void {
-    const running = this.underWay.get(agent) ?? this.latestTrip(agent);
-    if (running === null) {
-      return;
-    }
-    if (running.place !== null && running.place !== place) {
-      const legs = this.trips.get(running.id)?.legs;
-      legs?.push({ from: running.place, to: place, duration_s: Math.max(0, s - running.s) });
-    }
-    this.underWay.set(agent, { id: running.id, place, s });
-  }
-
-  /** The trip that an agent was on when the page was opened. */
-  private latestTrip(agent: string): { id: number; place: number | null; s: number } | null {
-    const own = [...this.trips.values()].filter(({ trip }) => trip.agent === agent && trip.ended === null);
-    const latest = own.sort((a, b) => b.trip.id - a.trip.id)[0];
-    if (latest === undefined) {
-      return null;
-    }
-    const s = this.clock.seconds(latest.trip.end_stamp_ns);
-    return { id: latest.trip.id, place: latest.legs.at(-1)?.to ?? null, s };
   }
 
   private note(s: number): void {
@@ -257,7 +226,7 @@ export class Memory {
       }
       if (!this.hasTrips) {
         this.hasTrips = true;
-        void this.readTrips().catch(() => (this.hasTrips = false));
+        void this.readTrips();
       }
       if (!this.hasEvents) {
         this.hasEvents = true;
@@ -277,20 +246,12 @@ export class Memory {
     }
   }
 
-  /** Reads the latest trips, once; events tell how they go on. */
   private async readTrips(): Promise<void> {
     const since = Number.isFinite(this.end) ? this.clock.stamp(this.end - PAST_S) : undefined;
-    const listed = (await this.space.trips(since)).reverse();
-    let n = 0;
-    for (const trip of listed) {
-      n += trip.leg_count;
-      if (n > LEGS_MAX || this.isClosed) {
-        break;
-      }
-      if (!this.trips.has(trip.id)) {
-        this.trips.set(trip.id, { trip, legs: await this.space.legs(trip.id) });
-        this.listener.refreshed();
-      }
+    try {
+      await this.trips.read(this.space, since, () => this.listener.refreshed());
+    } catch {
+      this.hasTrips = false;
     }
   }
 
@@ -308,7 +269,9 @@ export class Memory {
   }
 
   private async past(
-    name: string, kind: "causal" | "refined", fromS: number,
+    name: string,
+    kind: "causal" | "refined",
+    fromS: number,
   ): Promise<Parameters<Agent["track"]["prepend"]>[0]> {
     const poses: Parameters<Agent["track"]["prepend"]>[0] = [];
     let from: Int64 | null = this.clock.stamp(fromS);

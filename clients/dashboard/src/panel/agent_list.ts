@@ -26,7 +26,7 @@ export class AgentList {
   constructor(private readonly choose: (name: string) => void) {}
 
   update(memory: Memory, palette: Palette, selected: string | null, followed: string | null): void {
-    const names = [...memory.agents.keys()].sort(new Intl.Collator("en", { numeric: true }).compare);
+    const names = memory.agentNames();
     const shown = names.slice(0, ROWS_MAX);
     for (const [name, row] of this.rows) {
       if (!shown.includes(name)) {
@@ -56,8 +56,14 @@ export class AgentList {
     const sd = h("span", { class: "number" });
     const note = h("span", { class: "note" });
     const attributes = { type: "button", "data-agent": name };
-    const element = h("button", { class: "agent", attributes, on: { click: () => this.choose(name) } },
-      mark, h("span", { class: "name" }, name), note, sd);
+    const element = h(
+      "button",
+      { class: "agent", attributes, on: { click: () => this.choose(name) } },
+      mark,
+      h("span", { class: "name" }, name),
+      note,
+      sd,
+    );
     this.element.append(h("li", {}, element));
     const row = { element, mark, sd, note, drawn: "" };
     this.rows.set(name, row);

@@ -11,13 +11,21 @@ import { GridPanel } from "./grid_panel";
 import { badge, glyph } from "./status";
 import { TouchPanel } from "./touch_panel";
 
-const FOLLOW = "M10 3 V7 M10 13 V17 M3 10 H7 M13 10 H17 M10 8.5 A1.5 1.5 0 1 0 10 11.5 A1.5 1.5 0 1 0 10 8.5";
+const FOLLOW =
+  "M10 3 V7 M10 13 V17 M3 10 H7 M13 10 H17 M10 8.5 A1.5 1.5 0 1 0 10 11.5 A1.5 1.5 0 1 0 10 8.5";
 const REFINE = "M3 14 C6 4 9 17 12 8 S16 6 17 5";
 
 export interface AgentActions {
   follow(): void;
   refine(): void;
   chooseModule(module: number): void;
+}
+
+/** What is shown of the agent elsewhere on the page. */
+export interface ShownAgent {
+  isFollowed: boolean;
+  module: number | null;
+  isRefining: boolean;
 }
 
 export class AgentPanel {
@@ -34,10 +42,18 @@ export class AgentPanel {
 
   constructor(actions: AgentActions) {
     this.grid = new GridPanel((module) => actions.chooseModule(module));
-    this.follow = button("Follow", "Keep this agent in the middle (F)", () => actions.follow(), FOLLOW);
-    this.refine = button("Refined trail",
+    this.follow = button(
+      "Follow",
+      "Keep this agent in the middle (F)",
+      () => actions.follow(),
+      FOLLOW,
+    );
+    this.refine = button(
+      "Refined trail",
       "Ask for its way by all that has been seen since, and draw it beside the causal one",
-      () => actions.refine(), REFINE);
+      () => actions.refine(),
+      REFINE,
+    );
     this.element.append(
       h("header", {}, this.mark, this.name, this.status),
       h("div", { class: "actions" }, this.follow, this.refine),
@@ -48,8 +64,11 @@ export class AgentPanel {
   }
 
   update(
-    agent: Agent, detail: AgentDetail | null, memory: Memory, palette: Palette,
-    isFollowed: boolean, module: number | null, isRefining: boolean,
+    agent: Agent,
+    detail: AgentDetail | null,
+    memory: Memory,
+    palette: Palette,
+    { isFollowed, module, isRefining }: ShownAgent,
   ): void {
     const { live } = agent;
     const colour = agentColour(palette, agent.colour);
@@ -65,17 +84,27 @@ export class AgentPanel {
     this.refine.disabled = isRefining;
     const facts = this.facts;
     facts.set("position", `${position(live.translation_m)} m`, "x, y, z in map");
-    facts.set("sure to", `±${deviation(agent.positionSdM)}  ±${degrees(Math.max(...live.rotation_sd_rad))}`,
-      "Standard deviation along and about the worst axis; the ellipsoid shows two of them");
+    facts.set(
+      "sure to",
+      `±${deviation(agent.positionSdM)}  ±${degrees(Math.max(...live.rotation_sd_rad))}`,
+      "Standard deviation along and about the worst axis; the ellipsoid shows two of them",
+    );
     facts.set("heading", degrees(agent.headingRad), "In the x-y plane, against x");
-    facts.set("place", live.place === null ? "none" : `${live.place} · ${percent(live.confidence)}`,
-      "The place cell that answers strongest, and its confidence");
+    facts.set(
+      "place",
+      live.place === null ? "none" : `${live.place} · ${percent(live.confidence)}`,
+      "The place cell that answers strongest, and its confidence",
+    );
     facts.set("stamp", time(live.stamp_ns), exact(live.stamp_ns));
     facts.set("lag", `${count(live.lag_samples)} samples`, "Received and not yet on disk");
     facts.set("travelled", detail === null ? null : metres(detail.travelled_m), "In this session");
     const evidence = detail?.evidence;
-    facts.set("sightings", evidence === undefined ? null
-      : `${count(evidence.accepted)} used, ${count(evidence.refused)} refused`);
+    facts.set(
+      "sightings",
+      evidence === undefined
+        ? null
+        : `${count(evidence.accepted)} used, ${count(evidence.refused)} refused`,
+    );
     const ink = palette.label;
     this.touch.update(agent, memory, palette);
     this.grid.draw(colour, ink, module);

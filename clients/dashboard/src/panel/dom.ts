@@ -11,7 +11,9 @@ export interface Properties {
 }
 
 export function h<K extends keyof HTMLElementTagNameMap>(
-  tag: K, properties: Properties = {}, ...children: Child[]
+  tag: K,
+  properties: Properties = {},
+  ...children: Child[]
 ): HTMLElementTagNameMap[K] {
   const element = document.createElement(tag);
   if (properties.class !== undefined) {
@@ -44,7 +46,10 @@ export function icon(path: string): SVGSVGElement {
 }
 
 export function button(
-  label: string, title: string, press: () => void, drawing?: string,
+  label: string,
+  title: string,
+  press: () => void,
+  drawing?: string,
 ): HTMLButtonElement {
   const attributes = { type: "button", "aria-label": title };
   const made = h("button", { title, attributes, on: { click: press } });

@@ -13,34 +13,51 @@ const LINES_MAX = 60;
 export function inWords({ kind, fields }: ShownEvent): string | null {
   const text = (name: string): string => String(fields[name]);
   switch (kind) {
-    case "agent_enrolled": return "joined the team";
-    case "session_started": return "began a session";
+    case "agent_enrolled":
+      return "joined the team";
+    case "session_started":
+      return "began a session";
     case "agent_placed": {
       const [x, y, z] = fields["translation_m"] as Vec3;
       return `was found at ${[x, y, z].map((c) => metres(c).replace(" m", "")).join(", ")} m`;
     }
-    case "trip_ended": return `ended a trip of ${text("legs")} legs (${text("reason").replace("_", " ")})`;
-    case "landmark_learned": return `learned the landmark ${text("landmark")}`;
-    case "marker_passed": return `passed ${text("label")}`;
-    case "percept_surprising": return `felt something surprising on ${text("channel")}`;
-    case "objects_narrowed": return `touches one of ${text("live")} objects`;
+    case "trip_ended":
+      return `ended a trip of ${text("legs")} legs (${text("reason").replace("_", " ")})`;
+    case "landmark_learned":
+      return `learned the landmark ${text("landmark")}`;
+    case "marker_passed":
+      return `passed ${text("label")}`;
+    case "percept_surprising":
+      return `felt something surprising on ${text("channel")}`;
+    case "objects_narrowed":
+      return `touches one of ${text("live")} objects`;
     case "object_recognised":
       return `recognised ${text("object")} (${percent(Number(fields["probability"]))})`;
-    case "object_unknown": return "touches something unknown";
-    case "object_learned": return `learned ${text("object")} by ${text("contacts")} contacts`;
-    case "object_not_learned": return "could not tell how to learn what it touched";
-    case "objects_merged": return `found ${text("absorbed")} to be ${text("object")}`;
-    case "object_split": return `found ${text("part")} not to be ${text("object")}`;
-    case "samples_skipped": return `lost samples ${text("from")} to ${text("to")}`;
-    case "trip_forgotten": return `made room: trip ${text("trip")} was forgotten`;
-    case "agent_removed": return "was removed";
-    default: return null;
+    case "object_unknown":
+      return "touches something unknown";
+    case "object_learned":
+      return `learned ${text("object")} by ${text("contacts")} contacts`;
+    case "object_not_learned":
+      return "could not tell how to learn what it touched";
+    case "objects_merged":
+      return `found ${text("absorbed")} to be ${text("object")}`;
+    case "object_split":
+      return `found ${text("part")} not to be ${text("object")}`;
+    case "samples_skipped":
+      return `lost samples ${text("from")} to ${text("to")}`;
+    case "trip_forgotten":
+      return `made room: trip ${text("trip")} was forgotten`;
+    case "agent_removed":
+      return "was removed";
+    default:
+      return null;
   }
 }
 
 export class EventFeed {
   readonly element = h("ol", {
-    class: "feed", attributes: { "aria-live": "polite", "aria-label": "events" },
+    class: "feed",
+    attributes: { "aria-live": "polite", "aria-label": "events" },
   });
 
   clear(): void {
@@ -48,11 +65,11 @@ export class EventFeed {
   }
 
   add(events: ShownEvent[], memory: Memory, palette: Palette): void {
-    for (const event of events) {
+    const told = events.flatMap((event) => {
       const words = inWords(event);
-      if (words === null) {
-        continue;
-      }
+      return words === null ? [] : [{ event, words }];
+    });
+    for (const { event, words } of told.slice(-LINES_MAX)) {
       const name = h("b", {}, event.event.agent);
       const agent = memory.agents.get(event.event.agent);
       if (agent !== undefined) {
@@ -60,8 +77,12 @@ export class EventFeed {
       }
       const stamp = event.event.stamp_ns;
       const when = event.s === 0 ? "" : time(stamp).replace(/\.\d$/, "");
-      const line = h("li", { title: event.s === 0 ? "" : exact(stamp) },
-        h("time", {}, when), h("span", {}, name, ` ${words}`));
+      const line = h(
+        "li",
+        { title: event.s === 0 ? "" : exact(stamp) },
+        h("time", {}, when),
+        h("span", {}, name, ` ${words}`),
+      );
       line.classList.add(event.kind);
       this.element.prepend(line);
     }

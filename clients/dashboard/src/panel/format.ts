@@ -38,7 +38,9 @@ export function degrees(rad: number): string {
 /** A probability; what is not quite sure is never said to be 100 %. */
 export function percent(part: number): string {
   const isNearlySure = part > 0.995 && part < 1;
-  return isNearlySure ? `${(Math.floor(1000 * part) / 10).toFixed(1)} %` : `${(100 * part).toFixed(0)} %`;
+  return isNearlySure
+    ? `${(Math.floor(1000 * part) / 10).toFixed(1)} %`
+    : `${(100 * part).toFixed(0)} %`;
 }
 
 export function bytes(n: number): string {
@@ -72,5 +74,7 @@ export function span(s: number): string {
     return `${size.toFixed(size < 10 ? 1 : 0)} s`;
   }
   const minutes = Math.floor(size / 60);
-  return minutes < 100 ? `${minutes} min ${String(Math.floor(size % 60)).padStart(2, "0")}` : `${(size / 3600).toFixed(1)} h`;
+  return minutes < 100
+    ? `${minutes} min ${String(Math.floor(size % 60)).padStart(2, "0")}`
+    : `${(size / 3600).toFixed(1)} h`;
 }

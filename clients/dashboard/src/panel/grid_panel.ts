@@ -12,7 +12,8 @@ const TAIL = 14;
 /** Corners of a cell, and the edges between them. */
 const CORNERS: Vec3[] = Array.from({ length: 8 }, (_, i) => [(i >> 2) & 1, (i >> 1) & 1, i & 1]);
 const EDGES = CORNERS.flatMap((_, i) =>
-  [1, 2, 4].filter((bit) => !(i & bit)).map((bit) => [i, i | bit] as const));
+  [1, 2, 4].filter((bit) => !(i & bit)).map((bit) => [i, i | bit] as const),
+);
 
 interface Cell {
   element: HTMLButtonElement;
@@ -31,9 +32,10 @@ export class GridPanel {
 
   /** @param choose - Called with a module whose firing fields are to be shown, or not any more. */
   constructor(private readonly choose: (module: number) => void) {
-    const title = "Each cube is one cell of a module's lattice: the bright dot is the phase, the "
-      + "others fire the more the nearer their preferred phase. Press one to see where its active "
-      + "cells fire.";
+    const title =
+      "Each cube is one cell of a module's lattice: the bright dot is the phase, the " +
+      "others fire the more the nearer their preferred phase. Press one to see where its active " +
+      "cells fire.";
     this.element.append(
       h("h3", { title }, "Grid cells"),
       this.modules,
@@ -65,8 +67,11 @@ export class GridPanel {
     }
     drawOctant(this.octant, state.octant, colour, ink);
     const octant = state.octant === null ? "no movement yet" : `octant ${state.octant}`;
-    say(this.movement, `${octant} · step ${(100 * state.displacement_m).toFixed(1)} cm · `
-      + `turn ${degrees(state.turning_rad)}`);
+    say(
+      this.movement,
+      `${octant} · step ${(100 * state.displacement_m).toFixed(1)} cm · ` +
+        `turn ${degrees(state.turning_rad)}`,
+    );
   }
 
   private make(module: number): Cell {
@@ -122,8 +127,14 @@ function drawCell(cell: Cell, module: GridModule, colour: string, ink: string): 
   }
   const { clientWidth: width, clientHeight: height } = cell.canvas;
   const corners = CORNERS.map((corner) => onPaper(combine(STANDARD, corner)));
-  const [left, right] = [Math.min(...corners.map((c) => c.x)), Math.max(...corners.map((c) => c.x))];
-  const [top, bottom] = [Math.min(...corners.map((c) => c.y)), Math.max(...corners.map((c) => c.y))];
+  const [left, right] = [
+    Math.min(...corners.map((c) => c.x)),
+    Math.max(...corners.map((c) => c.x)),
+  ];
+  const [top, bottom] = [
+    Math.min(...corners.map((c) => c.y)),
+    Math.max(...corners.map((c) => c.y)),
+  ];
   const scale = Math.min((width - 14) / (right - left), (height - 14) / (bottom - top));
   const put = (phase: ArrayLike<number>): Dot => {
     const { x, y, depth } = onPaper(combine(STANDARD, phase));
@@ -142,8 +153,11 @@ function drawCell(cell: Cell, module: GridModule, colour: string, ink: string): 
   }
   const preferred = module.activation.map((activation, i) => ({
     activation,
-    ...put([Math.floor(i / (CELLS * CELLS)) / CELLS, (Math.floor(i / CELLS) % CELLS) / CELLS,
-      (i % CELLS) / CELLS]),
+    ...put([
+      Math.floor(i / (CELLS * CELLS)) / CELLS,
+      (Math.floor(i / CELLS) % CELLS) / CELLS,
+      (i % CELLS) / CELLS,
+    ]),
   }));
   for (const { x, y, activation } of preferred.sort((a, b) => b.depth - a.depth)) {
     context.globalAlpha = 0.16 + 0.84 * activation;
@@ -155,8 +169,12 @@ function drawCell(cell: Cell, module: GridModule, colour: string, ink: string): 
 }
 
 function drawPhase(
-  context: CanvasRenderingContext2D, cell: Cell, phase: Vec3,
-  put: (phase: ArrayLike<number>) => { x: number; y: number }, colour: string, ink: string,
+  context: CanvasRenderingContext2D,
+  cell: Cell,
+  phase: Vec3,
+  put: (phase: ArrayLike<number>) => { x: number; y: number },
+  colour: string,
+  ink: string,
 ): void {
   cell.tail.push(phase);
   cell.tail.splice(0, Math.max(0, cell.tail.length - TAIL));
@@ -187,7 +205,12 @@ function drawPhase(
 }
 
 /** A cube of the eight octants, with that of the latest movement filled. */
-function drawOctant(canvas: HTMLCanvasElement, octant: number | null, colour: string, ink: string): void {
+function drawOctant(
+  canvas: HTMLCanvasElement,
+  octant: number | null,
+  colour: string,
+  ink: string,
+): void {
   const context = sharpContext(canvas);
   if (context === null) {
     return;
@@ -229,13 +252,20 @@ export function octantSides(octant: number | null): Vec3 | null {
   if (octant === null || octant < 1 || octant > 8) {
     return null;
   }
-  const quadrants: [number, number][] = [[1, 1], [-1, 1], [-1, -1], [1, -1]];
+  const quadrants: [number, number][] = [
+    [1, 1],
+    [-1, 1],
+    [-1, -1],
+    [1, -1],
+  ];
   const [x, y] = quadrants[(octant - 1) % 4]!;
   return [x, y, octant <= 4 ? 1 : -1];
 }
 
 function line(
-  context: CanvasRenderingContext2D, a: { x: number; y: number }, b: { x: number; y: number },
+  context: CanvasRenderingContext2D,
+  a: { x: number; y: number },
+  b: { x: number; y: number },
 ): void {
   context.beginPath();
   context.moveTo(a.x, a.y);

@@ -19,7 +19,9 @@ export class HealthStrip {
   private readonly rate = this.figure("samples/s", "Samples applied in the last second");
   private readonly waiting = this.figure("waiting", "Samples that wait for earlier ones");
   private readonly notDurable = this.figure(
-    "not durable", "Applied samples that are not on disk yet: the lag of the watermark");
+    "not durable",
+    "Applied samples that are not on disk yet: the lag of the watermark",
+  );
   private readonly dropped = this.figure("dropped", "Messages dropped whole since the start");
   private readonly skipped = this.figure("refused", "Samples skipped for good since the start");
   private readonly memory = this.figure("memory", "Memory of the service");
@@ -47,7 +49,11 @@ export class HealthStrip {
     }
     say(this.rate.value, health.samples_per_s === null ? "—" : count(health.samples_per_s));
     this.put(this.waiting, count(health.waiting_samples), health.waiting_samples > 0);
-    this.put(this.notDurable, count(health.not_durable_samples), health.not_durable_samples > 10_000);
+    this.put(
+      this.notDurable,
+      count(health.not_durable_samples),
+      health.not_durable_samples > 10_000,
+    );
     this.put(this.dropped, count(health.dropped_messages), health.dropped_messages > 0);
     this.put(this.skipped, count(health.skipped_samples), health.skipped_samples > 0);
     say(this.memory.value, health.resident_bytes === null ? "—" : bytes(health.resident_bytes));

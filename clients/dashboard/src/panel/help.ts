@@ -1,46 +1,52 @@
 /** The shortcuts and signs, on request. */
 
+import { SHORTCUTS } from "../keys";
 import { button, h } from "./dom";
 import { glyph } from "./status";
-
-export const SHORTCUTS: [string, string][] = [
-  ["1 – 9", "choose an agent"],
-  ["F", "follow the chosen agent"],
-  ["O  T  S", "orbit, top and side view"],
-  ["R", "recall: then click a position"],
-  ["C", "colour places by strength or age"],
-  ["G", "next grid module's firing fields"],
-  ["space", "play the past, or stop"],
-  ["← →", "a second back or on; with shift ten"],
-  ["L", "back to now"],
-  ["D", "dark or light"],
-  ["Esc", "let go of what is chosen"],
-  ["?", "this list"],
-];
 
 export class Help {
   readonly element = h("dialog", { class: "help", attributes: { "aria-label": "help" } });
 
   constructor() {
     const keys = SHORTCUTS.map(([key, does]) =>
-      h("div", {}, h("dt", {}, h("kbd", {}, key)), h("dd", {}, does)));
+      h("div", {}, h("dt", {}, h("kbd", {}, key)), h("dd", {}, does)),
+    );
     const ink = "currentColor";
     const sign = (shape: Node, says: string): HTMLElement => h("li", {}, shape, says);
     this.element.append(
-      h("header", {}, h("h2", {}, "Keys and signs"),
-        button("", "Close", () => this.element.close(), "M5 5 L15 15 M15 5 L5 15")),
+      h(
+        "header",
+        {},
+        h("h2", {}, "Keys and signs"),
+        button("", "Close", () => this.element.close(), "M5 5 L15 15 M15 5 L5 15"),
+      ),
       h("dl", {}, ...keys),
-      h("ul", { class: "signs" },
+      h(
+        "ul",
+        { class: "signs" },
         sign(glyph("localized", ink), "localized: the dart points ahead"),
         sign(glyph("uncertain", ink), "uncertain, with a ring"),
         sign(glyph("lost", ink), "lost: no heading, with a ring"),
-        sign(h("span", { class: "sign shell" }), "shell around an agent or landmark: two standard deviations"),
+        sign(
+          h("span", { class: "sign shell" }),
+          "shell around an agent or landmark: two standard deviations",
+        ),
         sign(h("span", { class: "sign dot" }), "point: a place that the team remembers"),
         sign(h("span", { class: "sign line" }), "thin line: a trip from place to place"),
-        sign(h("span", { class: "sign ray" }), "short ray: a sighting; the thick ones are of other agents"),
-        sign(h("span", { class: "sign flash" }), "flash: found, recognised, learned, merged, come back to"),
+        sign(
+          h("span", { class: "sign ray" }),
+          "short ray: a sighting; the thick ones are of other agents",
+        ),
+        sign(
+          h("span", { class: "sign flash" }),
+          "flash: found, recognised, learned, merged, come back to",
+        ),
       ),
-      h("p", { class: "soft" }, "Drag to turn, drag with the right button to move, scroll to come near."),
+      h(
+        "p",
+        { class: "soft" },
+        "Drag to turn, drag with the right button to move, scroll to come near.",
+      ),
     );
     this.element.addEventListener("click", (event) => {
       if (event.target === this.element) {

@@ -28,7 +28,10 @@ export interface LayoutActions {
 }
 
 const STATES: Record<Connection["state"], string> = {
-  connecting: "connecting", live: "live", reconnecting: "reconnecting", refused: "refused",
+  connecting: "connecting",
+  live: "live",
+  reconnecting: "reconnecting",
+  refused: "refused",
 };
 
 export class Layout {
@@ -38,7 +41,11 @@ export class Layout {
   readonly labels = h("canvas", { class: "labels" });
   /** Called when the panels cover another part of the page. */
   resized: () => void = () => undefined;
-  private readonly state = h("span", { class: "state", attributes: { role: "status" } }, "connecting");
+  private readonly state = h(
+    "span",
+    { class: "state", attributes: { role: "status" } },
+    "connecting",
+  );
   private readonly left: HTMLElement;
   private readonly right: HTMLElement;
   private readonly views: Record<ViewName, HTMLButtonElement>;
@@ -51,28 +58,66 @@ export class Layout {
       top: button("Top", "View from above (T)", () => actions.look("top")),
       side: button("Side", "View from the side (S)", () => actions.look("side")),
     };
-    this.recallButton = button("Recall", "Ask which places answer at a position (R)", actions.recall);
+    this.recallButton = button(
+      "Recall",
+      "Ask which places answer at a position (R)",
+      actions.recall,
+    );
     const logo = h("img", { attributes: { src: logoUrl, alt: "", width: "22", height: "22" } });
-    const header = h("header", { class: "bar" },
-      h("a", { class: "brand", title: "The interface of the service", attributes: { href: "/docs/" } }, logo,
-        h("b", {}, "cogmap")),
-      parts.chooser, this.state, parts.health,
-      h("nav", { class: "tools" },
-        button("", "Dark or light (D)", actions.theme,
-          "M10 3 A7 7 0 1 0 10 17 Z M10 3 A7 7 0 1 1 10 17"),
-        button("?", "Keys and signs (?)", actions.help)));
-    this.left = h("aside", { class: "left" },
+    const header = h(
+      "header",
+      { class: "bar" },
+      h(
+        "a",
+        { class: "brand", title: "The interface of the service", attributes: { href: "/docs/" } },
+        logo,
+        h("b", {}, "cogmap"),
+      ),
+      parts.chooser,
+      this.state,
+      parts.health,
+      h(
+        "nav",
+        { class: "tools" },
+        button(
+          "",
+          "Dark or light (D)",
+          actions.theme,
+          "M10 3 A7 7 0 1 0 10 17 Z M10 3 A7 7 0 1 1 10 17",
+        ),
+        button("?", "Keys and signs (?)", actions.help),
+      ),
+    );
+    this.left = h(
+      "aside",
+      { class: "left" },
       h("section", { class: "card" }, h("h3", {}, "Team"), parts.agents),
-      h("section", { class: "card" }, h("h3", {}, "Memory"), parts.legend));
+      h("section", { class: "card" }, h("h3", {}, "Memory"), parts.legend),
+    );
     this.right = h("aside", { class: "right" }, ...parts.inspected);
-    const bottom = h("footer", { class: "bottom" },
+    const bottom = h(
+      "footer",
+      { class: "bottom" },
       h("section", { class: "events" }, parts.feed),
-      h("div", { class: "controls" },
+      h(
+        "div",
+        { class: "controls" },
         parts.timeline,
         h("div", { class: "segmented views" }, this.views.orbit, this.views.top, this.views.side),
-        this.recallButton));
-    this.element = h("div", { class: "page" },
-      this.view, header, this.left, this.right, bottom, parts.notice, parts.help);
+        this.recallButton,
+      ),
+    );
+    this.element = h(
+      "div",
+      { class: "page" },
+      this.view,
+      header,
+      this.left,
+      this.right,
+      bottom,
+      parts.notice,
+      parts.help,
+    );
     this.showView("orbit");
     new ResizeObserver(() => this.resized()).observe(this.right);
     new ResizeObserver(() => this.resized()).observe(bottom);

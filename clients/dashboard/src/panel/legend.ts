@@ -9,7 +9,10 @@ import { count } from "./format";
 export class Legend {
   readonly element = h("div", { class: "legend" });
   private readonly counts = {
-    places: h("dd"), trips: h("dd"), landmarks: h("dd"), objects: h("dd"),
+    places: h("dd"),
+    trips: h("dd"),
+    landmarks: h("dd"),
+    objects: h("dd"),
   };
   private readonly ramp = h("canvas", { class: "ramp", attributes: { width: "160", height: "1" } });
   private readonly least = h("span");
@@ -27,12 +30,16 @@ export class Legend {
       age: choice("age", "How long ago a place was visited last"),
     };
     const figures = Object.entries(this.counts).map(([name, value]) =>
-      h("div", {}, h("dt", {}, name), value));
+      h("div", {}, h("dt", {}, name), value),
+    );
     this.element.append(
       h("dl", { class: "counts" }, ...figures),
-      h("div", { class: "row" },
+      h(
+        "div",
+        { class: "row" },
         h("span", { class: "soft" }, "places by"),
-        h("span", { class: "segmented" }, this.choices.strength, this.choices.age)),
+        h("span", { class: "segmented" }, this.choices.strength, this.choices.age),
+      ),
       this.ramp,
       h("div", { class: "row ends soft" }, this.least, this.most),
     );

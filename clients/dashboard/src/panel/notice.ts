@@ -9,21 +9,33 @@ export class Notice {
   private readonly detail = h("span");
   private readonly tokenForm: HTMLFormElement;
   private readonly token = h("input", {
-    attributes: { type: "password", autocomplete: "off", required: "", "aria-label": "token", placeholder: "token" },
+    attributes: {
+      type: "password",
+      autocomplete: "off",
+      required: "",
+      "aria-label": "token",
+      placeholder: "token",
+    },
   });
 
   /** @param use - Called with a token that somebody typed. */
   constructor(use: (token: string) => void) {
-    this.tokenForm = h("form", {
-      class: "token",
-      on: {
-        submit: (event) => {
-          event.preventDefault();
-          use(this.token.value.trim());
-          this.token.value = "";
+    this.tokenForm = h(
+      "form",
+      {
+        class: "token",
+        on: {
+          submit: (event) => {
+            event.preventDefault();
+            use(this.token.value.trim());
+            this.token.value = "";
+          },
         },
       },
-    }, this.token, h("button", {}, "Use it"), h("span", { class: "soft" }, "It stays in this tab."));
+      this.token,
+      h("button", {}, "Use it"),
+      h("span", { class: "soft" }, "It stays in this tab."),
+    );
     this.element.append(this.title, this.detail, this.tokenForm);
     this.element.hidden = true;
   }
@@ -49,8 +61,12 @@ export class Notice {
         this.tell("calm", "Connecting", "to the service…");
         return true;
       case "reconnecting":
-        this.tell("warn", "Reconnecting",
-          `${connection.problem.message}. What is shown is the last that was heard; the page comes back by itself.`);
+        this.tell(
+          "warn",
+          "Reconnecting",
+          `${connection.problem.message}. What is shown is what was heard last; ` +
+            "the page comes back by itself.",
+        );
         return true;
       case "refused": {
         const { status, message } = connection.problem;

@@ -22,21 +22,32 @@ export class PlacePanel {
   constructor(recall: (at: Vec3) => void) {
     let here: Vec3 | null = null;
     this.position = (at) => (here = at);
-    const ask = button("Recall from here", "Ask which places answer at this position (R)",
-      () => here !== null && recall(here));
+    const ask = button(
+      "Recall from here",
+      "Ask which places answer at this position (R)",
+      () => here !== null && recall(here),
+    );
     this.element.append(
       h("header", {}, h("span", { class: "mark place" }), this.name),
       h("div", { class: "actions" }, ask),
       this.facts.element,
-      h("h3", {}, "Who was there"), this.visitors,
-      this.expectedTitle, this.expected, this.note,
+      h("h3", {}, "Who was there"),
+      this.visitors,
+      this.expectedTitle,
+      this.expected,
+      this.note,
     );
   }
 
   private readonly position: (at: Vec3) => void;
 
   /** Asks for a place, and what `agent` would feel there. */
-  async show(id: number, memory: Memory, agent: Agent | null, isWanted: () => boolean): Promise<void> {
+  async show(
+    id: number,
+    memory: Memory,
+    agent: Agent | null,
+    isWanted: () => boolean,
+  ): Promise<void> {
     say(this.name, `Place ${id}`);
     try {
       const place = await memory.space.place(id);
@@ -59,48 +70,79 @@ export class PlacePanel {
   private showFacts(place: Place): void {
     const facts = this.facts;
     facts.set("position", `${position(place.translation_m)} m`, "x, y, z in map");
-    facts.set("sure to", `±${deviation(Math.max(...place.position_sd_m))}`,
-      "Standard deviation of the position at the founding, along the worst axis");
+    facts.set(
+      "sure to",
+      `±${deviation(Math.max(...place.position_sd_m))}`,
+      "Standard deviation of the position at the founding, along the worst axis",
+    );
     facts.set("visits", String(place.visits), "Times an agent came here, the founding included");
-    facts.set("strength", place.strength.toFixed(2),
-      "The founding and each visit count one, and half as much after every half-life");
-    facts.set("founded", `${time(place.first_stamp_ns)} by ${place.founder}`, exact(place.first_stamp_ns));
+    facts.set(
+      "strength",
+      place.strength.toFixed(2),
+      "The founding and each visit count one, and half as much after every half-life",
+    );
+    facts.set(
+      "founded",
+      `${time(place.first_stamp_ns)} by ${place.founder}`,
+      exact(place.first_stamp_ns),
+    );
     facts.set("last visit", time(place.last_stamp_ns), exact(place.last_stamp_ns));
   }
 
   /** The founder, and the agents whose trips go through here. */
   private showVisitors(place: Place, memory: Memory): void {
     const passes = new Map<string, number>();
-    for (const { trip, legs } of memory.trips.values()) {
-      const n = legs.filter((leg) => leg.to === place.id).length
-        + (legs[0]?.from === place.id ? 1 : 0);
+    for (const { trip, legs } of memory.trips.trips.values()) {
+      const n =
+        legs.filter((leg) => leg.to === place.id).length + (legs[0]?.from === place.id ? 1 : 0);
       if (n > 0) {
         passes.set(trip.agent, (passes.get(trip.agent) ?? 0) + n);
       }
     }
-    const rows = [...passes].sort((a, b) => b[1] - a[1]).map(([name, n]) =>
-      h("li", {}, h("b", {}, name), ` passed ${n === 1 ? "once" : `${n} times`}`
-        + (name === place.founder ? ", founded it" : "")));
+    const rows = [...passes]
+      .sort((a, b) => b[1] - a[1])
+      .map(([name, n]) =>
+        h(
+          "li",
+          {},
+          h("b", {}, name),
+          ` passed ${n === 1 ? "once" : `${n} times`}` +
+            (name === place.founder ? ", founded it" : ""),
+        ),
+      );
     if (!passes.has(place.founder)) {
       rows.unshift(h("li", {}, h("b", {}, place.founder), " founded it"));
     }
     this.visitors.replaceChildren(...rows);
   }
 
-  private showPrediction(agent: Agent, there: Place, { place, confidence, percepts }: Prediction): void {
+  private showPrediction(
+    agent: Agent,
+    there: Place,
+    { place, confidence, percepts }: Prediction,
+  ): void {
     const from = agent.live.translation_m;
     const way = Math.hypot(...there.translation_m.map((x, i) => x - from[i]!));
     say(this.expectedTitle, `What ${agent.name} would feel there`);
-    this.expected.replaceChildren(...percepts.map(({ channel, expected, percepts: n }) => {
-      const level = expected.level;
-      const what = level === undefined ? `a view of ${expected.descriptor?.vector.length ?? 0} numbers`
-        : `${level.mean.toPrecision(3)} ± ${level.sd.toPrecision(2)}`;
-      return h("li", { title: `Learned from ${n} percepts` }, h("b", {}, channel), ` ${what}`);
-    }));
-    const answers = place === null ? "No place would answer after the way there."
-      : `Place ${place} would answer, with a confidence of ${percent(confidence)} after the noise of `
-        + `the ${metres(way)} there.`;
-    say(this.note, percepts.length > 0 ? answers : `${answers} Nothing was felt here that is remembered.`);
+    this.expected.replaceChildren(
+      ...percepts.map(({ channel, expected, percepts: n }) => {
+        const level = expected.level;
+        const what =
+          level === undefined
+            ? `a view of ${expected.descriptor?.vector.length ?? 0} numbers`
+            : `${level.mean.toPrecision(3)} ± ${level.sd.toPrecision(2)}`;
+        return h("li", { title: `Learned from ${n} percepts` }, h("b", {}, channel), ` ${what}`);
+      }),
+    );
+    const answers =
+      place === null
+        ? "No place would answer after the way there."
+        : `Place ${place} would answer, with a confidence of ${percent(confidence)} after the ` +
+          `noise of the ${metres(way)} there.`;
+    say(
+      this.note,
+      percepts.length > 0 ? answers : `${answers} Nothing was felt here that is remembered.`,
+    );
   }
 }
 

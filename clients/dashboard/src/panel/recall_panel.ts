@@ -15,22 +15,39 @@ export interface RecallActions {
 
 export class RecallPanel {
   readonly element = h("section", { class: "inspect recall-panel" });
-  private readonly inputs = (["x", "y", "z"] as const).map((axis) => h("input", {
-    attributes: { type: "number", step: "any", required: "", "aria-label": `${axis} in metres`, placeholder: axis },
-  }));
+  private readonly inputs = (["x", "y", "z"] as const).map((axis) =>
+    h("input", {
+      attributes: {
+        type: "number",
+        step: "any",
+        required: "",
+        "aria-label": `${axis} in metres`,
+        placeholder: axis,
+      },
+    }),
+  );
   private readonly results = h("ol", { class: "recalled" });
   private readonly note = h("p", { class: "soft" });
   private readonly aim: HTMLButtonElement;
 
   constructor(private readonly actions: RecallActions) {
-    this.aim = button("Point in the map", "Click a position in the map (R)", () => actions.aim(), CROSS);
+    this.aim = button(
+      "Point in the map",
+      "Click a position in the map (R)",
+      () => actions.aim(),
+      CROSS,
+    );
     const submit = (event: Event): void => {
       event.preventDefault();
       actions.ask(this.inputs.map((input) => Number(input.value)) as Vec3);
     };
     this.element.append(
-      h("header", {}, h("h2", {}, "Recall by position"),
-        button("", "Close", () => actions.close(), "M5 5 L15 15 M15 5 L5 15")),
+      h(
+        "header",
+        {},
+        h("h2", {}, "Recall by position"),
+        button("", "Close", () => actions.close(), "M5 5 L15 15 M15 5 L5 15"),
+      ),
       h("form", { class: "cue", on: { submit } }, ...this.inputs, h("button", {}, "Recall")),
       h("div", { class: "actions" }, this.aim),
       this.note,
@@ -52,11 +69,25 @@ export class RecallPanel {
     const bar = h("i");
     bar.style.width = `${100 * (confidence ?? 0)}%`;
     const attributes = { type: "button", "data-place": String(place.id) };
-    return h("li", {}, h("button", { attributes, on: { click: () => this.actions.choose(place.id) } },
-      h("span", { class: "what" }, `Place ${place.id}`),
-      h("span", { class: "bar", title: "Confidence" }, bar),
-      h("span", { class: "number", title: "Confidence" }, confidence === null ? "" : percent(confidence)),
-      h("span", { class: "soft number", title: "Distance; cosine of the grid codes" },
-        `${distance_m === null ? "" : metres(distance_m)} · ${cosine?.toFixed(3) ?? ""}`)));
+    return h(
+      "li",
+      {},
+      h(
+        "button",
+        { attributes, on: { click: () => this.actions.choose(place.id) } },
+        h("span", { class: "what" }, `Place ${place.id}`),
+        h("span", { class: "bar", title: "Confidence" }, bar),
+        h(
+          "span",
+          { class: "number", title: "Confidence" },
+          confidence === null ? "" : percent(confidence),
+        ),
+        h(
+          "span",
+          { class: "soft number", title: "Distance; cosine of the grid codes" },
+          `${distance_m === null ? "" : metres(distance_m)} · ${cosine?.toFixed(3) ?? ""}`,
+        ),
+      ),
+    );
   }
 }

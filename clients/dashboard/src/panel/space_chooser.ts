@@ -9,7 +9,9 @@ export class SpaceChooser {
 
   constructor(choose: (space: string) => void) {
     this.element = h("select", {
-      class: "space", title: "Space", attributes: { "aria-label": "space" },
+      class: "space",
+      title: "Space",
+      attributes: { "aria-label": "space" },
       on: { change: () => choose(this.element.value) },
     });
   }

@@ -18,7 +18,13 @@ export class Timeline {
   time: number | null = null;
   private isPlaying = false;
   private readonly slider = h("input", {
-    attributes: { type: "range", min: "0", max: String(STEPS), step: "1", "aria-label": "time shown" },
+    attributes: {
+      type: "range",
+      min: "0",
+      max: String(STEPS),
+      step: "1",
+      "aria-label": "time shown",
+    },
   });
   private readonly marks = h("canvas", { class: "marks" });
   private readonly label = h("output", { class: "when" });
@@ -28,13 +34,23 @@ export class Timeline {
   constructor(private readonly changed: () => void) {
     this.live = button("Live", "Show what is now (L)", () => this.goLive());
     this.live.classList.add("live");
-    this.play = button("", `Play the past, ${SPEED} times as fast (space)`, () => this.toggle(), PLAY);
+    this.play = button(
+      "",
+      `Play the past, ${SPEED} times as fast (space)`,
+      () => this.toggle(),
+      PLAY,
+    );
     this.slider.value = String(STEPS);
     this.slider.addEventListener("input", () => {
       this.isPlaying = false;
       this.take(Number(this.slider.value) / STEPS);
     });
-    this.element.append(this.play, h("div", { class: "track" }, this.marks, this.slider), this.label, this.live);
+    this.element.append(
+      this.play,
+      h("div", { class: "track" }, this.marks, this.slider),
+      this.label,
+      this.live,
+    );
   }
 
   goLive(): void {
@@ -114,8 +130,14 @@ export class Timeline {
     }
     const { clientWidth: width, clientHeight: height } = this.marks;
     const heights: Record<string, number> = {
-      agent_placed: 1, object_recognised: 1, objects_merged: 1, object_learned: 0.8,
-      object_split: 0.8, agent_enrolled: 0.4, landmark_learned: 0.45, percept_surprising: 0.4,
+      agent_placed: 1,
+      object_recognised: 1,
+      objects_merged: 1,
+      object_learned: 0.8,
+      object_split: 0.8,
+      agent_enrolled: 0.4,
+      landmark_learned: 0.45,
+      percept_surprising: 0.4,
     };
     for (const event of memory.events) {
       const tall = heights[event.kind];

@@ -31,33 +31,43 @@ export class TouchPanel {
     if (this.element.hidden) {
       return;
     }
-    const contacts = isUnderWay ? agent.live.contacts! : said?.contacts ?? 0;
-    say(this.title, isUnderWay
-      ? `${touch?.episode === "learn" ? "Learning" : "Recognising"} by touch · ${contacts} contacts`
-      : `Touched last · ${contacts} contacts`);
+    const contacts = isUnderWay ? agent.live.contacts! : (said?.contacts ?? 0);
+    const doing = touch?.episode === "learn" ? "Learning by touch" : "Recognising by touch";
+    say(this.title, `${isUnderWay ? doing : "Touched last"} · ${contacts} contacts`);
     this.showBars(said, palette);
     const name = said?.pose?.object ?? said?.objects[0]?.name;
     const model = name === undefined ? undefined : this.modelOf(name, memory);
     this.model.hidden = model === undefined;
-    say(this.note, said === null ? "What is felt teaches an object; nothing is compared."
-      : verdict(said));
+    say(
+      this.note,
+      said === null ? "What is felt teaches an object; nothing is compared." : verdict(said),
+    );
     if (model !== undefined) {
       this.draw(model, agent, said, palette);
     }
   }
 
   private showBars(said: Identification | null, palette: Palette): void {
-    const rows = said === null ? [] : [
-      ...said.objects.slice(0, BARS_MAX), { name: "something unknown", probability: said.unknown },
-    ];
+    const rows =
+      said === null
+        ? []
+        : [
+            ...said.objects.slice(0, BARS_MAX),
+            { name: "something unknown", probability: said.unknown },
+          ];
     while (this.bars.childElementCount > rows.length) {
       this.bars.lastElementChild!.remove();
     }
     rows.forEach(({ name, probability }, i) => {
       let row = this.bars.children[i] as HTMLElement | undefined;
       if (row === undefined) {
-        row = h("li", {}, h("span", { class: "what" }), h("span", { class: "bar" }, h("i")),
-          h("span", { class: "number" }));
+        row = h(
+          "li",
+          {},
+          h("span", { class: "what" }),
+          h("span", { class: "bar" }, h("i")),
+          h("span", { class: "number" }),
+        );
         this.bars.append(row);
       }
       const [what, bar, number] = row.children as unknown as [Element, Element, Element];
@@ -83,7 +93,10 @@ export class TouchPanel {
 
   /** Draws the model, turning slowly, and the way of the body on it. */
   private draw(
-    model: ObjectDetail, agent: Agent, said: Identification | null, palette: Palette,
+    model: ObjectDetail,
+    agent: Agent,
+    said: Identification | null,
+    palette: Palette,
   ): void {
     const context = sharpContext(this.model);
     if (context === null) {
@@ -99,7 +112,11 @@ export class TouchPanel {
       const [dx, dy, dz] = at.map((x, i) => x - middle[i]!) as Vec3;
       const x = dx * Math.cos(turn) - dy * Math.sin(turn);
       const away = dx * Math.sin(turn) + dy * Math.cos(turn);
-      return { x: width / 2 + scale * x, y: height / 2 - scale * (0.9 * dz + 0.42 * away), depth: away };
+      return {
+        x: width / 2 + scale * x,
+        y: height / 2 - scale * (0.9 * dz + 0.42 * away),
+        depth: away,
+      };
     };
     const points = model.places.map((place) => ({ ...put(place.position_m), place }));
     const levels = model.places.map((place) => place.levels[0]?.mean ?? 0);
@@ -152,8 +169,10 @@ function verdict(said: Identification): string {
     return "It is none of the objects that were learned.";
   }
   const poses = said.live_hypotheses;
-  return `${poses} ${poses === 1 ? "pose comes" : "poses come"} into question, `
-    + `${said.entropy_nats.toFixed(2)} nats.`;
+  return (
+    `${poses} ${poses === 1 ? "pose comes" : "poses come"} into question, ` +
+    `${said.entropy_nats.toFixed(2)} nats.`
+  );
 }
 
 function ramp(stops: string[], part: number): string {

@@ -114,8 +114,9 @@ export class Eye {
       this.camera.position.add(step);
       this.controls.target.add(step);
       if (this.flight !== null) {
-        [this.flight.from, this.flight.to, this.flight.targetFrom, this.flight.targetTo]
-          .forEach((corner) => corner.add(step));
+        [this.flight.from, this.flight.to, this.flight.targetFrom, this.flight.targetTo].forEach(
+          (corner) => corner.add(step),
+        );
       }
     }
     this.isFollowing = true;

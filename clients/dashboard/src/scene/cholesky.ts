@@ -18,5 +18,9 @@ export function choleskyColumns(c: ArrayLike<number>): [Vec3, Vec3, Vec3] {
   const yy = root(c[3]! - yx * yx);
   const zy = (c[4]! - zx * yx) / yy;
   const zz = root(c[5]! - zx * zx - zy * zy);
-  return [[xx, yx, zx], [0, yy, zy], [0, 0, zz]];
+  return [
+    [xx, yx, zx],
+    [0, yy, zy],
+    [0, 0, zz],
+  ];
 }

@@ -1,8 +1,16 @@
 /** Uncertainty as ellipsoids of two standard deviations, in one draw call. */
 
 import {
-  CustomBlending, DynamicDrawUsage, FrontSide, IcosahedronGeometry, InstancedBufferAttribute,
-  InstancedBufferGeometry, Mesh, OneFactor, OneMinusSrcAlphaFactor, ShaderMaterial,
+  CustomBlending,
+  DynamicDrawUsage,
+  FrontSide,
+  IcosahedronGeometry,
+  InstancedBufferAttribute,
+  InstancedBufferGeometry,
+  Mesh,
+  OneFactor,
+  OneMinusSrcAlphaFactor,
+  ShaderMaterial,
 } from "three";
 import type { Vec3 } from "../wire";
 import { choleskyColumns } from "./cholesky";
@@ -80,14 +88,23 @@ export class Ellipsoids {
    * Adds the ellipsoid of a covariance, given as its upper triangle [m²]. None wider than `limitM`
    * is drawn larger than that: who is lost may be anywhere.
    */
-  add(centre: Vec3, covariance: ArrayLike<number>, limitM: number, colour: Rgb, alpha: number): void {
+  add(
+    centre: Vec3,
+    covariance: ArrayLike<number>,
+    limitM: number,
+    colour: Rgb,
+    alpha: number,
+  ): void {
     const l = choleskyColumns(covariance);
     const widest = DEVIATIONS * Math.max(...l.map((column) => Math.hypot(...column)));
     const scale = DEVIATIONS * Math.min(1, limitM / Math.max(widest, 1e-9));
     const i = this.n;
     this.columns["centre"]!.array.set(centre, 3 * i);
     ["columnX", "columnY", "columnZ"].forEach((name, axis) => {
-      this.columns[name]!.array.set(l[axis]!.map((x) => x * scale), 3 * i);
+      this.columns[name]!.array.set(
+        l[axis]!.map((x) => x * scale),
+        3 * i,
+      );
     });
     this.columns["colour"]!.array.set([...colour, alpha], 4 * i);
     this.n += 1;
@@ -114,7 +131,11 @@ export class Ellipsoids {
       return new InstancedBufferAttribute(array, size).setUsage(DynamicDrawUsage);
     };
     this.columns = {
-      centre: make(3), columnX: make(3), columnY: make(3), columnZ: make(3), colour: make(4),
+      centre: make(3),
+      columnX: make(3),
+      columnY: make(3),
+      columnZ: make(3),
+      colour: make(4),
     };
     this.mesh.geometry.dispose();
     for (const [name, column] of Object.entries(this.columns)) {

@@ -27,6 +27,13 @@ export function flashOf(kind: string, centre: Vec3, palette: Palette, nowMs: num
   }
   const [radiusPx, alpha, lastsMs] = look;
   return {
-    centre, radiusM: 0, radiusPx, colour: rgb(colour), alpha, thickness: 0.06, beganMs: nowMs, lastsMs,
+    centre,
+    radiusM: 0,
+    radiusPx,
+    colour: rgb(colour),
+    alpha,
+    thickness: 0.06,
+    beganMs: nowMs,
+    lastsMs,
   };
 }

@@ -64,7 +64,11 @@ export class Floor {
       writer.add([x0, y, floor], [x1, y, floor], colour, alpha(y), 1);
     }
     const origin: Vec3 = [x0, y0, floor];
-    const axes = { x: [x0 + step, y0, floor], y: [x0, y0 + step, floor], z: [x0, y0, floor + step] };
+    const axes = {
+      x: [x0 + step, y0, floor],
+      y: [x0, y0 + step, floor],
+      z: [x0, y0, floor + step],
+    };
     this.names = [];
     for (const [axis, end] of Object.entries(axes) as ["x" | "y" | "z", Vec3][]) {
       writer.add(origin, end, rgb(palette.axis[axis]), 0.95, 2);
@@ -79,7 +83,10 @@ export class Floor {
     if (this.extent === null) {
       return [];
     }
-    const { x: [x0, x1], y: [y0, y1] } = this.extent;
+    const {
+      x: [x0, x1],
+      y: [y0, y1],
+    } = this.extent;
     const step = this.step;
     const near = (low: number, high: number, at: number): number =>
       Math.abs(at - low) < Math.abs(at - high) ? low - 0.4 * step : high + 0.4 * step;
@@ -97,5 +104,8 @@ export class Floor {
 
 function metres(value: number, step: number): string {
   const digits = Math.max(0, -Math.floor(Math.log10(step)));
-  return `${value.toFixed(digits).replace("-", "−").replace(/^−(0(\.0*)?)$/, "$1")}`;
+  return `${value
+    .toFixed(digits)
+    .replace("-", "−")
+    .replace(/^−(0(\.0*)?)$/, "$1")}`;
 }

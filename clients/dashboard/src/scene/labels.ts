@@ -26,7 +26,8 @@ interface Box {
 
 /** More labels than these nobody reads. */
 const LABELS_MAX = 90;
-export const FONT = 'Inter, "SF Pro Text", "Segoe UI", system-ui, Roboto, "DejaVu Sans", sans-serif';
+export const FONT =
+  'Inter, "SF Pro Text", "Segoe UI", system-ui, Roboto, "DejaVu Sans", sans-serif';
 
 export class Labels {
   private readonly context: CanvasRenderingContext2D;
@@ -60,8 +61,10 @@ export class Labels {
       const align = label.align ?? "left";
       const left = align === "center" ? label.x - (text + note) / 2 : label.x;
       const box = {
-        left: left - 2, right: left + text + note + 2,
-        top: label.y - size * 0.6, bottom: label.y + size * 0.6,
+        left: left - 2,
+        right: left + text + note + 2,
+        top: label.y - size * 0.6,
+        bottom: label.y + size * 0.6,
       };
       const isOutside = box.right < 0 || box.left > width || box.bottom < 0 || box.top > height;
       if (isOutside || taken.some((other) => overlaps(box, other))) {

@@ -1,8 +1,16 @@
 /** Many line segments of a width in pixels, in one draw call. */
 
 import {
-  BufferAttribute, CustomBlending, DynamicDrawUsage, InstancedBufferAttribute,
-  InstancedBufferGeometry, Mesh, OneFactor, OneMinusSrcAlphaFactor, ShaderMaterial, Vector2,
+  BufferAttribute,
+  CustomBlending,
+  DynamicDrawUsage,
+  InstancedBufferAttribute,
+  InstancedBufferGeometry,
+  Mesh,
+  OneFactor,
+  OneMinusSrcAlphaFactor,
+  ShaderMaterial,
+  Vector2,
 } from "three";
 import type { Vec3 } from "../wire";
 import type { Rgb } from "./palette";
@@ -43,7 +51,8 @@ void main() {
   vec2 offset = normal * position.y * half_px + direction * (position.x - 0.5) * 0.5;
   gl_Position = end + vec4(offset * 2.0 / uSize * end.w, 0.0, 0.0);
   float time = position.x < 0.5 ? style.x : style.y;
-  float left = uFade > 0.0 ? mix(uRest, 1.0, pow(clamp(1.0 - (uNow - time) / uFade, 0.0, 1.0), 1.6)) : 1.0;
+  float fresh = clamp(1.0 - (uNow - time) / max(uFade, 1e-6), 0.0, 1.0);
+  float left = uFade > 0.0 ? mix(uRest, 1.0, pow(fresh, 1.6)) : 1.0;
   vColour = vec4(colour.rgb, colour.a * left);
   vAcross = position.y * half_px;
   vWidth = 0.5 * style.z;
@@ -134,8 +143,14 @@ export class Lines {
   }
 
   set(
-    i: number, from: ArrayLike<number>, to: ArrayLike<number>, colour: Rgb, alpha: number,
-    width: number, fromS = 0, toS = fromS,
+    i: number,
+    from: ArrayLike<number>,
+    to: ArrayLike<number>,
+    colour: Rgb,
+    alpha: number,
+    width: number,
+    fromS = 0,
+    toS = fromS,
   ): void {
     this.from.array.set([from[0]!, from[1]!, from[2]!], 3 * i);
     this.to.array.set([to[0]!, to[1]!, to[2]!], 3 * i);

@@ -43,7 +43,9 @@ export class Projection {
 
   /** Where the line of sight through a pixel meets a height [m]; none where it does not. */
   onHeight(camera: PerspectiveCamera, x: number, y: number, z: number): Vec3 | null {
-    const far = new Vector3((2 * x) / this.width - 1, 1 - (2 * y) / this.height, 0.5).unproject(camera);
+    const far = new Vector3((2 * x) / this.width - 1, 1 - (2 * y) / this.height, 0.5).unproject(
+      camera,
+    );
     const way = far.sub(this.eye);
     const times = (z - this.eye.z) / way.z;
     if (!Number.isFinite(times) || times <= 0) {
@@ -76,7 +78,7 @@ export class Projection {
       }
       const v = (e[1]! * px + e[5]! * py + e[9]! * pz + e[13]!) / w;
       const dy = (0.5 - v * 0.5) * this.height - y;
-      // A place that is nearly as close to the pixel and in front of another is the one that is seen.
+      // Of two that are about as close to the pixel, the one in front is seen.
       const off = dx * dx + dy * dy;
       if (off < best - 4 || (off < best + 4 && w < bestDepth && off < REACH_PX.place ** 2)) {
         best = off;

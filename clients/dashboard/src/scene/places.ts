@@ -1,8 +1,15 @@
 /** The places as one point cloud, by strength or by age, in one draw call. */
 
 import {
-  BufferAttribute, BufferGeometry, CustomBlending, DynamicDrawUsage, OneFactor,
-  OneMinusSrcAlphaFactor, Points, ShaderMaterial, Vector3,
+  BufferAttribute,
+  BufferGeometry,
+  CustomBlending,
+  DynamicDrawUsage,
+  OneFactor,
+  OneMinusSrcAlphaFactor,
+  Points,
+  ShaderMaterial,
+  Vector3,
 } from "three";
 import type { Cloud } from "../memory/cloud";
 import { rgb, type Palette } from "./palette";
@@ -110,7 +117,11 @@ export class Places {
 
   /** Takes in what changed in the cloud, and shows it as of a time. */
   update(
-    nowS: number, untilS: number, pixel: number, ratio: number, depth: [number, number],
+    nowS: number,
+    untilS: number,
+    pixel: number,
+    ratio: number,
+    depth: [number, number],
   ): void {
     const uniforms = this.points.material.uniforms;
     uniforms["uNow"]!.value = nowS;

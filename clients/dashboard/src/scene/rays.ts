@@ -26,7 +26,15 @@ export class Rays {
 
   add(from: Vec3, to: Vec3, colour: Rgb, isOfAgent: boolean, nowMs: number): void {
     const s = nowMs / 1000;
-    this.lines.set(OTHERS + this.next, from, to, colour, isOfAgent ? 0.95 : 0.5, isOfAgent ? 2.2 : 1.2, s);
+    this.lines.set(
+      OTHERS + this.next,
+      from,
+      to,
+      colour,
+      isOfAgent ? 0.95 : 0.5,
+      isOfAgent ? 2.2 : 1.2,
+      s,
+    );
     this.lines.upload(OTHERS + this.next, 1);
     this.next = (this.next + 1) % RAYS;
     this.latestMs = nowMs;
@@ -60,7 +68,14 @@ export class Rays {
     this.lines.upload(0, OTHERS);
   }
 
-  private put(from: Vec3, to: Vec3, colour: Rgb, alpha: number, width: number, nowMs: number): void {
+  private put(
+    from: Vec3,
+    to: Vec3,
+    colour: Rgb,
+    alpha: number,
+    width: number,
+    nowMs: number,
+  ): void {
     if (this.n < OTHERS) {
       this.lines.set(this.n, from, to, colour, alpha, width, nowMs / 1000);
       this.n += 1;

@@ -1,8 +1,15 @@
-/** Rings and soft discs that face the viewer: flashes, marks and firing fields, in one draw call. */
+/** Rings and soft discs that face the eye: flashes, marks, firing fields; one draw call. */
 
 import {
-  BufferAttribute, CustomBlending, DynamicDrawUsage, InstancedBufferAttribute,
-  InstancedBufferGeometry, Mesh, OneFactor, OneMinusSrcAlphaFactor, ShaderMaterial,
+  BufferAttribute,
+  CustomBlending,
+  DynamicDrawUsage,
+  InstancedBufferAttribute,
+  InstancedBufferGeometry,
+  Mesh,
+  OneFactor,
+  OneMinusSrcAlphaFactor,
+  ShaderMaterial,
 } from "three";
 import type { Vec3 } from "../wire";
 import type { Rgb } from "./palette";

@@ -1,8 +1,14 @@
 /** Small solids that stand for agents and landmarks: instances of a few shapes in one draw call. */
 
 import {
-  BufferAttribute, BufferGeometry, DynamicDrawUsage, InstancedBufferAttribute,
-  InstancedBufferGeometry, Mesh, OctahedronGeometry, ShaderMaterial,
+  BufferAttribute,
+  BufferGeometry,
+  DynamicDrawUsage,
+  InstancedBufferAttribute,
+  InstancedBufferGeometry,
+  Mesh,
+  OctahedronGeometry,
+  ShaderMaterial,
 } from "three";
 import type { Quat, Vec3 } from "../wire";
 import type { Rgb } from "./palette";
@@ -146,20 +152,43 @@ function solid(corners: number[][], faces: number[][]): BufferGeometry {
 
 function dart(): BufferGeometry {
   const corners = [
-    [1.25, 0, 0], [-0.8, 0.72, 0], [-0.8, -0.72, 0], [-0.4, 0, 0.42], [-0.4, 0, -0.24],
+    [1.25, 0, 0],
+    [-0.8, 0.72, 0],
+    [-0.8, -0.72, 0],
+    [-0.4, 0, 0.42],
+    [-0.4, 0, -0.24],
   ];
-  const faces = [[0, 1, 3], [0, 3, 2], [0, 4, 1], [0, 2, 4], [1, 4, 3], [2, 3, 4]];
+  const faces = [
+    [0, 1, 3],
+    [0, 3, 2],
+    [0, 4, 1],
+    [0, 2, 4],
+    [1, 4, 3],
+    [2, 3, 4],
+  ];
   return solid(corners, faces);
 }
 
 function cube(): BufferGeometry {
   const half = 0.62;
   const corners = Array.from({ length: 8 }, (_, i) => [
-    i & 4 ? half : -half, i & 2 ? half : -half, i & 1 ? half : -half,
+    i & 4 ? half : -half,
+    i & 2 ? half : -half,
+    i & 1 ? half : -half,
   ]);
   const faces = [
-    [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-    [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    [0, 1, 3],
+    [0, 3, 2],
+    [4, 6, 7],
+    [4, 7, 5],
+    [0, 4, 5],
+    [0, 5, 1],
+    [2, 3, 7],
+    [2, 7, 6],
+    [0, 2, 6],
+    [0, 6, 4],
+    [1, 5, 7],
+    [1, 7, 3],
   ];
   return solid(corners, faces);
 }

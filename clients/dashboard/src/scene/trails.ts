@@ -42,7 +42,10 @@ export class Trails {
     const layout = palette.shade + wanted.map(({ key }) => key).join();
     if (layout !== this.layout) {
       this.layout = layout;
-      this.size = Math.min(SEGMENTS_OF_ONE_MAX, Math.floor(SEGMENTS_MAX / Math.max(1, wanted.length)));
+      this.size = Math.min(
+        SEGMENTS_OF_ONE_MAX,
+        Math.floor(SEGMENTS_MAX / Math.max(1, wanted.length)),
+      );
       const n = this.size * wanted.length;
       this.lines.reserve(n);
       for (let i = 0; i < n; i += 1) {
@@ -50,7 +53,12 @@ export class Trails {
       }
       this.lines.count = n;
       this.slots = wanted.map(({ track, colour, width }, i) => ({
-        track, colour, width, first: i * this.size, drawn: 0, rewrites: track.rewrites,
+        track,
+        colour,
+        width,
+        first: i * this.size,
+        drawn: 0,
+        rewrites: track.rewrites,
       }));
       this.lines.upload(0, n);
     }

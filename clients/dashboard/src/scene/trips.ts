@@ -2,7 +2,7 @@
 
 import type { Cloud } from "../memory/cloud";
 import type { Clock } from "../memory/clock";
-import type { ShownTrip } from "../memory/memory";
+import type { ShownTrip } from "../memory/trip_log";
 import { Lines, LineWriter } from "./lines";
 import { rgb, type Palette } from "./palette";
 

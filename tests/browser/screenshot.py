@@ -1,0 +1,95 @@
+"""Takes the picture of the page that the documents show: of a demo, as anybody can run it."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import re
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from PIL import Image
+from playwright.sync_api import Page, sync_playwright
+
+from conftest import ARGUMENTS, chromium
+
+#: Address that the demo prints.
+_ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+")
+#: Longest wait for it [s].
+_START_S = 30.0
+#: Largest picture [bytes].
+_BYTES_MAX = 400_000
+_SIZE = {"width": 1440, "height": 900}
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--binary", required=True, help="the program cogmap")
+    options.add_argument("--out", required=True, type=Path, help="the picture, PNG")
+    options.add_argument("--after", type=float, default=50.0, help="seconds into the demo")
+    options.add_argument("--keys", default="", help="keys that are pressed before")
+    options.add_argument("--theme", choices=["dark", "light"], default="dark")
+    asked = options.parse_args()
+    with tempfile.TemporaryFile("w+") as log:
+        command = [asked.binary, "demo", "--duration", f"{asked.after + 60:.0f}s"]
+        demo = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
+        try:
+            picture = take(address(demo, Path(f"/proc/self/fd/{log.fileno()}")), asked)
+        finally:
+            demo.terminate()
+            demo.wait()
+    asked.out.parent.mkdir(parents=True, exist_ok=True)
+    asked.out.write_bytes(picture)
+    print(f"{asked.out}: {len(picture)} bytes")
+
+
+def address(demo: "subprocess.Popen[str]", log: Path) -> str:
+    """Where the demo says that its service listens."""
+    deadline = time.monotonic() + _START_S
+    while time.monotonic() < deadline and demo.poll() is None:
+        found = _ADDRESS.search(log.read_text())
+        if found:
+            return found.group()
+        time.sleep(0.1)
+    raise RuntimeError(f"the demo told no address:\n{log.read_text()}")
+
+
+def take(url: str, asked: argparse.Namespace) -> bytes:
+    """The picture of the page, some time into the demo."""
+    began = time.monotonic()
+    arguments = ARGUMENTS + (["--no-sandbox"] if os.geteuid() == 0 else [])
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium(), args=arguments)
+        page = browser.new_page(viewport=_SIZE, color_scheme=asked.theme)
+        page.goto(f"{url}/?space=demo")
+        wait(page, began + asked.after - time.monotonic())
+        for key in asked.keys.split():
+            page.keyboard.press(key)
+        wait(page, 3.0)
+        picture = page.screenshot()
+        browser.close()
+    return small(picture)
+
+
+def wait(page: Page, seconds: float) -> None:
+    page.wait_for_timeout(max(0.0, 1000 * seconds))
+
+
+def small(picture: bytes) -> bytes:
+    """The picture with as many colours as fit into the bytes that it may have."""
+    image = Image.open(io.BytesIO(picture)).convert("RGB")
+    for colours in (None, 256, 128, 64):
+        made = image if colours is None else image.quantize(
+            colours, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.FLOYDSTEINBERG)
+        written = io.BytesIO()
+        made.save(written, "PNG", optimize=True)
+        if written.tell() <= _BYTES_MAX:
+            break
+    return written.getvalue()
+
+
+if __name__ == "__main__":
+    main()
