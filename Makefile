@@ -18,6 +18,7 @@ PAGE := target/dashboard/index.html
 BROWSER := tests/browser
 # Debian's, or another one that is named here.
 export CHROMIUM ?= chromium
+AS_ROOT := $(shell [ $$(id -u) = 0 ] || echo sudo --non-interactive)
 
 # The end-to-end tests of both languages start this binary.
 export COGMAP_BIN := $(TARGET)/debug/cogmap
@@ -81,9 +82,12 @@ test-browser: needs-node needs-chromium $(BROWSER)/.venv/installed ## the page i
 needs-node:
 	@test -n '$(NODE_FITS)' || { echo 'The page is built with Node 20.19, 22.12 or later: install it (nodejs.org, or your distribution).' >&2; exit 1; }
 
+# Debian's package, where it may be installed; elsewhere whoever runs the tests is told what is missing.
 .PHONY: needs-chromium
 needs-chromium:
-	@command -v $(CHROMIUM) >/dev/null || { echo 'There is no Chromium: apt-get install chromium, or name one: CHROMIUM=/path/to/it.' >&2; exit 1; }
+	@command -v $(CHROMIUM) >/dev/null || $(AS_ROOT) sh -c \
+	    'apt-get update --quiet && apt-get install --quiet --yes chromium' || { \
+	    echo 'There is no Chromium: apt-get install chromium, or name one: CHROMIUM=/path/to/it.' >&2; exit 1; }
 
 $(BROWSER)/.venv/installed: $(BROWSER)/requirements.txt $(CLIENT)/pyproject.toml
 	$(PYTHON) -m venv --clear $(BROWSER)/.venv
