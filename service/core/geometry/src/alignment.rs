@@ -1,8 +1,8 @@
 //! Alignment of points with points.
 
-use nalgebra::{Isometry3, Matrix3, Point3, SVD, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, SVD, Translation3, Vector3};
 
-use super::rotation::rotation_of;
+use super::rotation::{planar_procrustes, rotation_of};
 
 /// Steps of a decomposition, which needs some ten.
 const STEPS_MAX: usize = 200;
@@ -27,7 +27,7 @@ pub fn align(
         if sine == 0.0 && cosine == 0.0 {
             return None;
         }
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sine.atan2(cosine))
+        planar_procrustes(&products)
     } else {
         // Numbers beyond all bounds must not keep it going for ever.
         let svd = SVD::try_new(products, true, true, f64::EPSILON, STEPS_MAX)?;

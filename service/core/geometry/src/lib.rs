@@ -22,6 +22,6 @@ pub use planar::{
     planar_part,
 };
 pub use positive::positive;
-pub use rotation::{procrustes, rotation_from_xyzw};
+pub use rotation::{planar_procrustes, procrustes, rotation_from_xyzw};
 pub use se3_jacobian::log_jacobian;
 pub use symmetric::{from_upper_triangle, symmetric};

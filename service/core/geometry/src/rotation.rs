@@ -13,6 +13,13 @@ pub fn procrustes(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
     rotation_of(&svd).expect("both factors are asked for")
 }
 
+/// The rotation about z that maximises tr(Rᵀ M).
+pub fn planar_procrustes(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
+    let sine = matrix[(1, 0)] - matrix[(0, 1)];
+    let cosine = matrix[(0, 0)] + matrix[(1, 1)];
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sine.atan2(cosine))
+}
+
 /// The rotation of [`procrustes`] from the decomposition; `None` if that lacks a factor.
 pub(super) fn rotation_of(svd: &SVD<f64, U3, U3>) -> Option<UnitQuaternion<f64>> {
     let (u, v_t) = (svd.u?, svd.v_t?);

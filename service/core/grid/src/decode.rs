@@ -79,15 +79,16 @@ pub fn decode(
     let known: Vec<Known<'_>> = known_modules(modules, code);
     let centre = near.unwrap_or_else(Point3::origin);
     let range_m = range_m(known.iter().map(|module| module.lattice), PHASE_NOISE_TURNS);
+    let nothing = |searched_m| Decoded {
+        position: centre,
+        residual_m: 0.0,
+        ambiguous: true,
+        range_m,
+        searched_m,
+    };
     let (Some(finest), Some(coarsest)) = (known.first(), known.last()) else {
         // A code of another space with all its modules beyond this one's: nothing is known.
-        return Decoded {
-            position: centre,
-            residual_m: 0.0,
-            ambiguous: true,
-            range_m,
-            searched_m: 0.0,
-        };
+        return nothing(0.0);
     };
     let spacing_m = finest.lattice.spacing_m();
     let cell_m3 = coarsest.lattice.spacing_m().powi(3) / SQRT_2;
@@ -106,13 +107,7 @@ pub fn decode(
         }
     });
     let Some(best) = least(&found).or(outside) else {
-        return Decoded {
-            position: centre,
-            residual_m: 0.0,
-            ambiguous: true,
-            range_m,
-            searched_m,
-        };
+        return nothing(searched_m);
     };
 
     let apart = |other: &&Candidate| (other.position - best.position).norm() > 0.5 * spacing_m;

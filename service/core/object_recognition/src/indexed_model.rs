@@ -1,11 +1,11 @@
 //! A model with its indexes, ready for recognition.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
 use crate::model::{LevelMemory, ObjectModel};
-use crate::numeric::floor_u32;
+use crate::numeric::{centroid, floor_u32};
 use crate::surfels::map::SurfelMap;
 
 use crate::tuning::{FIELD_PER_SPACING, SHARE_BINS, SHARE_SAMPLES};
@@ -41,20 +41,15 @@ impl IndexedModel {
                 descriptors: place.descriptors.clone(),
             })
             .collect();
-        let noise_m2 = model.places().iter().map(|p| p.variance_m2 / p.count);
-        let noise_m2 = noise_m2.sum::<f64>() / places.len().max(1) as f64;
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
-        let middle = positions
-            .iter()
-            .fold(Vector3::zeros(), |sum, p| sum + p.coords)
-            / positions.len().max(1) as f64;
+        let middle = centroid(positions.iter().map(|position| position.coords));
         let radius_m = positions
             .iter()
             .map(|p| (p.coords - middle).norm())
             .fold(model.spacing_m(), f64::max);
         let extent_m = 2.0 * radius_m;
         Self {
-            packed: PackedPlaces::new(&places, model.spacing_m(), extent_m, noise_m2),
+            packed: PackedPlaces::new(&places, model.spacing_m(), extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
             surfel_map: SurfelMap::new(model),

@@ -49,6 +49,12 @@ pub(crate) fn bounds(points: impl Iterator<Item = Vector3<f64>>) -> (Vector3<f64
         .unwrap_or_default()
 }
 
+/// The mean of some points; zero without any.
+pub(crate) fn centroid(points: impl ExactSizeIterator<Item = Vector3<f64>>) -> Vector3<f64> {
+    let count = points.len().max(1) as f64;
+    points.sum::<Vector3<f64>>() / count
+}
+
 /// log Σ exp, without overflow.
 pub(crate) fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
     let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);

@@ -7,7 +7,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3};
 
-use geometry::procrustes;
+use geometry::{planar_procrustes, procrustes};
 
 use super::elimination::{CliqueTree, Equations, Front, slot};
 use super::graph::PoseGraph;
@@ -74,10 +74,7 @@ fn turned(node: &Node, matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
             .to_rotation_matrix()
             .matrix()
             .tr_mul(matrix);
-        let sin = relative[(1, 0)] - relative[(0, 1)];
-        let cos = relative[(0, 0)] + relative[(1, 1)];
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sin.atan2(cos));
-        return node.pose.rotation * turn;
+        return node.pose.rotation * planar_procrustes(&relative);
     }
     nearest_rotation(matrix)
 }

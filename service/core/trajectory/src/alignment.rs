@@ -1,6 +1,6 @@
 //! The rigid motion which brings an estimate nearest to the truth.
 
-use geometry::procrustes;
+use geometry::{planar_procrustes, procrustes};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 /// What is fitted before an error is taken.
@@ -34,11 +34,7 @@ impl Alignment {
         }
         let rotation = match self {
             Self::None => UnitQuaternion::identity(),
-            Self::Planar => {
-                let dot = covariance[(0, 0)] + covariance[(1, 1)];
-                let cross = covariance[(1, 0)] - covariance[(0, 1)];
-                UnitQuaternion::from_axis_angle(&Vector3::z_axis(), cross.atan2(dot))
-            }
+            Self::Planar => planar_procrustes(&covariance),
             Self::Spatial => procrustes(&covariance),
         };
         let mut shift = truth_centre - rotation * estimate_centre;

@@ -1,11 +1,11 @@
 //! Places of a model, packed for vectorised lookups, with their indexes.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use crate::index::lattice_index::LatticeIndex;
 use crate::index::nearest_grid::NearestGrid;
 use crate::indexed_place::IndexedPlace;
-use crate::numeric::to_f32;
+use crate::numeric::{centroid, to_f32};
 use crate::tuning::{
     GATE_SQUARED, NEAREST_CELLS_PER_REACH, NEAREST_GROWTH, NEAREST_MARGIN, NEAREST_SD,
 };
@@ -57,8 +57,7 @@ impl PackedPlaces {
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
         let (lattice_index, order) = LatticeIndex::new(&positions);
         let count = places.len().max(1) as f64;
-        let sum = positions.iter().map(|position| position.coords);
-        let middle = Point3::from(sum.sum::<Vector3<f64>>() / count);
+        let middle = Point3::from(centroid(positions.iter().map(|position| position.coords)));
         let levels = levels(places);
         let ordered = || order.iter().map(|&number| &places[number as usize]);
         let packed_place = |place: &IndexedPlace| PackedPlace {

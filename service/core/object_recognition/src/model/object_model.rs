@@ -104,6 +104,12 @@ impl ObjectModel {
         self.spacing_m
     }
 
+    /// Mean variance of a contact about its place, per axis \[m²\]; 0 without places.
+    pub(crate) fn noise_m2(&self) -> f64 {
+        let noises = self.places.iter().map(|p| p.variance_m2 / p.count);
+        noises.sum::<f64>() / self.places.len().max(1) as f64
+    }
+
     /// The settings.
     pub fn settings(&self) -> &ModelSettings {
         &self.settings

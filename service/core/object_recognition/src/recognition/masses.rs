@@ -156,11 +156,8 @@ impl Recognition {
             }
             Hypotheses::Poses(_) => {
                 let logs = self.pose_logs(library);
-                let own: Vec<f64> = { logs.iter() }
-                    .filter(|(other, _)| *other == object)
-                    .map(|(_, log)| *log)
-                    .collect();
-                log_sum(own.into_iter())
+                let own = logs.iter().filter(|(other, _)| *other == object);
+                log_sum(own.map(|(_, log)| *log))
             }
         }
     }
@@ -190,23 +187,13 @@ impl Recognition {
 
 /// Log of each object's mass.
 fn sums(library: &ObjectLibrary, logs: &[(ObjectId, f64)]) -> Vec<(ObjectId, f64)> {
-    let mut sums: BTreeMap<ObjectId, (f64, f64)> = library
-        .indexed_models()
-        .map(|(object, _)| (object, (f64::NEG_INFINITY, 0.0)))
-        .collect();
+    let objects = library.indexed_models().map(|(object, _)| object);
+    let mut own: BTreeMap<ObjectId, Vec<f64>> = objects.map(|own| (own, Vec::new())).collect();
     for (object, log) in logs {
-        if let Some((most, _)) = sums.get_mut(object) {
-            *most = most.max(*log);
+        if let Some(own) = own.get_mut(object) {
+            own.push(*log);
         }
     }
-    for (object, log) in logs {
-        if let Some((most, sum)) = sums.get_mut(object) {
-            *sum += (log - *most).exp();
-        }
-    }
-    let sum = |(object, (most, sum)): (ObjectId, (f64, f64))| {
-        let is_empty = most == f64::NEG_INFINITY;
-        (object, if is_empty { most } else { most + sum.ln() })
-    };
-    sums.into_iter().map(sum).collect()
+    let sum = |(object, own): (ObjectId, Vec<f64>)| (object, log_sum(own.into_iter()));
+    own.into_iter().map(sum).collect()
 }

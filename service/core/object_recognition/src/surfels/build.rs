@@ -2,10 +2,11 @@
 
 use std::f64::consts::{FRAC_1_PI, TAU};
 
-use nalgebra::{Unit, Vector3};
+use nalgebra::Unit;
 
 use crate::index::cell_lists::CellLists;
 use crate::model::ObjectModel;
+use crate::numeric::centroid;
 use crate::surfels::coverage_test::CoverageTest;
 use crate::surfels::fit::surfels;
 use crate::surfels::local_surface::LocalSurface;
@@ -24,10 +25,7 @@ impl SurfelMap {
         if surfels.len() < 3 {
             return None;
         }
-        let sum = surfels
-            .iter()
-            .fold(Vector3::zeros(), |sum, surfel| sum + surfel.position.coords);
-        let middle = sum / surfels.len() as f64;
+        let middle = centroid(surfels.iter().map(|surfel| surfel.position.coords));
         for surfel in &mut surfels {
             surfel.position -= middle;
         }
@@ -36,12 +34,7 @@ impl SurfelMap {
             .map(|surfel| surfel.position.coords.norm())
             .fold(1e-9, f64::max);
         let extent_m = 2.0 * radius_m;
-        let noise_m2 = model
-            .places()
-            .iter()
-            .map(|place| place.variance_m2 / place.count)
-            .sum::<f64>()
-            / model.places().len() as f64;
+        let noise_m2 = model.noise_m2();
         let mut map = Self {
             middle,
             pairs: PointPairTable::new(&surfels, extent_m),

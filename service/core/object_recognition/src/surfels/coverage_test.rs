@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::numeric::centroid;
 use crate::surfels::surfel::Surfel;
 use crate::tuning::{COVERAGE_CONTACTS_MIN, HALVINGS_MAX, PART_PLACES_MIN};
 use crate::z_score;
@@ -75,9 +76,8 @@ impl CoverageTest {
 
 /// The cut through the median of a part's area across its longest axis, and both halves.
 fn halved(surfels: &[Surfel], mut part: Vec<usize>) -> ((usize, f64), [Vec<usize>; 2]) {
-    let count = part.len().max(1) as f64;
     let place = |at: usize| surfels[at].position.coords;
-    let mean = part.iter().map(|&at| place(at)).sum::<Vector3<f64>>() / count;
+    let mean = centroid(part.iter().map(|&at| place(at)));
     let spread = part.iter().map(|&at| (place(at) - mean).map(|x| x * x));
     let axis = spread.sum::<Vector3<f64>>().imax();
     part.sort_by(|&a, &b| place(a)[axis].total_cmp(&place(b)[axis]).then(a.cmp(&b)));

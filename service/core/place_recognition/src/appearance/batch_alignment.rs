@@ -215,8 +215,7 @@ impl<'a> ChannelBatch<'a> {
 impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, About> {
     /// The batch of all queries, with the views about a pose; `None` if there are none.
     pub(crate) fn whole(&self, pose: &Isometry3<f64>) -> Option<BatchAlignment<'a>> {
-        let way: Vec<Point3<f64>> = self.queries.iter().map(|each| pose * each.at).collect();
-        let views = (self.views)(&way);
+        let views = (self.views)(&self.way(pose));
         let mut channels: Vec<u8> = self.queries.iter().map(|each| each.channel).collect();
         channels.sort_unstable();
         channels.dedup();

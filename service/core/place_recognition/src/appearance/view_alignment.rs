@@ -96,9 +96,14 @@ impl LocalQuery<'_> {
 }
 
 impl<'a, About: Fn(&[Point3<f64>]) -> ReferenceViews<'a>> ViewAlignment<'a, About> {
+    /// Positions of the queries for a pose of the body.
+    pub(super) fn way(&self, pose: &Isometry3<f64>) -> Vec<Point3<f64>> {
+        self.queries.iter().map(|each| pose * each.at).collect()
+    }
+
     /// The process about each query at a pose.
     fn about(&self, pose: &Isometry3<f64>) -> Vec<Option<DescriptorProcess>> {
-        let way: Vec<Point3<f64>> = self.queries.iter().map(|each| pose * each.at).collect();
+        let way = self.way(pose);
         let views = (self.views)(&way);
         let each = way.iter().zip(&self.queries);
         each.map(|(at, query)| {
