@@ -17,6 +17,7 @@
 
 use std::collections::BTreeMap;
 
+use super::graph::KeyframeGraph;
 use super::map::KeyframeMap;
 use super::settings::KeyframeSettings;
 use place_recognition::Part;
@@ -24,17 +25,29 @@ use state::Digest;
 use state::{CorruptState, State, StateReader, StateWriter};
 use state::{PagedVec, write_page};
 
+/// Number of the head.
 const HEAD: u8 = 0;
-const TRACKS_OF_AGENTS: u8 = 1;
-const KEYFRAMES: u8 = 2;
-const SIGHTINGS: u8 = 3;
-const CONSTRAINTS: u8 = 4;
-const LANDMARKS: u8 = 5;
-const VIEWS: u8 = 6;
-const TRACKS: u8 = 7;
-const SEARCHES: u8 = 8;
-const ATTACHMENTS: u8 = 9;
-const KIDNAP_TESTS: u8 = 10;
+
+/// A part of the graph.
+macro_rules! of_graph {
+    ($($field:ident).+) => {
+        Stored::InGraph(|graph| &graph.$($field).+, |graph| &mut graph.$($field).+)
+    };
+}
+
+/// The other parts, by number, from 1.
+const PARTS: [Stored; 10] = [
+    of_graph!(chains.tracks),
+    of_graph!(chains.keyframes.pages),
+    of_graph!(sightings.slab.pages),
+    of_graph!(constraints.slab.pages),
+    of_graph!(sightings.landmarks.slots.pages),
+    Stored::InRecognition(Part::Views),
+    Stored::InRecognition(Part::Tracks),
+    Stored::InRecognition(Part::Searches),
+    of_graph!(attachments.slab.pages),
+    Stored::InRecognition(Part::KidnapTests),
+];
 
 /// Number of pending sightings at the end of the head: they are the estimator's.
 const N_PENDING: u64 = 0;
@@ -50,6 +63,13 @@ pub struct KeyframePage {
     pub bytes: Vec<u8>,
 }
 
+impl KeyframePage {
+    fn new(part: u8, index: usize, bytes: Vec<u8>) -> Self {
+        let index = u32::try_from(index).expect("2³² items have fewer pages");
+        Self { part, index, bytes }
+    }
+}
+
 /// Pages that are no keyframe map: some are missing, damaged, left over or of another time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the pages are no map")]
@@ -58,26 +78,12 @@ pub struct CorruptKeyframes;
 impl KeyframeMap {
     /// The pages that changed after `since_revision`, the head always among them; 0 gives all.
     pub fn checkpoint(&self, since_revision: u64) -> impl Iterator<Item = KeyframePage> {
-        let since = since_revision;
-        let (graph, seen) = (&self.graph, &self.recognition);
-        std::iter::once(self.head())
-            .chain(pages_of(TRACKS_OF_AGENTS, &graph.chains.tracks, since))
-            .chain(pages_of(KEYFRAMES, &graph.chains.keyframes.pages, since))
-            .chain(pages_of(SIGHTINGS, &graph.sightings.slab.pages, since))
-            .chain(pages_of(CONSTRAINTS, &graph.constraints.slab.pages, since))
-            .chain(pages_of(
-                LANDMARKS,
-                &graph.sightings.landmarks.slots.pages,
-                since,
-            ))
-            .chain(seen_pages(VIEWS, seen.pages(Part::Views, since)))
-            .chain(seen_pages(TRACKS, seen.pages(Part::Tracks, since)))
-            .chain(seen_pages(SEARCHES, seen.pages(Part::Searches, since)))
-            .chain(pages_of(ATTACHMENTS, &graph.attachments.slab.pages, since))
-            .chain(seen_pages(
-                KIDNAP_TESTS,
-                seen.pages(Part::KidnapTests, since),
-            ))
+        let parts = (1..).zip(&PARTS);
+        let pages = parts.flat_map(move |(part, stored)| {
+            let changed = stored.changed(self, since_revision);
+            changed.map(move |(index, bytes)| KeyframePage::new(part, index, bytes))
+        });
+        std::iter::once(self.head()).chain(pages)
     }
 
     /// The map of a checkpoint, which goes on like the one that wrote it. Its pages count as
@@ -119,71 +125,43 @@ impl KeyframeMap {
     }
 
     fn push_page(&mut self, part: u8, bytes: &[u8]) -> Result<(), CorruptState> {
-        let (graph, seen) = (&mut self.graph, &mut self.recognition);
-        let revision = graph.revision;
-        match part {
-            TRACKS_OF_AGENTS => graph.chains.tracks.push_page(bytes, revision),
-            KEYFRAMES => graph.chains.keyframes.pages.push_page(bytes, revision),
-            SIGHTINGS => graph.sightings.slab.pages.push_page(bytes, revision),
-            CONSTRAINTS => graph.constraints.slab.pages.push_page(bytes, revision),
-            LANDMARKS => graph
-                .sightings
-                .landmarks
-                .slots
-                .pages
-                .push_page(bytes, revision),
-            VIEWS => seen.push_page(Part::Views, bytes),
-            TRACKS => seen.push_page(Part::Tracks, bytes),
-            SEARCHES => seen.push_page(Part::Searches, bytes),
-            ATTACHMENTS => graph.attachments.slab.pages.push_page(bytes, revision),
-            KIDNAP_TESTS => seen.push_page(Part::KidnapTests, bytes),
-            _ => Err(CorruptState::Invalid),
+        let stored = usize::from(part).checked_sub(1);
+        let stored = stored.and_then(|at| PARTS.get(at));
+        match stored.ok_or(CorruptState::Invalid)? {
+            Stored::InGraph(_, vector) => {
+                let revision = self.graph.revision;
+                vector(&mut self.graph).push(bytes, revision)
+            }
+            Stored::InRecognition(part) => self.recognition.push_page(*part, bytes),
         }
     }
 
     /// Equal maps have equal digests. Only pages that changed since the last time are hashed anew.
     pub fn digest(&self) -> Digest {
         let mut out = StateWriter::default();
-        let (graph, seen) = (&self.graph, &self.recognition);
         self.write_head(&mut out);
-        graph.chains.tracks.write_digests(&mut out);
-        graph.chains.keyframes.pages.write_digests(&mut out);
-        graph.sightings.slab.pages.write_digests(&mut out);
-        graph.constraints.slab.pages.write_digests(&mut out);
-        graph
-            .sightings
-            .landmarks
-            .slots
-            .pages
-            .write_digests(&mut out);
-        seen.write_digests(Part::Views, &mut out);
-        seen.write_digests(Part::Tracks, &mut out);
-        seen.write_digests(Part::Searches, &mut out);
-        graph.attachments.slab.pages.write_digests(&mut out);
-        seen.write_digests(Part::KidnapTests, &mut out);
+        for stored in &PARTS {
+            match stored {
+                Stored::InGraph(vector, _) => vector(&self.graph).write_digests(&mut out),
+                Stored::InRecognition(part) => self.recognition.write_digests(*part, &mut out),
+            }
+        }
         out.digest()
     }
 
     /// Bytes of memory that it takes, without labels.
     pub fn bytes(&self) -> usize {
-        let graph = &self.graph;
-        graph.chains.tracks.bytes()
-            + graph.chains.keyframes.pages.bytes()
-            + graph.sightings.slab.pages.bytes()
-            + graph.constraints.slab.pages.bytes()
-            + graph.sightings.landmarks.slots.pages.bytes()
-            + graph.attachments.slab.pages.bytes()
-            + self.recognition.bytes()
+        let in_graph = PARTS.iter().map(|stored| match stored {
+            Stored::InGraph(vector, _) => vector(&self.graph).bytes(),
+            Stored::InRecognition(_) => 0,
+        });
+        in_graph.sum::<usize>() + self.recognition.bytes()
     }
 
     fn head(&self) -> KeyframePage {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
-        KeyframePage {
-            part: HEAD,
-            index: 0,
-            bytes: out.into_bytes(),
-        }
+        KeyframePage::new(HEAD, 0, out.into_bytes())
     }
 
     fn write_head(&self, out: &mut StateWriter) {
@@ -223,31 +201,60 @@ impl KeyframeMap {
     }
 }
 
-/// The pages of a vector that changed.
-fn pages_of<T: State, const N: usize>(
-    part: u8,
-    items: &PagedVec<T, N>,
-    since: u64,
-) -> impl Iterator<Item = KeyframePage> {
-    items.changed_pages(since).map(move |(index, _, items)| {
-        let mut out = StateWriter::default();
-        write_page(items, &mut out);
-        KeyframePage {
-            part,
-            index: u32::try_from(index).expect("2³² items have fewer pages"),
-            bytes: out.into_bytes(),
-        }
-    })
+/// Where a part is.
+enum Stored {
+    /// In a vector of the graph, to be read or changed.
+    InGraph(
+        fn(&KeyframeGraph) -> &dyn Pages,
+        fn(&mut KeyframeGraph) -> &mut dyn Pages,
+    ),
+    InRecognition(Part),
 }
 
-/// Pages of place recognition.
-fn seen_pages(
-    part: u8,
-    pages: impl Iterator<Item = (usize, Vec<u8>)>,
-) -> impl Iterator<Item = KeyframePage> {
-    pages.map(move |(index, bytes)| KeyframePage {
-        part,
-        index: u32::try_from(index).expect("2³² items have fewer pages"),
-        bytes,
-    })
+/// Pages by number, as bytes.
+type NumberedPages<'a> = Box<dyn Iterator<Item = (usize, Vec<u8>)> + 'a>;
+
+impl Stored {
+    /// The pages that changed after a revision.
+    fn changed<'a>(&self, map: &'a KeyframeMap, since_revision: u64) -> NumberedPages<'a> {
+        match self {
+            Self::InGraph(vector, _) => vector(&map.graph).changed(since_revision),
+            Self::InRecognition(part) => map.recognition.pages(*part, since_revision),
+        }
+    }
+}
+
+/// A vector of pages, whatever its items are.
+trait Pages {
+    /// The pages that changed after a revision.
+    fn changed(&self, since_revision: u64) -> NumberedPages<'_>;
+    /// Appends a page.
+    fn push(&mut self, bytes: &[u8], revision: u64) -> Result<(), CorruptState>;
+    /// Writes the digests of all pages.
+    fn write_digests(&self, out: &mut StateWriter);
+    /// Bytes of memory that it takes.
+    fn bytes(&self) -> usize;
+}
+
+impl<T: State + Clone, const N: usize> Pages for PagedVec<T, N> {
+    fn changed(&self, since_revision: u64) -> NumberedPages<'_> {
+        let pages = self.changed_pages(since_revision);
+        Box::new(pages.map(|(index, _, items)| {
+            let mut out = StateWriter::default();
+            write_page(items, &mut out);
+            (index, out.into_bytes())
+        }))
+    }
+
+    fn push(&mut self, bytes: &[u8], revision: u64) -> Result<(), CorruptState> {
+        self.push_page(bytes, revision)
+    }
+
+    fn write_digests(&self, out: &mut StateWriter) {
+        Self::write_digests(self, out);
+    }
+
+    fn bytes(&self) -> usize {
+        Self::bytes(self)
+    }
 }

@@ -10,6 +10,16 @@
 //! is lost: the motions to and from them are composed, and their sightings and constraints move to
 //! a neighbour with the noise of the motion there.
 //!
+//! | part | holds | file |
+//! |---|---|---|
+//! | chains | each agent's keyframes, and where the agent is now | `chains` |
+//! | sightings | what was seen from keyframes, and the landmarks shown | `sightings` |
+//! | constraints | start poses and loop closures, and when closures are judged | `constraints` |
+//! | attachments | places that move with keyframes | `attachments` |
+//!
+//! A relaxation works on a copy of the graph (`relaxation`), as a problem of least squares
+//! (`problem`); `closures` brings its outcome back.
+//!
 //! [`KeyframeMap`] is the graph with place recognition, which closes loops by what was seen.
 
 mod agent_track;

@@ -11,7 +11,9 @@ pub(crate) use recorder::{LegUnderWay, Recorder, interval_s};
 
 use crate::input::AgentId;
 use crate::memory::strength::{Clock, Strength};
-use state::{CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum};
+use state::{
+    Codec, CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum, state_of_struct,
+};
 
 /// Most legs of a trip; a longer way is recorded as several trips. It bounds what one answer holds.
 pub(crate) const LEGS_MAX: usize = 1024;
@@ -149,31 +151,27 @@ impl Trip {
     }
 }
 
-/// The legs are stored page by page beside their trip; here they are only digested.
-impl State for Trip {
-    fn write(&self, out: &mut StateWriter) {
-        self.agent.write(out);
-        self.session.write(out);
-        self.start_stamp_ns.write(out);
-        self.end_stamp_ns.write(out);
-        self.ended.write(out);
-        self.length_m.write(out);
-        self.strength.write(out);
-        self.legs.write_digests(out);
+state_of_struct!(Trip {
+    agent,
+    session,
+    start_stamp_ns,
+    end_stamp_ns,
+    ended,
+    length_m,
+    strength,
+    legs as LegDigests
+});
+
+/// Digests of legs, which are stored page by page beside their trip.
+struct LegDigests;
+
+impl Codec<PagedVec<Leg, LEG_PAGE>> for LegDigests {
+    fn write(legs: &PagedVec<Leg, LEG_PAGE>, out: &mut StateWriter) {
+        legs.write_digests(out);
     }
 
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let trip = Self {
-            agent: State::read(input)?,
-            session: State::read(input)?,
-            start_stamp_ns: State::read(input)?,
-            end_stamp_ns: State::read(input)?,
-            ended: State::read(input)?,
-            length_m: State::read(input)?,
-            strength: State::read(input)?,
-            legs: PagedVec::default(),
-        };
-        // The digests of the legs are passed over: the map's digest is compared in the end.
+    /// The digests are passed over: the map's digest is compared in the end.
+    fn read(input: &mut StateReader<'_>) -> Result<PagedVec<Leg, LEG_PAGE>, CorruptState> {
         let legs = usize::try_from(u64::read(input)?).unwrap_or(usize::MAX);
         if !(1..=LEGS_MAX).contains(&legs) {
             return Err(CorruptState::Invalid);
@@ -181,7 +179,7 @@ impl State for Trip {
         for _ in 0..legs.div_ceil(LEG_PAGE) {
             u128::read(input)?;
         }
-        Ok(trip)
+        Ok(PagedVec::default())
     }
 }
 
