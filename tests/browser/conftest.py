@@ -22,7 +22,7 @@ ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore
 
 def chromium() -> str:
     """The browser: `CHROMIUM`, or Debian's."""
-    found = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    found = shutil.which(os.environ.get("CHROMIUM") or "chromium")
     if not found:
         raise FileNotFoundError("there is no Chromium: run `apt-get install chromium`, or name one in "
                                 "CHROMIUM")

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 from conftest import ARGUMENTS, chromium
 
@@ -22,7 +22,7 @@ _ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+")
 _START_S = 30.0
 #: Largest picture [bytes].
 _BYTES_MAX = 400_000
-_SIZE = {"width": 1440, "height": 900}
+_SIZE = ViewportSize(width=1440, height=900)
 
 
 def main() -> None:
@@ -46,7 +46,7 @@ def main() -> None:
     print(f"{asked.out}: {len(picture)} bytes")
 
 
-def address(demo: "subprocess.Popen[str]", log: Path) -> str:
+def address(demo: "subprocess.Popen[bytes]", log: Path) -> str:
     """Where the demo says that its service listens."""
     deadline = time.monotonic() + _START_S
     while time.monotonic() < deadline and demo.poll() is None:

@@ -110,7 +110,10 @@ def test_the_past_is_shown_and_left_again(service: Server, open_page: Open) -> N
     now = page.page.evaluate("cogmap.agent('ada')")
     for _ in range(3):
         page.page.keyboard.press("ArrowLeft")
-    moved = lambda: apart(now, page.page.evaluate("cogmap.agent('ada')"))
+
+    def moved() -> float:
+        return apart(now, page.page.evaluate("cogmap.agent('ada')"))
+
     eventually("the agent as it was", lambda: moved() > 0.5)
     assert page.stats()["time"] is not None
     assert "ago" in page.text(".when")
