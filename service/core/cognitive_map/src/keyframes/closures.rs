@@ -161,6 +161,7 @@ impl KeyframeGraph {
     pub(super) fn relaxed(&mut self) -> (Graph, Relaxed, usize) {
         let mut refuted = 0;
         let revision = self.revision;
+        let refuted_chi2 = self.settings.refuted_chi2();
         let mut rounds = 0;
         loop {
             rounds += 1;
@@ -174,7 +175,7 @@ impl KeyframeGraph {
             for number in 0..self.constraints.numbers() {
                 let link = graph.constraints.get(number as usize).copied().flatten();
                 let squared = link.map_or(0.0, |link| graph.map.squared_error(link));
-                if squared > tuning::REJECTED_MIN
+                if squared > refuted_chi2
                     && let Some(constraint) = self.constraints.get(number)
                     && constraint.state == ClosureState::Accepted
                     && let Some(constraint) = self.constraints.get_mut(number, revision)
@@ -196,7 +197,7 @@ impl KeyframeGraph {
         links
             .filter_map(|(link, number)| Some(((*link)?, self.constraints.get(number)?)))
             .filter(|(_, constraint)| constraint.state == ClosureState::Accepted)
-            .all(|(link, _)| graph.map.squared_error(link) <= tuning::REJECTED_MIN)
+            .all(|(link, _)| graph.map.squared_error(link) <= self.settings.refuted_chi2())
     }
 
     /// Accepts pending closures that agree with the map or with one another; answers their number.
@@ -215,6 +216,7 @@ impl KeyframeGraph {
         // with.
         let mut all = self.graph(Among::All);
         all.map.relax(&settings());
+        let gate_chi2 = self.settings.closure_gate_chi2;
         let path_variances = self.path_variances();
         let mut accepted = Vec::new();
         let mut candidates = Vec::new();
@@ -226,9 +228,9 @@ impl KeyframeGraph {
             let Some(link) = all.constraints.get(number as usize).copied().flatten() else {
                 continue;
             };
-            if waits(constraint) && agrees_with(constraint, &believed, &marginals) {
+            if waits(constraint) && agrees_with(constraint, &believed, &marginals, gate_chi2) {
                 accepted.push(number);
-            } else if all.map.squared_error(link) <= tuning::AGREES_MAX {
+            } else if all.map.squared_error(link) <= gate_chi2 {
                 candidates.extend(self.candidate(number, constraint, &all, &path_variances));
             }
         }
@@ -237,7 +239,7 @@ impl KeyframeGraph {
         let mut partners = vec![0; candidates.len()];
         for later in 0..candidates.len() {
             for earlier in later.saturating_sub(tuning::CLOSURES_COMPARED)..later {
-                if candidates[later].agrees(&candidates[earlier]) {
+                if candidates[later].agrees(&candidates[earlier], gate_chi2) {
                     partners[later] += 1;
                     partners[earlier] += 1;
                 }
@@ -369,7 +371,12 @@ fn settings() -> RelaxationSettings {
 }
 
 /// Whether the map is about as certain of the relative pose as a closure, and agrees.
-fn agrees_with(constraint: &Constraint, graph: &Graph, marginals: &Marginals<'_>) -> bool {
+fn agrees_with(
+    constraint: &Constraint,
+    graph: &Graph,
+    marginals: &Marginals<'_>,
+    gate_chi2: f64,
+) -> bool {
     let node = |number: u32| graph.poses.get(number as usize).copied().flatten();
     let (Some(from), Some(to)) = (node(constraint.from), node(constraint.to)) else {
         return false;
@@ -382,8 +389,7 @@ fn agrees_with(constraint: &Constraint, graph: &Graph, marginals: &Marginals<'_>
     // One that is too far off in one direction is so for every map that is sure enough: its
     // covariance, which takes long to find, need not be known.
     let least_certain = tuning::UNCERTAINTY_RATIO_MAX * tuning::UNCERTAINTY_RATIO_MAX + 1.0;
-    if (0..6).any(|k| off[k] * off[k] > tuning::AGREES_MAX * least_certain * (own[(k, k)] + least))
-    {
+    if (0..6).any(|k| off[k] * off[k] > gate_chi2 * least_certain * (own[(k, k)] + least)) {
         return false;
     }
     let Some(spread) = marginals.relative_pose(from, to) else {
@@ -395,7 +401,7 @@ fn agrees_with(constraint: &Constraint, graph: &Graph, marginals: &Marginals<'_>
     });
     let whole = spread.matrix() + own + Matrix6::from_diagonal_element(least);
     let inverse = whole.try_inverse();
-    is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= tuning::AGREES_MAX)
+    is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= gate_chi2)
 }
 
 impl Candidate {
@@ -406,7 +412,7 @@ impl Candidate {
     ///   │                  │           the ways along the chains, and both matches, close up
     /// B now ── match ──> B then
     /// ```
-    fn agrees(&self, other: &Self) -> bool {
+    fn agrees(&self, other: &Self, gate_chi2: f64) -> bool {
         if self.agent != other.agent {
             return false;
         }
@@ -432,7 +438,7 @@ impl Candidate {
         let own = self.own[0] + other.own[0] + tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
         let telling = (4.0 * tuning::UNCERTAINTY_RATIO_MAX * tuning::UNCERTAINTY_RATIO_MAX * own)
             .max(tuning::CERTAIN_SD_M * tuning::CERTAIN_SD_M);
-        squared <= tuning::AGREES_MAX && shift <= telling
+        squared <= gate_chi2 && shift <= telling
     }
 }
 

@@ -226,6 +226,7 @@ impl KeyframeGraph {
             self.add_keyframe(agent);
         }
         let revision = self.revision;
+        let (spacing, attached) = (self.settings.spacing, self.settings.attached_within());
         let Some(track) = self.tracks.get_mut(agent as usize, revision) else {
             return;
         };
@@ -240,22 +241,15 @@ impl KeyframeGraph {
         ) {
             (track.until_seq, track.until_ns) = (moment.seq, moment.stamp_ns);
         }
-        let is_step = !is_within(
-            track.since.motion(),
-            tuning::KEYFRAME_STEP.0,
-            tuning::KEYFRAME_STEP.1,
-        );
+        let is_step = !is_within(track.since.motion(), spacing.0, spacing.1);
         let mut rests = false;
         if is_within(
             &track.rest.inv_mul(track.since.motion()),
             tuning::REST_WITHIN.0,
             tuning::REST_WITHIN.1,
         ) {
-            rests = !is_within(
-                track.since.motion(),
-                tuning::ATTACHED_WITHIN.0,
-                tuning::ATTACHED_WITHIN.1,
-            ) && moment.stamp_ns.saturating_sub(track.rest_ns) >= tuning::REST_NS;
+            rests = !is_within(track.since.motion(), attached.0, attached.1)
+                && moment.stamp_ns.saturating_sub(track.rest_ns) >= tuning::REST_NS;
         } else {
             track.rest = *track.since.motion();
             (track.rest_seq, track.rest_ns) = (moment.seq, moment.stamp_ns);

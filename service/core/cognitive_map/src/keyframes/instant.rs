@@ -39,13 +39,8 @@ impl KeyframeGraph {
     /// The present instant of an agent: at its latest keyframe if that is near, or at a new one.
     pub(super) fn here(&mut self, agent: u32) -> Option<KeyframeOffset> {
         let track = self.tracks.get(agent as usize)?;
-        if track.needs_keyframe
-            || !is_within(
-                track.since.motion(),
-                tuning::ATTACHED_WITHIN.0,
-                tuning::ATTACHED_WITHIN.1,
-            )
-        {
+        let (length_m, angle_rad) = self.settings.attached_within();
+        if track.needs_keyframe || !is_within(track.since.motion(), length_m, angle_rad) {
             self.add_keyframe(agent);
         }
         let revision = self.revision;

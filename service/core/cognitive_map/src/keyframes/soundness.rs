@@ -72,7 +72,9 @@ impl KeyframeGraph {
             }
             let mut at = keyframe.shown;
             while at != NONE {
-                let shows = |sighting: &&Sighting| matches!(sighting.shown, Seen::Agent(target, _) if target == number);
+                let is_shown =
+                    |shown: &Seen| matches!(shown, Seen::Agent(target, _) if *target == number);
+                let shows = |sighting: &&Sighting| is_shown(&sighting.shown);
                 let Some(sighting) = self.sightings.get(at).filter(shows) else {
                     return false;
                 };
