@@ -124,8 +124,7 @@ pub(super) fn agrees_with(
     // One that is too far off in one direction is so for every map that is sure enough: its
     // covariance, which takes long to find, need not be known.
     let least_certain = tuning::UNCERTAINTY_RATIO_MAX * tuning::UNCERTAINTY_RATIO_MAX + 1.0;
-    if (0..6).any(|k| off[k] * off[k] > gate_chi2 * least_certain * (own[(k, k)] + least))
-    {
+    if (0..6).any(|k| off[k] * off[k] > gate_chi2 * least_certain * (own[(k, k)] + least)) {
         return false;
     }
     let Some(spread) = marginals.relative_pose(from, to) else {

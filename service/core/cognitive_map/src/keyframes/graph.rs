@@ -11,7 +11,6 @@ use super::moment::Moment;
 use super::own_frame::OwnFrame;
 use super::settings::KeyframeSettings;
 use super::sightings::Sightings;
-use super::tuning;
 use crate::estimator::Calibrated;
 use crate::input::StartPose;
 use geometry::PoseCovariance;

@@ -116,7 +116,8 @@ impl RelaxationCopy {
             )
         };
         let mut candidates: Vec<_> = closures.iter().filter_map(candidate).collect();
-        let partners = Candidate::count_partners(&mut candidates, self.0.settings.closure_gate_chi2);
+        let partners =
+            Candidate::count_partners(&mut candidates, self.0.settings.closure_gate_chi2);
         let is_supported = |(candidate, n_partners): &(&Candidate, usize)| {
             let constraint = self.0.constraints.slab.get(candidate.constraint);
             *n_partners >= tuning::PARTNERS_MIN && constraint.is_some_and(Constraint::is_candidate)

@@ -6,7 +6,6 @@ use super::graph::KeyframeGraph;
 use super::instant::KeyframeOffset;
 use super::moment::Moment;
 use super::sighting::{Seen, SeenPoint, Sighting};
-use super::tuning;
 use crate::input::{Label, Relation};
 use state::NONE;
 

@@ -184,7 +184,7 @@ fn a_wider_gate_takes_closures_that_disagree_more() {
                 walk.matched(seq - ROUND, &Isometry3::translation(0.0, side_m, 0.0));
             }
         }
-        walk.keyframes.graph.n_matches_believed()
+        walk.keyframes.graph.n_closures_accepted()
     };
     let (narrow, wide) = (n_believed(1.0), n_believed(100.0));
     assert!(narrow < wide / 2, "{narrow} {wide}");
