@@ -17,8 +17,8 @@ PEERS := tests/peers
 export COGMAP_BIN := $(TARGET)/debug/cogmap
 
 # Every step over the workspace names all of its targets, and so gets the same features of every
-# dependency: Zenoh is then built once, not once for each step. `--locked` builds the versions of Cargo.lock, and fails
-# where the manifests ask for others.
+# dependency: Zenoh is then built once, not once for each step. `--locked` builds the versions of
+# Cargo.lock, and fails where the manifests ask for others.
 ALL := --locked --workspace --all-targets
 
 # nextest runs the tests of all crates at once; without it, cargo's own runner does.
@@ -66,7 +66,8 @@ $(VENV)/installed: $(CLIENT)/pyproject.toml
 
 .PHONY: drills
 drills: release ## attacks and faults that take minutes, as JSON; DRILLS="NAME…" for some of them
-	COGMAP_BIN=$(TARGET)/release/cogmap cargo run --quiet --locked --package cogmap-tests --bin drills -- $(DRILLS)
+	COGMAP_BIN=$(TARGET)/release/cogmap \
+	    cargo run --quiet --locked --package cogmap-tests --bin drills -- $(DRILLS)
 
 # What `cargo fuzz` would set, without the sanitizers that need another compiler.
 COVERAGE := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
@@ -105,7 +106,8 @@ bench: release-lab ## the benchmarks, each beside its yardstick; ARGS="--json"
 
 .PHONY: scorecard
 scorecard: release-lab ## figures of README and docs beside the committed card, half an hour; DATA=DIR with the data sets, ARGS="--quick", "--update"
-	$(PYTHON) tests/scorecard/scorecard.py --binary $(TARGET)/release/cogmap $(if $(DATA),--data '$(DATA)') $(ARGS)
+	$(PYTHON) tests/scorecard/scorecard.py --binary $(TARGET)/release/cogmap \
+	    $(if $(DATA),--data '$(DATA)') $(ARGS)
 
 # Peers are large packages, so they have a venv of their own and no part in the gate.
 .PHONY: peers

@@ -79,7 +79,11 @@ struct Strict<T>(T);
 /// Passes deserializer methods on.
 macro_rules! forward_deserialize {
     ($($method:ident($($argument:ident: $kind:ty),*);)*) => {$(
-        fn $method<V: Visitor<'de>>(self, $($argument: $kind,)* visitor: V) -> Result<V::Value, D::Error> {
+        fn $method<V: Visitor<'de>>(
+            self,
+            $($argument: $kind,)*
+            visitor: V,
+        ) -> Result<V::Value, D::Error> {
             self.0.$method($($argument,)* Strict(visitor))
         }
     )*};

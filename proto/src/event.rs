@@ -223,7 +223,7 @@ pub enum EventKind {
     ObjectRecognised {
         /// Name of the object.
         object: String,
-        /// How probable it is, 0.995 at least.
+        /// How probable it is: at least what the space's settings ask for, 0.995 by default.
         probability: f64,
     },
     /// What the agent touches is none of the objects that were learned.

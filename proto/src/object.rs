@@ -266,7 +266,7 @@ pub struct Identification {
     pub space: String,
     /// Number of records that the map includes.
     pub map_revision: u64,
-    /// The answer, once one is at least 99.5 % probable.
+    /// The answer, once one is as probable as the space's settings ask for, 99.5 % by default.
     pub verdict: ObjectVerdict,
     /// Probability of each object that has one of at least 10⁻⁶, most probable first.
     pub objects: Vec<ObjectProbability>,

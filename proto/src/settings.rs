@@ -37,14 +37,43 @@ pub struct SpaceSettings {
     pub places_max: u32,
     /// Most legs of all trips together, at least 1: for one more, the weakest trip is forgotten.
     pub legs_max: u32,
-    /// Most moments of all agents that are remembered, so that the past can be smoothed, at least
-    /// 64: for one more, one from which next to nothing is lost is left out.
-    pub anchors_max: u32,
+    /// Most keyframes of all agents, moments of their past that are kept so that it can be
+    /// smoothed, at least 64: for one more, one from which next to nothing is lost is left out.
+    /// Spaces of before are stored with it as `anchors_max`.
+    #[serde(alias = "anchors_max")]
+    pub keyframes_max: u32,
     /// After this many samples of the space, by whichever agent, a use counts half as much for the
     /// strength of a place or trip.
     pub strength_half_life_samples: u32,
     /// Closest two poses of a stored trajectory \[s\]: at most this often a row is kept.
     pub trajectory_interval_s: f64,
+    /// Deviation of a component of a sighting from what the estimate expects, in standard
+    /// deviations, beyond which the whole sighting is refused. Smaller for a sensor that mixes
+    /// things up, larger for one whose stated noise is too small.
+    pub sighting_gate_sd: f64,
+    /// The same beyond which a component of a sighting loses weight (Huber 1964); with the gate or
+    /// more, none does. Smaller for a sensor whose errors have long tails.
+    pub sighting_huber_sd: f64,
+    /// Squared Mahalanobis distance up to which a loop closure agrees with the map or with another
+    /// closure: of true ones in a plane 1 in 100 exceeds 11.3 (χ², 3 degrees of freedom), in space
+    /// 1 in 13 (6 degrees). A closure that was accepted is rejected beyond 2.2 times as much.
+    /// Smaller for a place recogniser that often takes one place for another, larger for one that
+    /// states too small a noise.
+    pub closure_gate_chi2: f64,
+    /// An agent leaves a keyframe after this motion \[m\] at the latest, and where it sees
+    /// something, after a fifth of it. Wider for a vehicle that covers kilometres: `keyframes_max`
+    /// keyframes then reach as much farther.
+    pub keyframe_spacing_m: f64,
+    /// The same for rotation \[rad\].
+    pub keyframe_spacing_rad: f64,
+    /// Standard deviation of what a robot is moved along each axis between two of its sessions
+    /// \[m\]. Small for one that restarts where it stopped, large for one that is carried.
+    pub restart_sd_m: f64,
+    /// Standard deviation of what it is turned about each axis between them \[rad\].
+    pub restart_sd_rad: f64,
+    /// Probability from which on touches are answered with an object, or with none that is known.
+    /// Larger where a wrong answer costs more than further touches.
+    pub object_answer_probability: f64,
 }
 
 /// When a place cell is recruited.
@@ -99,9 +128,17 @@ impl Default for SpaceSettings {
             trip_gap_s: 2.0,
             places_max: 65_536,
             legs_max: 65_536,
-            anchors_max: 65_536,
+            keyframes_max: 65_536,
             strength_half_life_samples: 1_000_000,
             trajectory_interval_s: 0.005,
+            sighting_gate_sd: 4.0,
+            sighting_huber_sd: 2.0,
+            closure_gate_chi2: 11.3,
+            keyframe_spacing_m: 0.1,
+            keyframe_spacing_rad: 0.1,
+            restart_sd_m: 1.0,
+            restart_sd_rad: 0.5,
+            object_answer_probability: 0.995,
         }
     }
 }

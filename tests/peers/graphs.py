@@ -2,10 +2,11 @@
 """Pose graphs: `cogmap-lab replay g2o` beside GTSAM, whole and pose by pose.
 
 Whole, GTSAM starts from rotations (its own chordal start in space; in the plane, where it has none
-for correlated noise, the same written here) and goes on by Levenberg-Marquardt. Pose by pose it is iSAM2 with its default settings, by Cholesky factors, and by
-QR where these fail. Both get the file's own model and the same arrivals, in the same run, with one
-thread. Errors are RMSE of position against `NAME.opt_xyz.txt` beside the graph, or else against
-GTSAM's optimum, after the rigid motion that fits best.
+for correlated noise, the same written here) and goes on by Levenberg-Marquardt. Pose by pose it is
+iSAM2 with its default settings, by Cholesky factors, and by QR where these fail. Both get the
+file's own model and the same arrivals, in the same run, with one thread. Errors are RMSE of
+position against `NAME.opt_xyz.txt` beside the graph, or else against GTSAM's optimum, after the
+rigid motion that fits best.
 """
 
 from __future__ import annotations

@@ -121,8 +121,8 @@ class Grid:
         """Activations of all cells at positions [m], as unit vectors.
 
         Every module's part has the same length, so that the inner product of two codes is the mean
-        over the modules of their cosines: the score of the model (`similarity.rs`), for its number of
-        cells instead of infinitely many.
+        over the modules of their cosines: the score of the model (`similarity.rs`), for its number
+        of cells instead of infinitely many.
         """
         codes = np.empty((len(positions), self.cells), np.float32)
         for first in range(0, len(positions), _CHUNK):

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Gridness of the cells: an outside judge of the rate maps that a service answers.
 
-The judge is `GridScorer` of NeuralPlayground: it rotates a rate map's autocorrelation, and subtracts
-the largest correlation at 30°, 90° and 150° from the smallest at 60° and 120°. Every module is asked
-for more than 1 in its hexagonal layers, and for less than 0 where the same fields lie in squares; the
-program ends with 1 where that fails.
+The judge is `GridScorer` of NeuralPlayground: it rotates a rate map's autocorrelation, and
+subtracts the largest correlation at 30°, 90° and 150° from the smallest at 60° and 120°. Every
+module is asked for more than 1 in its hexagonal layers, and for less than 0 where the same fields
+lie in squares; the program ends with 1 where that fails.
 """
 
 from __future__ import annotations
@@ -105,7 +105,8 @@ def _holds(verdict: Verdict) -> bool:
 
 def _judge(rates: Floats, spacing_m: float) -> Tuple[Optional[float], Optional[float]]:
     """Gridness and distance of neighbouring fields [m] of a rate map."""
-    # The judge writes into what it is given. Where it finds no fields it warns, and answers NaN or fails.
+    # The judge writes into what it is given. Where it finds no fields it warns, and answers NaN or
+    # fails.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

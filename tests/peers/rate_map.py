@@ -31,10 +31,11 @@ class Slice:
 def slices(grid: Grid, cell: int, edge_spacings: float) -> Tuple[Slice, ...]:
     """Three planes of every module, each through the middle of one of the cell's fields.
 
-    `layer` is spanned by the first two lattice vectors, which are 60° apart: the fields lie in hexagons.
-    `square` is spanned by the first one and the difference of the others, which are perpendicular: the
-    same lattice, and the same fields, in squares. `horizontal` is the plane z = const, in which a walking
-    rat would be recorded: the layers of the first module, an oblique cut through all others.
+    `layer` is spanned by the first two lattice vectors, which are 60° apart: the fields lie in
+    hexagons. `square` is spanned by the first one and the difference of the others, which are
+    perpendicular: the same lattice, and the same fields, in squares. `horizontal` is the plane z =
+    const, in which a walking rat would be recorded: the layers of the first module, an oblique cut
+    through all others.
     """
     found = []
     for index, module in enumerate(grid.modules):

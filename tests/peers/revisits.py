@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Views alone: a robot's refined map beside GTSAM's optimum of the same links.
 
-For each seed `cogmap-lab eval env2` walks through the second room of the paper with odometry that drifts and
-views of the room, and writes what it remembers and believes as a graph. GTSAM solves that graph from
-rotations on, with the same kernel for revisits. What is told is how far both are apart (RMS of positions), and what dead reckoning and cogmap
-are off: where the refined map is farther off than dead reckoning and GTSAM agrees with it, the links do not
-say more.
+For each seed `cogmap-lab eval env2` walks through the second room of the paper with odometry that
+drifts and views of the room, and writes what it remembers and believes as a graph. GTSAM solves
+that graph from rotations on, with the same kernel for revisits. What is told is how far both are
+apart (RMS of positions), and what dead reckoning and cogmap are off: where the refined map is
+farther off than dead reckoning and GTSAM agrees with it, the links do not say more.
 """
 
 from __future__ import annotations
@@ -72,7 +72,9 @@ def _compare(seed: int, binary: Path) -> Row:
     with tempfile.TemporaryDirectory() as home:
         file = Path(home, "walk.g2o")
         command = [str(binary), *_WALK.split(), "--seed", str(seed), "--export-g2o", str(file)]
-        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True)
+        done = subprocess.run(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True
+        )
         graph = Graph(file)
     ours = json.loads(done.stdout)
     _doubt(graph)

@@ -1,7 +1,7 @@
 """A cogmap service on loopback ports, started for a comparison and gone after it.
 
-It is the service of the end-to-end tests (`tests/python/server.py`), with the binary that the caller
-names and without Zenoh: peers ask over HTTP alone.
+It is the service of the end-to-end tests (`tests/python/server.py`), with the binary that the
+caller names and without Zenoh: peers ask over HTTP alone.
 """
 
 from __future__ import annotations

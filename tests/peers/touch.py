@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Objects by touch: `cogmap-lab replay touch` beside an ideal observer of the same touches.
 
-The observer is told what a recogniser is told: the learned touches, the noise of position and level, and that the object is
-moved and not turned. It knows besides that no place is touched twice. Bayes' rule then says how likely each object is. A hypothesis is an object
-and the learned place of every touch so far; the offset between the frames has a flat prior, so given the places
-it is normal around the mean difference of touched and learned positions, and each further touch has a
-probability in closed form. Hypotheses less likely than the best by a factor of 10^9 are dropped, and at most 4,000 are kept.
+The observer is told what a recogniser is told: the learned touches, the noise of position and
+level, and that the object is moved and not turned. It knows besides that no place is touched twice.
+Bayes' rule then says how likely each object is. A hypothesis is an object and the learned place of
+every touch so far; the offset between the frames has a flat prior, so given the places it is normal
+around the mean difference of touched and learned positions, and each further touch has a
+probability in closed form. Hypotheses less likely than the best by a factor of 10^9 are dropped,
+and at most 4,000 are kept.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 mod authorities;
 mod error;
+mod exchange;
 
 use std::path::Path;
 use std::time::Duration;
@@ -9,12 +10,11 @@ use std::time::Duration;
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
     AgentDetail, AgentObject, AgentPage, AgentSummary, Codec, GridState, Identification,
-    IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization, LocalizeQuery, Name,
-    ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage, PredictAnswer,
-    PredictQuery, RecallAnswer, RecallQuery, SampleBatch, SpaceInfo, SpaceList, SpaceSettings,
-    Trajectory, Trip, TripDetail, TripPage,
+    IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization, LocalizeQuery, ObjectDetail,
+    ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage, PredictAnswer, PredictQuery,
+    RecallAnswer, RecallQuery, SampleBatch, SpaceInfo, SpaceList, SpaceSettings, Trajectory, Trip,
+    TripDetail, TripPage,
 };
-use serde::Serialize;
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};
 use ureq::tls::TlsConfig;
@@ -22,13 +22,10 @@ use ureq::{Agent, Body};
 
 use authorities::authorities;
 pub use error::ApiError;
+use exchange::{Content, agent_path, answer, done, escaped, json, path, refusal};
 
 /// Longest wait for a whole answer; the service itself gives up earlier.
 const TIMEOUT: Duration = Duration::from_secs(30);
-/// Longest answer \[bytes\]: a full page of the longest items, many times over.
-const ANSWER_BYTES_MAX: u64 = 64 << 20;
-/// Longest text kept of an answer that is no problem document \[bytes\].
-const EXCERPT_BYTES_MAX: usize = 400;
 
 /// Asks a service over HTTP. Cheap to clone; connections are pooled.
 #[derive(Clone, Debug)]
@@ -408,85 +405,6 @@ impl Api {
         };
         Ok(response)
     }
-}
-
-/// Body of a request.
-struct Content {
-    kind: &'static str,
-    bytes: Vec<u8>,
-}
-
-fn json<T: Serialize>(body: &T) -> Content {
-    Content {
-        kind: Codec::Json.encoding(),
-        bytes: Codec::Json.encode(body),
-    }
-}
-
-fn path(space: &str, rest: &str) -> Result<String, ApiError> {
-    Name::check(space)?;
-    Ok(format!("/v1/spaces/{space}{rest}"))
-}
-
-fn agent_path(space: &str, agent: &str, rest: &str) -> Result<String, ApiError> {
-    Name::check(agent)?;
-    path(space, &format!("/agents/{agent}{rest}"))
-}
-
-/// Whether something was done that has no answer.
-fn done(response: Response<Body>) -> Result<(), ApiError> {
-    if response.status().is_success() {
-        Ok(())
-    } else {
-        Err(refusal(response))
-    }
-}
-
-/// A label may have any characters; in a URL all but the unreserved ones are escaped (RFC 3986,
-/// section 2.3).
-fn escaped(text: &str) -> String {
-    use std::fmt::Write as _;
-    text.bytes().fold(String::new(), |mut url, byte| {
-        if byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'.' | b'_' | b'~') {
-            url.push(char::from(byte));
-        } else {
-            write!(url, "%{byte:02X}").expect("writing to a String does not fail");
-        }
-        url
-    })
-}
-
-fn bytes(response: Response<Body>) -> Result<Vec<u8>, ApiError> {
-    Ok(response
-        .into_body()
-        .into_with_config()
-        .limit(ANSWER_BYTES_MAX)
-        .read_to_vec()?)
-}
-
-fn answer<T: DeserializeOwned>(path: &str, response: Response<Body>) -> Result<T, ApiError> {
-    if !response.status().is_success() {
-        return Err(refusal(response));
-    }
-    serde_json::from_slice(&bytes(response)?).map_err(|source| ApiError::Answer {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-fn refusal(response: Response<Body>) -> ApiError {
-    let status = response.status().as_u16();
-    let body = match bytes(response) {
-        Ok(body) => body,
-        Err(error) => return error,
-    };
-    serde_json::from_slice(&body).map_or_else(
-        |_| ApiError::Status {
-            status,
-            body: String::from_utf8_lossy(&body[..body.len().min(EXCERPT_BYTES_MAX)]).into_owned(),
-        },
-        ApiError::Problem,
-    )
 }
 
 #[cfg(test)]

@@ -103,6 +103,7 @@ mod tests {
         rotation_sd_rad: [LONG; 3],
     };
 
+    #[expect(clippy::too_many_lines, reason = "a list: a sample of each kind")]
     fn longest_of_each_kind() -> Vec<Sample> {
         let text = "\u{1}".repeat(200);
         [

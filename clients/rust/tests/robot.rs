@@ -1,5 +1,6 @@
 //! A robot against a fake service, over an in-process Zenoh router on a free loopback port.
-#![allow(clippy::unwrap_used)] // Everything here is a test; clippy sees that only in test functions.
+// Everything here is a test; clippy sees that only in test functions.
+#![allow(clippy::unwrap_used)]
 
 mod service;
 

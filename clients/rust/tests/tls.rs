@@ -1,5 +1,6 @@
 //! `Api` and a service behind TLS.
-#![allow(clippy::unwrap_used)] // Everything here is a test; clippy sees that only in test functions.
+// Everything here is a test; clippy sees that only in test functions.
+#![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::io::{Read, Write};

@@ -38,6 +38,7 @@ pub(crate) fn batches(floats: &Floats) -> impl Strategy<Value = SampleBatch> + u
     })
 }
 
+#[expect(clippy::too_many_lines, reason = "a list: a strategy for each kind")]
 fn bodies(floats: &Floats) -> impl Strategy<Value = SampleBody> + use<> {
     let three = || uniform3(floats.clone());
     let four = || uniform4(floats.clone());

@@ -68,9 +68,17 @@ fn bernoulli() -> SpaceSettings {
         trip_gap_s: 3.0,
         places_max: 100_000,
         legs_max: 1_000_000,
-        anchors_max: 200_000,
+        keyframes_max: 200_000,
         strength_half_life_samples: 360_000,
         trajectory_interval_s: 0.25,
+        sighting_gate_sd: 5.0,
+        sighting_huber_sd: 1.5,
+        closure_gate_chi2: 16.0,
+        keyframe_spacing_m: 0.5,
+        keyframe_spacing_rad: 0.2,
+        restart_sd_m: 0.25,
+        restart_sd_rad: 0.125,
+        object_answer_probability: 0.999,
     }
 }
 

@@ -28,6 +28,7 @@ pub(super) const ENDS: [TripEnd; 6] = [
     TripEnd::StartPose,
 ];
 
+#[expect(clippy::too_many_lines, reason = "a list: each message once")]
 pub(super) fn each(visit: &mut impl Visit) {
     visit.message("estimate_localized", &estimate(Status::Localized));
     visit.message(
@@ -206,6 +207,7 @@ fn object_events() -> [(&'static str, EventKind); 7] {
     ]
 }
 
+#[expect(clippy::too_many_lines, reason = "a list: each kind once")]
 fn event_kinds() -> [(&'static str, EventKind); 15] {
     let session = 1_800_000_000_000_000_000;
     let landmark = "porte 3, étage α".to_owned();

@@ -1,7 +1,8 @@
 //! The joint estimate by itself, without the map around it: errors on a data set or in the room.
 //!
 //! ```text
-//! cargo run --release -p cogmap-lab --example estimate -- mrclam DIR [no-robots] [unknown] [anonymous=N,N]
+//! cargo run --release -p cogmap-lab --example estimate -- mrclam DIR \
+//!     [no-robots] [unknown] [anonymous=N,N]
 //! cargo run --release -p cogmap-lab --example estimate -- env2 [STEPS [RUNS [RANGE_M]]] [look]
 //! ```
 //!

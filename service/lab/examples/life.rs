@@ -19,6 +19,19 @@ use cognitive_map::{AgentId, CognitiveMap, Label, Record, Sample, Settings};
 /// Bytes of a page of memory, on the machines that tell how many a process has.
 const PAGE_BYTES: f64 = 4096.0;
 
+/// The mean, the 99th percentile and the longest of times \[µs\].
+fn times_us(times: &mut [Duration]) -> [f64; 3] {
+    times.sort_unstable();
+    let sum: Duration = times.iter().sum();
+    let us = |time: Duration| time.as_secs_f64() * 1e6;
+    let rank = times.len().saturating_sub(1) * 99 / 100;
+    [
+        us(sum) / times.len().max(1) as f64,
+        times.get(rank).copied().map_or(0.0, us),
+        times.last().copied().map_or(0.0, us),
+    ]
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let mut number = |default: u32| arguments.next().map_or(Ok(default), |text| text.parse());
@@ -69,17 +82,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
         if tick % (ticks / 10).max(1) == 0 {
-            times.sort_unstable();
-            let sum: Duration = times.iter().sum();
-            let us = |time: Duration| time.as_secs_f64() * 1e6;
-            let mean = us(sum) / times.len().max(1) as f64;
-            let rank = times.len().saturating_sub(1) * 99 / 100;
+            let [mean, p99, longest] = times_us(&mut times);
+            let (memory_mb, places) = (memory_mb(), map.place_count());
             println!(
-                "{samples:9}  {:11.1}  {mean:5.1} {:6.1} {:9.1}     {:6}  {error_m:.3}",
-                memory_mb(),
-                times.get(rank).copied().map_or(0.0, us),
-                times.last().copied().map_or(0.0, us),
-                map.place_count(),
+                "{samples:9}  {memory_mb:11.1}  {mean:5.1} {p99:6.1} {longest:9.1}     \
+                 {places:6}  {error_m:.3}",
             );
             times.clear();
         }

@@ -16,6 +16,15 @@ use cogmap_lab::eval::object::{
 };
 use cogmap_lab::touch::{TouchExperiment, TouchNoise, TouchProtocol, TouchReport, TouchSet};
 
+/// The turns that an argument asks for.
+fn rotate(argument: Option<&str>) -> Rotate {
+    match argument {
+        Some("24") => Rotate::Cube,
+        Some("so3") => Rotate::Free,
+        _ => Rotate::None,
+    }
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let number = |at: usize, default: f64| -> Result<f64, Box<dyn Error>> {
@@ -32,11 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let count = |number: f64| number as u32;
     match args.first().map(String::as_str) {
         Some("env3") => {
-            let rotate = match args.get(2).map(String::as_str) {
-                Some("24") => Rotate::Cube,
-                Some("so3") => Rotate::Free,
-                _ => Rotate::None,
-            };
+            let rotate = rotate(args.get(2).map(String::as_str));
             let protocol = ObjectProtocol {
                 rotate,
                 normals: if rotate == Rotate::Free {

@@ -1,12 +1,12 @@
 //! The past, smoothed: causal and refined errors of a data set or of a simulated team.
 //!
 //! ```text
-//! cargo run --release -p cogmap-lab --example refine -- mrclam DIR [no-robots] [anchors=N]
+//! cargo run --release -p cogmap-lab --example refine -- mrclam DIR [no-robots] [keyframes=N]
 //! cargo run --release -p cogmap-lab --example refine -- team [RUNS]
 //! cargo run --release -p cogmap-lab --example refine -- matches DIR [false=PERCENT] [g2o=FILE]
 //! ```
 //!
-//! `anchors` bounds how much is remembered; `false` adds matches of different places until they
+//! `keyframes` bounds how much is remembered; `false` adds matches of different places until they
 //! make up a share of all, and `g2o` writes the graph with the matches that are believed.
 
 #![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
@@ -32,9 +32,9 @@ fn main() -> ExitCode {
         found.and_then(|text| text.parse::<u32>().ok())
     };
     let done = match arguments.first().map(String::as_str) {
-        Some("mrclam") => arguments
-            .get(1)
-            .is_some_and(|directory| mrclam::run(directory, !has("no-robots"), value("anchors="))),
+        Some("mrclam") => arguments.get(1).is_some_and(|directory| {
+            mrclam::run(directory, !has("no-robots"), value("keyframes="))
+        }),
         Some("matches") => arguments.get(1).is_some_and(|directory| {
             let file = arguments
                 .iter()
@@ -53,7 +53,7 @@ fn main() -> ExitCode {
         ExitCode::SUCCESS
     } else {
         eprintln!(
-            "refine mrclam DIR [no-robots] [anchors=N] | team [RUNS] | matches DIR [false=PERCENT] [g2o=FILE]"
+            "refine mrclam DIR [no-robots] [keyframes=N] | team [RUNS] | matches DIR [false=PERCENT] [g2o=FILE]"
         );
         ExitCode::from(2)
     }

@@ -2,7 +2,8 @@
 //! has been before.
 //!
 //! ```text
-//! cargo run --release -p cogmap-lab --example revisits -- [runs=N] [seed=N] [steps=N] [every=N] [noise=PERCENT] [pure] [g2o=FILE]
+//! cargo run --release -p cogmap-lab --example revisits -- \
+//!     [runs=N] [seed=N] [steps=N] [every=N] [noise=PERCENT] [pure] [g2o=FILE]
 //! ```
 //!
 //! `g2o` writes the graph of the first run, with the revisits that are believed, beside its true

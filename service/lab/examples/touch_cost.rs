@@ -45,13 +45,32 @@ enum World {
     Plain,
 }
 
+/// The world that an argument asks for.
+fn world(argument: Option<&str>) -> World {
+    match argument {
+        Some("plain") => World::Plain,
+        _ => World::Coloured,
+    }
+}
+
+/// The contacts of an exploration of an object.
+fn explored(world: World, object: &VoxelObject, episode: usize) -> Vec<Contact> {
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    random.set_stream((1 << 50) + episode as u64);
+    let mut explorer = Explorer::new(object, NOISE, random);
+    let mut contacts = Vec::with_capacity(TOUCHES);
+    for _ in 0..TOUCHES {
+        let felt = explorer.feel();
+        contacts.push(contact(world, Point3::from(felt.position_m), felt.level));
+        explorer.advance();
+    }
+    contacts
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let counts = args.first().map_or("10,30,100,300", String::as_str);
-    let world = match args.get(1).map(String::as_str) {
-        Some("plain") => World::Plain,
-        _ => World::Coloured,
-    };
+    let world = world(args.get(1).map(String::as_str));
     let orientation = match args.get(2).map(String::as_str) {
         Some("24") => Orientation::cube(),
         _ => Orientation::Known,
@@ -72,15 +91,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut sure = [0_usize; TOUCHES];
         for episode in 0..EPISODES {
             let number = episode * objects.len() / EPISODES;
-            let mut random = ChaCha8Rng::seed_from_u64(SEED);
-            random.set_stream((1 << 50) + episode as u64);
-            let mut explorer = Explorer::new(&objects[number], NOISE, random);
-            let mut contacts = Vec::with_capacity(TOUCHES);
-            for _ in 0..TOUCHES {
-                let felt = explorer.feel();
-                contacts.push(contact(world, Point3::from(felt.position_m), felt.level));
-                explorer.advance();
-            }
+            let contacts = explored(world, &objects[number], episode);
             let mut least = [f64::INFINITY; TOUCHES];
             for run in 0..RUNS {
                 let mut recognition = Recognition::new(&orientation);

@@ -1,7 +1,8 @@
 //! Robots that wake up in a room that was explored.
 //!
 //! ```text
-//! cargo run --release -p cogmap-lab --example waking -- [trials=N] [per=N] [rooms=N] [explorer=N] [travel=CM] [seed=N] [cost]
+//! cargo run --release -p cogmap-lab --example waking -- \
+//!     [trials=N] [per=N] [rooms=N] [explorer=N] [travel=CM] [seed=N] [cost]
 //!     [carried] [stay=M] [after=M]
 //! ```
 //!

@@ -8,22 +8,22 @@ use serde_json::Value;
 use utoipa::PartialSchema;
 
 use super::*;
-use crate::decode::{Bound, SPACE_BOUNDS, TRAJECTORY_INTERVAL_S};
+use crate::decode::setting_bounds;
 
 const HEAD: &str = "# Settings
 
 <!-- Written by a test from the settings themselves: see service/src/config/document.rs. -->
 
-A setting is given in a file (`cogmap serve --config cogmap.toml`), in the environment or by a flag (`--set
-http.listen=127.0.0.1:8080`); the later of these wins. `cogmap check-config` prints those in effect. The reasons behind
-the defaults stand in [`cogmap.toml`](../service/cogmap.toml).
+A setting is given in a file (`cogmap serve --config cogmap.toml`), in the environment or by a flag
+(`--set http.listen=127.0.0.1:8080`); the later of these wins. `cogmap check-config` prints those in
+effect. The reasons behind the defaults stand in [`cogmap.toml`](../service/cogmap.toml).
 ";
 
 const SPACES: &str = "
 ## Spaces
 
-Settings of a space are fixed when it is created: in the file under `[spaces.NAME]`, in the environment as
-`COGMAP_SPACES__NAME__…`, over HTTP as the body of `PUT /v1/spaces/NAME`.
+Settings of a space are fixed when it is created: in the file under `[spaces.NAME]`, in the
+environment as `COGMAP_SPACES__NAME__…`, over HTTP as the body of `PUT /v1/spaces/NAME`.
 
 | setting | default | may be | meaning |
 |---|---|---|---|
@@ -59,17 +59,25 @@ fn page() -> String {
         }
     }
     page.push_str(SPACES);
+    page.push_str(&space_rows());
+    page
+}
+
+/// The rows of a space's settings.
+fn space_rows() -> String {
+    let mut page = String::new();
     let defaults = serde_json::to_value(SpaceSettings::default()).expect("plain data");
-    let bounds = SPACE_BOUNDS.into_iter();
-    let bounds: BTreeMap<_, _> = bounds
-        .chain([("trajectory_interval_s", TRAJECTORY_INTERVAL_S)])
-        .collect();
+    let bounds: BTreeMap<_, _> = setting_bounds().collect();
+    let bound = |name: &str| {
+        let bound = bounds.get(name);
+        bound.unwrap_or_else(|| panic!("the map's settings say nothing of {name}"))
+    };
     for (name, doc) in described::<SpaceSettings>() {
         if name == "odometry_noise" {
             for (part, doc) in described::<NoiseSettings>() {
                 let default = &defaults["odometry_noise"][&part];
-                let share = words(Bound::Share);
-                writeln!(page, "| `{name}.{part}` | `{default}` | {share} | {doc} |")
+                let rule = bound(&part);
+                writeln!(page, "| `{name}.{part}` | `{default}` | {rule} | {doc} |")
                     .expect("a text takes it");
             }
             continue;
@@ -79,11 +87,7 @@ fn page() -> String {
             "recruitment" => {
                 "`{ novelty = {} }`, or `{ bernoulli = { probability = 0.1 } }`".to_owned()
             }
-            _ => words(
-                *bounds
-                    .get(&*name)
-                    .unwrap_or_else(|| panic!("decode/bounds.rs says nothing of {name}")),
-            ),
+            _ => bound(&name).to_string(),
         };
         let default = &defaults[&name];
         let above = if name == "lost_sd_m" {
@@ -118,27 +122,6 @@ fn described<T: PartialSchema>() -> Vec<(String, String)> {
 fn plain(doc: &str) -> String {
     let words: Vec<_> = doc.split_whitespace().collect();
     words.join(" ").replace("\\[", "[").replace("\\]", "]")
-}
-
-fn words(bound: Bound) -> String {
-    match bound {
-        Bound::Share => "0 to 1".to_owned(),
-        Bound::Real {
-            min,
-            is_open: true,
-            max,
-        } => format!("above {min}, at most {max}"),
-        Bound::Real {
-            min,
-            is_open: false,
-            max,
-        } => format!("{min} to {max}"),
-        Bound::Whole {
-            min,
-            max: Some(max),
-        } => format!("{min} to {max}"),
-        Bound::Whole { min, max: None } => format!("at least {min}"),
-    }
 }
 
 /// To write the page anew: `COGMAP_WRITE_DOCS=1 cargo test -p cogmap the_page_of_settings`.

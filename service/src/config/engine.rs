@@ -29,7 +29,8 @@ section! {
         /// Most agents of a space.
         agents_max: usize = EngineSettings::default().agents_max, COUNT;
         /// How far ahead of the service's clock the number of a session may be that begins \[s\].
-        session_ahead_max_s: f64 = EngineSettings::default().session_ahead_max.as_secs_f64(), AHEAD_S;
+        session_ahead_max_s: f64 =
+            EngineSettings::default().session_ahead_max.as_secs_f64(), AHEAD_S;
         /// Most spaces.
         spaces_max: usize = EngineSettings::default().spaces_max, COUNT;
         /// How far ahead of the next sample of an agent one may be that waits for it.
@@ -37,7 +38,8 @@ section! {
         /// How long missing samples are waited for before they count as lost \[s\].
         gap_timeout_s: f64 = EngineSettings::default().gap_timeout.as_secs_f64(), INTERVAL_S;
         /// Longest time between syncs of the store while samples come in \[s\].
-        commit_interval_s: f64 = EngineSettings::default().commit_interval.as_secs_f64(), INTERVAL_S;
+        commit_interval_s: f64 =
+            EngineSettings::default().commit_interval.as_secs_f64(), INTERVAL_S;
         /// Time between checkpoints while samples come in \[s\].
         checkpoint_interval_s: f64 =
             EngineSettings::default().checkpoint_interval.as_secs_f64(), INTERVAL_S;

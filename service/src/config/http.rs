@@ -38,7 +38,8 @@ section! {
         token: Option<Token> = None, TOKEN;
         /// File whose first line is the token, instead of `token`.
         #[serde(skip_serializing_if = "Option::is_none")]
-        token_file: Option<PathBuf> = None, any("the path of a file, absent when http.token is set");
+        token_file: Option<PathBuf> = None,
+            any("the path of a file, absent when http.token is set");
         /// Names of hosts by which the service is asked, beside its addresses and `localhost`; `*`
         /// stands for any.
         hosts: Vec<String> = Vec::new(), HOSTS;

@@ -20,7 +20,7 @@ mod settings;
 mod sighting;
 mod trajectory;
 
-pub use bounds::{Bound, SPACE_BOUNDS, TRAJECTORY_INTERVAL_S};
+pub use bounds::{Bound, setting_bounds};
 pub use channel::InvalidChannel;
 pub use cue::{InvalidQuery, cue, unknown_agent};
 pub use journal::records_of;

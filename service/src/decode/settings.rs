@@ -3,6 +3,8 @@
 use cogmap_proto::SpaceSettings;
 use cognitive_map::InvalidSettings;
 
+use super::bounds::TRAJECTORY_INTERVAL_S;
+
 /// Settings of the core from those of the wire.
 ///
 /// # Errors
@@ -14,13 +16,8 @@ pub fn core_settings(settings: &SpaceSettings) -> Result<cognitive_map::Settings
             cognitive_map::Recruitment::Bernoulli { probability }
         }
     };
-    if !(0.001..=3600.0).contains(&settings.trajectory_interval_s) {
-        let field = "trajectory_interval_s";
-        return Err(InvalidSettings {
-            field,
-            rule: "0.001 to 3600",
-        });
-    }
+    let interval_s = settings.trajectory_interval_s;
+    TRAJECTORY_INTERVAL_S.check("trajectory_interval_s", interval_s)?;
     cognitive_map::Settings::new(cognitive_map::SettingsValues {
         seed: settings.seed,
         grid_modules: settings.grid_modules as usize,
@@ -41,8 +38,16 @@ pub fn core_settings(settings: &SpaceSettings) -> Result<cognitive_map::Settings
         trip_gap_s: settings.trip_gap_s,
         places_max: settings.places_max,
         legs_max: settings.legs_max,
-        anchors_max: settings.anchors_max,
+        keyframes_max: settings.keyframes_max,
         strength_half_life_samples: settings.strength_half_life_samples,
+        sighting_gate_sd: settings.sighting_gate_sd,
+        sighting_huber_sd: settings.sighting_huber_sd,
+        closure_gate_chi2: settings.closure_gate_chi2,
+        keyframe_spacing_m: settings.keyframe_spacing_m,
+        keyframe_spacing_rad: settings.keyframe_spacing_rad,
+        restart_sd_m: settings.restart_sd_m,
+        restart_sd_rad: settings.restart_sd_rad,
+        object_answer_probability: settings.object_answer_probability,
     })
 }
 

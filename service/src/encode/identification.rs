@@ -45,6 +45,7 @@ pub fn identification(
         entropy_nats,
         contacts,
         fit,
+        answer_probability: _, // told by the settings of the space
     } = posterior;
     let name = |id: ObjectId| map.object(id).map(|known| known.name().as_str().to_owned());
     let likely = objects

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cognitive_map::{CognitiveMap, Settings};
+use cognitive_map::{CognitiveMap, Event, Record, Settings};
 use metrics::counter;
 
 use super::checkpointer::Beside;
@@ -30,6 +30,33 @@ pub(crate) struct Recovered {
     pub(crate) next_block: u64,
     /// Revision of the map that the store's checkpoint holds.
     pub(crate) checkpoint_revision: u64,
+}
+
+impl Recovered {
+    /// A space in which nothing has happened.
+    fn empty(settings: &Settings) -> Self {
+        Self {
+            map: CognitiveMap::new(settings.clone()),
+            recorders: Vec::new(),
+            events: EventRing::since(0),
+            episodes: EndedEpisodes::default(),
+            next_block: 0,
+            checkpoint_revision: 0,
+        }
+    }
+
+    /// Applies a record of the space `name`, and keeps what it brought about. `events` is empty
+    /// before and after: its memory is used again.
+    fn apply(&mut self, name: &str, record: &Record, events: &mut Vec<Event>) {
+        self.map.apply(record, events);
+        let records = encode::event_records(name, &self.map, events);
+        records.for_each(|event| self.events.push(Arc::new(event)));
+        for event in events.drain(..) {
+            if let Some(change) = encode::ended_episode(name, &self.map, &event) {
+                self.episodes.put(event.agent.0, change.0);
+            }
+        }
+    }
 }
 
 /// Why a space cannot be recovered.
@@ -72,17 +99,8 @@ pub(crate) fn recover(
     } = *loading;
     let journal = store.open_journal(space)?;
     report(name, &journal);
-    let mut recovered = match load_checkpoint(loading, journal.extent.blocks) {
-        Some(recovered) => recovered,
-        None => Recovered {
-            map: CognitiveMap::new(settings.clone()),
-            recorders: Vec::new(),
-            events: EventRing::since(0),
-            episodes: EndedEpisodes::default(),
-            next_block: 0,
-            checkpoint_revision: 0,
-        },
-    };
+    let checkpoint = load_checkpoint(loading, journal.extent.blocks);
+    let mut recovered = checkpoint.unwrap_or_else(|| Recovered::empty(settings));
     let mut events = Vec::new();
     for block in store.journal(space, recovered.next_block) {
         if closing() {
@@ -99,15 +117,7 @@ pub(crate) fn recover(
         let mut chunks = Vec::new();
         for entry in &entries {
             records_of(entry, |record| {
-                recovered.map.apply(&record, &mut events);
-                let records = encode::event_records(name, &recovered.map, &events);
-                records.for_each(|event| recovered.events.push(Arc::new(event)));
-                for event in &events {
-                    if let Some(change) = encode::ended_episode(name, &recovered.map, event) {
-                        recovered.episodes.put(event.agent.0, change.0);
-                    }
-                }
-                events.clear();
+                recovered.apply(name, &record, &mut events);
                 let (map, recorders) = (&recovered.map, &mut recovered.recorders);
                 chunks.extend(trajectory::note_all(recorders, map, &record, interval_ns));
             });

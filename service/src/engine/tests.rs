@@ -19,6 +19,7 @@ use crate::store::{Derived, Journal, LocalStore};
 mod faults;
 mod mangled;
 mod removal;
+mod settings;
 mod window;
 
 const SPACE: &str = "lab";

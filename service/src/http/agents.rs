@@ -30,7 +30,8 @@ pub(crate) struct AgentsQuery {
 }
 
 /// The agents of a space.
-#[utoipa::path(get, path = "/v1/spaces/{space}/agents", tag = "agents", operation_id = "list_agents",
+#[utoipa::path(get, path = "/v1/spaces/{space}/agents",
+    tag = "agents", operation_id = "list_agents",
     params(SpaceParam, AgentsQuery),
     responses(
         (status = 200, description = "The agents, by name", body = AgentPage),

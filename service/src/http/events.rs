@@ -93,7 +93,8 @@ pub(crate) enum ServerSentEvent {
 /// or in `after`, and gets what happened since. The latest 1024 are kept, also over a restart. Who
 /// comes back later or cannot keep up is told so by `event: missed`, and how many, where that is
 /// known. The stream ends when the service stops or the space is deleted.
-#[utoipa::path(get, path = "/v1/spaces/{space}/events", tag = "spaces", operation_id = "follow_events",
+#[utoipa::path(get, path = "/v1/spaces/{space}/events",
+    tag = "spaces", operation_id = "follow_events",
     params(SpaceParam, EventsQuery, ("Last-Event-ID" = Option<String>, Header,
         description = "As `after`, and before it", pattern = "^[0-9]+-[0-9]+$")),
     responses(

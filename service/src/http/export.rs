@@ -80,7 +80,8 @@ pub(crate) struct MapExport {
 ///
 /// The map is as it was when the request came, whatever happens while it is sent. For a graph the
 /// whole map is relaxed, which may take seconds; all who ask meanwhile get the same one after it.
-#[utoipa::path(get, path = "/v1/spaces/{space}/export", tag = "spaces", operation_id = "export_space",
+#[utoipa::path(get, path = "/v1/spaces/{space}/export",
+    tag = "spaces", operation_id = "export_space",
     params(SpaceParam, ExportQuery),
     responses(
         (status = 200, description = "The map", content(
@@ -125,6 +126,41 @@ pub(crate) async fn get(
 /// JSON.
 type Section = fn(&CognitiveMap, &[AgentSummary], u32) -> Vec<(u32, String)>;
 
+/// The lists of the map with their names.
+const SECTIONS: [(&str, Section); 4] = [
+    ("agents", |_, agents, first| {
+        let agents = (0..).zip(agents.iter()).skip(first as usize);
+        agents
+            .take(CHUNK_ITEMS)
+            .map(|(at, agent)| (at, text(agent)))
+            .collect()
+    }),
+    ("places", |map, _, first| {
+        let places = map.places_from(PlaceId(first)).take(CHUNK_ITEMS);
+        places
+            .map(|(id, place)| (id.0, text(&encode::place(map, id, place))))
+            .collect()
+    }),
+    ("trips", |map, _, first| {
+        // A trip has up to a thousand legs.
+        let trips = map.trips_from(TripId(first)).take(1);
+        trips
+            .map(|(id, trip)| (id.0, text(&encode::trip_detail(map, id, trip))))
+            .collect()
+    }),
+    ("landmarks", |map, _, first| {
+        let known = (first..).map_while(|id| Some((id, map.landmark(LandmarkId(id))?)));
+        // One with several names once, and those that are set aside not at all.
+        let told = known.filter(|(id, landmark)| {
+            let named = map.landmark_by_label(landmark.label().as_str());
+            named.is_some_and(|(named, _)| named.0 == *id)
+        });
+        told.take(CHUNK_ITEMS)
+            .map(|(id, landmark)| (id, text(&encode::landmark(landmark))))
+            .collect()
+    }),
+];
+
 async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, Problem> {
     let room = long.enter()?;
     let map = space.snapshot().await?;
@@ -135,39 +171,6 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
             format!("{{\"space\":{}", text(&info))
         })
     };
-    let sections: [(&str, Section); 4] = [
-        ("agents", |_, agents, first| {
-            let agents = (0..).zip(agents.iter()).skip(first as usize);
-            agents
-                .take(CHUNK_ITEMS)
-                .map(|(at, agent)| (at, text(agent)))
-                .collect()
-        }),
-        ("places", |map, _, first| {
-            let places = map.places_from(PlaceId(first)).take(CHUNK_ITEMS);
-            places
-                .map(|(id, place)| (id.0, text(&encode::place(map, id, place))))
-                .collect()
-        }),
-        ("trips", |map, _, first| {
-            // A trip has up to a thousand legs.
-            let trips = map.trips_from(TripId(first)).take(1);
-            trips
-                .map(|(id, trip)| (id.0, text(&encode::trip_detail(map, id, trip))))
-                .collect()
-        }),
-        ("landmarks", |map, _, first| {
-            let known = (first..).map_while(|id| Some((id, map.landmark(LandmarkId(id))?)));
-            // One with several names once, and those that are set aside not at all.
-            let told = known.filter(|(id, landmark)| {
-                let named = map.landmark_by_label(landmark.label().as_str());
-                named.is_some_and(|(named, _)| named.0 == *id)
-            });
-            told.take(CHUNK_ITEMS)
-                .map(|(id, landmark)| (id, text(&encode::landmark(landmark))))
-                .collect()
-        }),
-    ];
     let views = space.agents_after(None, usize::MAX);
     let agents: Arc<[_]> = views
         .iter()
@@ -176,7 +179,7 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
             estimate: view.estimate(),
         })
         .collect();
-    let lists = sections.into_iter().flat_map(move |(name, section)| {
+    let lists = SECTIONS.into_iter().flat_map(move |(name, section)| {
         let (map, agents) = (Arc::clone(&map), Arc::clone(&agents));
         let (mut first, mut separator) = (Some(0), "");
         let items = std::iter::from_fn(move || {

@@ -72,7 +72,8 @@ fn ready(stopped: Vec<(String, String)>) -> Response<Body> {
 
 /// Metrics in Prometheus's text format.
 #[utoipa::path(get, path = "/metrics", tag = "service", operation_id = "get_metrics",
-    responses((status = 200, description = "The metrics", body = String, content_type = "text/plain")))]
+    responses((status = 200, description = "The metrics",
+        body = String, content_type = "text/plain")))]
 pub(crate) async fn metrics(
     State(service): State<Service>,
     _: NoQuery,

@@ -18,10 +18,12 @@ use crate::encode;
 /// The samples need no agent, and change nothing. Of places that look alike none is told as the
 /// pose before it can be told from the others. A few such questions are answered at once; further
 /// ones are told to come back.
-#[utoipa::path(post, path = "/v1/spaces/{space}/localize", tag = "memory", operation_id = "localize",
+#[utoipa::path(post, path = "/v1/spaces/{space}/localize",
+    tag = "memory", operation_id = "localize",
     params(SpaceParam), request_body = LocalizeQuery,
     responses(
-        (status = 200, description = "Where the samples were taken, as far as the map knows", body = Localization),
+        (status = 200, description = "Where the samples were taken, as far as the map knows",
+            body = Localization),
         (status = 404, description = "There is no such space"),
         (status = 422, description = "The samples make no sense, or not here")))]
 pub(crate) async fn post(

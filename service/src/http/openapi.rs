@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::examples;
 use super::problem::{Kind, PROBLEM_JSON};
-use crate::decode::{Bound, SPACE_BOUNDS, TRAJECTORY_INTERVAL_S};
+use crate::decode::{Bound, setting_bounds};
 
 /// Statuses that every route may answer with, whoever handles it.
 const EVERYWHERE: [(&str, &str); 7] = [
@@ -264,18 +264,16 @@ fn constrain_lists(schemas: &mut Value) {
 }
 
 fn constrain_settings(schemas: &mut Value) {
-    let share = of_bound(Bound::Share);
-    for (_, field) in entries(&mut schemas["NoiseSettings"]["properties"]) {
-        merge(field, &share);
-    }
     let bernoulli = "/Recruitment/oneOf/1/properties/bernoulli/properties/probability";
     if let Some(probability) = schemas.pointer_mut(bernoulli) {
-        merge(probability, &share);
+        merge(probability, &of_bound(Bound::Share));
     }
-    let settings = &mut schemas["SpaceSettings"]["properties"];
-    let interval = ("trajectory_interval_s", TRAJECTORY_INTERVAL_S);
-    for (field, bound) in SPACE_BOUNDS.into_iter().chain([interval]) {
-        merge(&mut settings[field], &of_bound(bound));
+    for (field, bound) in setting_bounds() {
+        for message in ["SpaceSettings", "NoiseSettings"] {
+            if let Some(schema) = schemas[message]["properties"].get_mut(field) {
+                merge(schema, &of_bound(bound));
+            }
+        }
     }
 }
 

@@ -38,7 +38,8 @@ pub(crate) struct PlacesQuery {
 }
 
 /// The places of a space.
-#[utoipa::path(get, path = "/v1/spaces/{space}/places", tag = "memory", operation_id = "list_places",
+#[utoipa::path(get, path = "/v1/spaces/{space}/places",
+    tag = "memory", operation_id = "list_places",
     params(SpaceParam, PlacesQuery),
     responses(
         (status = 200, description = "The places, by number", body = PlacePage),
@@ -85,7 +86,8 @@ fn places(map: &CognitiveMap, query: &PlacesQuery, limit: usize) -> Response<Bod
 }
 
 /// A place.
-#[utoipa::path(get, path = "/v1/spaces/{space}/places/{id}", tag = "memory", operation_id = "get_place",
+#[utoipa::path(get, path = "/v1/spaces/{space}/places/{id}",
+    tag = "memory", operation_id = "get_place",
     params(IdParams),
     responses(
         (status = 200, description = "The place", body = Place),

@@ -80,7 +80,8 @@ fn trips(map: &CognitiveMap, query: &TripsQuery, limit: usize) -> Response<Body>
 }
 
 /// A trip with its legs.
-#[utoipa::path(get, path = "/v1/spaces/{space}/trips/{id}", tag = "memory", operation_id = "get_trip",
+#[utoipa::path(get, path = "/v1/spaces/{space}/trips/{id}",
+    tag = "memory", operation_id = "get_trip",
     params(IdParams),
     responses(
         (status = 200, description = "The trip", body = TripDetail),

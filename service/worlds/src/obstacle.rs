@@ -264,7 +264,8 @@ mod tests {
             let samples = (0..=1000).map(|k| a + (b - a) * (f64::from(k) / 1000.0));
             let deep = samples.clone().any(|p| world.cubes().iter().any(|c| c.contains(&p, 0.0)));
             // Sampling may miss a grazed edge, so it decides only beyond a margin of its step.
-            let near = samples.into_iter().any(|p| world.cubes().iter().any(|c| c.contains(&p, 0.03)));
+            let is_in_cube = |p| world.cubes().iter().any(|c| c.contains(&p, 0.03));
+            let near = samples.into_iter().any(is_in_cube);
             let sees = world.sees(&a, &b);
             prop_assert!(!deep || !sees);
             prop_assert!(near || sees);
@@ -298,7 +299,11 @@ mod tests {
         }
 
         #[test]
-        fn along_an_axis_sight_and_distance_hold(seed in 0..20_u64, origin in position(), axis in 0..3_usize) {
+        fn along_an_axis_sight_and_distance_hold(
+            seed in 0..20_u64,
+            origin in position(),
+            axis in 0..3_usize,
+        ) {
             let world = ObstacleWorld::new(seed);
             let mut direction = Vector3::zeros();
             direction[axis] = -1.0;

@@ -228,8 +228,9 @@ mod tests {
             channel: "light".into(),
             value: 0.5,
         };
-        assert!(
-            matches!(sample(level).unwrap().body, SampleBody::Level(l) if l.value().to_bits() == 0.5_f64.to_bits())
-        );
+        assert!(matches!(
+            sample(level).unwrap().body,
+            SampleBody::Level(l) if l.value().to_bits() == 0.5_f64.to_bits()
+        ));
     }
 }

@@ -145,7 +145,12 @@ mod tests {
             let pose = Isometry3::new(eye, Vector3::from(turn));
             let target = eye + Vector3::from(offset);
             let sensor =
-                Sensor { report_probability: 1.0, range_sd_m: 0.0, bearing_sd_rad: 0.0, ..Sensor::default() };
+                Sensor {
+                    report_probability: 1.0,
+                    range_sd_m: 0.0,
+                    bearing_sd_rad: 0.0,
+                    ..Sensor::default()
+                };
             let mut random = ChaCha8Rng::seed_from_u64(1);
             let seen = sensor
                 .look(&world, &pose, || ReadingTarget::Robot("a".into()), &target, &mut random)
@@ -153,7 +158,8 @@ mod tests {
             let ReadingBody::Sighting { range_m, azimuth_rad, elevation_rad, .. } = seen else {
                 panic!("not a sighting")
             };
-            let found = pose * nalgebra::Point3::from(direction(azimuth_rad, elevation_rad) * range_m);
+            let seen = direction(azimuth_rad, elevation_rad) * range_m;
+            let found = pose * nalgebra::Point3::from(seen);
             prop_assert!((found.coords - target).norm() < 1e-9);
         }
     }

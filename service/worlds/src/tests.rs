@@ -203,7 +203,8 @@ fn robots_that_are_told_nothing_get_no_start_pose() {
     let told = ticks[0][0].readings.remove(0);
     assert!(matches!(
         told.body,
-        ReadingBody::StartPose { translation_m, .. } if nalgebra::Vector3::from(translation_m) == ObstacleWorld::new(5).centre_m()
+        ReadingBody::StartPose { translation_m, .. }
+            if nalgebra::Vector3::from(translation_m) == ObstacleWorld::new(5).centre_m()
     ));
     assert_eq!(ticks[0], ticks[1]);
 }

@@ -15,18 +15,15 @@ impl From<&Reading> for Sample {
                 angular_rad_s,
                 duration_s,
                 noise,
-            } => {
-                let noise = noise.map(|(translation_sd_m, rotation_sd_rad)| MotionNoise {
+            } => SampleBody::Velocity(Velocity {
+                linear_m_s: *linear_m_s,
+                angular_rad_s: *angular_rad_s,
+                duration_s: *duration_s,
+                noise: noise.map(|(translation_sd_m, rotation_sd_rad)| MotionNoise {
                     translation_sd_m,
                     rotation_sd_rad,
-                });
-                SampleBody::Velocity(Velocity {
-                    linear_m_s: *linear_m_s,
-                    angular_rad_s: *angular_rad_s,
-                    duration_s: *duration_s,
-                    noise,
-                })
-            }
+                }),
+            }),
             ReadingBody::Sighting {
                 target,
                 range_m,

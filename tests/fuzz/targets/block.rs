@@ -15,7 +15,7 @@ fuzz_target!(|data: &[u8]| {
     let Ok(entries) = entries(data) else {
         return;
     };
-    let settings = core_settings(&SpaceSettings::default()).expect("the default settings are valid");
+    let settings = core_settings(&SpaceSettings::default()).expect("the defaults are valid");
     let (mut map, mut events) = (CognitiveMap::new(settings.clone()), Vec::new());
     for entry in &entries {
         records_of(entry, |record| {

@@ -31,7 +31,7 @@ fuzz_target!(|data: &[u8]| {
 });
 
 fn fold(mut data: &[u8]) -> CognitiveMap {
-    let settings = core_settings(&SpaceSettings::default()).expect("the default settings are valid");
+    let settings = core_settings(&SpaceSettings::default()).expect("the defaults are valid");
     let (mut map, mut events) = (CognitiveMap::new(settings), Vec::new());
     for agent in 0..ROBOTS {
         let name = Label::new(&format!("robot{agent}")).expect("a valid name");

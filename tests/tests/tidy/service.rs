@@ -108,7 +108,8 @@ fn each_part_of_the_service_knows_only_its_neighbours() {
                 "crate::config",
             ],
             &["http/", "transport/", "cli/", "service.rs", "config/"],
-            "The engine, its store and what they are made of know nobody who uses them. Pass it in.",
+            "The engine, its store and what they are made of know nobody who uses them. Pass it \
+             in.",
         ),
         (
             &["crate::engine", "crate::answer", "crate::problem"],

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import logging
-import urllib.error
-import urllib.parse
-import urllib.request
 from dataclasses import replace
-from typing import Any, Dict, Iterable, Iterator, List, Optional, Tuple, Type, TypeVar, Union, cast
+from typing import Any, Iterable, Iterator, List, Optional, Tuple, Union, cast
 
 from .answer import (
     AgentDetail,
@@ -26,8 +22,9 @@ from .answer import (
     TripDetail,
     TripPage,
 )
-from .errors import ApiError, InvalidValue, WireError
+from .errors import ApiError
 from .event import Event, EventPage, EventRecord, MissedEvents
+from .http import HttpClient, Query
 from .landmark import Landmark, LandmarkPage
 from .localize import Localization, LocalizeQuery
 from .object import (
@@ -41,27 +38,20 @@ from .object import (
     ObjectSummary,
 )
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
-from .request import checked_token, json_of, path_of, tls_of
+from .request import json_of, path_of
 from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
 from .scalar import positive_seconds
 from .settings import SpaceSettings
 from .sse import server_sent_events
 from .trajectory import StampedPose, Trajectory
 from .unreachable import translated
-from .url import checked_url
 from .vector import vec3
 from .wire import CBOR, JSON, decode, encode, to_wire
 
-#: Members that every problem has (RFC 9457).
-_PROBLEM = frozenset(("type", "title", "status", "detail"))
-
 _log = logging.getLogger("cogmap")
 
-T = TypeVar("T")
-_Query = Dict[str, Union[None, str, int, float]]
 
-
-class Client:
+class Client(HttpClient):
     """Asks a cogmap service over HTTP.
 
     Holds no connection between calls, so it may be shared by threads. Lists that the service
@@ -81,21 +71,6 @@ class Client:
         Unreachable: Nothing answers at the address, or the connection broke.
         Timeout: The service fell silent.
     """
-
-    def __init__(
-        self,
-        url: str,
-        token: Optional[str] = None,
-        timeout_s: float = 10.0,
-        ca_file: Optional[str] = None,
-    ) -> None:
-        self._url = checked_url(url)
-        self._token = checked_token(token)
-        self._timeout_s = positive_seconds("timeout_s", timeout_s)
-        self._tls = tls_of(ca_file)
-
-    def __repr__(self) -> str:
-        return f"Client({self._url!r}{'' if self._token is None else ', token=...'})"
 
     # Spaces
 
@@ -126,7 +101,7 @@ class Client:
 
     def agents(self, space: str) -> Iterator[AgentSummary]:
         """All agents of a space, by name."""
-        query: _Query = {}
+        query: Query = {}
         while True:
             page = self._get(AgentPage, path_of(space, "agents"), query)
             yield from page.agents
@@ -168,7 +143,7 @@ class Client:
         path = path_of(space, "agents", agent, "trajectory")
         poses: List[StampedPose] = []
         while True:
-            query: _Query = {"kind": kind, "from_ns": from_ns, "to_ns": to_ns}
+            query: Query = {"kind": kind, "from_ns": from_ns, "to_ns": to_ns}
             page = self._get(Trajectory, path, query)
             poses.extend(page.poses)
             if page.next_from_ns is None:
@@ -241,7 +216,7 @@ class Client:
 
     def places(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Place]:
         """All places of a space, by id. `filters` are passed on as query parameters."""
-        query: _Query = dict(filters)
+        query: Query = dict(filters)
         while True:
             page = self._get(PlacePage, path_of(space, "places"), query)
             yield from page.places
@@ -255,7 +230,7 @@ class Client:
 
     def trips(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Trip]:
         """All trips of a space, by id. `filters` are passed on as query parameters."""
-        query: _Query = dict(filters)
+        query: Query = dict(filters)
         while True:
             page = self._get(TripPage, path_of(space, "trips"), query)
             yield from page.trips
@@ -269,7 +244,7 @@ class Client:
 
     def landmarks(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Landmark]:
         """All landmarks of a space, by label. `filters` are passed on as query parameters."""
-        query: _Query = dict(filters)
+        query: Query = dict(filters)
         while True:
             page = self._get(LandmarkPage, path_of(space, "landmarks"), query)
             yield from page.landmarks
@@ -287,7 +262,7 @@ class Client:
         self, space: str, **filters: Union[None, str, int, float]
     ) -> Iterator[ObjectSummary]:
         """All objects of a space, by name. `filters` are passed on as query parameters."""
-        query: _Query = dict(filters)
+        query: Query = dict(filters)
         while True:
             page = self._get(ObjectPage, path_of(space, "objects"), query)
             yield from page.objects
@@ -380,7 +355,7 @@ class Client:
     ) -> EventPage:
         """One page of the events that the service keeps, oldest first. Ask again with its `next` as
         `after` for what comes later."""
-        query: _Query = {"format": "json", "after": after, "agent": agent, "limit": limit}
+        query: Query = {"format": "json", "after": after, "agent": agent, "limit": limit}
         return self._get(EventPage, path_of(space, "events"), query)
 
     def export(
@@ -401,7 +376,7 @@ class Client:
             agent: Whose trajectory; `tum` needs it.
             session: Which run of the agent; the current one when absent.
         """
-        query: _Query = {"format": format, "agent": agent, "session": session}
+        query: Query = {"format": format, "agent": agent, "session": session}
         return self._request("GET", path_of(space, "export"), query, accept="*/*")
 
     # The service itself
@@ -422,76 +397,3 @@ class Client:
                 return False
             raise
         return True
-
-    # Requests
-
-    def _get(self, kind: Type[T], path: str, query: Optional[_Query] = None) -> T:
-        return self._decoded(kind, path, self._request("GET", path, query))
-
-    def _send(self, kind: Type[T], method: str, path: str, content_type: str, body: bytes) -> T:
-        answer = self._request(method, path, body=body, content_type=content_type)
-        return self._decoded(kind, path, answer)
-
-    def _decoded(self, kind: Type[T], path: str, answer: bytes) -> T:
-        try:
-            return decode(kind, answer, JSON)
-        except WireError as error:
-            raise WireError(f"{self._url}{path}: {error}") from error
-
-    def _request(
-        self,
-        method: str,
-        path: str,
-        query: Optional[_Query] = None,
-        *,
-        body: Optional[bytes] = None,
-        content_type: Optional[str] = None,
-        accept: str = JSON,
-    ) -> bytes:
-        given = {name: value for name, value in (query or {}).items() if value is not None}
-        if given:
-            path = f"{path}?{urllib.parse.urlencode(given)}"
-        request = self._make_request(method, path, accept=accept, body=body)
-        if content_type is not None:
-            request.add_header("Content-Type", content_type)
-        with translated(f"{method} {request.full_url}"):
-            with self._open(request, self._timeout_s) as response:
-                data: bytes = response.read()
-                return data
-
-    def _make_request(
-        self, method: str, path: str, *, accept: str, body: Optional[bytes] = None
-    ) -> urllib.request.Request:
-        request = urllib.request.Request(self._url + path, data=body, method=method)
-        request.add_header("Accept", accept)
-        if self._token is not None:
-            # Not a header that redirects carry along: the token is for this service alone.
-            request.add_unredirected_header("Authorization", f"Bearer {self._token}")
-        return request
-
-    def _open(self, request: urllib.request.Request, timeout_s: Optional[float]) -> Any:
-        try:
-            return urllib.request.urlopen(request, timeout=timeout_s, context=self._tls)
-        except urllib.error.HTTPError as error:
-            where = f"{request.get_method()} {request.full_url}"
-            if error.code == 401:
-                where += " without a token" if self._token is None else " with the given token"
-            with error:
-                raise _api_error(error.code, error.reason, error.read(), where) from None
-
-
-def _api_error(status: int, reason: str, body: bytes, where: str) -> ApiError:
-    """The error of a refused request; the body may be anything when a proxy wrote it."""
-    try:
-        problem = json.loads(body)
-        return ApiError(
-            status,
-            str(problem["type"]),
-            str(problem["title"]),
-            str(problem.get("detail", "")),
-            {name: value for name, value in problem.items() if name not in _PROBLEM},
-            where,
-        )
-    except (ValueError, KeyError, TypeError, AttributeError):
-        text = body[:200].decode("utf-8", "replace")
-        return ApiError(status, "about:blank", reason, text, where=where)

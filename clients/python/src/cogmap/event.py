@@ -178,7 +178,7 @@ class ObjectRecognised:
     TAG: ClassVar[str] = "object_recognised"
     #: Name of the object.
     object: str
-    #: How probable it is, 0.995 at least.
+    #: How probable it is: at least what the space's settings ask for, 0.995 by default.
     probability: float
 
 

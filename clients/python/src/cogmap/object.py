@@ -262,7 +262,7 @@ class Identification:
 
     space: str
     map_revision: int
-    #: The answer, once one is at least 99.5 % probable.
+    #: The answer, once one is as probable as the space's settings ask for, 99.5 % by default.
     verdict: ObjectVerdict
     #: Probability of each object that has a noticeable one, most probable first.
     objects: Tuple[ObjectProbability, ...]
@@ -303,8 +303,8 @@ class EndedEpisode:
     session: int
     #: Stamp of the sample that ended it [ns].
     stamp_ns: int
-    #: What its contacts said in the end, before anything was learned from it; absent when it taught an
-    #: object by its name.
+    #: What its contacts said in the end, before anything was learned from it; absent when it taught
+    #: an object by its name.
     identification: Optional[Identification]
 
 
@@ -318,6 +318,6 @@ class AgentObject:
     episode: Optional[EpisodeKind]
     #: What its contacts say; in the frame of the body when the episode began.
     identification: Optional[Identification]
-    #: The latest episode that has ended; absent when there was none in which something was felt. Also kept
-    #: when the robot is closed.
+    #: The latest episode that has ended; absent when there was none in which something was felt.
+    #: Also kept when the robot is closed.
     last: Optional[EndedEpisode] = None

@@ -29,7 +29,7 @@ from .errors import (
     WindowFull,
 )
 from .fork import zenoh_begins
-from .inbox import Inbox
+from .incoming import Incoming
 from .listeners import Listeners, WeakListeners
 from .problem import Problem
 from .rejection import Rejections, sentences
@@ -101,9 +101,7 @@ class Run:
         # Held while a batch is taken and put, so that batches leave in order.
         self._publishing = threading.Lock()
         self._wake = Wake()
-        self._estimates_in = Inbox(Estimate, bounds.ESTIMATES_WAITING_MAX, self._wake)
-        self._watermarks_in = Inbox(Watermark, bounds.ANSWERS_WAITING_MAX, self._wake)
-        self._problems_in = Inbox(Problem, bounds.ANSWERS_WAITING_MAX, self._wake)
+        self._incoming = Incoming(self._wake)
         self.connection = Connection(
             zenoh_session,
             owns_session,
@@ -111,9 +109,9 @@ class Run:
             space,
             agent,
             session_id,
-            hear_estimate=self._estimates_in.hear,
-            hear_watermark=self._watermarks_in.hear,
-            hear_problem=self._problems_in.hear,
+            hear_estimate=self._incoming.estimates.hear,
+            hear_watermark=self._incoming.watermarks.hear,
+            hear_problem=self._incoming.problems.hear,
             hear_matching=self._hear_matching,
         )
         self._thread = threading.Thread(
@@ -427,30 +425,21 @@ class Run:
                 return
 
     def _receive(self) -> None:
-        # Estimates first, and of the watermarks only those that are here by now: when a flush
-        # returns, the estimate published before is in place. What comes meanwhile wakes this thread
-        # again.
-        watermarks = len(self._watermarks_in)
-        wanted = self._listeners.want_estimates()
-        while self._estimates_in:
-            if len(self._estimates_in) > 1 and not wanted:
-                # Nobody asked for each one, and only the latest is kept: spare the decoding.
-                self._estimates_in.drop()
-                continue
-            estimate = self._estimates_in.take()
-            if estimate is not None and estimate.session == self.session_id:
-                with self.changed:
-                    self.estimate = estimate
-                    self.changed.notify_all()
-                self._listeners.hear_estimate(estimate)
-        for _ in range(watermarks):
-            watermark = self._watermarks_in.take()
-            if watermark is not None:
-                self._take_watermark(watermark)
-        while self._problems_in:
-            problem = self._problems_in.take()
-            if problem is not None:
-                self._take_problem(problem)
+        for told in self._incoming.drain(self._listeners.want_estimates()):
+            if isinstance(told, Estimate):
+                self._take_estimate(told)
+            elif isinstance(told, Watermark):
+                self._take_watermark(told)
+            else:
+                self._take_problem(told)
+
+    def _take_estimate(self, estimate: Estimate) -> None:
+        if estimate.session != self.session_id:
+            return
+        with self.changed:
+            self.estimate = estimate
+            self.changed.notify_all()
+        self._listeners.hear_estimate(estimate)
 
     def _take_watermark(self, watermark: Watermark) -> None:
         with self.changed:

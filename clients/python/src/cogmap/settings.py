@@ -82,10 +82,28 @@ class SpaceSettings:
     places_max: int
     #: Most legs of all trips together: for one more, the weakest trip is forgotten.
     legs_max: int
-    #: Most moments of all agents that are remembered, so that the past can be smoothed.
-    anchors_max: int
+    #: Most keyframes of all agents: moments that are kept, so that the past can be smoothed.
+    keyframes_max: int
     #: After this many samples of the space, a use counts half as much for the strength of a place
     #: or trip.
     strength_half_life_samples: int
     #: Closest two poses of a stored trajectory [s].
     trajectory_interval_s: float
+    #: Deviation of a component of a sighting from what the estimate expects, in standard
+    #: deviations, beyond which the whole sighting is refused.
+    sighting_gate_sd: float = 4.0
+    #: The same beyond which a component of a sighting loses weight.
+    sighting_huber_sd: float = 2.0
+    #: Squared Mahalanobis distance up to which a loop closure agrees with the map or with another
+    #: closure.
+    closure_gate_chi2: float = 11.3
+    #: An agent leaves a keyframe after this motion [m] at the latest.
+    keyframe_spacing_m: float = 0.1
+    #: The same for rotation [rad].
+    keyframe_spacing_rad: float = 0.1
+    #: Standard deviation of what a robot is moved along each axis between two sessions [m].
+    restart_sd_m: float = 1.0
+    #: Standard deviation of what it is turned about each axis between them [rad].
+    restart_sd_rad: float = 0.5
+    #: Probability from which on touches are answered with an object, or with none that is known.
+    object_answer_probability: float = 0.995

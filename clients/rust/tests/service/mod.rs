@@ -60,6 +60,25 @@ pub(crate) fn router(endpoint: &str) -> Session {
     zenoh::open(config).wait().unwrap()
 }
 
+/// Answers each question for the watermark.
+fn answer_watermarks(router: &Session, space: &str, book: Arc<Mutex<Book>>) -> Queryable<()> {
+    router
+        .declare_queryable(query_key(space, Verb::Watermark.as_str()))
+        .callback(move |query| {
+            let payload = query.payload().unwrap().to_bytes();
+            let codec = Codec::of_encoding(&query.encoding().unwrap().to_string()).unwrap();
+            codec.decode::<WatermarkQuery>(&payload).unwrap();
+            let watermark = book.lock().unwrap().watermark();
+            query
+                .reply(query.key_expr(), codec.encode(&watermark))
+                .encoding(codec.encoding())
+                .wait()
+                .unwrap();
+        })
+        .wait()
+        .unwrap()
+}
+
 impl Service {
     pub(crate) fn start(endpoint: &str, space: &str, agent: &str, faults: Faults) -> Self {
         Self::on(router(endpoint), space, agent, faults)
@@ -73,22 +92,7 @@ impl Service {
             journal: Vec::new(),
             early: BTreeMap::new(),
         }));
-        let asked = Arc::clone(&book);
-        let watermarks = router
-            .declare_queryable(query_key(space, Verb::Watermark.as_str()))
-            .callback(move |query| {
-                let payload = query.payload().unwrap().to_bytes();
-                let codec = Codec::of_encoding(&query.encoding().unwrap().to_string()).unwrap();
-                codec.decode::<WatermarkQuery>(&payload).unwrap();
-                let watermark = asked.lock().unwrap().watermark();
-                query
-                    .reply(query.key_expr(), codec.encode(&watermark))
-                    .encoding(codec.encoding())
-                    .wait()
-                    .unwrap();
-            })
-            .wait()
-            .unwrap();
+        let watermarks = answer_watermarks(&router, space, Arc::clone(&book));
         let taken = Arc::clone(&book);
         let publisher = router.clone();
         let (space, agent) = (space.to_owned(), agent.to_owned());

@@ -28,5 +28,5 @@ pub use memory::percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue,
 pub use memory::place::{Place, PlaceId};
 pub use memory::recall::{RecallCue, Recalled, Rivals};
 pub use memory::trip::{Leg, Trip, TripEnd, TripId};
-pub use settings::{InvalidSettings, Recruitment, Settings, SettingsValues};
+pub use settings::{Bound, InvalidSettings, Recruitment, SettingNumber, Settings, SettingsValues};
 pub use state::{Digest, InvalidDigest};

@@ -140,7 +140,7 @@ pub fn decode(
 /// false matches in a ball of radius L around the truth is
 ///
 /// ```text
-/// N(L) = (4/3) π L³ · 2^(M/2) · Vₙ(q) · (Σ 1/spacingₘ²)^(3/2)       n = 3(M−1), Vₙ volume of an n-ball
+/// N(L) = (4/3) π L³ · 2^(M/2) · Vₙ(q) · (Σ 1/spacingₘ²)^(3/2)   n = 3(M−1), Vₙ volume of an n-ball
 /// ```
 ///
 /// and the range is where N = 1, at least half the coarsest spacing, infinite for several modules

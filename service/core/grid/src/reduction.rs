@@ -171,7 +171,8 @@ mod tests {
             let reduced = reduce(&entries);
             // Whole coefficients of determinant ±1 are what leaves a lattice the same.
             prop_assert!((determinant(&reduced.coefficients).abs() - 1.0).abs() < 1e-6);
-            prop_assert!(reduced.coefficients.iter().flatten().all(|x| x.fract().abs() < f64::MIN_POSITIVE));
+            let mut all = reduced.coefficients.iter().flatten();
+            prop_assert!(all.all(|x| x.fract().abs() < f64::MIN_POSITIVE));
             // The first vector's bound: 2^((n−1)/4) det^(1/n), a little more for δ < 1.
             let shortest = squared(&reduced.vectors[0]).sqrt();
             prop_assert!(shortest <= 2.1 * determinant(&entries).abs().powf(0.2));

@@ -68,14 +68,15 @@ pub fn exponential_confidence(distance: f64, sigma: f64) -> f64 {
 /// activations as if each module had infinitely many cells, averaged over the known modules.
 ///
 /// ```text
-/// kernel = mean over known m of exp(−d_m² / (4 σ_m²))     d_m torus distance, σ_m = TUNING_WIDTH · spacing
+/// kernel = mean over known m of exp(−d_m² / (4 σ_m²))
+/// d_m torus distance, σ_m = TUNING_WIDTH · spacing
 /// ```
 ///
 /// It costs one exponential per module instead of 27, and does not depend on how the cells tile the
 /// phase. It is not quite the cosine of the materialised
 /// [`population_vector`](super::population::population_vector)s, for 27 cells are few, and a far
 /// phase is near several images; they differ by less than a tenth
-/// (`the_kernel_is_the_cosine_of_activations_to_a_tenth` in `tests/grid_population.rs`).
+/// (`the_kernel_is_the_cosine_of_activations_to_a_tenth` in `tests/population.rs`).
 pub fn kernel(modules: &GridModules, cue: &PartialCode, code: &GridCode) -> f64 {
     let mut sum = 0.0;
     let mut known = 0.0;

@@ -29,4 +29,4 @@ pub use next_touch::NextTouch;
 pub use orientation::Orientation;
 pub use posterior::{PoseEstimate, Posterior, Verdict};
 pub use recognition::Recognition;
-pub use tuning::SURE;
+pub use tuning::ANSWER_PROBABILITY;

@@ -10,7 +10,7 @@ use crate::indexed_model::IndexedModel;
 use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::ObjectModel;
 use crate::surfels::map::PerceptContext;
-use crate::tuning::BACKGROUND_SAMPLES;
+use crate::tuning::{ANSWER_PROBABILITY, BACKGROUND_SAMPLES};
 
 /// Number of an object, chosen by the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -36,8 +36,9 @@ pub(crate) struct Sample {
 ///
 /// Putting a model builds its indexes, some milliseconds per thousand places. Recognition changes
 /// nothing here.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct ObjectLibrary {
+    answer_probability: f64,
     /// Shared with the library's clones, so that a snapshot costs a pointer per object.
     objects: BTreeMap<ObjectId, Arc<LibraryEntry>>,
     level_prior: Vec<LevelPrior>,
@@ -45,7 +46,29 @@ pub struct ObjectLibrary {
     extent_m: f64,
 }
 
+impl Default for ObjectLibrary {
+    fn default() -> Self {
+        Self::answering_from(ANSWER_PROBABILITY)
+    }
+}
+
 impl ObjectLibrary {
+    /// A library without objects, about which an answer is given from a probability on.
+    pub fn answering_from(answer_probability: f64) -> Self {
+        Self {
+            answer_probability,
+            objects: BTreeMap::new(),
+            level_prior: Vec::new(),
+            samples: Vec::new(),
+            extent_m: 0.0,
+        }
+    }
+
+    /// Probability from which on an answer is given.
+    pub fn answer_probability(&self) -> f64 {
+        self.answer_probability
+    }
+
     /// Puts a model in place of an earlier one of the same object. Running episodes keep the
     /// evidence that they have.
     pub fn put(&mut self, id: ObjectId, model: ObjectModel) {
@@ -65,7 +88,7 @@ impl ObjectLibrary {
     /// A library of some of these objects, each under a new number.
     #[must_use]
     pub fn select(&self, objects: impl IntoIterator<Item = (ObjectId, ObjectId)>) -> Self {
-        let mut selected = Self::default();
+        let mut selected = Self::answering_from(self.answer_probability);
         for (id, number) in objects {
             if let Some(object) = self.objects.get(&id) {
                 selected.objects.insert(number, Arc::clone(object));

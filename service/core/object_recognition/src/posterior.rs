@@ -4,7 +4,6 @@ use geometry::PoseCovariance;
 use nalgebra::Isometry3;
 
 use crate::library::ObjectId;
-use crate::tuning::SURE;
 
 /// Answer of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,14 +52,17 @@ pub struct Posterior {
     /// Goodness of fit of the best hypothesis, as a z-score: about 0 for a learned object, far
     /// below −3 for others. 0 where the orientation is not free.
     pub fit: f64,
+    /// Probability from which on an answer is given.
+    pub answer_probability: f64,
 }
 
 impl Posterior {
-    /// The answer, once one is at least 99.5 % probable.
+    /// The answer, once one is as probable as the library asks for.
     pub fn verdict(&self) -> Verdict {
+        let least = self.answer_probability;
         match self.objects.first() {
-            _ if self.unknown >= SURE => Verdict::Unknown,
-            Some((object, probability)) if *probability >= SURE => Verdict::Object(*object),
+            _ if self.unknown >= least => Verdict::Unknown,
+            Some((object, probability)) if *probability >= least => Verdict::Object(*object),
             _ => Verdict::Undecided,
         }
     }

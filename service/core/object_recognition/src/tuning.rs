@@ -4,15 +4,15 @@
 //!
 //! - *derived*: it follows from the equation or the paper that is named.
 //! - *budget*: it bounds time or memory, and is not below what the figures need.
-//! - *chosen*: it was set by hand. The figures of `docs/recognition.md` hold it; measure them anew
-//!   after a change, with
+//! - *chosen*: it is a judgement. No measurement of it alone is recorded; the figures of
+//!   `docs/recognition.md` are those of all together. Measure them anew after a change, with
 //!   `cogmap-lab replay points DIR --told --trials 10 --looks 10,30,60 --seed 21`.
 
 // Evidence.
 
-/// Probability at which an answer is given: one in 200 such answers may be wrong. Chosen
-/// with the command above.
-pub const SURE: f64 = 0.995;
+/// Probability at which an answer is given, where a library states no other: one in 200 such
+/// answers may be wrong. Chosen with the command above.
+pub const ANSWER_PROBABILITY: f64 = 0.995;
 /// Share of contacts that no model explains: misreadings, and touches of something else. Chosen.
 pub(crate) const OUTLIER_SHARE: f64 = 0.02;
 /// Prior probability that the object is none of the library. Chosen.

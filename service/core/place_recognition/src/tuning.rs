@@ -1,4 +1,5 @@
-//! Tuning: all constants of place recognition, by part, with unit and reason.
+//! Tuning: all constants of place recognition, by part, with unit and meaning. One without a reason
+//! is a judgement: no measurement of it alone is recorded.
 //!
 //! Lengths *in reaches* are multiples of the reach of a channel: the distance beyond which its
 //! views are no more similar than unrelated ones. Pairs of a length and an angle bound a motion
@@ -49,7 +50,7 @@ pub(crate) mod memory {
     pub(crate) const NUMBERS_MAX: usize = 1 << 21;
     /// Least motion between two views that are compared \[m, rad\].
     pub(crate) const MOVED: (f64, f64) = (0.05, 0.1);
-    /// Least motion after which a view may be new \[m, rad\]: that between keyframes.
+    /// Least motion after which a view may be new \[m, rad\]: nearer ones hardly differ in a room.
     pub(crate) const STEP: (f64, f64) = (0.1, 0.1);
     /// A view that is similar to none of those nearer than this, in reaches, is an outlier:
     /// somebody passes by.

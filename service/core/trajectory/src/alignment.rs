@@ -81,7 +81,8 @@ mod tests {
                 Vector3::new(shift[0], shift[1], 0.0),
                 Vector3::new(0.0, 0.0, turn[2]),
             );
-            for (alignment, motion) in [(Alignment::Spatial, spatial), (Alignment::Planar, planar)] {
+            let both = [(Alignment::Spatial, spatial), (Alignment::Planar, planar)];
+            for (alignment, motion) in both {
                 let moved: Vec<_> =
                     truth.iter().map(|g| motion.rotation * g + motion.translation.vector).collect();
                 let fitted = alignment.fit(&moved, &truth);

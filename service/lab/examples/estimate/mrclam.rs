@@ -8,7 +8,8 @@ use cogmap_lab::mrclam::Mrclam;
 use cogmap_worlds::robot_name;
 use cognitive_map::estimator::{Estimator, Parameters};
 use cognitive_map::{Label, Sample, SampleBody, Target};
-use nalgebra::Vector2;
+use geometry::PoseCovariance;
+use nalgebra::{Isometry3, Vector2, Vector3};
 use trajectory::{Alignment, StampedPose, Trajectory, ate_rmse_m};
 
 /// Between two instants at which the covariance is compared with the error \[ns\].
@@ -49,31 +50,7 @@ pub(crate) fn run(directory: &str, told: &Told) -> bool {
         };
         let (agent, stamp_ns) = (agents[&entry.robot], sample.stamp_ns);
         let begin = Instant::now();
-        match &sample.body {
-            SampleBody::Motion(motion) => {
-                estimator.motion(agent, stamp_ns, motion, &mut Vec::new());
-            }
-            SampleBody::StartPose(start) if agent == 0 || told.all_starts => {
-                estimator.start_pose(agent, start, &mut Vec::new());
-            }
-            SampleBody::Sighting(sighting) => match &sighting.target {
-                Target::Landmark(label) => {
-                    estimator.landmark(agent, stamp_ns, label, &sighting.relation, &mut Vec::new());
-                }
-                Target::Agent(name) if told.sightings_of_robots => {
-                    let target = by_name[name.as_str()];
-                    estimator.sighting(
-                        agent,
-                        stamp_ns,
-                        target,
-                        &sighting.relation,
-                        &mut Vec::new(),
-                    );
-                }
-                _ => {}
-            },
-            _ => {}
-        }
+        take(&mut estimator, agent, &sample, told, &by_name);
         times_s.push(begin.elapsed().as_secs_f64());
         if !estimator.is_in_map(agent) {
             continue;
@@ -84,14 +61,10 @@ pub(crate) fn run(directory: &str, told: &Told) -> bool {
         let poses = causal.entry(entry.robot).or_default();
         poses.pop_if(|last| last.stamp_ns == stamp_ns);
         poses.push(StampedPose { stamp_ns, pose });
-        if let Some(truth) = set.robots()[&entry.robot].truth_at(stamp_ns) {
-            let off = truth.in_space().pose.translation.vector - pose.translation.vector;
-            let off = pose.rotation.inverse() * off;
-            let spread = covariance.matrix().fixed_view::<2, 2>(0, 0).into_owned();
-            if let Some(inverse) = spread.try_inverse() {
-                let off = Vector2::new(off.x, off.y);
-                consistency.note(entry.robot, stamp_ns, off.dot(&(inverse * off)));
-            }
+        let truth = set.robots()[&entry.robot].truth_at(stamp_ns);
+        let truth = truth.map(|truth| truth.in_space().pose.translation.vector);
+        if let Some(nees) = truth.and_then(|truth| nees(&truth, &pose, &covariance)) {
+            consistency.note(entry.robot, stamp_ns, nees);
         }
     }
     print(&set, &estimator, &agents, &causal);
@@ -110,6 +83,45 @@ pub(crate) fn run(directory: &str, told: &Told) -> bool {
         times_s[times_s.len() - 1] * 1e3,
     );
     true
+}
+
+/// Gives the estimator a sample, unless it must not be told.
+fn take(
+    estimator: &mut Estimator,
+    agent: u32,
+    sample: &Sample,
+    told: &Told,
+    by_name: &BTreeMap<String, u32>,
+) {
+    let stamp_ns = sample.stamp_ns;
+    match &sample.body {
+        SampleBody::Motion(motion) => {
+            estimator.motion(agent, stamp_ns, motion, &mut Vec::new());
+        }
+        SampleBody::StartPose(start) if agent == 0 || told.all_starts => {
+            estimator.start_pose(agent, start, &mut Vec::new());
+        }
+        SampleBody::Sighting(sighting) => match &sighting.target {
+            Target::Landmark(label) => {
+                estimator.landmark(agent, stamp_ns, label, &sighting.relation, &mut Vec::new());
+            }
+            Target::Agent(name) if told.sightings_of_robots => {
+                let target = by_name[name.as_str()];
+                estimator.sighting(agent, stamp_ns, target, &sighting.relation, &mut Vec::new());
+            }
+            _ => {}
+        },
+        _ => {}
+    }
+}
+
+/// Normalised estimation error squared of a position in the plane.
+fn nees(truth: &Vector3<f64>, pose: &Isometry3<f64>, covariance: &PoseCovariance) -> Option<f64> {
+    let off = pose.rotation.inverse() * (truth - pose.translation.vector);
+    let spread = covariance.matrix().fixed_view::<2, 2>(0, 0).into_owned();
+    let inverse = spread.try_inverse()?;
+    let off = Vector2::new(off.x, off.y);
+    Some(off.dot(&(inverse * off)))
 }
 
 /// Prints a line for each robot, and the means.

@@ -27,25 +27,75 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
     };
     let (mut matches, n_false) = matches_of(&set, f64::from(false_percent) / 100.0);
     matches.sort_by_key(|found| (found.later_ns, found.earlier_ns));
-    let noise = PoseNoise::new([MATCH_SD.0, MATCH_SD.0, 0.0], [0.0, 0.0, MATCH_SD.1]);
-    let Some(relation) = noise
-        .and_then(|noise| RelativePose::new([0.0; 3], [0.0, 0.0, 0.0, 1.0], noise))
-        .ok()
-        .map(Relation::Pose)
-    else {
+    let Some(relation) = same_place() else {
         return false;
     };
+    let mut graph = KeyframeGraph::new(KeyframeSettings::default());
+    let Ways {
+        causal,
+        odometry,
+        relaxations_s,
+    } = walk(&mut graph, &set, &matches, &relation);
+    let begin = Instant::now();
+    let refined = graph.refine();
+    let seconds = begin.elapsed().as_secs_f64();
+    let rows = refined.agents[0].poses.iter();
+    let poses: Vec<StampedPose> = rows
+        .map(|row| StampedPose {
+            stamp_ns: row.stamp_ns,
+            pose: row.pose,
+        })
+        .collect();
+    let [odometry_m, causal_m, refined_m] =
+        [&odometry, &causal, &poses].map(|poses| error_m(&set, poses).unwrap_or(f64::NAN));
+    let relaxed_s: f64 = relaxations_s.iter().sum();
+    println!(
+        "{} matches, {n_false} false; {} believed; aligned: odometry {odometry_m:.3} m, causal {causal_m:.3} m, refined {refined_m:.3} m",
+        matches.len(),
+        graph.n_closures_accepted(),
+    );
+    println!(
+        "{} keyframes; {} relaxations in {relaxed_s:.2} s, the longest {:.0} ms; refined in {seconds:.2} s",
+        graph.n_keyframes(),
+        relaxations_s.len(),
+        relaxations_s.iter().copied().fold(0.0, f64::max) * 1e3,
+    );
+    g2o.is_none_or(|file| std::fs::write(file, text(&graph)).is_ok())
+}
+
+/// What a match says: the same place and heading, about.
+fn same_place() -> Option<Relation> {
+    let noise = PoseNoise::new([MATCH_SD.0, MATCH_SD.0, 0.0], [0.0, 0.0, MATCH_SD.1]);
+    let relation = RelativePose::new([0.0; 3], [0.0, 0.0, 0.0, 1.0], noise.ok()?);
+    relation.ok().map(Relation::Pose)
+}
+
+/// Error of a trajectory after alignment \[m\].
+fn error_m(set: &Tuc, poses: &[StampedPose]) -> Option<f64> {
+    let estimate = Trajectory::from_poses(poses).ok()?;
+    let span = Span::common([estimate.span(), set.truth().span()])?;
+    ate_rmse_m(&estimate, set.truth(), span, Alignment::Planar).ok()
+}
+
+/// The ways of a robot, with and without what the matches correct.
+#[derive(Default)]
+struct Ways {
+    causal: Vec<StampedPose>,
+    odometry: Vec<StampedPose>,
+    relaxations_s: Vec<f64>,
+}
+
+/// Walks through the recording, with its matches.
+fn walk(graph: &mut KeyframeGraph, set: &Tuc, matches: &[Match], relation: &Relation) -> Ways {
     let stamps: Vec<i64> = set.steps().iter().map(|step| step.stamp_ns).collect();
     let step_of = |stamp_ns: i64| {
         let after = stamps.partition_point(|&stamp| stamp < stamp_ns);
         after.min(stamps.len() - 1)
     };
-    let mut graph = KeyframeGraph::new(KeyframeSettings::default());
     let agent = graph.enrol();
     graph.found(agent);
     let (mut pose, mut alone) = (Isometry3::identity(), Isometry3::identity());
-    let (mut causal, mut odometry) = (Vec::new(), Vec::new());
-    let mut relaxations_s = Vec::new();
+    let mut ways = Ways::default();
     let mut next = matches.iter().peekable();
     for (index, step) in set.steps().iter().enumerate() {
         pose *= step.motion;
@@ -65,12 +115,12 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
         );
         while let Some(found) = next.next_if(|found| step_of(found.later_ns) <= index) {
             let earlier = step_of(found.earlier_ns) as u64 + 1;
-            graph.closure(&moment(pose), earlier, &relation);
+            graph.closure(&moment(pose), earlier, relation);
         }
         if graph.is_due() {
             let begin = Instant::now();
             let corrections = graph.relax();
-            relaxations_s.push(begin.elapsed().as_secs_f64());
+            ways.relaxations_s.push(begin.elapsed().as_secs_f64());
             if let Some(correction) = corrections.first() {
                 pose = correction.pose;
             }
@@ -79,40 +129,10 @@ pub(crate) fn run(directory: &str, false_percent: u32, g2o: Option<&str>) -> boo
             stamp_ns: step.stamp_ns,
             pose,
         };
-        causal.push(at(pose));
-        odometry.push(at(alone));
+        ways.causal.push(at(pose));
+        ways.odometry.push(at(alone));
     }
-    let begin = Instant::now();
-    let refined = graph.refine();
-    let seconds = begin.elapsed().as_secs_f64();
-    let poses: Vec<StampedPose> = refined.agents[0]
-        .poses
-        .iter()
-        .map(|row| StampedPose {
-            stamp_ns: row.stamp_ns,
-            pose: row.pose,
-        })
-        .collect();
-    let error = |poses: &[StampedPose]| {
-        let estimate = Trajectory::from_poses(poses).ok()?;
-        let span = Span::common([estimate.span(), set.truth().span()])?;
-        ate_rmse_m(&estimate, set.truth(), span, Alignment::Planar).ok()
-    };
-    let [odometry_m, causal_m, refined_m] =
-        [&odometry, &causal, &poses].map(|poses| error(poses).unwrap_or(f64::NAN));
-    let relaxed_s: f64 = relaxations_s.iter().sum();
-    println!(
-        "{} matches, {n_false} false; {} believed; aligned: odometry {odometry_m:.3} m, causal {causal_m:.3} m, refined {refined_m:.3} m",
-        matches.len(),
-        graph.n_closures_accepted(),
-    );
-    println!(
-        "{} anchors; {} relaxations in {relaxed_s:.2} s, the longest {:.0} ms; refined in {seconds:.2} s",
-        graph.n_keyframes(),
-        relaxations_s.len(),
-        relaxations_s.iter().copied().fold(0.0, f64::max) * 1e3,
-    );
-    g2o.is_none_or(|file| std::fs::write(file, text(&graph)).is_ok())
+    ways
 }
 
 /// The set's matches over longer gaps, and false ones until they make up a share; how many are

@@ -40,7 +40,7 @@ pub(crate) fn run(directory: &str, sees_robots: bool, keyframes_max: Option<u32>
         means[0], means[1], means[2], means[3]
     );
     println!(
-        "{} anchors, {} sightings; {} steps in {seconds:.2} s, chi2 {:.0} from {:.0}; us a sample: p50 {:.2}, p99 {:.2}, max {:.0}",
+        "{} keyframes, {} sightings; {} steps in {seconds:.2} s, chi2 {:.0} from {:.0}; us a sample: p50 {:.2}, p99 {:.2}, max {:.0}",
         lived.graph.n_keyframes(),
         lived.graph.n_sightings(),
         refined.relaxed.n_steps,

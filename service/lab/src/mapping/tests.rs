@@ -200,10 +200,21 @@ proptest! {
     #[test]
     fn any_small_graph_is_answered(
         edges in prop::collection::vec(
-            (0..6_u64, 0..6_u64, -3.0..3.0_f64, -3.0..3.0_f64, -3.0..3.0_f64, 0.0..100.0_f64, 0.0..100.0_f64),
+            (
+                0..6_u64,
+                0..6_u64,
+                -3.0..3.0_f64,
+                -3.0..3.0_f64,
+                -3.0..3.0_f64,
+                0.0..100.0_f64,
+                0.0..100.0_f64,
+            ),
             1..20,
         ),
-        sightings in prop::collection::vec((0..6_u64, 10..13_u64, -3.0..3.0_f64, 0.0..10.0_f64), 0..6),
+        sightings in prop::collection::vec(
+            (0..6_u64, 10..13_u64, -3.0..3.0_f64, 0.0..10.0_f64),
+            0..6,
+        ),
     ) {
         let mut text = String::new();
         for (from, to, x, y, turn, a, b) in edges {
@@ -212,7 +223,11 @@ proptest! {
             }
         }
         for (pose, point, x, information) in sightings {
-            writeln!(text, "EDGE_SE2_XY {pose} {point} {x} 1 {information} 0 {information}").unwrap();
+            writeln!(
+                text,
+                "EDGE_SE2_XY {pose} {point} {x} 1 {information} 0 {information}"
+            )
+            .unwrap();
         }
         if let Ok(graph) = G2oGraph::read(&text) {
             let recording = recording(&graph);

@@ -52,55 +52,15 @@ impl Mrclam {
         let mut robots = BTreeMap::new();
         let mut n_unknown_barcodes = 0;
         for robot in 1..FIRST_LANDMARK {
-            let odometry_file = format!("Robot{robot}_Odometry.dat");
-            let truth_file = format!("Robot{robot}_Groundtruth.dat");
-            let (Some(odometry), Some(truth)) = (text_of(&odometry_file)?, text_of(&truth_file)?)
-            else {
-                continue;
-            };
-            let odometry = sorted(odometry_rows(&odometry_file, &odometry)?, |row| {
-                row.stamp_ns
-            });
-            let truth = sorted(truth_rows(&truth_file, &truth)?, |row| row.stamp_ns);
-            for (file, is_empty) in [
-                (odometry_file, odometry.is_empty()),
-                (truth_file, truth.is_empty()),
-            ] {
-                if is_empty {
-                    return Err(MrclamError::Empty { file });
-                }
+            if let Some((log, n_unknown)) = robot_log(robot, &subjects, &text_of)? {
+                n_unknown_barcodes += n_unknown;
+                robots.insert(robot, log);
             }
-            let file = format!("Robot{robot}_Measurement.dat");
-            let seen = measurement_rows(&file, &text_of(&file)?.unwrap_or_default(), &subjects)?;
-            let n_rows = seen.len();
-            let known: Vec<Measurement> = seen.into_iter().flatten().collect();
-            n_unknown_barcodes += n_rows - known.len();
-            let measurements = sorted(known, |row| row.stamp_ns);
-            robots.insert(
-                robot,
-                RobotLog {
-                    odometry,
-                    measurements,
-                    truth,
-                },
-            );
         }
         if robots.is_empty() {
             return Err(MrclamError::NoRobot);
         }
-        let spans = robots.values().flat_map(|log| {
-            let (o, g) = (&log.odometry, &log.truth);
-            [
-                Span {
-                    start_ns: o[0].stamp_ns,
-                    end_ns: o[o.len() - 1].stamp_ns,
-                },
-                Span {
-                    start_ns: g[0].stamp_ns,
-                    end_ns: g[g.len() - 1].stamp_ns,
-                },
-            ]
-        });
+        let spans = robots.values().flat_map(RobotLog::spans);
         let span = Span::common(spans).ok_or(MrclamError::NoCommonSpan)?;
         Ok(Self {
             robots,
@@ -136,6 +96,60 @@ impl Mrclam {
 fn sorted<T>(mut rows: Vec<T>, stamp_ns: impl Fn(&T) -> i64) -> Vec<T> {
     rows.sort_by_key(stamp_ns);
     rows
+}
+
+/// What a robot recorded, and how many of its sightings are of unknown barcodes; none where its
+/// odometry or its truth is not there.
+fn robot_log(
+    robot: u32,
+    subjects: &BTreeMap<u32, u32>,
+    text_of: &impl Fn(&str) -> Result<Option<String>, MrclamError>,
+) -> Result<Option<(RobotLog, usize)>, MrclamError> {
+    let odometry_file = format!("Robot{robot}_Odometry.dat");
+    let truth_file = format!("Robot{robot}_Groundtruth.dat");
+    let (Some(odometry), Some(truth)) = (text_of(&odometry_file)?, text_of(&truth_file)?) else {
+        return Ok(None);
+    };
+    let odometry = sorted(odometry_rows(&odometry_file, &odometry)?, |row| {
+        row.stamp_ns
+    });
+    let truth = sorted(truth_rows(&truth_file, &truth)?, |row| row.stamp_ns);
+    for (file, is_empty) in [
+        (odometry_file, odometry.is_empty()),
+        (truth_file, truth.is_empty()),
+    ] {
+        if is_empty {
+            return Err(MrclamError::Empty { file });
+        }
+    }
+    let file = format!("Robot{robot}_Measurement.dat");
+    let seen = measurement_rows(&file, &text_of(&file)?.unwrap_or_default(), subjects)?;
+    let n_rows = seen.len();
+    let known: Vec<Measurement> = seen.into_iter().flatten().collect();
+    let n_unknown = n_rows - known.len();
+    let log = RobotLog {
+        odometry,
+        measurements: sorted(known, |row| row.stamp_ns),
+        truth,
+    };
+    Ok(Some((log, n_unknown)))
+}
+
+impl RobotLog {
+    /// Times over which the odometry and the truth reach.
+    fn spans(&self) -> [Span; 2] {
+        let (o, g) = (&self.odometry, &self.truth);
+        [
+            Span {
+                start_ns: o[0].stamp_ns,
+                end_ns: o[o.len() - 1].stamp_ns,
+            },
+            Span {
+                start_ns: g[0].stamp_ns,
+                end_ns: g[g.len() - 1].stamp_ns,
+            },
+        ]
+    }
 }
 
 /// The subject of each barcode.

@@ -297,10 +297,6 @@ fn summary(
     left_out: &[Trial],
     times: &mut [f64],
 ) -> Report {
-    let id = |truth: usize| u32::try_from(truth).ok().map(ObjectId);
-    let share = |trials: &[Trial], is: &dyn Fn(&Trial) -> bool| {
-        trials.iter().filter(|trial| is(trial)).count() as f64 / trials.len().max(1) as f64
-    };
     let mut report = Report {
         objects: clouds.len(),
         trials: known.len(),
@@ -311,23 +307,7 @@ fn summary(
         rotation_deg: BTreeMap::new(),
         unknown_caught: BTreeMap::new(),
         unknown_answered: BTreeMap::new(),
-        stop: Stop {
-            accuracy: share(
-                known,
-                &|trial| matches!(trial.stop, Some((_, Verdict::Object(object))) if Some(object) == id(trial.truth)),
-            ),
-            contacts_mean: known
-                .iter()
-                .map(|trial| {
-                    trial
-                        .stop
-                        .map_or(settings.looks.last().copied().unwrap_or(0), |s| s.0)
-                        as f64
-                })
-                .sum::<f64>()
-                / known.len().max(1) as f64,
-            undecided: share(known, &|trial| trial.stop.is_none()),
-        },
+        stop: stop(settings, known),
         decision_ms_p50: quantile(times, 0.5),
         decision_ms_p99: quantile(times, 0.99),
         live_hypotheses: BTreeMap::new(),
@@ -335,53 +315,97 @@ fn summary(
         confusions: BTreeMap::new(),
     };
     for (at, &count) in settings.looks.iter().enumerate() {
-        let right = |trial: &Trial| trial.looks[at].first == id(trial.truth);
-        report.top1_after.insert(count, share(known, &right));
-        report
-            .false_unknown_after
-            .insert(count, share(known, &|trial| trial.looks[at].unknown));
-        let live = known
-            .iter()
-            .map(|trial| trial.looks[at].live as f64)
-            .sum::<f64>();
-        report
-            .live_hypotheses
-            .insert(count, live / known.len().max(1) as f64);
-        let errors = known
-            .iter()
-            .filter_map(|trial| trial.looks[at].rotation_rad);
-        let mut errors: Vec<_> = errors.map(f64::to_degrees).collect();
-        if !errors.is_empty() {
-            let rotation = Rotation {
-                p50: quantile(&mut errors, 0.5),
-                p90: quantile(&mut errors, 0.9),
-            };
-            report.rotation_deg.insert(count, rotation);
-        }
-        if !left_out.is_empty() {
-            let mut fits: Vec<_> = known.iter().map(|trial| trial.looks[at].fit).collect();
-            let threshold = quantile(&mut fits, 0.02);
-            let caught = share(left_out, &|trial| trial.looks[at].fit < threshold);
-            report.unknown_caught.insert(count, caught);
-            report
-                .unknown_answered
-                .insert(count, share(left_out, &|trial| trial.looks[at].unknown));
-        }
+        note_look(&mut report, (at, count), known, left_out);
     }
     report.by_object = by_object(clouds, known);
+    report.confusions = confusions(clouds, known);
+    report
+}
+
+/// Number of an object in the library.
+fn id(truth: usize) -> Option<ObjectId> {
+    u32::try_from(truth).ok().map(ObjectId)
+}
+
+/// The share of trials that are so.
+fn share(trials: &[Trial], is: &dyn Fn(&Trial) -> bool) -> f64 {
+    trials.iter().filter(|trial| is(trial)).count() as f64 / trials.len().max(1) as f64
+}
+
+/// What came of stopping at the first answer.
+fn stop(settings: &PointsSettings, known: &[Trial]) -> Stop {
+    let most = settings.looks.last().copied().unwrap_or(0);
+    let contacts = known
+        .iter()
+        .map(|trial| trial.stop.map_or(most, |stop| stop.0) as f64);
+    Stop {
+        accuracy: share(known, &|trial| {
+            let Some((_, Verdict::Object(object))) = trial.stop else {
+                return false;
+            };
+            Some(object) == id(trial.truth)
+        }),
+        contacts_mean: contacts.sum::<f64>() / known.len().max(1) as f64,
+        undecided: share(known, &|trial| trial.stop.is_none()),
+    }
+}
+
+/// Notes what was found at a look, given its place among the looks and its number of contacts.
+fn note_look(
+    report: &mut Report,
+    (at, count): (usize, usize),
+    known: &[Trial],
+    left_out: &[Trial],
+) {
+    let right = |trial: &Trial| trial.looks[at].first == id(trial.truth);
+    report.top1_after.insert(count, share(known, &right));
+    report
+        .false_unknown_after
+        .insert(count, share(known, &|trial| trial.looks[at].unknown));
+    let live = known
+        .iter()
+        .map(|trial| trial.looks[at].live as f64)
+        .sum::<f64>();
+    report
+        .live_hypotheses
+        .insert(count, live / known.len().max(1) as f64);
+    let errors = known
+        .iter()
+        .filter_map(|trial| trial.looks[at].rotation_rad);
+    let mut errors: Vec<_> = errors.map(f64::to_degrees).collect();
+    if !errors.is_empty() {
+        let rotation = Rotation {
+            p50: quantile(&mut errors, 0.5),
+            p90: quantile(&mut errors, 0.9),
+        };
+        report.rotation_deg.insert(count, rotation);
+    }
+    if !left_out.is_empty() {
+        let mut fits: Vec<_> = known.iter().map(|trial| trial.looks[at].fit).collect();
+        let threshold = quantile(&mut fits, 0.02);
+        let caught = share(left_out, &|trial| trial.looks[at].fit < threshold);
+        report.unknown_caught.insert(count, caught);
+        report
+            .unknown_answered
+            .insert(count, share(left_out, &|trial| trial.looks[at].unknown));
+    }
+}
+
+/// How often one object was taken for another in the end.
+fn confusions(clouds: &[Cloud], known: &[Trial]) -> BTreeMap<String, usize> {
+    let mut confusions = BTreeMap::new();
     for trial in known {
         let first = trial.looks.last().and_then(|look| look.first);
         if first != id(trial.truth) {
             let name = first
                 .and_then(|first| clouds.get(first.0 as usize))
                 .map_or("none", |c| &c.name);
-            *report
-                .confusions
+            *confusions
                 .entry(format!("{} as {name}", clouds[trial.truth].name))
                 .or_default() += 1;
         }
     }
-    report
+    confusions
 }
 
 /// What was found of each object after the last contact.

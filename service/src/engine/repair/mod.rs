@@ -297,16 +297,7 @@ impl Repair<'_> {
         let mut fits = true;
         let entry = match entry {
             Entry::Enrol { agent, name } => {
-                self.enrol_to(agent, before);
-                match self.agents.get_mut(agent as usize) {
-                    Some(known) => {
-                        if known.is_enrolled && self.holes {
-                            before.push(&Entry::Remove { agent });
-                        }
-                        known.enrol_again(&name);
-                    }
-                    None => self.agents.push(KnownAgent::named(agent, &name)),
-                }
+                self.enrol(agent, &name, before);
                 Entry::Enrol { agent, name }
             }
             Entry::Samples { agent, batch } => {
@@ -358,6 +349,20 @@ impl Repair<'_> {
         };
         fitted.push(&entry);
         fits
+    }
+
+    /// Enrols an agent under a name, also one that takes the place of a removed one.
+    fn enrol(&mut self, agent: u32, name: &str, before: &mut BlockWriter) {
+        self.enrol_to(agent, before);
+        match self.agents.get_mut(agent as usize) {
+            Some(known) => {
+                if known.is_enrolled && self.holes {
+                    before.push(&Entry::Remove { agent });
+                }
+                known.enrol_again(name);
+            }
+            None => self.agents.push(KnownAgent::named(agent, name)),
+        }
     }
 
     fn next_lesson(&mut self) -> u64 {

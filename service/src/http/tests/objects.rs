@@ -130,6 +130,35 @@ async fn contacts_tell_the_object_and_its_pose() {
     );
 }
 
+/// A step along the rod.
+fn step(way_m: f64) -> SampleBody {
+    SampleBody::Increment(Increment {
+        translation_m: [way_m, 0.0, 0.0],
+        rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+        noise: None,
+    })
+}
+
+/// What is felt.
+fn feel(value: f64) -> SampleBody {
+    SampleBody::Level(Level {
+        channel: "touch".to_owned(),
+        value,
+        offset_m: [0.0; 3],
+        normal: None,
+    })
+}
+
+/// The mark that begins a lesson.
+fn learn(name: &str) -> SampleBody {
+    SampleBody::Object(ObjectMark::Learn {
+        name: Some(name.to_owned()),
+        spacing_m: 0.01,
+        orientation: Orientation::Known {},
+        noise: noise(),
+    })
+}
+
 #[tokio::test]
 async fn an_agent_learns_and_recognises_by_touch() {
     let rig = rig();
@@ -138,31 +167,8 @@ async fn an_agent_learns_and_recognises_by_touch() {
         seq += 1;
         at(1, seq - 1, body)
     };
-    let step = |way_m: f64| {
-        SampleBody::Increment(Increment {
-            translation_m: [way_m, 0.0, 0.0],
-            rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
-            noise: None,
-        })
-    };
-    let feel = |value| {
-        SampleBody::Level(Level {
-            channel: "touch".to_owned(),
-            value,
-            offset_m: [0.0; 3],
-            normal: None,
-        })
-    };
     for (name, rod) in [("fork", FORK), ("knife", KNIFE)] {
-        let learn = ObjectMark::Learn {
-            name: Some(name.to_owned()),
-            spacing_m: 0.01,
-            orientation: Orientation::Known {},
-            noise: noise(),
-        };
-        rig.samples("arm", &next(SampleBody::Object(learn)))
-            .await
-            .good();
+        rig.samples("arm", &next(learn(name))).await.good();
         for value in rod {
             rig.samples("arm", &next(feel(value))).await.good();
             rig.samples("arm", &next(step(PITCH_M))).await.good();

@@ -67,6 +67,14 @@ fn assert_keeps(path: &Path, promise: &Promise, what: &str) {
     }
 }
 
+/// Leaves a torn block behind the first space's journal.
+fn tear(path: &Path) {
+    let segment = path.join(SPACES).join("0").join(format!("{:016x}.log", 0));
+    let mut bytes = fs::read(&segment).unwrap();
+    bytes.extend(b"CGM2, and no more");
+    fs::write(&segment, bytes).unwrap();
+}
+
 #[test]
 fn whenever_the_power_is_cut_what_was_acknowledged_is_there() {
     let home = directory();
@@ -107,10 +115,7 @@ fn whenever_the_power_is_cut_what_was_acknowledged_is_there() {
     // A kill between an append and its sync, and a torn block behind.
     append(&journal, hall, "hall", 4);
     drop(journal);
-    let segment = path.join(SPACES).join("0").join(format!("{:016x}.log", 0));
-    let mut bytes = fs::read(&segment).unwrap();
-    bytes.extend(b"CGM2, and no more");
-    fs::write(&segment, bytes).unwrap();
+    tear(&path);
     let journal = open(&path);
     assert_eq!(journal.open_journal(hall).unwrap().extent.blocks, 13);
     promise(&[("hall", durable(13))]);

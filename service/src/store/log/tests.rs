@@ -318,7 +318,10 @@ proptest! {
     fn any_bytes_are_read_without_a_lie(
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
         cut in prop::option::of(any::<prop::sample::Index>()),
-        inserted in prop::option::of((any::<prop::sample::Index>(), prop::collection::vec(any::<u8>(), 1..80))),
+        inserted in prop::option::of((
+            any::<prop::sample::Index>(),
+            prop::collection::vec(any::<u8>(), 1..80),
+        )),
         copied in prop::option::of((any::<prop::sample::Index>(), any::<prop::sample::Index>())),
     ) {
         let directory = tempfile::tempdir().unwrap();

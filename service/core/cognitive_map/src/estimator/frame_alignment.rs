@@ -124,7 +124,8 @@ mod tests {
     proptest! {
         #[test]
         fn motions_in_space_are_found(
-            shift in prop::array::uniform3(-9.0..9.0_f64), turn in prop::array::uniform3(-1.8..1.8_f64),
+            shift in prop::array::uniform3(-9.0..9.0_f64),
+            turn in prop::array::uniform3(-1.8..1.8_f64),
         ) {
             let pose = Isometry3::new(shift.into(), turn.into());
             let mut points = FLOOR.to_vec();

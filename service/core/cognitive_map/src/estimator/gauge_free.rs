@@ -14,7 +14,8 @@ impl Frame {
     /// covariance C, the rigid motions J, and weights W:
     ///
     /// ```text
-    /// e' = e − J G e      G = (Jᵀ W J)⁻¹ Jᵀ W      C'ᵢᵢ = Cᵢᵢ − Kᵢ Jᵢᵀ − Jᵢ Kᵢᵀ + Jᵢ G K Jᵢᵀ      K = C Gᵀ
+    /// e' = e − J G e      G = (Jᵀ W J)⁻¹ Jᵀ W      K = C Gᵀ
+    /// C'ᵢᵢ = Cᵢᵢ − Kᵢ Jᵢᵀ − Jᵢ Kᵢᵀ + Jᵢ G K Jᵢᵀ
     /// ```
     ///
     /// Of planar frames only motions in the plane, and errors along it. Landmarks in a line have

@@ -2,7 +2,9 @@
 
 use nalgebra::{SVector, Vector6};
 
-use super::tuning::{ANY_TURN_SD_RAD, LASTING_DEVIATIONS_MAX, LASTING_RATIO_MAX, WANDERED_MAX};
+use super::tuning::{
+    ANY_TURN_SD_RAD, CALIBRATION_RENEWAL, LASTING_DEVIATIONS_MAX, LASTING_RATIO_MAX, WANDERED_MAX,
+};
 use crate::input::Motion;
 use crate::settings::Settings;
 
@@ -37,18 +39,7 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self {
-            length_error_sd: 0.05,
-            angle_error_sd: 0.1,
-            bias_sd_rad_s: 0.004,
-            calibration_renewal: 0.01,
-            translation_sd_per_sqrt_m: 0.04,
-            rotation_sd_per_sqrt_m: 0.1,
-            rotation_sd_per_sqrt_rad: 0.15,
-            lasting_range_error: 0.1,
-            soft: 2.0,
-            gate: 4.0,
-        }
+        Self::of(&Settings::default())
     }
 }
 
@@ -59,11 +50,13 @@ impl Parameters {
             length_error_sd: settings.length_error_sd,
             angle_error_sd: settings.angle_error_sd,
             bias_sd_rad_s: settings.bias_sd_rad_s,
+            calibration_renewal: CALIBRATION_RENEWAL,
             translation_sd_per_sqrt_m: settings.translation_sd_per_sqrt_m,
             rotation_sd_per_sqrt_m: settings.rotation_sd_per_sqrt_m,
             rotation_sd_per_sqrt_rad: settings.rotation_sd_per_sqrt_rad,
             lasting_range_error: settings.lasting_range_error,
-            ..Self::default()
+            soft: settings.sighting_huber_sd,
+            gate: settings.sighting_gate_sd,
         }
     }
 

@@ -161,7 +161,8 @@ proptest! {
     /// Nothing depends on where the map's origin lies, nor on how its axes point.
     #[test]
     fn estimates_move_with_the_frame(
-        shift in prop::array::uniform3(-50.0..50.0_f64), turn in prop::array::uniform3(-1.8..1.8_f64),
+        shift in prop::array::uniform3(-50.0..50.0_f64),
+        turn in prop::array::uniform3(-1.8..1.8_f64),
     ) {
         let frame = Isometry3::new(shift.into(), turn.into());
         let run = |from: &Isometry3<f64>| {
@@ -177,14 +178,16 @@ proptest! {
                 let stamp_ns = i64::try_from(step).unwrap() * SECOND_NS;
                 estimator.motion(agent, stamp_ns, &moved, &mut Vec::new());
                 let post = from * Point3::from(*post);
-                estimator.landmark(agent, stamp_ns, &label(step % POSTS.len()), &polar(&truth, &post), &mut Vec::new());
+                let (name, seen) = (label(step % POSTS.len()), polar(&truth, &post));
+                estimator.landmark(agent, stamp_ns, &name, &seen, &mut Vec::new());
             }
             estimator.pose(agent).unwrap()
         };
         let (here, spread_here) = run(&Isometry3::identity());
         let (there, spread_there) = run(&frame);
         let rest = (frame * here).inv_mul(&there);
-        prop_assert!(rest.translation.vector.norm() < 1e-7 && rest.rotation.angle() < 1e-7, "{rest}");
+        let (length_m, angle_rad) = (rest.translation.vector.norm(), rest.rotation.angle());
+        prop_assert!(length_m < 1e-7 && angle_rad < 1e-7, "{rest}");
         let off = (spread_here.matrix() - spread_there.matrix()).amax();
         prop_assert!(off < 1e-7 * spread_here.matrix().amax(), "{off}");
     }

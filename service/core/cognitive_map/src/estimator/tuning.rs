@@ -1,7 +1,7 @@
 //! Constants of the estimator: unit, meaning and source of each.
 //!
-//! What a space sets is in [`Parameters`](super::Parameters). A source is an equation, a physical
-//! reason, or what measures the constant:
+//! What a space sets, the gate of sightings among it, is in [`Parameters`](super::Parameters). A
+//! source is an equation, a physical reason, or what measures the constant:
 //!
 //! - *team*: `cogmap-lab replay mrclam DIR`, also with `--unknown-starts` and `--anonymous 3`
 //! - *liars*: `make drills DRILLS="liars"`
@@ -67,6 +67,8 @@ pub(super) const LASTING_DEVIATIONS_MAX: f64 = 8.0;
 /// Largest lasting error of lengths and of angles, as a ratio. Source: with more, readings would
 /// say next to nothing, or the contrary.
 pub(super) const LASTING_RATIO_MAX: f64 = 0.9;
+/// Part of its variance that a lasting error renews on 100 m, in 100 rad, or in 1000 s.
+pub(super) const CALIBRATION_RENEWAL: f64 = 0.01;
 /// Largest deviation of a lasting error, in those that the settings state: it may wander, but not
 /// for ever.
 pub(super) const WANDERED_MAX: f64 = 2.0;

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector6};
 
-use super::tuning::RESTART_SD;
 use crate::agent::Agent;
 use crate::estimator::{Effect, Estimator};
 use crate::event::{Event, EventKind};
@@ -79,7 +78,8 @@ impl Fold<'_> {
         self.agent.still_since = None;
         self.agent.announced.restart();
         if before.is_some() {
-            let sd = Vector6::from(RESTART_SD);
+            let (length_m, angle_rad) = (self.settings.restart_sd_m, self.settings.restart_sd_rad);
+            let sd = Vector6::from_fn(|k, _| if k < 3 { length_m } else { angle_rad });
             self.estimator.restart(self.agent_id.0, &sd);
             self.keyframes.graph.restart(self.agent_id.0, &sd);
         }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! kind  index                     bytes
-//! 0     0                         header: version, settings' digest, revision, counts; map's digest
+//! 0     0                         header: version, digests of settings and map, revision, counts
 //! 1     page                      up to 4 agents
 //! 2     page                      up to 64 places
 //! 3     page                      up to 16 trips, without their legs

@@ -69,8 +69,16 @@ pub(super) fn digest_of(settings: &Settings) -> Digest {
         trip_gap_s,
         places_max,
         legs_max,
-        anchors_max,
+        keyframes_max,
         strength_half_life_samples,
+        sighting_gate_sd,
+        sighting_huber_sd,
+        closure_gate_chi2,
+        keyframe_spacing_m,
+        keyframe_spacing_rad,
+        restart_sd_m,
+        restart_sd_rad,
+        object_answer_probability,
     } = &**settings;
     let mut out = StateWriter::default();
     seed.write(&mut out);
@@ -101,10 +109,28 @@ pub(super) fn digest_of(settings: &Settings) -> Digest {
     for value in [
         places_max,
         legs_max,
-        anchors_max,
+        keyframes_max,
         strength_half_life_samples,
     ] {
         value.write(&mut out);
+    }
+    // What was a constant before it became a setting counts only where it differs from that
+    // constant, so that checkpoints and digests from before still hold. A number says which it is.
+    let later = [
+        (sighting_gate_sd, 4.0),
+        (sighting_huber_sd, 2.0),
+        (closure_gate_chi2, 11.3),
+        (keyframe_spacing_m, 0.1),
+        (keyframe_spacing_rad, 0.1),
+        (restart_sd_m, 1.0),
+        (restart_sd_rad, 0.5),
+        (object_answer_probability, 0.995),
+    ];
+    for (number, (value, constant)) in (0_u8..).zip(later) {
+        if value.to_bits() != f64::to_bits(constant) {
+            number.write(&mut out);
+            value.write(&mut out);
+        }
     }
     out.digest()
 }

@@ -80,6 +80,7 @@ impl CognitiveMap {
             places: PlaceMap::new(&settings),
             estimator: Arc::new(Estimator::new(Parameters::of(&settings))),
             keyframes: Arc::new(KeyframeMap::new(KeyframeSettings::of(&settings))),
+            objects: ObjectMemory::new(settings.object_answer_probability),
             names: Arc::default(),
             settings: Arc::new(settings),
             revision: 0,
@@ -88,7 +89,6 @@ impl CognitiveMap {
             trips: TripMap::default(),
             landmarks: LandmarkMap::default(),
             percepts: PerceptMap::default(),
-            objects: ObjectMemory::default(),
         }
     }
 

@@ -1,8 +1,5 @@
 //! Constants of the fold: unit, meaning and source of each.
 
-/// What a restart between two sessions adds to the uncertainty of a pose \[m, m, m, rad, rad,
-/// rad\]. Source: a robot usually restarts where it stopped, but nobody knows.
-pub(super) const RESTART_SD: [f64; 6] = [1.0, 1.0, 1.0, 0.5, 0.5, 0.5];
 /// Part of a field radius by which an agent moves until the places are asked again. Source:
 /// confidence changes by at most a tenth over that distance, and a robot at rest asks nothing.
 pub(super) const ASK_PER_FIELD_RADIUS: f64 = 0.125;

@@ -52,13 +52,13 @@ impl Candidate {
     }
 
     /// For each of these, sorted by agent and time, with how many others of them it agrees.
-    pub(super) fn count_partners(candidates: &mut [Self]) -> Vec<usize> {
+    pub(super) fn count_partners(candidates: &mut [Self], gate_chi2: f64) -> Vec<usize> {
         candidates
             .sort_by_key(|candidate| (candidate.agent, candidate.stamp_ns, candidate.constraint));
         let mut partners = vec![0; candidates.len()];
         for later in 0..candidates.len() {
             for earlier in later.saturating_sub(tuning::CLOSURES_COMPARED)..later {
-                if candidates[later].agrees(&candidates[earlier]) {
+                if candidates[later].agrees(&candidates[earlier], gate_chi2) {
                     partners[later] += 1;
                     partners[earlier] += 1;
                 }
@@ -74,7 +74,7 @@ impl Candidate {
     ///   │                  │           the ways along the chains, and both matches, close up
     /// B now ── match ──> B then
     /// ```
-    fn agrees(&self, other: &Self) -> bool {
+    fn agrees(&self, other: &Self, gate_chi2: f64) -> bool {
         if self.agent != other.agent {
             return false;
         }
@@ -100,7 +100,7 @@ impl Candidate {
         let own = self.own[0] + other.own[0] + tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
         let telling = (4.0 * tuning::UNCERTAINTY_RATIO_MAX * tuning::UNCERTAINTY_RATIO_MAX * own)
             .max(tuning::CERTAIN_SD_M * tuning::CERTAIN_SD_M);
-        squared <= tuning::AGREES_MAX && shift <= telling
+        squared <= gate_chi2 && shift <= telling
     }
 }
 
@@ -109,6 +109,7 @@ pub(super) fn agrees_with(
     constraint: &Constraint,
     problem: &Problem,
     marginals: &Marginals<'_>,
+    gate_chi2: f64,
 ) -> bool {
     let ends = problem
         .node(constraint.from)
@@ -123,8 +124,7 @@ pub(super) fn agrees_with(
     // One that is too far off in one direction is so for every map that is sure enough: its
     // covariance, which takes long to find, need not be known.
     let least_certain = tuning::UNCERTAINTY_RATIO_MAX * tuning::UNCERTAINTY_RATIO_MAX + 1.0;
-    if (0..6).any(|k| off[k] * off[k] > tuning::AGREES_MAX * least_certain * (own[(k, k)] + least))
-    {
+    if (0..6).any(|k| off[k] * off[k] > gate_chi2 * least_certain * (own[(k, k)] + least)) {
         return false;
     }
     let Some(spread) = marginals.relative_pose(from, to) else {
@@ -136,5 +136,5 @@ pub(super) fn agrees_with(
     });
     let whole = spread.matrix() + own + Matrix6::from_diagonal_element(least);
     let inverse = whole.try_inverse();
-    is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= tuning::AGREES_MAX)
+    is_known && inverse.is_some_and(|inverse| off.dot(&(inverse * off)) <= gate_chi2)
 }

@@ -11,7 +11,6 @@ use super::moment::Moment;
 use super::own_frame::OwnFrame;
 use super::settings::KeyframeSettings;
 use super::sightings::Sightings;
-use super::tuning;
 use crate::estimator::Calibrated;
 use crate::input::StartPose;
 use geometry::PoseCovariance;
@@ -219,12 +218,13 @@ impl KeyframeGraph {
             });
             self.add_keyframe(agent);
         }
+        let (spacing, attached) = (self.settings.spacing, self.settings.attached_within());
         let Some(track) = self.track_mut(agent) else {
             return;
         };
         track.go(moment, increment, variance, calibrated);
-        let is_step = !track.is_near(tuning::KEYFRAME_STEP);
-        let rests = track.rests_elsewhere(moment);
+        let is_step = !track.is_near(spacing);
+        let rests = track.rests_elsewhere(moment, attached);
         if is_step || rests {
             self.add_keyframe(agent);
         }

@@ -102,7 +102,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn behaves_like_a_map(steps in prop::collection::vec(("[a-c]{1,5}", any::<bool>()), 0..900)) {
+        fn behaves_like_a_map(
+            steps in prop::collection::vec(("[a-c]{1,5}", any::<bool>()), 0..900),
+        ) {
             let mut landmarks = Landmarks::default();
             let mut plain: BTreeMap<String, (u32, u32)> = BTreeMap::new();
             for (text, shows) in steps {

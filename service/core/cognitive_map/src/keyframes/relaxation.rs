@@ -77,15 +77,18 @@ impl RelaxationCopy {
         // with.
         let mut all = Problem::new(&self.0, Among::All);
         all.map.relax(&from_wide());
+        let gate_chi2 = self.0.settings.closure_gate_chi2;
         let mut accepted = Vec::new();
         let mut others = Vec::new();
         for (number, constraint) in self.closures() {
             let Some(squared) = all.squared_error(number) else {
                 continue;
             };
-            if constraint.is_candidate() && agrees_with(constraint, &accepted_alone, &marginals) {
+            if constraint.is_candidate()
+                && agrees_with(constraint, &accepted_alone, &marginals, gate_chi2)
+            {
                 accepted.push(number);
-            } else if squared <= tuning::AGREES_MAX {
+            } else if squared <= gate_chi2 {
                 others.push((number, constraint));
             }
         }
@@ -113,7 +116,8 @@ impl RelaxationCopy {
             )
         };
         let mut candidates: Vec<_> = closures.iter().filter_map(candidate).collect();
-        let partners = Candidate::count_partners(&mut candidates);
+        let partners =
+            Candidate::count_partners(&mut candidates, self.0.settings.closure_gate_chi2);
         let is_supported = |(candidate, n_partners): &(&Candidate, usize)| {
             let constraint = self.0.constraints.slab.get(candidate.constraint);
             *n_partners >= tuning::PARTNERS_MIN && constraint.is_some_and(Constraint::is_candidate)
@@ -127,6 +131,7 @@ impl RelaxationCopy {
     /// The relaxed graph, after closures that do not fit into it were rejected; and their number.
     /// Moves the keyframes.
     pub(super) fn relax(&mut self) -> (Problem, Relaxed, usize) {
+        let refuted_chi2 = self.0.settings.refuted_chi2();
         let mut n_rejected = 0;
         let mut rounds = 0;
         loop {
@@ -139,7 +144,7 @@ impl RelaxationCopy {
             let relaxed = problem.map.relax(&settings);
             let is_too_far = |number: u32| {
                 let squared = problem.squared_error(number);
-                squared.is_some_and(|squared| squared > tuning::REJECTED_MIN)
+                squared.is_some_and(|squared| squared > refuted_chi2)
             };
             let accepted = self.accepted().map(|(number, _)| number);
             let refuted: Vec<u32> = accepted.filter(|&number| is_too_far(number)).collect();
@@ -192,9 +197,10 @@ impl RelaxationCopy {
 
     /// Whether all accepted closures are within the range of their kernels.
     fn fits(&self, problem: &Problem) -> bool {
+        let refuted_chi2 = self.0.settings.refuted_chi2();
         self.accepted().all(|(number, _)| {
             let squared = problem.squared_error(number);
-            squared.is_none_or(|squared| squared <= tuning::REJECTED_MIN)
+            squared.is_none_or(|squared| squared <= refuted_chi2)
         })
     }
 

@@ -1,16 +1,10 @@
-//! Tuning: all constants of the keyframe graph, with unit and reason.
+//! Tuning: all constants of the keyframe graph, with unit and meaning. One without a reason is a
+//! judgement: no measurement of it alone is recorded.
 //!
-//! Pairs of a length and an angle bound a motion \[m, rad\]. Limits of memory are in
-//! [`KeyframeSettings`](super::settings::KeyframeSettings).
+//! Pairs of a length and an angle bound a motion \[m, rad\]. Limits of memory and what a space
+//! sets are in [`KeyframeSettings`](super::settings::KeyframeSettings).
 
 // Keyframes and sightings.
-
-/// Motion after which a keyframe is added in any case \[m, rad\]: poses between two are
-/// interpolated.
-pub(super) const KEYFRAME_STEP: (f64, f64) = (0.1, 0.1);
-
-/// Motion since a keyframe up to which sightings are attached to it \[m, rad\].
-pub(super) const ATTACHED_WITHIN: (f64, f64) = (0.02, 0.02);
 
 /// Motion that counts as rest \[m, rad\].
 pub(super) const REST_WITHIN: (f64, f64) = (0.005, 0.005);
@@ -59,12 +53,10 @@ pub(super) const ROTATION_LEVER_M: f64 = 0.5;
 
 // Loop closures.
 
-/// Squared Mahalanobis distance up to which a closure agrees with the map or with another closure:
-/// a true one exceeds it once in a hundred times (χ², 3 degrees of freedom).
-pub(super) const AGREES_MAX: f64 = 11.3;
-
-/// Squared Mahalanobis distance after a relaxation from which a closure is rejected.
-pub(super) const REJECTED_MIN: f64 = 25.0;
+/// Squared Mahalanobis distance after a relaxation from which a closure is rejected, in the gate
+/// of closures. By default 25, five deviations: a relaxation that others share in must contradict
+/// it more than a gate does before it is dropped.
+pub(super) const REFUTED_PER_GATE: f64 = 25.0 / 11.3;
 
 /// Factor by which the map may be less certain than a closure for their agreement alone to count.
 pub(super) const UNCERTAINTY_RATIO_MAX: f64 = 2.0;

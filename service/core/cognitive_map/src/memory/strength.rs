@@ -9,7 +9,7 @@ use state::state_of_struct;
 /// half-life.
 ///
 /// ```text
-/// strength(t) = Σ 2^(tᵢ − t)       tᵢ the uses, t now, both in half-lives on the space's sample clock
+/// strength(t) = Σ 2^(tᵢ − t)     tᵢ the uses, t now, in half-lives on the space's sample clock
 /// key         = log₂ strength(t) + t
 /// ```
 ///

@@ -127,7 +127,11 @@ proptest! {
     #[test]
     fn arbitrary_pages_are_refused(
         noise in prop::collection::vec(
-            (0u8..10, prop_oneof![0u32..3, any::<u32>()], prop::collection::vec(any::<u8>(), 0..99)),
+            (
+                0u8..10,
+                prop_oneof![0u32..3, any::<u32>()],
+                prop::collection::vec(any::<u8>(), 0..99),
+            ),
             0..9,
         ),
         with_header in any::<bool>(),

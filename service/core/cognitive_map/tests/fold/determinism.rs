@@ -36,7 +36,8 @@ proptest! {
         run(&mut map, &records);
         let refined = map.refined();
         for pose in refined.agents.iter().flat_map(|agent| &agent.poses) {
-            let numbers = pose.pose.translation.vector.iter().chain(pose.pose.rotation.coords.iter());
+            let (position, rotation) = (pose.pose.translation.vector, pose.pose.rotation.coords);
+            let numbers = position.iter().chain(rotation.iter());
             prop_assert!(numbers.copied().all(f64::is_finite), "{:?}", pose);
         }
         for (_, agent) in map.agents() {
@@ -119,7 +120,10 @@ proptest! {
     ) {
         let mut once = effective(&settings, &records);
         let is_motion = |record: &Record| {
-            matches!(record, Record::Sample { sample, .. } if matches!(sample.body, SampleBody::Motion(_)))
+            let Record::Sample { sample, .. } = record else {
+                return false;
+            };
+            matches!(sample.body, SampleBody::Motion(_))
         };
         let motions: Vec<_> = (0..once.len()).filter(|&at| is_motion(&once[at])).collect();
         prop_assume!(!motions.is_empty());

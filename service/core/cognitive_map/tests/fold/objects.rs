@@ -9,7 +9,7 @@ use object_recognition::{Orientation, Verdict};
 use crate::journal::{Robot, label, level, run};
 
 /// Levels along three rods whose places are 2 cm apart.
-const RODS: [(&str, [f64; 12]); 3] = [
+pub(crate) const RODS: [(&str, [f64; 12]); 3] = [
     (
         "fork",
         [
@@ -31,7 +31,7 @@ const RODS: [(&str, [f64; 12]); 3] = [
 ];
 const PITCH_M: f64 = 0.02;
 /// From one end to the other.
-const UP: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+pub(crate) const UP: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
 fn noise() -> TouchNoise {
     TouchNoise::new(0.001, 0.02, 0.2).unwrap()
@@ -46,7 +46,7 @@ fn learn(name: Option<&str>) -> SampleBody {
     })
 }
 
-fn identify() -> SampleBody {
+pub(crate) fn identify() -> SampleBody {
     SampleBody::Object(ObjectMark::Identify {
         orientation: Orientation::Known,
         noise: noise(),
@@ -58,7 +58,12 @@ fn end() -> SampleBody {
 }
 
 /// Feels the places of a rod one after the other; answers what happened.
-fn feel(map: &mut CognitiveMap, hand: &mut Robot, rod: &[f64], order: &[usize]) -> Vec<EventKind> {
+pub(crate) fn feel(
+    map: &mut CognitiveMap,
+    hand: &mut Robot,
+    rod: &[f64],
+    order: &[usize],
+) -> Vec<EventKind> {
     let mut events = Vec::new();
     let mut at = order[0];
     for &place in order {
@@ -78,17 +83,24 @@ fn feel(map: &mut CognitiveMap, hand: &mut Robot, rod: &[f64], order: &[usize]) 
 }
 
 /// A map that knows the rods, and a hand.
-fn taught() -> (CognitiveMap, Robot) {
-    let mut map = CognitiveMap::new(Settings::default());
+pub(crate) fn taught(settings: Settings) -> (CognitiveMap, Robot) {
+    let mut map = CognitiveMap::new(settings);
     let mut hand = Robot::enrol(&mut map);
     for (name, rod) in &RODS {
         hand.sample(&mut map, learn(Some(name)));
         feel(&mut map, &mut hand, rod, &UP);
         let events = hand.sample(&mut map, end());
-        assert!(
-            matches!(&events[..], [EventKind::ObjectLearned { name: learned, contacts: 12, .. }] if learned.as_str() == *name),
-            "{events:?}"
-        );
+        let [
+            EventKind::ObjectLearned {
+                name: learned,
+                contacts: 12,
+                ..
+            },
+        ] = &events[..]
+        else {
+            panic!("{events:?}")
+        };
+        assert_eq!(learned.as_str(), *name);
     }
     assert_eq!(map.object_count(), 3);
     (map, hand)
@@ -104,7 +116,7 @@ fn recognised(events: &[EventKind]) -> Vec<&str> {
 
 #[test]
 fn what_was_learned_by_touch_is_known_again_from_an_unknown_start() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     for (name, rod) in &RODS {
         hand.sample(&mut map, identify());
         let events = feel(&mut map, &mut hand, rod, &[10, 9, 8, 7, 6, 5, 4, 3, 2, 1]);
@@ -123,7 +135,7 @@ fn what_was_learned_by_touch_is_known_again_from_an_unknown_start() {
 
 #[test]
 fn what_was_learned_on_the_spot_is_named_later() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     let strange = RODS[2].1.map(|level| level + 20.0);
     hand.sample(&mut map, identify());
     feel(&mut map, &mut hand, &strange, &UP);
@@ -161,7 +173,7 @@ fn what_was_learned_on_the_spot_is_named_later() {
 
 #[test]
 fn something_unknown_is_said_to_be_and_learned() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     let strange = RODS[2].1.map(|level| level + 20.0);
     hand.sample(&mut map, identify());
     let events = feel(&mut map, &mut hand, &strange, &UP);
@@ -183,7 +195,7 @@ fn something_unknown_is_said_to_be_and_learned() {
 
 #[test]
 fn another_visit_extends_an_object_in_its_own_frame() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     let fork = map.object_by_name(&label("fork")).unwrap();
     let mut longer = RODS[0].1.to_vec();
     longer.extend([13.0, 14.0]);
@@ -240,7 +252,7 @@ fn names(map: &CognitiveMap) -> Vec<String> {
 
 #[test]
 fn what_two_hands_find_at_the_same_time_is_one_object() {
-    let (mut map, mut left) = taught();
+    let (mut map, mut left) = taught(Settings::default());
     let mut right = Robot::enrol(&mut map);
     let strange = RODS[2].1.map(|level| level + 20.0);
     for hand in [&mut left, &mut right] {
@@ -256,7 +268,7 @@ fn what_two_hands_find_at_the_same_time_is_one_object() {
 
 #[test]
 fn pieces_of_one_thing_become_one_object_once_the_whole_is_known() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     let mut strange = RODS[2].1.map(|level| level + 20.0).to_vec();
     strange.extend(RODS[1].1.map(|level| level + 40.0));
     let all: Vec<usize> = (0..strange.len()).collect();
@@ -285,7 +297,7 @@ fn pieces_of_one_thing_become_one_object_once_the_whole_is_known() {
 
 #[test]
 fn two_objects_that_were_named_apart_stay_two() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     visit(&mut map, &mut hand, learn(Some("gabel")), &RODS[0].1, &UP);
     let events = visit(&mut map, &mut hand, identify(), &RODS[0].1, &UP);
     assert_eq!(recognised(&events), [""; 0], "it may be either");
@@ -294,7 +306,7 @@ fn two_objects_that_were_named_apart_stay_two() {
 
 #[test]
 fn what_was_joined_in_error_comes_apart_again() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     let fork = map.object_by_name(&label("fork")).unwrap();
     let levels = |map: &CognitiveMap| {
         let places = map.object_places(fork).iter();
@@ -334,7 +346,7 @@ fn what_was_joined_in_error_comes_apart_again() {
 
 #[test]
 fn a_visit_to_what_was_known_before_does_not_undo_what_was_added() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     let fork = map.object_by_name(&label("fork")).unwrap();
     let mut longer = RODS[0].1.to_vec();
     longer.extend([13.0, 14.0, 15.0, 16.0]);
@@ -411,7 +423,7 @@ fn a_lesson_teaches_at_once_and_what_is_forgotten_is_unknown() {
 
 #[test]
 fn an_episode_goes_on_where_a_checkpoint_was_taken() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     hand.sample(&mut map, identify());
     let rod = &RODS[2].1;
     feel(&mut map, &mut hand, rod, &[10]);
@@ -428,7 +440,7 @@ fn an_episode_goes_on_where_a_checkpoint_was_taken() {
 
 #[test]
 fn the_end_of_an_episode_tells_what_was_recognised() {
-    let (mut map, mut hand) = taught();
+    let (mut map, mut hand) = taught(Settings::default());
     hand.sample(&mut map, identify());
     feel(&mut map, &mut hand, &RODS[1].1, &UP);
     let (_, said) = map.episode(hand.id).unwrap();

@@ -97,7 +97,9 @@ proptest! {
                 Some(PartialCode::from(&map.modules().code_at(&position)))
             });
             let cosine =
-                code.map(|code| similarity::kernel(map.modules(), &code, &place.code(map.modules())));
+                code.map(|code| {
+                    similarity::kernel(map.modules(), &code, &place.code(map.modules()))
+                });
             expected.push((id, distance_m, cosine, place.last_stamp_ns()));
         }
         let recalled = map.recall(&cue);
@@ -110,7 +112,8 @@ proptest! {
         everything.limit = usize::MAX;
         let all = map.recall(&everything);
         let confidence = |id: PlaceId| {
-            all.iter().find(|recalled| recalled.place == id).and_then(|recalled| recalled.confidence)
+            let found = all.iter().find(|recalled| recalled.place == id);
+            found.and_then(|recalled| recalled.confidence)
         };
         expected.sort_by(|a, b| {
             let by_distance = || a.1.partial_cmp(&b.1).unwrap();

@@ -193,7 +193,10 @@ proptest! {
     fn a_map_whose_agents_come_and_go_is_restored(
         settings in any_settings(),
         records in journals(),
-        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<bool>(), 0u32..4), 0..24),
+        changes in prop::collection::vec(
+            (any::<prop::sample::Index>(), any::<bool>(), 0u32..4),
+            0..24,
+        ),
         cut in any::<prop::sample::Index>(),
     ) {
         let mut records = records;

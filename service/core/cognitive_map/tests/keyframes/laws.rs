@@ -303,17 +303,17 @@ fn thinning_keeps_the_loops() {
     let thinned = walked(2, 1500, tight());
     assert!(whole.keyframes.graph.n_keyframes() > 2500);
     assert!(thinned.keyframes.graph.n_keyframes() <= 150);
-    let rows_at_anchors = |walk: &Walk| walk.error_m(&walk.keyframes.graph.refine());
-    let (whole_m, thinned_m) = (rows_at_anchors(&whole), rows_at_anchors(&thinned));
+    let rows_at_keyframes = |walk: &Walk| walk.error_m(&walk.keyframes.graph.refine());
+    let (whole_m, thinned_m) = (rows_at_keyframes(&whole), rows_at_keyframes(&thinned));
     let motion = whole.told[0].translation.vector - whole.truth[0].translation.vector;
     assert!(motion.norm() > 0.5, "{}", motion.norm());
     assert!(thinned_m < 2.0 * whole_m, "{thinned_m} {whole_m}");
 }
 
-/// Anchors may go without a sighting less: when room for sightings ran out first, what was seen
+/// Keyframes may go without a sighting less: when room for sightings ran out first, what was seen
 /// from then on was not taken in, and the way went on by motion alone.
 #[test]
-fn what_is_seen_is_taken_in_though_there_is_room_for_anchors_only() {
+fn what_is_seen_is_taken_in_though_there_is_room_for_keyframes_only() {
     let whole = walked(1, 1500, roomy());
     let bounded = KeyframeSettings {
         sightings_max: 500,

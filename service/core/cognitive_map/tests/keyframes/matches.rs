@@ -18,8 +18,8 @@ struct Rounds {
 }
 
 impl Rounds {
-    fn new(frame: &Isometry3<f64>) -> Self {
-        let mut keyframes = KeyframeMap::new(KeyframeSettings::default());
+    fn new(settings: KeyframeSettings, frame: &Isometry3<f64>) -> Self {
+        let mut keyframes = KeyframeMap::new(settings);
         let agent = keyframes.graph.enrol();
         let start = cognitive_map::StartPose::new(
             frame.translation.vector.into(),
@@ -109,7 +109,7 @@ fn rounds_in(
     drift_rad: f64,
     at: &mut impl FnMut(&mut Rounds, u64),
 ) -> Rounds {
-    let mut walk = Rounds::new(frame);
+    let mut walk = Rounds::new(KeyframeSettings::default(), frame);
     for seq in 1..=4 * ROUND {
         walk.step(drift_rad);
         at(&mut walk, seq);
@@ -166,6 +166,28 @@ fn false_matches_do_not_bend() {
     };
     let (clean, doubted) = (drifting(false), drifting(true));
     assert!(doubted.off_m() < clean.off_m() + 0.2, "{}", doubted.off_m());
+}
+
+#[test]
+fn a_wider_gate_takes_closures_that_disagree_more() {
+    let n_believed = |closure_gate_chi2| {
+        let settings = KeyframeSettings {
+            closure_gate_chi2,
+            ..KeyframeSettings::default()
+        };
+        let mut walk = Rounds::new(settings, &Isometry3::identity());
+        for seq in 1..=4 * ROUND {
+            walk.step(0.0);
+            if seq > ROUND && seq.is_multiple_of(5) {
+                // Off by four of its deviations, to one side and to the other in turn.
+                let side_m = if seq.is_multiple_of(10) { 0.2 } else { -0.2 };
+                walk.matched(seq - ROUND, &Isometry3::translation(0.0, side_m, 0.0));
+            }
+        }
+        walk.keyframes.graph.n_closures_accepted()
+    };
+    let (narrow, wide) = (n_believed(1.0), n_believed(100.0));
+    assert!(narrow < wide / 2, "{narrow} {wide}");
 }
 
 #[test]

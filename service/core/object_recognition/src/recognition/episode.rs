@@ -148,6 +148,7 @@ impl Recognition {
             pose,
             contacts: self.count,
             fit,
+            answer_probability: library.answer_probability(),
         }
     }
 

@@ -180,7 +180,8 @@ proptest! {
         let inverse = matrix.try_inverse().expect("positive");
         let (a, b) = (pair.0 % n, pair.1 % n);
         let half = |of: usize| {
-            tree.half_solution(u32::try_from(of).unwrap(), graph.dimensions[of]).expect("determined")
+            let variable = u32::try_from(of).unwrap();
+            tree.half_solution(variable, graph.dimensions[of]).expect("determined")
         };
         let block = half(a).product(&half(b));
         for r in 0..graph.dimensions[a] {

@@ -31,22 +31,9 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
     {
         samples += batch.len() as u64;
         let number = u32::try_from(team.len())?;
-        let robot = team.entry(robot).or_insert_with(|| {
-            let name = robot.as_str().into();
-            records_of(
-                &Entry::Enrol {
-                    agent: number,
-                    name,
-                },
-                |record| {
-                    map.apply(&record, &mut events);
-                },
-            );
-            Robot {
-                agent: number,
-                ..Robot::default()
-            }
-        });
+        let robot = team
+            .entry(robot)
+            .or_insert_with(|| Robot::enrol(number, robot, &mut map));
         let batch = SampleBatch {
             session: 1,
             first_seq: robot.next,
@@ -68,14 +55,9 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
         );
     }
     let mut refined = refined_trajectories(&map);
-    let finish = |(name, mut robot): (&str, Robot)| {
-        let rest = robot.recorder.rows();
-        robot.outcome.causal.extend(rest.iter().map(row));
+    let finish = |(name, robot): (&str, Robot)| {
         let poses = refined.remove(name).unwrap_or_default();
-        robot.outcome.refined = poses.iter().map(row).collect();
-        let agent = map.agent(AgentId(robot.agent));
-        robot.outcome.evidence = agent.map(evidence).unwrap_or_default();
-        (name.to_owned(), robot.outcome)
+        (name.to_owned(), robot.finish(&map, &poses))
     };
     Ok(Outcome {
         robots: team.into_iter().map(finish).collect(),
@@ -102,6 +84,28 @@ struct Robot {
 }
 
 impl Robot {
+    /// Enrols a robot.
+    fn enrol(agent: u32, name: &str, map: &mut CognitiveMap) -> Self {
+        let name = name.into();
+        records_of(&Entry::Enrol { agent, name }, |record| {
+            map.apply(&record, &mut Vec::new());
+        });
+        Self {
+            agent,
+            ..Self::default()
+        }
+    }
+
+    /// What came of it, with its refined trajectory.
+    fn finish(mut self, map: &CognitiveMap, refined: &[trajectory::StampedPose]) -> RobotOutcome {
+        let rest = self.recorder.rows();
+        self.outcome.causal.extend(rest.iter().map(row));
+        self.outcome.refined = refined.iter().map(row).collect();
+        let agent = map.agent(AgentId(self.agent));
+        self.outcome.evidence = agent.map(evidence).unwrap_or_default();
+        self.outcome
+    }
+
     /// Notes where the agent is after a record.
     fn note(&mut self, record: &Record, map: &CognitiveMap, interval_ns: i64) {
         let id = AgentId(self.agent);

@@ -41,7 +41,8 @@ pub(in crate::cli) struct PointsArgs {
     leave_out: usize,
     /// Numbers of contacts after which is looked, with commas between; the last ends an
     /// exploration.
-    #[arg(long, value_delimiter = ',', value_name = "N", default_values_t = PointsSettings::default().looks)]
+    #[arg(long, value_delimiter = ',', value_name = "N",
+        default_values_t = PointsSettings::default().looks)]
     looks: Vec<usize>,
     /// Seed of what is learned, contacts, poses and noise.
     #[arg(long, default_value_t = 1)]

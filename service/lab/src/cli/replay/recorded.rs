@@ -262,6 +262,23 @@ fn write(
     Ok(())
 }
 
+/// The motion that moves poses to where they fit the truth best.
+fn fitted(case: &Case<'_>, poses: &[Isometry3<f64>]) -> Isometry3<f64> {
+    let (estimate, truth) = pairs(case, poses);
+    let (unmoved, truth_frame) = match &case.truth {
+        Truth::OfPoses(truth) if truth[0].is_some_and(|first| first.norm() < 1e-9) => {
+            (poses[0].inverse(), true)
+        }
+        truth => (Isometry3::identity(), !matches!(truth, Truth::Unknown)),
+    };
+    let motion = if truth_frame {
+        case.alignment.fit(&estimate, &truth)
+    } else {
+        Isometry3::identity()
+    };
+    motion * unmoved
+}
+
 /// The paths in the frame of the truth, each moved to where it fits best, or as they are where
 /// there is none.
 fn figure(
@@ -273,23 +290,8 @@ fn figure(
         label: label.to_owned(),
         positions_m,
     };
-    let fitted = |poses: &[Isometry3<f64>]| {
-        let (estimate, truth) = pairs(case, poses);
-        let (unmoved, truth_frame) = match &case.truth {
-            Truth::OfPoses(truth) if truth[0].is_some_and(|first| first.norm() < 1e-9) => {
-                (poses[0].inverse(), true)
-            }
-            truth => (Isometry3::identity(), !matches!(truth, Truth::Unknown)),
-        };
-        let motion = if truth_frame {
-            case.alignment.fit(&estimate, &truth)
-        } else {
-            Isometry3::identity()
-        };
-        motion * unmoved
-    };
     let positions = |poses: &[Isometry3<f64>]| -> Vec<Vector3<f64>> {
-        let motion = fitted(poses);
+        let motion = fitted(case, poses);
         let moved = poses.iter().map(|pose| (motion * pose).translation.vector);
         moved.collect()
     };
@@ -306,7 +308,7 @@ fn figure(
             Some(path("truth", positions.collect()))
         }
     };
-    let motion = fitted(&refined.poses);
+    let motion = fitted(case, &refined.poses);
     let moved = refined
         .landmarks
         .iter()

@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::Args;
 use cogmap_lab::touch::{TouchExperiment, TouchNoise, TouchProtocol, TouchReport, TouchSet};
 
-use object_recognition::SURE;
+use object_recognition::ANSWER_PROBABILITY;
 
 use crate::cli::eval::{Progress, Turns};
 use cogmap::cli::output;
@@ -40,7 +40,7 @@ pub(in crate::cli) struct TouchArgs {
     #[arg(long)]
     told: bool,
     /// An answer is given as soon as its probability is this high.
-    #[arg(long, default_value_t = SURE, value_name = "P")]
+    #[arg(long, default_value_t = ANSWER_PROBABILITY, value_name = "P")]
     sure: f64,
     /// Seed of the order of touches, of noise and of where the object is.
     #[arg(long, default_value_t = 1)]

@@ -83,6 +83,17 @@ fn draw_on(
     }))?;
     drop(chart);
 
+    draw_sidebar(&sidebar, path, most)?;
+    body.present()?;
+    Ok(())
+}
+
+/// The scale of colours, and what the marks on the map are.
+fn draw_sidebar(
+    sidebar: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    path: &Path,
+    most: u64,
+) -> Result<(), Box<dyn std::error::Error>> {
     let text = ("sans-serif", 17).into_font().color(&INK);
     let (top, height) = (40, 300);
     for step in 0..SCALE_STEPS {
@@ -104,7 +115,6 @@ fn draw_on(
         let label = "an obstacle, at any height";
         sidebar.draw(&Text::new(label, (58, places + 26), &text))?;
     }
-    body.present()?;
     Ok(())
 }
 

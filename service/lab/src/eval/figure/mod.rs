@@ -27,7 +27,28 @@ pub fn figures(experiment: &Experiment) -> Result<Vec<Figure>, FigureError> {
     let protocol = &experiment.protocol;
     let report = Report::of(experiment);
     let subtitle = format!("{} · {}", report.environment, conditions(&report));
-    let mut charts = vec![
+    let mut charts = measures();
+    charts.iter_mut().for_each(mark);
+    charts.push(prediction());
+    charts.push(errors(experiment));
+    let mut figures = charts
+        .iter()
+        .map(|chart| chart.draw(experiment, &subtitle))
+        .collect::<Result<Vec<_>, _>>()?;
+    if let Some(path) = experiment.path() {
+        let subtitle = format!(
+            "{} · seed {}, {} steps, seen from above",
+            report.environment, report.seed, protocol.steps
+        );
+        figures.push(heat::draw(path, protocol.environment.side_m(), &subtitle)?);
+    }
+    figures.sort_by_key(|figure| figure.name);
+    Ok(figures)
+}
+
+/// The charts of one measure each.
+fn measures() -> Vec<Chart> {
+    vec![
         score(
             "pseudo-activation",
             "Pseudo-activation of the recalled place",
@@ -70,24 +91,28 @@ pub fn figures(experiment: &Experiment) -> Result<Vec<Figure>, FigureError> {
             "places recruited a step, over a tenth of the walk",
             Quantity::Growth,
         ),
-    ];
+    ]
+}
+
+/// Marks in a chart what the paper states.
+fn mark(chart: &mut Chart) {
     let paper_growth = format!("the paper's P_new = {PAPER_P_NEW}");
-    for chart in &mut charts {
-        match chart.name {
-            "growth" => chart
-                .marks
-                .push(Mark::level(PAPER_P_NEW, paper_growth.clone())),
-            "place-count" => chart.marks.push(Mark {
-                start: 0.0,
-                per_step: PAPER_P_NEW,
-                label: paper_growth.clone(),
-            }),
-            // In the frame of a room's corner all patterns point much the same way.
-            "interference-score" => chart.y_axis = YAxis::UpToOne,
-            _ => {}
-        }
+    match chart.name {
+        "growth" => chart.marks.push(Mark::level(PAPER_P_NEW, paper_growth)),
+        "place-count" => chart.marks.push(Mark {
+            start: 0.0,
+            per_step: PAPER_P_NEW,
+            label: paper_growth,
+        }),
+        // In the frame of a room's corner all patterns point much the same way.
+        "interference-score" => chart.y_axis = YAxis::UpToOne,
+        _ => {}
     }
-    charts.push(Chart {
+}
+
+/// The chart of the error of the recalled place.
+fn prediction() -> Chart {
+    Chart {
         lines: vec![
             Line::banded(
                 Quantity::PredictionError,
@@ -101,21 +126,7 @@ pub fn figures(experiment: &Experiment) -> Result<Vec<Figure>, FigureError> {
             "distance from the true position [m]",
             Quantity::PredictionError,
         )
-    });
-    charts.push(errors(experiment));
-    let mut figures = charts
-        .iter()
-        .map(|chart| chart.draw(experiment, &subtitle))
-        .collect::<Result<Vec<_>, _>>()?;
-    if let Some(path) = experiment.path() {
-        let subtitle = format!(
-            "{} · seed {}, {} steps, seen from above",
-            report.environment, report.seed, protocol.steps
-        );
-        figures.push(heat::draw(path, protocol.environment.side_m(), &subtitle)?);
     }
-    figures.sort_by_key(|figure| figure.name);
-    Ok(figures)
 }
 
 /// A chart of a number from 0 to 1.

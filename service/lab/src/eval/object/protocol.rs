@@ -1,6 +1,6 @@
 //! What is done with how many objects.
 
-use object_recognition::SURE;
+use object_recognition::ANSWER_PROBABILITY;
 
 use crate::eval::object::Rotate;
 use crate::objects::ExplorationNoise;
@@ -25,7 +25,8 @@ pub struct ObjectProtocol {
     pub trials: u32,
     /// Most touches of an exploration.
     pub touches_max: usize,
-    /// An answer is given as soon as its probability is this high; [`SURE`] is the service's.
+    /// An answer is given as soon as its probability is this high; [`ANSWER_PROBABILITY`] is the
+    /// service's.
     pub sure: f64,
     /// Most touches of each object while learning.
     pub learning_touches: usize,
@@ -73,7 +74,7 @@ impl ObjectProtocol {
             normals: Normals::Untold,
             trials: 1000,
             touches_max: 200,
-            sure: SURE,
+            sure: ANSWER_PROBABILITY,
             learning_touches: 10_000,
             seed: 1,
         }

@@ -102,7 +102,11 @@ proptest! {
     }
 
     #[test]
-    fn what_is_nowhere_the_same_is_never_claimed(seed in any::<u64>(), n in 5_usize..60, is_planar: bool) {
+    fn what_is_nowhere_the_same_is_never_claimed(
+        seed in any::<u64>(),
+        n in 5_usize..60,
+        is_planar: bool,
+    ) {
         let numbers = &mut Numbers(seed);
         let half_m = if is_planar { FLOOR } else { HALL };
         let (one, other) = (world(numbers, n, half_m), world(numbers, 20, half_m));
@@ -116,20 +120,26 @@ proptest! {
         let numbers = &mut Numbers(seed);
         let points = world(numbers, 15, FLOOR);
         let older = seen_points(numbers, &Isometry3::identity(), &points, true);
-        let mirrored: Vec<_> = points.iter().map(|point| Point3::new(-point.x, point.y, point.z)).collect();
-        let newer = seen_points(numbers, &motion([1.0, 2.0, 0.0], Vector3::z() * heading), &mirrored, true);
+        let mirrored = points.iter().map(|point| Point3::new(-point.x, point.y, point.z));
+        let mirrored: Vec<_> = mirrored.collect();
+        let frame = motion([1.0, 2.0, 0.0], Vector3::z() * heading);
+        let newer = seen_points(numbers, &frame, &mirrored, true);
         prop_assert_eq!(register(&older, &newer, true), None);
         // As high as wide, for a flat world is much like its mirror image turned upside down.
         let points = world(numbers, 15, [6.0; 3]);
         let older = seen_points(numbers, &Isometry3::identity(), &points, false);
-        let mirrored: Vec<_> = points.iter().map(|point| Point3::new(-point.x, point.y, point.z)).collect();
-        let newer = seen_points(numbers, &motion([1.0, 2.0, -1.0], Vector3::y() * heading), &mirrored, false);
+        let mirrored = points.iter().map(|point| Point3::new(-point.x, point.y, point.z));
+        let mirrored: Vec<_> = mirrored.collect();
+        let frame = motion([1.0, 2.0, -1.0], Vector3::y() * heading);
+        let newer = seen_points(numbers, &frame, &mirrored, false);
         prop_assert_eq!(register(&older, &newer, false), None);
     }
 
     #[test]
     fn a_frame_in_space_is_found_by_where_its_landmarks_lie(
-        seed in any::<u64>(), shift in prop::array::uniform3(-9.0..9.0_f64), turn in prop::array::uniform3(-1.8..1.8_f64),
+        seed in any::<u64>(),
+        shift in prop::array::uniform3(-9.0..9.0_f64),
+        turn in prop::array::uniform3(-1.8..1.8_f64),
     ) {
         let numbers = &mut Numbers(seed);
         let points = world(numbers, 15, HALL);
@@ -149,7 +159,11 @@ proptest! {
 
     /// Landmarks that hang together, as on one board, agree together: that is one agreement.
     #[test]
-    fn boards_with_many_landmarks_count_once(seed in any::<u64>(), n_boards in 2_usize..7, is_planar: bool) {
+    fn boards_with_many_landmarks_count_once(
+        seed in any::<u64>(),
+        n_boards in 2_usize..7,
+        is_planar: bool,
+    ) {
         let numbers = &mut Numbers(seed);
         let half_m = if is_planar { FLOOR } else { HALL };
         let mut boards = || {

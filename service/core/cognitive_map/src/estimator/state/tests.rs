@@ -159,7 +159,10 @@ proptest! {
     }
 
     #[test]
-    fn a_relation_comes_back_to_the_last_bit(kind in 0u8..3, numbers in prop::array::uniform3(-1.0..1.0_f64)) {
+    fn a_relation_comes_back_to_the_last_bit(
+        kind in 0u8..3,
+        numbers in prop::array::uniform3(-1.0..1.0_f64),
+    ) {
         let waiting = relation(kind, numbers);
         let mut out = StateWriter::default();
         waiting.write(&mut out);

@@ -95,6 +95,14 @@ pub(crate) struct ObjectMemory {
 }
 
 impl ObjectMemory {
+    /// A memory without objects, about which an answer is given from a probability on.
+    pub(crate) fn new(answer_probability: f64) -> Self {
+        Self {
+            library: Arc::new(ObjectLibrary::answering_from(answer_probability)),
+            ..Self::default()
+        }
+    }
+
     /// What may be recognised.
     pub(crate) fn library(&self) -> &ObjectLibrary {
         &self.library

@@ -179,7 +179,12 @@ proptest! {
         let at = chosen.get(&positions) + Vector3::from(shift) * reach_m;
         let world = World::of(positions).without(&forgotten);
         let code = world.code(&at, &noise.map(|noise| noise.map(|x| x * sd)), &known);
-        let cue = RecallCue { founder: founder.map(AgentId), since_ns, until_ns, ..cue(code, limit) };
+        let cue = RecallCue {
+            founder: founder.map(AgentId),
+            since_ns,
+            until_ns,
+            ..cue(code, limit)
+        };
         let scan = world.scan(&cue);
         let recalled = world.recall(&cue);
         let found: Vec<_> = recalled.iter().map(|r| (r.place, r.cosine.unwrap())).collect();

@@ -1,9 +1,12 @@
 //! Settings of a space: fixed when it is created, because the fold depends on them.
 
+mod bound;
+mod number;
+
 use grid::GridSettings;
 
-/// Most grid modules.
-const GRID_MODULES_MAX: usize = 16;
+pub use bound::Bound;
+pub use number::SettingNumber;
 
 /// Valid settings. Build with [`Settings::new`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,12 +54,30 @@ pub struct SettingsValues {
     pub places_max: u32,
     /// Most legs of all trips together: for one more, the weakest trip is forgotten.
     pub legs_max: u32,
-    /// Most moments of all agents that are remembered, so that the past can be smoothed: for one
-    /// more, one from which next to nothing is lost is left out.
-    pub anchors_max: u32,
+    /// Most keyframes of all agents, moments of their past that are kept so that it can be
+    /// smoothed: for one more, one from which next to nothing is lost is left out.
+    pub keyframes_max: u32,
     /// After this many records of the space, a use counts half as much for the strength of a
     /// memory.
     pub strength_half_life_samples: u32,
+    /// Deviation of a component of a sighting from what the estimate expects, in standard
+    /// deviations, beyond which the whole sighting is refused.
+    pub sighting_gate_sd: f64,
+    /// The same beyond which a component of a sighting loses weight (Huber 1964).
+    pub sighting_huber_sd: f64,
+    /// Squared Mahalanobis distance up to which a loop closure agrees with the map or with another
+    /// closure.
+    pub closure_gate_chi2: f64,
+    /// Motion between keyframes \[m\].
+    pub keyframe_spacing_m: f64,
+    /// Rotation between keyframes \[rad\].
+    pub keyframe_spacing_rad: f64,
+    /// Deviation of what a robot is moved along each axis between two sessions \[m\].
+    pub restart_sd_m: f64,
+    /// Deviation of what it is turned about each axis between two sessions \[rad\].
+    pub restart_sd_rad: f64,
+    /// Probability from which on an episode of touches is answered with an object, or with none.
+    pub object_answer_probability: f64,
 }
 
 /// When a place cell is recruited.
@@ -79,7 +100,7 @@ pub struct InvalidSettings {
     /// Name of the field.
     pub field: &'static str,
     /// What it must be.
-    pub rule: &'static str,
+    pub rule: String,
 }
 
 impl Default for SettingsValues {
@@ -104,8 +125,16 @@ impl Default for SettingsValues {
             trip_gap_s: 2.0,
             places_max: 65_536,
             legs_max: 65_536,
-            anchors_max: 65_536,
+            keyframes_max: 65_536,
             strength_half_life_samples: 1_000_000,
+            sighting_gate_sd: 4.0,
+            sighting_huber_sd: 2.0,
+            closure_gate_chi2: 11.3,
+            keyframe_spacing_m: 0.1,
+            keyframe_spacing_rad: 0.1,
+            restart_sd_m: 1.0,
+            restart_sd_rad: 0.5,
+            object_answer_probability: object_recognition::ANSWER_PROBABILITY,
         }
     }
 }
@@ -116,60 +145,18 @@ impl Settings {
     /// # Errors
     /// Names the first field that makes no sense, and the rule that it breaks.
     pub fn new(values: SettingsValues) -> Result<Self, InvalidSettings> {
-        let check = |holds: bool, field, rule| {
-            if holds {
-                Ok(())
-            } else {
-                Err(InvalidSettings { field, rule })
-            }
-        };
-        // A comparison with NaN is false, so each of these refuses NaN too.
-        let positive = |x: f64| x > 0.0 && x <= 1e6;
-        let share = |x: f64| (0.0..=1.0).contains(&x);
-        let v = &values;
-        let modules = (1..=GRID_MODULES_MAX).contains(&v.grid_modules);
-        check(modules, "grid_modules", "1 to 16")?;
-        let spacing = (1e-3..=1e6).contains(&v.grid_spacing_m);
-        check(spacing, "grid_spacing_m", "0.001 to 1000000")?;
-        let ratio = v.grid_ratio > 1.0 && v.grid_ratio <= 10.0;
-        check(ratio, "grid_ratio", "above 1, at most 10")?;
-        let radius = (1e-3..=1e6).contains(&v.field_radius_m);
-        check(radius, "field_radius_m", "0.001 to 1000000")?;
-        if let Recruitment::Bernoulli { probability } = v.recruitment {
-            check(share(probability), "recruitment.probability", "0 to 1")?;
+        for number in SettingNumber::ALL {
+            number.check(&values)?;
         }
-        check(
-            share(v.translation_sd_per_sqrt_m),
-            "translation_sd_per_sqrt_m",
-            "0 to 1",
-        )?;
-        check(
-            share(v.rotation_sd_per_sqrt_m),
-            "rotation_sd_per_sqrt_m",
-            "0 to 1",
-        )?;
-        check(
-            share(v.rotation_sd_per_sqrt_rad),
-            "rotation_sd_per_sqrt_rad",
-            "0 to 1",
-        )?;
-        check(share(v.length_error_sd), "length_error_sd", "0 to 1")?;
-        check(share(v.angle_error_sd), "angle_error_sd", "0 to 1")?;
-        check(share(v.bias_sd_rad_s), "bias_sd_rad_s", "0 to 1")?;
-        let lasting = share(v.lasting_range_error);
-        check(lasting, "lasting_range_error", "0 to 1")?;
-        check(positive(v.localized_sd_m), "localized_sd_m", "positive")?;
-        let lost = v.lost_sd_m > v.localized_sd_m && v.lost_sd_m <= 1e6;
-        check(lost, "lost_sd_m", "above localized_sd_m")?;
-        check(positive(v.trip_stillness_s), "trip_stillness_s", "positive")?;
-        check(positive(v.trip_gap_s), "trip_gap_s", "positive")?;
-        // The place that a leg starts from is held while the next one is recruited.
-        check(v.places_max >= 2, "places_max", "at least 2")?;
-        check(v.legs_max >= 1, "legs_max", "at least 1")?;
-        let anchors = (64..=1 << 24).contains(&v.anchors_max);
-        check(anchors, "anchors_max", "64 to 16777216")?;
-        let half_life = v.strength_half_life_samples >= 1;
-        check(half_life, "strength_half_life_samples", "at least 1")?;
+        if let Recruitment::Bernoulli { probability } = values.recruitment {
+            Bound::Share.check("recruitment.probability", probability)?;
+        }
+        if values.lost_sd_m <= values.localized_sd_m {
+            return Err(InvalidSettings {
+                field: "lost_sd_m",
+                rule: "above localized_sd_m".to_owned(),
+            });
+        }
         Ok(Self(values))
     }
 

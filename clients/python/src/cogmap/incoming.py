@@ -1,0 +1,45 @@
+"""What the service tells a run, until the run's own thread takes it."""
+
+from __future__ import annotations
+
+from typing import Iterator, Union
+
+from . import bounds
+from .answer import Estimate, Watermark
+from .inbox import Inbox
+from .problem import Problem
+from .wake import Wake
+
+
+class Incoming:
+    """The messages that wait for a run's thread, a queue for each kind."""
+
+    def __init__(self, wake: Wake) -> None:
+        self.estimates = Inbox(Estimate, bounds.ESTIMATES_WAITING_MAX, wake)
+        self.watermarks = Inbox(Watermark, bounds.ANSWERS_WAITING_MAX, wake)
+        self.problems = Inbox(Problem, bounds.ANSWERS_WAITING_MAX, wake)
+
+    def drain(self, every_estimate: bool) -> Iterator[Union[Estimate, Watermark, Problem]]:
+        """What waits, one after the other; without `every_estimate` only the latest estimate.
+
+        Estimates come first, and of the watermarks only those that are here when it begins: when a
+        flush returns, the estimate that was published before is in place. What comes meanwhile
+        wakes the thread again.
+        """
+        watermarks = len(self.watermarks)
+        while self.estimates:
+            if len(self.estimates) > 1 and not every_estimate:
+                # Nobody asked for each one, and only the latest is kept: spare the decoding.
+                self.estimates.drop()
+                continue
+            estimate = self.estimates.take()
+            if estimate is not None:
+                yield estimate
+        for _ in range(watermarks):
+            watermark = self.watermarks.take()
+            if watermark is not None:
+                yield watermark
+        while self.problems:
+            problem = self.problems.take()
+            if problem is not None:
+                yield problem
