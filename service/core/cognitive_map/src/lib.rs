@@ -1,4 +1,4 @@
-#![doc = include_str!("../README.md")]
+//! The pure core of cogmap: a cognitive map as a deterministic fold over a journal of samples.
 
 pub mod estimator;
 pub mod keyframes;

@@ -130,10 +130,10 @@ impl AgentTrack {
     }
 
     /// Notes where the agent came to rest. Answers whether it has rested so long, away from the
-    /// latest keyframe by more than a length and an angle \[m, rad\], that it needs one there.
-    pub(super) fn rests_elsewhere(&mut self, moment: &Moment, attached_within: (f64, f64)) -> bool {
+    /// latest keyframe, that it needs one there.
+    pub(super) fn rests_elsewhere(&mut self, moment: &Moment, attached: (f64, f64)) -> bool {
         if self.rests() {
-            return !self.is_near(attached_within)
+            return !self.is_near(attached)
                 && moment.stamp_ns.saturating_sub(self.rest_ns) >= tuning::REST_NS;
         }
         self.rest = *self.since.motion();

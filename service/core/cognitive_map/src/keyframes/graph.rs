@@ -218,13 +218,13 @@ impl KeyframeGraph {
             });
             self.add_keyframe(agent);
         }
-        let (spacing, attached_within) = (self.settings.spacing, self.settings.attached_within());
+        let (spacing, attached) = (self.settings.spacing, self.settings.attached_within());
         let Some(track) = self.track_mut(agent) else {
             return;
         };
         track.go(moment, increment, variance, calibrated);
         let is_step = !track.is_near(spacing);
-        let rests = track.rests_elsewhere(moment, attached_within);
+        let rests = track.rests_elsewhere(moment, attached);
         if is_step || rests {
             self.add_keyframe(agent);
         }

@@ -68,8 +68,9 @@ impl KeyframeGraph {
 
     /// The present instant of an agent: at its latest keyframe if that is near, or at a new one.
     pub(super) fn here(&mut self, agent: u32) -> Option<KeyframeOffset> {
+        let attached = self.settings.attached_within();
         let track = self.chains.track(agent)?;
-        if track.needs_keyframe || !track.is_near(self.settings.attached_within()) {
+        if track.needs_keyframe || !track.is_near(attached) {
             self.add_keyframe(agent);
         }
         let revision = self.revision;
