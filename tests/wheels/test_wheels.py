@@ -22,7 +22,7 @@ from wait import eventually
 
 ROOT = Path(__file__).parents[2]
 #: Where `make wheels` puts them.
-WHEELS = Path(os.environ.get("COGMAP_WHEELS", ROOT / "target" / "wheels"))
+WHEELS = Path(os.environ.get("COGMAP_WHEELS", ROOT / "target" / "wheels")).resolve()
 #: Longest run of a command: the installation waits for the package index [s].
 _COMMAND_S = 300.0
 #: The robot of the client's page.
