@@ -28,13 +28,16 @@ export class Inspector {
   readonly panels: HTMLElement[];
   isAiming = false;
   private readonly agentPanel: AgentPanel;
-  private readonly placePanel = new PlacePanel((at) => void this.recall(at));
+  private readonly placePanel = new PlacePanel(
+    (at) => void this.recall(at),
+    () => this.choose(null),
+  );
   private readonly recallPanel: RecallPanel;
   private memory: Memory | null = null;
   private module: number | null = null;
   private grid: GridState | null = null;
   private detail: AgentDetail | null = null;
-  /** The agent that was chosen last: it is asked what it would feel elsewhere. */
+  /** The agent that was chosen last: what is known of it holds for no other. */
   private lastAgent: string | null = null;
   private isRefining = false;
   private stage!: Stage;
@@ -45,6 +48,7 @@ export class Inspector {
     this.agentPanel = new AgentPanel({
       follow: () => this.toggleFollow(),
       refine: () => void this.toggleRefined(),
+      close: () => this.choose(null),
       chooseModule: (module) => this.chooseModule(this.module === module ? null : module),
     });
     this.recallPanel = new RecallPanel({
@@ -82,11 +86,9 @@ export class Inspector {
       void this.askGrid();
       void this.askDetail();
     } else if (picked?.kind === "place" && this.memory !== null) {
-      const { agents } = this.memory;
-      const agent = agents.get(this.lastAgent ?? "") ?? agents.values().next().value ?? null;
       const isWanted = (): boolean => this.stage.focus.selected === picked;
       this.inspect("place");
-      void this.placePanel.show(picked.id, this.memory, agent, isWanted);
+      void this.placePanel.show(picked.id, this.memory, isWanted);
     } else if (picked === null) {
       focus.followed = null;
       this.chooseModule(null);

@@ -42,6 +42,15 @@ test("no line joins what a gap or a leap parts", () => {
   );
 });
 
+test("an agent was at rest if it said nothing for a while, or has not moved", () => {
+  const moving = track([1, 1.1, 1.2]);
+  assert.equal(moving.restBefore(1.3), null);
+  assert.deepEqual(moving.restBefore(2)?.position, [1.2, 0, 0]);
+  moving.push(1.3, [1.2, 0, 0], AHEAD);
+  assert.deepEqual(moving.restBefore(1.4)?.position, [1.2, 0, 0]);
+  assert.equal(new Track().restBefore(1), null);
+});
+
 test("a long track keeps its later half", () => {
   const made = new Track();
   for (let i = 0; i < 40_000; i += 1) {

@@ -12,9 +12,10 @@ export class Agent {
   refined: Track | null = null;
   /** What its episode with an object says, while there is one. */
   touch: AgentObject | null = null;
-  /** Poses of the body during the episode under way. */
+  /** Poses of the body since the episode under way began; empty where that is not known. */
   touchPath: TrackPose[] = [];
   private isTouching = false;
+  private wasSeenFree = false;
 
   constructor(
     /** Which of the colours is its own. */
@@ -26,18 +27,24 @@ export class Agent {
     return this.live.name;
   }
 
-  /** Notes where the body is while it touches an object. */
-  feel(): void {
+  /**
+   * Notes where the body is at a time [s] while it touches an object. An episode counts from where
+   * the body was when it began. That is known only of a body that had been at rest: ticks do not
+   * say when an episode began.
+   */
+  feel(s: number): void {
     const { contacts, translation_m, rotation_xyzw } = this.live;
     if (contacts === null) {
       this.isTouching = false;
+      this.wasSeenFree = true;
       return;
     }
     if (!this.isTouching) {
       this.isTouching = true;
-      this.touchPath = [];
+      const rest = this.wasSeenFree ? this.track.restBefore(s) : null;
+      this.touchPath = rest === null ? [] : [rest];
     }
-    if (this.touchPath.length < TOUCH_POSES_MAX) {
+    if (this.touchPath.length > 0 && this.touchPath.length < TOUCH_POSES_MAX) {
       this.touchPath.push({ position: translation_m, rotation: rotation_xyzw });
     }
   }

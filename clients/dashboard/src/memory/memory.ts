@@ -148,7 +148,7 @@ export class Memory {
         }
       }
       agent.live = live;
-      agent.feel();
+      agent.feel(s);
       agent.track.push(s, live.translation_m, live.rotation_xyzw);
       this.note(s);
     }

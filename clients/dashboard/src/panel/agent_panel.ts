@@ -4,7 +4,7 @@ import type { Agent } from "../memory/agent";
 import type { Memory } from "../memory/memory";
 import { agentColour, type Palette } from "../scene/palette";
 import type { AgentDetail } from "../wire";
-import { button, h, say } from "./dom";
+import { button, CLOSE, h, say } from "./dom";
 import { Facts } from "./facts";
 import { count, degrees, deviation, exact, metres, percent, position, time } from "./format";
 import { GridPanel } from "./grid_panel";
@@ -19,6 +19,7 @@ export interface AgentActions {
   follow(): void;
   refine(): void;
   chooseModule(module: number): void;
+  close(): void;
 }
 
 /** What is shown of the agent elsewhere on the page. */
@@ -55,7 +56,7 @@ export class AgentPanel {
       REFINE,
     );
     this.element.append(
-      h("header", {}, this.mark, this.name, this.status),
+      h("header", {}, this.mark, this.name, this.status, button("", "Close", actions.close, CLOSE)),
       h("div", { class: "actions" }, this.follow, this.refine),
       this.facts.element,
       this.touch.element,

@@ -32,6 +32,9 @@ export function h<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
+/** The drawing of a button that closes. */
+export const CLOSE = "M5 5 L15 15 M15 5 L5 15";
+
 /** A drawing of lines, 20 by 20. */
 export function icon(path: string): SVGSVGElement {
   const space = "http://www.w3.org/2000/svg";

@@ -22,6 +22,9 @@ export function inWords({ kind, fields }: ShownEvent): string | null {
       return `was found at ${[x, y, z].map((c) => metres(c).replace(" m", "")).join(", ")} m`;
     }
     case "trip_ended":
+      if (fields["reason"] === "full") {
+        return null; // The next one continues it.
+      }
       return `ended a trip of ${text("legs")} legs (${text("reason").replace("_", " ")})`;
     case "landmark_learned":
       return `learned the landmark ${text("landmark")}`;

@@ -23,7 +23,7 @@ export class HealthStrip {
     "Applied samples that are not on disk yet: the lag of the watermark",
   );
   private readonly dropped = this.figure("dropped", "Messages dropped whole since the start");
-  private readonly skipped = this.figure("refused", "Samples skipped for good since the start");
+  private readonly skipped = this.figure("skipped", "Samples skipped for good since the start");
   private readonly memory = this.figure("memory", "Memory of the service");
 
   constructor() {

@@ -1,7 +1,7 @@
 /** The shortcuts and signs, on request. */
 
 import { SHORTCUTS } from "../keys";
-import { button, h } from "./dom";
+import { button, CLOSE, h } from "./dom";
 import { glyph } from "./status";
 
 export class Help {
@@ -18,7 +18,7 @@ export class Help {
         "header",
         {},
         h("h2", {}, "Keys and signs"),
-        button("", "Close", () => this.element.close(), "M5 5 L15 15 M15 5 L5 15"),
+        button("", "Close", () => this.element.close(), CLOSE),
       ),
       h("dl", {}, ...keys),
       h(

@@ -5,7 +5,7 @@ import type { Agent } from "../memory/agent";
 import type { Memory } from "../memory/memory";
 import { Problem } from "../problem";
 import type { Place, Prediction, Vec3 } from "../wire";
-import { button, h, say } from "./dom";
+import { button, CLOSE, h, say } from "./dom";
 import { Facts } from "./facts";
 import { deviation, exact, metres, percent, position, time } from "./format";
 
@@ -18,8 +18,8 @@ export class PlacePanel {
   private readonly expectedTitle = h("h3");
   private readonly note = h("p", { class: "soft" });
 
-  /** @param recall - Called with the position of the place. */
-  constructor(recall: (at: Vec3) => void) {
+  /** @param recall - Called with the position of the place. @param close - Called to let go. */
+  constructor(recall: (at: Vec3) => void, close: () => void) {
     let here: Vec3 | null = null;
     this.position = (at) => (here = at);
     const ask = button(
@@ -28,7 +28,13 @@ export class PlacePanel {
       () => here !== null && recall(here),
     );
     this.element.append(
-      h("header", {}, h("span", { class: "mark place" }), this.name),
+      h(
+        "header",
+        {},
+        h("span", { class: "mark place" }),
+        this.name,
+        button("", "Close", close, CLOSE),
+      ),
       h("div", { class: "actions" }, ask),
       this.facts.element,
       h("h3", {}, "Who was there"),
@@ -41,13 +47,8 @@ export class PlacePanel {
 
   private readonly position: (at: Vec3) => void;
 
-  /** Asks for a place, and what `agent` would feel there. */
-  async show(
-    id: number,
-    memory: Memory,
-    agent: Agent | null,
-    isWanted: () => boolean,
-  ): Promise<void> {
+  /** Asks for a place, and what the agent that is nearest would feel there. */
+  async show(id: number, memory: Memory, isWanted: () => boolean): Promise<void> {
     say(this.name, `Place ${id}`);
     try {
       const place = await memory.space.place(id);
@@ -57,6 +58,7 @@ export class PlacePanel {
       this.position(place.translation_m);
       this.showFacts(place);
       this.showVisitors(place, memory);
+      const agent = nearest(memory, place.translation_m);
       if (agent !== null) {
         this.showPrediction(agent, place, await predictAt(place, memory, agent));
       }
@@ -144,6 +146,19 @@ export class PlacePanel {
       percepts.length > 0 ? answers : `${answers} Nothing was felt here that is remembered.`,
     );
   }
+}
+
+/** The agent that has the shortest way to a position, of those that know where they are. */
+function nearest(memory: Memory, at: Vec3): Agent | null {
+  let found: Agent | null = null;
+  let least = Infinity;
+  for (const agent of memory.agents.values()) {
+    const way = Math.hypot(...agent.live.translation_m.map((x, i) => x - at[i]!));
+    if (agent.live.status !== "lost" && way < least) {
+      [found, least] = [agent, way];
+    }
+  }
+  return found;
 }
 
 /** What an agent would feel if it moved straight to a place. */

@@ -1,7 +1,7 @@
 /** Recall: a position as a cue, the places that answer it, best first. */
 
 import type { RecalledPlace, Vec3 } from "../wire";
-import { button, h, say } from "./dom";
+import { button, CLOSE, h, say } from "./dom";
 import { metres, percent } from "./format";
 
 const CROSS = "M10 2 V7 M10 13 V18 M2 10 H7 M13 10 H18";
@@ -46,7 +46,7 @@ export class RecallPanel {
         "header",
         {},
         h("h2", {}, "Recall by position"),
-        button("", "Close", () => actions.close(), "M5 5 L15 15 M15 5 L5 15"),
+        button("", "Close", () => actions.close(), CLOSE),
       ),
       h("form", { class: "cue", on: { submit } }, ...this.inputs, h("button", {}, "Recall")),
       h("div", { class: "actions" }, this.aim),

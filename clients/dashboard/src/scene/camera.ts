@@ -15,11 +15,14 @@ export interface Insets {
 
 export type ViewName = "orbit" | "top" | "side";
 
-/** Directions from the target to the eye: azimuth against x, and height over the horizon [rad]. */
-const VIEWS: Record<ViewName, { azimuth: number; height: number }> = {
-  orbit: { azimuth: -1.05, height: 0.5 },
-  top: { azimuth: -Math.PI / 2, height: Math.PI / 2 - 0.001 },
-  side: { azimuth: -Math.PI / 2, height: 0.02 },
+/**
+ * Directions from the target to the eye: azimuth against x, and height over the horizon [rad]; and
+ * how much room is left around the map, which is nowhere wider than its sphere.
+ */
+const VIEWS: Record<ViewName, { azimuth: number; height: number; margin: number }> = {
+  orbit: { azimuth: -1.05, height: 0.5, margin: 1.08 },
+  top: { azimuth: -Math.PI / 2, height: Math.PI / 2 - 0.001, margin: 0.92 },
+  side: { azimuth: -Math.PI / 2, height: 0.02, margin: 0.92 },
 };
 const FIELD_OF_VIEW_DEG = 38;
 /** How long the eye takes to another view [ms]. */
@@ -78,10 +81,10 @@ export class Eye {
 
   /** Goes to a view of all that there is. */
   show(view: ViewName, bounds: Bounds, nowMs: number, isSudden: boolean): void {
-    const { azimuth, height } = VIEWS[view];
+    const { azimuth, height, margin } = VIEWS[view];
     const free = Math.min(this.free.width, this.free.height);
     const fit = Math.tan((this.camera.fov * Math.PI) / 360) * free;
-    const distance = (bounds.radius * 1.08) / fit;
+    const distance = (bounds.radius * margin) / fit;
     // The floor lies below the map, and is to be seen too.
     const target = new Vector3(...bounds.centre);
     target.z -= 0.12 * bounds.radius;

@@ -60,7 +60,7 @@ export class Ellipsoids {
   private n = 0;
 
   constructor() {
-    const sphere = new IcosahedronGeometry(1, 4);
+    const sphere = new IcosahedronGeometry(1, 10);
     const geometry = new InstancedBufferGeometry();
     geometry.setAttribute("position", sphere.getAttribute("position"));
     const material = new ShaderMaterial({

@@ -14,6 +14,7 @@ import { Solids, type Shape } from "./solids";
 /** Size of an agent: at least so much [m], and so many pixels. */
 const AGENT_M = 0.16;
 const AGENT_PX = 10;
+const PAST_SIZE = 0.75;
 const LANDMARK_M = 0.04;
 const LANDMARK_PX = 5;
 /** The shape says how an agent is localised. */
@@ -88,13 +89,16 @@ export class Things {
     const { memory, focus, palette, nowMs, radiusM, floorZ } = drawing;
     const agent = memory.agents.get(name)!;
     const colour = rgb(agentColour(palette, agent.colour));
-    // Trajectories do not say how sure the past was.
-    const status = focus.time === null ? agent.live.status : "localized";
-    this.solids.add(SHAPES[status], position, rotation, colour, AGENT_M, AGENT_PX);
+    // Trajectories do not say how an agent was localised: it is a smaller, paler dart.
+    const isLive = focus.time === null;
+    const status = isLive ? agent.live.status : "localized";
+    const paint = isLive ? colour : mixed(colour, rgb(palette.grid));
+    const size = isLive ? 1 : PAST_SIZE;
+    this.solids.add(SHAPES[status], position, rotation, paint, size * AGENT_M, size * AGENT_PX);
     this.rays.stem(position, floorZ, colour, nowMs);
     const alpha = palette.shade === "dark" ? 0.34 : 0.2;
     this.rings.add({ ...mark(position, colour, 26), thickness: 1, alpha });
-    if (focus.time === null) {
+    if (isLive) {
       const covariance = agent.live.position_covariance_m2;
       this.ellipsoids.add(position, covariance, radiusM / 3, colour, 0.8);
     }
@@ -131,6 +135,11 @@ export class Things {
       this.rays.link(recalled.cue, place.translation_m, colour, 0.25 + 0.5 * sure, nowMs);
     });
   }
+}
+
+/** The colour halfway between two. */
+function mixed(a: Rgb, b: Rgb): Rgb {
+  return a.map((x, i) => (x + b[i]!) / 2) as Rgb;
 }
 
 function mark(centre: Vec3, colour: Rgb, radiusPx: number): Ring {
