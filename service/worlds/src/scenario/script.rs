@@ -7,12 +7,12 @@ const CYCLE_S: u64 = 60;
 /// When the acts come in a cycle \[s\]. A robot that woke up is switched off for the next cycle.
 pub(super) const SWITCH_OFF_S: u64 = 4;
 pub(super) const WAKE_S: u64 = 18;
-pub(super) const CARRY_S: u64 = 40;
+pub(super) const CARRY_S: u64 = 36;
 pub(super) const LEARN_S: [(u64, u64, Thing); 2] = [(2, 14, Thing::Cup), (15, 27, Thing::Bottle)];
 pub(super) const TOUCH_S: (u64, u64) = (30, 44);
 /// An act comes only where so much is left for what it leads to \[s\].
 pub(super) const WAKE_ROOM_S: u64 = 7;
-pub(super) const CARRY_ROOM_S: u64 = 12;
+pub(super) const CARRY_ROOM_S: u64 = 15;
 /// Ticks a second, and so steps of 0.1 m: 1 m/s.
 pub(super) const RATE_HZ: u64 = 10;
 
