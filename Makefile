@@ -127,7 +127,7 @@ fuzz: ## arbitrary bytes against all that reads bytes; TARGETS="fold" SECONDS=36
 	done
 
 .PHONY: demo
-demo: release ## the service with a simulated team of robots; ARGS="--robots 8 --duration 30"
+demo: release ## the service with a simulated team of robots; ARGS="--robots 8 --duration 5m"
 	$(TARGET)/release/cogmap demo $(ARGS)
 
 .PHONY: serve

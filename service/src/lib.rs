@@ -14,6 +14,7 @@ pub mod engine;
 pub mod http;
 pub mod journal;
 pub mod metrics;
+mod ports;
 pub mod problem;
 pub mod service;
 pub mod store;

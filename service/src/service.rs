@@ -18,6 +18,7 @@ use crate::engine::{Engine, Publisher, Silent, SpaceError};
 use crate::http::{self, HttpSettings};
 use crate::journal;
 use crate::metrics;
+use crate::ports;
 use crate::store::{self, Journal, LocalStore, StoreError};
 use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohPublisher};
 
@@ -66,6 +67,22 @@ pub enum StartError {
         /// Why.
         source: SpaceError,
     },
+    /// Somebody else has the port of the HTTP listener.
+    #[error(
+        "HTTP cannot listen on {address}, since another program does: choose another port with --set http.listen=ADDRESS:PORT"
+    )]
+    HttpTaken {
+        /// Its address.
+        address: SocketAddr,
+    },
+    /// Somebody else has the port of a Zenoh listener.
+    #[error(
+        "Zenoh cannot listen on {endpoint}, since another program does: choose another port with --set zenoh.listen=tcp/ADDRESS:PORT, or if rmw_zenohd runs there, be its client: cogmap serve --set zenoh.mode=client --set zenoh.connect={endpoint}"
+    )]
+    ZenohTaken {
+        /// Its endpoint.
+        endpoint: String,
+    },
     /// The HTTP listener.
     #[error("listen on {address}")]
     Http {
@@ -89,7 +106,10 @@ impl Service {
         check_spaces(config)?;
         let (http_settings, shares) = share_descriptors(config);
         let address = config.http.listen;
-        let of_http = |source| StartError::Http { address, source };
+        let of_http = |source: std::io::Error| match source.kind() {
+            std::io::ErrorKind::AddrInUse => StartError::HttpTaken { address },
+            _ => StartError::Http { address, source },
+        };
         let listener = listen(address).map_err(of_http)?;
         if config.http.is_open() {
             tracing::warn!(%address, "anyone who reaches this address can read and write: set http.token");
@@ -193,6 +213,12 @@ async fn open_zenoh(
     let Some(settings) = transport_settings(config, shares) else {
         return Ok((None, None));
     };
+    // Zenoh would say it in a paragraph that names its source files.
+    if let Some(endpoint) = ports::taken_endpoint(&settings.listen) {
+        return Err(StartError::ZenohTaken {
+            endpoint: endpoint.clone(),
+        });
+    }
     let session = transport::open(&settings).await?;
     let codec = config.zenoh.encoding.codec();
     let publisher = ZenohPublisher::declare(session.clone(), codec).await?;
@@ -335,7 +361,7 @@ fn transport_settings(config: &Config, shares: Shares) -> Option<TransportSettin
     let zenoh = &config.zenoh;
     zenoh.enabled.then(|| TransportSettings {
         mode: zenoh.mode.as_str().to_owned(),
-        listen: zenoh.listen.clone(),
+        listen: zenoh.endpoints().to_vec(),
         connect: zenoh.connect.clone(),
         config_file: zenoh.config_file.clone(),
         sessions_max: shares.sessions,

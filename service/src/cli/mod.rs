@@ -34,7 +34,7 @@ enum Command {
     /// Run the service.
     Serve(ConfigArgs),
     /// Run the service with a simulated team of robots, and sum up at the end.
-    Demo(demo::DemoArgs),
+    Demo(Box<demo::DemoArgs>),
     /// Check the settings and print the effective ones.
     CheckConfig(ConfigArgs),
     /// Write what a store holds: the journal as JSON lines, a trajectory as TUM.
@@ -72,6 +72,11 @@ struct ConfigArgs {
 
 impl ConfigArgs {
     fn load(&self) -> Result<Config, ConfigError> {
+        self.load_over(toml::Table::new())
+    }
+
+    /// The settings, over other defaults for some keys.
+    fn load_over(&self, defaults: toml::Table) -> Result<Config, ConfigError> {
         let mut overrides = Vec::new();
         let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
         if let Some(http) = &self.http {
@@ -86,7 +91,7 @@ impl ConfigArgs {
         }
         // What is said at length comes last and holds.
         overrides.extend(self.set.iter().cloned());
-        Config::load(self.config.as_deref(), &overrides)
+        Config::load_over(defaults, self.config.as_deref(), &overrides)
     }
 }
 

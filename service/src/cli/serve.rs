@@ -17,7 +17,7 @@ pub(super) fn run(args: &ConfigArgs) -> anyhow::Result<()> {
             let service = Service::start(&config, prometheus).await?;
             tracing::info!(
                 http = %format_args!("http://{}", service.address()),
-                zenoh = ?config.zenoh.listen,
+                zenoh = ?config.zenoh.endpoints(),
                 store = %config.store.directory.display(),
                 "serving"
             );

@@ -20,7 +20,8 @@ const SECTIONS: [&str; 6] = ["HTTP", "ZENOH", "STORE", "ENGINE", "SPACES", "LOG"
 /// with capitals, dots or hyphens in their names need the file.
 ///
 /// A value is read as TOML where that fits the key (`1024`, `true`, `["tcp/a:7447"]`), otherwise as
-/// text, so that texts need no quotes.
+/// text, so that texts need no quotes, and where the key takes a list of texts as its only item
+/// (`tcp/a:7447`).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Assignment {
     /// Where it comes from, for errors.
@@ -86,7 +87,8 @@ impl Assignment {
     /// The settings of `table` with this one put in.
     pub(super) fn apply(&self, table: &Table) -> Result<(Table, Config), ConfigError> {
         let text = Value::String(self.value.clone());
-        let candidates = [self.toml_value(), Some(text)];
+        let only_item = Value::Array(vec![text.clone()]);
+        let candidates = [self.toml_value(), Some(text), Some(only_item)];
         let mut first_error = None;
         for value in candidates.into_iter().flatten() {
             let mut changed = table.clone();

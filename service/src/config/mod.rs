@@ -69,10 +69,23 @@ impl Config {
     /// # Errors
     /// Names the source, the key and the rule that it breaks.
     pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, ConfigError> {
+        Self::load_over(toml::Table::new(), path, overrides)
+    }
+
+    /// As [`Config::load`], with other defaults for some keys: what no source says comes from
+    /// `defaults`, and from [`Config::default`] only where these say nothing either.
+    ///
+    /// # Errors
+    /// As [`Config::load`].
+    pub fn load_over(
+        defaults: toml::Table,
+        path: Option<&Path>,
+        overrides: &[String],
+    ) -> Result<Self, ConfigError> {
         let environment = std::env::vars_os()
             .filter_map(|(name, value)| Some((name.into_string().ok()?, value)))
             .map(|(name, value)| (name, value.to_string_lossy().into_owned()));
-        Self::from_sources(path, environment, overrides)
+        Self::from_sources_over(defaults, path, environment, overrides)
     }
 
     /// As [`Config::load`], with the environment as an argument.
@@ -84,15 +97,31 @@ impl Config {
         environment: impl IntoIterator<Item = (String, String)>,
         overrides: &[String],
     ) -> Result<Self, ConfigError> {
-        let mut table = toml::Table::new();
-        let mut config = Self::default();
+        Self::from_sources_over(toml::Table::new(), path, environment, overrides)
+    }
+
+    fn from_sources_over(
+        defaults: toml::Table,
+        path: Option<&Path>,
+        environment: impl IntoIterator<Item = (String, String)>,
+        overrides: &[String],
+    ) -> Result<Self, ConfigError> {
+        let mut table = defaults;
         if let Some(path) = path {
             let source = path.display().to_string();
             let text = std::fs::read_to_string(path)
                 .map_err(|error| ConfigError::source(&source, &error))?;
-            config = toml::from_str(&text).map_err(|error| ConfigError::source(&source, &error))?;
-            table = toml::from_str(&text).map_err(|error| ConfigError::source(&source, &error))?;
+            // On its own, so that an error names the line of the file.
+            let _: Self =
+                toml::from_str(&text).map_err(|error| ConfigError::source(&source, &error))?;
+            let of_file =
+                toml::from_str(&text).map_err(|error| ConfigError::source(&source, &error))?;
+            put_over(&mut table, of_file);
         }
+        let mut config: Self = table
+            .clone()
+            .try_into()
+            .map_err(|error| ConfigError::source("settings", &error))?;
         let mut assignments = Assignment::of_environment(environment)?;
         for text in overrides {
             assignments.push(Assignment::of_flag(text)?);
@@ -128,6 +157,18 @@ impl Config {
     /// Never: all keys are texts, and all values have a form in TOML.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("settings are tables of plain values")
+    }
+}
+
+/// Puts the values of a table over those of another one, section by section.
+fn put_over(under: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (under.get_mut(&key), value) {
+            (Some(toml::Value::Table(under)), toml::Value::Table(over)) => put_over(under, over),
+            (_, value) => {
+                under.insert(key, value);
+            }
+        }
     }
 }
 

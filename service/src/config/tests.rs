@@ -230,3 +230,50 @@ fn printed_settings_read_back() {
     let again: Config = toml::from_str(&config.to_toml()).expect("parses");
     assert_eq!(again, config);
 }
+
+#[test]
+fn other_defaults_lie_under_all_that_is_said() {
+    let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
+    file.write_all(b"[http]\nrequests_max = 7\nstreams_max = 7\n")
+        .expect("written");
+    let defaults = "http = { listen = '127.0.0.1:1', requests_max = 9 }\nspaces = { demo = {} }\n";
+    let defaults: toml::Table = toml::from_str(defaults).expect("settings are TOML");
+    let load = |environment: &[(&str, &str)], flags: &[&str]| {
+        let environment = environment
+            .iter()
+            .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+        let flags: Vec<_> = flags.iter().map(|flag| (*flag).to_owned()).collect();
+        let (defaults, path) = (defaults.clone(), Some(file.path()));
+        Config::from_sources_over(defaults, path, environment, &flags).expect("loads")
+    };
+    let config = load(&[], &[]);
+    assert_eq!(
+        (config.http.listen.port(), config.http.requests_max),
+        (1, 7)
+    );
+    let spaces: Vec<_> = config.spaces.keys().map(ToString::to_string).collect();
+    assert_eq!(spaces, ["demo"]);
+    let config = load(&[("COGMAP_HTTP__LISTEN", "127.0.0.1:2")], &[]);
+    assert_eq!(config.http.listen.port(), 2);
+    let config = load(&[], &["http.listen=127.0.0.1:3", "spaces.other.seed=4"]);
+    assert_eq!(config.http.listen.port(), 3);
+    assert_eq!(config.spaces.len(), 2);
+}
+
+#[test]
+fn a_single_text_is_a_list_of_one() {
+    let client = ["zenoh.mode=client", "zenoh.connect=tcp/127.0.0.1:7447"];
+    let config = load("", &[], &client).expect("loads");
+    assert_eq!(config.zenoh.connect, ["tcp/127.0.0.1:7447"]);
+    // A client takes no port of its own unless it is told to.
+    assert!(config.zenoh.endpoints().is_empty());
+    let listens = [client[0], client[1], "zenoh.listen=tcp/127.0.0.1:7448"];
+    let config = load("", &[], &listens).expect("loads");
+    assert_eq!(config.zenoh.endpoints(), ["tcp/127.0.0.1:7448"]);
+    assert_eq!(
+        load("", &[], &[]).expect("loads").zenoh.endpoints().len(),
+        1
+    );
+    // A list of numbers would not become one of texts.
+    refusal("", &[], &["zenoh.connect=7"]);
+}

@@ -27,7 +27,8 @@ section! {
         enabled: bool = true, any("true or false");
         /// Part that the service plays in the network.
         mode: ZenohMode = ZenohMode::Peer, any("peer, client or router");
-        /// Endpoints that the service listens on, like `tcp/0.0.0.0:7447`.
+        /// Endpoints that the service listens on, like `tcp/0.0.0.0:7447`. A client listens on none
+        /// unless it is told to.
         listen: Vec<String> = vec!["tcp/127.0.0.1:7447".to_owned()], ENDPOINTS;
         /// Endpoints that it connects to.
         connect: Vec<String> = Vec::new(), ENDPOINTS;
@@ -75,6 +76,16 @@ pub enum ZenohEncoding {
 }
 
 impl ZenohConfig {
+    /// The endpoints that the service listens on: a client, which has a router to meet others, does
+    /// not take the default one.
+    pub fn endpoints(&self) -> &[String] {
+        if self.mode == ZenohMode::Client && self.listen == Self::default().listen {
+            &[]
+        } else {
+            &self.listen
+        }
+    }
+
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         self.check_values()?;
         let alone =

@@ -20,6 +20,13 @@ impl Default for DeadReckoning {
     }
 }
 
+impl From<Isometry3<f64>> for DeadReckoning {
+    /// Begins at a pose.
+    fn from(pose: Isometry3<f64>) -> Self {
+        Self { pose }
+    }
+}
+
 impl DeadReckoning {
     /// Takes in one reading: a velocity composes its exact screw motion, a start pose replaces the
     /// pose, anything else changes nothing. Answers with the pose when it was touched.

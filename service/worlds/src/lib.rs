@@ -16,17 +16,25 @@
 //! - **Landmarks**: beacons on corners of some cubes. The paper's agent has no exteroception
 //!   beyond its place memory; robots that are to keep their drift bounded need some.
 //! - **Noise**: the paper names none for its odometry; see [`OdometryNoise`].
+//!
+//! The demo plays in the second of these rooms ([`Scenario`]): robots that patrol it wake up lost or
+//! are carried off, and an arm feels things ([`Thing`]).
 
 mod dead_reckoning;
 mod eye;
+mod hand;
 mod obstacle;
 mod odometry;
+mod patroller;
 mod pure_walk;
 mod reading;
+mod round;
+mod scenario;
 mod scenery;
 mod sensor;
 mod steering;
 mod team;
+mod thing;
 mod walker;
 mod wire;
 
@@ -35,10 +43,14 @@ pub use eye::Eye;
 pub use obstacle::{Beacon, Cube, ObstacleWorld, SIDE_M};
 pub use odometry::{InvalidNoise, Odometer, OdometryNoise};
 pub use pure_walk::PureWalker;
-pub use reading::{Reading, ReadingBody, ReadingTarget, robot_name};
+pub use reading::{Reading, ReadingBody, ReadingMark, ReadingNoise, ReadingTarget, robot_name};
+pub use scenario::{
+    ARM, Act, AgentTick, InvalidScenario, Scenario, ScenarioSettings, ScenarioTick,
+};
 pub use scenery::Scenery;
 pub use sensor::{InvalidSensor, Sensor};
 pub use team::{InvalidTeam, RobotTick, StartKnowledge, Team, TeamSettings};
+pub use thing::Thing;
 pub use walker::{BODY_RADIUS_M, STEP_M, Step, Walker};
 
 #[cfg(test)]

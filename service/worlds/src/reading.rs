@@ -1,9 +1,10 @@
 //! Readings: what a sensor gives, in plain numbers, before anything has judged them.
 
 use cognitive_map::{
-    Descriptor, InvalidSample, Label, Level, Motion, PoseNoise, RangeBearing, Relation, Sample,
-    SampleBody, Sighting, StartPose, Target,
+    Descriptor, InvalidSample, Label, Level, Motion, ObjectMark, PoseNoise, RangeBearing, Relation,
+    Sample, SampleBody, Sighting, Spacing, StartPose, Target, TouchNoise,
 };
+use object_recognition::Orientation;
 
 /// One reading of one robot.
 ///
@@ -60,6 +61,19 @@ pub enum ReadingBody {
         /// Value, in the channel's unit.
         value: f64,
     },
+    /// A scalar felt by a finger that touches something.
+    Contact {
+        /// Channel.
+        channel: String,
+        /// Value, in the channel's unit.
+        value: f64,
+        /// Where the finger touches, in the body frame \[m\].
+        offset_m: [f64; 3],
+        /// Out of the surface, in the body frame.
+        normal: [f64; 3],
+    },
+    /// What is touched from here on.
+    Object(ReadingMark),
     /// A view on a channel, from the body's origin.
     Descriptor {
         /// Channel.
@@ -67,6 +81,38 @@ pub enum ReadingBody {
         /// The vector, of any length but zero.
         vector: Vec<f32>,
     },
+}
+
+/// What an arm says of what it touches. The object may be turned in any way.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReadingMark {
+    /// It is an object of a name, to be learned.
+    Learn {
+        /// The name.
+        name: String,
+        /// Contacts within this distance \[m\] are of one place.
+        spacing_m: f64,
+        /// How exactly is felt.
+        noise: ReadingNoise,
+    },
+    /// It is to be recognised.
+    Identify {
+        /// How exactly is felt.
+        noise: ReadingNoise,
+    },
+    /// Nothing more is touched.
+    End,
+}
+
+/// How exactly an arm feels: standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadingNoise {
+    /// Of a contact's position along each axis \[m\].
+    pub position_sd_m: f64,
+    /// Of a normal about each axis \[rad\].
+    pub normal_sd_rad: f64,
+    /// Of a level, in its channel's unit.
+    pub level_sd: f64,
 }
 
 /// What a sighting is of.
@@ -146,9 +192,44 @@ fn body(body: &ReadingBody) -> Result<SampleBody, InvalidSample> {
         ReadingBody::Level { channel, value } => {
             SampleBody::Level(Level::new(Label::new(channel)?, *value, [0.0; 3], None)?)
         }
+        ReadingBody::Contact {
+            channel,
+            value,
+            offset_m,
+            normal,
+        } => SampleBody::Level(Level::new(
+            Label::new(channel)?,
+            *value,
+            *offset_m,
+            Some(*normal),
+        )?),
+        ReadingBody::Object(mark) => SampleBody::Object(object_mark(mark)?),
         ReadingBody::Descriptor { channel, vector } => {
             SampleBody::Descriptor(Descriptor::new(Label::new(channel)?, vector)?)
         }
+    })
+}
+
+fn object_mark(mark: &ReadingMark) -> Result<ObjectMark, InvalidSample> {
+    let core = |noise: &ReadingNoise| {
+        TouchNoise::new(noise.position_sd_m, noise.normal_sd_rad, noise.level_sd)
+    };
+    Ok(match mark {
+        ReadingMark::Learn {
+            name,
+            spacing_m,
+            noise,
+        } => ObjectMark::Learn {
+            name: Some(Label::new(name)?),
+            spacing: Spacing::new(*spacing_m)?,
+            orientation: Orientation::Free,
+            noise: core(noise)?,
+        },
+        ReadingMark::Identify { noise } => ObjectMark::Identify {
+            orientation: Orientation::Free,
+            noise: core(noise)?,
+        },
+        ReadingMark::End => ObjectMark::End,
     })
 }
 

@@ -145,7 +145,7 @@ impl Walker {
 }
 
 /// The pose at the end of a step relative to its start.
-fn screw(step: &Step) -> Isometry3<f64> {
+pub(super) fn screw(step: &Step) -> Isometry3<f64> {
     let (linear, angular) = (step.translation_m.into(), step.rotation_rad.into());
     *Motion::from_velocity(linear, angular, 1.0, None)
         .expect("a step of 0.1 m and 0.3 rad is within every limit")

@@ -1,9 +1,9 @@
 //! Readings as samples of the wire.
 
-use crate::reading::{Reading, ReadingBody, ReadingTarget};
+use crate::reading::{Reading, ReadingBody, ReadingMark, ReadingNoise, ReadingTarget};
 use cogmap_proto::{
-    Descriptor, Level, MotionNoise, Relation, Sample, SampleBody, Sighting, StartPose, Target,
-    Velocity,
+    Descriptor, Level, MotionNoise, ObjectMark, Orientation, Relation, Sample, SampleBody,
+    Sighting, StartPose, Target, TouchNoise, Velocity,
 };
 
 impl From<&Reading> for Sample {
@@ -58,6 +58,18 @@ impl From<&Reading> for Sample {
                 offset_m: [0.0; 3],
                 normal: None,
             }),
+            ReadingBody::Contact {
+                channel,
+                value,
+                offset_m,
+                normal,
+            } => SampleBody::Level(Level {
+                channel: channel.clone(),
+                value: *value,
+                offset_m: *offset_m,
+                normal: Some(*normal),
+            }),
+            ReadingBody::Object(mark) => SampleBody::Object(mark.into()),
             ReadingBody::Descriptor { channel, vector } => SampleBody::Descriptor(Descriptor {
                 channel: channel.clone(),
                 vector: vector.clone(),
@@ -66,6 +78,39 @@ impl From<&Reading> for Sample {
         Self {
             stamp_ns: reading.stamp_ns,
             body,
+        }
+    }
+}
+
+impl From<&ReadingMark> for ObjectMark {
+    fn from(mark: &ReadingMark) -> Self {
+        let orientation = Orientation::Free {};
+        match mark {
+            ReadingMark::Learn {
+                name,
+                spacing_m,
+                noise,
+            } => Self::Learn {
+                name: Some(name.clone()),
+                spacing_m: *spacing_m,
+                orientation,
+                noise: noise.into(),
+            },
+            ReadingMark::Identify { noise } => Self::Identify {
+                orientation,
+                noise: noise.into(),
+            },
+            ReadingMark::End => Self::End {},
+        }
+    }
+}
+
+impl From<&ReadingNoise> for TouchNoise {
+    fn from(noise: &ReadingNoise) -> Self {
+        Self {
+            position_sd_m: noise.position_sd_m,
+            normal_sd_rad: noise.normal_sd_rad,
+            level_sd: noise.level_sd,
         }
     }
 }

@@ -21,6 +21,7 @@ mod store; // damage on the disk, repair and backups
 
 // What the service does for the outside.
 mod cli; // the commands
+mod demo; // robots that are lost and found, and a cup that is recognised
 mod eval; // the experiments
 mod http; // samples in, answers out
 mod http_guard; // who is let in, and how the service goes

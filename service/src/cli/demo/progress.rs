@@ -10,7 +10,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use crate::cli::output;
 
 /// Seconds between lines where the output is no terminal.
-const LINE_INTERVAL_S: u64 = 5;
+const LINE_INTERVAL_S: u64 = 10;
 
 /// Live lines in a terminal, a line now and then elsewhere.
 pub(super) struct Progress {
@@ -44,7 +44,8 @@ impl Progress {
             let wide = ProgressStyle::with_template("[{bar:40}] {pos} of {len} s")
                 .unwrap_or_else(|_| ProgressStyle::default_bar());
             let time = all.add(ProgressBar::new(duration.as_secs()).with_style(wide));
-            let robots = (0..robots)
+            // The arm has a line of its own.
+            let robots = (0..=robots)
                 .map(|_| all.add(ProgressBar::no_length().with_style(plain.clone())))
                 .collect();
             Bars { time, robots, all }
@@ -72,6 +73,15 @@ impl Progress {
                 "{seconds} of {} s: {sent} samples sent, {pending} not yet durable",
                 self.seconds
             ));
+        }
+    }
+
+    /// Says a line of what happens, above the live ones.
+    pub(super) fn say(&self, line: &str) {
+        match &self.bars {
+            // A terminal that has gone takes none.
+            Some(bars) => drop(bars.all.println(line)),
+            None => output::progress(line),
         }
     }
 
