@@ -80,14 +80,17 @@ test-browser: needs-node needs-chromium $(BROWSER)/.venv/installed ## the page i
 
 .PHONY: needs-node
 needs-node:
-	@test -n '$(NODE_FITS)' || { echo 'The page is built with Node 20.19, 22.12 or later: install it (nodejs.org, or your distribution).' >&2; exit 1; }
+	@test -n '$(NODE_FITS)' || { \
+	    echo 'The page is built with Node 20.19, 22.12 or later: install it.' >&2; exit 1; }
 
-# Debian's package, where it may be installed; elsewhere whoever runs the tests is told what is missing.
+# Debian's package, where it may be installed; elsewhere whoever runs the tests is told what is
+# missing.
 .PHONY: needs-chromium
 needs-chromium:
 	@command -v $(CHROMIUM) >/dev/null || $(AS_ROOT) sh -c \
 	    'apt-get update --quiet && apt-get install --quiet --yes chromium' || { \
-	    echo 'There is no Chromium: apt-get install chromium, or name one: CHROMIUM=/path/to/it.' >&2; exit 1; }
+	    echo 'There is no Chromium: apt-get install chromium, or CHROMIUM=/path/to/it.' >&2; \
+	    exit 1; }
 
 $(BROWSER)/.venv/installed: $(BROWSER)/requirements.txt $(CLIENT)/pyproject.toml
 	$(PYTHON) -m venv --clear $(BROWSER)/.venv
@@ -170,13 +173,15 @@ $(PEERS)/.venv/installed: $(PEERS)/requirements.txt $(PEERS)/judge.txt $(CLIENT)
 	touch $@
 
 # The versions of Node that the page's build tool runs on; empty where there is no such Node.
-NODE_FITS := $(shell node -p '(([a, b]) => a > 22 || a == 22 && b >= 12 || a == 20 && b >= 19 ? 1 : "") \
+NODE_FITS := $(shell node -p \
+    '(([a, b]) => a > 22 || a == 22 && b >= 12 || a == 20 && b >= 19 ? 1 : "") \
     (process.versions.node.split(".").map(Number))' 2>/dev/null)
 BUILDS_PAGE := $(and $(wildcard $(DASHBOARD)/package-lock.json),$(NODE_FITS))
 
 .PHONY: dashboard
 dashboard: $(if $(BUILDS_PAGE),$(PAGE)) ## the page that the service shows at /; needs Node 20.19, 22.12 or later
-	$(if $(BUILDS_PAGE),,@echo 'The page is not built, and the service shows a plain one: that needs $(DASHBOARD) and Node 20.19, 22.12 or later.')
+	$(if $(BUILDS_PAGE),,@echo 'The page is not built, and the service shows a plain one: \
+	    that needs $(DASHBOARD) and Node 20.19, 22.12 or later.')
 
 $(PAGE): $(shell find $(DASHBOARD) -name node_modules -prune -o -type f -print 2>/dev/null)
 	cd $(DASHBOARD) && npm ci --no-audit --no-fund && npm run build
@@ -230,4 +235,5 @@ fmt: ## format the Rust code
 .PHONY: clean
 clean: ## remove what was built
 	cargo clean
-	rm -rf $(VENV) $(PEERS)/.venv $(BROWSER)/.venv $(DASHBOARD)/node_modules $(PEERS)/.mypy_cache $(CLIENT)/.mypy_cache $(CLIENT)/.pytest_cache
+	rm -rf $(VENV) $(PEERS)/.venv $(BROWSER)/.venv $(DASHBOARD)/node_modules \
+	    $(PEERS)/.mypy_cache $(CLIENT)/.mypy_cache $(CLIENT)/.pytest_cache

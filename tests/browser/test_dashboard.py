@@ -48,7 +48,8 @@ def test_the_page_follows_what_happens(service: Server, open_page: Open) -> None
     bob.drive(5)
     page.until_places(places + 5)
     page.until("the second agent", agents=2)
-    eventually("the agent moves", lambda: apart(before, page.page.evaluate("cogmap.agent('ada')")) > 0.5)
+    now = lambda: page.page.evaluate("cogmap.agent('ada')")
+    eventually("the agent moves", lambda: apart(before, now()) > 0.5)
     eventually("the revision", lambda: page.stats()["revision"]
                == str(service.client().space("default").map_revision))
     assert page.complaints == []
@@ -137,7 +138,9 @@ def test_the_page_comes_back_after_a_restart(service: Server, open_page: Open) -
     page.until_places(places + 5)
 
 
-def test_a_token_is_asked_for_and_stays_in_the_tab(make_service: MakeServer, open_page: Open) -> None:
+def test_a_token_is_asked_for_and_stays_in_the_tab(
+    make_service: MakeServer, open_page: Open
+) -> None:
     service = make_service(["http.token=secret-of-the-house"], token="secret-of-the-house")
     Driver(service, "ada").drive(STEPS)
     page = open_page(service)

@@ -175,12 +175,14 @@ def test_the_export_holds_the_map(client: cogmap.Client) -> None:
 def test_the_cloud_has_the_places_and_later_what_changed(client: cogmap.Client) -> None:
     cloud = client.point_cloud("default")
     places = {place.id: place for place in client.places("default")}
-    assert cloud.places.keys() == places.keys() and (cloud.since_revision, cloud.forgotten) == (0, ())
+    assert cloud.places.keys() == places.keys()
+    assert (cloud.since_revision, cloud.forgotten) == (0, ())
     for number, place in places.items():
         shown = cloud.places[number]
         assert shown.position_m == pytest.approx(place.translation_m, abs=1e-6)
         assert (shown.visits, shown.first_s) == (place.visits, place.first_stamp_ns / 1e9)
-    again = client.post_samples("default", AGENT, dataclasses.replace(circle(), session=SESSION + 1))
+    later = dataclasses.replace(circle(), session=SESSION + 1)
+    again = client.post_samples("default", AGENT, later)
     assert again.watermark.durable == STEPS + 3
     changed = client.point_cloud("default", since_revision=cloud.revision)
     assert changed.since_revision == cloud.revision

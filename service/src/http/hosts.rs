@@ -62,8 +62,9 @@ impl HostRule {
                 });
             if !is_own {
                 let detail = format!(
-                    "a page of {origin:?} may not change anything here; if it is this service's, add the \
-                     name of its host to the setting http.hosts; if it may, the origin to http.cors_origins"
+                    "a page of {origin:?} may not change anything here; if it is this service's, \
+                     add the name of its host to the setting http.hosts; if it may, the origin to \
+                     http.cors_origins"
                 );
                 return Err(Problem::new(Kind::ForeignOrigin, detail));
             }

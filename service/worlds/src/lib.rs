@@ -17,8 +17,8 @@
 //!   beyond its place memory; robots that are to keep their drift bounded need some.
 //! - **Noise**: the paper names none for its odometry; see [`OdometryNoise`].
 //!
-//! The demo plays in the second of these rooms ([`Scenario`]): robots that patrol it wake up lost or
-//! are carried off, and an arm feels things ([`Thing`]).
+//! The demo plays in the second of these rooms ([`Scenario`]): robots that patrol it wake up lost
+//! or are carried off, and an arm feels things ([`Thing`]).
 
 mod dead_reckoning;
 mod eye;

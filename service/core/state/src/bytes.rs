@@ -181,7 +181,9 @@ macro_rules! state_of_enum {
                 input: &mut $crate::StateReader<'_>,
             ) -> Result<Self, $crate::CorruptState> {
                 match <u8 as $crate::State>::read(input)? {
-                    $($code => Ok(Self::$variant $(($crate::state_of_enum!(@read $field, input)))?),)+
+                    $($code => Ok(
+                        Self::$variant $(($crate::state_of_enum!(@read $field, input)))?
+                    ),)+
                     _ => Err($crate::CorruptState::Invalid),
                 }
             }

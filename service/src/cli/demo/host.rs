@@ -46,8 +46,8 @@ pub(super) fn run(args: &DemoArgs, runtime: &Runtime) -> anyhow::Result<Summary>
 }
 
 /// The settings. What the user says holds; what the user does not say is the demo's choice: a
-/// temporary store, the space, few words in the log, and other ports where the usual ones are taken.
-/// A demo is there to be looked at, and nobody relies on its ports: so it tells that it goes
+/// temporary store, the space, few words in the log, and other ports where the usual ones are
+/// taken. A demo is there to be looked at, and nobody relies on its ports: so it tells that it goes
 /// elsewhere, and does. A port that the user names and somebody has is refused by the service.
 fn settings(args: &DemoArgs, temporary: &Path) -> anyhow::Result<Config> {
     let mut choices = Choices {
@@ -75,9 +75,9 @@ fn settings(args: &DemoArgs, temporary: &Path) -> anyhow::Result<Config> {
         && taken != endpoint
     {
         output::progress(&format!(
-            "{taken} is taken by another program, so Zenoh is at {endpoint}; --set zenoh.listen=ENDPOINT \
-             chooses, and if rmw_zenohd runs there, be its client: cogmap demo --set zenoh.mode=client \
-             --set zenoh.connect={taken}"
+            "{taken} is taken by another program, so Zenoh is at {endpoint}; \
+             --set zenoh.listen=ENDPOINT chooses, and if rmw_zenohd runs there, be its client: \
+             cogmap demo --set zenoh.mode=client --set zenoh.connect={taken}"
         ));
     }
     Ok(config)
