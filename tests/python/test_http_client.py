@@ -3,10 +3,12 @@ what the service refuses."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import threading
+import time
 import urllib.request
-from typing import List, Tuple
+from typing import List, Tuple, Union
 
 import pytest
 
@@ -168,6 +170,50 @@ def test_the_export_holds_the_map(client: cogmap.Client) -> None:
     assert client.space("default").digest.encode() in text
     way = client.export("default", "tum", agent=AGENT)
     assert len(way.splitlines()) == len(client.trajectory("default", AGENT).poses)
+
+
+def test_the_cloud_has_the_places_and_later_what_changed(client: cogmap.Client) -> None:
+    cloud = client.point_cloud("default")
+    places = {place.id: place for place in client.places("default")}
+    assert cloud.places.keys() == places.keys() and (cloud.since_revision, cloud.forgotten) == (0, ())
+    for number, place in places.items():
+        shown = cloud.places[number]
+        assert shown.position_m == pytest.approx(place.translation_m, abs=1e-6)
+        assert (shown.visits, shown.first_s) == (place.visits, place.first_stamp_ns / 1e9)
+    again = client.post_samples("default", AGENT, dataclasses.replace(circle(), session=SESSION + 1))
+    assert again.watermark.durable == STEPS + 3
+    changed = client.point_cloud("default", since_revision=cloud.revision)
+    assert changed.since_revision == cloud.revision
+    assert cloud.update(changed) == client.point_cloud("default")
+
+
+def test_a_live_stream_shows_the_agent_and_what_it_sees(service: Server) -> None:
+    ticks: List[Union[cogmap.LiveTick, cogmap.LaggedTicks]] = []
+
+    def watch() -> None:
+        ticks.extend(service.client().live("default", rate_hz=50, timeout_s=LONG_S))
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    eventually("the first tick", lambda: len(ticks) > 0)
+    client = service.client()
+    client.post_samples("default", AGENT, circle())
+    eventually("the drive", lambda: client.space("default").agents == 1)
+    time.sleep(0.2)  # ten ticks, the last of which have nothing new
+    service.terminate()
+    watcher.join(LONG_S)
+    assert not watcher.is_alive()
+    shown = [tick for tick in ticks if isinstance(tick, cogmap.LiveTick)]
+    latest = [agent for tick in shown for agent in tick.agents][-1]
+    assert (latest.name, latest.session, latest.seq) == (AGENT, SESSION, STEPS + 2)
+    assert latest.translation_m == pytest.approx(where(STEPS), abs=EXACT)
+    (seen,) = (sighting for tick in shown for sighting in tick.sightings)
+    assert seen.target == cogmap.LandmarkTarget("the centre")
+    assert seen.from_m == pytest.approx((0, 0, 0), abs=EXACT)
+    assert seen.to_m == pytest.approx((0, 1, 0), abs=EXACT)
+    kinds = [record.event.kind for tick in shown for record in tick.events]
+    assert cogmap.MarkerPassed("round") in kinds
+    assert shown[-1].counts.landmarks == 1 and shown[-1].health.dropped_messages == 0
 
 
 def test_events_come_as_things_happen_and_end_with_the_service(service: Server) -> None:

@@ -27,6 +27,18 @@ const HOSTS: Rule<Vec<String>> = Rule {
     },
 };
 
+const ORIGINS: Rule<Vec<String>> = Rule {
+    words: "origins in lower case: http:// or https://, a host, and a port if it is not the usual one",
+    holds: |origins| origins.iter().all(|origin| is_origin(origin)),
+    shown: |origins| {
+        origins
+            .iter()
+            .find(|origin| !is_origin(origin))
+            .cloned()
+            .unwrap_or_default()
+    },
+};
+
 section! {
     /// Settings of the HTTP interface.
     pub struct HttpConfig of "http" {
@@ -42,6 +54,9 @@ section! {
         /// Names of hosts by which the service is asked, beside its addresses and `localhost`; `*`
         /// stands for any.
         hosts: Vec<String> = Vec::new(), HOSTS;
+        /// Origins of pages, such as `https://map.example.org`, that may ask and change everything as
+        /// the service's own page may.
+        cors_origins: Vec<String> = Vec::new(), ORIGINS;
         /// Longest time from a request's head to the head of its answer \[s\].
         request_timeout_s: f64 = 30.0, INTERVAL_S;
         /// Most requests under way; further ones are told to come back.
@@ -67,6 +82,17 @@ fn is_host(name: &str) -> bool {
     name == "*" || (!name.is_empty() && name.chars().all(legal))
 }
 
+/// Whether a text is an origin as browsers write it (RFC 6454, section 6.2).
+fn is_origin(text: &str) -> bool {
+    let authority = text
+        .strip_prefix("http://")
+        .or_else(|| text.strip_prefix("https://"));
+    let legal = |c: char| {
+        c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, '-' | '.' | ':' | '[' | ']')
+    };
+    authority.is_some_and(|authority| !authority.is_empty() && authority.chars().all(legal))
+}
+
 impl HttpConfig {
     /// Whether others than this machine can use the interface without a token.
     pub fn is_open(&self) -> bool {
@@ -78,6 +104,7 @@ impl HttpConfig {
         HttpSettings {
             token: self.token.clone(),
             hosts: HostRule::new(&self.hosts, self.token.is_some()),
+            cors_origins: self.cors_origins.clone(),
             request_timeout: Duration::from_secs_f64(self.request_timeout_s),
             requests_max: self.requests_max,
             streams_max: self.streams_max,

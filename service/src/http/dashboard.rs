@@ -28,7 +28,7 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
 const FOR_EVER: &str = "public, max-age=31536000, immutable";
 /// For the page itself, which names them: a browser asks each time whether it is another one.
 const ASK_AGAIN: &str = "no-cache";
-/// Bytes of a file's hash in its entity tag.
+/// Bytes of a file's hash in its entity tag: those of a number of 128 bits.
 const TAG_BYTES: usize = 16;
 
 /// The page, if it was there when the program was built. A program for development reads it from
@@ -62,10 +62,9 @@ async fn asset<F: Embed>(Path(file): Path<String>, headers: HeaderMap) -> Respon
 /// A file, or that the browser has it already.
 fn answer(asked: &HeaderMap, file: EmbeddedFile, caching: &'static str) -> Response<Body> {
     let hash = file.metadata.sha256_hash();
-    let digits: String = { hash[..TAG_BYTES].iter() }
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
-    let tag = format!("\"{digits}\"");
+    let start = hash.first_chunk::<TAG_BYTES>();
+    let start = start.expect("SHA-256 has 32 bytes");
+    let tag = format!("\"{:032x}\"", u128::from_be_bytes(*start));
     let known = asked.get(IF_NONE_MATCH).and_then(|tags| tags.to_str().ok());
     let mut response = if known.is_some_and(|tags| names(tags, &tag)) {
         StatusCode::NOT_MODIFIED.into_response()

@@ -56,6 +56,7 @@ pub(crate) struct Guarded<S> {
 struct Inner {
     token: Option<Token>,
     hosts: HostRule,
+    origins: Vec<String>,
     timeout: Duration,
     requests: Arc<Semaphore>,
     routes: BTreeMap<String, RouteMeters>,
@@ -74,6 +75,7 @@ impl Guard {
         Self(Arc::new(Inner {
             token: settings.token.clone(),
             hosts: settings.hosts.clone(),
+            origins: settings.cors_origins.clone(),
             timeout: settings.request_timeout,
             requests: Arc::new(Semaphore::new(settings.requests_max)),
             routes: routes
@@ -88,7 +90,7 @@ impl Guard {
         if OPEN_PATHS.contains(&request.uri().path()) {
             return Ok(None);
         }
-        self.0.hosts.check(request)?;
+        self.0.hosts.check(request, &self.0.origins)?;
         if !self.knows(request) && !is_page(request) {
             let detail = "the header Authorization must be: Bearer, a space, the token";
             return Err(Problem::new(Kind::Unauthorized, detail));

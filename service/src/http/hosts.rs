@@ -36,8 +36,9 @@ impl HostRule {
         Self::Named(names.iter().map(|name| name.to_lowercase()).collect())
     }
 
-    /// Whether a request is for this service, and not sent by a page of another.
-    pub(crate) fn check(&self, request: &Request) -> Result<(), Problem> {
+    /// Whether a request is for this service, and not sent by a page of another that is not among
+    /// `origins`.
+    pub(crate) fn check(&self, request: &Request, origins: &[String]) -> Result<(), Problem> {
         if *self == Self::Any {
             return Ok(());
         }
@@ -54,14 +55,15 @@ impl HostRule {
         let origin = header(ORIGIN).map(|value| value.to_str().unwrap_or_default());
         if let Some(origin) = origin.filter(|_| !request.method().is_safe()) {
             let authority = origin.split_once("://").map(|(_, authority)| authority);
-            let is_own = authority.is_some_and(|authority| {
-                host.is_some_and(|host| host.eq_ignore_ascii_case(authority))
-                    || self.names(authority)
-            });
+            let is_own = origins.iter().any(|known| known == origin)
+                || authority.is_some_and(|authority| {
+                    host.is_some_and(|host| host.eq_ignore_ascii_case(authority))
+                        || self.names(authority)
+                });
             if !is_own {
                 let detail = format!(
                     "a page of {origin:?} may not change anything here; if it is this service's, add the \
-                     name of its host to the setting http.hosts"
+                     name of its host to the setting http.hosts; if it may, the origin to http.cors_origins"
                 );
                 return Err(Problem::new(Kind::ForeignOrigin, detail));
             }
@@ -107,7 +109,8 @@ mod tests {
             request = request.header(*name, *value);
         }
         let request = request.body(Body::empty()).expect("a request");
-        rule.check(&request).map_err(|problem| problem.kind())
+        rule.check(&request, &["https://pages.example".to_owned()])
+            .map_err(|problem| problem.kind())
     }
 
     #[test]

@@ -48,7 +48,7 @@ pub(crate) enum LiveEvent {
     /// What changed since the tick before.
     Tick {
         /// The tick, as JSON.
-        data: LiveTick,
+        data: Box<LiveTick>,
     },
     /// The reader was too slow: ticks were left out. The next one has all that changed.
     Lagged {
@@ -66,7 +66,7 @@ pub(crate) struct LaggedTicks {
 
 /// Watch a space as it changes.
 ///
-/// A stream of server-sent events. Each `event: tick` has a LiveTick as its `data`: what changed
+/// A stream of server-sent events. Each `event: tick` has a `LiveTick` as its `data`: what changed
 /// since the tick before, and everything in the first one. Who reads more slowly than ticks come is
 /// told so by `event: lagged`, and gets fewer of them; each has all that changed since the one
 /// before, so nothing but events and sightings beyond those that are kept is missed. The stream ends

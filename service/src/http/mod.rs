@@ -6,6 +6,8 @@
 mod activity;
 mod agents;
 mod cloud;
+mod compression;
+mod cors;
 mod dashboard;
 mod docs;
 mod elsewhere;
@@ -84,10 +86,8 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(spaces::list))
         .routes(routes!(spaces::get, spaces::put, spaces::delete))
         .routes(routes!(agents::list))
-        .routes(routes!(agents::get, agents::delete))
         .routes(routes!(agents::grid))
         .routes(routes!(trajectory::get))
-        .routes(routes!(samples::post))
         .routes(routes!(recall::post))
         .routes(routes!(localize::post))
         .routes(routes!(predict::post))
@@ -102,11 +102,15 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(objects::identify))
         .routes(routes!(objects::of_agent))
         .routes(routes!(events::get))
-        .routes(routes!(live::get))
         .routes(routes!(export::get))
+        .routes(routes!(health::metrics))
+        .layer(compression::layer())
+        // Short answers, of which the first is asked for most of all: nothing looks at them.
+        .routes(routes!(agents::get, agents::delete))
+        .routes(routes!(samples::post))
+        .routes(routes!(live::get))
         .routes(routes!(health::healthz))
         .routes(routes!(health::readyz))
-        .routes(routes!(health::metrics))
 }
 
 /// The description of the interface (`OpenAPI` 3.1, JSON). With `token`, it says that a bearer
@@ -130,15 +134,20 @@ pub fn router(
     let (described, paths) = described().split_for_parts();
     let paths: Vec<String> = paths.paths.paths.into_keys().collect();
     let guard = Guard::new(settings, paths.iter().cloned());
-    described
-        .merge(docs::routes(&openapi(settings.token.is_some())))
-        .merge(dashboard::routes::<_, dashboard::Built>())
+    let pages = docs::routes(&openapi(settings.token.is_some()))
+        .merge(dashboard::routes::<_, dashboard::Built>());
+    let router = described
+        .merge(pages.layer(compression::layer()))
         .fallback(elsewhere::unknown_path)
         .method_not_allowed_fallback(elsewhere::other_method)
         .layer(guard)
         .with_state(Service::new(Shared::new(
             engine, prometheus, settings, stopping, paths,
-        )))
+        )));
+    if settings.cors_origins.is_empty() {
+        return router;
+    }
+    router.layer(cors::layer(&settings.cors_origins))
 }
 
 /// Serves until `shutdown` comes, then finishes what is under way, within a bounded time.

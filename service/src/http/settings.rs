@@ -12,6 +12,8 @@ pub struct HttpSettings {
     pub token: Option<Token>,
     /// Which hosts the service answers as.
     pub hosts: HostRule,
+    /// Origins of pages that may ask and change everything as the service's own page may.
+    pub cors_origins: Vec<String>,
     /// Longest time from a request's head to the head of its answer.
     pub request_timeout: Duration,
     /// Most requests under way.

@@ -82,6 +82,7 @@ from .event import (
 )
 from .landmark import Landmark, LandmarkPage
 from .link import DEFAULT_ENDPOINT, open_session
+from .live import LaggedTicks, LiveAgent, LiveCounts, LiveHealth, LiveSighting, LiveTick
 from .localize import Localization, LocalizationHypothesis, LocalizedPose, LocalizeQuery
 from .object import (
     AgentObject,
@@ -108,6 +109,7 @@ from .object import (
     Undecided,
     UnknownObject,
 )
+from .point_cloud import CloudPlace, PointCloud
 from .robot import Robot
 from .sample import (
     AgentTarget,
@@ -164,6 +166,7 @@ __all__ = [
     "Client",
     "ClockWarning",
     "Closed",
+    "CloudPlace",
     "CogmapError",
     "Contact",
     "ContactDescriptor",
@@ -192,6 +195,7 @@ __all__ = [
     "IngestAnswer",
     "InvalidValue",
     "KnownObject",
+    "LaggedTicks",
     "Landmark",
     "LandmarkLearned",
     "LandmarkPage",
@@ -199,6 +203,11 @@ __all__ = [
     "LearnObject",
     "Leg",
     "Level",
+    "LiveAgent",
+    "LiveCounts",
+    "LiveHealth",
+    "LiveSighting",
+    "LiveTick",
     "Localization",
     "LocalizationHypothesis",
     "LocalizeQuery",
@@ -238,6 +247,7 @@ __all__ = [
     "PlaceForgotten",
     "PlacePage",
     "PlaceRecruited",
+    "PointCloud",
     "Position",
     "PredictAnswer",
     "PredictedPercept",

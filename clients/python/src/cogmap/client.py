@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import logging
-import urllib.error
-import urllib.parse
-import urllib.request
 from dataclasses import replace
-from typing import Any, Dict, Iterable, Iterator, List, Optional, Tuple, Type, TypeVar, Union, cast
+from typing import Any, Iterable, Iterator, List, Optional, Tuple, Union, cast
 
 from .answer import (
     AgentDetail,
@@ -26,9 +22,11 @@ from .answer import (
     TripDetail,
     TripPage,
 )
-from .errors import ApiError, InvalidValue, WireError
+from .errors import ApiError, InvalidValue
 from .event import Event, EventPage, EventRecord, MissedEvents
+from .http_service import HttpService, Query
 from .landmark import Landmark, LandmarkPage
+from .live import LaggedTicks, LiveTick
 from .localize import Localization, LocalizeQuery
 from .object import (
     AgentObject,
@@ -40,28 +38,20 @@ from .object import (
     ObjectPage,
     ObjectSummary,
 )
+from .point_cloud import PointCloud
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
-from .request import checked_token, json_of, path_of, tls_of
+from .request import json_of, path_of
 from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
-from .scalar import positive_seconds
 from .settings import SpaceSettings
-from .sse import server_sent_events
+from .sse import ServerSentEvent
 from .trajectory import StampedPose, Trajectory
-from .unreachable import translated
-from .url import checked_url
 from .vector import vec3
 from .wire import CBOR, JSON, decode, encode, to_wire
 
-#: Members that every problem has (RFC 9457).
-_PROBLEM = frozenset(("type", "title", "status", "detail"))
-
 _log = logging.getLogger("cogmap")
 
-T = TypeVar("T")
-_Query = Dict[str, Union[None, str, int, float]]
 
-
-class Client:
+class Client(HttpService):
     """Asks a cogmap service over HTTP.
 
     Holds no connection between calls, so it may be shared by threads. Lists that the service
@@ -89,10 +79,7 @@ class Client:
         timeout_s: float = 10.0,
         ca_file: Optional[str] = None,
     ) -> None:
-        self._url = checked_url(url)
-        self._token = checked_token(token)
-        self._timeout_s = positive_seconds("timeout_s", timeout_s)
-        self._tls = tls_of(ca_file)
+        super().__init__(url, token, timeout_s, ca_file)
 
     def __repr__(self) -> str:
         return f"Client({self._url!r}{'' if self._token is None else ', token=...'})"
@@ -126,7 +113,7 @@ class Client:
 
     def agents(self, space: str) -> Iterator[AgentSummary]:
         """All agents of a space, by name."""
-        query: _Query = {}
+        query: Query = {}
         while True:
             page = self._get(AgentPage, path_of(space, "agents"), query)
             yield from page.agents
@@ -168,7 +155,7 @@ class Client:
         path = path_of(space, "agents", agent, "trajectory")
         poses: List[StampedPose] = []
         while True:
-            query: _Query = {"kind": kind, "from_ns": from_ns, "to_ns": to_ns}
+            query: Query = {"kind": kind, "from_ns": from_ns, "to_ns": to_ns}
             page = self._get(Trajectory, path, query)
             poses.extend(page.poses)
             if page.next_from_ns is None:
@@ -241,7 +228,7 @@ class Client:
 
     def places(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Place]:
         """All places of a space, by id. `filters` are passed on as query parameters."""
-        query: _Query = dict(filters)
+        query: Query = dict(filters)
         while True:
             page = self._get(PlacePage, path_of(space, "places"), query)
             yield from page.places
@@ -255,7 +242,7 @@ class Client:
 
     def trips(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Trip]:
         """All trips of a space, by id. `filters` are passed on as query parameters."""
-        query: _Query = dict(filters)
+        query: Query = dict(filters)
         while True:
             page = self._get(TripPage, path_of(space, "trips"), query)
             yield from page.trips
@@ -269,7 +256,7 @@ class Client:
 
     def landmarks(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Landmark]:
         """All landmarks of a space, by label. `filters` are passed on as query parameters."""
-        query: _Query = dict(filters)
+        query: Query = dict(filters)
         while True:
             page = self._get(LandmarkPage, path_of(space, "landmarks"), query)
             yield from page.landmarks
@@ -287,7 +274,7 @@ class Client:
         self, space: str, **filters: Union[None, str, int, float]
     ) -> Iterator[ObjectSummary]:
         """All objects of a space, by name. `filters` are passed on as query parameters."""
-        query: _Query = dict(filters)
+        query: Query = dict(filters)
         while True:
             page = self._get(ObjectPage, path_of(space, "objects"), query)
             yield from page.objects
@@ -357,18 +344,18 @@ class Client:
         `0-0` is before all that the service keeps. `MissedEvents` stands where some were missed,
         because this program was too slow or came back too late. Otherwise as `events`.
         """
-        if timeout_s is not None:
-            timeout_s = positive_seconds("timeout_s", timeout_s)
-        request = self._make_request("GET", path_of(space, "events"), accept="text/event-stream")
-        if after is not None:
-            request.add_header("Last-Event-ID", after)
-        with translated(f"GET {request.full_url}"), self._open(request, timeout_s) as response:
-            for told in server_sent_events(response):
-                if told.event == "missed":
-                    yield decode(MissedEvents, told.data.encode(), JSON)
-                elif told.event == "message":
-                    event = decode(Event, told.data.encode(), JSON)
-                    yield EventRecord(told.id or "", event)
+        path = path_of(space, "events")
+        return self._stream(path, _event_of, timeout_s=timeout_s, last_event_id=after)
+
+    def live(
+        self, space: str, *, rate_hz: Optional[float] = None, timeout_s: Optional[float] = None
+    ) -> Iterator[Union[LiveTick, LaggedTicks]]:
+        """What changes in a space, tick by tick: `rate_hz` of them in a second, 10 when absent. The
+        first one has all agents, each later one what changed since. `LaggedTicks` stands where this
+        program was too slow for some; the next tick has all that changed. Ends as `events` does.
+        """
+        query: Query = {"rate_hz": rate_hz}
+        return self._stream(path_of(space, "live"), _tick_of, query=query, timeout_s=timeout_s)
 
     def latest_events(
         self,
@@ -380,7 +367,7 @@ class Client:
     ) -> EventPage:
         """One page of the events that the service keeps, oldest first. Ask again with its `next` as
         `after` for what comes later."""
-        query: _Query = {"format": "json", "after": after, "agent": agent, "limit": limit}
+        query: Query = {"format": "json", "after": after, "agent": agent, "limit": limit}
         return self._get(EventPage, path_of(space, "events"), query)
 
     def export(
@@ -401,8 +388,20 @@ class Client:
             agent: Whose trajectory; `tum` needs it.
             session: Which run of the agent; the current one when absent.
         """
-        query: _Query = {"format": format, "agent": agent, "session": session}
+        query: Query = {"format": format, "agent": agent, "session": session}
         return self._request("GET", path_of(space, "export"), query, accept="*/*")
+
+    def point_cloud(self, space: str, *, since_revision: Optional[int] = None) -> PointCloud:
+        """The places of a space as points, with strength, visits and stamps. With the `revision` of
+        an earlier cloud as `since_revision` only what changed since: `PointCloud.update` takes it
+        in."""
+        query: Query = {
+            "format": "ply",
+            "encoding": "binary",
+            "since_revision": since_revision,
+        }
+        path = path_of(space, "export")
+        return PointCloud.read(self._request("GET", path, query, accept="*/*"))
 
     # The service itself
 
@@ -423,75 +422,20 @@ class Client:
             raise
         return True
 
-    # Requests
 
-    def _get(self, kind: Type[T], path: str, query: Optional[_Query] = None) -> T:
-        return self._decoded(kind, path, self._request("GET", path, query))
-
-    def _send(self, kind: Type[T], method: str, path: str, content_type: str, body: bytes) -> T:
-        answer = self._request(method, path, body=body, content_type=content_type)
-        return self._decoded(kind, path, answer)
-
-    def _decoded(self, kind: Type[T], path: str, answer: bytes) -> T:
-        try:
-            return decode(kind, answer, JSON)
-        except WireError as error:
-            raise WireError(f"{self._url}{path}: {error}") from error
-
-    def _request(
-        self,
-        method: str,
-        path: str,
-        query: Optional[_Query] = None,
-        *,
-        body: Optional[bytes] = None,
-        content_type: Optional[str] = None,
-        accept: str = JSON,
-    ) -> bytes:
-        given = {name: value for name, value in (query or {}).items() if value is not None}
-        if given:
-            path = f"{path}?{urllib.parse.urlencode(given)}"
-        request = self._make_request(method, path, accept=accept, body=body)
-        if content_type is not None:
-            request.add_header("Content-Type", content_type)
-        with translated(f"{method} {request.full_url}"):
-            with self._open(request, self._timeout_s) as response:
-                data: bytes = response.read()
-                return data
-
-    def _make_request(
-        self, method: str, path: str, *, accept: str, body: Optional[bytes] = None
-    ) -> urllib.request.Request:
-        request = urllib.request.Request(self._url + path, data=body, method=method)
-        request.add_header("Accept", accept)
-        if self._token is not None:
-            # Not a header that redirects carry along: the token is for this service alone.
-            request.add_unredirected_header("Authorization", f"Bearer {self._token}")
-        return request
-
-    def _open(self, request: urllib.request.Request, timeout_s: Optional[float]) -> Any:
-        try:
-            return urllib.request.urlopen(request, timeout=timeout_s, context=self._tls)
-        except urllib.error.HTTPError as error:
-            where = f"{request.get_method()} {request.full_url}"
-            if error.code == 401:
-                where += " without a token" if self._token is None else " with the given token"
-            with error:
-                raise _api_error(error.code, error.reason, error.read(), where) from None
+def _event_of(told: ServerSentEvent) -> Optional[Union[EventRecord, MissedEvents]]:
+    """What a stream of events tells; `None` where that is something else."""
+    if told.event == "missed":
+        return decode(MissedEvents, told.data.encode(), JSON)
+    if told.event == "message":
+        return EventRecord(told.id or "", decode(Event, told.data.encode(), JSON))
+    return None
 
 
-def _api_error(status: int, reason: str, body: bytes, where: str) -> ApiError:
-    """The error of a refused request; the body may be anything when a proxy wrote it."""
-    try:
-        problem = json.loads(body)
-        return ApiError(
-            status,
-            str(problem["type"]),
-            str(problem["title"]),
-            str(problem.get("detail", "")),
-            {name: value for name, value in problem.items() if name not in _PROBLEM},
-            where,
-        )
-    except (ValueError, KeyError, TypeError, AttributeError):
-        text = body[:200].decode("utf-8", "replace")
-        return ApiError(status, "about:blank", reason, text, where=where)
+def _tick_of(told: ServerSentEvent) -> Optional[Union[LiveTick, LaggedTicks]]:
+    """What a live stream tells; `None` where that is something else."""
+    if told.event == "tick":
+        return decode(LiveTick, told.data.encode(), JSON)
+    if told.event == "lagged":
+        return decode(LaggedTicks, told.data.encode(), JSON)
+    return None

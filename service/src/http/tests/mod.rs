@@ -1,6 +1,8 @@
 //! The interface, request by request, over a real engine on a store of its own.
 
 mod cloud;
+mod compression;
+mod cors;
 mod dashboard;
 mod events;
 mod forgetting;

@@ -1,5 +1,6 @@
 //! `cogmap-lab bench ingest`.
 
+use std::num::NonZero;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -26,16 +27,20 @@ const TIMEOUT: Duration = Duration::from_secs(20);
 pub(in crate::cli) struct IngestArgs {
     /// Samples of a message.
     #[arg(long, value_delimiter = ',', default_values_t = [1, 8, 64])]
-    samples_per_message: Vec<usize>,
+    pub(super) samples_per_message: Vec<usize>,
     /// Length of each measurement, such as 5s; a number alone is in seconds.
     #[arg(long, default_value = "5s", value_name = "DURATION", value_parser = seconds)]
-    seconds: f64,
+    pub(super) seconds: f64,
     /// Directory for the store; a temporary one, removed at the end, when absent.
     #[arg(long, value_name = "DIR")]
-    data_dir: Option<std::path::PathBuf>,
+    pub(super) data_dir: Option<std::path::PathBuf>,
+    /// Compare ingest while as many live streams of the space are open with ingest while none is,
+    /// in turn, instead of with the raw rate.
+    #[arg(long, value_name = "STREAMS")]
+    pub(super) live: Option<NonZero<u16>>,
     /// Print one JSON object.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 #[derive(Debug, Serialize)]

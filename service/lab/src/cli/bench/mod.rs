@@ -3,6 +3,7 @@
 mod descriptors;
 mod http;
 mod ingest;
+mod live;
 mod load;
 mod recall;
 mod step;
@@ -31,7 +32,10 @@ pub(super) fn run(command: &BenchCommand) -> anyhow::Result<()> {
         BenchCommand::Step(args) => step::run(args),
         BenchCommand::Recall(args) => recall::run(args),
         BenchCommand::Descriptors(args) => descriptors::run(args),
-        BenchCommand::Ingest(args) => ingest::run(args),
+        BenchCommand::Ingest(args) => match args.live {
+            Some(live_streams) => live::run(args, live_streams.get()),
+            None => ingest::run(args),
+        },
         BenchCommand::Http(args) => http::run(args),
         BenchCommand::Load(args) => load::run(args),
     }
