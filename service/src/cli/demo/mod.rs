@@ -39,7 +39,12 @@ pub(super) struct DemoArgs {
     seed: u64,
     /// Send only the robots, to the service at this Zenoh endpoint; --http is then the base URL of
     /// its HTTP interface.
-    #[arg(long, value_name = "ENDPOINT", requires = "http", conflicts_with_all = ["zenoh", "data_dir", "set"])]
+    #[arg(
+        long,
+        value_name = "ENDPOINT",
+        requires = "http",
+        conflicts_with_all = ["zenoh", "data_dir", "set"]
+    )]
     connect: Option<String>,
     /// Bearer token of that service's HTTP interface.
     #[arg(

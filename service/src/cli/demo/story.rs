@@ -1,7 +1,7 @@
 //! What happens in the demo: what the room does, and what the service makes of it.
 
 use cogmap_proto::{Estimate, Event, EventKind, Status};
-use cogmap_worlds::{Act, Thing};
+use cogmap_worlds::Act;
 use nalgebra::Vector3;
 
 use super::summary::{Cause, ObjectRecord, SearchRecord};
@@ -92,11 +92,11 @@ impl Story {
     pub(super) fn estimate(&mut self, estimate: &Estimate, error_m: f64) -> Option<String> {
         let at_s = self.seconds(estimate.stamp_ns);
         let robot = &estimate.agent;
-        let search = self.searches.iter_mut().rev();
         // The latest search of the robot, while it lasts.
-        let search = search
-            .into_iter()
-            .find(|search| search.robot == *robot)
+        let search = self
+            .searches
+            .iter_mut()
+            .rfind(|search| search.robot == *robot)
             .filter(|search| search.found_s.is_none() && at_s >= search.at_s)?;
         let text = match estimate.status {
             Status::Uncertain if search.noticed_s.is_none() => {
@@ -212,12 +212,10 @@ impl Story {
     }
 }
 
-fn with_article(thing: Thing) -> String {
-    format!("a {}", thing.name())
-}
-
 #[cfg(test)]
 mod tests {
+    use cogmap_worlds::Thing;
+
     use super::*;
 
     const SECOND_NS: i64 = 1_000_000_000;
