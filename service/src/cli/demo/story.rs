@@ -55,10 +55,9 @@ impl Story {
                 let carried_m = robot_m.map(|robot_m| (robot_m - from_m).norm());
                 search.carried_m = carried_m;
                 self.searches.push(search);
-                let from = self.whereabouts(from_m);
                 let way_m = carried_m.unwrap_or_default();
                 format!(
-                    "{robot} is carried off while it flies: from {from}, {way_m:.1} m, to {here}; \
+                    "{robot} is carried off while it flies, {way_m:.1} m, and goes on {here}; \
                      its odometry does not notice"
                 )
             }
@@ -204,11 +203,11 @@ impl Story {
         let north = third(1, ["south", "", "north"]);
         let east = third(0, ["west", "", "east"]);
         let side = match (north, east) {
-            ("", "") => "in the middle".to_owned(),
-            ("", side) | (side, "") => format!("in the {side}"),
-            (north, east) => format!("in the {north}-{east} corner"),
+            ("", "") => "middle".to_owned(),
+            ("", side) | (side, "") => side.to_owned(),
+            (north, east) => format!("{north}-{east} corner"),
         };
-        format!("{side}{}", third(2, [", low", "", ", high up"]))
+        format!("{}in the {side}", third(2, ["low ", "", "high up "]))
     }
 }
 
@@ -253,10 +252,9 @@ mod tests {
         let line = story.act(&carried, 45 * SECOND_NS, Some(there_m));
         assert!(line.starts_with(" 40.0 s  robot5"), "{line}");
         assert!(
-            line.contains("in the south-west corner, low, 22.5 m"),
+            line.contains("22.5 m, and goes on high up in the north-east corner"),
             "{line}"
         );
-        assert!(line.contains("north-east corner, high up"), "{line}");
         // It believes itself where it was: nobody has noticed anything.
         assert_eq!(story.estimate(&told(Status::Localized, 41), 22.5), None);
         // An estimate from before says nothing.
