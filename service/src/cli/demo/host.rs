@@ -46,9 +46,9 @@ pub(super) fn run(args: &DemoArgs, runtime: &Runtime) -> anyhow::Result<Summary>
 }
 
 /// The settings. What the user says holds; what the user does not say is the demo's choice: a
-/// temporary store, the space, few words in the log, and other ports where the usual ones are
-/// taken. A demo is there to be looked at, and nobody relies on its ports: so it tells that it goes
-/// elsewhere, and does. A port that the user names and somebody has is refused by the service.
+/// temporary store, the space, few words in the log, and free ports in place of taken ones. A demo
+/// is there to be looked at and nobody relies on its ports, so it says where it goes instead. The
+/// service refuses a port that the user names and another program has.
 fn settings(args: &DemoArgs, temporary: &Path) -> anyhow::Result<Config> {
     let mut choices = Choices {
         directory: temporary.to_owned(),
@@ -67,7 +67,8 @@ fn settings(args: &DemoArgs, temporary: &Path) -> anyhow::Result<Config> {
     let config = args.config.load_over(choices.table())?;
     if config.http.listen != usual.http.listen {
         output::progress(&format!(
-            "{} is taken by another program, so HTTP is at {}; --set http.listen=ADDRESS:PORT chooses",
+            "{} is taken by another program, so HTTP is at {}; --set http.listen=ADDRESS:PORT \
+             chooses",
             usual.http.listen, config.http.listen
         ));
     }
@@ -133,7 +134,8 @@ fn endpoint(config: &Config) -> anyhow::Result<String> {
         ZenohMode::Peer | ZenohMode::Router => &zenoh.listen,
     };
     let endpoint = endpoints.first().context(
-        "the demo's robots need an endpoint: zenoh.listen, or in client mode zenoh.connect, is empty",
+        "the demo's robots need an endpoint: zenoh.listen, or in client mode zenoh.connect, is \
+         empty",
     )?;
     Ok(endpoint.replace("/0.0.0.0:", "/127.0.0.1:"))
 }

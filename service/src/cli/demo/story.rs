@@ -1,7 +1,7 @@
 //! What happens in the demo: what the room does, and what the service makes of it.
 
 use cogmap_proto::{Estimate, Event, EventKind, Status};
-use cogmap_worlds::{Act, Thing};
+use cogmap_worlds::Act;
 use nalgebra::Vector3;
 
 use super::summary::{Cause, ObjectRecord, SearchRecord};
@@ -55,10 +55,9 @@ impl Story {
                 let carried_m = robot_m.map(|robot_m| (robot_m - from_m).norm());
                 search.carried_m = carried_m;
                 self.searches.push(search);
-                let from = self.whereabouts(from_m);
                 let way_m = carried_m.unwrap_or_default();
                 format!(
-                    "{robot} is carried off while it flies: from {from}, {way_m:.1} m, to {here}; \
+                    "{robot} is carried off while it flies, {way_m:.1} m, and goes on {here}; \
                      its odometry does not notice"
                 )
             }
@@ -92,11 +91,11 @@ impl Story {
     pub(super) fn estimate(&mut self, estimate: &Estimate, error_m: f64) -> Option<String> {
         let at_s = self.seconds(estimate.stamp_ns);
         let robot = &estimate.agent;
-        let search = self.searches.iter_mut().rev();
         // The latest search of the robot, while it lasts.
-        let search = search
-            .into_iter()
-            .find(|search| search.robot == *robot)
+        let search = self
+            .searches
+            .iter_mut()
+            .rfind(|search| search.robot == *robot)
             .filter(|search| search.found_s.is_none() && at_s >= search.at_s)?;
         let text = match estimate.status {
             Status::Uncertain if search.noticed_s.is_none() => {
@@ -204,20 +203,18 @@ impl Story {
         let north = third(1, ["south", "", "north"]);
         let east = third(0, ["west", "", "east"]);
         let side = match (north, east) {
-            ("", "") => "in the middle".to_owned(),
-            ("", side) | (side, "") => format!("in the {side}"),
-            (north, east) => format!("in the {north}-{east} corner"),
+            ("", "") => "middle".to_owned(),
+            ("", side) | (side, "") => side.to_owned(),
+            (north, east) => format!("{north}-{east} corner"),
         };
-        format!("{side}{}", third(2, [", low", "", ", high up"]))
+        format!("{}in the {side}", third(2, ["low ", "", "high up "]))
     }
-}
-
-fn with_article(thing: Thing) -> String {
-    format!("a {}", thing.name())
 }
 
 #[cfg(test)]
 mod tests {
+    use cogmap_worlds::Thing;
+
     use super::*;
 
     const SECOND_NS: i64 = 1_000_000_000;
@@ -255,10 +252,9 @@ mod tests {
         let line = story.act(&carried, 45 * SECOND_NS, Some(there_m));
         assert!(line.starts_with(" 40.0 s  robot5"), "{line}");
         assert!(
-            line.contains("in the south-west corner, low, 22.5 m"),
+            line.contains("22.5 m, and goes on high up in the north-east corner"),
             "{line}"
         );
-        assert!(line.contains("north-east corner, high up"), "{line}");
         // It believes itself where it was: nobody has noticed anything.
         assert_eq!(story.estimate(&told(Status::Localized, 41), 22.5), None);
         // An estimate from before says nothing.
