@@ -46,91 +46,81 @@ impl Header {
     }
 }
 
+/// Digests settings in this order, which names each field once; the pattern of all fields does not
+/// compile where one is missing.
+///
+/// What was a constant before it became a setting counts only where it differs from that constant,
+/// so that checkpoints and digests from before still hold. A number says which it is.
+macro_rules! digest_in_order {
+    (@write $out:ident, $field:ident) => {
+        State::write($field, &mut $out)
+    };
+    (@write $out:ident, $field:ident, $state:expr) => {
+        State::write(&$state, &mut $out)
+    };
+    (
+        $values:expr,
+        [$($field:ident $(as $state:expr)?),+ $(,)?],
+        [$($later:ident was $constant:literal),+ $(,)?] $(,)?
+    ) => {{
+        let SettingsValues { $($field,)+ $($later,)+ } = $values;
+        let mut out = StateWriter::default();
+        $(digest_in_order!(@write out, $field $(, $state)?);)+
+        let later = [$(($later, $constant)),+];
+        for (number, (value, constant)) in (0_u8..).zip(later) {
+            if value.to_bits() != f64::to_bits(constant) {
+                number.write(&mut out);
+                value.write(&mut out);
+            }
+        }
+        out.digest()
+    }};
+}
+
 /// Digest of settings.
 pub(super) fn digest_of(settings: &Settings) -> Digest {
-    // Taken apart, so that a new field cannot be forgotten here.
-    let SettingsValues {
-        seed,
-        grid_modules,
-        grid_spacing_m,
-        grid_ratio,
-        field_radius_m,
-        recruitment,
-        translation_sd_per_sqrt_m,
-        rotation_sd_per_sqrt_m,
-        rotation_sd_per_sqrt_rad,
-        length_error_sd,
-        angle_error_sd,
-        bias_sd_rad_s,
-        lasting_range_error,
-        localized_sd_m,
-        lost_sd_m,
-        trip_stillness_s,
-        trip_gap_s,
-        places_max,
-        legs_max,
-        keyframes_max,
-        strength_half_life_samples,
-        sighting_gate_sd,
-        sighting_huber_sd,
-        closure_gate_chi2,
-        keyframe_spacing_m,
-        keyframe_spacing_rad,
-        restart_sd_m,
-        restart_sd_rad,
-        object_answer_probability,
-    } = &**settings;
-    let mut out = StateWriter::default();
-    seed.write(&mut out);
-    (*grid_modules as u64).write(&mut out);
-    let probability = match recruitment {
+    digest_in_order!(
+        &**settings,
+        [
+            seed,
+            grid_modules as (*grid_modules as u64),
+            recruitment as probability(recruitment),
+            grid_spacing_m,
+            grid_ratio,
+            field_radius_m,
+            translation_sd_per_sqrt_m,
+            rotation_sd_per_sqrt_m,
+            rotation_sd_per_sqrt_rad,
+            length_error_sd,
+            angle_error_sd,
+            bias_sd_rad_s,
+            lasting_range_error,
+            localized_sd_m,
+            lost_sd_m,
+            trip_stillness_s,
+            trip_gap_s,
+            places_max,
+            legs_max,
+            keyframes_max,
+            strength_half_life_samples,
+        ],
+        [
+            sighting_gate_sd was 4.0,
+            sighting_huber_sd was 2.0,
+            closure_gate_chi2 was 11.3,
+            keyframe_spacing_m was 0.1,
+            keyframe_spacing_rad was 0.1,
+            restart_sd_m was 1.0,
+            restart_sd_rad was 0.5,
+            object_answer_probability was 0.995,
+        ],
+    )
+}
+
+/// Probability of recruitment; `None` where novelty decides.
+fn probability(recruitment: &Recruitment) -> Option<f64> {
+    match recruitment {
         Recruitment::Novelty => None,
         Recruitment::Bernoulli { probability } => Some(*probability),
-    };
-    probability.write(&mut out);
-    for value in [
-        grid_spacing_m,
-        grid_ratio,
-        field_radius_m,
-        translation_sd_per_sqrt_m,
-        rotation_sd_per_sqrt_m,
-        rotation_sd_per_sqrt_rad,
-        length_error_sd,
-        angle_error_sd,
-        bias_sd_rad_s,
-        lasting_range_error,
-        localized_sd_m,
-        lost_sd_m,
-        trip_stillness_s,
-        trip_gap_s,
-    ] {
-        value.write(&mut out);
     }
-    for value in [
-        places_max,
-        legs_max,
-        keyframes_max,
-        strength_half_life_samples,
-    ] {
-        value.write(&mut out);
-    }
-    // What was a constant before it became a setting counts only where it differs from that
-    // constant, so that checkpoints and digests from before still hold. A number says which it is.
-    let later = [
-        (sighting_gate_sd, 4.0),
-        (sighting_huber_sd, 2.0),
-        (closure_gate_chi2, 11.3),
-        (keyframe_spacing_m, 0.1),
-        (keyframe_spacing_rad, 0.1),
-        (restart_sd_m, 1.0),
-        (restart_sd_rad, 0.5),
-        (object_answer_probability, 0.995),
-    ];
-    for (number, (value, constant)) in (0_u8..).zip(later) {
-        if value.to_bits() != f64::to_bits(constant) {
-            number.write(&mut out);
-            value.write(&mut out);
-        }
-    }
-    out.digest()
 }
