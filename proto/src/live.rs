@@ -47,7 +47,8 @@ pub struct LiveAgent {
     pub translation_m: [f64; 3],
     /// Orientation in `map`, unit quaternion `[x, y, z, w]`.
     pub rotation_xyzw: [f64; 4],
-    /// Upper triangle, row by row, of the covariance of the position along the axes of `map` \[m²\].
+    /// Upper triangle, row by row, of the covariance of the position along the axes of `map`
+    /// \[m²\].
     pub position_covariance_m2: [f64; 6],
     /// Standard deviation of the orientation about the axes of `map` \[rad\].
     pub rotation_sd_rad: [f64; 3],

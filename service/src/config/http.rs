@@ -54,8 +54,8 @@ section! {
         /// Names of hosts by which the service is asked, beside its addresses and `localhost`; `*`
         /// stands for any.
         hosts: Vec<String> = Vec::new(), HOSTS;
-        /// Origins of pages, such as `https://map.example.org`, that may ask and change everything as
-        /// the service's own page may.
+        /// Origins of pages, such as `https://map.example.org`, that may ask and change everything
+        /// as the service's own page may.
         cors_origins: Vec<String> = Vec::new(), ORIGINS;
         /// Longest time from a request's head to the head of its answer \[s\].
         request_timeout_s: f64 = 30.0, INTERVAL_S;

@@ -88,8 +88,8 @@ pub(crate) struct MapExport {
 /// whole map is relaxed, which may take seconds; all who ask meanwhile get the same one after it.
 ///
 /// A binary point cloud has the vertex properties `id`, `x`, `y`, `z` \[m\], `strength`, `visits`,
-/// `first_s` and `last_s` (stamps \[s\]), and names its `revision` in a comment. Who asks again with
-/// `since_revision` gets the places that changed since, and the numbers of forgotten ones as a
+/// `first_s` and `last_s` (stamps \[s\]), and names its `revision` in a comment. Who asks again
+/// with `since_revision` gets the places that changed since, and the numbers of forgotten ones as a
 /// second element `forgotten`. Where the comment `since_revision` says 0, these are all places: the
 /// service does not know what changed, or that would be more.
 #[utoipa::path(get, path = "/v1/spaces/{space}/export", tag = "spaces", operation_id = "export_space",

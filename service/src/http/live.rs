@@ -69,8 +69,8 @@ pub(crate) struct LaggedTicks {
 /// A stream of server-sent events. Each `event: tick` has a `LiveTick` as its `data`: what changed
 /// since the tick before, and everything in the first one. Who reads more slowly than ticks come is
 /// told so by `event: lagged`, and gets fewer of them; each has all that changed since the one
-/// before, so nothing but events and sightings beyond those that are kept is missed. The stream ends
-/// when the service stops or the space is deleted.
+/// before, so nothing but events and sightings beyond those that are kept is missed. The stream
+/// ends when the service stops or the space is deleted.
 #[utoipa::path(get, path = "/v1/spaces/{space}/live", tag = "spaces", operation_id = "watch_space",
     params(SpaceParam, LiveQuery),
     responses(
