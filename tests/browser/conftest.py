@@ -12,6 +12,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 from page import Dashboard
 from server import Server
+from wait import LONG_S
 
 MakeServer = Callable[..., Server]
 Open = Callable[..., Dashboard]
@@ -71,6 +72,7 @@ def open_page(browser: Browser) -> Iterator[Open]:
         **options: Any,
     ) -> Dashboard:
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
+        context.set_default_timeout(1000 * LONG_S)
         contexts.append(context)
         return Dashboard(context.new_page(), service, space)
 

@@ -227,7 +227,7 @@ def test_nothing_comes_from_elsewhere(service: Server, open_page: Open) -> None:
 
 def test_pages_that_follow_see_a_drive_to_its_end(service: Server, open_page: Open) -> None:
     ada = Driver(service, "ada")
-    pages = [open_page(service) for _ in range(3)]
+    pages = [open_page(service, width=640, height=480) for _ in range(3)]
     with Driving(ada):
         for page in pages:
             page.until_places(8)

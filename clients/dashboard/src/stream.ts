@@ -12,6 +12,12 @@ const RETRY_MS_MAX = 5000;
 /** The service says something every fifteen seconds; silence beyond this is a break [ms]. */
 const SILENCE_MS = 20_000;
 
+/**
+ * A page that nobody sees lets go of its stream after a while [ms]: a browser has six connections
+ * to a service for all of its tabs.
+ */
+const HIDDEN_MS = 10_000;
+
 export type Connection =
   | { state: "connecting" }
   | { state: "live" }
@@ -45,6 +51,7 @@ export class LiveStream {
     let wait = RETRY_MS;
     this.listener.changed({ state: "connecting" });
     while (!this.stop.signal.aborted) {
+      await seen();
       let problem: Problem;
       try {
         await this.follow(() => (wait = RETRY_MS));
@@ -54,6 +61,10 @@ export class LiveStream {
       }
       if (this.stop.signal.aborted) {
         return;
+      }
+      if (document.hidden) {
+        this.listener.changed({ state: "connecting" });
+        continue;
       }
       // A wrong token or an unknown space does not become right by asking again.
       if ([400, 401, 403, 404].includes(problem.status)) {
@@ -71,6 +82,12 @@ export class LiveStream {
     const abort = (): void => connection.abort();
     this.stop.signal.addEventListener("abort", abort);
     let timer = setTimeout(abort, SILENCE_MS);
+    let hiding: ReturnType<typeof setTimeout> | undefined;
+    const hide = (): void => {
+      clearTimeout(hiding);
+      hiding = document.hidden ? setTimeout(abort, HIDDEN_MS) : undefined;
+    };
+    document.addEventListener("visibilitychange", hide);
     try {
       const answer = await this.space.live(this.rateHz, connection.signal);
       if (answer.body === null) {
@@ -98,7 +115,23 @@ export class LiveStream {
       }
     } finally {
       clearTimeout(timer);
+      clearTimeout(hiding);
+      document.removeEventListener("visibilitychange", hide);
       this.stop.signal.removeEventListener("abort", abort);
     }
   }
+}
+
+/** Waits until somebody sees the page. */
+function seen(): Promise<void> {
+  return new Promise((resume) => {
+    const look = (): void => {
+      if (!document.hidden) {
+        document.removeEventListener("visibilitychange", look);
+        resume();
+      }
+    };
+    document.addEventListener("visibilitychange", look);
+    look();
+  });
 }

@@ -23,14 +23,14 @@ test("poses that are older than the latest one are left out", () => {
   assert.equal(track([1, 2, 2, 1.5, 3]).n, 3);
 });
 
-test("the past is put before what came live, without what is there already", () => {
-  const made = track([10, 11]);
-  made.prepend([8, 9, 10, 11].map((s) => ({ s, position: [s, 0, 0], rotation: AHEAD })));
+test("the past is put where it belongs, without what is there already", () => {
+  const made = track([10, 11, 15]);
+  made.merge([8, 9, 10, 11, 13].map((s) => ({ s, position: [s, 0, 0], rotation: AHEAD })));
   assert.deepEqual(
-    [0, 1, 2, 3].map((i) => made.time(i)),
-    [8, 9, 10, 11],
+    [0, 1, 2, 3, 4, 5].map((i) => made.time(i)),
+    [8, 9, 10, 11, 13, 15],
   );
-  assert.equal(made.n, 4);
+  assert.equal(made.n, 6);
 });
 
 test("no line joins what a gap or a leap parts", () => {

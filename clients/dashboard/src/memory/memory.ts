@@ -93,6 +93,11 @@ export class Memory {
         // The service may have restarted: what was read before may be of another past.
         this.cloudRevision = null;
         this.seenCounts = "";
+        this.trips.interrupt();
+        // What happened while there was no connection is asked for.
+        for (const agent of this.agents.values()) {
+          void this.readPast(agent, agent.track.time(agent.track.n - 1));
+        }
         void this.refresh();
       },
       ticked: (tick) => this.apply(tick),
@@ -126,7 +131,7 @@ export class Memory {
     const poses = await this.past(name, "refined", begin);
     if (agent !== undefined) {
       agent.refined = new Agent(agent.colour, agent.live).track;
-      agent.refined.prepend(poses);
+      agent.refined.merge(poses);
       this.listener.refreshed();
     }
   }
@@ -258,7 +263,7 @@ export class Memory {
   private async readPast(agent: Agent, fromS: number): Promise<void> {
     try {
       const poses = await this.past(agent.name, "causal", fromS);
-      agent.track.prepend(poses);
+      agent.track.merge(poses);
       if (poses[0] !== undefined) {
         this.note(poses[0].s);
       }
@@ -272,8 +277,8 @@ export class Memory {
     name: string,
     kind: "causal" | "refined",
     fromS: number,
-  ): Promise<Parameters<Agent["track"]["prepend"]>[0]> {
-    const poses: Parameters<Agent["track"]["prepend"]>[0] = [];
+  ): Promise<Parameters<Agent["track"]["merge"]>[0]> {
+    const poses: Parameters<Agent["track"]["merge"]>[0] = [];
     let from: Int64 | null = this.clock.stamp(fromS);
     for (let page = 0; page < PAST_PAGES_MAX && from !== null; page += 1) {
       const answer = await this.space.trajectory(name, kind, from);

@@ -45,19 +45,12 @@ export class Track {
     this.n += 1;
   }
 
-  /** Puts older poses before those that are there. */
-  prepend(older: { s: number; position: Vec3; rotation: Quat }[]): void {
-    const own = this.rows.slice(0, STRIDE * this.n);
-    const begin = this.n > 0 ? this.time(0) : Infinity;
+  /** Puts poses among those that are there, each where its time says. */
+  merge(poses: { s: number; position: Vec3; rotation: Quat }[]): void {
+    const own = Array.from({ length: this.n }, (_, i) => ({ s: this.time(i), ...this.pose(i) }));
     this.n = 0;
-    for (const { s, position, rotation } of older) {
-      if (s < begin) {
-        this.push(s, position, rotation);
-      }
-    }
-    for (let at = 0; at < own.length; at += STRIDE) {
-      const row = own.subarray(at, at + STRIDE);
-      this.push(row[0]!, [row[1]!, row[2]!, row[3]!], [row[4]!, row[5]!, row[6]!, row[7]!]);
+    for (const { s, position, rotation } of [...own, ...poses].sort((a, b) => a.s - b.s)) {
+      this.push(s, position, rotation);
     }
     this.rewrites += 1;
   }
