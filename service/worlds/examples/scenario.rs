@@ -31,10 +31,7 @@ fn main() {
             epoch_ns: 0,
             duration_s: f64::from(options["seconds"]),
         };
-        println!(
-            "seed {seed}: {}",
-            Run::new(settings).to_the_end().join("; ")
-        );
+        println!("seed {seed}: {}", Run::new(settings).finish().join("; "));
     }
 }
 
@@ -64,7 +61,7 @@ impl Run {
         }
     }
 
-    fn to_the_end(mut self) -> Vec<String> {
+    fn finish(mut self) -> Vec<String> {
         while self.scenario.has_more() {
             let now_s = self.scenario.elapsed_s();
             let tick = self.scenario.tick();

@@ -63,8 +63,8 @@ impl Story {
             }
             Act::Learning(thing) => {
                 format!(
-                    "the arm feels its way over {} and learns it",
-                    with_article(*thing)
+                    "the arm feels its way over a {} and learns it",
+                    thing.name()
                 )
             }
             Act::Touching(thing) => {
