@@ -1,7 +1,7 @@
 //! Implementations of `State`, written by macros.
 
-/// Implements [`State`](crate::State) for a struct, field by field. A field `as` a [`Codec`](crate::Codec) is
-/// written by that.
+/// Implements [`State`](crate::State) for a struct, field by field. A field `as` a
+/// [`Codec`](crate::Codec) is written by that.
 ///
 /// ```
 /// struct Survey {
@@ -39,7 +39,8 @@ macro_rules! state_of_struct {
     };
 }
 
-/// Implements [`State`](crate::State) for a struct of one unnamed field: the bytes are those of the field.
+/// Implements [`State`](crate::State) for a struct of one unnamed field: the bytes are those of the
+/// field.
 ///
 /// ```
 /// #[derive(Debug, PartialEq)]
@@ -63,8 +64,8 @@ macro_rules! state_of_newtype {
     };
 }
 
-/// Implements [`State`](crate::State) for an enum: one byte, a code for each variant, then the variant's field,
-/// if it has one.
+/// Implements [`State`](crate::State) for an enum: one byte, a code for each variant, then the
+/// variant's field, if it has one.
 ///
 /// ```
 /// enum Colour {
