@@ -88,6 +88,10 @@ export class Inspector {
       }
       this.lastAgent = picked.name;
       this.inspect("agent");
+      const agent = this.agent;
+      if (agent !== null && agent.touch === null) {
+        void this.memory?.askTouch(agent);
+      }
       void this.askGrid();
       void this.askDetail();
     } else if (picked?.kind === "place" && this.memory !== null) {
