@@ -18,14 +18,19 @@ _EXACT = cogmap.MotionNoise((1e-4,) * 3, (1e-5,) * 3)
 
 
 class Driver:
-    """An agent that drives in circles, a level and a sighting now and then."""
+    """An agent that drives in circles, a level and a sighting now and then. It is told that it starts
+    at `x`; without that it does not know where it is, and sees a lamp that nobody else sees."""
 
-    def __init__(self, service: Server, agent: str, space: str = "default", x: float = 0.0) -> None:
+    def __init__(
+        self, service: Server, agent: str, space: str = "default", x: Optional[float] = 0.0
+    ) -> None:
         self.agent = agent
         self._service = service
         self._space = space
         self._seq = 0
-        self._send([cogmap.Sample(START_NS, cogmap.StartPose((x, 0.0, 0.5)))])
+        self._lamp = "lamp" if x is not None else f"lamp of {agent}"
+        if x is not None:
+            self._send([cogmap.Sample(START_NS, cogmap.StartPose((x, 0.0, 0.5)))])
 
     @property
     def stamp_ns(self) -> int:
@@ -40,7 +45,7 @@ class Driver:
             if step % 10 == 5:
                 body = cogmap.Level("light", math.sin(step / 30))
             elif step % 10 == 9:
-                body = cogmap.Sighting(cogmap.LandmarkTarget("lamp"),
+                body = cogmap.Sighting(cogmap.LandmarkTarget(self._lamp),
                                        cogmap.RangeBearing(2.0, 0.3, 0.1, 0.02))
             else:
                 turn = cogmap.quaternion_from_yaw(0.05)

@@ -56,6 +56,11 @@ class Dashboard:
         """What an element says."""
         return self.page.locator(selector).first.inner_text()
 
+    def panel(self, selector: str) -> str:
+        """What a part says that may not be there yet."""
+        part = self.page.locator(selector)
+        return (part.first.text_content() or "") if part.first.is_visible() else ""
+
     def settle(self) -> None:
         """Waits until the eye stands still."""
         last: List[Any] = [None]

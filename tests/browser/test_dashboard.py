@@ -6,6 +6,7 @@ import json
 import urllib.request
 from typing import Sequence
 
+from arm import FELT, Arm
 from driver import Driver, Driving
 from conftest import MakeServer, Open
 from page import brightness, n_colours
@@ -101,6 +102,38 @@ def test_a_position_recalls_places(service: Server, open_page: Open) -> None:
     page.page.click(".cue button")
     eventually("the typed position", lambda: page.stats()["recalled"][:1] == [expected.place.id])
     assert page.complaints == []
+
+
+def test_hypotheses_narrow_while_an_arm_touches(service: Server, open_page: Open) -> None:
+    arm = Arm(service)
+    for name in FELT:
+        arm.learn(name)
+    page = open_page(service)
+    page.until("the arm", agents=1)
+    eventually("the objects", lambda: page.page.locator("[data-object]").count() == len(FELT))
+    arm.identify()
+    arm.touch(FELT["cup"][::-1][:1], -0.02)
+    eventually("both in question", lambda: "Recognising by touch" in page.panel(".touch")
+               and {"cup", "can"} <= set(page.page.locator(".bars .what").all_inner_texts()))
+    arm.touch(FELT["cup"][::-1][1:], -0.02)
+    eventually("the verdict", lambda: "It is cup." in page.panel(".touch"))
+    eventually("the event", lambda: "recognised cup" in page.text(".feed"))
+    page.page.click("[data-object=can]")
+    eventually("the model", lambda: "8 contacts" in page.panel(".object-panel"))
+    assert page.complaints == []
+
+
+def test_an_agent_that_is_lost_is_told_by_word_and_shape(service: Server, open_page: Open) -> None:
+    Driver(service, "ada").drive(STEPS)
+    Driver(service, "eve", x=None).drive(STEPS)
+    page = open_page(service)
+    page.until("both agents", agents=2)
+    eventually("the word", lambda: "lost" in page.text("[data-agent=eve]"))
+    shapes = [page.page.locator(f"[data-agent={name}] path").get_attribute("d")
+              for name in ("ada", "eve")]
+    assert shapes[0] != shapes[1]
+    page.page.click("[data-agent=eve]")
+    eventually("the badge", lambda: page.text(".agent-panel .badge") == "lost")
 
 
 def test_the_past_is_shown_and_left_again(service: Server, open_page: Open) -> None:

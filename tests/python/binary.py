@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Dict, Sequence
 
 #: What the workspace built last in the dev profile.
-_BUILT = Path(__file__).parents[2] / "target" / "debug" / "cogmap"
+_BUILT = Path(__file__).resolve().parents[2] / "target" / "debug" / "cogmap"
 #: Longest run of a command, on a machine that is busy with other tests [s].
 _COMMAND_S = 300.0
 

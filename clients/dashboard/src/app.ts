@@ -9,6 +9,7 @@ import { HealthStrip } from "./panel/health_strip";
 import { Help } from "./panel/help";
 import { Layout } from "./panel/layout";
 import { Legend } from "./panel/legend";
+import { ObjectList } from "./panel/object_list";
 import { Notice } from "./panel/notice";
 import { SpaceChooser } from "./panel/space_chooser";
 import { Timeline } from "./panel/timeline";
@@ -38,6 +39,9 @@ export class App {
   private readonly agentList = new AgentList((name) =>
     this.inspector.choose({ kind: "agent", name }),
   );
+  private readonly objects = new ObjectList((name) =>
+    this.inspector.choose({ kind: "object", name }),
+  );
   private readonly legend = new Legend((colour) => this.colourPlaces(colour));
   private readonly feed = new EventFeed();
   private readonly timeline = new Timeline(() => this.showTime());
@@ -54,6 +58,7 @@ export class App {
         health: this.health.element,
         agents: this.agentList.element,
         legend: this.legend.element,
+        objects: this.objects.element,
         feed: this.feed.element,
         timeline: this.timeline.element,
         notice: this.notice.element,
@@ -226,6 +231,7 @@ export class App {
     this.health.update(memory, palette.strength[2]!);
     this.agentList.update(memory, palette, picked, focus.followed);
     this.legend.update(memory, palette, this.placeColour);
+    this.objects.update(memory, focus.selected?.kind === "object" ? focus.selected.name : null);
     this.timeline.update(memory, palette);
     this.inspector.fill();
     this.stage.frames.add(performance.now() - began);

@@ -5,6 +5,7 @@ import type { Agent } from "./memory/agent";
 import type { Memory } from "./memory/memory";
 import { AgentPanel } from "./panel/agent_panel";
 import type { Layout } from "./panel/layout";
+import { ObjectPanel } from "./panel/object_panel";
 import { PlacePanel } from "./panel/place_panel";
 import { RecallPanel } from "./panel/recall_panel";
 import { Problem } from "./problem";
@@ -16,6 +17,8 @@ import type { AgentDetail, GridState, Vec3 } from "./wire";
 /** How often the grid state and the detail of an agent are asked for [ms]. */
 const GRID_MS = 160;
 const DETAIL_MS = 1000;
+/** How often a model turns on [ms]. */
+const TURN_MS = 50;
 /** Places that recall asks for. */
 const RECALLED = 8;
 /** Firing fields are shown within this many spacings; this part of a spacing is their radius. */
@@ -32,6 +35,7 @@ export class Inspector {
     (at) => void this.recall(at),
     () => this.choose(null),
   );
+  private readonly objectPanel = new ObjectPanel(() => this.choose(null));
   private readonly recallPanel: RecallPanel;
   private memory: Memory | null = null;
   private module: number | null = null;
@@ -57,7 +61,7 @@ export class Inspector {
       close: () => this.closeRecall(),
       choose: (id) => this.choose({ kind: "place", id }),
     });
-    this.panels = [this.agentPanel.element, this.placePanel.element, this.recallPanel.element];
+    this.panels = Object.values(this.shown).map(({ element }) => element);
   }
 
   /** Begins, once there are a scene and a page. */
@@ -66,6 +70,7 @@ export class Inspector {
     this.inspect("none");
     window.setInterval(() => void this.askGrid(), GRID_MS);
     window.setInterval(() => void this.askDetail(), DETAIL_MS);
+    window.setInterval(() => this.turn(), TURN_MS);
   }
 
   open(memory: Memory): void {
@@ -83,12 +88,19 @@ export class Inspector {
       }
       this.lastAgent = picked.name;
       this.inspect("agent");
+      const agent = this.agent;
+      if (agent !== null && agent.touch === null) {
+        void this.memory?.askTouch(agent);
+      }
       void this.askGrid();
       void this.askDetail();
     } else if (picked?.kind === "place" && this.memory !== null) {
       const isWanted = (): boolean => this.stage.focus.selected === picked;
       this.inspect("place");
       void this.placePanel.show(picked.id, this.memory, isWanted);
+    } else if (picked?.kind === "object" && this.memory !== null) {
+      this.inspect("object");
+      void this.objectPanel.show(picked.name, this.memory);
     } else if (picked === null) {
       focus.followed = null;
       this.chooseModule(null);
@@ -204,16 +216,34 @@ export class Inspector {
     }
   }
 
+  private turn(): void {
+    const kind = this.stage.focus.selected?.kind;
+    if (kind === "object") {
+      this.objectPanel.draw(this.stage.palette);
+    } else if (kind === "agent") {
+      this.agentPanel.touch.turn();
+    }
+  }
+
   private get agent(): Agent | null {
     const selected = this.stage.focus.selected;
     const name = selected?.kind === "agent" ? selected.name : "";
     return this.memory?.agents.get(name) ?? null;
   }
 
-  private inspect(what: "agent" | "place" | "recall" | "none"): void {
-    this.agentPanel.element.hidden = what !== "agent";
-    this.placePanel.element.hidden = what !== "place";
-    this.recallPanel.element.hidden = what !== "recall";
+  private get shown() {
+    return {
+      agent: this.agentPanel,
+      place: this.placePanel,
+      object: this.objectPanel,
+      recall: this.recallPanel,
+    };
+  }
+
+  private inspect(what: "agent" | "place" | "object" | "recall" | "none"): void {
+    for (const [name, { element }] of Object.entries(this.shown)) {
+      element.hidden = name !== what;
+    }
     this.layout.inspect(what !== "none");
   }
 

@@ -25,6 +25,8 @@ import type {
 
 /** Most pages of one list that the page asks for. */
 const PAGES_MAX = 64;
+/** Items of a page: as many as there may be. */
+const PAGE_ITEMS = 1000;
 
 async function ask(path: string, init: RequestInit = {}): Promise<Response> {
   const headers = new Headers(init.headers);
@@ -150,12 +152,13 @@ export class Space {
     const items: T[] = [];
     let after = parameters["after"];
     for (let page = 0; page < PAGES_MAX; page += 1) {
-      const asked = query({ ...parameters, limit: 1000, after });
+      const asked = query({ ...parameters, limit: PAGE_ITEMS, after });
       const answer = await get<Record<string, unknown>>(`${this.base}/${path}?${asked}`);
       const found = answer[field] as T[];
       items.push(...found);
       const next = answer["next"] as string | number | null | undefined;
-      if (next === null || next === undefined || found.length === 0) {
+      // Events have a next page even where it is empty so far.
+      if (next === null || next === undefined || found.length < PAGE_ITEMS) {
         break;
       }
       after = next;

@@ -169,10 +169,7 @@ fn body(body: &ReadingBody) -> Result<SampleBody, InvalidSample> {
             range_sd_m,
             bearing_sd_rad,
         } => SampleBody::Sighting(Sighting {
-            target: match target {
-                ReadingTarget::Landmark(label) => Target::Landmark(Label::new(label)?),
-                ReadingTarget::Robot(name) => Target::Agent(Label::new(name)?),
-            },
+            target: target_of(target)?,
             relation: Relation::RangeBearing(RangeBearing::new(
                 *range_m,
                 *azimuth_rad,
@@ -189,25 +186,35 @@ fn body(body: &ReadingBody) -> Result<SampleBody, InvalidSample> {
             *rotation_xyzw,
             PoseNoise::none(),
         )?),
-        ReadingBody::Level { channel, value } => {
-            SampleBody::Level(Level::new(Label::new(channel)?, *value, [0.0; 3], None)?)
-        }
+        ReadingBody::Level { channel, value } => level(channel, *value, [0.0; 3], None)?,
         ReadingBody::Contact {
             channel,
             value,
             offset_m,
             normal,
-        } => SampleBody::Level(Level::new(
-            Label::new(channel)?,
-            *value,
-            *offset_m,
-            Some(*normal),
-        )?),
+        } => level(channel, *value, *offset_m, Some(*normal))?,
         ReadingBody::Object(mark) => SampleBody::Object(object_mark(mark)?),
         ReadingBody::Descriptor { channel, vector } => {
             SampleBody::Descriptor(Descriptor::new(Label::new(channel)?, vector)?)
         }
     })
+}
+
+fn target_of(target: &ReadingTarget) -> Result<Target, InvalidSample> {
+    Ok(match target {
+        ReadingTarget::Landmark(label) => Target::Landmark(Label::new(label)?),
+        ReadingTarget::Robot(name) => Target::Agent(Label::new(name)?),
+    })
+}
+
+fn level(
+    channel: &str,
+    value: f64,
+    offset_m: [f64; 3],
+    normal: Option<[f64; 3]>,
+) -> Result<SampleBody, InvalidSample> {
+    let level = Level::new(Label::new(channel)?, value, offset_m, normal)?;
+    Ok(SampleBody::Level(level))
 }
 
 fn object_mark(mark: &ReadingMark) -> Result<ObjectMark, InvalidSample> {

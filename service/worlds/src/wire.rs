@@ -32,10 +32,7 @@ impl From<&Reading> for Sample {
                 range_sd_m,
                 bearing_sd_rad,
             } => SampleBody::Sighting(Sighting {
-                target: match target {
-                    ReadingTarget::Landmark(label) => Target::Landmark(label.clone()),
-                    ReadingTarget::Robot(name) => Target::Agent(name.clone()),
-                },
+                target: target.into(),
                 relation: Relation::RangeBearing {
                     range_m: *range_m,
                     azimuth_rad: *azimuth_rad,
@@ -52,23 +49,13 @@ impl From<&Reading> for Sample {
                 rotation_xyzw: *rotation_xyzw,
                 noise: None,
             }),
-            ReadingBody::Level { channel, value } => SampleBody::Level(Level {
-                channel: channel.clone(),
-                value: *value,
-                offset_m: [0.0; 3],
-                normal: None,
-            }),
+            ReadingBody::Level { channel, value } => level(channel, *value, [0.0; 3], None),
             ReadingBody::Contact {
                 channel,
                 value,
                 offset_m,
                 normal,
-            } => SampleBody::Level(Level {
-                channel: channel.clone(),
-                value: *value,
-                offset_m: *offset_m,
-                normal: Some(*normal),
-            }),
+            } => level(channel, *value, *offset_m, Some(*normal)),
             ReadingBody::Object(mark) => SampleBody::Object(mark.into()),
             ReadingBody::Descriptor { channel, vector } => SampleBody::Descriptor(Descriptor {
                 channel: channel.clone(),
@@ -78,6 +65,24 @@ impl From<&Reading> for Sample {
         Self {
             stamp_ns: reading.stamp_ns,
             body,
+        }
+    }
+}
+
+fn level(channel: &str, value: f64, offset_m: [f64; 3], normal: Option<[f64; 3]>) -> SampleBody {
+    SampleBody::Level(Level {
+        channel: channel.to_owned(),
+        value,
+        offset_m,
+        normal,
+    })
+}
+
+impl From<&ReadingTarget> for Target {
+    fn from(target: &ReadingTarget) -> Self {
+        match target {
+            ReadingTarget::Landmark(label) => Self::Landmark(label.clone()),
+            ReadingTarget::Robot(name) => Self::Agent(name.clone()),
         }
     }
 }

@@ -34,6 +34,8 @@ const EVENTS_MAX = 1500;
 /** How often it asks for what ticks leave out [ms]. */
 const REFRESH_MS = 2000;
 const TOUCH_MS = 400;
+/** Agents whose episodes are asked for at a time: judging one takes the service milliseconds. */
+const TOUCHING_MAX = 4;
 
 export interface ShownEvent extends EventRecord {
   /** Time on the view's clock [s]; 0 for events without a stamp. */
@@ -294,20 +296,16 @@ export class Memory {
     return poses;
   }
 
-  /** Asks what the episodes with objects say. */
+  /** Asks what an agent touches, or touched last. */
+  async askTouch(agent: Agent): Promise<void> {
+    agent.touch = await this.space.agentObject(agent.name).catch(() => null);
+  }
+
+  /** Asks what the episodes with objects say, and once more when they have ended. */
   private async askTouches(): Promise<void> {
-    const touching = [...this.agents.values()].filter(({ live }) => live.contacts !== null);
-    for (const agent of touching.slice(0, 4)) {
-      try {
-        agent.touch = await this.space.agentObject(agent.name);
-      } catch {
-        // The agent may be gone.
-      }
-    }
-    for (const agent of this.agents.values()) {
-      if (agent.live.contacts === null && agent.touch?.episode) {
-        agent.touch = await this.space.agentObject(agent.name).catch(() => null);
-      }
-    }
+    const agents = [...this.agents.values()];
+    const touching = agents.filter(({ live }) => live.contacts !== null).slice(0, TOUCHING_MAX);
+    const ended = agents.filter(({ live, touch }) => live.contacts === null && touch?.episode);
+    await Promise.all([...touching, ...ended].map((agent) => this.askTouch(agent)));
   }
 }

@@ -9,7 +9,7 @@ const STRIDE = 8;
 /** Two poses farther apart than this are not joined by a line [s]. */
 const GAP_S = 3;
 /** Nor are those between which the agent would have moved faster than this [m/s]. */
-const SPEED_MAX_M_S = 60;
+const SPEED_MAX_M_S = 40;
 
 /** An agent is at rest that says nothing for so long [s], or moves less than this [m]. */
 const REST_S = 0.25;

@@ -32,7 +32,7 @@ export interface ShownAgent {
 export class AgentPanel {
   readonly element = h("section", { class: "inspect agent-panel" });
   readonly grid: GridPanel;
-  private readonly touch = new TouchPanel();
+  readonly touch = new TouchPanel();
   private readonly mark = h("span", { class: "mark" });
   private readonly name = h("h2");
   private readonly status = h("span");

@@ -13,6 +13,7 @@ export interface Parts {
   health: HTMLElement;
   agents: HTMLElement;
   legend: HTMLElement;
+  objects: HTMLElement;
   feed: HTMLElement;
   timeline: HTMLElement;
   notice: HTMLElement;
@@ -92,7 +93,7 @@ export class Layout {
       "aside",
       { class: "left" },
       h("section", { class: "card" }, h("h3", {}, "Team"), parts.agents),
-      h("section", { class: "card" }, h("h3", {}, "Memory"), parts.legend),
+      h("section", { class: "card" }, h("h3", {}, "Memory"), parts.legend, parts.objects),
     );
     this.right = h("aside", { class: "right" }, ...parts.inspected);
     const bottom = h(

@@ -3,10 +3,11 @@
 import { conjugate, rotate } from "../grid/lattice";
 import type { Agent } from "../memory/agent";
 import type { Memory } from "../memory/memory";
-import { agentColour, rgb, type Palette } from "../scene/palette";
+import { agentColour, type Palette } from "../scene/palette";
 import type { Identification, ObjectDetail, Vec3 } from "../wire";
-import { h, say, sharpContext } from "./dom";
+import { h, say } from "./dom";
 import { percent } from "./format";
+import { drawModel } from "./object_model";
 
 /** Hypotheses that are shown. */
 const BARS_MAX = 5;
@@ -17,6 +18,8 @@ export class TouchPanel {
   private readonly bars = h("ul", { class: "bars" });
   private readonly model = h("canvas", { class: "model" });
   private readonly note = h("p", { class: "soft" });
+  private drawing: { model: ObjectDetail; way: Vec3[]; colour: string; palette: Palette } | null =
+    null;
   private readonly models = new Map<string, ObjectDetail | "asked">();
 
   constructor() {
@@ -42,8 +45,22 @@ export class TouchPanel {
       this.note,
       said === null ? "What is felt teaches an object; nothing is compared." : verdict(said),
     );
-    if (model !== undefined) {
-      this.draw(model, agent, said, palette);
+    this.drawing =
+      model === undefined
+        ? null
+        : {
+            model,
+            way: pathOnModel(agent, said),
+            colour: agentColour(palette, agent.colour),
+            palette,
+          };
+  }
+
+  /** Turns the model on. */
+  turn(): void {
+    if (this.drawing !== null && !this.element.hidden) {
+      const { model, way, colour, palette } = this.drawing;
+      drawModel(this.model, model, way, colour, palette);
     }
   }
 
@@ -90,60 +107,6 @@ export class TouchPanel {
     }
     return known === "asked" ? undefined : known;
   }
-
-  /** Draws the model, turning slowly, and the way of the body on it. */
-  private draw(
-    model: ObjectDetail,
-    agent: Agent,
-    said: Identification | null,
-    palette: Palette,
-  ): void {
-    const context = sharpContext(this.model);
-    if (context === null) {
-      return;
-    }
-    const { clientWidth: width, clientHeight: height } = this.model;
-    const { min_m: low, max_m: high } = model.summary;
-    const middle = low.map((x, i) => (x + high[i]!) / 2) as Vec3;
-    const size = Math.max(Math.hypot(...low.map((x, i) => high[i]! - x)), 1e-3);
-    const scale = (0.86 * Math.min(width, height)) / size;
-    const turn = performance.now() / 4000;
-    const put = (at: Vec3): { x: number; y: number; depth: number } => {
-      const [dx, dy, dz] = at.map((x, i) => x - middle[i]!) as Vec3;
-      const x = dx * Math.cos(turn) - dy * Math.sin(turn);
-      const away = dx * Math.sin(turn) + dy * Math.cos(turn);
-      return {
-        x: width / 2 + scale * x,
-        y: height / 2 - scale * (0.9 * dz + 0.42 * away),
-        depth: away,
-      };
-    };
-    const points = model.places.map((place) => ({ ...put(place.position_m), place }));
-    const levels = model.places.map((place) => place.levels[0]?.mean ?? 0);
-    const [least, most] = [Math.min(...levels), Math.max(...levels)];
-    for (const { x, y, depth, place } of points.sort((a, b) => b.depth - a.depth)) {
-      const level = ((place.levels[0]?.mean ?? least) - least) / Math.max(most - least, 1e-9);
-      context.globalAlpha = 0.5 + 0.4 * Math.min(1, Math.max(0, 0.5 - depth / size));
-      context.fillStyle = ramp(palette.age, level);
-      context.beginPath();
-      context.arc(x, y, 2.4, 0, 2 * Math.PI);
-      context.fill();
-    }
-    const path = pathOnModel(agent, said);
-    context.globalAlpha = 0.9;
-    context.strokeStyle = context.fillStyle = agentColour(palette, agent.colour);
-    context.lineWidth = 1.5;
-    context.beginPath();
-    path.forEach((at) => context.lineTo(put(at).x, put(at).y));
-    context.stroke();
-    const last = path.at(-1);
-    if (last !== undefined) {
-      context.beginPath();
-      context.arc(put(last).x, put(last).y, 4, 0, 2 * Math.PI);
-      context.fill();
-    }
-    context.globalAlpha = 1;
-  }
 }
 
 /** The way of the body since the episode began, in the frame of the most probable object. */
@@ -173,11 +136,4 @@ function verdict(said: Identification): string {
     `${poses} ${poses === 1 ? "pose comes" : "poses come"} into question, ` +
     `${said.entropy_nats.toFixed(2)} nats.`
   );
-}
-
-function ramp(stops: string[], part: number): string {
-  const at = Math.min(0.999, Math.max(0, part)) * (stops.length - 1);
-  const [low, high] = [rgb(stops[Math.floor(at)]!), rgb(stops[Math.floor(at) + 1]!)];
-  const mixed = low.map((x, i) => Math.round(255 * (x + (at % 1) * (high[i]! - x))));
-  return `rgb(${mixed.join(" ")})`;
 }

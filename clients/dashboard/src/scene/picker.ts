@@ -8,7 +8,8 @@ import type { Vec3 } from "../wire";
 export type Picked =
   | { kind: "agent"; name: string }
   | { kind: "landmark"; name: string }
-  | { kind: "place"; id: number };
+  | { kind: "place"; id: number }
+  | { kind: "object"; name: string };
 
 /** How near the point has to be to what is meant [px]. */
 const REACH_PX = { agent: 18, landmark: 12, place: 11 };
