@@ -137,6 +137,11 @@ impl Agent {
         self.announced.placed()
     }
 
+    /// Contacts of the episode with an object that is under way; `None` where there is none.
+    pub fn episode_contacts(&self) -> Option<u64> {
+        self.episode.as_ref().map(Episode::count)
+    }
+
     /// Pose in `map`; counted from identity while the agent is not placed.
     pub fn pose(&self) -> &Isometry3<f64> {
         &self.announced.in_map

@@ -146,6 +146,14 @@ impl CognitiveMap {
         self.places.iter_from(first)
     }
 
+    /// Identifiers of all places that were recruited, moved, visited or forgotten after a revision,
+    /// and of some others, in order: at most 64 for each of those. Nothing that was forgotten
+    /// before the map was restored from a checkpoint is among them, so `since_revision` must not be
+    /// below the checkpoint's.
+    pub fn places_near_changes(&self, since_revision: u64) -> impl Iterator<Item = PlaceId> {
+        self.places.ids_near_changes(since_revision)
+    }
+
     /// A place.
     pub fn place(&self, place: PlaceId) -> Option<&Place> {
         self.places.get(place)

@@ -314,6 +314,15 @@ impl PlaceMap {
         self.iter().map(|(id, _)| id)
     }
 
+    /// Identifiers of the pages in which a place was recruited, changed or forgotten after a
+    /// revision, in order: those of forgotten places and of places that did not change among them.
+    pub(crate) fn ids_near_changes(&self, since: u64) -> impl Iterator<Item = PlaceId> {
+        let next = self.places.next_index();
+        let pages = self.places.changed_pages(since);
+        let ids = pages.flat_map(move |(page, _)| page * PAGE..next.min((page + 1) * PAGE));
+        ids.map(|id| PlaceId(u32::try_from(id).expect("identifiers are given out as 32 bits")))
+    }
+
     /// Squared distance of a place from a position \[m²\].
     fn squared(&self, place: PlaceId, position: &Point3<f64>) -> f64 {
         self.get(place).map_or(f64::INFINITY, |place| {
