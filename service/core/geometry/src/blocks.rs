@@ -34,12 +34,14 @@ pub fn beside(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3x6<f64> {
 
 /// Jacobian of a point q = T⁻¹ p of the map, as seen from a pose, with respect to the error on the
 /// right of that pose T = T̂ exp(ξ): | −I  q× |. `seen` is q \[m\].
+#[inline]
 pub fn seen_by_pose(seen: &Vector3<f64>) -> Matrix3x6<f64> {
     beside(&-Matrix3::identity(), &seen.cross_matrix())
 }
 
 /// Jacobian of a point T y with respect to the error on the right of the pose T = T̂ exp(ξ), with
 /// its `rotation` R: R | I  −y× |. `point` is y \[m\].
+#[inline]
 pub fn carried_by_pose(rotation: &Matrix3<f64>, point: &Vector3<f64>) -> Matrix3x6<f64> {
     beside(rotation, &-(rotation * point.cross_matrix()))
 }

@@ -81,12 +81,14 @@ pub fn log(motion: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
 }
 
 /// The twist of [`log`] as one vector ξ = (ρ, φ) \[m, rad\].
+#[inline]
 pub fn twist(motion: &Isometry3<f64>) -> Vector6<f64> {
     let (linear, angular) = log(motion);
     join(&linear, &angular)
 }
 
 /// The twist with this translation part ρ \[m\] and rotation part φ \[rad\].
+#[inline]
 pub fn join(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(
         linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
@@ -94,6 +96,7 @@ pub fn join(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
 }
 
 /// Translation part ρ \[m\] and rotation part φ \[rad\] of a twist.
+#[inline]
 pub fn split(twist: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (
         twist.fixed_rows::<3>(0).into_owned(),
@@ -104,6 +107,7 @@ pub fn split(twist: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
 /// T ⊕ ξ = T exp(ξ): a pose after a perturbation on its right. The rotation is normalised again,
 /// because products of unit quaternions drift away from length one.
 #[must_use]
+#[inline]
 pub fn plus(pose: &Isometry3<f64>, twist: &Vector6<f64>) -> Isometry3<f64> {
     let (linear, angular) = split(twist);
     let mut moved = pose * exp(&linear, &angular);

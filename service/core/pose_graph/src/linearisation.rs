@@ -26,37 +26,35 @@ pub(super) struct NormalBlocks {
 impl Link {
     /// s = rᵀ Ω r at these poses of its nodes.
     pub(super) fn squared_error(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
-        match self.residual(from, to) {
-            Residual::Pose(residual, information) => residual.dot(&(information * residual)),
-            Residual::Position(residual, information) => residual.dot(&(information * residual)),
-        }
-    }
-
-    /// r and Ω at these poses of its nodes.
-    fn residual(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> Residual<'_> {
         match self {
             Self::PosePrior {
                 at, information, ..
-            } => Residual::Pose(se3::twist(&at.inv_mul(to)), information.matrix()),
+            } => {
+                let residual = se3::twist(&at.inv_mul(to));
+                residual.dot(&(information.matrix() * residual))
+            }
             Self::Between {
                 transform,
                 information,
                 ..
             } => {
-                let error = transform.inv_mul(&from.inv_mul(to));
-                Residual::Pose(se3::twist(&error), information.matrix())
+                let residual = se3::twist(&transform.inv_mul(&from.inv_mul(to)));
+                residual.dot(&(information.matrix() * residual))
             }
             Self::PointPrior {
                 at, information, ..
-            } => Residual::Position(to.translation.vector - at.coords, information.matrix()),
+            } => {
+                let residual = to.translation.vector - at.coords;
+                residual.dot(&(information.matrix() * residual))
+            }
             Self::Sighting {
                 position,
                 information,
                 target,
                 ..
             } => {
-                let off = seen(from, to, &target.lever()) - position;
-                Residual::Position(off, information.matrix())
+                let residual = seen(from, to, &target.lever()) - position;
+                residual.dot(&(information.matrix() * residual))
             }
         }
     }
@@ -68,40 +66,56 @@ impl Link {
         to: &Isometry3<f64>,
         weigh: impl Fn(f64) -> f64,
     ) -> NormalBlocks {
-        match self.residual(from, to) {
-            Residual::Pose(residual, information) => {
-                let (to_to, to_gradient) = pose_blocks(&residual, information, weigh);
-                let alone = NormalBlocks {
+        match self {
+            Self::PosePrior {
+                at, information, ..
+            } => {
+                let residual = se3::twist(&at.inv_mul(to));
+                let (to_to, to_gradient) = pose_blocks(&residual, information.matrix(), weigh);
+                NormalBlocks {
                     to_to,
                     to_gradient,
                     ..NormalBlocks::zero()
-                };
-                match self {
-                    Self::Between { .. } => alone.with_measuring_pose(&from.inv_mul(to)),
-                    _ => alone,
                 }
             }
-            Residual::Position(residual, information) => {
-                let (information, force) = weighted(&residual, information, weigh);
-                match self {
-                    Self::Sighting { target, .. } => {
-                        sighting_blocks((from, to), *target, &information, &force)
-                    }
-                    _ => NormalBlocks {
-                        to_to: corner(&information),
-                        to_gradient: top(&force),
-                        ..NormalBlocks::zero()
-                    },
+            Self::Between {
+                transform,
+                information,
+                ..
+            } => {
+                let between = from.inv_mul(to);
+                let residual = se3::twist(&transform.inv_mul(&between));
+                let (to_to, to_gradient) = pose_blocks(&residual, information.matrix(), weigh);
+                // r(T_from exp δ) = r(T_to exp(−Ad(T_to⁻¹ T_from) δ)).
+                let moved = -se3::adjoint(&between.inverse());
+                let to_from = to_to * moved;
+                NormalBlocks {
+                    from_from: moved.tr_mul(&to_from),
+                    to_from,
+                    to_to,
+                    from_gradient: moved.tr_mul(&to_gradient),
+                    to_gradient,
                 }
             }
+            Self::PointPrior {
+                at, information, ..
+            } => {
+                let residual = to.translation.vector - at.coords;
+                let (information, force) = weighted(&residual, information.matrix(), weigh);
+                NormalBlocks {
+                    to_to: corner(&information),
+                    to_gradient: top(&force),
+                    ..NormalBlocks::zero()
+                }
+            }
+            Self::Sighting {
+                position,
+                information,
+                target,
+                ..
+            } => sighting_blocks((from, to), *target, position, information.matrix(), weigh),
         }
     }
-}
-
-/// r and Ω of a link.
-enum Residual<'a> {
-    Pose(Vector6<f64>, &'a Matrix6<f64>),
-    Position(Vector3<f64>, &'a Matrix3<f64>),
 }
 
 impl NormalBlocks {
@@ -114,33 +128,19 @@ impl NormalBlocks {
             to_gradient: Vector6::zeros(),
         }
     }
-
-    /// Adds the pose that measured, with the measured one at `between` in its frame.
-    ///
-    /// ```text
-    /// r(T_from exp δ) = r(T_to exp(−Ad(T_to⁻¹ T_from) δ))
-    /// ```
-    fn with_measuring_pose(self, between: &Isometry3<f64>) -> Self {
-        let moved = -se3::adjoint(&between.inverse());
-        let to_from = self.to_to * moved;
-        Self {
-            from_from: moved.tr_mul(&to_from),
-            to_from,
-            from_gradient: moved.tr_mul(&self.to_gradient),
-            ..self
-        }
-    }
 }
 
-/// The blocks of a sighting, of w Ω and w Ω r.
+/// The blocks of a sighting.
 fn sighting_blocks(
     (from, to): (&Isometry3<f64>, &Isometry3<f64>),
     target: SightingTarget,
+    position: &Vector3<f64>,
     information: &Matrix3<f64>,
-    force: &Vector3<f64>,
+    weigh: impl Fn(f64) -> f64,
 ) -> NormalBlocks {
     let in_target = target.lever();
     let seen = seen(from, to, &in_target);
+    let (information, force) = weighted(&(seen - position), information, weigh);
     // The target's motion in the axes of the pose that saw it.
     let turn = match target {
         SightingTarget::Point(_) => from.rotation.inverse(),
@@ -149,7 +149,7 @@ fn sighting_blocks(
         }
     };
     let turn = turn.to_rotation_matrix().into_inner();
-    let turned = turn.tr_mul(information);
+    let turned = turn.tr_mul(&information);
     // What that pose's own motion does to the target in its frame: −ρ − φ×seen.
     let lever = seen.cross_matrix();
     let with_lever = information * lever;
@@ -157,18 +157,18 @@ fn sighting_blocks(
     let zeros = Matrix3::zeros();
     let mut blocks = NormalBlocks {
         from_from: from_blocks(
-            information,
+            &information,
             &-with_lever,
             &-with_lever.transpose(),
             &lever_lever,
         ),
         to_from: from_blocks(&-turned, &(turned * lever), &zeros, &zeros),
         to_to: corner(&(turned * turn)),
-        from_gradient: se3::join(&-force, &lever.tr_mul(force)),
-        to_gradient: top(&turn.tr_mul(force)),
+        from_gradient: se3::join(&-force, &lever.tr_mul(&force)),
+        to_gradient: top(&turn.tr_mul(&force)),
     };
     if in_target != Vector3::zeros() {
-        blocks.swing(&in_target, &turned, &turn, &lever, force);
+        blocks.swing(&in_target, &turned, &turn, &lever, &force);
     }
     blocks
 }

@@ -47,13 +47,15 @@ impl CellLists {
     ) -> Self {
         let count = size.iter().product::<i64>();
         let count = usize::try_from(count).expect("a box has a positive number of cells");
-        let places = (0u32..).zip(positions.iter().zip(reaches_m));
-        let reached = places.flat_map(|(place, (position, reach_m))| {
-            let indices = reached_cells(&lattice, position, *reach_m);
-            let cells = indices.filter_map(|index| cell(low, size, index));
-            cells.map(move |cell| (cell, place))
-        });
-        let places = Buckets::new(count, reached);
+        let mut reached = Vec::new();
+        for (place, (position, reach_m)) in (0u32..).zip(positions.iter().zip(reaches_m)) {
+            for_each_reached(&lattice, position, *reach_m, |index| {
+                if let Some(cell) = cell(low, size, index) {
+                    reached.push((cell, place));
+                }
+            });
+        }
+        let places = Buckets::new(count, reached.into_iter());
         Self {
             lattice,
             low,
@@ -72,12 +74,13 @@ impl CellLists {
     }
 }
 
-/// Lattice indices of the cells that a ball about a position may touch.
-fn reached_cells(
+/// Visits the cells that a ball about a position may touch, by lattice index.
+fn for_each_reached(
     lattice: &Lattice,
     position: &Point3<f64>,
     reach_m: f64,
-) -> impl Iterator<Item = [i64; 3]> + Clone {
+    mut visit: impl FnMut([i64; 3]),
+) {
     // Half the longest diagonal of a cell is 1.225 spacings.
     let far_m = reach_m + 1.225 * lattice.spacing_m();
     let reach = Vector3::repeat(reach_m);
@@ -86,14 +89,16 @@ fn reached_cells(
         &(position.coords - reach),
         &(position.coords + reach),
     );
-    let along = move |axis: usize| low[axis]..low[axis] + size[axis];
-    let rows = along(0).flat_map(move |i| along(1).map(move |j| (i, j)));
-    let cells = rows.flat_map(move |(i, j)| along(2).map(move |k| [i, j, k]));
-    let (basis, position) = (*lattice.basis(), position.coords);
-    cells.filter(move |index| {
-        let middle = basis * Vector3::from(index.map(|index| index as f64 + 0.5));
-        (middle - position).norm() <= far_m
-    })
+    for i in low[0]..low[0] + size[0] {
+        for j in low[1]..low[1] + size[1] {
+            for k in low[2]..low[2] + size[2] {
+                let middle = Vector3::new(i as f64 + 0.5, j as f64 + 0.5, k as f64 + 0.5);
+                if (lattice.basis() * middle - position.coords).norm() <= far_m {
+                    visit([i, j, k]);
+                }
+            }
+        }
+    }
 }
 
 /// Number of the cell with a lattice index in a box; `None` outside the box.
