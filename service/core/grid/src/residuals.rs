@@ -61,7 +61,8 @@ impl<'a> Residuals<'a> {
             .collect()
     }
 
-    /// What a shift of one module's point \[m\] does to the residuals of all modules and of the box.
+    /// What a shift of one module's point \[m\] does to the residuals of all modules and of the
+    /// box.
     pub(super) fn shifted(&self, module: usize, by: &Vector3<f64>) -> Vec<f64> {
         let position = self.weights[module] * by;
         let mut residuals = Vec::with_capacity(3 * self.lattices.len() + 3);

@@ -141,7 +141,8 @@ pub(crate) const LIST_CELL_PER_REACH: f64 = 0.33;
 
 // Surfels: fitting them to places.
 
-/// Neighbours by which the density of places is estimated: their number scatters by a third. Chosen.
+/// Neighbours by which the density of places is estimated: their number scatters by a third.
+/// Chosen.
 pub(crate) const DENSITY_NEIGHBOURS: usize = 10;
 /// Neighbours to which a surfel is fitted. Chosen.
 pub(crate) const FIT_NEIGHBOURS: usize = 16;

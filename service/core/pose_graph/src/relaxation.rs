@@ -88,7 +88,8 @@ impl PoseGraph {
     /// Moves all nodes to the nearest places at which χ² is least: Gauss–Newton steps inside a
     /// region of trust (Powell's dogleg; Nocedal & Wright 2006, Sec. 4.1).
     ///
-    /// Of a part that nothing connects with `map` the directions that no link determines are not moved.
+    /// Of a part that nothing connects with `map` the directions that no link determines are not
+    /// moved.
     pub fn relax(&mut self, settings: &RelaxationSettings) -> Relaxed {
         let structure = NormalEquations {
             map: self,

@@ -3,6 +3,7 @@
 mod bytes;
 mod codec;
 mod digest;
+mod macros;
 mod matrix;
 mod moments;
 mod page_version;

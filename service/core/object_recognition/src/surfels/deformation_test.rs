@@ -172,8 +172,8 @@ mod tests {
         // A ball that is moved is the same ball.
         let (moved, _) = many(&|normal| 0.003 * normal.x);
         assert!((moved - mean).abs() < 0.1, "{moved}");
-        // One of 83 mm, and one that is 4 mm longer than wide; each contact differs by 0.75 deviations,
-        // or less.
+        // One of 83 mm, and one that is 4 mm longer than wide; each contact differs by 0.75
+        // deviations, or less.
         let (larger, _) = many(&|_| 0.0015);
         let (longer, _) = many(&|normal| 0.002 * (2.0 * normal.z * normal.z - 1.0));
         assert!(larger < -2.5 && longer < -2.5, "{larger} {longer}");

@@ -1,9 +1,9 @@
 //! Batch alignment: a pose by all queries at once.
 //!
 //! Consecutive queries have correlated errors: the views about them leave the same part open, and
-//! odometry errs in the same way. The correlations follow from the Gaussian process. With queries Y (rows)
-//! from points x along the way, views U from points p, and the kernel K between views, k between
-//! views and queries, κ between queries:
+//! odometry errs in the same way. The correlations follow from the Gaussian process. With queries Y
+//! (rows) from points x along the way, views U from points p, and the kernel K between views, k
+//! between views and queries, κ between queries:
 //!
 //! ```text
 //! R = Y − kᵀK⁻¹U      C = κ − kᵀK⁻¹k + D      cost = ½ n (ln |C| + tr C⁻¹RRᵀ)

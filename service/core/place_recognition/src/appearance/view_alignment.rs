@@ -4,7 +4,7 @@
 //! log odds
 //!
 //! ```text
-//! s = ln((1 − ε) exp(min(½ n τ (1 − q − ln e), G)) + ε)        where something is known; 0 elsewhere
+//! s = ln((1 − ε) exp(min(½ n τ (1 − q − ln e), G)) + ε)      where something is known, else 0
 //! ```
 //!
 //! with effective dimension n, of which the part τ counts, since queries within the kernel's length

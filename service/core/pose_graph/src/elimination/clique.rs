@@ -8,8 +8,8 @@ use super::dense;
 /// Unknowns that a variable has at most.
 pub(crate) const DIMENSION_MAX: usize = 6;
 
-/// Variables that are eliminated together, the later ones that are coupled with them, and the dense matrix
-/// over both.
+/// Variables that are eliminated together, the later ones that are coupled with them, and the dense
+/// matrix over both.
 ///
 /// With the frontal variables first, the rows and columns of the front are
 ///

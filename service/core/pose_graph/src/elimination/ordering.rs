@@ -179,8 +179,8 @@ impl Quotient {
         }
     }
 
-    /// Replaces a pivot by the element of all that is coupled with it. Returns the elements used up by
-    /// that.
+    /// Replaces a pivot by the element of all that is coupled with it. Returns the elements used up
+    /// by that.
     fn eliminate(&mut self, pivot: usize) -> Vec<usize> {
         self.step += 1;
         let step = self.step;
