@@ -1,15 +1,14 @@
-"""A browser for the tests, and services for it. Debian's Chromium is looked for; none is fetched."""
+"""A browser for the tests, and services for it."""
 
 from __future__ import annotations
 
-import os
-import shutil
 from pathlib import Path
 from typing import Any, Callable, Iterator, List, Optional, Sequence
 
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
+from chromium import launch
 from page import Dashboard
 from server import Server
 from wait import LONG_S
@@ -17,25 +16,12 @@ from wait import LONG_S
 MakeServer = Callable[..., Server]
 Open = Callable[..., Dashboard]
 
-#: WebGL without a graphics card.
-ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
-
-
-def chromium() -> str:
-    """The browser: `CHROMIUM`, or Debian's."""
-    found = shutil.which(os.environ.get("CHROMIUM") or "chromium")
-    if not found:
-        raise FileNotFoundError("there is no Chromium: run `apt-get install chromium`, or name one in "
-                                "CHROMIUM")
-    return found
-
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    """A headless browser. Root may not have a sandbox in a container."""
-    arguments = ARGUMENTS + (["--no-sandbox"] if os.geteuid() == 0 else [])
+    """A headless browser."""
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=arguments)
+        browser = launch(playwright)
         yield browser
         browser.close()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import os
 import re
 import subprocess
 import tempfile
@@ -14,7 +13,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Page, ViewportSize, sync_playwright
 
-from conftest import ARGUMENTS, chromium
+from chromium import launch
 
 #: Address that the demo prints.
 _ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+")
@@ -27,23 +26,29 @@ _SIZE = ViewportSize(width=1440, height=900)
 
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--binary", required=True, help="the program cogmap")
+    options.add_argument("--binary", help="the program cogmap, whose demo is shown")
+    options.add_argument("--url", help="a service that runs a demo already, instead of one")
     options.add_argument("--out", required=True, type=Path, help="the picture, PNG")
-    options.add_argument("--after", type=float, default=50.0, help="seconds into the demo")
+    options.add_argument("--after", type=float, default=42.0, help="seconds until then")
     options.add_argument("--keys", default="", help="keys that are pressed before")
     options.add_argument("--theme", choices=["dark", "light"], default="dark")
     asked = options.parse_args()
+    picture = take(asked.url, asked) if asked.url else take_demo(asked)
+    asked.out.parent.mkdir(parents=True, exist_ok=True)
+    asked.out.write_bytes(picture)
+    print(f"{asked.out}: {len(picture)} bytes")
+
+
+def take_demo(asked: argparse.Namespace) -> bytes:
+    """The picture of the page of a demo that is started for it."""
     with tempfile.TemporaryFile("w+") as log:
         command = [asked.binary, "demo", "--duration", f"{asked.after + 60:.0f}s"]
         demo = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
         try:
-            picture = take(address(demo, Path(f"/proc/self/fd/{log.fileno()}")), asked)
+            return take(address(demo, Path(f"/proc/self/fd/{log.fileno()}")), asked)
         finally:
             demo.terminate()
             demo.wait()
-    asked.out.parent.mkdir(parents=True, exist_ok=True)
-    asked.out.write_bytes(picture)
-    print(f"{asked.out}: {len(picture)} bytes")
 
 
 def address(demo: "subprocess.Popen[bytes]", log: Path) -> str:
@@ -60,9 +65,8 @@ def address(demo: "subprocess.Popen[bytes]", log: Path) -> str:
 def take(url: str, asked: argparse.Namespace) -> bytes:
     """The picture of the page, some time into the demo."""
     began = time.monotonic()
-    arguments = ARGUMENTS + (["--no-sandbox"] if os.geteuid() == 0 else [])
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=arguments)
+        browser = launch(playwright)
         page = browser.new_page(viewport=_SIZE, color_scheme=asked.theme)
         page.goto(f"{url}/?space=demo")
         wait(page, began + asked.after - time.monotonic())
@@ -79,13 +83,12 @@ def wait(page: Page, seconds: float) -> None:
 
 
 def small(picture: bytes) -> bytes:
-    """The picture with as many colours as fit into the bytes that it may have."""
+    """The picture with brightness in as fine steps as fit into the bytes that it may have."""
     image = Image.open(io.BytesIO(picture)).convert("RGB")
-    for colours in (None, 256, 128, 64):
-        made = image if colours is None else image.quantize(
-            colours, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.FLOYDSTEINBERG)
+    for step in (1, 2, 3, 4, 6, 8):
+        table = [min(255, (value + step // 2) // step * step) for value in range(256)]
         written = io.BytesIO()
-        made.save(written, "PNG", optimize=True)
+        image.point(3 * table).save(written, "PNG", optimize=True)
         if written.tell() <= _BYTES_MAX:
             break
     return written.getvalue()

@@ -51,6 +51,15 @@ test("an agent was at rest if it said nothing for a while, or has not moved", ()
   assert.equal(new Track().restBefore(1), null);
 });
 
+test("no line joins the frame of a lost agent with the map", () => {
+  const made = track([1, 1.1, 1.2, 1.3]);
+  made.part(1.2);
+  assert.deepEqual(
+    [1, 2, 3].map((i) => made.isJoined(i)),
+    [true, false, true],
+  );
+});
+
 test("a long track keeps its later half", () => {
   const made = new Track();
   for (let i = 0; i < 40_000; i += 1) {

@@ -188,6 +188,11 @@ export class Memory {
     const earlier = (await this.space.events()).map((record) => this.shown(record));
     const fresh = earlier.filter(({ id }) => !known.has(id));
     this.events.unshift(...fresh);
+    for (const { kind, event, s } of fresh) {
+      if (kind === "agent_placed") {
+        this.agents.get(event.agent)?.track.part(s);
+      }
+    }
     this.listener.recounted();
   }
 
@@ -198,6 +203,8 @@ export class Memory {
       this.cloud.recruit(place, fields["translation_m"] as never, s);
     } else if (kind === "place_forgotten") {
       this.cloud.forget(place);
+    } else if (kind === "agent_placed") {
+      this.agents.get(event.agent)?.track.part(s);
     } else if (kind === "trip_started") {
       this.trips.start(fields["trip"] as number, event.agent, event.stamp_ns);
     }

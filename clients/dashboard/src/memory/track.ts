@@ -4,6 +4,8 @@ import type { Quat, Vec3 } from "../wire";
 
 /** Poses that a track keeps; an hour at ten poses a second. Beyond, the older half goes. */
 const POSES_MAX = 36_000;
+/** Breaks that a track keeps. */
+const BREAKS_MAX = 32;
 /** Numbers of a pose: time, position, rotation. */
 const STRIDE = 8;
 /** Two poses farther apart than this are not joined by a line [s]. */
@@ -26,6 +28,8 @@ export class Track {
   n = 0;
   /** Grows with each change other than poses added at the end. */
   rewrites = 0;
+  /** Times at which the frame of the poses became another one [s]. */
+  private breaks: number[] = [];
 
   push(s: number, position: Vec3, rotation: Quat): void {
     if (this.n > 0 && s <= this.time(this.n - 1)) {
@@ -69,9 +73,19 @@ export class Track {
     return { position: [r[1]!, r[2]!, r[3]!], rotation: [r[4]!, r[5]!, r[6]!, r[7]!] };
   }
 
+  /** Parts what was before a time from what is since: it became known where the agent is [s]. */
+  part(s: number): void {
+    this.breaks.push(s);
+    this.breaks.splice(0, Math.max(0, this.breaks.length - BREAKS_MAX));
+    this.rewrites += 1;
+  }
+
   /** Whether pose `i` follows the one before without a break: no gap, no leap. */
   isJoined(i: number): boolean {
     if (i === 0) {
+      return false;
+    }
+    if (this.breaks.some((at) => at > this.time(i - 1) && at <= this.time(i))) {
       return false;
     }
     const s = this.time(i) - this.time(i - 1);

@@ -38,13 +38,13 @@ export function drawModel(
   const [least, most] = [Math.min(...levels), Math.max(...levels)];
   const points = model.places.map((place, i) => ({
     ...put(place.position_m),
-    level: (levels[i]! - least) / Math.max(most - least, 1e-9),
+    level: most > least ? (levels[i]! - least) / (most - least) : 0.5,
   }));
   const radius = Math.min(4.5, Math.max(1.8, 0.35 * scale * model.summary.spacing_m));
   for (const { x, y, depth, level } of points.sort((a, b) => b.depth - a.depth)) {
     const near = Math.min(1, Math.max(0, 0.5 - depth));
     context.globalAlpha = 0.35 + 0.6 * near;
-    context.fillStyle = ramp(palette.age, level);
+    context.fillStyle = ramp(palette.age.slice(1), level);
     disc(context, x, y, radius * (0.8 + 0.4 * near));
   }
   context.globalAlpha = 0.95;

@@ -70,7 +70,7 @@ export class TouchPanel {
         ? []
         : [
             ...said.objects.slice(0, BARS_MAX),
-            { name: "something unknown", probability: said.unknown },
+            { name: "none of these", probability: said.unknown },
           ];
     while (this.bars.childElementCount > rows.length) {
       this.bars.lastElementChild!.remove();

@@ -1,6 +1,7 @@
 /** The labels of agents, landmarks, scales and recalled places. */
 
 import type { Agent } from "../memory/agent";
+import { percent } from "../panel/format";
 import type { Landmark, RecalledPlace, Vec3 } from "../wire";
 import type { Mark } from "./floor";
 import type { Label } from "./labels";
@@ -25,7 +26,7 @@ export function agentLabel(
   }
   const best = agent.touch?.identification?.objects[0];
   if (isLive && agent.live.contacts !== null && best !== undefined) {
-    notes.push(`${best.name} ${Math.round(100 * best.probability)} %`);
+    notes.push(`${best.name} ${percent(best.probability)}`);
   }
   return [
     {

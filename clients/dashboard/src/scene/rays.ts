@@ -5,7 +5,7 @@ import { Lines } from "./lines";
 import type { Rgb } from "./palette";
 
 /** A sighting is seen for this long [s]. */
-const LASTS_S = 1.1;
+const LASTS_S = 0.7;
 /** Sightings that are shown at once, and other lines. */
 const RAYS = 512;
 const OTHERS = 320;
