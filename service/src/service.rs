@@ -214,12 +214,16 @@ async fn open_zenoh(
         return Ok((None, None));
     };
     // Zenoh would say it in a paragraph that names its source files.
-    if let Some(endpoint) = ports::taken_endpoint(&settings.listen) {
-        return Err(StartError::ZenohTaken {
-            endpoint: endpoint.clone(),
-        });
+    let taken = || {
+        let endpoint = ports::taken_endpoint(&settings.listen)?.clone();
+        Some(StartError::ZenohTaken { endpoint })
+    };
+    if let Some(error) = taken() {
+        return Err(error);
     }
-    let session = transport::open(&settings).await?;
+    // Somebody may have come first since.
+    let session = transport::open(&settings).await;
+    let session = session.map_err(|error| taken().unwrap_or_else(|| error.into()))?;
     let codec = config.zenoh.encoding.codec();
     let publisher = ZenohPublisher::declare(session.clone(), codec).await?;
     Ok((Some(session), Some(Arc::new(publisher))))

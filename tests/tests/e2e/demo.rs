@@ -3,7 +3,7 @@
 
 use std::net::TcpListener;
 
-use cogmap_tests::run;
+use cogmap_tests::{Server, run};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -69,6 +69,30 @@ fn the_demo_loses_robots_and_finds_them_and_recognises_a_cup() {
         number(fifth, "causal_end_error_m") < reckoned_m / 2.0,
         "{fifth}"
     );
+}
+
+#[test]
+fn the_acts_come_again_against_a_service_that_is_there() {
+    let server = Server::start(&[]);
+    let (endpoint, url) = (server.endpoint(), server.url());
+    let of_service = ["--connect", &endpoint, "--http", &url, "--space", "default"];
+    let mut args = vec!["demo", "--duration", "90", "--speed", "3", "--json"];
+    args.extend(of_service);
+    let summary = run(&args).json();
+    let searches = summary["searches"].as_array().expect("a list");
+    let woken: Vec<_> = searches.iter().filter(|s| s["cause"] == "woken").collect();
+    // The robot was removed in between, so it knows as little the second time.
+    assert_eq!(woken.len(), 2, "{summary}");
+    for search in woken {
+        assert!(
+            number(search, "lost_s") >= number(search, "at_s"),
+            "{search}"
+        );
+        assert!(
+            number(search, "found_s") > number(search, "at_s"),
+            "{search}"
+        );
+    }
 }
 
 #[test]

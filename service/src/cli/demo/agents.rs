@@ -172,7 +172,8 @@ impl DemoAgent {
 /// Removes an agent that the space knows from before, so that it knows nothing of where it is.
 pub(super) fn remove(api: &Api, space: &str, name: &str) -> Result<(), ApiError> {
     match api.delete_agent(space, name) {
-        Err(ApiError::Problem(problem)) if problem.status == 404 => Ok(()),
+        // It was never there, or has been removed already.
+        Err(ApiError::Problem(problem)) if matches!(problem.status, 404 | 410) => Ok(()),
         result => result,
     }
 }

@@ -12,17 +12,33 @@ use crate::cli::{free_port, output};
 use crate::config::{Config, ConfigError, ZenohMode};
 use crate::metrics;
 use crate::ports;
-use crate::service::Service;
+use crate::service::{Service, StartError};
 
 /// Runs a service for the robots.
 pub(super) fn run(args: &DemoArgs, runtime: &Runtime) -> anyhow::Result<Summary> {
     let temporary = std::env::temp_dir().join(format!("cogmap-demo-{}", std::process::id()));
-    let config = settings(args, &temporary)?;
+    let mut config = settings(args, &temporary)?;
     output::start_log(&config.log);
-    let endpoint = endpoint(&config)?;
     let prometheus = metrics::install()?;
     let summary = runtime.block_on(async {
-        let service = Service::start(&config, prometheus.clone()).await?;
+        let (service, endpoint) = loop {
+            let endpoint = endpoint(&config)?;
+            let error = match Service::start(&config, prometheus.clone()).await {
+                Ok(service) => break (service, endpoint),
+                Err(error) => error,
+            };
+            // Another program may take a port after it was found free.
+            let again = match error {
+                StartError::HttpTaken { .. } | StartError::ZenohTaken { .. } => {
+                    settings(args, &temporary)?
+                }
+                _ => return Err(error.into()),
+            };
+            if again == config {
+                return Err(error.into());
+            }
+            config = again;
+        };
         let doors = Doors {
             endpoint,
             url: format!("http://{}", reachable(service.address())),
