@@ -12,7 +12,10 @@ _STEP_NS = 20_000_000
 _START_NS = 1_795_264_924_000_000_000
 _EXACT = cogmap.MotionNoise((1e-5,) * 3, (1e-6,) * 3)
 #: What is felt along two things, one level every two centimetres.
-FELT = {"cup": (3.0, 5.0, 9.0, 2.0, 7.0, 7.0, 1.0, 4.0), "can": (3.0, 9.0, 2.0, 5.0, 1.0, 7.0, 4.0, 7.0)}
+FELT = {
+    "cup": (3.0, 5.0, 9.0, 2.0, 7.0, 7.0, 1.0, 4.0),
+    "can": (3.0, 9.0, 2.0, 5.0, 1.0, 7.0, 4.0, 7.0),
+}
 
 
 class Arm:
