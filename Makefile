@@ -42,7 +42,7 @@ help: ## list the targets
 # The steps are lines of one recipe, because their order matters: what fails fastest comes first,
 # and the summaries of the test runners come last.
 .PHONY: test
-test: ## the whole gate: format, lints, documentation, tests of Rust, of Python and in a browser
+test: needs-node needs-chromium ## the whole gate: format, lints, documentation, tests of Rust, of Python and in a browser
 	cargo fmt --all --check
 	cargo clippy $(ALL) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps --lib --examples

@@ -17,7 +17,7 @@ use super::reply;
 
 /// The page that stands for one that was not built: self-contained, so that it works without any
 /// other host.
-const PLAIN_PAGE: &str = include_str!("plain_page.html");
+pub(super) const PLAIN_PAGE: &str = include_str!("plain_page.html");
 
 /// What a browser lets the page do: run and show what comes from here, and ask only here. Images
 /// may be made by the page itself.
