@@ -49,8 +49,10 @@ def test_the_page_follows_what_happens(service: Server, open_page: Open) -> None
     bob.drive(5)
     page.until_places(places + 5)
     page.until("the second agent", agents=2)
-    now = lambda: page.page.evaluate("cogmap.agent('ada')")
-    eventually("the agent moves", lambda: apart(before, now()) > 0.5)
+    eventually(
+        "the agent moves",
+        lambda: apart(before, page.page.evaluate("cogmap.agent('ada')")) > 0.5,
+    )
     eventually("the revision", lambda: page.stats()["revision"]
                == str(service.client().space("default").map_revision))
     assert page.complaints == []

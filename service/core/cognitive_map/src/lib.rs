@@ -1,4 +1,4 @@
-//! The pure core of cogmap: a cognitive map as a deterministic fold over a journal of samples.
+#![doc = include_str!("../README.md")]
 
 pub mod estimator;
 pub mod keyframes;
