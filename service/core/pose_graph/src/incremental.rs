@@ -151,7 +151,8 @@ impl IncrementalRelaxation {
             self.solution[own.clone()].fill(0.0);
             progress.passed_on[own].fill(0.0);
             concerned.push(node);
-            concerned.extend(map.links_of[node as usize].iter().map(|&(_, other)| other));
+            let links = map.links_of[node as usize].iter();
+            concerned.extend(links.flat_map(|&(_, others)| others));
         }
         concerned.retain(|&node| (node as usize) < known);
         let mut gap = self.tree.remove(concerned);

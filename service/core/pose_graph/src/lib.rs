@@ -2,6 +2,7 @@
 
 pub mod g2o;
 
+mod calibration;
 mod descent;
 mod elimination;
 mod equations;
@@ -17,12 +18,13 @@ mod node;
 mod relaxation;
 mod rotation_first;
 
+pub use calibration::{Calibration, Reading};
 pub use graph::{InvalidLink, PoseGraph};
 pub use incremental::{IncrementalRelaxation, IncrementalSettings, Updated};
 pub use information::{Information, InvalidInformation, PoseInformation, PositionInformation};
 pub use innovation::{ExpectedPose, ExpectedPosition, Innovation};
 pub use kernel::{InvalidScale, Kernel, Scale};
-pub use link::{Link, LinkId, SightingTarget};
+pub use link::{CalibrationInformation, Link, LinkId, SightingTarget};
 pub use marginals::Marginals;
-pub use node::{Freedom, PointId, PoseId};
+pub use node::{CalibrationId, Freedom, PointId, PoseId};
 pub use relaxation::{Graduation, RelaxationSettings, Relaxed, Start};

@@ -1,12 +1,12 @@
 //! Marginal covariances of nodes.
 
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::elimination::{CliqueTree, HalfSolution};
 use super::equations::NormalEquations;
 use super::graph::PoseGraph;
 use super::innovation::{ExpectedPose, ExpectedPosition};
-use super::node::{PointId, PoseId};
+use super::node::{CalibrationId, PointId, PoseId};
 use geometry::{PoseCovariance, se3, seen_by_pose, symmetric};
 
 /// Covariances of nodes, given all links.
@@ -54,6 +54,14 @@ impl Marginals<'_> {
         let covariance = self.placed(point.0, point.0, &half.product(&half));
         let block = covariance.fixed_view::<3, 3>(0, 0).into_owned();
         Some(symmetric(&block))
+    }
+
+    /// Variances of a calibration's length, angle and bias \[1, 1, rad²/s²\]; of a planar robot, the
+    /// bias about z alone. `None` if the links leave it free.
+    pub fn calibration(&self, calibration: CalibrationId) -> Option<(f64, f64, Vector3<f64>)> {
+        let half = self.half(calibration.0)?;
+        let variances = self.placed(calibration.0, calibration.0, &half.product(&half)).diagonal();
+        Some((variances[0], variances[1], variances.fixed_rows::<3>(3).into_owned()))
     }
 
     /// Covariance of the pose of `to` in the frame of `from`, with what the errors of the two have

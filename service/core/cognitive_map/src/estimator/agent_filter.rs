@@ -288,6 +288,14 @@ impl AgentFilter {
         self.calibration = Calibration::of_components(&bounded);
     }
 
+    /// Sets the lasting errors of odometry, within what the settings allow.
+    pub(super) fn set_calibration(&mut self, calibration: &Calibration, parameters: &Parameters) {
+        let most = parameters.calibration_max();
+        let components = calibration.components();
+        let bounded = components.zip_map(&most, |error, most| error.clamp(-most, most));
+        self.calibration = Calibration::of_components(&bounded);
+    }
+
     /// Whether the position is out of bounds or of unbounded variance, so that the pose says
     /// nothing.
     ///

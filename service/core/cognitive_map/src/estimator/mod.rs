@@ -69,6 +69,7 @@ mod tuning;
 mod verdict;
 
 pub use calibration::{Calibrated, Calibration};
+pub use external_pose::ExternalEstimate;
 pub use effect::{AgentSighted, Effect, FramesMerged};
 pub use joint::Estimator;
 pub(crate) use observers::Observers;

@@ -61,7 +61,7 @@ impl Parameters {
     }
 
     /// Deviations of the calibration, in the order of the body's error.
-    pub(super) fn calibration_sd(&self) -> SVector<f64, 5> {
+    pub(crate) fn calibration_sd(&self) -> SVector<f64, 5> {
         let bias = self.bias_sd_rad_s;
         SVector::from([self.length_error_sd, self.angle_error_sd, bias, bias, bias])
     }

@@ -95,15 +95,12 @@ impl Fold<'_> {
             return;
         }
         for correction in self.keyframes.graph.relax() {
-            if let Some(covariance) = correction.covariance {
-                self.estimator.fuse_pose(
-                    correction.agent,
-                    &correction.pose,
-                    &covariance,
-                    &mut self.effects,
-                );
-                self.apply_effects();
-            }
+            self.estimator.fuse(
+                correction.agent,
+                &correction.estimate,
+                &mut self.effects,
+            );
+            self.apply_effects();
         }
     }
 }

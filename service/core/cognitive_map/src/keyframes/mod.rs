@@ -25,7 +25,7 @@
 mod agent_track;
 mod attachment;
 mod attachments;
-mod calibration_smoothing;
+mod calibrations;
 mod candidate;
 mod chains;
 mod checkpoint;

@@ -5,21 +5,20 @@ use nalgebra::Isometry3;
 use super::candidate::{Candidate, agrees_with};
 use super::constraint::{ClosureState, Constraint, composed};
 use super::graph::KeyframeGraph;
-use super::problem::{Among, Problem};
+use super::problem::{Among, Calibrating, Problem};
 use super::tuning;
-use geometry::{PoseCovariance, is_somewhere, is_within};
+use crate::estimator::ExternalEstimate;
+use geometry::{is_somewhere, is_within};
 use pose_graph::{Graduation, RelaxationSettings, Relaxed};
 use state::{NONE, Slab};
 
-/// The pose of an agent after a relaxation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a relaxation says of an agent.
+#[derive(Clone, Copy, Debug)]
 pub struct Correction {
     /// Number of the agent.
     pub agent: u32,
-    /// Its pose now, in the map.
-    pub pose: Isometry3<f64>,
-    /// Covariance of that pose; `None` where nothing determines it.
-    pub covariance: Option<PoseCovariance>,
+    /// Its pose now, in the map, and its odometry.
+    pub estimate: ExternalEstimate,
 }
 
 /// A copy of the keyframe graph, which shares all pages that do not change.
@@ -71,11 +70,11 @@ impl RelaxationCopy {
         if self.0.constraints.first_candidate() == NONE {
             return 0;
         }
-        let accepted_alone = Problem::new(&self.0, Among::Accepted);
+        let accepted_alone = Problem::new(&self.0, Among::Accepted, Calibrating::Free);
         let marginals = accepted_alone.map.marginals();
         // With kernels that begin wide, all closures together find the map that most of them agree
         // with.
-        let mut all = Problem::new(&self.0, Among::All);
+        let mut all = Problem::new(&self.0, Among::All, Calibrating::Held);
         all.map.relax(&from_wide());
         let gate_chi2 = self.0.settings.closure_gate_chi2;
         let mut accepted = Vec::new();
@@ -133,17 +132,15 @@ impl RelaxationCopy {
     pub(super) fn relax(&mut self) -> (Problem, Relaxed, usize) {
         let refuted_chi2 = self.0.settings.refuted_chi2();
         let mut n_rejected = 0;
-        let mut rounds = 0;
-        loop {
-            rounds += 1;
-            let mut problem = Problem::new(&self.0, Among::Accepted);
+        for _ in 0..tuning::RELAXATION_ROUNDS_MAX {
+            let mut held = Problem::new(&self.0, Among::Accepted, Calibrating::Held);
             let mut settings = from_wide();
-            if self.fits(&problem) {
+            if self.fits(&held) {
                 settings.graduation = Graduation::None;
             }
-            let relaxed = problem.map.relax(&settings);
+            held.map.relax(&settings);
             let is_too_far = |number: u32| {
-                let squared = problem.squared_error(number);
+                let squared = held.squared_error(number);
                 squared.is_some_and(|squared| squared > refuted_chi2)
             };
             let accepted = self.accepted().map(|(number, _)| number);
@@ -152,11 +149,14 @@ impl RelaxationCopy {
                 self.set_state(number, ClosureState::Refuted);
             }
             n_rejected += refuted.len();
-            if refuted.is_empty() || rounds >= tuning::RELAXATION_ROUNDS_MAX {
-                return (problem, relaxed, n_rejected);
+            self.move_keyframes(&held);
+            if refuted.is_empty() {
+                break;
             }
-            self.move_keyframes(&problem);
         }
+        let mut problem = Problem::new(&self.0, Among::Accepted, Calibrating::Free);
+        let relaxed = problem.map.relax(&RelaxationSettings::default());
+        (problem, relaxed, n_rejected)
     }
 
     /// The poses of the agents in the map in a relaxed graph.
@@ -168,14 +168,18 @@ impl RelaxationCopy {
             let Some(node) = node.filter(|_| !track.needs_keyframe) else {
                 continue;
             };
-            let covariance = marginals.pose(node).map(|covariance| {
-                composed(&covariance, track.since.motion(), &track.since.covariance())
-            });
-            corrections.push(Correction {
-                agent,
-                pose: problem.map.pose(node) * track.since.motion(),
-                covariance,
-            });
+            let Some(covariance) = marginals.pose(node) else {
+                continue;
+            };
+            let since = &track.since;
+            let estimate = ExternalEstimate {
+                pose: problem.map.pose(node) * since.motion(),
+                covariance: composed(&covariance, since.motion(), &since.covariance()),
+                calibration: problem.calibration(agent, &marginals),
+                prevails: true,
+            };
+            if std::env::var("DBG").is_ok() { if let Some((c,v)) = &estimate.calibration { eprintln!("t {:.0} kf {} acc {} c {:.4} {:.4} {:.5} sd {:.4} {:.4} {:.5}", track.stamp_ns as f64/1e9, self.0.n_keyframes(), self.accepted().count(), c.length, c.angle, c.bias_rad_s.z, v[0].sqrt(), v[1].sqrt(), v[4].sqrt()); } }
+            corrections.push(Correction { agent, estimate });
         }
         corrections
     }

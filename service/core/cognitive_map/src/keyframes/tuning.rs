@@ -94,6 +94,19 @@ pub(super) const COARSE_STEP: (f64, f64) = (1.0, 0.5);
 /// times; a refinement of the whole past judges them again.
 pub(super) const COARSE_PENDING_MAX: usize = 512;
 
+// Calibrations of odometry.
+
+/// Motions between keyframes that share a calibration. More would be coupled needlessly in the
+/// solver, and fewer would be as many calibrations as poses.
+pub(super) const CALIBRATED_TOGETHER: u32 = 32;
+
+/// Least change of a calibration from one to the next, as a part of the variance that is expected of
+/// it: for the information to be finite.
+pub(super) const WANDER_MIN: f64 = 1e-6;
+
+/// Least variance of a component of a calibration \[1, 1, rad²/s²\].
+pub(super) const CALIBRATION_VARIANCE_MIN: f64 = 1e-12;
+
 // Kernels of the relaxation.
 
 /// Least standard deviation of a motion, so that its covariance has an inverse \[m, rad\].

@@ -12,7 +12,7 @@ const AXES: [usize; 6] = [0, 1, 2, 3, 4, 5];
 struct Graph {
     dimensions: Vec<usize>,
     links: Vec<(u32, u32)>,
-    links_of: Vec<Vec<(u32, u32)>>,
+    links_of: Vec<Vec<(u32, [u32; 2])>>,
 }
 
 impl Graph {
@@ -36,9 +36,9 @@ impl Graph {
     fn link(&mut self, a: u32, b: u32) {
         let id = u32::try_from(self.links.len()).unwrap();
         self.links.push((a, b));
-        self.links_of[a as usize].push((id, b));
+        self.links_of[a as usize].push((id, [b; 2]));
         if a != b {
-            self.links_of[b as usize].push((id, a));
+            self.links_of[b as usize].push((id, [a; 2]));
         }
     }
 
@@ -117,7 +117,7 @@ impl Equations for Graph {
         self.dimensions[variable as usize]
     }
 
-    fn links(&self, variable: u32) -> &[(u32, u32)] {
+    fn links(&self, variable: u32) -> &[(u32, [u32; 2])] {
         &self.links_of[variable as usize]
     }
 

@@ -18,9 +18,9 @@ pub(crate) trait Equations {
     /// Number of unknowns of a variable, at most [`DIMENSION_MAX`].
     fn dimension(&self, variable: u32) -> usize;
 
-    /// The links of a variable: number of the link and the variable at its other end, which is the
-    /// variable itself for a link that has only one.
-    fn links(&self, variable: u32) -> &[(u32, u32)];
+    /// The links of a variable: number of the link and its other variables, one of them twice where
+    /// there is no second, and the variable itself for a link that has only one.
+    fn links(&self, variable: u32) -> &[(u32, [u32; 2])];
 
     /// Whether a link couples its variables. A link without weight would only make the factor
     /// denser.
@@ -238,7 +238,7 @@ impl CliqueTree {
             let links = equations.links(variable).iter();
             let couplings = links.filter(|&&(link, _)| equations.couples(link));
             couplings
-                .map(|&(_, other)| other)
+                .flat_map(|&(_, others)| others)
                 .map(|other| self.local[other as usize])
                 .filter(|&place| place != NOWHERE)
                 .collect()
@@ -318,11 +318,14 @@ impl CliqueTree {
                         local,
                     },
                 );
-                for &(link, other) in equations.links(variable) {
+                for &(link, others) in equations.links(variable) {
                     // A link belongs to the clique of the first of its variables, and to the first
                     // of them there.
-                    let other_place = self.local[other as usize];
-                    if other_place != NOWHERE && other_place as usize >= place {
+                    let is_first = |other: u32| {
+                        let other_place = self.local[other as usize];
+                        other_place != NOWHERE && other_place as usize >= place
+                    };
+                    if others.into_iter().all(is_first) {
                         equations.add(
                             link,
                             &mut Front {
