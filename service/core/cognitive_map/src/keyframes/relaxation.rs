@@ -2,10 +2,11 @@
 
 use nalgebra::Isometry3;
 
-use super::candidate::{Candidate, agrees_with};
 use super::constraint::{ClosureState, Constraint, composed};
 use super::graph::KeyframeGraph;
+use super::evidence::{Chance, log_evidence};
 use super::problem::{Among, Calibrating, Problem};
+use super::runs::{Member, Run};
 use super::tuning;
 use crate::estimator::ExternalEstimate;
 use geometry::{is_somewhere, is_within};
@@ -64,67 +65,104 @@ impl RelaxationCopy {
         &self.0
     }
 
-    /// Accepts pending closures that agree with the map or with one another; answers their number.
-    /// Moves the keyframes to where all accepted closures have them.
+    /// Accepts pending closures that are evident by the map, or by one another; answers their
+    /// number. Moves the keyframes to where all accepted closures have them.
     pub(super) fn accept_consistent(&mut self) -> usize {
         if self.0.constraints.first_candidate() == NONE {
             return 0;
         }
-        let accepted_alone = Problem::new(&self.0, Among::Accepted, Calibrating::Free);
-        let marginals = accepted_alone.map.marginals();
         // With kernels that begin wide, all closures together find the map that most of them agree
         // with.
         let mut all = Problem::new(&self.0, Among::All, Calibrating::Held);
         all.map.relax(&from_wide());
-        let gate_chi2 = self.0.settings.closure_gate_chi2;
-        let mut accepted = Vec::new();
-        let mut others = Vec::new();
-        for (number, constraint) in self.closures() {
-            let Some(squared) = all.squared_error(number) else {
-                continue;
-            };
-            if constraint.is_candidate()
-                && agrees_with(constraint, &accepted_alone, &marginals, gate_chi2)
-            {
-                accepted.push(number);
-            } else if squared <= gate_chi2 {
-                others.push((number, constraint));
+        let mut runs = self.pending_runs(&all);
+        let mut n_accepted = 0;
+        for _ in 0..tuning::ACCEPTANCE_ROUNDS_MAX {
+            let n_new = self.accept_evident(&mut runs);
+            n_accepted += n_new;
+            if n_new == 0 || runs.is_empty() {
+                break;
             }
         }
-        accepted.extend(self.supported(&others, &all));
-        for &number in &accepted {
-            self.set_state(number, ClosureState::Accepted);
-        }
-        if self.fits(&all) {
-            self.move_keyframes(&all);
-        }
-        accepted.len()
+        n_accepted
     }
 
-    /// The candidates among closures with which enough of the closures agree.
-    fn supported(&self, closures: &[(u32, &Constraint)], problem: &Problem) -> Vec<u32> {
+    /// The runs of pending closures that fit a map with all closures.
+    fn pending_runs(&self, all: &Problem) -> Vec<Run> {
+        let gate_chi2 = self.0.settings.closure_gate_chi2;
         let chains = &self.0.chains;
         let path_variances = chains.path_variances();
-        let candidate = |&(number, constraint): &(u32, &Constraint)| {
-            Candidate::new(
-                number,
-                constraint,
-                &chains.keyframes,
-                problem,
-                &path_variances,
-            )
+        let fitting = self.closures().filter_map(|(number, constraint)| {
+            let fits = constraint.is_candidate() && all.squared_error(number)? <= gate_chi2;
+            let member =
+                || Member::new(number, constraint, &chains.keyframes, all, &path_variances);
+            fits.then(member).flatten()
+        });
+        Run::of(fitting.collect(), gate_chi2)
+    }
+
+    /// Accepts the runs that are evident by the map; or, where there is none, some that are evident
+    /// together. Takes them out of the list; answers the number of their closures.
+    fn accept_evident(&mut self, runs: &mut Vec<Run>) -> usize {
+        let evidence = self.evidence(runs);
+        let evident = |&(_, odds): &(usize, f64)| odds >= tuning::ACCEPTED_LOG_ODDS;
+        let mut chosen: Vec<usize> = evidence.iter().filter(|e| evident(e)).map(|e| e.0).collect();
+        if chosen.is_empty() {
+            let mut seeds = evidence;
+            seeds.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+            for &(seed, odds) in seeds.iter().take(tuning::SEEDS_MAX) {
+                let mut trial = Self(self.0.clone());
+                trial.accept_run(&runs[seed]);
+                trial.relax();
+                let mut odds = odds;
+                let others = trial.evidence(runs).into_iter();
+                let others = others.filter(|other| other.0 != seed && evident(other));
+                let mut together = vec![seed];
+                for (other, more) in others {
+                    together.push(other);
+                    odds += more;
+                }
+                if together.len() > 1 && odds >= tuning::ACCEPTED_LOG_ODDS {
+                    chosen = together;
+                    break;
+                }
+            }
+        }
+        let mut n_accepted = 0;
+        for &index in &chosen {
+            n_accepted += self.accept_run(&runs[index]);
+        }
+        let mut index = 0;
+        runs.retain(|_| {
+            index += 1;
+            !chosen.contains(&(index - 1))
+        });
+        if n_accepted > 0 {
+            self.relax();
+        }
+        n_accepted
+    }
+
+    /// The log-odds of each run, by what has been accepted.
+    fn evidence(&self, runs: &[Run]) -> Vec<(usize, f64)> {
+        let problem = Problem::new(&self.0, Among::Accepted, Calibrating::Free);
+        let marginals = problem.map.marginals();
+        let chance = Chance::of(&self.0.chains, &problem);
+        let constraints = &self.0.constraints.slab;
+        let odds = |(index, run): (usize, &Run)| {
+            let constraint = constraints.get(run.middle)?;
+            let odds = log_evidence(constraint, &problem, &marginals, &chance)?;
+            Some((index, odds))
         };
-        let mut candidates: Vec<_> = closures.iter().filter_map(candidate).collect();
-        let partners =
-            Candidate::count_partners(&mut candidates, self.0.settings.closure_gate_chi2);
-        let is_supported = |(candidate, n_partners): &(&Candidate, usize)| {
-            let constraint = self.0.constraints.slab.get(candidate.constraint);
-            *n_partners >= tuning::PARTNERS_MIN && constraint.is_some_and(Constraint::is_candidate)
-        };
-        let supported = candidates.iter().zip(partners).filter(is_supported);
-        supported
-            .map(|(candidate, _)| candidate.constraint)
-            .collect()
+        runs.iter().enumerate().filter_map(odds).collect()
+    }
+
+    /// Accepts the closures of a run; answers their number.
+    fn accept_run(&mut self, run: &Run) -> usize {
+        for &number in &run.members {
+            self.set_state(number, ClosureState::Accepted);
+        }
+        run.members.len()
     }
 
     /// The relaxed graph, after closures that do not fit into it were rejected; and their number.

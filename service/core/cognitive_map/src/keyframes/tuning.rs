@@ -71,6 +71,27 @@ pub(super) const PARTNERS_MIN: usize = 2;
 /// Earlier closures, in the order of time, with which a closure is compared.
 pub(super) const CLOSURES_COMPARED: usize = 24;
 
+/// Longest way between two closures of a run \[m\].
+pub(super) const RUN_STEP_MAX_M: f64 = 3.0;
+
+/// Way and rotation after which a run ends and another one begins \[m, rad\]: what looks alike for
+/// so long, and beyond a corner, is likely to be the same.
+pub(super) const RUN_LENGTH_MAX_M: f64 = 20.0;
+pub(super) const RUN_TURN_MAX_RAD: f64 = 1.0;
+
+/// Least standard deviation of the places of a map along each axis, where chance is concerned
+/// \[m\].
+pub(super) const CHANCE_SD_MIN_M: f64 = 1.0;
+
+/// Log of the odds at which runs of closures are accepted: 99 to 1.
+pub(super) const ACCEPTED_LOG_ODDS: f64 = 4.6;
+
+/// Seeds that are tried, where no run is evident by itself.
+pub(super) const SEEDS_MAX: usize = 3;
+
+/// Rounds in which runs are accepted by those accepted before.
+pub(super) const ACCEPTANCE_ROUNDS_MAX: usize = 4;
+
 /// Standard deviation of an unknown angle \[rad\].
 pub(super) const UNKNOWN_ANGLE_SD_RAD: f64 = 3.0;
 
