@@ -64,6 +64,11 @@ impl Marginals<'_> {
         Some((variances[0], variances[1], variances.fixed_rows::<3>(3).into_owned()))
     }
 
+    /// Log of the determinant of the normal equations, without directions that the links leave free.
+    pub fn log_determinant(&self) -> f64 {
+        self.tree.log_determinant()
+    }
+
     /// Covariance of the pose of `to` in the frame of `from`, with what the errors of the two have
     /// in common: what a match between them is to be judged by. `None` if the links leave one of
     /// them free.

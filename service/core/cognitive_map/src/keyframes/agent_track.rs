@@ -40,6 +40,8 @@ pub(super) struct AgentTrack {
     pub(super) since: MotionSum,
     /// Calibration with which that motion was corrected.
     pub(super) calibrated: Calibrated,
+    /// Factor of the noise of odometry's rotations, as closures show it.
+    pub(super) turn_noise: f64,
     /// The motion since the latest keyframe when it came to rest, with sample and stamp \[ns\].
     pub(super) rest: Isometry3<f64>,
     pub(super) rest_seq: u64,
@@ -62,6 +64,7 @@ state_of_struct!(AgentTrack {
     until_ns,
     since,
     calibrated,
+    turn_noise,
     rest,
     rest_seq,
     rest_ns,
@@ -84,6 +87,7 @@ impl AgentTrack {
             until_ns: 0,
             since: MotionSum::default(),
             calibrated: Calibrated::default(),
+            turn_noise: 1.0,
             rest: Isometry3::identity(),
             rest_seq: 0,
             rest_ns: 0,

@@ -42,6 +42,7 @@ mod list;
 mod map;
 mod moment;
 mod neighbour;
+mod odometry_noise;
 mod own_frame;
 mod places;
 mod pose_lookup;

@@ -6,6 +6,7 @@ use super::calibrations::Calibrations;
 use super::constraint::{ClosureState, Constraint};
 use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
+use super::odometry_noise::with_turn_noise;
 use super::sighting::{Seen, Sighting};
 use super::tuning;
 use crate::estimator::Calibration;
@@ -151,7 +152,8 @@ impl Problem {
         let Some((from, to)) = ends.filter(|_| !keyframe.begins) else {
             return;
         };
-        let information = information(&keyframe.covariance, track.is_planar);
+        let covariance = with_turn_noise(&keyframe.covariance, track.turn_noise);
+        let information = information(&covariance, track.is_planar);
         let link = match self.calibrations.of_motion(number) {
             Some(calibration) => Link::Odometry {
                 from,

@@ -26,6 +26,11 @@ pub struct Correction {
 pub(super) struct RelaxationCopy(KeyframeGraph);
 
 impl RelaxationCopy {
+    /// Of a graph as it is.
+    pub(super) fn of(graph: KeyframeGraph) -> Self {
+        Self(graph)
+    }
+
     /// Of the whole graph.
     pub(super) fn whole(graph: &KeyframeGraph) -> Self {
         Self(graph.clone())
@@ -129,7 +134,9 @@ impl RelaxationCopy {
             }
         }
         let mut n_accepted = 0;
+        let mut agents = std::collections::BTreeSet::new();
         for &index in &chosen {
+            if let Some(c)=self.0.constraints.slab.get(runs[index].middle) && let Some(k)=self.0.chains.keyframes.get(c.from) { agents.insert(k.agent); }
             n_accepted += self.accept_run(&runs[index]);
         }
         let mut index = 0;
@@ -139,6 +146,10 @@ impl RelaxationCopy {
         });
         if n_accepted > 0 {
             self.relax();
+            for agent in agents {
+                self.learn_odometry_noise(agent);
+                if std::env::var("DBG").is_ok() { eprintln!("turn noise {:?} acc {}", self.0.chains.track(agent).map(|t| t.turn_noise), self.accepted().count()); }
+            }
         }
         n_accepted
     }

@@ -128,6 +128,12 @@ pub(super) const WANDER_MIN: f64 = 1e-6;
 /// Least variance of a component of a calibration \[1, 1, rad²/s²\].
 pub(super) const CALIBRATION_VARIANCE_MIN: f64 = 1e-12;
 
+/// Factor of an agent's noise of rotations, as closures may show it.
+pub(super) const TURN_NOISE_BOUNDS: std::ops::RangeInclusive<f64> = 0.01..=10.0;
+
+/// Factor that is one deviation off what is expected of that.
+pub(super) const TURN_NOISE_PRIOR_SD: f64 = 10.0;
+
 // Kernels of the relaxation.
 
 /// Least standard deviation of a motion, so that its covariance has an inverse \[m, rad\].

@@ -4,6 +4,7 @@ use pulp::Arch;
 
 use super::amalgamation::amalgamate;
 use super::clique::{Clique, DIMENSION_MAX, Front};
+use super::dense::FIXED;
 use super::number;
 use super::ordering::{self, Problem};
 
@@ -346,6 +347,16 @@ impl CliqueTree {
             self.cliques[id as usize] = Some(clique);
         }
         n_fixed
+    }
+
+    /// Log of the determinant of the equations, without the directions that they leave free.
+    pub(crate) fn log_determinant(&self) -> f64 {
+        let cliques = self.all().into_iter().map(|id| self.clique(id));
+        let sums = cliques.map(|clique| {
+            let pivots = (0..clique.n_pivots()).map(|k| clique.pivot(k));
+            pivots.filter(|pivot| *pivot < FIXED.sqrt()).map(f64::ln).sum::<f64>()
+        });
+        2.0 * sums.sum::<f64>()
     }
 
     /// Solves for all unknowns: those of a variable stand at [`slot`] of it.
