@@ -24,7 +24,10 @@ pub(super) const PLANAR_CALIBRATION_AXES: [usize; 3] = [0, 1, 5];
 impl Calibration {
     /// Its components in their places in a twist.
     pub(super) fn components(&self) -> Vector6<f64> {
-        se3::join(&Vector3::new(self.length, self.angle, 0.0), &self.bias_rad_s)
+        se3::join(
+            &Vector3::new(self.length, self.angle, 0.0),
+            &self.bias_rad_s,
+        )
     }
 
     /// Of components in their places in a twist.
@@ -116,8 +119,12 @@ impl Reading {
     ) -> Matrix6<f64> {
         let (linear, angular) = self.corrected(calibration);
         let mut by_twist = Matrix6::zeros();
-        by_twist.fixed_view_mut::<3, 1>(0, 0).copy_from(&self.linear_m);
-        by_twist.fixed_view_mut::<3, 1>(3, 1).copy_from(&self.angular_rad);
+        by_twist
+            .fixed_view_mut::<3, 1>(0, 0)
+            .copy_from(&self.linear_m);
+        by_twist
+            .fixed_view_mut::<3, 1>(3, 1)
+            .copy_from(&self.angular_rad);
         for k in 3..6 {
             by_twist[(k, k)] = self.moving_s;
         }

@@ -62,7 +62,8 @@ impl NormalEquations<'_> {
         let (from, to) = slot.link.nodes();
         let blocks = || {
             let weigh = |s| slot.kernel.cost_and_weight(s, self.widening).1;
-            slot.link.normal_blocks(|node| &self.poses[node as usize], weigh)
+            slot.link
+                .normal_blocks(|node| &self.poses[node as usize], weigh)
         };
         slot.is_on.then(|| (from, to, blocks()))
     }

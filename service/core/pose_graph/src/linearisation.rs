@@ -130,7 +130,12 @@ impl Link {
                 ..
             } => {
                 let calibration = Calibration::of_place(place(calibration.0));
-                odometry_blocks((from, to), (reading, &calibration), information.matrix(), weigh)
+                odometry_blocks(
+                    (from, to),
+                    (reading, &calibration),
+                    information.matrix(),
+                    weigh,
+                )
             }
             Self::CalibrationPrior {
                 at, information, ..

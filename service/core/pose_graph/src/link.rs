@@ -116,7 +116,10 @@ impl CalibrationInformation {
         if variances.iter().any(|variance| variance.is_nan()) {
             return Err(InvalidInformation::NotFinite);
         }
-        if variances.iter().any(|variance| *variance < f64::MIN_POSITIVE) {
+        if variances
+            .iter()
+            .any(|variance| *variance < f64::MIN_POSITIVE)
+        {
             return Err(InvalidInformation::Singular);
         }
         let mut diagonal = variances.map(f64::recip);

@@ -60,8 +60,14 @@ impl Marginals<'_> {
     /// bias about z alone. `None` if the links leave it free.
     pub fn calibration(&self, calibration: CalibrationId) -> Option<(f64, f64, Vector3<f64>)> {
         let half = self.half(calibration.0)?;
-        let variances = self.placed(calibration.0, calibration.0, &half.product(&half)).diagonal();
-        Some((variances[0], variances[1], variances.fixed_rows::<3>(3).into_owned()))
+        let variances = self
+            .placed(calibration.0, calibration.0, &half.product(&half))
+            .diagonal();
+        Some((
+            variances[0],
+            variances[1],
+            variances.fixed_rows::<3>(3).into_owned(),
+        ))
     }
 
     /// Log of the determinant of the normal equations, without directions that the links leave free.

@@ -183,7 +183,7 @@ impl AgentFilter {
             variance,
             calibrated: Calibrated {
                 calibration: self.calibration,
-                variance: SVector::from_fn(|k, _| self.at_run_start[(POSE + k, POSE + k)]),
+                states_noise: motion.noise().is_some(),
                 wander,
                 moving_s: reading.moving_s(),
             },

@@ -22,8 +22,8 @@ pub struct Calibration {
 pub struct Calibrated {
     /// What it was corrected by.
     pub calibration: Calibration,
-    /// Variances of that, in the order of the fields.
-    pub variance: SVector<f64, 5>,
+    /// Whether odometry stated its noise.
+    pub states_noise: bool,
     /// Variances by which the true errors may have changed with the motion.
     pub wander: SVector<f64, 5>,
     /// How long the body moved, and the bias with it \[s\].
@@ -37,7 +37,7 @@ state_of_struct!(Calibration {
 });
 state_of_struct!(Calibrated {
     calibration,
-    variance,
+    states_noise,
     wander,
     moving_s
 });

@@ -88,12 +88,7 @@ impl Frame {
     /// ω of the largest det(ω P⁻¹ + (1 − ω) Σ⁻¹)      G = (1 − ω) (Σ⁻¹ − P⁻¹) = V Λ Vᵀ
     /// a measurement Vᵀ ξ = Λ⁻¹ Vᵀ (1 − ω) Σ⁻¹ ν of covariance Λ⁻¹, where Λ is large enough
     /// ```
-    fn fuse(
-        &mut self,
-        index: usize,
-        external: &ExternalEstimate,
-        parameters: &Parameters,
-    ) -> bool {
+    fn fuse(&mut self, index: usize, external: &ExternalEstimate, parameters: &Parameters) -> bool {
         self.flush();
         if let Some((calibration, variances)) = &external.calibration {
             self.recalibrate(index, calibration, variances, parameters);
@@ -135,7 +130,10 @@ impl Frame {
         parameters: &Parameters,
     ) {
         let member = &mut self.members[index];
-        self.covariance.isolate(member.offset + 7, &variances.fixed_rows::<4>(1).into_owned());
+        self.covariance.isolate(
+            member.offset + 7,
+            &variances.fixed_rows::<4>(1).into_owned(),
+        );
         let mut calibration = *calibration;
         calibration.length = member.filter().calibration.length;
         member

@@ -69,8 +69,8 @@ mod tuning;
 mod verdict;
 
 pub use calibration::{Calibrated, Calibration};
-pub use external_pose::ExternalEstimate;
 pub use effect::{AgentSighted, Effect, FramesMerged};
+pub use external_pose::ExternalEstimate;
 pub use joint::Estimator;
 pub(crate) use observers::Observers;
 pub use outcome::{Evidence, LandmarkOutcome, Step};

@@ -95,11 +95,8 @@ impl Fold<'_> {
             return;
         }
         for correction in self.keyframes.graph.relax() {
-            self.estimator.fuse(
-                correction.agent,
-                &correction.estimate,
-                &mut self.effects,
-            );
+            self.estimator
+                .fuse(correction.agent, &correction.estimate, &mut self.effects);
             self.apply_effects();
         }
     }

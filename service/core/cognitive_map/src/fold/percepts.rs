@@ -4,8 +4,8 @@ use nalgebra::Point3;
 
 use super::apply::Fold;
 use super::tuning::{ANSWER_MIN, DRIFT_MAX, KIDNAPPED_SD};
-use crate::estimator::ExternalEstimate;
 use crate::agent::Status;
+use crate::estimator::ExternalEstimate;
 use crate::event::EventKind;
 use crate::input::{Descriptor, Level};
 use crate::keyframes::Relocalised;

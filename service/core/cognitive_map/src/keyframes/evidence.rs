@@ -1,6 +1,8 @@
 //! Evidence: how much more probable a loop closure is by the map than by chance.
 
-use nalgebra::{Matrix3, Matrix6, Vector2, Vector3};
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix2, Matrix6, Vector2, Vector3};
 
 use super::chains::Chains;
 use super::constraint::Constraint;
@@ -14,33 +16,29 @@ use pose_graph::Marginals;
 /// The log-probability density of the displacement that a false closure states is that of the
 /// displacements between places of the map, as a normal distribution, in any direction.
 pub(super) struct Chance {
-    /// Covariance of the places \[m²\], twice, for the displacement of two.
     log_density: f64,
-    n_axes: usize,
 }
 
 impl Chance {
     /// Of a map.
     pub(super) fn of(chains: &Chains, problem: &Problem) -> Self {
         let numbers = 0..chains.keyframes.numbers();
-        let places: Vec<Vector3<f64>> = numbers
-            .filter_map(|number| Some(problem.pose(number)?.translation.vector))
+        let places: Vec<Vector2<f64>> = numbers
+            .filter_map(|number| Some(problem.pose(number)?.translation.vector.xy()))
             .collect();
         let n = places.len().max(1) as f64;
-        let mean = places.iter().sum::<Vector3<f64>>() / n;
-        let spread = |sum: Matrix3<f64>, place: &Vector3<f64>| {
+        let mean = places.iter().sum::<Vector2<f64>>() / n;
+        let spread = |sum: Matrix2<f64>, place: &Vector2<f64>| {
             let off = place - mean;
             sum + off * off.transpose()
         };
-        let covariance = places.iter().fold(Matrix3::zeros(), spread) / n;
-        let plane = covariance.fixed_view::<2, 2>(0, 0).into_owned();
         let least = tuning::CHANCE_SD_MIN_M * tuning::CHANCE_SD_MIN_M;
-        let floor = nalgebra::Matrix2::from_diagonal_element(least);
-        // Two places of the map: twice the covariance.
-        let area = std::f64::consts::TAU * ((plane + floor) * 2.0).determinant().sqrt();
+        let covariance = places.iter().fold(Matrix2::zeros(), spread) / n
+            + Matrix2::from_diagonal_element(least);
+        // The displacement of two places has twice the covariance of one.
+        let area_m2 = TAU * (covariance * 2.0).determinant().sqrt();
         Self {
-            log_density: -area.ln() - std::f64::consts::TAU.ln(),
-            n_axes: 3,
+            log_density: -(area_m2 * TAU).ln(),
         }
     }
 }
@@ -71,7 +69,6 @@ pub(super) fn log_evidence(
     let planar = planar_part(&whole);
     let off = Vector3::new(off[0], off[1], off[5]);
     let squared = off.dot(&(planar.try_inverse()? * off));
-    let volume = (std::f64::consts::TAU.powi(3) * planar.determinant()).sqrt();
-    let _ = (Vector2::<f64>::zeros(), chance.n_axes);
+    let volume = (TAU.powi(3) * planar.determinant()).sqrt();
     Some(-0.5 * squared - volume.ln() - chance.log_density)
 }

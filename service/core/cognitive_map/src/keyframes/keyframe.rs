@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use crate::estimator::{Calibrated, Calibration};
+use crate::estimator::Calibrated;
 use geometry::PoseCovariance;
 use state::{Slab, state_of_struct};
 
@@ -44,16 +44,6 @@ pub(super) struct Keyframe {
     pub(super) begins: bool,
     /// Deviation of the way there from an even motion, by keyframes that were removed \[m\].
     pub(super) unevenness_m: f64,
-}
-
-impl Keyframe {
-    /// Corrects the motion to it by another calibration of odometry.
-    pub(super) fn recalibrate(&mut self, calibration: &Calibration) {
-        if self.calibrated.calibration != *calibration {
-            self.motion = self.calibrated.corrected_by(&self.motion, calibration);
-            self.calibrated.calibration = *calibration;
-        }
-    }
 }
 
 state_of_struct!(Keyframe {

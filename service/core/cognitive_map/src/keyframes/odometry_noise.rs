@@ -13,6 +13,10 @@ impl RelaxationCopy {
     /// Lets an agent's noise of rotations become half or twice what it is taken for, where that
     /// makes all measurements together more probable (the evidence of the model: MacKay 1992).
     pub(super) fn learn_odometry_noise(&mut self, agent: u32) {
+        let track = self.graph().chains.track(agent);
+        if track.is_none_or(|track| track.states_noise) {
+            return;
+        }
         let now = self.log_evidence(agent);
         for factor in [0.5, 2.0] {
             let mut other = self.graph().clone();
@@ -56,7 +60,9 @@ impl RelaxationCopy {
 
 /// Number of rotations about an axis that odometry of an agent measured.
 fn turns(chains: &Chains, agent: u32, is_planar: bool) -> f64 {
-    let motions = chains.of_agent(agent).filter(|(_, keyframe)| !keyframe.begins);
+    let motions = chains
+        .of_agent(agent)
+        .filter(|(_, keyframe)| !keyframe.begins);
     let axes = if is_planar { 1.0 } else { 3.0 };
     motions.count() as f64 * axes
 }

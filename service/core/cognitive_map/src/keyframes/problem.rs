@@ -102,12 +102,6 @@ impl Problem {
         Some(self.map.squared_error(link))
     }
 
-    /// The calibration of the motion to a keyframe, where it is estimated.
-    pub(super) fn calibration_of(&self, keyframe: u32) -> Option<Calibration> {
-        let calibration = self.calibrations.of_motion(keyframe)?;
-        Some(Calibration::of_graph(&self.map.calibration(calibration)))
-    }
-
     /// The latest calibration of an agent, with the variances of its components.
     pub(super) fn calibration(
         &self,
@@ -117,7 +111,10 @@ impl Problem {
         let latest = self.calibrations.latest(agent)?;
         let (length, angle, bias) = marginals.calibration(latest)?;
         let variances = SVector::from([length, angle, bias.x, bias.y, bias.z]);
-        Some((Calibration::of_graph(&self.map.calibration(latest)), variances))
+        Some((
+            Calibration::of_graph(&self.map.calibration(latest)),
+            variances,
+        ))
     }
 
     /// Adds a node for a keyframe in the map.

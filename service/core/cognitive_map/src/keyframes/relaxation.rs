@@ -1,10 +1,12 @@
 //! A copy of the keyframe graph in which closures are judged and keyframes are moved.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Isometry3;
 
 use super::constraint::{ClosureState, Constraint, composed};
-use super::graph::KeyframeGraph;
 use super::evidence::{Chance, log_evidence};
+use super::graph::KeyframeGraph;
 use super::problem::{Among, Calibrating, Problem};
 use super::runs::{Member, Run};
 use super::tuning;
@@ -83,13 +85,38 @@ impl RelaxationCopy {
         let mut runs = self.pending_runs(&all);
         let mut n_accepted = 0;
         for _ in 0..tuning::ACCEPTANCE_ROUNDS_MAX {
-            let n_new = self.accept_evident(&mut runs);
-            n_accepted += n_new;
-            if n_new == 0 || runs.is_empty() {
+            let mut n_new = self.accept_evident(&runs);
+            if n_new == 0 {
+                n_new = self.accept_together(&runs);
+            }
+            if n_new == 0 {
                 break;
             }
+            n_accepted += n_new;
+            self.settle(&runs);
+            let constraints = &self.0.constraints.slab;
+            let is_pending = |run: &Run| {
+                let middle = constraints.get(run.middle);
+                middle.is_some_and(Constraint::is_candidate)
+            };
+            runs.retain(is_pending);
         }
         n_accepted
+    }
+
+    /// Accepts pending closures since a stamp that are evident by the map as it is, each by itself;
+    /// answers their number.
+    pub(super) fn accept_new(&mut self, since_ns: i64) -> usize {
+        let chains = &self.0.chains;
+        let is_new = |&(_, constraint): &(u32, &Constraint)| {
+            let from = chains.keyframes.get(constraint.from);
+            constraint.state == ClosureState::Pending
+                && from.is_some_and(|from| from.until_ns >= since_ns)
+        };
+        let new: Vec<Run> = { self.closures().filter(is_new) }
+            .map(|(number, _)| Run::of_one(number))
+            .collect();
+        self.accept_evident(&new)
     }
 
     /// The runs of pending closures that fit a map with all closures.
@@ -106,52 +133,55 @@ impl RelaxationCopy {
         Run::of(fitting.collect(), gate_chi2)
     }
 
-    /// Accepts the runs that are evident by the map; or, where there is none, some that are evident
-    /// together. Takes them out of the list; answers the number of their closures.
-    fn accept_evident(&mut self, runs: &mut Vec<Run>) -> usize {
-        let evidence = self.evidence(runs);
-        let evident = |&(_, odds): &(usize, f64)| odds >= tuning::ACCEPTED_LOG_ODDS;
-        let mut chosen: Vec<usize> = evidence.iter().filter(|e| evident(e)).map(|e| e.0).collect();
-        if chosen.is_empty() {
-            let mut seeds = evidence;
-            seeds.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-            for &(seed, odds) in seeds.iter().take(tuning::SEEDS_MAX) {
-                let mut trial = Self(self.0.clone());
-                trial.accept_run(&runs[seed]);
-                trial.relax();
-                let mut odds = odds;
-                let others = trial.evidence(runs).into_iter();
-                let others = others.filter(|other| other.0 != seed && evident(other));
-                let mut together = vec![seed];
-                for (other, more) in others {
-                    together.push(other);
-                    odds += more;
-                }
-                if together.len() > 1 && odds >= tuning::ACCEPTED_LOG_ODDS {
-                    chosen = together;
-                    break;
-                }
+    /// Accepts the runs that are evident by the map; answers the number of their closures.
+    fn accept_evident(&mut self, runs: &[Run]) -> usize {
+        if runs.is_empty() {
+            return 0;
+        }
+        let evident = self.evidence(runs).into_iter();
+        let evident = evident.filter(|&(index, odds)| odds >= runs[index].log_odds_needed());
+        evident
+            .map(|(index, _)| self.accept_run(&runs[index]))
+            .sum()
+    }
+
+    /// Accepts runs of which each is no more evident than chance, but which are evident together:
+    /// one of them, and those that are evident by it. Answers the number of their closures.
+    fn accept_together(&mut self, runs: &[Run]) -> usize {
+        let mut seeds = self.evidence(runs);
+        seeds.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        for &(seed, odds) in seeds.iter().take(tuning::SEEDS_MAX) {
+            let mut trial = Self(self.0.clone());
+            trial.accept_run(&runs[seed]);
+            trial.relax();
+            let others = trial.evidence(runs).into_iter();
+            let others = others
+                .filter(|&(index, odds)| index != seed && odds >= runs[index].log_odds_needed());
+            let others: Vec<_> = others.collect();
+            let together = odds + others.iter().map(|other| other.1).sum::<f64>();
+            if !others.is_empty() && together >= tuning::ACCEPTED_LOG_ODDS {
+                let others = others.iter().map(|&(index, _)| &runs[index]);
+                let all = std::iter::once(&runs[seed]).chain(others);
+                return all.map(|run| self.accept_run(run)).sum();
             }
         }
-        let mut n_accepted = 0;
-        let mut agents = std::collections::BTreeSet::new();
-        for &index in &chosen {
-            if let Some(c)=self.0.constraints.slab.get(runs[index].middle) && let Some(k)=self.0.chains.keyframes.get(c.from) { agents.insert(k.agent); }
-            n_accepted += self.accept_run(&runs[index]);
+        0
+    }
+
+    /// Relaxes the map with closures that have just been accepted, and learns how noisy the
+    /// odometry of their agents is.
+    fn settle(&mut self, runs: &[Run]) {
+        self.relax();
+        let agent = |run: &Run| {
+            let constraint = self.0.constraints.slab.get(run.middle)?;
+            let is_accepted = constraint.state == ClosureState::Accepted;
+            let from = self.0.chains.keyframes.get(constraint.from)?;
+            is_accepted.then_some(from.agent)
+        };
+        let agents: BTreeSet<u32> = runs.iter().filter_map(agent).collect();
+        for agent in agents {
+            self.learn_odometry_noise(agent);
         }
-        let mut index = 0;
-        runs.retain(|_| {
-            index += 1;
-            !chosen.contains(&(index - 1))
-        });
-        if n_accepted > 0 {
-            self.relax();
-            for agent in agents {
-                self.learn_odometry_noise(agent);
-                if std::env::var("DBG").is_ok() { eprintln!("turn noise {:?} acc {}", self.0.chains.track(agent).map(|t| t.turn_noise), self.accepted().count()); }
-            }
-        }
-        n_accepted
     }
 
     /// The log-odds of each run, by what has been accepted.
@@ -227,7 +257,6 @@ impl RelaxationCopy {
                 calibration: problem.calibration(agent, &marginals),
                 prevails: true,
             };
-            if std::env::var("DBG").is_ok() { if let Some((c,v)) = &estimate.calibration { eprintln!("t {:.0} kf {} acc {} c {:.4} {:.4} {:.5} sd {:.4} {:.4} {:.5}", track.stamp_ns as f64/1e9, self.0.n_keyframes(), self.accepted().count(), c.length, c.angle, c.bias_rad_s.z, v[0].sqrt(), v[1].sqrt(), v[4].sqrt()); } }
             corrections.push(Correction { agent, estimate });
         }
         corrections

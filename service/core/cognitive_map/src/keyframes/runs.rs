@@ -98,6 +98,23 @@ impl Member {
 }
 
 impl Run {
+    /// Of one closure.
+    pub(super) fn of_one(number: u32) -> Self {
+        Self {
+            members: vec![number],
+            middle: number,
+        }
+    }
+
+    /// Log of the odds at which it is accepted.
+    pub(super) fn log_odds_needed(&self) -> f64 {
+        if self.members.len() < tuning::RUN_CLOSURES_MIN {
+            tuning::ACCEPTED_ALONE_LOG_ODDS
+        } else {
+            tuning::ACCEPTED_LOG_ODDS
+        }
+    }
+
     /// The runs that closures form.
     pub(super) fn of(mut members: Vec<Member>, gate_chi2: f64) -> Vec<Self> {
         members.sort_by_key(|member| (member.agent, member.stamp_ns, member.constraint));

@@ -58,16 +58,6 @@ pub(super) const ROTATION_LEVER_M: f64 = 0.5;
 /// it more than a gate does before it is dropped.
 pub(super) const REFUTED_PER_GATE: f64 = 25.0 / 11.3;
 
-/// Factor by which the map may be less certain than a closure for their agreement alone to count.
-pub(super) const UNCERTAINTY_RATIO_MAX: f64 = 2.0;
-
-/// Standard deviation up to which agreement counts, however certain the closures are: by chance few
-/// places lie so close \[m\].
-pub(super) const CERTAIN_SD_M: f64 = 0.5;
-
-/// Fewest other closures that must agree with one that the map cannot distinguish from a false one.
-pub(super) const PARTNERS_MIN: usize = 2;
-
 /// Earlier closures, in the order of time, with which a closure is compared.
 pub(super) const CLOSURES_COMPARED: usize = 24;
 
@@ -86,6 +76,12 @@ pub(super) const CHANCE_SD_MIN_M: f64 = 1.0;
 /// Log of the odds at which runs of closures are accepted: 99 to 1.
 pub(super) const ACCEPTED_LOG_ODDS: f64 = 4.6;
 
+/// Fewest closures of a run that others support; one alone may be any mistake.
+pub(super) const RUN_CLOSURES_MIN: usize = 3;
+
+/// Log of the odds at which fewer are accepted.
+pub(super) const ACCEPTED_ALONE_LOG_ODDS: f64 = 2.0 * ACCEPTED_LOG_ODDS;
+
 /// Seeds that are tried, where no run is evident by itself.
 pub(super) const SEEDS_MAX: usize = 3;
 
@@ -101,6 +97,10 @@ pub(super) const CLOSURE_SD_MIN: f64 = 1e-3;
 /// Keyframes for each record between two relaxations: so the amortised cost of a relaxation is that
 /// of so many keyframes a record.
 pub(super) const KEYFRAMES_PER_RECORD: usize = 8;
+
+/// Time of the stream between two relaxations \[ns\]: a closure that is evident corrects the agent
+/// within a second.
+pub(super) const RELAXATION_NS: u64 = 500_000_000;
 
 /// Most rounds of relaxation and rejection.
 pub(super) const RELAXATION_ROUNDS_MAX: usize = 3;

@@ -354,7 +354,10 @@ impl CliqueTree {
         let cliques = self.all().into_iter().map(|id| self.clique(id));
         let sums = cliques.map(|clique| {
             let pivots = (0..clique.n_pivots()).map(|k| clique.pivot(k));
-            pivots.filter(|pivot| *pivot < FIXED.sqrt()).map(f64::ln).sum::<f64>()
+            pivots
+                .filter(|pivot| *pivot < FIXED.sqrt())
+                .map(f64::ln)
+                .sum::<f64>()
         });
         2.0 * sums.sum::<f64>()
     }
