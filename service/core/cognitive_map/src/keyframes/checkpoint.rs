@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! part  index  bytes
-//! 0     0      what is new, the sweep cursor, vacant numbers
+//! 0     0      what is new, the sweep cursor, vacant numbers, the relaxation under way
 //! 1     page   up to 4 agents
 //! 2     page   up to 32 keyframes
 //! 3     page   up to 64 sightings
@@ -19,6 +19,7 @@ use std::collections::BTreeMap;
 
 use super::graph::KeyframeGraph;
 use super::map::KeyframeMap;
+use super::pending_relaxation::PendingRelaxation;
 use super::settings::KeyframeSettings;
 use place_recognition::Part;
 use state::Digest;
@@ -74,6 +75,20 @@ impl KeyframePage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the pages are no map")]
 pub struct CorruptKeyframes;
+
+impl KeyframeGraph {
+    /// Digest of a graph without a relaxation under way, as that of a relaxation is.
+    pub(super) fn digest(&self) -> Digest {
+        let mut out = StateWriter::default();
+        self.chains.sweep.write(&mut out);
+        self.constraints.schedule.write(&mut out);
+        self.sightings.landmarks.slots.vacancy().write(&mut out);
+        for vector in PARTS.iter().filter_map(Stored::in_graph) {
+            vector(self).write_digests(&mut out);
+        }
+        out.digest()
+    }
+}
 
 impl KeyframeMap {
     /// The pages that changed after `since_revision`, the head always among them; 0 gives all.
@@ -140,6 +155,9 @@ impl KeyframeMap {
     pub fn digest(&self) -> Digest {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
+        if let Some(pending) = &self.graph.pending {
+            pending.write_digested(&mut out);
+        }
         for stored in &PARTS {
             match stored {
                 Stored::InGraph(vector, _) => vector(&self.graph).write_digests(&mut out),
@@ -161,6 +179,11 @@ impl KeyframeMap {
     fn head(&self) -> KeyframePage {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
+        let pending = &self.graph.pending;
+        pending.is_some().write(&mut out);
+        if let Some(pending) = pending {
+            pending.write(&mut out);
+        }
         KeyframePage::new(HEAD, 0, out.into_bytes())
     }
 
@@ -197,6 +220,9 @@ impl KeyframeMap {
         if u64::read(&mut input)? != N_PENDING {
             return Err(CorruptState::Invalid);
         }
+        if bool::read(&mut input)? {
+            graph.pending = Some(Box::new(PendingRelaxation::read(&mut input)?));
+        }
         input.end()
     }
 }
@@ -215,6 +241,14 @@ enum Stored {
 type NumberedPages<'a> = Box<dyn Iterator<Item = (usize, Vec<u8>)> + 'a>;
 
 impl Stored {
+    /// The vector of the graph, if it is there.
+    fn in_graph(&self) -> Option<fn(&KeyframeGraph) -> &dyn Pages> {
+        match self {
+            Self::InGraph(vector, _) => Some(*vector),
+            Self::InRecognition(_) => None,
+        }
+    }
+
     /// The pages that changed after a revision.
     fn changed<'a>(&self, map: &'a KeyframeMap, since_revision: u64) -> NumberedPages<'a> {
         match self {
