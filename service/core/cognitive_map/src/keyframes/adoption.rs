@@ -141,3 +141,6 @@ impl KeyframeGraph {
         is_over
     }
 }
+
+#[cfg(test)]
+mod tests;
