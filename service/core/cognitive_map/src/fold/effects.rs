@@ -92,7 +92,7 @@ impl Fold<'_> {
     /// When that is depends on the records alone.
     pub(super) fn relax_matches(&mut self) {
         let (agent, stamp_ns) = (self.agent_id.0, self.stamp_ns);
-        for correction in self.keyframes.graph.go_on_relaxing(agent, stamp_ns) {
+        for correction in self.keyframes.go_on_relaxing(agent, stamp_ns) {
             if let Some(covariance) = correction.covariance {
                 self.estimator.fuse_pose(
                     correction.agent,
@@ -103,7 +103,7 @@ impl Fold<'_> {
                 self.apply_effects();
             }
         }
-        self.keyframes.graph.begin_relaxation(agent, stamp_ns);
+        self.keyframes.begin_relaxation(agent, stamp_ns);
     }
 }
 
@@ -121,19 +121,19 @@ impl CognitiveMap {
     /// whole map relaxed. A function of the map alone; takes time in proportion to what is
     /// remembered.
     pub fn refined(&self) -> Refined {
-        self.keyframes.graph.refine()
+        self.keyframes.settled().refine()
     }
 
     /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in
     /// the making as [`refined`](Self::refined).
     pub fn pose_graph(&self) -> PoseGraph {
-        self.keyframes.graph.pose_graph()
+        self.keyframes.settled().pose_graph()
     }
 
     /// The relaxation under way, of the map as it was some records ago. The map waits for its
     /// outcome at a later record, unless somebody [runs](RelaxationJob::run) it before.
     pub fn relaxation(&self) -> Option<&RelaxationJob> {
-        self.keyframes.graph.relaxation()
+        self.keyframes.relaxation()
     }
 
     /// Number of loop closures that are accepted.

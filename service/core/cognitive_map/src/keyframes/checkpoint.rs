@@ -19,7 +19,6 @@ use std::collections::BTreeMap;
 
 use super::graph::KeyframeGraph;
 use super::map::KeyframeMap;
-use super::pending_relaxation::PendingRelaxation;
 use super::settings::KeyframeSettings;
 use place_recognition::Part;
 use state::Digest;
@@ -132,6 +131,7 @@ impl KeyframeMap {
         if !graph.sightings.landmarks.sort()
             || !graph.is_sound()
             || !seen.is_sound(graph.chains.tracks.len())
+            || !{ map.pending.iter() }.all(|one| one.outcome().is_sound(graph.chains.tracks.len()))
         {
             return Err(CorruptKeyframes);
         }
@@ -155,8 +155,9 @@ impl KeyframeMap {
     pub fn digest(&self) -> Digest {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
-        if let Some(pending) = &self.graph.pending {
+        if let (Some(pending), Some(meanwhile)) = (&self.pending, &self.graph.meanwhile) {
             pending.write_digested(&mut out);
+            meanwhile.write(&mut out);
         }
         for stored in &PARTS {
             match stored {
@@ -179,10 +180,11 @@ impl KeyframeMap {
     fn head(&self) -> KeyframePage {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
-        let pending = &self.graph.pending;
+        let pending = self.pending.as_ref().zip(self.graph.meanwhile.as_deref());
         pending.is_some().write(&mut out);
-        if let Some(pending) = pending {
+        if let Some((pending, meanwhile)) = pending {
             pending.write(&mut out);
+            meanwhile.write(&mut out);
         }
         KeyframePage::new(HEAD, 0, out.into_bytes())
     }
@@ -221,7 +223,8 @@ impl KeyframeMap {
             return Err(CorruptState::Invalid);
         }
         if bool::read(&mut input)? {
-            graph.pending = Some(Box::new(PendingRelaxation::read(&mut input)?));
+            self.pending = Some(State::read(&mut input)?);
+            self.graph.meanwhile = Some(Box::new(State::read(&mut input)?));
         }
         input.end()
     }

@@ -7,9 +7,9 @@ use super::attachments::Attachments;
 use super::chains::Chains;
 use super::constraint::{ClosureState, Constraint};
 use super::constraints::Constraints;
+use super::meanwhile::Meanwhile;
 use super::moment::Moment;
 use super::own_frame::OwnFrame;
-use super::pending_relaxation::PendingRelaxation;
 use super::settings::KeyframeSettings;
 use super::sightings::Sightings;
 use crate::estimator::Calibrated;
@@ -34,8 +34,8 @@ pub struct KeyframeGraph {
     pub(super) constraints: Constraints,
     /// Places that keep their pose relative to a keyframe.
     pub(super) attachments: Attachments,
-    /// The relaxation under way.
-    pub(super) pending: Option<Box<PendingRelaxation>>,
+    /// What has come since a relaxation began that is under way.
+    pub(super) meanwhile: Option<Box<Meanwhile>>,
 }
 
 impl KeyframeGraph {
@@ -48,7 +48,7 @@ impl KeyframeGraph {
             sightings: Sightings::default(),
             constraints: Constraints::default(),
             attachments: Attachments::default(),
-            pending: None,
+            meanwhile: None,
         }
     }
 
@@ -183,8 +183,8 @@ impl KeyframeGraph {
             track.needs_keyframe = true;
             track.since.inflate(&sd.component_mul(sd));
         }
-        if let Some(pending) = &mut self.pending {
-            pending.inflate(agent, &sd.component_mul(sd));
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.inflate(agent, &sd.component_mul(sd));
         }
     }
 
@@ -200,8 +200,8 @@ impl KeyframeGraph {
 
     /// Where an agent was says no longer where it is: for a relaxation under way.
     pub(super) fn cut(&mut self, agent: u32) {
-        if let Some(pending) = &mut self.pending {
-            pending.cut(agent);
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.cut(agent);
         }
     }
 
@@ -235,8 +235,8 @@ impl KeyframeGraph {
             });
             self.add_keyframe(agent);
         }
-        if let Some(pending) = &mut self.pending {
-            pending.go(agent, increment, variance);
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.go(agent, increment, variance);
         }
         let (spacing, attached) = (self.settings.spacing, self.settings.attached_within());
         let Some(track) = self.track_mut(agent) else {
@@ -265,8 +265,8 @@ impl KeyframeGraph {
         }
         let (pose, is_origin) = (track.pose, track.is_origin);
         let number = self.chains.append(agent, self.revision);
-        if let Some(pending) = &mut self.pending {
-            pending.keyframes_apart.insert(number);
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.keyframes.insert(number);
         }
         if is_origin {
             let (known, state) = (PoseCovariance::zero(), ClosureState::Origin);
@@ -278,8 +278,8 @@ impl KeyframeGraph {
     /// Adds a constraint; answers its number, or [`NONE`] if memory is full or an end is gone.
     pub(super) fn add_constraint(&mut self, constraint: Constraint) -> u32 {
         let number = self.put_constraint(constraint);
-        if let Some(pending) = &mut self.pending {
-            pending.constraints_apart.insert(number);
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.constraints.insert(number);
         }
         number
     }
@@ -306,6 +306,6 @@ impl KeyframeGraph {
             && self.sightings.is_sound(keyframes)
             && self.constraints.is_sound(keyframes)
             && self.attachments.is_sound(keyframes)
-            && { self.pending.iter() }.all(|pending| pending.is_sound(self.chains.tracks.len()))
+            && { self.meanwhile.iter() }.all(|since| since.is_sound(self.chains.tracks.len()))
     }
 }

@@ -20,7 +20,7 @@
 //! A relaxation works on a copy of the graph (`relaxation`), as a problem of least squares
 //! (`problem`); `closures` brings its outcome back. While samples come in, a relaxation is of the
 //! graph as it was at one record (`relaxation_job`), and comes into force at a later one
-//! (`adoption`), so that no record waits for it.
+//! (`adoption`), so that no record waits for it; `meanwhile` has what comes in between.
 //!
 //! [`KeyframeMap`] is the graph with place recognition, which closes loops by what was seen.
 
@@ -42,6 +42,7 @@ mod keyframe_index;
 mod landmarks;
 mod list;
 mod map;
+mod meanwhile;
 mod moment;
 mod neighbour;
 mod own_frame;

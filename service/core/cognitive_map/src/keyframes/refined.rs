@@ -74,7 +74,7 @@ impl KeyframeGraph {
     }
 
     fn relaxed_whole(&self) -> (Problem, Relaxed) {
-        let mut copy = RelaxationCopy::whole(&self.settled());
+        let mut copy = RelaxationCopy::whole(self);
         copy.accept_consistent();
         let (problem, relaxed, _) = copy.relax();
         (problem, relaxed)

@@ -43,7 +43,7 @@ fn steps(most: usize) -> impl Strategy<Value = Vec<(u32, Step)>> {
 /// A graph that is soon full. The x of a pose is the number of its step, and nothing but the
 /// relaxation gives one another y than 0.
 struct Team {
-    graph: KeyframeGraph,
+    map: KeyframeMap,
     step: u64,
     /// Numbers of the closures that were added since it was emptied.
     closed: BTreeSet<u32>,
@@ -58,7 +58,8 @@ impl Team {
             constraints_max: 5,
             ..KeyframeSettings::default()
         };
-        let mut graph = KeyframeGraph::new(settings);
+        let mut map = KeyframeMap::new(settings);
+        let graph = &mut map.graph;
         for agent in 0..AGENTS {
             graph.enrol();
             if agent + 1 < AGENTS {
@@ -66,7 +67,7 @@ impl Team {
             }
         }
         Self {
-            graph,
+            map,
             step: 0,
             closed: BTreeSet::new(),
             added: BTreeSet::new(),
@@ -82,7 +83,7 @@ impl Team {
             pose: Isometry3::translation(self.step as f64, 0.0, 0.0),
         };
         let (before, keyframes) = (self.closures(), self.keyframes());
-        let graph = &mut self.graph;
+        let graph = &mut self.map.graph;
         match step {
             Step::Go => {
                 let ahead = Isometry3::translation(1.0, 0.0, 0.0);
@@ -121,7 +122,7 @@ impl Team {
 
     /// Agent, sample and place of each keyframe, by number.
     fn keyframes(&self) -> BTreeMap<u32, (u32, u64, u64)> {
-        let all = self.graph.chains.keyframes.iter();
+        let all = self.map.graph.chains.keyframes.iter();
         let told_apart = |keyframe: &Keyframe| {
             let x = keyframe.pose.translation.x.to_bits();
             (keyframe.agent, keyframe.seq, x)
@@ -132,7 +133,7 @@ impl Team {
 
     /// What each closure says, by number.
     fn closures(&self) -> BTreeMap<u32, Isometry3<f64>> {
-        let all = self.graph.constraints.slab.iter();
+        let all = self.map.graph.constraints.slab.iter();
         all.filter(|(_, one)| one.is_closure())
             .map(|(number, one)| (number, one.transform))
             .collect()
@@ -142,7 +143,7 @@ impl Team {
     /// all agents.
     fn begin(&mut self) -> RelaxationOutcome {
         let shift = Isometry3::translation(0.0, SHIFT_M, 0.0);
-        let (chains, closures) = (&self.graph.chains, &self.graph.constraints.slab);
+        let (chains, closures) = (&self.map.graph.chains, &self.map.graph.constraints.slab);
         let pose = |(number, _)| Some((number, shift * chains.in_map(number)?));
         let corrections = (0..AGENTS).filter_map(|agent| {
             let track = chains.track(agent).filter(|track| track.is_in_map())?;
@@ -162,35 +163,27 @@ impl Team {
             corrections: corrections.collect(),
         };
         let job = RelaxationJob::restored(Digest(0), outcome.clone());
-        self.graph.pending = Some(Box::new(PendingRelaxation::new(job)));
+        self.map.pending = Some(PendingRelaxation::Awaited(job));
+        self.map.graph.meanwhile = Some(Box::default());
         outcome
     }
 
     /// Brings the outcome into force; answers where the agents are by it.
     fn bring_into_force(&mut self, outcome: &RelaxationOutcome) -> Vec<Correction> {
-        let mut pending = self.graph.pending.take().unwrap();
-        self.graph.bring_into_force(&mut pending, outcome);
-        let corrections = outcome.corrections.iter();
-        let corrections = corrections.filter_map(|one| pending.carried_on(one));
-        let corrections = corrections.collect();
-        pending.stage = Stage::InForce(outcome.clone().into(), 0);
-        self.graph.pending = Some(pending);
+        let corrections = self.map.graph.bring_into_force(outcome);
+        self.map.pending = Some(PendingRelaxation::InForce(outcome.clone().into(), 0));
         corrections
     }
 
     /// Moves some keyframes of an outcome in force; answers whether all have moved.
     fn move_some(&mut self) -> bool {
-        let Some(mut pending) = self.graph.pending.take() else {
-            return true;
-        };
-        let is_over = self.graph.move_some(&mut pending, 2);
-        self.graph.pending = (!is_over).then_some(pending);
-        is_over
+        self.map.move_keyframes(2);
+        self.map.pending.is_none()
     }
 
     /// The numbers of the keyframes that an outcome knows, and of those that go on from there.
     fn to_be_moved(&self, outcome: &RelaxationOutcome) -> BTreeSet<u32> {
-        let chains = &self.graph.chains;
+        let chains = &self.map.graph.chains;
         let mut moved = BTreeSet::new();
         for agent in 0..AGENTS {
             let is_in_map = chains.track(agent).unwrap().is_in_map();
@@ -232,14 +225,14 @@ proptest! {
         let expected = team.to_be_moved(&outcome);
         let corrections = team.bring_into_force(&outcome);
         while !team.move_some() {}
-        prop_assert!(team.graph.is_sound());
-        let chains = &team.graph.chains;
+        prop_assert!(team.map.graph.is_sound());
+        let chains = &team.map.graph.chains;
         for (number, keyframe) in chains.keyframes.iter() {
             let (y, is_expected) = (keyframe.pose.translation.y, expected.contains(&number));
             let expected_m = if is_expected { SHIFT_M } else { 0.0 };
             prop_assert!((y - expected_m).abs() < 1e-6, "{number} {is_expected}: {keyframe:?}");
         }
-        for (number, closure) in team.graph.constraints.slab.iter() {
+        for (number, closure) in team.map.graph.constraints.slab.iter() {
             let is_known = outcome.states.iter().any(|(known, _)| *known == number);
             let expected = if !closure.is_closure() {
                 closure.state
@@ -281,8 +274,8 @@ proptest! {
             go(&mut team, &[step]);
         }
         while !team.move_some() {}
-        prop_assert!(team.graph.is_sound());
-        for (_, keyframe) in team.graph.chains.keyframes.iter() {
+        prop_assert!(team.map.graph.is_sound());
+        for (_, keyframe) in team.map.graph.chains.keyframes.iter() {
             let at = keyframe.pose.translation;
             prop_assert!(at.x <= in_force || at.y == 0.0, "{}", at);
         }
