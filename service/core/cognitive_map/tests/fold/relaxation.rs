@@ -85,6 +85,10 @@ fn fold_with(records: &[Record], mut between: impl FnMut(usize, &mut CognitiveMa
     format!("{digest} {events:?}")
 }
 
+#[expect(
+    clippy::disallowed_methods,
+    reason = "threads beside the core, as a service has them"
+)]
 #[test]
 fn who_relaxes_and_when_makes_no_difference() {
     let records = drive();
