@@ -134,7 +134,7 @@ impl KeyframeGraph {
 
     /// Whether enough records have come in since all closures were judged together to pay for
     /// judging them again.
-    fn is_judgement_due(&self) -> bool {
+    pub(super) fn is_judgement_due(&self) -> bool {
         let schedule = &self.constraints.schedule;
         schedule.records as usize >= self.n_keyframes() / tuning::KEYFRAMES_PER_RECORD
     }
