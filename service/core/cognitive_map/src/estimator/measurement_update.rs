@@ -270,7 +270,9 @@ impl Frame {
                 .sensor
                 .variance(innovation, Some((&seen, measurement.stamp_ns)), parameters);
         let mut outcome = Outcome::nothing();
-        outcome.variance.fixed_rows_mut::<3>(0).copy_from(&variance);
+        // The past takes together what was seen from one place, and counts it once.
+        let once = member.sensor.variance(innovation, None, parameters);
+        outcome.variance.fixed_rows_mut::<3>(0).copy_from(&once);
         let spread = projection.spread.diagonal();
         let Some(squares) = scope.judge(
             &innovation.residual,
