@@ -9,6 +9,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`mrclam`] | the UTIAS multi-robot data sets |
+//! | [`nees`] | errors against their covariances |
 //! | [`g2o`] | pose graphs |
 //! | [`tuc`] | the TUC data sets: odometry and place matches, many of them false |
 //! | [`victoria`] | Victoria Park, as text with odometry and sightings |
@@ -62,6 +63,7 @@ pub mod eval;
 pub mod g2o;
 pub mod mapping;
 pub mod mrclam;
+pub mod nees;
 pub mod objects;
 pub mod points;
 pub mod touch;

@@ -308,8 +308,10 @@ fn timeless(report: &mut Value) -> bool {
     let robots = report["robots"].as_object_mut().unwrap();
     for robot in robots.values_mut() {
         robot["consistency"]["nees_mean"].take();
+        robot["consistency"]["nees"].take();
     }
     report["consistency"]["nees_mean"].take();
+    report["consistency"]["nees"].take();
     factor.is_number()
 }
 

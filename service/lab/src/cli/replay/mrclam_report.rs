@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use cogmap_lab::mrclam::{Mrclam, PlanarPose, RobotLog};
+use cogmap_lab::nees::{Nees, NeesMeans};
 use cogmap_proto::StampedPose;
 use cogmap_worlds::dead_reckoned;
 use cogmap_worlds::robot_name;
-use nalgebra::Vector2;
 use serde::Serialize;
 use trajectory::{Alignment, Trajectory, ate_rmse_m};
 
@@ -66,6 +66,8 @@ struct Consistency {
     /// Normalised estimation error squared of the position in the plane, per component, once a
     /// second (of a replay straight into the core).
     nees_mean: Option<f64>,
+    /// The same of x, y and heading each by itself, of the position and of the pose in the plane.
+    nees: Option<NeesMeans>,
     /// Normalised innovation squared of the accepted sightings, per component.
     nis_mean: Option<f64>,
 }
@@ -77,12 +79,14 @@ pub(super) fn report(
     outcome: &Outcome,
 ) -> anyhow::Result<Report> {
     let mut robots = BTreeMap::new();
+    let mut nees = Nees::default();
     let nothing = RobotOutcome::default();
     for (&number, log) in set.robots() {
         let name = robot_name(number);
         let of_robot = batches.iter().filter(|batch| batch.robot == name);
         let samples = of_robot.map(|batch| batch.samples.len() as u64).sum();
         let came_out = outcome.robots.get(&name).unwrap_or(&nothing);
+        nees.add_all(&normalised_errors(log, came_out));
         robots.insert(name, robot_report(set, number, log, samples, came_out)?);
     }
     let span_s = (set.span().end_ns - set.span().start_ns) as f64 * 1e-9;
@@ -106,6 +110,7 @@ pub(super) fn report(
         rejected: robots.values().map(|robot| robot.rejected).sum(),
         consistency: Consistency {
             nees_mean: of(|robot| robot.consistency.nees_mean),
+            nees: nees.means(),
             nis_mean: of(|robot| robot.consistency.nis_mean),
         },
         update_ms: outcome.timing,
@@ -137,6 +142,7 @@ fn robot_report(
     };
     let (causal, refined) = (errors(&came_out.causal)?, errors(&came_out.refined)?);
     let first = came_out.causal.first();
+    let nees = normalised_errors(log, came_out).means();
     Ok(RobotReport {
         samples,
         dead_reckoning_ate_rmse_m: error(&reckoned, Alignment::None)?,
@@ -149,23 +155,26 @@ fn robot_report(
         accepted: came_out.evidence.accepted,
         rejected: came_out.evidence.refused,
         consistency: Consistency {
-            nees_mean: mean(squared_errors(log, came_out)),
+            nees_mean: nees.map(|nees| nees.position),
+            nees,
             nis_mean: came_out.evidence.nis_mean,
         },
     })
 }
 
-/// Normalised squared errors of the position in the plane, per component.
-fn squared_errors(log: &RobotLog, came_out: &RobotOutcome) -> impl Iterator<Item = f64> {
-    came_out.beliefs.iter().filter_map(|(belief, covariance)| {
-        let truth = log.truth_at(belief.stamp_ns)?.in_space().pose;
-        let believed = stamped_pose(belief).pose;
-        let off = truth.translation.vector - believed.translation.vector;
-        let off = believed.rotation.inverse() * off;
-        let off = Vector2::new(off.x, off.y);
-        let spread = covariance.matrix().fixed_view::<2, 2>(0, 0).into_owned();
-        Some(off.dot(&(spread.try_inverse()? * off)) / 2.0)
-    })
+/// The robot's errors in their deviations.
+fn normalised_errors(log: &RobotLog, came_out: &RobotOutcome) -> Nees {
+    let mut nees = Nees::default();
+    for (belief, covariance) in &came_out.beliefs {
+        if let Some(truth) = log.truth_at(belief.stamp_ns) {
+            nees.add(
+                &truth.in_space().pose,
+                &stamped_pose(belief).pose,
+                covariance,
+            );
+        }
+    }
+    nees
 }
 
 /// Mean; none of nothing.
@@ -220,6 +229,12 @@ impl Report {
             ratio(self.consistency.nees_mean),
             ratio(self.consistency.nis_mean),
         ))?;
+        if let Some(nees) = self.consistency.nees {
+            output::line(&format!(
+                "of poses: x {:.2}, y {:.2}, heading {:.2}, position {:.2}, all three {:.2}",
+                nees.x, nees.y, nees.heading, nees.position, nees.pose,
+            ))?;
+        }
         if let (Some(timing), Some(factor)) = (self.update_ms, self.real_time_factor) {
             output::line(&format!(
                 "{factor:.0} times real time; a sample p50 {:.1} us, p99 {:.1} us, max {:.1} ms",
