@@ -1,10 +1,8 @@
-//! Where the poses of a graph are known to lie.
+//! Where poses without stamps are known to lie.
 
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
-
-use pose_graph::g2o::G2oGraph;
 
 /// Positions by the id of the pose: a text with id, x, y and, in space, z \[m\] in columns.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +17,8 @@ pub enum ReferenceError {
         /// Number of the line, from 1.
         line: usize,
     },
-    /// No pose of the graph has a position.
-    #[error("it has no position of a pose of the graph")]
+    /// No pose has a position.
+    #[error("it has no position of any of the poses")]
     NothingInCommon,
 }
 
@@ -48,19 +46,47 @@ impl Reference {
         Ok(Self(positions))
     }
 
-    /// For each pose of a graph, in the order of their ids, its position if there is one.
+    /// For each pose its position, if there is one.
     ///
     /// # Errors
     /// There is none for any.
-    pub fn of_poses(&self, graph: &G2oGraph) -> Result<Vec<Option<Vector3<f64>>>, ReferenceError> {
-        let positions: Vec<_> = graph
-            .poses()
-            .keys()
-            .map(|id| self.0.get(id).copied())
+    pub fn of(
+        &self,
+        poses: impl IntoIterator<Item = u64>,
+    ) -> Result<Vec<Option<Vector3<f64>>>, ReferenceError> {
+        let positions: Vec<_> = poses
+            .into_iter()
+            .map(|id| self.0.get(&id).copied())
             .collect();
         if positions.iter().all(Option::is_none) {
             return Err(ReferenceError::NothingInCommon);
         }
         Ok(positions)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::{Reference, ReferenceError};
+
+    #[test]
+    fn a_reference_is_read_by_id() {
+        let reference = Reference::read("# id x y\n5 1 2\n0 0 0 3 # first\n77 1 1\n").unwrap();
+        let positions = reference.of(0..6).unwrap();
+        assert_eq!(positions[0], Some(Vector3::new(0.0, 0.0, 3.0)));
+        assert_eq!(positions[1], None);
+        assert_eq!(positions[5], Some(Vector3::new(1.0, 2.0, 0.0)));
+        for bad in ["0 1", "0 1 x", "x 1 2", "0 1 2 3 4", "0 1 inf"] {
+            let text = format!("# id\n{bad}\n");
+            assert_eq!(
+                Reference::read(&text),
+                Err(ReferenceError::Line { line: 2 }),
+                "{bad}"
+            );
+        }
+        let elsewhere = Reference::read("99 0 0").unwrap();
+        assert_eq!(elsewhere.of(0..6), Err(ReferenceError::NothingInCommon));
     }
 }
