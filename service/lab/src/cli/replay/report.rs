@@ -127,13 +127,13 @@ impl RobotReport {
         came_out: &RobotOutcome,
     ) -> Self {
         let truth = known.truth.as_ref();
-        let begun_ns = first_ns(team);
-        let placed = came_out.causal.first().zip(begun_ns);
+        let placed = came_out.causal.first().zip(known.reckoned.first());
         Self {
             samples: team.samples_of(name),
             digest: None,
             errors: Errors::of(scoring, known, came_out),
-            placed_after_s: placed.map(|(row, begun)| (row.stamp_ns - begun) as f64 * 1e-9),
+            placed_after_s: placed
+                .map(|(row, begun)| (row.stamp_ns - begun.stamp_ns) as f64 * 1e-9),
             accepted: came_out.evidence.accepted,
             rejected: came_out.evidence.refused,
             consistency: Consistency {
@@ -144,20 +144,17 @@ impl RobotReport {
     }
 }
 
-/// When a team begins.
-fn first_ns(team: &Team) -> Option<i64> {
-    let stamps = team.batches.iter().flat_map(|batch| &batch.samples);
-    stamps.map(|sample| sample.stamp_ns).min()
-}
-
-/// Time from a team's first sample to its last \[s\].
+/// How long a team was out \[s\]: from its first motion to its last, or what its robots were out
+/// together, where they came one after the other.
 fn lasted_s(team: &Team) -> f64 {
-    let stamps = team.batches.iter().flat_map(|batch| &batch.samples);
-    let last_ns = stamps.map(|sample| sample.stamp_ns).max();
-    let lasted = last_ns.zip(first_ns(team));
-    lasted.map_or(0.0, |(last, first)| {
-        last.saturating_sub(first) as f64 * 1e-9
-    })
+    let spans = team.robots.values().filter_map(|known| {
+        let (first, last) = (known.reckoned.first()?, known.reckoned.last()?);
+        Some([first.stamp_ns, last.stamp_ns])
+    });
+    let lasted_s = |[first, last]: [i64; 2]| last.saturating_sub(first) as f64 * 1e-9;
+    let sum_s: f64 = spans.clone().map(lasted_s).sum();
+    let whole = spans.reduce(|one, other| [one[0].min(other[0]), one[1].max(other[1])]);
+    whole.map_or(0.0, lasted_s).min(sum_s)
 }
 
 impl Report {
