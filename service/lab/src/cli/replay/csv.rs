@@ -107,7 +107,7 @@ pub(super) fn run(args: &CsvArgs) -> anyhow::Result<()> {
         Waking::of(&seen.collect::<Vec<_>>())
     });
     let report = CsvReport {
-        medians: Errors::medians(report.robots().values().map(|robot| &robot.errors)),
+        medians: report.medians(),
         waking,
         report,
     };

@@ -9,12 +9,18 @@ use super::team::Known;
 /// RMSE of position \[m\], in the frame of the truth and after the best rigid motion.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Errors {
-    pub(super) dead_reckoning_ate_rmse_m: Option<f64>,
-    pub(super) dead_reckoning_aligned_ate_rmse_m: Option<f64>,
-    pub(super) causal_ate_rmse_m: Option<f64>,
-    pub(super) causal_aligned_ate_rmse_m: Option<f64>,
-    pub(super) refined_ate_rmse_m: Option<f64>,
-    pub(super) refined_aligned_ate_rmse_m: Option<f64>,
+    #[serde(rename = "dead_reckoning_ate_rmse_m")]
+    pub(super) dead_reckoning: Option<f64>,
+    #[serde(rename = "dead_reckoning_aligned_ate_rmse_m")]
+    pub(super) dead_reckoning_aligned: Option<f64>,
+    #[serde(rename = "causal_ate_rmse_m")]
+    pub(super) causal: Option<f64>,
+    #[serde(rename = "causal_aligned_ate_rmse_m")]
+    pub(super) causal_aligned: Option<f64>,
+    #[serde(rename = "refined_ate_rmse_m")]
+    pub(super) refined: Option<f64>,
+    #[serde(rename = "refined_aligned_ate_rmse_m")]
+    pub(super) refined_aligned: Option<f64>,
 }
 
 impl Errors {
@@ -25,37 +31,36 @@ impl Errors {
         let [causal, causal_aligned] = scoring.errors_of_rows_m(&came_out.causal, truth);
         let [refined, refined_aligned] = scoring.errors_of_rows_m(&came_out.refined, truth);
         Self {
-            dead_reckoning_ate_rmse_m: reckoned,
-            dead_reckoning_aligned_ate_rmse_m: reckoned_aligned,
-            causal_ate_rmse_m: causal,
-            causal_aligned_ate_rmse_m: causal_aligned,
-            refined_ate_rmse_m: refined,
-            refined_aligned_ate_rmse_m: refined_aligned,
+            dead_reckoning: reckoned,
+            dead_reckoning_aligned: reckoned_aligned,
+            causal,
+            causal_aligned,
+            refined,
+            refined_aligned,
         }
     }
 
     /// Means of each.
-    pub(super) fn means<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Self {
-        Self::each(&all, |values| mean(values.into_iter()))
+    pub(super) fn means(all: &[&Self]) -> Self {
+        Self::each(all, |values| mean(values.into_iter()))
     }
 
     /// Medians of each.
-    pub(super) fn medians<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Self {
-        Self::each(&all, median)
+    pub(super) fn medians(all: &[&Self]) -> Self {
+        Self::each(all, median)
     }
 
-    fn each<'a>(
-        all: &(impl Iterator<Item = &'a Self> + Clone),
-        middle: fn(Vec<f64>) -> Option<f64>,
-    ) -> Self {
-        let of = |value: fn(&Self) -> Option<f64>| middle(all.clone().filter_map(value).collect());
+    fn each(all: &[&Self], middle: fn(Vec<f64>) -> Option<f64>) -> Self {
+        let of = |value: fn(&Self) -> Option<f64>| {
+            middle(all.iter().filter_map(|errors| value(errors)).collect())
+        };
         Self {
-            dead_reckoning_ate_rmse_m: of(|errors| errors.dead_reckoning_ate_rmse_m),
-            dead_reckoning_aligned_ate_rmse_m: of(|e| e.dead_reckoning_aligned_ate_rmse_m),
-            causal_ate_rmse_m: of(|errors| errors.causal_ate_rmse_m),
-            causal_aligned_ate_rmse_m: of(|errors| errors.causal_aligned_ate_rmse_m),
-            refined_ate_rmse_m: of(|errors| errors.refined_ate_rmse_m),
-            refined_aligned_ate_rmse_m: of(|errors| errors.refined_aligned_ate_rmse_m),
+            dead_reckoning: of(|errors| errors.dead_reckoning),
+            dead_reckoning_aligned: of(|e| e.dead_reckoning_aligned),
+            causal: of(|errors| errors.causal),
+            causal_aligned: of(|errors| errors.causal_aligned),
+            refined: of(|errors| errors.refined),
+            refined_aligned: of(|errors| errors.refined_aligned),
         }
     }
 
@@ -65,12 +70,12 @@ impl Errors {
             |value: Option<f64>| value.map_or("  never".to_owned(), |m| format!("{m:7.3}"));
         format!(
             "{}  {}     {}  {}    {}  {}",
-            metres(self.dead_reckoning_ate_rmse_m),
-            metres(self.dead_reckoning_aligned_ate_rmse_m),
-            metres(self.causal_ate_rmse_m),
-            metres(self.causal_aligned_ate_rmse_m),
-            metres(self.refined_ate_rmse_m),
-            metres(self.refined_aligned_ate_rmse_m),
+            metres(self.dead_reckoning),
+            metres(self.dead_reckoning_aligned),
+            metres(self.causal),
+            metres(self.causal_aligned),
+            metres(self.refined),
+            metres(self.refined_aligned),
         )
     }
 }

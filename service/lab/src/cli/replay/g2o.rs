@@ -39,6 +39,9 @@ pub(in crate::cli) struct G2oArgs {
     replay: ReplayArgs,
 }
 
+/// Known positions of the poses, in the order of their ids; none without a reference.
+type Known<'a> = Option<&'a [Option<Vector3<f64>>]>;
+
 /// A graph at its optimum. Without a reference there is no error.
 #[derive(Debug, Serialize)]
 struct Optimum {
@@ -91,11 +94,7 @@ fn begins_at_origin(known: &[Option<Vector3<f64>>]) -> bool {
 }
 
 /// Sends the graph pose by pose.
-fn replay(
-    args: &G2oArgs,
-    graph: &G2oGraph,
-    known: Option<&[Option<Vector3<f64>>]>,
-) -> anyhow::Result<()> {
+fn replay(args: &G2oArgs, graph: &G2oGraph, known: Known<'_>) -> anyhow::Result<()> {
     let (start_pose, start) = if known.is_some_and(begins_at_origin) {
         ("the origin of the reference", Isometry3::identity())
     } else {
@@ -132,11 +131,7 @@ fn alignment(graph: &G2oGraph) -> Alignment {
 }
 
 /// Relaxes the graph as a whole, from rotations first and with all edges at their word.
-fn solve(
-    args: &G2oArgs,
-    graph: &G2oGraph,
-    known: Option<&[Option<Vector3<f64>>]>,
-) -> anyhow::Result<()> {
+fn solve(args: &G2oArgs, graph: &G2oGraph, known: Known<'_>) -> anyhow::Result<()> {
     let (mut map, nodes, points) = graph.to_pose_graph();
     let begin = Instant::now();
     map.relax(&RelaxationSettings {
@@ -197,11 +192,7 @@ fn write(
     args: &G2oArgs,
     graph: &G2oGraph,
     poses: &[Isometry3<f64>],
-    (placed, landmarks, known): (
-        &[Vector3<f64>],
-        &[Vector3<f64>],
-        Option<&[Option<Vector3<f64>>]>,
-    ),
+    (placed, landmarks, known): (&[Vector3<f64>], &[Vector3<f64>], Known<'_>),
 ) -> anyhow::Result<()> {
     let Some(directory) = &args.replay.out else {
         return Ok(());

@@ -44,12 +44,12 @@ pub(super) struct Report {
 
 /// Errors of one robot. None for a robot that never found its place.
 #[derive(Debug, Serialize)]
-pub(super) struct RobotReport {
+struct RobotReport {
     samples: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     digest: Option<String>,
     #[serde(flatten)]
-    pub(super) errors: Errors,
+    errors: Errors,
     /// When it found its place \[s\] after the start.
     placed_after_s: Option<f64>,
     accepted: u64,
@@ -98,7 +98,7 @@ impl Report {
             trips: sum(|outcome| outcome.trips),
             landmarks: sum(|outcome| outcome.landmarks),
             closures: outcomes.iter().map(|outcome| outcome.closures).sum(),
-            errors: Errors::means(robots.values().map(|robot| &robot.errors)),
+            errors: Errors::means(&errors_of(&robots)),
             accepted: robots.values().map(|robot| robot.accepted).sum(),
             rejected: robots.values().map(|robot| robot.rejected).sum(),
             consistency: Consistency {
@@ -113,9 +113,9 @@ impl Report {
         }
     }
 
-    /// The robots.
-    pub(super) fn robots(&self) -> &BTreeMap<String, RobotReport> {
-        &self.robots
+    /// The median over the robots of each error.
+    pub(super) fn medians(&self) -> Errors {
+        Errors::medians(&errors_of(&self.robots))
     }
 }
 
@@ -142,6 +142,10 @@ impl RobotReport {
             },
         }
     }
+}
+
+fn errors_of(robots: &BTreeMap<String, RobotReport>) -> Vec<&Errors> {
+    robots.values().map(|robot| &robot.errors).collect()
 }
 
 /// How long a team was out \[s\]: from its first motion to its last, or what its robots were out
