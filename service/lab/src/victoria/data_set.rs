@@ -6,13 +6,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix2, Matrix3, SMatrix, Vector2, Vector3};
 
-use super::error::{VictoriaError, VictoriaReason};
-
-/// Name of the file in a directory.
-pub(super) const FILE: &str = "victoria_park.txt";
-
-/// A file of the original set, which is not read.
-pub(super) const ORIGINAL: &str = "aa3_dr.mat";
+use super::error::{FILE, ORIGINAL, VictoriaError, VictoriaReason};
 
 /// Motion from one pose to the next.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,11 @@
 use std::io;
 use std::path::PathBuf;
 
-use super::data_set::{FILE, ORIGINAL};
+/// Name of the file in a directory.
+pub(super) const FILE: &str = "victoria_park.txt";
+
+/// A file of the original set, which is not read.
+pub(super) const ORIGINAL: &str = "aa3_dr.mat";
 
 /// Why a set cannot be read.
 #[derive(Debug, thiserror::Error)]
