@@ -12,6 +12,7 @@ mod offline;
 mod online;
 mod outcome;
 mod points;
+mod replayed;
 mod report;
 mod scoring;
 mod setting;
