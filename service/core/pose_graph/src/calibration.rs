@@ -60,11 +60,11 @@ impl Calibration {
 
 /// An even motion between two poses as odometry read it.
 ///
-/// With a calibration (c_l, c_a, b), the length v and the rotation vector ω that were read, and the
-/// time T over which the body moved, it is
+/// With the errors of lengths and angles c and d, the bias b, the length v and the rotation vector ω
+/// that were read, and the time T over which the body moved, it is
 ///
 /// ```text
-/// exp((1 − c_l) v, (1 − c_a) ω − T b)
+/// exp((1 − c) v, (1 − d) ω − T b)
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {

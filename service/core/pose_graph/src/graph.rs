@@ -6,7 +6,7 @@ use super::calibration::Calibration;
 use super::elimination::number;
 use super::kernel::Kernel;
 use super::link::{Link, LinkId};
-use super::node::{CalibrationId, Freedom, Node, PointId, PoseId};
+use super::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId};
 use state::Digest;
 
 /// A graph of poses and points with the measurements between them.
@@ -57,9 +57,15 @@ impl PoseGraph {
         PointId(self.add_node(Node::point(point, freedom)))
     }
 
-    /// Adds the calibration of a robot's odometry: of a planar one, if it may move in the plane only.
-    pub fn add_calibration(&mut self, at: &Calibration, freedom: Freedom) -> CalibrationId {
-        CalibrationId(self.add_node(Node::calibration(at, freedom)))
+    /// Adds the calibration of a robot's odometry: of a planar one, if it may move in the plane
+    /// only.
+    pub fn add_calibration(
+        &mut self,
+        at: &Calibration,
+        freedom: Freedom,
+        lengths: Lengths,
+    ) -> CalibrationId {
+        CalibrationId(self.add_node(Node::calibration(at, freedom, lengths)))
     }
 
     /// Puts a pose somewhere else and says how it may move from now on: so a frame that has turned

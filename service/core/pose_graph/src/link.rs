@@ -174,13 +174,13 @@ impl Link {
             | Self::PointPrior {
                 point: PointId(node),
                 ..
-            } => (node, node),
-            Self::Between { from, to, .. } | Self::Odometry { from, to, .. } => (from.0, to.0),
-            Self::Sighting { from, target, .. } => (from.0, target.node()),
-            Self::CalibrationPrior {
+            }
+            | Self::CalibrationPrior {
                 calibration: CalibrationId(node),
                 ..
             } => (node, node),
+            Self::Between { from, to, .. } | Self::Odometry { from, to, .. } => (from.0, to.0),
+            Self::Sighting { from, target, .. } => (from.0, target.node()),
             Self::CalibrationWander { from, to, .. } => (from.0, to.0),
         }
     }

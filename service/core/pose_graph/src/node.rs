@@ -1,6 +1,6 @@
 //! Nodes: poses, points and calibrations.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector6};
 
 use super::calibration::{CALIBRATION_AXES, Calibration, PLANAR_CALIBRATION_AXES};
 use geometry::{ALL_AXES, PLANAR_AXES, se3};
@@ -51,6 +51,16 @@ enum Kind {
     Calibration,
 }
 
+/// Whether the lengths that odometry reads are calibrated with its rotations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lengths {
+    /// Their error is as stated. Loop closures that say no more than that two poses are one leave
+    /// the scale of a map open, and are the more probable the smaller it is.
+    Known,
+    /// Their error is estimated.
+    Estimated,
+}
+
 /// A node with its place. A point is a pose that keeps the axes of `map`; a calibration is one as
 /// [`Calibration::place`] says.
 #[derive(Clone, Debug)]
@@ -91,11 +101,19 @@ impl Node {
         }
     }
 
-    pub(super) fn calibration(calibration: &Calibration, freedom: Freedom) -> Self {
-        let axes: &[usize] = match freedom {
+    pub(super) fn calibration(
+        calibration: &Calibration,
+        freedom: Freedom,
+        lengths: Lengths,
+    ) -> Self {
+        let whole: &[usize] = match freedom {
             Freedom::Held => &[],
-            Freedom::Planar => &PLANAR_CALIBRATION_AXES[1..],
-            Freedom::Full => &CALIBRATION_AXES[1..],
+            Freedom::Planar => &PLANAR_CALIBRATION_AXES,
+            Freedom::Full => &CALIBRATION_AXES,
+        };
+        let axes = match lengths {
+            Lengths::Estimated => whole,
+            Lengths::Known => whole.get(1..).unwrap_or_default(),
         };
         Self {
             pose: calibration.place(),
@@ -129,11 +147,6 @@ impl Node {
             twist[axis] = *unknown;
         }
         twist
-    }
-
-    /// The translation part \[m\] and the rotation part \[rad\] of a motion by its unknowns.
-    pub(super) fn motion(&self, unknowns: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
-        se3::split(&self.twist(unknowns))
     }
 
     /// The node's pose `from` after a motion by its unknowns: T exp(ξ), p + ρ for a point, and the

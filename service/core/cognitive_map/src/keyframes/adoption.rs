@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::constraint::composed;
+use super::constraints::Schedule;
 use super::graph::KeyframeGraph;
 use super::map::KeyframeMap;
 use super::meanwhile::Meanwhile;
@@ -24,9 +25,7 @@ impl KeyframeMap {
         let job = RelaxationJob::new(&self.graph);
         self.pending = Some(PendingRelaxation::Awaited(job));
         // What comes from now on is for the next one.
-        let judgement = self.graph.is_judgement_due();
-        let schedule = &mut self.graph.constraints.schedule;
-        *schedule = schedule.begun_anew(judgement);
+        self.graph.constraints.schedule = Schedule::default();
         let mut meanwhile = Meanwhile::default();
         meanwhile.note(agent, stamp_ns);
         self.graph.meanwhile = Some(Box::new(meanwhile));

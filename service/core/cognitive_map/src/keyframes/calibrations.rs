@@ -2,9 +2,12 @@
 
 use nalgebra::{SVector, Vector3};
 
+use super::agent_track::AgentTrack;
 use super::chains::Chains;
 use super::tuning;
-use pose_graph::{CalibrationId, CalibrationInformation, Freedom, Kernel, Link, PoseGraph};
+use pose_graph::{
+    CalibrationId, CalibrationInformation, Freedom, Kernel, Lengths, Link, PoseGraph,
+};
 
 /// The calibration nodes of a pose graph.
 #[derive(Debug, Default)]
@@ -17,11 +20,17 @@ pub(super) struct Calibrations {
 
 impl Calibrations {
     /// Adds the calibrations of all agents: one for every few motions of an agent, from the first
-    /// one, of which the space's settings say what to expect, on; each as far from the one before
-    /// as it may have changed since.
+    /// one on, which is as the estimator has learned it by now, as far off as the space's settings
+    /// admit; each later one as far from the one before as it may have changed since.
     ///
-    /// Without lasting errors, by the settings, there are none.
-    pub(super) fn add(chains: &Chains, prior_sd: &SVector<f64, 5>, map: &mut PoseGraph) -> Self {
+    /// Without lasting errors, by the settings, there are none. Where lengths are known, they are as
+    /// the estimator has learned them by now.
+    pub(super) fn add(
+        chains: &Chains,
+        prior_sd: &SVector<f64, 5>,
+        lengths: Lengths,
+        map: &mut PoseGraph,
+    ) -> Self {
         let mut all = Self {
             of_motion: vec![None; chains.keyframes.numbers() as usize],
             latest: vec![None; chains.tracks.len()],
@@ -29,15 +38,10 @@ impl Calibrations {
         if prior_sd.iter().all(|sd| *sd == 0.0) {
             return all;
         }
-        let numbers = 0..chains.tracks.len();
-        for ((track, agent), index) in chains.tracks.iter().zip(0..).zip(numbers) {
+        for (track, agent) in chains.tracks.iter().zip(0..) {
             if track.is_in_map() {
-                let freedom = if track.is_planar {
-                    Freedom::Planar
-                } else {
-                    Freedom::Full
-                };
-                all.latest[index] = all.add_agent(chains, agent, freedom, prior_sd, map);
+                let latest = all.add_agent(chains, (agent, track), prior_sd, lengths, map);
+                all.latest[agent as usize] = latest;
             }
         }
         all
@@ -57,11 +61,25 @@ impl Calibrations {
     fn add_agent(
         &mut self,
         chains: &Chains,
-        agent: u32,
-        freedom: Freedom,
+        (agent, track): (u32, &AgentTrack),
         prior_sd: &SVector<f64, 5>,
+        lengths: Lengths,
         map: &mut PoseGraph,
     ) -> Option<CalibrationId> {
+        let freedom = if track.is_planar {
+            Freedom::Planar
+        } else {
+            Freedom::Full
+        };
+        let learned = track.calibrated.calibration.in_graph();
+        let expected = match lengths {
+            Lengths::Estimated => learned,
+            // What the estimator has learned of rotations may be by closures that are judged here.
+            Lengths::Known => pose_graph::Calibration {
+                length: learned.length,
+                ..pose_graph::Calibration::default()
+            },
+        };
         let prior = prior_sd.component_mul(prior_sd);
         let mut newest = None;
         let (mut n_motions, mut wander) = (0, SVector::zeros());
@@ -70,12 +88,11 @@ impl Calibrations {
             let calibrated = &keyframe.calibrated;
             let node = newest.filter(|_| n_motions < tuning::CALIBRATED_TOGETHER);
             let node = node.unwrap_or_else(|| {
-                let guess = calibrated.calibration.in_graph();
-                let node = map.add_calibration(&guess, freedom);
+                let node = map.add_calibration(&expected, freedom, lengths);
                 let link = match newest {
                     None => Link::CalibrationPrior {
                         calibration: node,
-                        at: pose_graph::Calibration::default(), // EXPERIMENT length held
+                        at: expected,
                         information: information(&prior),
                     },
                     Some(from) => Link::CalibrationWander {

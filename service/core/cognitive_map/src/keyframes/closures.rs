@@ -36,7 +36,7 @@ impl KeyframeGraph {
         };
         let (seen, noise) = seen_pose(relation, &pose_now.inv_mul(&pose_then));
         let is_kept = self.add_closure(&now, &then, &seen, &noise, ClosureState::Pending);
-        self.note_closure(&now, is_kept);
+        self.constraints.schedule.new_closures += u32::from(is_kept);
         is_kept
     }
 
@@ -79,16 +79,8 @@ impl KeyframeGraph {
         noise: &PoseCovariance,
     ) {
         let is_kept = self.add_closure(now, then, seen, noise, ClosureState::Accepted);
-        self.note_closure(now, is_kept);
+        self.constraints.schedule.new_closures += u32::from(is_kept);
         self.constraints.schedule.accepted += u32::from(is_kept);
-    }
-
-    /// Counts a closure if it was kept.
-    fn note_closure(&mut self, now: &KeyframeOffset, is_kept: bool) {
-        let stamp_ns = { self.chains.keyframes.get(now.keyframe) }.map(|now| now.until_ns);
-        let schedule = &mut self.constraints.schedule;
-        schedule.closed_ns = stamp_ns.unwrap_or(schedule.closed_ns);
-        schedule.new_closures += u32::from(is_kept);
     }
 
     /// Adds a closure between two instants; answers whether there is room for it.
@@ -120,43 +112,26 @@ impl KeyframeGraph {
 
     /// Number of accepted closures.
     pub fn n_closures_accepted(&self) -> usize {
-        self.constraints.count(ClosureState::Accepted)
+        self.constraints.n_accepted()
     }
 
-    /// Whether closures are new, and it is time for a relaxation: a while of the stream has passed
-    /// since the last one.
+    /// Whether closures are new, and enough records have come in since the last relaxation to pay
+    /// for another one.
     pub fn is_due(&self) -> bool {
         let schedule = &self.constraints.schedule;
-        let since_ns = schedule.closed_ns.saturating_sub(schedule.relaxed_ns);
         schedule.new_closures > 0
-            && (self.is_judgement_due() || since_ns.unsigned_abs() >= tuning::RELAXATION_NS)
+            && schedule.records as usize >= self.n_keyframes() / tuning::KEYFRAMES_PER_RECORD
     }
 
-    /// Whether enough records have come in since all closures were judged together to pay for
-    /// judging them again.
-    pub(super) fn is_judgement_due(&self) -> bool {
-        let schedule = &self.constraints.schedule;
-        schedule.records as usize >= self.n_keyframes() / tuning::KEYFRAMES_PER_RECORD
-    }
-
-    /// Relaxes the graph with the closures that are accepted, moves the keyframes, and answers the
-    /// poses of the agents in the map; nothing if no closure was accepted or rejected.
+    /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses
+    /// of the agents in the map; nothing if no closure was accepted or rejected.
     ///
     /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then
     /// the same records give the same map.
     pub fn relax(&mut self) -> Vec<Correction> {
-        let judgement = self.is_judgement_due();
-        let schedule = self.constraints.schedule;
-        self.constraints.schedule = schedule.begun_anew(judgement);
+        let schedule = std::mem::take(&mut self.constraints.schedule);
         let mut coarse = RelaxationCopy::coarse(self);
-        let judged = if judgement {
-            coarse.accept_consistent()
-        } else {
-            coarse.accept_new(schedule.relaxed_ns)
-        };
-        if !judgement && schedule.accepted as usize + judged == 0 {
-            return Vec::new();
-        }
+        let judged = coarse.accept_consistent();
         let (problem, _, refuted) = coarse.relax();
         if schedule.accepted as usize + judged + refuted == 0 {
             return Vec::new();

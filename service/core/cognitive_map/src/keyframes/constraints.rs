@@ -2,7 +2,7 @@
 
 use state::{NONE, Slab, state_of_struct};
 
-use super::constraint::{ClosureState, Constraint};
+use super::constraint::Constraint;
 use super::keyframe::{Keyframe, KeyframeSlab};
 use super::list::unlink;
 
@@ -16,35 +16,16 @@ pub(super) struct Constraints {
 /// What has come in since the last relaxation.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Schedule {
-    /// Motions since closures were last judged all together.
+    /// Motions.
     pub(super) records: u32,
-    /// Stamp of the latest closure when a relaxation last began \[ns\].
-    pub(super) relaxed_ns: i64,
-    /// Stamp of the latest closure \[ns\].
-    pub(super) closed_ns: i64,
     /// Loop closures that were kept.
     pub(super) new_closures: u32,
     /// Those of them that were accepted at once.
     pub(super) accepted: u32,
 }
 
-impl Schedule {
-    /// As a relaxation begins, in which all closures are judged together or not.
-    pub(super) fn begun_anew(&self, judgement: bool) -> Self {
-        Self {
-            records: if judgement { 0 } else { self.records },
-            relaxed_ns: self.closed_ns,
-            closed_ns: self.closed_ns,
-            new_closures: 0,
-            accepted: 0,
-        }
-    }
-}
-
 state_of_struct!(Schedule {
     records,
-    relaxed_ns,
-    closed_ns,
     new_closures,
     accepted
 });
@@ -65,10 +46,10 @@ impl Constraints {
         first.map_or(NONE, |(number, _)| number)
     }
 
-    /// Number of constraints in a state.
-    pub(super) fn count(&self, state: ClosureState) -> usize {
+    /// Number of loop closures that count.
+    pub(super) fn n_accepted(&self) -> usize {
         let all = self.slab.iter();
-        all.filter(|(_, constraint)| constraint.state == state)
+        all.filter(|(_, constraint)| constraint.is_accepted())
             .count()
     }
 

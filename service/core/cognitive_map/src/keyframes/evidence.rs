@@ -41,6 +41,15 @@ impl Chance {
             log_density: -(area_m2 * TAU).ln(),
         }
     }
+
+    /// Log of the ratio between the probability density of a closure that fits exactly and that by
+    /// chance.
+    pub(super) fn log_gain(&self, closure: &Constraint) -> f64 {
+        let least = tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
+        let own = closure.covariance.matrix() + Matrix6::from_diagonal_element(least);
+        let volume = (TAU.powi(3) * planar_part(&own).determinant()).sqrt();
+        -volume.ln() - self.log_density
+    }
 }
 
 /// Log of the ratio between the probability density of a closure by the map and that by chance; and

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::chains::Chains;
+use super::evidence::Chance;
 use super::problem::{Among, Calibrating, Problem};
 use super::relaxation::RelaxationCopy;
 use super::tuning;
@@ -11,7 +12,7 @@ use pose_graph::RelaxationSettings;
 
 impl RelaxationCopy {
     /// Lets an agent's noise of rotations become half or twice what it is taken for, where that
-    /// makes all measurements together more probable (the evidence of the model: MacKay 1992).
+    /// makes all measurements together more probable (the evidence of the model: `MacKay` 1992).
     pub(super) fn learn_odometry_noise(&mut self, agent: u32) {
         let track = self.graph().chains.track(agent);
         if track.is_none_or(|track| track.states_noise) {
@@ -55,6 +56,22 @@ impl RelaxationCopy {
         let prior = (ln_scale / tuning::TURN_NOISE_PRIOR_SD.ln()).powi(2);
         -0.5 * (problem.map.chi_squared() + problem.map.marginals().log_determinant() + prior)
             - n_turns * ln_scale
+    }
+}
+
+impl RelaxationCopy {
+    /// Log of the probability density of all measurements, up to a constant that is that of the
+    /// graph: as [`learn_odometry_noise`](Self::learn_odometry_noise) compares it, and of each
+    /// accepted closure how much more probable it is by the map than by chance.
+    pub(super) fn log_probability(&self, problem: &Problem) -> f64 {
+        let chains = &self.graph().chains;
+        let chance = Chance::of(chains, problem);
+        let closures = self.accepted().map(|(_, closure)| chance.log_gain(closure));
+        let noise = (0..)
+            .zip(chains.tracks.iter())
+            .map(|(agent, track)| turns(chains, agent, track.is_planar) * track.turn_noise.ln());
+        let misfit = problem.map.chi_squared() + problem.map.marginals().log_determinant();
+        closures.sum::<f64>() - 0.5 * misfit - noise.sum::<f64>()
     }
 }
 

@@ -12,7 +12,7 @@ use super::tuning;
 use crate::estimator::Calibration;
 use geometry::{PoseCovariance, from_planar_part, planar_part};
 use pose_graph::{
-    Freedom, Kernel, Link, LinkId, Marginals, PointId, PoseGraph, PoseId, PoseInformation,
+    Freedom, Kernel, Lengths, Link, LinkId, Marginals, PointId, PoseGraph, PoseId, PoseInformation,
     PositionInformation, Scale, SightingTarget,
 };
 use state::NONE;
@@ -67,7 +67,12 @@ impl Problem {
         }
         if calibrating == Calibrating::Free {
             let prior_sd = &graph.settings.calibration_sd;
-            problem.calibrations = Calibrations::add(chains, prior_sd, &mut problem.map);
+            let lengths = if graph.constraints.n_accepted() > 0 {
+                Lengths::Known
+            } else {
+                Lengths::Estimated
+            };
+            problem.calibrations = Calibrations::add(chains, prior_sd, lengths, &mut problem.map);
         }
         for (number, keyframe) in chains.keyframes.iter() {
             problem.add_motion(graph, number, keyframe);

@@ -38,6 +38,21 @@ impl RelaxationCopy {
         Self(graph.clone())
     }
 
+    /// Of the whole graph, as if no closure had been judged and no odometry been learned.
+    pub(super) fn whole_undecided(graph: &KeyframeGraph) -> Self {
+        let mut whole = Self(graph.clone());
+        let accepted: Vec<u32> = whole.accepted().map(|(number, _)| number).collect();
+        for number in accepted {
+            whole.set_state(number, ClosureState::Pending);
+        }
+        for agent in (0..).take(whole.0.chains.tracks.len()) {
+            if let Some(track) = whole.0.track_mut(agent) {
+                track.turn_noise = 1.0;
+            }
+        }
+        whole
+    }
+
     /// The coarse graph, which is relaxed while samples come in: one keyframe a step, and those
     /// with sightings, at the begin of a stretch, and the latest ones. Keyframes and constraints
     /// keep their numbers.
@@ -102,21 +117,6 @@ impl RelaxationCopy {
             runs.retain(is_pending);
         }
         n_accepted
-    }
-
-    /// Accepts pending closures since a stamp that are evident by the map as it is, each by itself;
-    /// answers their number.
-    pub(super) fn accept_new(&mut self, since_ns: i64) -> usize {
-        let chains = &self.0.chains;
-        let is_new = |&(_, constraint): &(u32, &Constraint)| {
-            let from = chains.keyframes.get(constraint.from);
-            constraint.state == ClosureState::Pending
-                && from.is_some_and(|from| from.until_ns >= since_ns)
-        };
-        let new: Vec<Run> = { self.closures().filter(is_new) }
-            .map(|(number, _)| Run::of_one(number))
-            .collect();
-        self.accept_evident(&new)
     }
 
     /// The runs of pending closures that fit a map with all closures.
@@ -291,9 +291,9 @@ impl RelaxationCopy {
         all.filter(|(_, constraint)| constraint.is_closure())
     }
 
-    fn accepted(&self) -> impl Iterator<Item = (u32, &Constraint)> {
+    pub(super) fn accepted(&self) -> impl Iterator<Item = (u32, &Constraint)> {
         self.closures()
-            .filter(|(_, constraint)| constraint.state == ClosureState::Accepted)
+            .filter(|(_, constraint)| constraint.is_accepted())
     }
 
     fn set_state(&mut self, number: u32, state: ClosureState) {

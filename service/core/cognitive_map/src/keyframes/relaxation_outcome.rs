@@ -40,7 +40,7 @@ impl RelaxationOutcome {
             (was.state != is.state).then_some((number, is.state))
         };
         let learned = |(agent, (was, is)): (u32, (&AgentTrack, &AgentTrack))| {
-            (was.turn_noise != is.turn_noise).then_some((agent, is.turn_noise))
+            (was.turn_noise.to_bits() != is.turn_noise.to_bits()).then_some((agent, is.turn_noise))
         };
         let tracks = { graph.chains.tracks.iter() }.zip(relaxed.chains.tracks.iter());
         let turn_noises = (0..).zip(tracks).filter_map(learned).collect();

@@ -98,14 +98,6 @@ impl Member {
 }
 
 impl Run {
-    /// Of one closure.
-    pub(super) fn of_one(number: u32) -> Self {
-        Self {
-            members: vec![number],
-            middle: number,
-        }
-    }
-
     /// Log of the odds at which it is accepted.
     pub(super) fn log_odds_needed(&self) -> f64 {
         if self.members.len() < tuning::RUN_CLOSURES_MIN {

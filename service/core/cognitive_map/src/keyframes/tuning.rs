@@ -98,10 +98,6 @@ pub(super) const CLOSURE_SD_MIN: f64 = 1e-3;
 /// of so many keyframes a record.
 pub(super) const KEYFRAMES_PER_RECORD: usize = 8;
 
-/// Time of the stream between two relaxations \[ns\]: a closure that is evident corrects the agent
-/// within a second.
-pub(super) const RELAXATION_NS: u64 = 500_000_000;
-
 /// Stream time from the record at which a relaxation begins to the one at which it comes into
 /// force \[ns\]: enough for one of ten thousand keyframes, which takes 0.2 s, on a busy machine,
 /// and little enough for a closure to reach the pose within a second.

@@ -6,12 +6,13 @@ use nalgebra::{Isometry3, Vector6};
 use proptest::prelude::*;
 
 use super::*;
-use crate::estimator::Calibrated;
+use crate::estimator::{Calibrated, ExternalEstimate};
 use crate::input::{PoseNoise, Relation, RelativePose, StartPose};
 use crate::keyframes::constraint::ClosureState;
 use crate::keyframes::keyframe::Keyframe;
 use crate::keyframes::moment::Moment;
 use crate::keyframes::settings::KeyframeSettings;
+use geometry::PoseCovariance;
 use state::Digest;
 
 /// Agents, the last of which is in no map until it is told where it is.
@@ -150,11 +151,16 @@ impl Team {
             let newest = chains.in_map(track.newest)?;
             Some(Correction {
                 agent,
-                pose: shift * newest * track.since.motion(),
-                covariance: None,
+                estimate: ExternalEstimate {
+                    pose: shift * newest * track.since.motion(),
+                    covariance: PoseCovariance::zero(),
+                    calibration: None,
+                    prevails: true,
+                },
             })
         });
         let outcome = RelaxationOutcome {
+            turn_noises: vec![(0, 0.5)],
             poses: chains.keyframes.iter().filter_map(pose).collect(),
             states: { closures.iter() }
                 .filter(|(_, closure)| closure.is_candidate())
@@ -253,7 +259,7 @@ proptest! {
         let corrected: Vec<_> = corrections.iter().map(|one| one.agent).collect();
         prop_assert_eq!(corrected, stayed);
         for correction in corrections {
-            let at = correction.pose.translation;
+            let at = correction.estimate.pose.translation;
             prop_assert!((at.y - SHIFT_M).abs() < 1e-6, "{}", at);
         }
     }
