@@ -136,7 +136,7 @@ impl KeyframeGraph {
         if schedule.accepted as usize + judged + refuted == 0 {
             return Vec::new();
         }
-        let corrections = coarse.corrections(&problem);
+        let corrections = coarse.corrections(&problem, judged > 0);
         coarse.move_keyframes(&problem);
         self.adopt(coarse.graph());
         corrections

@@ -239,7 +239,11 @@ impl RelaxationCopy {
     }
 
     /// The poses of the agents in the map in a relaxed graph.
-    pub(super) fn corrections(&self, problem: &Problem) -> Vec<Correction> {
+    ///
+    /// They prevail over what the agents' filters hold where closures were judged by their
+    /// evidence; not where closures were accepted as they came, for a robot that recognises what
+    /// it cannot see may have been carried off.
+    pub(super) fn corrections(&self, problem: &Problem, prevail: bool) -> Vec<Correction> {
         let marginals = problem.map.marginals();
         let mut corrections = Vec::new();
         for (agent, track) in (0..).zip(self.0.chains.tracks.iter()) {
@@ -255,7 +259,7 @@ impl RelaxationCopy {
                 pose: problem.map.pose(node) * since.motion(),
                 covariance: composed(&covariance, since.motion(), &since.covariance()),
                 calibration: problem.calibration(agent, &marginals),
-                prevails: true,
+                prevails: prevail,
             };
             corrections.push(Correction { agent, estimate });
         }

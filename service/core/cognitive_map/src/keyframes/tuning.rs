@@ -67,11 +67,11 @@ pub(super) const RUN_STEP_MAX_M: f64 = 3.0;
 /// Way and rotation after which a run ends and another one begins \[m, rad\]: what looks alike for
 /// so long, and beyond a corner, is likely to be the same.
 pub(super) const RUN_LENGTH_MAX_M: f64 = 20.0;
-pub(super) const RUN_TURN_MAX_RAD: f64 = 1.0;
+pub(super) const RUN_TURN_MAX_RAD: f64 = 2.0;
 
 /// Least standard deviation of the places of a map along each axis, where chance is concerned
-/// \[m\].
-pub(super) const CHANCE_SD_MIN_M: f64 = 1.0;
+/// \[m\]: in a room, any closure lies near any other, and a false one bends little.
+pub(super) const CHANCE_SD_MIN_M: f64 = 5.0;
 
 /// Log of the odds at which runs of closures are accepted: 99 to 1.
 pub(super) const ACCEPTED_LOG_ODDS: f64 = 4.6;
