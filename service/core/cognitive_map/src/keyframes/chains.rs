@@ -81,8 +81,18 @@ impl Chains {
         Some(track.own_frame.0.unwrap_or_default() * keyframe.pose)
     }
 
+    /// Puts a keyframe of the map somewhere else. One whose agent has left the map for a frame of
+    /// its own stays.
+    pub(super) fn put(&mut self, number: u32, pose: &Isometry3<f64>, revision: u64) {
+        if self.in_map(number).is_some()
+            && let Some(keyframe) = self.keyframes.get_mut(number, revision)
+        {
+            (keyframe.pose, keyframe.is_in_map) = (*pose, true);
+        }
+    }
+
     /// Moves a keyframe by a motion of the map's frame.
-    fn move_in_map(&mut self, number: u32, moved: &Isometry3<f64>, revision: u64) {
+    pub(super) fn move_in_map(&mut self, number: u32, moved: &Isometry3<f64>, revision: u64) {
         let was = self.in_map(number);
         if let (Some(was), Some(keyframe)) = (was, self.keyframes.get_mut(number, revision)) {
             keyframe.pose = moved * was;

@@ -81,6 +81,18 @@ pub(super) const CLOSURE_SD_MIN: f64 = 1e-3;
 /// of so many keyframes a record.
 pub(super) const KEYFRAMES_PER_RECORD: usize = 8;
 
+/// Stream time from the record at which a relaxation begins to the one at which it comes into
+/// force \[ns\]: enough for one of ten thousand keyframes, which takes 0.2 s, on a busy machine,
+/// and little enough for a closure to reach the pose within a second.
+pub(super) const RELAXATION_DELAY_NS: i64 = 500_000_000;
+
+/// Most records between the two, whatever their stamps say: two seconds of twenty robots that send
+/// a hundred samples a second.
+pub(super) const RELAXATION_RECORDS_MAX: u32 = 4096;
+
+/// Keyframes that move with one record, once a relaxation is in force: about 0.2 ms.
+pub(super) const KEYFRAMES_MOVED_PER_RECORD: usize = 1024;
+
 /// Most rounds of relaxation and rejection.
 pub(super) const RELAXATION_ROUNDS_MAX: usize = 3;
 
