@@ -18,8 +18,6 @@ pub struct PoseGraph {
     pub(super) links: Vec<LinkSlot>,
     /// For each node its links and the nodes at their other ends; the node itself if there is none.
     pub(super) links_of: Vec<Vec<(u32, u32)>>,
-    /// Nodes whose links have changed since someone last asked.
-    touched: Vec<u32>,
 }
 
 /// A link and how it counts.
@@ -58,9 +56,7 @@ impl PoseGraph {
     }
 
     /// Puts a pose somewhere else and says how it may move from now on: so a frame that has turned
-    /// out to lie in another is carried there and its origin set free. An
-    /// [`IncrementalRelaxation`](super::IncrementalRelaxation) does not take notice of it; a new
-    /// one is to be begun.
+    /// out to lie in another is carried there and its origin set free.
     pub fn place_pose(&mut self, id: PoseId, pose: Isometry3<f64>, freedom: Freedom) {
         self.nodes[id.0 as usize] = Node::pose(pose, freedom);
     }
@@ -76,27 +72,34 @@ impl PoseGraph {
     /// It names a node that is not of this graph, or one node twice.
     pub fn add_link(&mut self, link: Link, kernel: Kernel) -> Result<LinkId, InvalidLink> {
         let (from, to) = link.nodes();
-        let id = self.insert(link, kernel, true)?;
-        self.touched.extend([from, to]);
-        Ok(id)
-    }
-
-    /// Adds a link that says nothing until it is switched on. Nothing is computed anew for it.
-    ///
-    /// # Errors
-    /// As [`add_link`](Self::add_link).
-    pub fn add_silent_link(&mut self, link: Link, kernel: Kernel) -> Result<LinkId, InvalidLink> {
-        self.insert(link, kernel, false)
+        if from.max(to) as usize >= self.nodes.len() {
+            return Err(InvalidLink::UnknownNode);
+        }
+        let joins_two = matches!(link, Link::Between { .. } | Link::Sighting { .. });
+        if joins_two && from == to {
+            return Err(InvalidLink::Loop);
+        }
+        let id = number(self.links.len());
+        self.links_of[from as usize].push((id, to));
+        if joins_two {
+            self.links_of[to as usize].push((id, from));
+        }
+        self.links.push(LinkSlot {
+            link,
+            kernel,
+            is_on: true,
+        });
+        Ok(LinkId(id))
     }
 
     /// Makes a link say nothing.
     pub fn switch_off(&mut self, link: LinkId) {
-        self.switch(link, false);
+        self.links[link.0 as usize].is_on = false;
     }
 
     /// Makes a link count again.
     pub fn switch_on(&mut self, link: LinkId) {
-        self.switch(link, true);
+        self.links[link.0 as usize].is_on = true;
     }
 
     /// Where a pose is.
@@ -187,40 +190,6 @@ impl PoseGraph {
             sum += slot.kernel.cost_and_weight(s, widening).0;
         }
         sum
-    }
-
-    /// Nodes whose links have changed since the last call.
-    pub(super) fn take_touched(&mut self) -> Vec<u32> {
-        std::mem::take(&mut self.touched)
-    }
-
-    fn insert(&mut self, link: Link, kernel: Kernel, is_on: bool) -> Result<LinkId, InvalidLink> {
-        let (from, to) = link.nodes();
-        if from.max(to) as usize >= self.nodes.len() {
-            return Err(InvalidLink::UnknownNode);
-        }
-        let joins_two = matches!(link, Link::Between { .. } | Link::Sighting { .. });
-        if joins_two && from == to {
-            return Err(InvalidLink::Loop);
-        }
-        let id = number(self.links.len());
-        self.links_of[from as usize].push((id, to));
-        if joins_two {
-            self.links_of[to as usize].push((id, from));
-        }
-        self.links.push(LinkSlot {
-            link,
-            kernel,
-            is_on,
-        });
-        Ok(LinkId(id))
-    }
-
-    fn switch(&mut self, link: LinkId, is_on: bool) {
-        let slot = &mut self.links[link.0 as usize];
-        slot.is_on = is_on;
-        let (from, to) = slot.link.nodes();
-        self.touched.extend([from, to]);
     }
 
     fn add_node(&mut self, node: Node) -> u32 {

@@ -5,9 +5,8 @@ use nalgebra::{Matrix3, Matrix6};
 use super::elimination::{CliqueTree, HalfSolution};
 use super::equations::NormalEquations;
 use super::graph::PoseGraph;
-use super::innovation::{ExpectedPose, ExpectedPosition};
 use super::node::{PointId, PoseId};
-use geometry::{PoseCovariance, se3, seen_by_pose, symmetric};
+use geometry::{PoseCovariance, se3, symmetric};
 
 /// Covariances of nodes, given all links.
 ///
@@ -17,8 +16,8 @@ use geometry::{PoseCovariance, se3, seen_by_pose, symmetric};
 /// robust kernel has discounted counts as little here as there.
 #[derive(Clone, Debug)]
 pub struct Marginals<'a> {
-    pub(super) map: &'a PoseGraph,
-    pub(super) tree: std::borrow::Cow<'a, CliqueTree>,
+    map: &'a PoseGraph,
+    tree: CliqueTree,
 }
 
 impl PoseGraph {
@@ -32,10 +31,7 @@ impl PoseGraph {
         };
         let mut tree = CliqueTree::structured(&equations, self.nodes.len());
         tree.refactor(&equations, &tree.all());
-        Marginals {
-            map: self,
-            tree: std::borrow::Cow::Owned(tree),
-        }
+        Marginals { map: self, tree }
     }
 }
 
@@ -73,48 +69,6 @@ impl Marginals<'_> {
         let covariance =
             to_to - common - common.transpose() + moved * from_from * moved.transpose();
         Some(PoseCovariance::from_upper_part(&covariance))
-    }
-
-    /// Where `to` is expected in the frame of `from`. `None` if the links leave one of them free.
-    pub fn expected_pose(&self, from: PoseId, to: PoseId) -> Option<ExpectedPose> {
-        let covariance = if from == to {
-            PoseCovariance::zero()
-        } else {
-            self.relative_pose(from, to)?
-        };
-        let transform = self.map.pose(from).inv_mul(self.map.pose(to));
-        Some(ExpectedPose {
-            transform,
-            covariance,
-        })
-    }
-
-    /// Where a point is expected in the frame of a pose. `None` if the links leave one of them
-    /// free.
-    ///
-    /// ```text
-    /// d = Rᵀ dp − ρ + seen×φ
-    /// ```
-    pub fn expected_position(&self, from: PoseId, point: PointId) -> Option<ExpectedPosition> {
-        let (from_half, point_half) = (self.half(from.0)?, self.half(point.0)?);
-        let from_from = self.placed(from.0, from.0, &from_half.product(&from_half));
-        let block = self.placed(point.0, point.0, &point_half.product(&point_half));
-        let point_point = block.fixed_view::<3, 3>(0, 0).into_owned();
-        let block = self.placed(point.0, from.0, &point_half.product(&from_half));
-        let point_from = block.fixed_view::<3, 6>(0, 0).into_owned();
-        let pose = self.map.pose(from);
-        let position = pose.inverse_transform_point(&self.map.point(point)).coords;
-        let turn = pose.rotation.inverse().to_rotation_matrix().into_inner();
-        let moved = seen_by_pose(&position);
-        let common = turn * point_from * moved.transpose();
-        let covariance = turn * point_point * turn.transpose()
-            + common
-            + common.transpose()
-            + moved * from_from * moved.transpose();
-        Some(ExpectedPosition {
-            position,
-            covariance: symmetric(&covariance),
-        })
     }
 
     fn half(&self, node: u32) -> Option<HalfSolution> {

@@ -152,25 +152,6 @@ proptest! {
         prop_assert!(graph.error(&tree) < 1e-9, "{}", graph.error(&tree));
     }
 
-    /// Links come one by one, and only what they concern is factored anew.
-    #[test]
-    fn a_part_factored_anew_is_the_whole_factored_anew(
-        mut graph in graph(),
-        later in prop::collection::vec((0..60_usize, 0..60_usize), 1..20),
-    ) {
-        let n = graph.dimensions.len();
-        let mut tree = CliqueTree::structured(&graph, n);
-        tree.refactor(&graph, &tree.all());
-        for (a, b) in later {
-            let (a, b) = (u32::try_from(a % n).unwrap(), u32::try_from(b % n).unwrap());
-            graph.link(a, b);
-            let gap = tree.remove([a, b]);
-            let rebuilt = tree.restructure(&graph, &gap, |variable| variable == a);
-            tree.refactor(&graph, &rebuilt);
-            prop_assert!(graph.error(&tree) < 1e-9, "{}", graph.error(&tree));
-        }
-    }
-
     #[test]
     fn marginals_are_blocks_of_the_inverse(graph in graph(), pair in (0..60_usize, 0..60_usize)) {
         let n = graph.dimensions.len();
