@@ -18,7 +18,7 @@
 //! | [`points`] | objects as points with normals, recognised in any pose |
 //! | [`csv`] | recordings as tables: motion, levels, views and ranges of robots |
 //! | [`stream`] | what one robot sends, and its dead reckoning |
-//! | [`reference`] | known positions of poses that have no time |
+//! | [`mod@reference`] | known positions of poses that have no time |
 //! | [`paths`] | a figure of paths |
 //! | [`eval`] | the seed paper's experiments: protocols, measures, tables and figures |
 //!

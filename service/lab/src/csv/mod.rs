@@ -4,11 +4,11 @@
 //! |---|---|
 //! | `samples.csv` | `t_s,agent,kind`, and what the kind has |
 //! | `truth.csv` | `t_s,agent,x,y,z,yaw,quality`; `yaw` is empty where it is unknown |
-//! | `CHANNEL.npy` | one view a row, as `numpy.save` writes a matrix of half, single or double precision |
+//! | `CHANNEL.npy` | one view a row, as `numpy.save` writes 16, 32 or 64-bit floats |
 //!
 //! | kind | columns |
 //! |---|---|
-//! | `increment` | dx, dy, dz \[m\] and dyaw \[rad\] since the motion before, in the body frame; their deviations: of x and y, of z, of the yaw |
+//! | `increment` | dx, dy, dz \[m\], dyaw \[rad\] since the motion before; sd of x and y, z, yaw |
 //! | `velocity` | vx, vy \[m/s\], turn rate \[rad/s\], and for how long until the stamp \[s\] |
 //! | `level` | channel, value |
 //! | `descriptor` | channel, row of its file |
