@@ -98,7 +98,7 @@ impl Frame {
             if !external.prevails {
                 return false;
             }
-            self.add_to_pose(index, &intersection.missing());
+            self.put(index, &intersection);
             intersection = Intersection::new(self.members[index].filter(), external);
         }
         let member = &self.members[index];
@@ -121,7 +121,9 @@ impl Frame {
 }
 
 impl Frame {
-    /// Sets the lasting errors of a member's odometry, which are uncorrelated with everything then.
+    /// Sets the lasting errors of a member's rotations, and makes all of its odometry uncorrelated
+    /// with everything: the length's, too, or the pose that comes with them would be taken for a
+    /// measurement of it.
     fn recalibrate(
         &mut self,
         index: usize,
@@ -130,10 +132,9 @@ impl Frame {
         parameters: &Parameters,
     ) {
         let member = &mut self.members[index];
-        self.covariance.isolate(
-            member.offset + 7,
-            &variances.fixed_rows::<4>(1).into_owned(),
-        );
+        let (offset, mut variances) = (member.offset + 6, *variances);
+        variances[0] = self.covariance.variance(offset);
+        self.covariance.isolate(offset, &variances);
         let mut calibration = *calibration;
         calibration.length = member.filter().calibration.length;
         member
@@ -143,11 +144,16 @@ impl Frame {
         self.tell_members();
     }
 
-    /// Adds variances to the components of a member's pose.
-    fn add_to_pose(&mut self, index: usize, variances: &Vector6<f64>) {
-        let offset = self.members[index].offset;
+    /// Puts a member where an external pose is, far from where it was thought to be, as unsure as that
+    /// makes its own pose. Nobody else moves: an update would, by a derivative that means nothing so
+    /// far away.
+    fn put(&mut self, index: usize, intersection: &Intersection) {
+        let member = &mut self.members[index];
+        let pose = &mut member.state_mut().filter.pose;
+        *pose = se3::plus(pose, &intersection.off());
+        let offset = member.offset;
         let own: Matrix6<f64> = self.covariance.block(offset, offset);
-        let wider = own + Matrix6::from_diagonal(variances);
+        let wider = own + Matrix6::from_diagonal(&intersection.missing());
         self.covariance.set_diagonal(offset, &wider);
         self.tell_members();
     }
@@ -200,6 +206,12 @@ impl Intersection {
             let expected = 2.0 * (self.own[(k, k)] + self.external[(k, k)]);
             self.innovation[k].powi(2) <= gate.powi(2) * expected
         })
+    }
+
+    /// How far the external pose is from the own one, where that is not known without error.
+    fn off(&self) -> Vector6<f64> {
+        let off = |scale: f64, off: f64| if scale > 0.0 { off / scale } else { 0.0 };
+        self.scale.zip_map(&self.innovation, off)
     }
 
     /// The variances that the own pose lacks for the innovation to be what is expected of the two.

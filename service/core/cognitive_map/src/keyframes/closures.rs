@@ -1,6 +1,8 @@
 //! Loop closures: constraints between keyframes of one place. A closure is accepted while it agrees
 //! with the map or with other closures.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
 use place_recognition::{Relocalised, Revisit, SampleKey};
 
@@ -131,15 +133,24 @@ impl KeyframeGraph {
     pub fn relax(&mut self) -> Vec<Correction> {
         let schedule = std::mem::take(&mut self.constraints.schedule);
         let mut coarse = RelaxationCopy::coarse(self);
-        let judged = coarse.accept_consistent();
-        let (problem, _, refuted) = coarse.relax();
-        if schedule.accepted as usize + judged + refuted == 0 {
+        let judged = if coarse.accepted().next().is_none() && coarse.is_noise_open() {
+            coarse.judged_anew()
+        } else {
+            coarse.accept_consistent();
+            vec![coarse]
+        };
+        let best = RelaxationCopy::most_probable(judged).expect("there is one at least");
+        let accepted = |copy: &Self| -> BTreeSet<u32> {
+            let all = copy.constraints.slab.iter();
+            let accepted = all.filter(|(_, constraint)| constraint.is_accepted());
+            accepted.map(|(number, _)| number).collect()
+        };
+        let (before, now) = (accepted(self), accepted(best.copy.graph()));
+        if schedule.accepted == 0 && before == now {
             return Vec::new();
         }
-        let corrections = coarse.corrections(&problem, judged > 0);
-        coarse.move_keyframes(&problem);
-        self.adopt(coarse.graph());
-        corrections
+        self.adopt(best.copy.graph());
+        best.corrections(!now.is_subset(&before))
     }
 
     /// Moves the keyframes as in a relaxed coarse copy, and adopts the states of its closures.

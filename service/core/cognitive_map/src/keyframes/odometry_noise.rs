@@ -62,11 +62,17 @@ impl RelaxationCopy {
 impl RelaxationCopy {
     /// Log of the probability density of all measurements, up to a constant that is that of the
     /// graph: as [`learn_odometry_noise`](Self::learn_odometry_noise) compares it, and of each
-    /// accepted closure how much more probable it is by the map than by chance.
+    /// run of accepted closures how much more probable it is by the map than by chance.
+    ///
+    /// A run is one claim, so the one in its middle counts: else a false run that odometry can be
+    /// bent to would outweigh many true ones.
     pub(super) fn log_probability(&self, problem: &Problem) -> f64 {
+        let copy = self.of_middles(problem);
+        let mut problem = Problem::new(copy.graph(), Among::Accepted, Calibrating::Free);
+        problem.map.relax(&RelaxationSettings::default());
         let chains = &self.graph().chains;
-        let chance = Chance::of(chains, problem);
-        let closures = self.accepted().map(|(_, closure)| chance.log_gain(closure));
+        let chance = Chance::of(chains, &problem);
+        let closures = copy.accepted().map(|(_, closure)| chance.log_gain(closure));
         let noise = (0..)
             .zip(chains.tracks.iter())
             .map(|(agent, track)| turns(chains, agent, track.is_planar) * track.turn_noise.ln());

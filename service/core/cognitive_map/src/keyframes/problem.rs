@@ -67,7 +67,7 @@ impl Problem {
         }
         if calibrating == Calibrating::Free {
             let prior_sd = &graph.settings.calibration_sd;
-            let lengths = if graph.constraints.n_accepted() > 0 {
+            let lengths = if graph.constraints.n_accepted() > 0 || among == Among::All {
                 Lengths::Known
             } else {
                 Lengths::Estimated
@@ -154,9 +154,10 @@ impl Problem {
         let Some((from, to)) = ends.filter(|_| !keyframe.begins) else {
             return;
         };
+        let calibration = self.calibrations.of_motion(number);
         let covariance = with_turn_noise(&keyframe.covariance, track.turn_noise);
         let information = information(&covariance, track.is_planar);
-        let link = match self.calibrations.of_motion(number) {
+        let link = match calibration {
             Some(calibration) => Link::Odometry {
                 from,
                 to,

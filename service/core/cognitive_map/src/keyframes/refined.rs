@@ -76,18 +76,15 @@ impl KeyframeGraph {
     /// The whole past relaxed, with the closures that are accepted by now, or with all of them judged
     /// anew by all that is known now: whichever makes the measurements more probable.
     fn relaxed_whole(&self) -> (Problem, Relaxed) {
-        let judged = |mut copy: RelaxationCopy| {
-            copy.accept_consistent();
-            let (problem, relaxed, _) = copy.relax();
-            (copy.log_probability(&problem), problem, relaxed)
-        };
-        let as_it_is = judged(RelaxationCopy::whole(self));
-        if self.constraints.n_accepted() == 0 {
-            return (as_it_is.1, as_it_is.2);
+        let mut as_it_is = RelaxationCopy::whole(self);
+        let mut all = Vec::new();
+        if as_it_is.has_closures() {
+            all = as_it_is.judged_anew();
+            as_it_is.accept_consistent();
         }
-        let anew = judged(RelaxationCopy::whole_undecided(self));
-        let (_, problem, relaxed) = if anew.0 > as_it_is.0 { anew } else { as_it_is };
-        (problem, relaxed)
+        all.insert(0, as_it_is);
+        let best = RelaxationCopy::most_probable(all).expect("there is one at least");
+        (best.problem, best.statistics)
     }
 }
 

@@ -25,32 +25,79 @@ pub struct Correction {
 }
 
 /// A copy of the keyframe graph, which shares all pages that do not change.
-pub(super) struct RelaxationCopy(KeyframeGraph);
+#[derive(Clone)]
+pub(super) struct RelaxationCopy {
+    graph: KeyframeGraph,
+    /// Whether only runs count that are long enough to be no mistake: where the noise of odometry is
+    /// supposed, single closures agree with some supposition.
+    only_long_runs: bool,
+}
 
 impl RelaxationCopy {
     /// Of a graph as it is.
     pub(super) fn of(graph: KeyframeGraph) -> Self {
-        Self(graph)
+        Self {
+            graph,
+            only_long_runs: false,
+        }
     }
 
     /// Of the whole graph.
     pub(super) fn whole(graph: &KeyframeGraph) -> Self {
-        Self(graph.clone())
+        Self::of(graph.clone())
     }
 
-    /// Of the whole graph, as if no closure had been judged and no odometry been learned.
-    pub(super) fn whole_undecided(graph: &KeyframeGraph) -> Self {
-        let mut whole = Self(graph.clone());
-        let accepted: Vec<u32> = whole.accepted().map(|(number, _)| number).collect();
+    /// As if no closure had been judged, and the noise of rotations that nobody states were so many
+    /// times what is assumed.
+    pub(super) fn undecided(&self, turn_noise: f64) -> Self {
+        let mut undecided = self.clone();
+        let accepted: Vec<u32> = self.accepted().map(|(number, _)| number).collect();
         for number in accepted {
-            whole.set_state(number, ClosureState::Pending);
+            undecided.set_state(number, ClosureState::Pending);
         }
-        for agent in (0..).take(whole.0.chains.tracks.len()) {
-            if let Some(track) = whole.0.track_mut(agent) {
-                track.turn_noise = 1.0;
+        for agent in (0..).take(self.graph.chains.tracks.len()) {
+            if let Some(track) = undecided.graph.track_mut(agent)
+                && !track.states_noise
+            {
+                track.turn_noise = turn_noise;
             }
         }
-        whole
+        undecided
+    }
+
+    /// Whether there are loop closures, of whatever state.
+    pub(super) fn has_closures(&self) -> bool {
+        self.closures().next().is_some()
+    }
+
+    /// Whether an agent has closures, and odometry whose noise nobody states.
+    pub(super) fn is_noise_open(&self) -> bool {
+        let agents = self.closures().filter_map(|(_, closure)| {
+            let from = self.graph.chains.keyframes.get(closure.from)?;
+            Some(from.agent)
+        });
+        let agents: BTreeSet<u32> = agents.collect();
+        let tracks = &self.graph.chains;
+        { agents.into_iter() }
+            .filter_map(|agent| tracks.track(agent))
+            .any(|track| !track.states_noise)
+    }
+
+    /// Judges all closures anew, once for each noise that odometry may have where nobody states it;
+    /// answers the judged copies.
+    pub(super) fn judged_anew(&self) -> Vec<Self> {
+        let factors = if self.is_noise_open() {
+            tuning::TURN_NOISES_TRIED
+        } else {
+            &[1.0]
+        };
+        let judged = |&factor: &f64| {
+            let mut anew = self.undecided(factor);
+            anew.only_long_runs = factor < 1.0;
+            anew.accept_consistent();
+            anew
+        };
+        factors.iter().map(judged).collect()
     }
 
     /// The coarse graph, which is relaxed while samples come in: one keyframe a step, and those
@@ -79,23 +126,29 @@ impl RelaxationCopy {
             }
         }
         drop_old_candidates(&mut coarse);
-        Self(coarse)
+        Self::of(coarse)
     }
 
     /// The copy as it is now.
     pub(super) fn graph(&self) -> &KeyframeGraph {
-        &self.0
+        &self.graph
     }
 
     /// Accepts pending closures that are evident by the map, or by one another; answers their
     /// number. Moves the keyframes to where all accepted closures have them.
     pub(super) fn accept_consistent(&mut self) -> usize {
-        if self.0.constraints.first_candidate() == NONE {
+        if self.graph.constraints.first_candidate() == NONE {
             return 0;
         }
         // With kernels that begin wide, all closures together find the map that most of them agree
         // with.
-        let mut all = Problem::new(&self.0, Among::All, Calibrating::Held);
+        let calibrating = if self.is_noise_open() {
+            // Noise that was learned, or is supposed, is what there is beside lasting errors.
+            Calibrating::Free
+        } else {
+            Calibrating::Held
+        };
+        let mut all = Problem::new(&self.graph, Among::All, calibrating);
         all.map.relax(&from_wide());
         let mut runs = self.pending_runs(&all);
         let mut n_accepted = 0;
@@ -109,7 +162,7 @@ impl RelaxationCopy {
             }
             n_accepted += n_new;
             self.settle(&runs);
-            let constraints = &self.0.constraints.slab;
+            let constraints = &self.graph.constraints.slab;
             let is_pending = |run: &Run| {
                 let middle = constraints.get(run.middle);
                 middle.is_some_and(Constraint::is_candidate)
@@ -121,16 +174,44 @@ impl RelaxationCopy {
 
     /// The runs of pending closures that fit a map with all closures.
     fn pending_runs(&self, all: &Problem) -> Vec<Run> {
-        let gate_chi2 = self.0.settings.closure_gate_chi2;
-        let chains = &self.0.chains;
-        let path_variances = chains.path_variances();
-        let fitting = self.closures().filter_map(|(number, constraint)| {
-            let fits = constraint.is_candidate() && all.squared_error(number)? <= gate_chi2;
-            let member =
-                || Member::new(number, constraint, &chains.keyframes, all, &path_variances);
-            fits.then(member).flatten()
+        let gate_chi2 = self.graph.settings.closure_gate_chi2;
+        let fits = |number| {
+            all.squared_error(number)
+                .is_some_and(|squared| squared <= gate_chi2)
+        };
+        let mut runs = self.runs(all, |number, closure| {
+            closure.is_candidate() && fits(number)
         });
-        Run::of(fitting.collect(), gate_chi2)
+        runs.retain(|run| !self.only_long_runs || run.is_long());
+        runs
+    }
+
+    /// The runs of some of the closures.
+    fn runs(&self, problem: &Problem, are: impl Fn(u32, &Constraint) -> bool) -> Vec<Run> {
+        let chains = &self.graph.chains;
+        let variances = chains.path_variances();
+        let member = |(number, closure): (u32, &Constraint)| {
+            Member::new(number, closure, &chains.keyframes, problem, &variances)
+        };
+        let closures = self
+            .closures()
+            .filter(|&(number, closure)| are(number, closure));
+        Run::of(
+            closures.filter_map(member).collect(),
+            self.graph.settings.closure_gate_chi2,
+        )
+    }
+
+    /// A copy in which of each run of accepted closures only the one in the middle is accepted.
+    pub(super) fn of_middles(&self, problem: &Problem) -> Self {
+        let runs = self.runs(problem, |_, closure| closure.is_accepted());
+        let mut copy = self.clone();
+        for run in &runs {
+            for &number in run.members.iter().filter(|number| **number != run.middle) {
+                copy.set_state(number, ClosureState::Pending);
+            }
+        }
+        copy
     }
 
     /// Accepts the runs that are evident by the map; answers the number of their closures.
@@ -150,8 +231,11 @@ impl RelaxationCopy {
     fn accept_together(&mut self, runs: &[Run]) -> usize {
         let mut seeds = self.evidence(runs);
         seeds.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let n_candidates = { self.closures() }
+            .filter(|(_, closure)| closure.is_candidate())
+            .count();
         for &(seed, odds) in seeds.iter().take(tuning::SEEDS_MAX) {
-            let mut trial = Self(self.0.clone());
+            let mut trial = self.clone();
             trial.accept_run(&runs[seed]);
             trial.relax();
             let others = trial.evidence(runs).into_iter();
@@ -159,7 +243,7 @@ impl RelaxationCopy {
                 .filter(|&(index, odds)| index != seed && odds >= runs[index].log_odds_needed());
             let others: Vec<_> = others.collect();
             let together = odds + others.iter().map(|other| other.1).sum::<f64>();
-            if !others.is_empty() && together >= tuning::ACCEPTED_LOG_ODDS {
+            if !others.is_empty() && together >= runs[seed].log_odds_needed_together(n_candidates) {
                 let others = others.iter().map(|&(index, _)| &runs[index]);
                 let all = std::iter::once(&runs[seed]).chain(others);
                 return all.map(|run| self.accept_run(run)).sum();
@@ -173,9 +257,9 @@ impl RelaxationCopy {
     fn settle(&mut self, runs: &[Run]) {
         self.relax();
         let agent = |run: &Run| {
-            let constraint = self.0.constraints.slab.get(run.middle)?;
+            let constraint = self.graph.constraints.slab.get(run.middle)?;
             let is_accepted = constraint.state == ClosureState::Accepted;
-            let from = self.0.chains.keyframes.get(constraint.from)?;
+            let from = self.graph.chains.keyframes.get(constraint.from)?;
             is_accepted.then_some(from.agent)
         };
         let agents: BTreeSet<u32> = runs.iter().filter_map(agent).collect();
@@ -186,10 +270,10 @@ impl RelaxationCopy {
 
     /// The log-odds of each run, by what has been accepted.
     fn evidence(&self, runs: &[Run]) -> Vec<(usize, f64)> {
-        let problem = Problem::new(&self.0, Among::Accepted, Calibrating::Free);
+        let problem = Problem::new(&self.graph, Among::Accepted, Calibrating::Free);
         let marginals = problem.map.marginals();
-        let chance = Chance::of(&self.0.chains, &problem);
-        let constraints = &self.0.constraints.slab;
+        let chance = Chance::of(&self.graph.chains, &problem);
+        let constraints = &self.graph.constraints.slab;
         let odds = |(index, run): (usize, &Run)| {
             let constraint = constraints.get(run.middle)?;
             let odds = log_evidence(constraint, &problem, &marginals, &chance)?;
@@ -206,36 +290,105 @@ impl RelaxationCopy {
         run.members.len()
     }
 
-    /// The relaxed graph, after closures that do not fit into it were rejected; and their number.
-    /// Moves the keyframes.
-    pub(super) fn relax(&mut self) -> (Problem, Relaxed, usize) {
-        let refuted_chi2 = self.0.settings.refuted_chi2();
-        let mut n_rejected = 0;
-        for _ in 0..tuning::RELAXATION_ROUNDS_MAX {
-            let mut held = Problem::new(&self.0, Among::Accepted, Calibrating::Held);
+    /// Of copies whose closures were judged in different ways, the one by which the measurements are
+    /// most probable, relaxed; of equal ones the first.
+    pub(super) fn most_probable(copies: Vec<Self>) -> Option<RelaxedCopy> {
+        if copies.len() == 1 {
+            return copies.into_iter().next().map(RelaxedCopy::of);
+        }
+        let weighed = copies.into_iter().map(|copy| {
+            let relaxed = RelaxedCopy::of(copy);
+            (relaxed.copy.log_probability(&relaxed.problem), relaxed)
+        });
+        let best = weighed.reduce(|best, other| if other.0 > best.0 { other } else { best });
+        best.map(|(_, relaxed)| relaxed)
+    }
+
+    /// The relaxed graph, after closures that do not fit into it were rejected. Moves the keyframes.
+    fn relax(&mut self) -> (Problem, Relaxed) {
+        let refuted_chi2 = self.graph.settings.refuted_chi2();
+        let mut rounds_left = tuning::RELAXATION_ROUNDS_MAX;
+        loop {
+            let mut problem = Problem::new(&self.graph, Among::Accepted, Calibrating::Free);
             let mut settings = from_wide();
-            if self.fits(&held) {
+            if self.fits(&problem) {
                 settings.graduation = Graduation::None;
             }
-            held.map.relax(&settings);
+            let relaxed = problem.map.relax(&settings);
+            self.move_keyframes(&problem);
             let is_too_far = |number: u32| {
-                let squared = held.squared_error(number);
+                let squared = problem.squared_error(number);
                 squared.is_some_and(|squared| squared > refuted_chi2)
             };
-            let accepted = self.accepted().map(|(number, _)| number);
-            let refuted: Vec<u32> = accepted.filter(|&number| is_too_far(number)).collect();
+            let numbers = self.accepted().map(|(number, _)| number);
+            let refuted: Vec<u32> = numbers.filter(|&number| is_too_far(number)).collect();
+            if refuted.is_empty() || rounds_left == 0 {
+                return (problem, relaxed);
+            }
             for &number in &refuted {
                 self.set_state(number, ClosureState::Refuted);
             }
-            n_rejected += refuted.len();
-            self.move_keyframes(&held);
-            if refuted.is_empty() {
-                break;
+            rounds_left -= 1;
+        }
+    }
+
+    /// Moves the keyframes to their poses in a relaxed graph.
+    pub(super) fn move_keyframes(&mut self, problem: &Problem) {
+        let (keyframes, revision) = (&mut self.graph.chains.keyframes, self.graph.revision);
+        for number in 0..keyframes.numbers() {
+            let pose = problem.pose(number);
+            let Some(pose) = pose.filter(|pose| is_somewhere(&pose.translation.vector)) else {
+                continue;
+            };
+            if let Some(keyframe) = keyframes.get_mut(number, revision) {
+                keyframe.pose = *pose;
+                keyframe.is_in_map = true;
             }
         }
-        let mut problem = Problem::new(&self.0, Among::Accepted, Calibrating::Free);
-        let relaxed = problem.map.relax(&RelaxationSettings::default());
-        (problem, relaxed, n_rejected)
+    }
+
+    /// Whether all accepted closures are within the range of their kernels.
+    fn fits(&self, problem: &Problem) -> bool {
+        let refuted_chi2 = self.graph.settings.refuted_chi2();
+        self.accepted().all(|(number, _)| {
+            let squared = problem.squared_error(number);
+            squared.is_none_or(|squared| squared <= refuted_chi2)
+        })
+    }
+
+    fn closures(&self) -> impl Iterator<Item = (u32, &Constraint)> {
+        let all = self.graph.constraints.slab.iter();
+        all.filter(|(_, constraint)| constraint.is_closure())
+    }
+
+    pub(super) fn accepted(&self) -> impl Iterator<Item = (u32, &Constraint)> {
+        self.closures()
+            .filter(|(_, constraint)| constraint.is_accepted())
+    }
+
+    fn set_state(&mut self, number: u32, state: ClosureState) {
+        let (constraints, revision) = (&mut self.graph.constraints.slab, self.graph.revision);
+        if let Some(constraint) = constraints.get_mut(number, revision) {
+            constraint.state = state;
+        }
+    }
+}
+
+/// A copy whose closures were judged, relaxed.
+pub(super) struct RelaxedCopy {
+    pub(super) copy: RelaxationCopy,
+    pub(super) problem: Problem,
+    pub(super) statistics: Relaxed,
+}
+
+impl RelaxedCopy {
+    fn of(mut copy: RelaxationCopy) -> Self {
+        let (problem, statistics) = copy.relax();
+        Self {
+            copy,
+            problem,
+            statistics,
+        }
     }
 
     /// The poses of the agents in the map in a relaxed graph.
@@ -243,10 +396,11 @@ impl RelaxationCopy {
     /// They prevail over what the agents' filters hold where closures were judged by their
     /// evidence; not where closures were accepted as they came, for a robot that recognises what
     /// it cannot see may have been carried off.
-    pub(super) fn corrections(&self, problem: &Problem, prevail: bool) -> Vec<Correction> {
+    pub(super) fn corrections(&self, prevail: bool) -> Vec<Correction> {
+        let problem = &self.problem;
         let marginals = problem.map.marginals();
         let mut corrections = Vec::new();
-        for (agent, track) in (0..).zip(self.0.chains.tracks.iter()) {
+        for (agent, track) in (0..).zip(self.copy.graph.chains.tracks.iter()) {
             let node = problem.node(track.newest);
             let Some(node) = node.filter(|_| !track.needs_keyframe) else {
                 continue;
@@ -264,47 +418,6 @@ impl RelaxationCopy {
             corrections.push(Correction { agent, estimate });
         }
         corrections
-    }
-
-    /// Moves the keyframes to their poses in a relaxed graph.
-    pub(super) fn move_keyframes(&mut self, problem: &Problem) {
-        let (keyframes, revision) = (&mut self.0.chains.keyframes, self.0.revision);
-        for number in 0..keyframes.numbers() {
-            let pose = problem.pose(number);
-            let Some(pose) = pose.filter(|pose| is_somewhere(&pose.translation.vector)) else {
-                continue;
-            };
-            if let Some(keyframe) = keyframes.get_mut(number, revision) {
-                keyframe.pose = *pose;
-                keyframe.is_in_map = true;
-            }
-        }
-    }
-
-    /// Whether all accepted closures are within the range of their kernels.
-    fn fits(&self, problem: &Problem) -> bool {
-        let refuted_chi2 = self.0.settings.refuted_chi2();
-        self.accepted().all(|(number, _)| {
-            let squared = problem.squared_error(number);
-            squared.is_none_or(|squared| squared <= refuted_chi2)
-        })
-    }
-
-    fn closures(&self) -> impl Iterator<Item = (u32, &Constraint)> {
-        let all = self.0.constraints.slab.iter();
-        all.filter(|(_, constraint)| constraint.is_closure())
-    }
-
-    pub(super) fn accepted(&self) -> impl Iterator<Item = (u32, &Constraint)> {
-        self.closures()
-            .filter(|(_, constraint)| constraint.is_accepted())
-    }
-
-    fn set_state(&mut self, number: u32, state: ClosureState) {
-        let (constraints, revision) = (&mut self.0.constraints.slab, self.0.revision);
-        if let Some(constraint) = constraints.get_mut(number, revision) {
-            constraint.state = state;
-        }
     }
 }
 

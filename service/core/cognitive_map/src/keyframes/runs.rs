@@ -98,10 +98,26 @@ impl Member {
 }
 
 impl Run {
+    /// Whether it is of so many closures that they are no single mistake.
+    pub(super) fn is_long(&self) -> bool {
+        self.members.len() >= tuning::RUN_CLOSURES_MIN
+    }
+
     /// Log of the odds at which it is accepted.
     pub(super) fn log_odds_needed(&self) -> f64 {
-        if self.members.len() < tuning::RUN_CLOSURES_MIN {
+        if !self.is_long() {
             tuning::ACCEPTED_ALONE_LOG_ODDS
+        } else {
+            tuning::ACCEPTED_LOG_ODDS
+        }
+    }
+
+    /// Log of the odds at which it is accepted with others that are evident by it. Of so many
+    /// candidates there are as many pairs as their square, and where closures are single some pairs
+    /// agree by chance.
+    pub(super) fn log_odds_needed_together(&self, n_candidates: usize) -> f64 {
+        if !self.is_long() {
+            2.0 * tuning::ACCEPTED_ALONE_LOG_ODDS + 2.0 * (n_candidates as f64).ln()
         } else {
             tuning::ACCEPTED_LOG_ODDS
         }

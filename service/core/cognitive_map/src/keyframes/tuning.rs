@@ -139,6 +139,10 @@ pub(super) const CALIBRATION_VARIANCE_MIN: f64 = 1e-12;
 /// Factor of an agent's noise of rotations, as closures may show it.
 pub(super) const TURN_NOISE_BOUNDS: std::ops::RangeInclusive<f64> = 0.01..=10.0;
 
+/// Factors of it with which closures are judged, where the noise is not stated: what is assumed is
+/// that of modest wheels, and good ones have a twentieth of it.
+pub(super) const TURN_NOISES_TRIED: &[f64] = &[1.0, 0.25, 0.0625];
+
 /// Factor that is one deviation off what is expected of that.
 pub(super) const TURN_NOISE_PRIOR_SD: f64 = 10.0;
 

@@ -52,9 +52,10 @@ impl Rounds {
             &Calibrated::default(),
         );
         if self.keyframes.graph.is_due() {
-            self.corrections = self.keyframes.graph.relax();
-            if let Some(correction) = self.corrections.first() {
+            let corrections = self.keyframes.graph.relax();
+            if let Some(correction) = corrections.first() {
                 self.told = correction.estimate.pose;
+                self.corrections = corrections;
             }
         }
     }
