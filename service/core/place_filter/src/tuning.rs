@@ -1,0 +1,136 @@
+//! Constants: unit, meaning and source of each.
+
+/// What is learned of a channel.
+pub(crate) mod channel {
+    /// Distances at which levels are compared: the least \[m\], and the ratio of one to the next.
+    pub(crate) const LAG_MIN_M: f64 = 0.05;
+    /// See [`LAG_MIN_M`]. Source: the root of two; sixteen of them reach 13 m.
+    pub(crate) const LAG_RATIO: f64 = std::f64::consts::SQRT_2;
+    /// Number of distances.
+    pub(crate) const LAGS: usize = 16;
+    /// Pairs at a distance after which its mean is used.
+    pub(crate) const PAIRS_MIN: f64 = 8.0;
+    /// Pairs after which further ones replace what was long ago.
+    pub(crate) const PAIRS_MAX: f64 = 2000.0;
+    /// Levels after which the model is fitted again.
+    pub(crate) const REFIT: u64 = 32;
+    /// Distances with enough pairs that a model needs.
+    pub(crate) const LAGS_MIN: usize = 4;
+    /// A difference counts up to so many deviations of the channel: a sensor's sentinel is none.
+    pub(crate) const FAR: f64 = 6.0;
+    /// Levels after which one is bounded before it counts.
+    pub(crate) const LEVELS_MIN: u64 = 16;
+    /// Levels over which mean and deviation of a channel are taken, about.
+    pub(crate) const LEVELS: f64 = 20_000.0;
+    /// Shortest correlation length \[m\], number of lengths that are tried, and their ratio.
+    pub(crate) const LENGTH_MIN_M: f64 = 0.15;
+    /// See [`LENGTH_MIN_M`].
+    pub(crate) const LENGTHS: u32 = 24;
+    /// See [`LENGTH_MIN_M`]; the longest is 17 m.
+    pub(crate) const LENGTH_RATIO: f64 = 1.23;
+    /// Least part of the channel's variance that two levels at one place differ by: no sensor is
+    /// exact, and none of the models is.
+    pub(crate) const NUGGET_MIN: f64 = 1e-3;
+    /// Variance of the field, in that of the noise, from which on a channel says something.
+    pub(crate) const TELLS: f64 = 0.25;
+}
+
+/// What places remember.
+pub(crate) mod trace {
+    /// Variance of a position that nobody knows better \[m²\]: 3 cm.
+    pub(crate) const POSITION_M2: f64 = 1e-3;
+    /// Who is less sure of the position by this factor of the variance does not teach.
+    pub(crate) const LESS_SURE: f64 = 4.0;
+    /// Levels that a trace is a mean of, at most: fields change.
+    pub(crate) const LEVELS: f64 = 30.0;
+}
+
+/// Nodes of a way.
+pub(crate) mod window {
+    /// Motion between two nodes, in correlation lengths of the channel with the shortest.
+    pub(crate) const STEP: f64 = 0.2;
+    /// The same at least, at most, and where no channel is known \[m\].
+    pub(crate) const STEP_M: (f64, f64, f64) = (0.1, 0.5, 0.15);
+    /// Most nodes.
+    pub(crate) const NODES: usize = 40;
+    /// Most channels of a node.
+    pub(crate) const CHANNELS: usize = 8;
+}
+
+/// Prediction of a level.
+pub(crate) mod predict {
+    /// Most places that a level is predicted from.
+    pub(crate) const SUPPORTS: usize = 20;
+    /// They are apart by so many correlation lengths, and not farther than so many.
+    pub(crate) const APART: f64 = 0.2;
+    /// See [`APART`].
+    pub(crate) const REACH: f64 = 1.5;
+    /// A prediction that leaves more than this part of the field's variance open says nothing.
+    pub(crate) const OPEN_MAX: f64 = 0.8;
+}
+
+/// Following an agent that is known about.
+pub(crate) mod follow {
+    /// Standard deviation of a position, in correlation lengths, up to which a level corrects it:
+    /// beyond, the field is not straight enough.
+    pub(crate) const NEAR: f64 = 0.5;
+    /// Errors of interpolation are alike over so many correlation lengths.
+    pub(crate) const ALIKE: f64 = 1.0;
+    /// Part by which a level changes what is known of how well levels fit.
+    pub(crate) const RATIO_SHARE: f64 = 0.05;
+    /// One level counts for that up to this.
+    pub(crate) const RATIO_MAX: f64 = 25.0;
+    /// Evidence against a pose by one channel, at most, and by all together, from which on it is
+    /// contradicted \[nats\]. Source: one false alarm in a million; no channel alone.
+    pub(crate) const AGAINST: (f64, f64) = (10.0, 13.8);
+    /// What a single level says, at most \[nats\].
+    pub(crate) const ONE: f64 = 4.0;
+}
+
+/// Search of an agent that is not known about.
+pub(crate) mod search {
+    /// Nodes between two searches.
+    pub(crate) const FRESH: u32 = 3;
+    /// Nodes of the first one.
+    pub(crate) const NODES_MIN: usize = 6;
+    /// Nodes that are used.
+    pub(crate) const NODES: usize = 14;
+    /// Nodes by which a seed is judged.
+    pub(crate) const CHECKS: usize = 4;
+    /// Places at which poses are seeded.
+    pub(crate) const ANCHORS: usize = 96;
+    /// Headings that are tried at each.
+    pub(crate) const HEADINGS: u32 = 20;
+    /// Distance of the agent from the anchor, in correlation lengths.
+    pub(crate) const BESIDE: f64 = 0.35;
+    /// Seeds that are refined.
+    pub(crate) const SEEDS: usize = 10;
+    /// Hypotheses that are kept.
+    pub(crate) const KEPT: usize = 8;
+    /// Rounds of a refinement.
+    pub(crate) const ROUNDS: usize = 3;
+    /// Poses are the same up to so many correlation lengths, and radians.
+    pub(crate) const SAME: (f64, f64) = (0.5, 0.5);
+    /// A refinement has come to its end with a step of this length \[m, rad\].
+    pub(crate) const SETTLED: f64 = 0.1;
+    /// What the map leaves open goes together over this part of a correlation length.
+    pub(crate) const ALIKE: f64 = 0.4;
+    /// A residual counts up to so many deviations, and loses weight from so many (Huber 1964).
+    pub(crate) const FAR_SD: f64 = 4.0;
+    /// See [`FAR_SD`].
+    pub(crate) const HUBER_SD: f64 = 2.0;
+    /// Probability that a sensor of an agent lies.
+    pub(crate) const LIES: f64 = 0.02;
+    /// Standard deviation of the vertical \[rad\].
+    pub(crate) const TILT_SD_RAD: f64 = 0.05;
+    /// Error of odometry, as a part of the way.
+    pub(crate) const DRIFT: f64 = 0.04;
+    /// Log odds at which a pose is believed: one wrong answer in a thousand \[nats\].
+    pub(crate) const SURE: f64 = 6.9;
+    /// Largest mean of the squared residuals of a pose that is believed, in their variances.
+    pub(crate) const MISFIT_MAX: f64 = 2.0;
+    /// Supports of a prediction.
+    pub(crate) const SUPPORTS: usize = 12;
+    /// Largest deviation of the heading of an answer \[rad\].
+    pub(crate) const HEADING_SD_MAX_RAD: f64 = 0.2;
+}
