@@ -75,7 +75,7 @@ pub(crate) mod follow {
     /// beyond, the field is not straight enough.
     pub(crate) const NEAR: f64 = 0.5;
     /// Errors of interpolation are alike over so many correlation lengths.
-    pub(crate) const ALIKE: f64 = 1.0;
+    pub(crate) const ALIKE: f64 = 0.8;
     /// Part by which a level changes what is known of how well levels fit.
     pub(crate) const RATIO_SHARE: f64 = 0.05;
     /// One level counts for that up to this.
@@ -92,19 +92,19 @@ pub(crate) mod search {
     /// Nodes between two searches.
     pub(crate) const FRESH: u32 = 3;
     /// Nodes of the first one.
-    pub(crate) const NODES_MIN: usize = 6;
+    pub(crate) const NODES_MIN: usize = 5;
     /// Nodes that are used.
     pub(crate) const NODES: usize = 14;
     /// Nodes by which a seed is judged.
     pub(crate) const CHECKS: usize = 4;
     /// Places at which poses are seeded.
-    pub(crate) const ANCHORS: usize = 96;
+    pub(crate) const ANCHORS: usize = 192;
     /// Headings that are tried at each.
-    pub(crate) const HEADINGS: u32 = 20;
+    pub(crate) const HEADINGS: u32 = 16;
     /// Distance of the agent from the anchor, in correlation lengths.
     pub(crate) const BESIDE: f64 = 0.35;
     /// Seeds that are refined.
-    pub(crate) const SEEDS: usize = 10;
+    pub(crate) const SEEDS: usize = 12;
     /// Hypotheses that are kept.
     pub(crate) const KEPT: usize = 8;
     /// Rounds of a refinement.
@@ -127,6 +127,8 @@ pub(crate) mod search {
     pub(crate) const DRIFT: f64 = 0.04;
     /// Log odds at which a pose is believed: one wrong answer in a thousand \[nats\].
     pub(crate) const SURE: f64 = 6.9;
+    /// Least factor of the covariance by the mean of the squared residuals.
+    pub(crate) const MISFIT_MIN: f64 = 0.6;
     /// Largest mean of the squared residuals of a pose that is believed, in their variances.
     pub(crate) const MISFIT_MAX: f64 = 2.0;
     /// Supports of a prediction.

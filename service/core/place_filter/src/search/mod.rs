@@ -70,7 +70,7 @@ impl Search {
         let lengths = lengths.filter_map(|felt| field.kernel(felt.channel));
         let length_m = lengths.map(|kernel| kernel.length_m).reduce(f64::min)?;
         let kept = std::mem::take(&mut self.kept);
-        let again = |pose| refine(pose, &used, seeker, field, 1);
+        let again = |pose| refine(pose, &used, seeker, field, 2);
         let mut refined: Vec<Refined> = kept.iter().filter_map(again).collect();
         self.fresh += 1;
         if self.fresh >= tuning::FRESH {
@@ -93,7 +93,7 @@ impl Search {
             .collect();
         let best = distinct.first()?;
         let next = distinct.get(1).map_or(0.0, |next| next.log_odds.max(0.0));
-        let mut covariance = best.covariance * best.misfit.max(1.0);
+        let mut covariance = best.covariance * best.misfit.max(tuning::MISFIT_MIN);
         if seeker.is_planar {
             clear_out_of_plane(&mut covariance);
         }

@@ -136,22 +136,23 @@ fn equations(
             };
             let residual = felt.value - expected.mean;
             let drifted = kernel.squared_slope() * drift_m2;
-            let variance = kernel.nugget + expected.variance + drifted;
+            let left = expected.variance + drifted;
+            let variance = kernel.nugget + left;
             sums.levels.push(Judged {
                 channel: felt.channel,
                 kernel: *kernel,
                 at: felt.at,
                 value: felt.value - kernel.mean,
                 residual,
-                left: expected.variance + drifted,
+                left,
             });
             let far = (residual * residual / variance).sqrt();
             let trust = (tuning::HUBER_SD / far).min(1.0);
-            let part = (apart_m / (2.0 * tuning::ALIKE * kernel.length_m)).min(1.0);
+            let part = (apart_m / (2.0 * tuning::ALIKE * kernel.length_m)).clamp(1e-3, 1.0);
             let row = expected.slope.transpose() * point_by_pose(&rotation, &lever.coords);
             sums.misfit += part * (residual * residual / variance).min(6.25);
             parts += part;
-            let weight = part * trust / variance;
+            let weight = trust / (kernel.nugget + left / part);
             sums.information += row.transpose() * row * weight;
             sums.gradient += row.transpose() * (residual * weight);
         }
