@@ -111,6 +111,11 @@ pub(crate) mod search {
     pub(crate) const ROUNDS: usize = 3;
     /// Poses are the same up to so many correlation lengths, and radians.
     pub(crate) const SAME: (f64, f64) = (0.5, 0.5);
+    /// Before a pose is believed, it is shifted so far along each axis, in correlation lengths,
+    /// and turned so far \[rad\]: no other may explain about as much.
+    pub(crate) const SHIFTS: [f64; 6] = [-3.0, -1.5, -0.8, 0.8, 1.5, 3.0];
+    /// See [`SHIFTS`].
+    pub(crate) const TURNS_RAD: [f64; 3] = [1.6, 3.1, -1.6];
     /// A refinement has come to its end with a step of this length \[m, rad\].
     pub(crate) const SETTLED: f64 = 0.1;
     /// What the map leaves open goes together over this part of a correlation length.

@@ -104,11 +104,38 @@ impl Search {
             && best.misfit <= tuning::MISFIT_MAX
             && covariance.position_sd_m() <= seeker.sd_max_m
             && turn.max(0.0).sqrt() <= tuning::HEADING_SD_MAX_RAD;
-        is_sure.then_some(Found {
+        let is_alone = || {
+            let others = shifted(best, seeker, length_m);
+            let others = others.map(|pose| refine(&pose, &used, seeker, field, 1));
+            others.flatten().all(|other| {
+                same(&other.body, &best.body, length_m)
+                    || best.log_odds - other.log_odds >= tuning::SURE
+            })
+        };
+        (is_sure && is_alone()).then_some(Found {
             pose: best.body,
             covariance,
         })
     }
+}
+
+/// Poses of the frame of motion that a field might have that is the same along a line, or all
+/// around: the pose shifted along the axes of its error, and turned.
+fn shifted<'a>(
+    best: &'a Refined,
+    seeker: &'a Seeker<'_>,
+    length_m: f64,
+) -> impl Iterator<Item = Isometry3<f64>> + 'a {
+    let errors = best.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    let axes = errors.symmetric_eigen().eigenvectors;
+    let shifts = (0..3).flat_map(move |axis| {
+        let along = axes.column(axis).into_owned() * length_m;
+        tuning::SHIFTS
+            .map(|shift| Isometry3::translation(shift * along.x, shift * along.y, shift * along.z))
+    });
+    let turns = tuning::TURNS_RAD.map(|turn_rad| Isometry3::rotation(Vector3::z() * turn_rad));
+    let to_odom = seeker.in_odom.inverse();
+    shifts.chain(turns).map(move |by| best.body * by * to_odom)
 }
 
 /// Some nodes of a way, at equal distances, the latest among them.
