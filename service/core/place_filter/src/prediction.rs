@@ -25,6 +25,8 @@ pub struct Prediction {
     pub mean: f64,
     /// Its change per metre along the axes of the map.
     pub slope: Vector3<f64>,
+    /// Variance of that along each axis.
+    pub slope_variance: Vector3<f64>,
     /// Variance of the field there, without the noise of a level.
     pub variance: f64,
 }
@@ -49,6 +51,8 @@ pub(crate) fn predict(
     let mut of_values = [0.0; tuning::SUPPORTS];
     let mut of_point = [0.0; tuning::SUPPORTS];
     let mut to_point = [0.0; tuning::SUPPORTS];
+    let mut of_slope = [Vector3::zeros(); tuning::SUPPORTS];
+    let squared_length = kernel.length_m * kernel.length_m;
     // Cholesky, and both right-hand sides forwards at once.
     for row in 0..n {
         let support = &supports[row];
@@ -69,12 +73,15 @@ pub(crate) fn predict(
         }
         to_point[row] = kernel.covariance((support.at - at).norm_squared());
         let (mut value, mut point) = (support.value - kernel.mean, to_point[row]);
+        let mut slope = (support.at - at) * (to_point[row] / squared_length);
         for k in 0..row {
+            slope -= of_slope[k] * lower[row][k];
             value -= lower[row][k] * of_values[k];
             point -= lower[row][k] * of_point[k];
         }
         of_values[row] = value / lower[row][row];
         of_point[row] = point / lower[row][row];
+        of_slope[row] = slope / lower[row][row];
     }
     let explained: f64 = of_point[..n].iter().map(|x| x * x).sum();
     let variance = (kernel.sill - explained).max(0.0);
@@ -89,7 +96,8 @@ pub(crate) fn predict(
         of_values[row] /= lower[row][row];
     }
     let (mut mean, mut slope) = (kernel.mean, Vector3::zeros());
-    let squared_length = kernel.length_m * kernel.length_m;
+    let known = of_slope[..n].iter().map(|slope| slope.component_mul(slope));
+    let known = known.fold(Vector3::zeros(), |sum, each| sum + each);
     for (k, support) in supports.iter().enumerate() {
         let part = of_values[k] * to_point[k];
         mean += part;
@@ -98,6 +106,7 @@ pub(crate) fn predict(
     Some(Prediction {
         mean,
         slope,
+        slope_variance: known.map(|known| (kernel.squared_slope() - known).max(0.0)),
         variance,
     })
 }

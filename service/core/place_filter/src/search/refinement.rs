@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use geometry::{OUT_OF_PLANE, se3};
-use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use super::Seeker;
 use super::evidence::{Judged, evidence};
@@ -33,6 +33,8 @@ pub(super) struct Refined {
 struct Equations {
     information: Matrix6<f64>,
     gradient: Vector6<f64>,
+    /// Part of the information that errors of the slopes make up.
+    doubt: Matrix6<f64>,
     /// Of the vertical.
     log_odds: f64,
     misfit: f64,
@@ -70,7 +72,7 @@ pub(super) fn refine(
         body = se3::plus(&body, &step);
         at = equations(&body, used, seeker, upright, field);
     }
-    let covariance = at.information.cholesky()?.inverse();
+    let covariance = doubtful(&at).cholesky()?.inverse();
     let extent_m = field.extent_m();
     let (volume, dimensions, held) = if seeker.is_planar {
         (extent_m.x * extent_m.y, 3.0, 3.0 * HELD.ln())
@@ -88,6 +90,18 @@ pub(super) fn refine(
         misfit: at.misfit,
         step: step.norm(),
     })
+}
+
+/// The information without what errors of the slopes make up, along each of its axes in units of
+/// metres and radians, and not less than what is known without any level.
+fn doubtful(at: &Equations) -> Matrix6<f64> {
+    let mut axes = at.information.symmetric_eigen();
+    for k in 0..6 {
+        let axis = axes.eigenvectors.column(k);
+        let made_up = (axis.transpose() * at.doubt * axis)[(0, 0)];
+        axes.eigenvalues[k] = (axes.eigenvalues[k] - made_up).max(1e-3);
+    }
+    axes.recompose()
 }
 
 /// Where the vertical of the frame of motion points in the map, beside the vertical.
@@ -109,6 +123,7 @@ fn equations(
     let mut sums = Equations {
         information: Matrix6::zeros(),
         gradient: Vector6::zeros(),
+        doubt: Matrix6::zeros(),
         log_odds: 0.0,
         misfit: 0.0,
         levels: Vec::new(),
@@ -149,11 +164,16 @@ fn equations(
             let far = (residual * residual / variance).sqrt();
             let trust = (tuning::HUBER_SD / far).min(1.0);
             let part = (apart_m / (2.0 * tuning::ALIKE * kernel.length_m)).clamp(1e-3, 1.0);
-            let row = expected.slope.transpose() * point_by_pose(&rotation, &lever.coords);
+            let by_pose = point_by_pose(&rotation, &lever.coords);
+            let row = expected.slope.transpose() * by_pose;
             sums.misfit += part * (residual * residual / variance).min(6.25);
             parts += part;
             let weight = trust / (kernel.nugget + left / part);
             sums.information += row.transpose() * row * weight;
+            // A slope that is no larger than its error says nothing: a field that is the same along
+            // a line must not tell where along it.
+            let unsure = Matrix3::from_diagonal(&expected.slope_variance);
+            sums.doubt += by_pose.transpose() * unsure * by_pose * weight;
             sums.gradient += row.transpose() * (residual * weight);
         }
     }
@@ -182,6 +202,8 @@ fn hold_upright(
             sums.information.row_mut(k).fill(0.0);
             sums.information.column_mut(k).fill(0.0);
             sums.information[(k, k)] = HELD;
+            sums.doubt.row_mut(k).fill(0.0);
+            sums.doubt.column_mut(k).fill(0.0);
             sums.gradient[k] = 0.0;
         }
         return;
