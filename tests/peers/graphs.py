@@ -1,12 +1,9 @@
 #!/usr/bin/env python3
-"""Pose graphs: `cogmap-lab replay g2o` beside GTSAM, whole and pose by pose.
+"""Pose graphs: `cogmap-lab replay g2o` beside GTSAM, each graph as a whole.
 
-Whole, GTSAM starts from rotations (its own chordal start in space; in the plane, where it has none
-for correlated noise, the same written here) and goes on by Levenberg-Marquardt. Pose by pose it is
-iSAM2 with its default settings, by Cholesky factors, and by QR where these fail. Both get the
-file's own model and the same arrivals, in the same run, with one thread. Errors are RMSE of
-position against `NAME.opt_xyz.txt` beside the graph, or else against GTSAM's optimum, after the
-rigid motion that fits best.
+GTSAM starts from rotations (its own chordal start in space; in the plane, where it has none for
+correlated noise, the same written here) and goes on by Levenberg-Marquardt. Both get the file's own
+model, in the same run, with one thread.
 """
 
 from __future__ import annotations
@@ -17,11 +14,10 @@ import argparse
 import json
 import subprocess
 import sys
-import tempfile
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Tuple
+from typing import Any, Dict, Iterator, List, Tuple
 
 import gtsam
 import numpy as np
@@ -39,14 +35,10 @@ _HELD_SD = 1e-6
 
 @dataclass(frozen=True)
 class Solved:
-    """One program on one graph. What it was not asked, or did not finish, is null."""
+    """One program on one graph."""
 
-    chi2_half: Optional[float]
-    batch_s: Optional[float]
-    causal_aligned_rmse_m: Optional[float]
-    update_ms_mean: Optional[float]
-    update_ms_p99: Optional[float]
-    update_ms_max: Optional[float]
+    chi2_half: float
+    batch_s: float
 
 
 @dataclass(frozen=True)
@@ -58,7 +50,7 @@ class Row:
     closures: int
     cogmap: Solved
     gtsam: Solved
-    ratios: Dict[str, Optional[float]]
+    ratios: Dict[str, float]
 
 
 class Graph:
@@ -107,16 +99,13 @@ def main() -> int:
     """Runs the comparison that the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("paths", nargs="+", type=Path, help="graphs, or directories of graphs")
-    most = "most time for iSAM2 on one graph [s]; what it has not finished by then is left out"
-    parser.add_argument("--patience", type=float, default=300.0, help=most)
-    parser.add_argument("--whole", action="store_true", help="leave out the runs pose by pose")
     parser.add_argument("--binary", type=Path, default=_BINARY, help="the program cogmap-lab")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     args = parser.parse_args()
     rows = []
     for path in _graphs(args.paths):
         print(path.name, file=sys.stderr, flush=True)
-        rows.append(_compare(path, args))
+        rows.append(_compare(path, args.binary))
     if args.json:
         version = getattr(gtsam, "__version__", None)
         print(json.dumps({"gtsam": version, "rows": [asdict(row) for row in rows]}))
@@ -130,43 +119,18 @@ def _graphs(paths: List[Path]) -> Iterator[Path]:
         yield from sorted(path.glob("**/*.g2o")) if path.is_dir() else [path]
 
 
-def _compare(path: Path, args: argparse.Namespace) -> Row:
-    graph = Graph(path)
-    chi2_half, batch_s, optimum = whole(graph)
-    beside = path.with_name(path.name.removesuffix(".g2o") + ".opt_xyz.txt")
-    with tempfile.TemporaryDirectory() as home:
-        if not beside.exists():
-            beside = Path(home, "optimum.txt")
-            np.savetxt(beside, np.c_[graph.keys, optimum], fmt=["%d"] + ["%.9f"] * 3)
-        command = [args.binary, "replay", "g2o", path, "--json", "--reference", beside]
-        command += ["--no-causal"] if args.whole else []
-        done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, check=True)
-        known = np.loadtxt(beside, ndmin=2)
-    reference = np.zeros((len(known), 3))
-    reference[:, : known.shape[1] - 1] = known[:, 1:]
+def _compare(path: Path, binary: Path) -> Row:
+    chi2_half, batch_s, _ = whole(Graph(path))
+    command = [str(binary), "replay", "g2o", str(path), "--json"]
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
     ours = json.loads(done.stdout)
-    update = ours["update_ms"] or {}
-    cogmap = Solved(
-        ours["chi2_half"],
-        ours["batch_s"],
-        ours["causal_aligned_ate_rmse_m"],
-        update.get("mean"),
-        update.get("p99"),
-        update.get("max"),
-    )
-    incremental = None if args.whole else _pose_by_pose(graph, args.patience)
-    peer = Solved(chi2_half, batch_s, None, None, None, None)
-    if incremental is not None:
-        newest, times_ms = incremental
-        error = _aligned_rmse(newest, reference, graph.is_spatial)
-        p99, most = (float(np.quantile(times_ms, q, method="inverted_cdf")) for q in (0.99, 1.0))
-        peer = Solved(chi2_half, batch_s, error, float(np.mean(times_ms)), p99, most)
-    closures: Dict[str, int] = ours["closures"]
+    cogmap = Solved(ours["chi2_half"], ours["batch_s"])
+    peer = Solved(chi2_half, batch_s)
     ratios = {
-        name: None if None in (value, other) or not other else value / other
+        name: value / other
         for (name, value), other in zip(asdict(cogmap).items(), asdict(peer).values())
     }
-    return Row(path.stem, ours["poses"], sum(closures.values()), cogmap, peer, ratios)
+    return Row(path.stem, ours["poses"], ours["closures"], cogmap, peer, ratios)
 
 
 def whole(graph: Graph) -> Tuple[float, float, Floats]:
@@ -222,90 +186,14 @@ def _agreed(first: Any, second: Any, factors: Any, steps: Any, origin: complex) 
     return np.r_[origin, splu(csc_matrix(adjoint @ rest)).solve(adjoint @ right)]
 
 
-def _pose_by_pose(graph: Graph, patience_s: float) -> Optional[Tuple[Floats, List[float]]]:
-    """Each position as it was known when its pose had arrived, and the times of the updates."""
-    for factorization in ("CHOLESKY", "QR"):
-        try:
-            return _arrivals(graph, factorization, patience_s)
-        except RuntimeError as error:
-            reason = str(error).strip().splitlines()[0]
-            print(f"iSAM2 by {factorization} failed: {reason}", file=sys.stderr)
-    return None
-
-
-def _arrivals(
-    graph: Graph, factorization: str, patience_s: float
-) -> Optional[Tuple[Floats, List[float]]]:
-    arriving: Dict[int, List[int]] = {}
-    for index, pair in enumerate(graph.joined):
-        arriving.setdefault(max(pair), []).append(index)
-    parameters = gtsam.ISAM2Params()
-    parameters.setFactorization(factorization)
-    isam = gtsam.ISAM2(parameters)
-    newest = isam.calculateEstimatePose3 if graph.is_spatial else isam.calculateEstimatePose2
-    known: Dict[int, Any] = {}
-    times_ms: List[float] = []
-    for key in graph.keys:
-        factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        guess = graph.first()
-        if not known:
-            factors.push_back(graph.hold(key, guess))
-        for index in arriving.get(key, []):
-            factor: Any = graph.factors.at(index)
-            factors.push_back(factor)
-            if graph.joined[index] == (key - 1, key):
-                guess = known[key - 1].compose(factor.measured())
-        values.insert(key, guess)
-        begin = time.perf_counter()
-        isam.update(factors, values)
-        pose = newest(key)
-        times_ms.append((time.perf_counter() - begin) * 1e3)
-        known[key] = pose
-        if sum(times_ms) > patience_s * 1e3:
-            print(f"iSAM2 by {factorization} was stopped at {len(known)} poses", file=sys.stderr)
-            return None
-    return graph.rows(list(known.values())), times_ms
-
-
-def _aligned_rmse(estimate: Floats, reference: Floats, is_spatial: bool) -> float:
-    """RMSE after the rigid motion, without scale, that fits best."""
-    left, right = estimate - estimate.mean(0), reference - reference.mean(0)
-    if is_spatial:
-        u, _, v = np.linalg.svd(right.T @ left)
-        signs = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))])
-        rotation = u @ signs @ v
-    else:
-        dot = (left * right).sum()
-        cross = (left[:, 0] * right[:, 1] - left[:, 1] * right[:, 0]).sum()
-        angle = np.arctan2(cross, dot)
-        cos, sin = np.cos(angle), np.sin(angle)
-        rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    apart = left @ rotation.T - right
-    return float(np.sqrt((apart**2).sum(1).mean()))
-
-
 def _text(rows: List[Row]) -> str:
     """The rows as a table."""
-    lines = [
-        "graph            by        chi2/2       whole [s]  newest pose off [m]"
-        "  update [ms]: mean      p99      max"
-    ]
+    lines = ["graph            by        chi2/2       whole [s]"]
     for row in rows:
         for name, solved in (("cogmap", row.cogmap), ("GTSAM", row.gtsam)):
-            cells = [
-                _cell(solved.chi2_half, 13, 4),
-                _cell(solved.batch_s, 12, 3),
-                _cell(solved.causal_aligned_rmse_m, 21, 4),
-                _cell(solved.update_ms_mean, 19, 2),
-                _cell(solved.update_ms_p99, 9, 1),
-                _cell(solved.update_ms_max, 9, 1),
-            ]
-            lines.append(f"{row.graph:<17}{name:<7}" + "".join(cells))
+            cells = f"{solved.chi2_half:>13.4f}{solved.batch_s:>12.3f}"
+            lines.append(f"{row.graph:<17}{name:<7}{cells}")
     return "\n".join(lines)
-
-
-def _cell(value: Optional[float], width: int, digits: int) -> str:
-    return f"{'':>{width}}" if value is None else f"{value:>{width}.{digits}f}"
 
 
 if __name__ == "__main__":

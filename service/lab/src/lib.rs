@@ -9,13 +9,17 @@
 //! | module | what |
 //! |---|---|
 //! | [`mrclam`] | the UTIAS multi-robot data sets |
+//! | [`nees`] | errors against their covariances |
 //! | [`g2o`] | pose graphs |
 //! | [`tuc`] | the TUC data sets: odometry and place matches, many of them false |
 //! | [`victoria`] | Victoria Park, as text with odometry and sightings |
 //! | [`objects`] | objects of coloured voxels, and an end effector that explores them |
 //! | [`touch`] | objects as sets of touches |
 //! | [`points`] | objects as points with normals, recognised in any pose |
-//! | [`mapping`] | recordings through the experience map, causal and refined |
+//! | [`csv`] | recordings as tables: motion, levels, views and ranges of robots |
+//! | [`stream`] | what one robot sends, and its dead reckoning |
+//! | [`mod@reference`] | known positions of poses that have no time |
+//! | [`paths`] | a figure of paths |
 //! | [`eval`] | the seed paper's experiments: protocols, measures, tables and figures |
 //!
 //! # From a data set to a score
@@ -58,12 +62,16 @@
 //! Nothing here reads a clock or draws randomness that was not seeded. Only
 //! the functions called `load` touch files.
 
+pub mod csv;
 pub mod eval;
 pub mod g2o;
-pub mod mapping;
 pub mod mrclam;
+pub mod nees;
 pub mod objects;
+pub mod paths;
 pub mod points;
+pub mod reference;
+pub mod stream;
 pub mod touch;
 pub mod tuc;
 pub mod victoria;

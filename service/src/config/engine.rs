@@ -19,6 +19,12 @@ const AHEAD_S: Rule<f64> = Rule {
     shown: f64::to_string,
 };
 
+const THREADS: Rule<usize> = Rule {
+    words: "0 to 64",
+    holds: |count| *count <= 64,
+    shown: usize::to_string,
+};
+
 section! {
     /// Bounds and intervals of the engine. None of these changes the maps.
     pub struct EngineConfig of "engine" {
@@ -43,6 +49,9 @@ section! {
         /// Time between checkpoints while samples come in \[s\].
         checkpoint_interval_s: f64 =
             EngineSettings::default().checkpoint_interval.as_secs_f64(), INTERVAL_S;
+        /// Threads that relax the past beside the writers of all spaces; 0 leaves it to the
+        /// writers.
+        relaxation_threads: usize = EngineSettings::default().relaxation_threads, THREADS;
     }
 }
 
@@ -59,6 +68,7 @@ impl EngineConfig {
             gap_timeout: Duration::from_secs_f64(self.gap_timeout_s),
             commit_interval: Duration::from_secs_f64(self.commit_interval_s),
             checkpoint_interval: Duration::from_secs_f64(self.checkpoint_interval_s),
+            relaxation_threads: self.relaxation_threads,
         }
     }
 

@@ -24,6 +24,7 @@ mod question;
 mod queue;
 mod recovery;
 mod refinement;
+mod relaxers;
 mod removal;
 mod repair;
 mod sequencer;
@@ -174,6 +175,8 @@ impl Engine {
             settings.commit_interval,
         );
         let (jobs, checkpointer) = checkpointer::start(Arc::clone(&store), Arc::clone(&health));
+        let (relaxers, mut threads) = relaxers::start(settings.relaxation_threads);
+        threads.extend([committer, checkpointer]);
         let spaces_max = settings.spaces_max;
         let around = Surroundings {
             store,
@@ -181,6 +184,7 @@ impl Engine {
             health: Arc::clone(&health),
             commits,
             jobs,
+            relaxers,
             questions: QuestionRoom::default(),
             settings,
         };
@@ -195,7 +199,7 @@ impl Engine {
         }
         let control = Control {
             around: Some(around),
-            threads: vec![committer, checkpointer],
+            threads,
         };
         Ok(Self(Arc::new(Inner {
             spaces: ArcSwap::from_pointee(spaces),

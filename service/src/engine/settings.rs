@@ -24,6 +24,8 @@ pub struct EngineSettings {
     pub commit_interval: Duration,
     /// Time between checkpoints while samples come in.
     pub checkpoint_interval: Duration,
+    /// Threads that relax the past of all spaces; 0 leaves it to the spaces' writers.
+    pub relaxation_threads: usize,
 }
 
 impl Default for EngineSettings {
@@ -38,6 +40,7 @@ impl Default for EngineSettings {
             gap_timeout: Duration::from_secs(10),
             commit_interval: Duration::from_millis(10),
             checkpoint_interval: Duration::from_secs(30),
+            relaxation_threads: 2,
         }
     }
 }

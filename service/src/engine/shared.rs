@@ -19,6 +19,7 @@ use super::live::Live;
 use super::publisher::Publisher;
 use super::question::QuestionRoom;
 use super::refinement::Refinements;
+use super::relaxers::Relaxers;
 use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
 use super::unavailable::Unavailable;
@@ -75,6 +76,7 @@ pub(crate) struct Surroundings {
     pub(crate) health: Arc<Health>,
     pub(crate) commits: std::sync::mpsc::Sender<Commit>,
     pub(crate) jobs: std::sync::mpsc::Sender<Job>,
+    pub(crate) relaxers: Relaxers,
     pub(crate) questions: QuestionRoom,
     pub(crate) settings: EngineSettings,
 }

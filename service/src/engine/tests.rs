@@ -18,6 +18,7 @@ use crate::store::{Derived, Journal, LocalStore};
 
 mod faults;
 mod mangled;
+mod relaxation;
 mod removal;
 mod settings;
 mod window;

@@ -124,10 +124,12 @@ fn binary(
         first += CHUNK_PLACES;
         (!bytes.is_empty()).then_some(bytes)
     });
-    let numbers = { forgotten.into_iter() }.map(|id| id.0.to_le_bytes().to_vec());
+    let numbers: Vec<u8> = { forgotten.into_iter() }
+        .flat_map(|id| id.0.to_le_bytes())
+        .collect();
     std::iter::once(head.into_bytes())
         .chain(vertices)
-        .chain(numbers)
+        .chain((!numbers.is_empty()).then_some(numbers))
 }
 
 /// The bytes of a place.

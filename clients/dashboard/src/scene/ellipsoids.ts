@@ -2,10 +2,8 @@
 
 import {
   CustomBlending,
-  DynamicDrawUsage,
   FrontSide,
   IcosahedronGeometry,
-  InstancedBufferAttribute,
   InstancedBufferGeometry,
   Mesh,
   OneFactor,
@@ -14,6 +12,7 @@ import {
 } from "three";
 import type { Vec3 } from "../wire";
 import { choleskyColumns } from "./cholesky";
+import { Instances } from "./instances";
 import type { Rgb } from "./palette";
 
 /** Two standard deviations. */
@@ -55,9 +54,7 @@ void main() {
 
 export class Ellipsoids {
   readonly mesh: Mesh<InstancedBufferGeometry, ShaderMaterial>;
-  private capacity = 0;
-  private columns!: Record<string, InstancedBufferAttribute>;
-  private n = 0;
+  private readonly instances: Instances<"centre" | "columnX" | "columnY" | "columnZ" | "colour">;
 
   constructor() {
     const sphere = new IcosahedronGeometry(1, 10);
@@ -75,13 +72,15 @@ export class Ellipsoids {
       uniforms: { uGlow: { value: 0 } },
     });
     this.mesh = new Mesh(geometry, material);
-    this.mesh.frustumCulled = false;
-    this.reserve(64);
+    this.instances = new Instances(
+      this.mesh,
+      { centre: 3, columnX: 3, columnY: 3, columnZ: 3, colour: 4 },
+      64,
+    );
   }
 
   begin(n: number): void {
-    this.reserve(n);
-    this.n = 0;
+    this.instances.begin(n);
   }
 
   /**
@@ -98,48 +97,18 @@ export class Ellipsoids {
     const l = choleskyColumns(covariance);
     const widest = DEVIATIONS * Math.max(...l.map((column) => Math.hypot(...column)));
     const scale = DEVIATIONS * Math.min(1, limitM / Math.max(widest, 1e-9));
-    const i = this.n;
-    this.columns["centre"]!.array.set(centre, 3 * i);
-    ["columnX", "columnY", "columnZ"].forEach((name, axis) => {
-      this.columns[name]!.array.set(
-        l[axis]!.map((x) => x * scale),
-        3 * i,
-      );
+    const [columnX, columnY, columnZ] = l.map((column) => column.map((x) => x * scale));
+    this.instances.add({
+      centre,
+      columnX: columnX!,
+      columnY: columnY!,
+      columnZ: columnZ!,
+      colour: [...colour, alpha],
     });
-    this.columns["colour"]!.array.set([...colour, alpha], 4 * i);
-    this.n += 1;
   }
 
   finish(glow: number): void {
     this.mesh.material.uniforms["uGlow"]!.value = glow;
-    this.mesh.geometry.instanceCount = this.n;
-    this.mesh.visible = this.n > 0;
-    Object.values(this.columns).forEach((column) => {
-      column.clearUpdateRanges();
-      column.addUpdateRange(0, this.n * column.itemSize);
-      column.needsUpdate = true;
-    });
-  }
-
-  private reserve(n: number): void {
-    if (n <= this.capacity) {
-      return;
-    }
-    this.capacity = Math.max(n, 2 * this.capacity);
-    const make = (size: number): InstancedBufferAttribute => {
-      const array = new Float32Array(size * this.capacity);
-      return new InstancedBufferAttribute(array, size).setUsage(DynamicDrawUsage);
-    };
-    this.columns = {
-      centre: make(3),
-      columnX: make(3),
-      columnY: make(3),
-      columnZ: make(3),
-      colour: make(4),
-    };
-    this.mesh.geometry.dispose();
-    for (const [name, column] of Object.entries(this.columns)) {
-      this.mesh.geometry.setAttribute(name, column);
-    }
+    this.instances.finish();
   }
 }

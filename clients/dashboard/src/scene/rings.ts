@@ -3,8 +3,6 @@
 import {
   BufferAttribute,
   CustomBlending,
-  DynamicDrawUsage,
-  InstancedBufferAttribute,
   InstancedBufferGeometry,
   Mesh,
   OneFactor,
@@ -12,6 +10,7 @@ import {
   ShaderMaterial,
 } from "three";
 import type { Vec3 } from "../wire";
+import { Instances } from "./instances";
 import type { Rgb } from "./palette";
 
 export interface Ring {
@@ -75,9 +74,7 @@ void main() {
 export class Rings {
   readonly mesh: Mesh<InstancedBufferGeometry, ShaderMaterial>;
   private flashes: Flash[] = [];
-  private capacity = 0;
-  private columns!: Record<"centre" | "colour" | "size", InstancedBufferAttribute>;
-  private n = 0;
+  private readonly instances: Instances<"centre" | "colour" | "size">;
 
   constructor() {
     const geometry = new InstancedBufferGeometry();
@@ -96,8 +93,7 @@ export class Rings {
       uniforms: { uPixel: { value: 0.001 }, uGlow: { value: 0 } },
     });
     this.mesh = new Mesh(geometry, material);
-    this.mesh.frustumCulled = false;
-    this.reserve(256);
+    this.instances = new Instances(this.mesh, { centre: 3, colour: 4, size: 3 }, 256);
   }
 
   flash(flash: Flash): void {
@@ -112,8 +108,7 @@ export class Rings {
   /** Begins a new drawing, with the flashes of now. */
   begin(nowMs: number, nSteady: number): void {
     this.flashes = this.flashes.filter((flash) => nowMs - flash.beganMs < flash.lastsMs);
-    this.reserve(this.flashes.length + nSteady);
-    this.n = 0;
+    this.instances.begin(this.flashes.length + nSteady);
     for (const flash of this.flashes) {
       const age = Math.max(0, (nowMs - flash.beganMs) / flash.lastsMs);
       const grown = 0.2 + 0.8 * (1 - (1 - age) ** 3);
@@ -127,41 +122,19 @@ export class Rings {
   }
 
   add(ring: Ring): void {
-    if (this.n >= this.capacity) {
+    if (this.instances.isFull) {
       return;
     }
-    const i = this.n;
-    this.columns.centre.array.set(ring.centre, 3 * i);
-    this.columns.colour.array.set([...ring.colour, ring.alpha], 4 * i);
-    this.columns.size.array.set([ring.radiusM, ring.radiusPx, ring.thickness], 3 * i);
-    this.n += 1;
+    this.instances.add({
+      centre: ring.centre,
+      colour: [...ring.colour, ring.alpha],
+      size: [ring.radiusM, ring.radiusPx, ring.thickness],
+    });
   }
 
   finish(pixel: number, glow: number): void {
     this.mesh.material.uniforms["uPixel"]!.value = pixel;
     this.mesh.material.uniforms["uGlow"]!.value = glow;
-    this.mesh.geometry.instanceCount = this.n;
-    this.mesh.visible = this.n > 0;
-    Object.values(this.columns).forEach((column) => {
-      column.clearUpdateRanges();
-      column.addUpdateRange(0, this.n * column.itemSize);
-      column.needsUpdate = true;
-    });
-  }
-
-  private reserve(n: number): void {
-    if (n <= this.capacity) {
-      return;
-    }
-    this.capacity = Math.max(n, 2 * this.capacity);
-    const make = (size: number): InstancedBufferAttribute => {
-      const array = new Float32Array(size * this.capacity);
-      return new InstancedBufferAttribute(array, size).setUsage(DynamicDrawUsage);
-    };
-    this.columns = { centre: make(3), colour: make(4), size: make(3) };
-    this.mesh.geometry.dispose();
-    for (const [name, column] of Object.entries(this.columns)) {
-      this.mesh.geometry.setAttribute(name, column);
-    }
+    this.instances.finish();
   }
 }

@@ -3,14 +3,13 @@
 import {
   BufferAttribute,
   BufferGeometry,
-  DynamicDrawUsage,
-  InstancedBufferAttribute,
   InstancedBufferGeometry,
   Mesh,
   OctahedronGeometry,
   ShaderMaterial,
 } from "three";
 import type { Quat, Vec3 } from "../wire";
+import { Instances } from "./instances";
 import type { Rgb } from "./palette";
 
 /** A dart shows a heading; an octahedron, longer ahead, one that is in doubt; a cube has none. */
@@ -62,9 +61,7 @@ void main() {
 
 export class Solids {
   readonly mesh: Mesh<InstancedBufferGeometry, ShaderMaterial>;
-  private capacity = 0;
-  private columns!: Record<"centre" | "turn" | "colour" | "size", InstancedBufferAttribute>;
-  private n = 0;
+  private readonly instances: Instances<"centre" | "turn" | "colour" | "size">;
 
   constructor() {
     const material = new ShaderMaterial({
@@ -73,51 +70,27 @@ export class Solids {
       uniforms: { uPixel: { value: 0.001 }, uDark: { value: 1 } },
     });
     this.mesh = new Mesh(shapes(), material);
-    this.mesh.frustumCulled = false;
-    this.reserve(64);
+    this.instances = new Instances(this.mesh, { centre: 3, turn: 4, colour: 4, size: 2 }, 64);
   }
 
   /** Begins a new drawing of up to `n` solids. */
   begin(n: number): void {
-    this.reserve(n);
-    this.n = 0;
+    this.instances.begin(n);
   }
 
   add(shape: Shape, centre: Vec3, turn: Quat, colour: Rgb, sizeM: number, sizePx: number): void {
-    const i = this.n;
-    this.columns.centre.array.set(centre, 3 * i);
-    this.columns.turn.array.set(turn, 4 * i);
-    this.columns.colour.array.set([...colour, SHAPES.indexOf(shape)], 4 * i);
-    this.columns.size.array.set([sizeM, sizePx], 2 * i);
-    this.n += 1;
+    this.instances.add({
+      centre,
+      turn,
+      colour: [...colour, SHAPES.indexOf(shape)],
+      size: [sizeM, sizePx],
+    });
   }
 
   finish(pixel: number, isDark: boolean): void {
     this.mesh.material.uniforms["uPixel"]!.value = pixel;
     this.mesh.material.uniforms["uDark"]!.value = isDark ? 1 : 0;
-    this.mesh.geometry.instanceCount = this.n;
-    this.mesh.visible = this.n > 0;
-    Object.values(this.columns).forEach((column) => {
-      column.clearUpdateRanges();
-      column.addUpdateRange(0, this.n * column.itemSize);
-      column.needsUpdate = true;
-    });
-  }
-
-  private reserve(n: number): void {
-    if (n <= this.capacity) {
-      return;
-    }
-    this.capacity = Math.max(n, 2 * this.capacity);
-    const make = (size: number): InstancedBufferAttribute => {
-      const array = new Float32Array(size * this.capacity);
-      return new InstancedBufferAttribute(array, size).setUsage(DynamicDrawUsage);
-    };
-    this.columns = { centre: make(3), turn: make(4), colour: make(4), size: make(2) };
-    this.mesh.geometry.dispose();
-    for (const [name, column] of Object.entries(this.columns)) {
-      this.mesh.geometry.setAttribute(name, column);
-    }
+    this.instances.finish();
   }
 }
 

@@ -21,7 +21,7 @@ pub use input::{
     ObjectMark, PoseNoise, RangeBearing, Record, Relation, RelativePose, RelativePosition, Sample,
     SampleBody, Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel, TouchNoise,
 };
-pub use keyframes::Guess;
+pub use keyframes::{Guess, RelaxationJob};
 pub use memory::landmark::{Landmark, LandmarkId};
 pub use memory::object::{Identified, KnownObject};
 pub use memory::percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};

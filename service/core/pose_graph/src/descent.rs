@@ -23,11 +23,15 @@ impl SteepestDescent {
     pub(super) fn new(equations: &NormalEquations<'_>) -> Self {
         let n = slot(equations.map.nodes.len(), 0, 1);
         let (mut gradient, mut curvature) = (vec![0.0; n], vec![0.0; n]);
-        equations.for_each_link(|from, to, blocks| {
+        equations.for_each_link(|[from, to], calibration, blocks| {
             equations.gather(to, &blocks.to_gradient, &mut gradient);
             equations.gather(to, &blocks.to_to.diagonal(), &mut curvature);
             equations.gather(from, &blocks.from_gradient, &mut gradient);
             equations.gather(from, &blocks.from_from.diagonal(), &mut curvature);
+            if let Some((node, blocks)) = calibration.zip(blocks.by_calibration.as_ref()) {
+                equations.gather(node, &blocks.gradient, &mut gradient);
+                equations.gather(node, &blocks.own.diagonal(), &mut curvature);
+            }
         });
         let direction: Vec<f64> = gradient
             .iter()
@@ -97,11 +101,17 @@ impl SteepestDescent {
 /// δᵀ H δ.
 fn quadratic_form(equations: &NormalEquations<'_>, step: &[f64]) -> f64 {
     let mut sum = 0.0;
-    equations.for_each_link(|from, to, blocks| {
+    equations.for_each_link(|[from, to], calibration, blocks| {
         let (from_step, to_step) = (equations.twist(from, step), equations.twist(to, step));
         sum += to_step.dot(&(blocks.to_to * to_step));
         sum += 2.0 * to_step.dot(&(blocks.to_from * from_step));
         sum += from_step.dot(&(blocks.from_from * from_step));
+        if let Some((node, blocks)) = calibration.zip(blocks.by_calibration.as_ref()) {
+            let step = equations.twist(node, step);
+            sum += step.dot(&(blocks.own * step));
+            sum += 2.0 * from_step.dot(&(blocks.from * step));
+            sum += 2.0 * to_step.dot(&(blocks.to * step));
+        }
     });
     sum
 }

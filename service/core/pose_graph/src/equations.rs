@@ -23,7 +23,7 @@ impl Equations for NormalEquations<'_> {
         self.map.nodes[variable as usize].axes().len()
     }
 
-    fn links(&self, variable: u32) -> &[(u32, u32)] {
+    fn links(&self, variable: u32) -> &[(u32, [u32; 2])] {
         &self.map.links_of[variable as usize]
     }
 
@@ -44,6 +44,14 @@ impl Equations for NormalEquations<'_> {
             front.add(to, from, &blocks.to_from);
             front.add_right(from.0, from.1, 0, (-blocks.from_gradient).as_slice());
         }
+        let calibration = self.map.links[link as usize].link.calibration();
+        if let Some((node, blocks)) = calibration.zip(blocks.by_calibration) {
+            let own = (node, axes(node));
+            front.add(own, own, &blocks.own);
+            front.add(from, own, &blocks.from);
+            front.add(to, own, &blocks.to);
+            front.add_right(own.0, own.1, 0, (-blocks.gradient).as_slice());
+        }
     }
 }
 
@@ -53,18 +61,20 @@ impl NormalEquations<'_> {
         let slot = &self.map.links[link as usize];
         let (from, to) = slot.link.nodes();
         let blocks = || {
-            let (from, to) = (&self.poses[from as usize], &self.poses[to as usize]);
             let weigh = |s| slot.kernel.cost_and_weight(s, self.widening).1;
-            slot.link.normal_blocks(from, to, weigh)
+            slot.link
+                .normal_blocks(|node| &self.poses[node as usize], weigh)
         };
         slot.is_on.then(|| (from, to, blocks()))
     }
 
-    /// Hands out the nodes and the blocks of every link that is on.
-    pub(super) fn for_each_link(&self, mut each: impl FnMut(u32, u32, &NormalBlocks)) {
+    /// Hands out the nodes and the blocks of every link that is on; and the node of its
+    /// calibration, if it has one.
+    pub(super) fn for_each_link(&self, mut each: impl FnMut([u32; 2], Option<u32>, &NormalBlocks)) {
         for link in 0..number(self.map.links.len()) {
             if let Some((from, to, blocks)) = self.blocks(link) {
-                each(from, to, &blocks);
+                let calibration = self.map.links[link as usize].link.calibration();
+                each([from, to], calibration, &blocks);
             }
         }
     }

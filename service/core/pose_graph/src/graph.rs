@@ -2,10 +2,11 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use super::calibration::Calibration;
 use super::elimination::number;
 use super::kernel::Kernel;
 use super::link::{Link, LinkId};
-use super::node::{Freedom, Node, PointId, PoseId};
+use super::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId};
 use state::Digest;
 
 /// A graph of poses and points with the measurements between them.
@@ -16,10 +17,9 @@ use state::Digest;
 pub struct PoseGraph {
     pub(super) nodes: Vec<Node>,
     pub(super) links: Vec<LinkSlot>,
-    /// For each node its links and the nodes at their other ends; the node itself if there is none.
-    pub(super) links_of: Vec<Vec<(u32, u32)>>,
-    /// Nodes whose links have changed since someone last asked.
-    touched: Vec<u32>,
+    /// For each node its links and the other nodes of each: one of them twice if there is no
+    /// second, the node itself if there is none.
+    pub(super) links_of: Vec<Vec<(u32, [u32; 2])>>,
 }
 
 /// A link and how it counts.
@@ -57,10 +57,19 @@ impl PoseGraph {
         PointId(self.add_node(Node::point(point, freedom)))
     }
 
+    /// Adds the calibration of a robot's odometry: of a planar one, if it may move in the plane
+    /// only.
+    pub fn add_calibration(
+        &mut self,
+        at: &Calibration,
+        freedom: Freedom,
+        lengths: Lengths,
+    ) -> CalibrationId {
+        CalibrationId(self.add_node(Node::calibration(at, freedom, lengths)))
+    }
+
     /// Puts a pose somewhere else and says how it may move from now on: so a frame that has turned
-    /// out to lie in another is carried there and its origin set free. An
-    /// [`IncrementalRelaxation`](super::IncrementalRelaxation) does not take notice of it; a new
-    /// one is to be begun.
+    /// out to lie in another is carried there and its origin set free.
     pub fn place_pose(&mut self, id: PoseId, pose: Isometry3<f64>, freedom: Freedom) {
         self.nodes[id.0 as usize] = Node::pose(pose, freedom);
     }
@@ -76,27 +85,41 @@ impl PoseGraph {
     /// It names a node that is not of this graph, or one node twice.
     pub fn add_link(&mut self, link: Link, kernel: Kernel) -> Result<LinkId, InvalidLink> {
         let (from, to) = link.nodes();
-        let id = self.insert(link, kernel, true)?;
-        self.touched.extend([from, to]);
-        Ok(id)
-    }
-
-    /// Adds a link that says nothing until it is switched on. Nothing is computed anew for it.
-    ///
-    /// # Errors
-    /// As [`add_link`](Self::add_link).
-    pub fn add_silent_link(&mut self, link: Link, kernel: Kernel) -> Result<LinkId, InvalidLink> {
-        self.insert(link, kernel, false)
+        let third = link.calibration();
+        if from.max(to).max(third.unwrap_or(0)) as usize >= self.nodes.len() {
+            return Err(InvalidLink::UnknownNode);
+        }
+        if link.joins_two() && from == to {
+            return Err(InvalidLink::Loop);
+        }
+        let id = number(self.links.len());
+        let mut join = |node: u32, others| self.links_of[node as usize].push((id, others));
+        if let Some(third) = third {
+            join(from, [to, third]);
+            join(to, [from, third]);
+            join(third, [from, to]);
+        } else if link.joins_two() {
+            join(from, [to; 2]);
+            join(to, [from; 2]);
+        } else {
+            join(from, [from; 2]);
+        }
+        self.links.push(LinkSlot {
+            link,
+            kernel,
+            is_on: true,
+        });
+        Ok(LinkId(id))
     }
 
     /// Makes a link say nothing.
     pub fn switch_off(&mut self, link: LinkId) {
-        self.switch(link, false);
+        self.links[link.0 as usize].is_on = false;
     }
 
     /// Makes a link count again.
     pub fn switch_on(&mut self, link: LinkId) {
-        self.switch(link, true);
+        self.links[link.0 as usize].is_on = true;
     }
 
     /// Where a pose is.
@@ -109,6 +132,11 @@ impl PoseGraph {
         self.nodes[id.0 as usize].pose.translation.vector.into()
     }
 
+    /// A calibration.
+    pub fn calibration(&self, id: CalibrationId) -> Calibration {
+        Calibration::of_place(&self.nodes[id.0 as usize].pose)
+    }
+
     /// Whether a pose stays where it is.
     pub fn is_held(&self, id: PoseId) -> bool {
         self.nodes[id.0 as usize].freedom() == Freedom::Held
@@ -116,7 +144,7 @@ impl PoseGraph {
 
     /// Whether no pose moves out of the plane.
     pub fn is_planar(&self) -> bool {
-        let mut poses = self.nodes.iter().filter(|node| !node.is_point());
+        let mut poses = self.nodes.iter().filter(|node| node.is_pose());
         poses.all(|node| node.freedom() != Freedom::Full)
     }
 
@@ -128,7 +156,7 @@ impl PoseGraph {
 
     /// The poses, in the order in which they were added.
     pub fn poses(&self) -> impl Iterator<Item = (PoseId, &Isometry3<f64>)> {
-        let nodes = (0..).zip(&self.nodes).filter(|(_, node)| !node.is_point());
+        let nodes = (0..).zip(&self.nodes).filter(|(_, node)| node.is_pose());
         nodes.map(|(number, node)| (PoseId(number), &node.pose))
     }
 
@@ -152,11 +180,7 @@ impl PoseGraph {
     /// Squared Mahalanobis error of one link, without its kernel.
     pub fn squared_error(&self, link: LinkId) -> f64 {
         let link = &self.links[link.0 as usize].link;
-        let (from, to) = link.nodes();
-        link.squared_error(
-            &self.nodes[from as usize].pose,
-            &self.nodes[to as usize].pose,
-        )
+        link.squared_error(|node| &self.nodes[node as usize].pose)
     }
 
     /// Whether a link counts.
@@ -182,45 +206,10 @@ impl PoseGraph {
     pub(super) fn cost<'a>(&self, pose: impl Fn(u32) -> &'a Isometry3<f64>, widening: f64) -> f64 {
         let mut sum = 0.0;
         for slot in self.links.iter().filter(|slot| slot.is_on) {
-            let (from, to) = slot.link.nodes();
-            let s = slot.link.squared_error(pose(from), pose(to));
+            let s = slot.link.squared_error(&pose);
             sum += slot.kernel.cost_and_weight(s, widening).0;
         }
         sum
-    }
-
-    /// Nodes whose links have changed since the last call.
-    pub(super) fn take_touched(&mut self) -> Vec<u32> {
-        std::mem::take(&mut self.touched)
-    }
-
-    fn insert(&mut self, link: Link, kernel: Kernel, is_on: bool) -> Result<LinkId, InvalidLink> {
-        let (from, to) = link.nodes();
-        if from.max(to) as usize >= self.nodes.len() {
-            return Err(InvalidLink::UnknownNode);
-        }
-        let joins_two = matches!(link, Link::Between { .. } | Link::Sighting { .. });
-        if joins_two && from == to {
-            return Err(InvalidLink::Loop);
-        }
-        let id = number(self.links.len());
-        self.links_of[from as usize].push((id, to));
-        if joins_two {
-            self.links_of[to as usize].push((id, from));
-        }
-        self.links.push(LinkSlot {
-            link,
-            kernel,
-            is_on,
-        });
-        Ok(LinkId(id))
-    }
-
-    fn switch(&mut self, link: LinkId, is_on: bool) {
-        let slot = &mut self.links[link.0 as usize];
-        slot.is_on = is_on;
-        let (from, to) = slot.link.nodes();
-        self.touched.extend([from, to]);
     }
 
     fn add_node(&mut self, node: Node) -> u32 {

@@ -2,13 +2,12 @@
 
 pub mod g2o;
 
+mod calibration;
 mod descent;
 mod elimination;
 mod equations;
 mod graph;
-mod incremental;
 mod information;
-mod innovation;
 mod kernel;
 mod linearisation;
 mod link;
@@ -17,12 +16,11 @@ mod node;
 mod relaxation;
 mod rotation_first;
 
+pub use calibration::{Calibration, Reading};
 pub use graph::{InvalidLink, PoseGraph};
-pub use incremental::{IncrementalRelaxation, IncrementalSettings, Updated};
 pub use information::{Information, InvalidInformation, PoseInformation, PositionInformation};
-pub use innovation::{ExpectedPose, ExpectedPosition, Innovation};
 pub use kernel::{InvalidScale, Kernel, Scale};
-pub use link::{Link, LinkId, SightingTarget};
+pub use link::{CalibrationInformation, Link, LinkId, SightingTarget};
 pub use marginals::Marginals;
-pub use node::{Freedom, PointId, PoseId};
+pub use node::{CalibrationId, Freedom, Lengths, PointId, PoseId};
 pub use relaxation::{Graduation, RelaxationSettings, Relaxed, Start};

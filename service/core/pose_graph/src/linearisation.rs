@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
+use super::calibration::{Calibration, Reading};
 use super::link::{Link, SightingTarget};
 use geometry::{from_blocks, log_jacobian, se3};
 
@@ -21,11 +22,25 @@ pub(super) struct NormalBlocks {
     pub(super) to_to: Matrix6<f64>,
     pub(super) from_gradient: Vector6<f64>,
     pub(super) to_gradient: Vector6<f64>,
+    /// Of a motion: what its calibration adds.
+    pub(super) by_calibration: Option<CalibrationBlocks>,
+}
+
+/// The blocks of a link's calibration.
+#[derive(Clone, Debug)]
+pub(super) struct CalibrationBlocks {
+    pub(super) own: Matrix6<f64>,
+    /// Rows of the node, columns of the calibration.
+    pub(super) from: Matrix6<f64>,
+    pub(super) to: Matrix6<f64>,
+    pub(super) gradient: Vector6<f64>,
 }
 
 impl Link {
-    /// s = rᵀ Ω r at these poses of its nodes.
-    pub(super) fn squared_error(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
+    /// s = rᵀ Ω r at these places of its nodes.
+    pub(super) fn squared_error<'a>(&self, place: impl Fn(u32) -> &'a Isometry3<f64>) -> f64 {
+        let (from, to) = self.nodes();
+        let (from, to) = (place(from), place(to));
         match self {
             Self::PosePrior {
                 at, information, ..
@@ -56,16 +71,38 @@ impl Link {
                 let residual = seen(from, to, &target.lever()) - position;
                 residual.dot(&(information.matrix() * residual))
             }
+            Self::Odometry {
+                reading,
+                calibration,
+                information,
+                ..
+            } => {
+                let calibration = Calibration::of_place(place(calibration.0));
+                let motion = reading.motion(&calibration);
+                let residual = se3::twist(&motion.inv_mul(&from.inv_mul(to)));
+                residual.dot(&(information.matrix() * residual))
+            }
+            Self::CalibrationPrior {
+                at, information, ..
+            } => {
+                let residual = Calibration::of_place(to).components() - at.components();
+                residual.dot(&information.diagonal().component_mul(&residual))
+            }
+            Self::CalibrationWander { information, .. } => {
+                let residual = change(from, to);
+                residual.dot(&information.diagonal().component_mul(&residual))
+            }
         }
     }
 
     /// The squared error, and the normal equations multiplied by the weight that `weigh` gives it.
-    pub(super) fn normal_blocks(
+    pub(super) fn normal_blocks<'a>(
         &self,
-        from: &Isometry3<f64>,
-        to: &Isometry3<f64>,
+        place: impl Fn(u32) -> &'a Isometry3<f64>,
         weigh: impl Fn(f64) -> f64,
     ) -> NormalBlocks {
+        let (from, to) = self.nodes();
+        let (from, to) = (place(from), place(to));
         match self {
             Self::PosePrior {
                 at, information, ..
@@ -83,18 +120,36 @@ impl Link {
                 information,
                 ..
             } => {
-                let between = from.inv_mul(to);
-                let residual = se3::twist(&transform.inv_mul(&between));
-                let (to_to, to_gradient) = pose_blocks(&residual, information.matrix(), weigh);
-                // r(T_from exp δ) = r(T_to exp(−Ad(T_to⁻¹ T_from) δ)).
-                let moved = -se3::adjoint(&between.inverse());
-                let to_from = to_to * moved;
+                let error = transform.inv_mul(&from.inv_mul(to));
+                between_blocks((from, to), &error, information.matrix(), weigh)
+            }
+            Self::Odometry {
+                reading,
+                calibration,
+                information,
+                ..
+            } => {
+                let calibration = Calibration::of_place(place(calibration.0));
+                odometry_blocks(
+                    (from, to),
+                    (reading, &calibration),
+                    information.matrix(),
+                    weigh,
+                )
+            }
+            Self::CalibrationPrior {
+                at, information, ..
+            } => {
+                let residual = Calibration::of_place(to).components() - at.components();
+                calibration_blocks(&residual, information.diagonal())
+            }
+            Self::CalibrationWander { information, .. } => {
+                let blocks = calibration_blocks(&change(from, to), information.diagonal());
                 NormalBlocks {
-                    from_from: moved.tr_mul(&to_from),
-                    to_from,
-                    to_to,
-                    from_gradient: moved.tr_mul(&to_gradient),
-                    to_gradient,
+                    from_from: blocks.to_to,
+                    to_from: -blocks.to_to,
+                    from_gradient: -blocks.to_gradient,
+                    ..blocks
                 }
             }
             Self::PointPrior {
@@ -126,8 +181,65 @@ impl NormalBlocks {
             to_to: Matrix6::zeros(),
             from_gradient: Vector6::zeros(),
             to_gradient: Vector6::zeros(),
+            by_calibration: None,
         }
     }
+}
+
+/// The blocks of a relative pose with this error.
+fn between_blocks(
+    (from, to): (&Isometry3<f64>, &Isometry3<f64>),
+    error: &Isometry3<f64>,
+    information: &Matrix6<f64>,
+    weigh: impl Fn(f64) -> f64,
+) -> NormalBlocks {
+    let residual = se3::twist(error);
+    let (to_to, to_gradient) = pose_blocks(&residual, information, weigh);
+    // r(T_from exp δ) = r(T_to exp(−Ad(T_to⁻¹ T_from) δ)).
+    let moved = -se3::adjoint(&to.inv_mul(from));
+    let to_from = to_to * moved;
+    NormalBlocks {
+        from_from: moved.tr_mul(&to_from),
+        to_from,
+        to_to,
+        from_gradient: moved.tr_mul(&to_gradient),
+        to_gradient,
+        by_calibration: None,
+    }
+}
+
+/// The blocks of a motion by a reading and its calibration.
+fn odometry_blocks(
+    (from, to): (&Isometry3<f64>, &Isometry3<f64>),
+    (reading, calibration): (&Reading, &Calibration),
+    information: &Matrix6<f64>,
+    weigh: impl Fn(f64) -> f64,
+) -> NormalBlocks {
+    let error = reading.motion(calibration).inv_mul(&from.inv_mul(to));
+    let mut blocks = between_blocks((from, to), &error, information, weigh);
+    let moved = reading.jacobian(calibration, &error);
+    let to_calibration = blocks.to_to * moved;
+    blocks.by_calibration = Some(CalibrationBlocks {
+        own: moved.tr_mul(&to_calibration),
+        from: blocks.to_from.tr_mul(&moved),
+        to: to_calibration,
+        gradient: moved.tr_mul(&blocks.to_gradient),
+    });
+    blocks
+}
+
+/// The blocks of an error of a calibration.
+fn calibration_blocks(residual: &Vector6<f64>, information: &Vector6<f64>) -> NormalBlocks {
+    NormalBlocks {
+        to_to: Matrix6::from_diagonal(information),
+        to_gradient: information.component_mul(residual),
+        ..NormalBlocks::zero()
+    }
+}
+
+/// By how much a calibration differs from an earlier one.
+fn change(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
+    Calibration::of_place(to).components() - Calibration::of_place(from).components()
 }
 
 /// The blocks of a sighting.
@@ -166,6 +278,7 @@ fn sighting_blocks(
         to_to: corner(&(turned * turn)),
         from_gradient: se3::join(&-force, &lever.tr_mul(&force)),
         to_gradient: top(&turn.tr_mul(&force)),
+        by_calibration: None,
     };
     if in_target != Vector3::zeros() {
         blocks.swing(&in_target, &turned, &turn, &lever, &force);

@@ -1,9 +1,10 @@
 //! Links: measurements between nodes.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 
-use super::information::{PoseInformation, PositionInformation};
-use super::node::{PointId, PoseId};
+use super::calibration::{Calibration, Reading};
+use super::information::{InvalidInformation, PoseInformation, PositionInformation};
+use super::node::{CalibrationId, PointId, PoseId};
 
 /// A link in a pose graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,6 +18,9 @@ pub struct LinkId(pub(super) u32);
 /// | `PointPrior` | p − z |
 /// | `Between` | log(Z⁻¹ T_from⁻¹ T_to) |
 /// | `Sighting` | T_from⁻¹ p − z, with the target's position p = T_target l |
+/// | `Odometry` | log(M(c)⁻¹ T_from⁻¹ T_to), with the motion M that the calibration c corrects the reading to |
+/// | `CalibrationPrior` | c − z |
+/// | `CalibrationWander` | c_to − c_from |
 #[derive(Clone, Debug, PartialEq)]
 pub enum Link {
     /// Where a pose is, in `map`.
@@ -59,6 +63,74 @@ pub enum Link {
         /// Information in the axes of the pose.
         information: PositionInformation,
     },
+    /// The motion from one pose to another, as odometry with unknown lasting errors read it.
+    Odometry {
+        /// The pose before.
+        from: PoseId,
+        /// The pose after.
+        to: PoseId,
+        /// The lasting errors.
+        calibration: CalibrationId,
+        /// The reading.
+        reading: Reading,
+        /// Information about the rest of the error, in the axes of the pose after.
+        information: PoseInformation,
+    },
+    /// What is known of a calibration beforehand.
+    CalibrationPrior {
+        /// The calibration.
+        calibration: CalibrationId,
+        /// As it is expected.
+        at: Calibration,
+        /// Information about its components.
+        information: CalibrationInformation,
+    },
+    /// By how much a calibration changes until a later one.
+    CalibrationWander {
+        /// The calibration before.
+        from: CalibrationId,
+        /// The calibration after.
+        to: CalibrationId,
+        /// Information about the change of its components.
+        information: CalibrationInformation,
+    },
+}
+
+/// Information about the components of a calibration, which are independent: the inverses of their
+/// variances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CalibrationInformation(Vector6<f64>);
+
+impl CalibrationInformation {
+    /// Of the variances of the length, the angle and the bias \[1, 1, rad²/s²\]. A component of
+    /// which nothing is known has an infinite one.
+    ///
+    /// # Errors
+    /// A variance is not positive.
+    pub fn of_variances(
+        length: f64,
+        angle: f64,
+        bias: &Vector3<f64>,
+    ) -> Result<Self, InvalidInformation> {
+        let variances = Vector6::new(length, angle, 1.0, bias.x, bias.y, bias.z);
+        if variances.iter().any(|variance| variance.is_nan()) {
+            return Err(InvalidInformation::NotFinite);
+        }
+        if variances
+            .iter()
+            .any(|variance| *variance < f64::MIN_POSITIVE)
+        {
+            return Err(InvalidInformation::Singular);
+        }
+        let mut diagonal = variances.map(f64::recip);
+        diagonal[2] = 0.0; // no component stands there
+        Ok(Self(diagonal))
+    }
+
+    /// By the places of the components in a twist.
+    pub(super) fn diagonal(&self) -> &Vector6<f64> {
+        &self.0
+    }
 }
 
 /// Target of a sighting.
@@ -102,9 +174,35 @@ impl Link {
             | Self::PointPrior {
                 point: PointId(node),
                 ..
+            }
+            | Self::CalibrationPrior {
+                calibration: CalibrationId(node),
+                ..
             } => (node, node),
-            Self::Between { from, to, .. } => (from.0, to.0),
+            Self::Between { from, to, .. } | Self::Odometry { from, to, .. } => (from.0, to.0),
             Self::Sighting { from, target, .. } => (from.0, target.node()),
+            Self::CalibrationWander { from, to, .. } => (from.0, to.0),
+        }
+    }
+
+    /// Whether it is between nodes, and not a prior of one.
+    pub(super) fn joins_two(&self) -> bool {
+        match self {
+            Self::PosePrior { .. } | Self::PointPrior { .. } | Self::CalibrationPrior { .. } => {
+                false
+            }
+            Self::Between { .. }
+            | Self::Sighting { .. }
+            | Self::Odometry { .. }
+            | Self::CalibrationWander { .. } => true,
+        }
+    }
+
+    /// The node of the calibration, of a link that joins two poses by way of one.
+    pub(super) fn calibration(&self) -> Option<u32> {
+        match self {
+            Self::Odometry { calibration, .. } => Some(calibration.0),
+            _ => None,
         }
     }
 }

@@ -1,13 +1,12 @@
 //! Marginal covariances of nodes.
 
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::elimination::{CliqueTree, HalfSolution};
 use super::equations::NormalEquations;
 use super::graph::PoseGraph;
-use super::innovation::{ExpectedPose, ExpectedPosition};
-use super::node::{PointId, PoseId};
-use geometry::{PoseCovariance, se3, seen_by_pose, symmetric};
+use super::node::{CalibrationId, PointId, PoseId};
+use geometry::{PoseCovariance, se3, symmetric};
 
 /// Covariances of nodes, given all links.
 ///
@@ -17,8 +16,8 @@ use geometry::{PoseCovariance, se3, seen_by_pose, symmetric};
 /// robust kernel has discounted counts as little here as there.
 #[derive(Clone, Debug)]
 pub struct Marginals<'a> {
-    pub(super) map: &'a PoseGraph,
-    pub(super) tree: std::borrow::Cow<'a, CliqueTree>,
+    map: &'a PoseGraph,
+    tree: CliqueTree,
 }
 
 impl PoseGraph {
@@ -32,10 +31,7 @@ impl PoseGraph {
         };
         let mut tree = CliqueTree::structured(&equations, self.nodes.len());
         tree.refactor(&equations, &tree.all());
-        Marginals {
-            map: self,
-            tree: std::borrow::Cow::Owned(tree),
-        }
+        Marginals { map: self, tree }
     }
 }
 
@@ -56,6 +52,25 @@ impl Marginals<'_> {
         Some(symmetric(&block))
     }
 
+    /// Variances of a calibration's length, angle and bias \[1, 1, rad²/s²\]; of a planar robot, the
+    /// bias about z alone. `None` if the links leave it free.
+    pub fn calibration(&self, calibration: CalibrationId) -> Option<(f64, f64, Vector3<f64>)> {
+        let half = self.half(calibration.0)?;
+        let variances = self
+            .placed(calibration.0, calibration.0, &half.product(&half))
+            .diagonal();
+        Some((
+            variances[0],
+            variances[1],
+            variances.fixed_rows::<3>(3).into_owned(),
+        ))
+    }
+
+    /// Log of the determinant of the normal equations, without directions that the links leave free.
+    pub fn log_determinant(&self) -> f64 {
+        self.tree.log_determinant()
+    }
+
     /// Covariance of the pose of `to` in the frame of `from`, with what the errors of the two have
     /// in common: what a match between them is to be judged by. `None` if the links leave one of
     /// them free.
@@ -73,48 +88,6 @@ impl Marginals<'_> {
         let covariance =
             to_to - common - common.transpose() + moved * from_from * moved.transpose();
         Some(PoseCovariance::from_upper_part(&covariance))
-    }
-
-    /// Where `to` is expected in the frame of `from`. `None` if the links leave one of them free.
-    pub fn expected_pose(&self, from: PoseId, to: PoseId) -> Option<ExpectedPose> {
-        let covariance = if from == to {
-            PoseCovariance::zero()
-        } else {
-            self.relative_pose(from, to)?
-        };
-        let transform = self.map.pose(from).inv_mul(self.map.pose(to));
-        Some(ExpectedPose {
-            transform,
-            covariance,
-        })
-    }
-
-    /// Where a point is expected in the frame of a pose. `None` if the links leave one of them
-    /// free.
-    ///
-    /// ```text
-    /// d = Rᵀ dp − ρ + seen×φ
-    /// ```
-    pub fn expected_position(&self, from: PoseId, point: PointId) -> Option<ExpectedPosition> {
-        let (from_half, point_half) = (self.half(from.0)?, self.half(point.0)?);
-        let from_from = self.placed(from.0, from.0, &from_half.product(&from_half));
-        let block = self.placed(point.0, point.0, &point_half.product(&point_half));
-        let point_point = block.fixed_view::<3, 3>(0, 0).into_owned();
-        let block = self.placed(point.0, from.0, &point_half.product(&from_half));
-        let point_from = block.fixed_view::<3, 6>(0, 0).into_owned();
-        let pose = self.map.pose(from);
-        let position = pose.inverse_transform_point(&self.map.point(point)).coords;
-        let turn = pose.rotation.inverse().to_rotation_matrix().into_inner();
-        let moved = seen_by_pose(&position);
-        let common = turn * point_from * moved.transpose();
-        let covariance = turn * point_point * turn.transpose()
-            + common
-            + common.transpose()
-            + moved * from_from * moved.transpose();
-        Some(ExpectedPosition {
-            position,
-            covariance: symmetric(&covariance),
-        })
     }
 
     fn half(&self, node: u32) -> Option<HalfSolution> {

@@ -1,7 +1,8 @@
-//! Nodes: poses and points.
+//! Nodes: poses, points and calibrations.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector6};
 
+use super::calibration::{CALIBRATION_AXES, Calibration, PLANAR_CALIBRATION_AXES};
 use geometry::{ALL_AXES, PLANAR_AXES, se3};
 
 /// A pose in a pose graph: a place, an agent's keyframe, a landmark with an orientation.
@@ -11,6 +12,10 @@ pub struct PoseId(pub(super) u32);
 /// A point in a pose graph: a landmark of which only the position is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PointId(pub(super) u32);
+
+/// The calibration of a robot's odometry over a while.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct CalibrationId(pub(super) u32);
 
 impl PoseId {
     /// Its number among the nodes of its graph, counted from 0.
@@ -38,13 +43,32 @@ pub enum Freedom {
     Full,
 }
 
-/// A node with its place. A point is a pose that keeps the axes of `map`.
+/// What a node is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Pose,
+    Point,
+    Calibration,
+}
+
+/// Whether the lengths that odometry reads are calibrated with its rotations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lengths {
+    /// Their error is as stated. Loop closures that say no more than that two poses are one leave
+    /// the scale of a map open, and are the more probable the smaller it is.
+    Known,
+    /// Their error is estimated.
+    Estimated,
+}
+
+/// A node with its place. A point is a pose that keeps the axes of `map`; a calibration is one as
+/// [`Calibration::place`] says.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
     pub(super) pose: Isometry3<f64>,
     axes: &'static [usize],
     freedom: Freedom,
-    is_point: bool,
+    kind: Kind,
 }
 
 impl Node {
@@ -58,7 +82,7 @@ impl Node {
             pose,
             axes,
             freedom,
-            is_point: false,
+            kind: Kind::Pose,
         }
     }
 
@@ -73,7 +97,29 @@ impl Node {
             pose,
             axes,
             freedom,
-            is_point: true,
+            kind: Kind::Point,
+        }
+    }
+
+    pub(super) fn calibration(
+        calibration: &Calibration,
+        freedom: Freedom,
+        lengths: Lengths,
+    ) -> Self {
+        let whole: &[usize] = match freedom {
+            Freedom::Held => &[],
+            Freedom::Planar => &PLANAR_CALIBRATION_AXES,
+            Freedom::Full => &CALIBRATION_AXES,
+        };
+        let axes = match lengths {
+            Lengths::Estimated => whole,
+            Lengths::Known => whole.get(1..).unwrap_or_default(),
+        };
+        Self {
+            pose: calibration.place(),
+            axes,
+            freedom,
+            kind: Kind::Calibration,
         }
     }
 
@@ -86,8 +132,12 @@ impl Node {
         self.freedom
     }
 
+    pub(super) fn is_pose(&self) -> bool {
+        self.kind == Kind::Pose
+    }
+
     pub(super) fn is_point(&self) -> bool {
-        self.is_point
+        self.kind == Kind::Point
     }
 
     /// The unknowns in their places in a twist.
@@ -99,18 +149,21 @@ impl Node {
         twist
     }
 
-    /// The translation part \[m\] and the rotation part \[rad\] of a motion by its unknowns.
-    pub(super) fn motion(&self, unknowns: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
-        se3::split(&self.twist(unknowns))
-    }
-
-    /// The node's pose `from` after a motion by its unknowns: T exp(ξ), or p + ρ for a point.
+    /// The node's pose `from` after a motion by its unknowns: T exp(ξ), p + ρ for a point, and the
+    /// sum for a calibration.
     pub(super) fn moved(&self, from: &Isometry3<f64>, unknowns: &[f64]) -> Isometry3<f64> {
-        if self.is_point {
-            let (linear, _) = self.motion(unknowns);
-            let at = Translation3::from(from.translation.vector + linear);
-            return Isometry3::from_parts(at, from.rotation);
+        let twist = self.twist(unknowns);
+        match self.kind {
+            Kind::Pose => se3::plus(from, &twist),
+            Kind::Point => {
+                let (linear, _) = se3::split(&twist);
+                let at = Translation3::from(from.translation.vector + linear);
+                Isometry3::from_parts(at, from.rotation)
+            }
+            Kind::Calibration => {
+                let components = Calibration::of_place(from).components() + twist;
+                Calibration::of_components(&components).place()
+            }
         }
-        se3::plus(from, &self.twist(unknowns))
     }
 }

@@ -145,10 +145,7 @@ impl PoseGraph {
     fn widening(&self, poses: &[Isometry3<f64>]) -> f64 {
         let mut widening = 1.0_f64;
         for slot in self.links.iter().filter(|slot| slot.is_on) {
-            let (from, to) = slot.link.nodes();
-            let s = slot
-                .link
-                .squared_error(&poses[from as usize], &poses[to as usize]);
+            let s = slot.link.squared_error(|node| &poses[node as usize]);
             if let Some(square) = slot.kernel.graduated_square() {
                 widening = widening.max(3.0 * s / square);
             }

@@ -64,7 +64,7 @@ fn solve<E: Equations>(equations: &E, tree: &CliqueTree) -> Vec<f64> {
 
 /// The rotation next to a matrix that the node can have.
 fn turned(node: &Node, matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
-    if node.is_point() || node.freedom() == Freedom::Held {
+    if !node.is_pose() || node.freedom() == Freedom::Held {
         return node.pose.rotation;
     }
     if node.freedom() == Freedom::Planar {
@@ -82,6 +82,9 @@ fn turned(node: &Node, matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
 /// The position next to another that the node can have.
 fn shifted(node: &Node, position: &Vector3<f64>) -> Vector3<f64> {
     let old = node.pose.translation.vector;
+    if !node.is_pose() && !node.is_point() {
+        return old;
+    }
     match node.freedom() {
         Freedom::Held => old,
         Freedom::Full => *position,
@@ -123,21 +126,25 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
 /// three axes.
 fn rotation_weight(link: &Link) -> f64 {
     match link {
-        Link::PosePrior { information, .. } | Link::Between { information, .. } => {
-            information.matrix().diagonal().rows(3, 3).sum()
-        }
-        Link::PointPrior { .. } | Link::Sighting { .. } => 0.0,
+        Link::PosePrior { information, .. }
+        | Link::Between { information, .. }
+        | Link::Odometry { information, .. } => information.matrix().diagonal().rows(3, 3).sum(),
+        Link::PointPrior { .. }
+        | Link::Sighting { .. }
+        | Link::CalibrationPrior { .. }
+        | Link::CalibrationWander { .. } => 0.0,
     }
 }
 
 fn position_weight(link: &Link) -> f64 {
     match link {
-        Link::PosePrior { information, .. } | Link::Between { information, .. } => {
-            information.matrix().diagonal().rows(0, 3).sum()
-        }
+        Link::PosePrior { information, .. }
+        | Link::Between { information, .. }
+        | Link::Odometry { information, .. } => information.matrix().diagonal().rows(0, 3).sum(),
         Link::PointPrior { information, .. } | Link::Sighting { information, .. } => {
             information.matrix().trace()
         }
+        Link::CalibrationPrior { .. } | Link::CalibrationWander { .. } => 0.0,
     }
 }
 
@@ -198,14 +205,14 @@ impl Equations for Rotations<'_> {
     const N_RIGHT: usize = 3;
 
     fn dimension(&self, variable: u32) -> usize {
-        if self.map.nodes[variable as usize].is_point() {
-            0
-        } else {
+        if self.map.nodes[variable as usize].is_pose() {
             3
+        } else {
+            0
         }
     }
 
-    fn links(&self, variable: u32) -> &[(u32, u32)] {
+    fn links(&self, variable: u32) -> &[(u32, [u32; 2])] {
         &self.map.links_of[variable as usize]
     }
 
@@ -223,26 +230,35 @@ impl Equations for Rotations<'_> {
         if !slot.is_on || weight == 0.0 {
             return;
         }
-        match &slot.link {
-            Link::PosePrior { pose, at, .. } => add_prior(pose.0, &at.rotation, weight, front),
-            Link::Between {
-                from,
-                to,
-                transform,
-                ..
-            } => {
-                let (from, to) = ((from.0, &ROWS[..]), (to.0, &ROWS[..]));
-                let own = Matrix6::from_diagonal_element(weight);
-                front.add(from, from, &own);
-                front.add(to, to, &own);
-                let mut cross = Matrix6::zeros();
-                let rotation = transform.rotation.to_rotation_matrix();
-                let block = rotation.matrix().transpose() * -weight;
-                cross.fixed_view_mut::<3, 3>(0, 0).copy_from(&block);
-                front.add(to, from, &cross);
-            }
-            Link::PointPrior { .. } | Link::Sighting { .. } => {}
+        if let Link::PosePrior { pose, at, .. } = &slot.link {
+            return add_prior(pose.0, &at.rotation, weight, front);
         }
+        let Some(transform) = relative_pose(self.map, &slot.link) else {
+            return;
+        };
+        let (from, to) = slot.link.nodes();
+        let (from, to) = ((from, &ROWS[..]), (to, &ROWS[..]));
+        let own = Matrix6::from_diagonal_element(weight);
+        front.add(from, from, &own);
+        front.add(to, to, &own);
+        let mut cross = Matrix6::zeros();
+        let rotation = transform.rotation.to_rotation_matrix();
+        let block = rotation.matrix().transpose() * -weight;
+        cross.fixed_view_mut::<3, 3>(0, 0).copy_from(&block);
+        front.add(to, from, &cross);
+    }
+}
+
+/// The relative pose that a link measured, of a motion by the calibration as it is.
+fn relative_pose(map: &PoseGraph, link: &Link) -> Option<Isometry3<f64>> {
+    match link {
+        Link::Between { transform, .. } => Some(*transform),
+        Link::Odometry {
+            reading,
+            calibration,
+            ..
+        } => Some(reading.motion(&map.calibration(*calibration))),
+        _ => None,
     }
 }
 
@@ -280,17 +296,18 @@ impl Positions<'_> {
 impl Equations for Positions<'_> {
     const N_RIGHT: usize = 3;
 
-    fn dimension(&self, _variable: u32) -> usize {
-        1
+    fn dimension(&self, variable: u32) -> usize {
+        let node = &self.map.nodes[variable as usize];
+        usize::from(node.is_pose() || node.is_point())
     }
 
-    fn links(&self, variable: u32) -> &[(u32, u32)] {
+    fn links(&self, variable: u32) -> &[(u32, [u32; 2])] {
         &self.map.links_of[variable as usize]
     }
 
     fn add_own(&self, variable: u32, front: &mut Front<'_>) {
         let held = self.held[variable as usize];
-        if held > 0.0 {
+        if held > 0.0 && self.dimension(variable) > 0 {
             let at = self.poses[variable as usize].translation.vector;
             Self::add_prior(variable, &at, held, front);
         }
@@ -309,8 +326,11 @@ impl Equations for Positions<'_> {
             Link::PointPrior { point, at, .. } => {
                 return Self::add_prior(point.0, &at.coords, weight, front);
             }
-            Link::Between { transform, .. } => transform.translation.vector,
             Link::Sighting { position, .. } => *position,
+            link => match relative_pose(self.map, link) {
+                Some(transform) => transform.translation.vector,
+                None => return,
+            },
         };
         let (from, to) = slot.link.nodes();
         let step = self.poses[from as usize].rotation * seen * weight;

@@ -42,7 +42,7 @@ const SHOWN_HIGH: &str = "\"high\"";
 const SILENT: &str = "";
 
 /// All figures of merit, in the order of the table.
-pub const MEASURES: [Measure; 30] = {
+pub const MEASURES: [Measure; 33] = {
     use Over::{End, Max, Mean, Rmse};
     use Quantity as Q;
     [
@@ -135,6 +135,27 @@ pub const MEASURES: [Measure; 30] = {
             "published pose, RMSE [m]",
             Q::CausalError,
             Rmse,
+            [SILENT; 2],
+        ),
+        of_steps(
+            "position_nees_mean",
+            "published position, squared error over promised",
+            Q::PositionNees,
+            Mean,
+            [SILENT; 2],
+        ),
+        of_steps(
+            "rotation_nees_mean",
+            "published rotation, squared error over promised",
+            Q::RotationNees,
+            Mean,
+            [SILENT; 2],
+        ),
+        of_steps(
+            "pose_nees_mean",
+            "published pose, squared error over promised",
+            Q::PoseNees,
+            Mean,
             [SILENT; 2],
         ),
         Measure {

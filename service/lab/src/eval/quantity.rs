@@ -57,11 +57,18 @@ pub enum Quantity {
     /// How far a view is from what the place there remembers, before it is learned: one minus the
     /// cosine.
     ViewSurprise,
+    /// Squared error of the published position in its deviations, per component: eᵀ P⁻¹ e / 3. Its
+    /// mean is 1 where covariances are honest.
+    PositionNees,
+    /// The same of the rotation.
+    RotationNees,
+    /// The same of both together, over 6.
+    PoseNees,
 }
 
 impl Quantity {
     /// All of them, in the order of their declaration.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 22] = [
         Self::RecallError,
         Self::OracleError,
         Self::PredictionError,
@@ -81,6 +88,9 @@ impl Quantity {
         Self::Landmarks,
         Self::ViewRecallError,
         Self::ViewSurprise,
+        Self::PositionNees,
+        Self::RotationNees,
+        Self::PoseNees,
     ];
 
     /// Its position in [`Quantity::ALL`].

@@ -6,10 +6,11 @@ use cognitive_map::{
     AgentId, CognitiveMap, Descriptor, Event, EventKind, InvalidSample, Label, PerceptCue, PlaceId,
     RecallCue, Recalled, Record, Sample,
 };
+use geometry::{PoseCovariance, se3};
 use grid::population::{TUNING_WIDTH, interference_pattern, population_vector};
 use grid::similarity::{cosine, exponential_confidence};
 use grid::{GridCode, GridModules, PartialCode, decode};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use pose_graph::PoseGraph;
 
 use super::agent::{Agent, stamp_ns};
@@ -306,6 +307,13 @@ impl Trial {
         };
         let causal_m = agent.pose().translation.vector;
         values[Quantity::CausalError] = Some((causal_m - truth_m).norm());
+        if let Some(covariance) = self.map.covariance(AGENT) {
+            let off = agent.pose().inv_mul(&self.agent.pose());
+            let [position, rotation, pose] = normalised_squares(&off, &covariance);
+            values[Quantity::PositionNees] = position;
+            values[Quantity::RotationNees] = rotation;
+            values[Quantity::PoseNees] = pose;
+        }
         let reckoned_m = self.reckoning.pose().translation.vector;
         values[Quantity::DeadReckoningError] = Some((reckoned_m - truth_m).norm());
         if self.steps.is_multiple_of(STEPS_PER_DECODING) {
@@ -411,6 +419,20 @@ impl Trial {
         let place = self.map.place(place)?;
         Some((place.position().coords - truth_m).norm())
     }
+}
+
+/// Squared errors of position, rotation and pose in their deviations, per component; none of what
+/// is promised without error.
+fn normalised_squares(off: &Isometry3<f64>, covariance: &PoseCovariance) -> [Option<f64>; 3] {
+    let (error, covariance) = (se3::twist(off), covariance.matrix());
+    let of = |from: usize| {
+        let error: Vector3<f64> = error.fixed_rows::<3>(from).into_owned();
+        let own: Matrix3<f64> = covariance.fixed_view::<3, 3>(from, from).into_owned();
+        Some(error.dot(&(own.try_inverse()? * error)) / 3.0)
+    };
+    let pose = covariance.try_inverse();
+    let pose = pose.map(|inverse| error.dot(&(inverse * error)) / 6.0);
+    [of(0), of(3), pose]
 }
 
 /// The places that a grid code recalls, best first, and nothing but the code.

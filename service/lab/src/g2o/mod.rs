@@ -1,11 +1,8 @@
-//! Recordings that are pose graphs in the g2o text format, and the positions they are compared
-//! with.
+//! Pose graphs in the g2o text format as a robot would have sent them.
 
-mod recording;
-mod reference;
+mod samples;
 
-pub use recording::recording;
-pub use reference::{Reference, ReferenceError};
+pub use samples::{UnfitGraph, stream};
 
 #[cfg(test)]
 mod tests;

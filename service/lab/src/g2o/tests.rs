@@ -1,10 +1,10 @@
-//! Graphs as recordings, and reference positions.
+//! Graphs as what a robot would have sent.
 
-use nalgebra::Vector3;
+use cogmap_proto::{Relation, SampleBody, Target};
+use nalgebra::Isometry3;
 use pose_graph::g2o::G2oGraph;
 
-use super::{Reference, ReferenceError, recording};
-use crate::mapping::{CausalRun, Refined};
+use super::{UnfitGraph, stream};
 
 /// A square walked twice, with errors that no arrangement explains.
 const PLANAR: &str = "\
@@ -18,63 +18,65 @@ EDGE_SE2 0 4 0.10 -0.05 0.04 50 0 0 50 0 100
 EDGE_SE2 5 1 0.05 0.08 -0.10 50 20 0 50 0 100
 ";
 
-/// A tetrahedron with errors that no arrangement explains.
-const SPATIAL: &str = "\
-VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1
-EDGE_SE3:QUAT 0 1 1 0.1 0 0 0 0.38 0.92 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
-EDGE_SE3:QUAT 1 2 0.9 0 0.2 0.30 0 0 0.95 10 0 0 0 0 1 20 0 0 0 0 10 0 0 0 40 5 0 40 0 40
-EDGE_SE3:QUAT 2 3 1.1 0.1 0.1 0 0.45 0 0.89 10 2 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 80
-EDGE_SE3:QUAT 0 2 1.3 0.9 0.2 0.20 0.10 0.40 0.88 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
-EDGE_SE3:QUAT 0 3 1.4 1.5 1.1 0.30 0.60 0.20 0.71 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
-EDGE_SE3:QUAT 3 1 0.2 -1.2 -0.9 -0.5 -0.3 0.1 0.80 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40
-";
-
 #[test]
-fn a_graph_refined_as_a_whole_ends_at_its_optimum() {
-    for (text, chi_squared) in [(PLANAR, 2.213_048_826), (SPATIAL, 23.050_535_008)] {
-        let refined = Refined::of(&recording(&G2oGraph::read(text).unwrap()), None);
-        assert_eq!(refined.verdict.n_rejected(), 0);
-        let found = refined.chi_squared;
-        assert!((found - chi_squared).abs() < 1e-4 * chi_squared, "{found}");
-    }
-}
-
-#[test]
-fn a_graph_that_arrives_pose_by_pose_ends_near_its_optimum() {
-    for text in [PLANAR, SPATIAL] {
-        let recording = recording(&G2oGraph::read(text).unwrap());
-        let mut run = CausalRun::new(&recording);
-        while run.step().is_some() {}
-        assert_eq!(run.verdict().n_rejected(), 0);
-        let optimum = Refined::of(&recording, None).chi_squared;
-        assert!(run.chi_squared() >= optimum * (1.0 - 1e-4));
-        assert!(
-            run.chi_squared() < 1.5 * optimum,
-            "{} {optimum}",
-            run.chi_squared()
-        );
-    }
-}
-
-#[test]
-fn a_reference_is_read_by_id() {
+fn motion_comes_in_order_and_other_edges_name_the_earlier_pose() {
     let graph = G2oGraph::read(PLANAR).unwrap();
-    let reference = Reference::read("# id x y\n5 1 2\n0 0 0 3 # first\n77 1 1\n").unwrap();
-    let positions = reference.of_poses(&graph).unwrap();
-    assert_eq!(positions[0], Some(Vector3::new(0.0, 0.0, 3.0)));
-    assert_eq!(positions[1], None);
-    assert_eq!(positions[5], Some(Vector3::new(1.0, 2.0, 0.0)));
-    for bad in ["0 1", "0 1 x", "x 1 2", "0 1 2 3 4", "0 1 inf"] {
-        let text = format!("# id\n{bad}\n");
-        assert_eq!(
-            Reference::read(&text),
-            Err(ReferenceError::Line { line: 2 }),
-            "{bad}"
-        );
+    let stream = stream(&graph, &Isometry3::identity()).unwrap();
+    // A start, five motions and two sightings: 0 from 4, and 1 from 5.
+    let bodies: Vec<&SampleBody> = stream.samples().iter().map(|sample| &sample.body).collect();
+    assert_eq!((bodies.len(), stream.reckoned().len()), (8, 6));
+    assert!(matches!(bodies[0], SampleBody::StartPose(_)));
+    for (number, earlier) in [(5, 0), (7, 1)] {
+        let SampleBody::Sighting(seen) = bodies[number] else {
+            panic!("{:?}", bodies[number])
+        };
+        assert_eq!(seen.target, Target::OwnSample(earlier));
     }
-    let elsewhere = Reference::read("99 0 0").unwrap();
-    assert_eq!(
-        elsewhere.of_poses(&graph),
-        Err(ReferenceError::NothingInCommon)
+}
+
+/// The edge from 0 to 4 says 0.10, −0.05 and a turn by 0.04: seen from 4, pose 0 is behind. That
+/// from 5 to 1 is a sighting as it stands.
+#[test]
+fn an_edge_is_seen_from_the_later_pose() {
+    let graph = G2oGraph::read(PLANAR).unwrap();
+    let stream = stream(&graph, &Isometry3::identity()).unwrap();
+    let pose = |number: usize| match &stream.samples()[number].body {
+        SampleBody::Sighting(seen) => match &seen.relation {
+            Relation::Pose {
+                translation_m,
+                noise,
+                ..
+            } => (*translation_m, *noise),
+            other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
+    };
+    let (behind, noise) = pose(5);
+    let (sin, cos) = 0.04_f64.sin_cos();
+    assert!(
+        (behind[0] - (-0.10 * cos + 0.05 * sin)).abs() < 1e-9,
+        "{behind:?}"
     );
+    assert!(
+        (behind[1] - (0.10 * sin + 0.05 * cos)).abs() < 1e-9,
+        "{behind:?}"
+    );
+    // Its turn is as uncertain from either end; its position more so, by the turn and the lever.
+    assert!((noise.rotation_sd_rad[2] - 0.1).abs() < 1e-9);
+    assert!(noise.translation_sd_m[0] > 50.0_f64.recip().sqrt());
+    assert_eq!(
+        (noise.translation_sd_m[2], noise.rotation_sd_rad[0]),
+        (0.0, 0.0)
+    );
+    let (ahead, noise) = pose(7);
+    assert!((ahead[0] - 0.05).abs() < 1e-12 && (ahead[1] - 0.08).abs() < 1e-12);
+    assert!((noise.translation_sd_m[1] - (50.0_f64 / 2100.0).sqrt()).abs() < 1e-9);
+}
+
+#[test]
+fn a_graph_with_a_hole_is_no_recording() {
+    let text = PLANAR.replace("EDGE_SE2 2 3", "EDGE_SE2 1 3");
+    let graph = G2oGraph::read(&text).unwrap();
+    let refused = stream(&graph, &Isometry3::identity());
+    assert_eq!(refused, Err(UnfitGraph::NoMotion(3)));
 }

@@ -1,13 +1,12 @@
 //! The lines of a data set in memory.
 
 use std::fs;
-use std::io;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
-use trajectory::{InvalidStamp, parse_seconds};
-use trajectory::{InvalidTrajectory, StampedPosition, Trajectory};
+use super::error::{TucError, TucReason};
+use trajectory::{StampedPosition, Trajectory, parse_seconds};
 
 /// One step of odometry.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +15,10 @@ pub struct OdometryStep {
     pub stamp_ns: i64,
     /// The motion since the step before, in the frame of the body at that moment.
     pub motion: Isometry3<f64>,
+    /// Its velocity \[m/s\] and angular velocity \[rad/s\] …
+    pub velocity: [Vector3<f64>; 2],
+    /// … and how long it was held \[s\].
+    pub duration_s: f64,
     /// Standard deviations of its errors \[m, m, m, rad, rad, rad\], zero across the plane.
     pub noise_sd: Vector6<f64>,
 }
@@ -38,72 +41,6 @@ pub struct Tuc {
     matches: Vec<Match>,
     truth: Trajectory,
     start: Isometry3<f64>,
-}
-
-/// Why a data set cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum TucError {
-    /// A file cannot be read.
-    #[error("read {file}")]
-    Io {
-        /// Name of the file.
-        file: String,
-        /// The system's reason.
-        source: io::Error,
-    },
-    /// The directory has no file with such an ending.
-    #[error("there is no file *{0}")]
-    Absent(&'static str),
-    /// A line makes no sense.
-    #[error("line {line}: {reason}")]
-    Line {
-        /// Number of the line, from 1.
-        line: usize,
-        /// What is wrong with it.
-        reason: TucReason,
-    },
-    /// One of the texts is not that of a set.
-    #[error("{file}")]
-    Text {
-        /// Name of the file.
-        file: String,
-        /// Why.
-        source: Box<Self>,
-    },
-    /// There is no odometry.
-    #[error("there is no odometry")]
-    NoOdometry,
-    /// The truth is no trajectory.
-    #[error(transparent)]
-    Truth(#[from] InvalidTrajectory),
-}
-
-/// What is wrong with a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum TucReason {
-    /// Too few columns.
-    #[error("expected {expected} columns, found {found}")]
-    Columns {
-        /// As the format says.
-        expected: usize,
-        /// In the line.
-        found: usize,
-    },
-    /// A time.
-    #[error(transparent)]
-    Stamp(#[from] InvalidStamp),
-    /// A column is not a finite number.
-    #[error("column {column} is not a finite number")]
-    NotANumber {
-        /// Number of the column, from 1.
-        column: usize,
-    },
-    /// A variance is negative.
-    #[error("a variance is negative")]
-    NegativeVariance,
-    /// Odometry does not go forward in time.
-    #[error("the stamp is not later than the one before")]
-    NotLater,
 }
 
 impl Tuc {
@@ -284,12 +221,14 @@ fn step(columns: &[&str], before_ns: Option<i64>) -> Result<OdometryStep, TucRea
         return Err(TucReason::NegativeVariance);
     }
     let duration_s = before_ns.map_or(0.0, |before_ns| (stamp_ns - before_ns) as f64 * 1e-9);
-    let linear = Vector3::new(forward, left, 0.0) * duration_s;
-    let angular = Vector3::new(0.0, 0.0, turn * duration_s);
+    let linear = Vector3::new(forward, left, 0.0);
+    let angular = Vector3::new(0.0, 0.0, turn);
     let sd = variances.map(|variance: f64| variance.sqrt() * duration_s);
     Ok(OdometryStep {
         stamp_ns,
-        motion: geometry::se3::exp(&linear, &angular),
+        motion: geometry::se3::exp(&(linear * duration_s), &(angular * duration_s)),
+        velocity: [linear, angular],
+        duration_s,
         noise_sd: Vector6::new(sd[0], sd[1], 0.0, 0.0, 0.0, sd[2]),
     })
 }

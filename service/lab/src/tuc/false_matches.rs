@@ -33,8 +33,7 @@ impl Tuc {
     }
 
     /// Adds false matches between moments of the given ones, drawn evenly, until they make up this
-    /// share of all, from 0 to below
-    /// 1. The order of the recording is kept by [`Tuc::recording`].
+    /// share of all, from 0 to below 1. [`Tuc::stream`] puts them in order.
     pub fn add_false(&self, matches: &mut Vec<Match>, share: f64, seed: u64) {
         let n_true = matches.iter().filter(|found| self.is_true(found)).count();
         let moments: Vec<i64> = matches

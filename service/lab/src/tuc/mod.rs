@@ -16,10 +16,13 @@
 //! none is kept here.
 
 mod data_set;
+mod error;
 mod false_matches;
-mod recording;
+mod samples;
 
-pub use data_set::{Match, OdometryStep, Tuc, TucError, TucReason};
+pub use data_set::{Match, OdometryStep, Tuc};
+pub use error::{TucError, TucReason};
+pub use samples::Motion;
 
 #[cfg(test)]
 mod tests;

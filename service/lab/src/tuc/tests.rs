@@ -1,13 +1,12 @@
-//! The format, and a map that false matches do not bend.
+//! The format, and what a robot would have sent of it.
 
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::{Match, Tuc, TucError, TucReason};
-use crate::mapping::Refined;
+use super::{Match, Motion, Tuc, TucError, TucReason};
+use cogmap_proto::{SampleBody, Sighting, Target};
 use trajectory::format_seconds;
-use trajectory::{Alignment, StampedPose, Trajectory, ate_rmse_m};
 
 const INPUT: &str = "\
 odom2 0 0 0 0 0.0025 0.0025 0.0001
@@ -99,34 +98,56 @@ fn rounds() -> Tuc {
     Tuc::read(&input, &truth).unwrap()
 }
 
+/// The samples of a robot on a circle: the start, a motion at each step, and each match behind the
+/// motion of its later moment, naming the sample of the earlier one.
 #[test]
-fn more_false_matches_than_true_ones_do_not_bend_the_map() {
+fn matches_are_sightings_of_what_the_robot_was() {
     let set = rounds();
-    let mut matches = set.matches().to_vec();
-    set.add_false(&mut matches, 0.7, 5);
-    let ate_m = |matches: &[Match]| {
-        let recording = set.recording(matches);
-        let refined = Refined::of(&recording, None);
-        let poses = recording.steps.iter().zip(&refined.poses);
-        let poses: Vec<_> = poses
-            .map(|(step, &pose)| StampedPose {
-                stamp_ns: step.stamp_ns,
-                pose,
-            })
-            .collect();
-        let estimate = Trajectory::from_poses(&poses).unwrap();
-        ate_rmse_m(
-            &estimate,
-            set.truth(),
-            set.truth().span(),
-            Alignment::Planar,
-        )
-        .unwrap()
+    let stream = set.stream(set.matches(), Motion::StatedNoise);
+    let samples = stream.samples();
+    assert_eq!(samples.len(), 401 + set.matches().len());
+    assert!(matches!(samples[0].body, SampleBody::StartPose(_)));
+    let sighted = samples
+        .iter()
+        .enumerate()
+        .filter_map(|(number, sample)| match &sample.body {
+            SampleBody::Sighting(Sighting {
+                target: Target::OwnSample(earlier),
+                ..
+            }) => Some((number, *earlier)),
+            _ => None,
+        });
+    let mut n = 0;
+    for (number, earlier) in sighted {
+        let now_ns = samples[number].stamp_ns;
+        let then = &samples[usize::try_from(earlier).unwrap()];
+        assert_eq!(now_ns - then.stamp_ns, 10_000_000_000);
+        assert!(!matches!(then.body, SampleBody::Sighting(_)));
+        n += 1;
+    }
+    assert_eq!(n, set.matches().len());
+    let SampleBody::Increment(first) = &samples[1].body else {
+        panic!("{:?}", samples[1])
     };
-    let (odometry, clean, doubted) = (ate_m(&[]), ate_m(set.matches()), ate_m(&matches));
-    assert!(odometry > 0.5, "{odometry}");
-    assert!(clean < 0.5 * odometry, "{clean} {odometry}");
-    assert!(doubted < clean + 0.1, "{doubted} {clean}");
+    assert!((first.noise.unwrap().translation_sd_m[0] - 0.005).abs() < 1e-12);
+}
+
+/// The motion is the same however it is told; without noise of its own it is a velocity.
+#[test]
+fn unstated_noise_leaves_the_motion_as_it_is() {
+    let set = rounds();
+    let stated = set.stream(&[], Motion::StatedNoise);
+    let unstated = set.stream(&[], Motion::UnstatedNoise);
+    assert_eq!(stated.reckoned().len(), 401);
+    for (one, other) in stated.reckoned().iter().zip(unstated.reckoned()) {
+        assert_eq!(one, other);
+    }
+    for sample in &unstated.samples()[1..] {
+        let SampleBody::Velocity(velocity) = &sample.body else {
+            panic!("{sample:?}")
+        };
+        assert_eq!(velocity.noise, None);
+    }
 }
 
 #[test]

@@ -1,18 +1,12 @@
 //! The lines of a set in memory.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, Vector3};
-use pose_graph::{InvalidInformation, PoseInformation, PositionInformation};
+use nalgebra::{Isometry3, Matrix2, Matrix3, SMatrix, Vector2, Vector3};
 
-/// Name of the file in a directory.
-const FILE: &str = "victoria_park.txt";
-
-/// A file of the original set, which is not read.
-const ORIGINAL: &str = "aa3_dr.mat";
+use super::error::{FILE, ORIGINAL, VictoriaError, VictoriaReason};
 
 /// Motion from one pose to the next.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,8 +17,8 @@ pub struct Odometry {
     pub to: u64,
     /// The second in the frame of the first.
     pub motion: Isometry3<f64>,
-    /// Information in the axes of the second.
-    pub information: PoseInformation,
+    /// Covariance of x, y and heading in the axes of the second \[m, m, rad\].
+    pub covariance: Matrix3<f64>,
 }
 
 /// A tree that was seen.
@@ -34,10 +28,10 @@ pub struct Sighting {
     pub pose: u64,
     /// Number of the tree.
     pub landmark: u64,
-    /// Where, in the frame of the pose \[m\].
-    pub position: Vector3<f64>,
-    /// Information in the axes of the pose.
-    pub information: PositionInformation,
+    /// Where, in the plane of the pose \[m\].
+    pub position: Vector2<f64>,
+    /// Covariance in the axes of the pose \[m²\].
+    pub covariance: Matrix2<f64>,
 }
 
 /// A set.
@@ -45,81 +39,6 @@ pub struct Sighting {
 pub struct Victoria {
     pub(super) odometry: Vec<Odometry>,
     pub(super) sightings: Vec<Sighting>,
-}
-
-/// Why a set cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum VictoriaError {
-    /// A file cannot be read.
-    #[error("read {}", file.display())]
-    Io {
-        /// The file.
-        file: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
-    /// Only the original form is there.
-    #[error(
-        "{} holds the original set ({ORIGINAL} and others), which is not read; its text form {FILE} is",
-        .0.display()
-    )]
-    Original(PathBuf),
-    /// A line makes no sense.
-    #[error("line {line}: {reason}")]
-    Line {
-        /// Number of the line, from 1.
-        line: usize,
-        /// What is wrong with it.
-        reason: VictoriaReason,
-    },
-    /// The text is not that of a set.
-    #[error("{}", file.display())]
-    Text {
-        /// The file.
-        file: PathBuf,
-        /// Why.
-        source: Box<Self>,
-    },
-    /// There is no motion.
-    #[error("there is no odometry")]
-    NoOdometry,
-}
-
-/// What is wrong with a line.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum VictoriaReason {
-    /// Another kind of line.
-    #[error("lines of the kind {0:?} are not read")]
-    Kind(String),
-    /// Another number of columns.
-    #[error("expected {expected} columns, found {found}")]
-    Columns {
-        /// As the format says.
-        expected: usize,
-        /// In the line.
-        found: usize,
-    },
-    /// A column is not a finite number.
-    #[error("column {column} is not a finite number")]
-    NotANumber {
-        /// Number of the column, from 1.
-        column: usize,
-    },
-    /// A column is no number of a pose or landmark.
-    #[error("column {column} is not a whole number")]
-    NotAnId {
-        /// Number of the column, from 1.
-        column: usize,
-    },
-    /// Motion that ends where it begins.
-    #[error("the motion joins a pose with itself")]
-    Loop,
-    /// A number that was a pose before is a landmark here, or the other way round.
-    #[error("{0} is a pose in one line and a landmark in another")]
-    PoseAndLandmark(u64),
-    /// The covariance makes no sense.
-    #[error(transparent)]
-    Covariance(#[from] InvalidInformation),
 }
 
 impl Victoria {
@@ -162,10 +81,30 @@ impl Victoria {
                     })?;
             }
         }
-        if set.odometry.is_empty() {
-            return Err(VictoriaError::NoOdometry);
-        }
+        set.check()?;
         Ok(set)
+    }
+
+    /// One way through all poses, and sightings from it.
+    fn check(&self) -> Result<(), VictoriaError> {
+        let first = self.odometry.first().ok_or(VictoriaError::NoOdometry)?;
+        let mut reached = BTreeSet::from([first.from]);
+        let mut at = first.from;
+        for &Odometry { from, to, .. } in &self.odometry {
+            if from != at || to <= from {
+                return Err(VictoriaError::Apart { from, to });
+            }
+            reached.insert(to);
+            at = to;
+        }
+        match self
+            .sightings
+            .iter()
+            .find(|seen| !reached.contains(&seen.pose))
+        {
+            Some(seen) => Err(VictoriaError::Unreached(seen.pose)),
+            None => Ok(()),
+        }
     }
 
     /// Motion, in the order of the file.
@@ -193,7 +132,7 @@ impl Victoria {
         };
         match columns[0] {
             "ODOMETRY" => {
-                let [x, y, heading, covariance @ ..] = numbers::<9>(columns)?;
+                let [x, y, heading, xx, xy, xt, yy, yt, tt] = numbers::<9>(columns)?;
                 let (from, to) = (node(1, false)?, node(2, false)?);
                 if from == to {
                     return Err(VictoriaReason::Loop);
@@ -202,7 +141,7 @@ impl Victoria {
                     from,
                     to,
                     motion: Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * heading),
-                    information: pose_information(&covariance)?,
+                    covariance: positive(Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt))?,
                 });
             }
             "LANDMARK" => {
@@ -210,8 +149,8 @@ impl Victoria {
                 self.sightings.push(Sighting {
                     pose: node(1, false)?,
                     landmark: node(2, true)?,
-                    position: Vector3::new(x, y, 0.0),
-                    information: position_information(&Matrix2::new(xx, xy, xy, yy))?,
+                    position: Vector2::new(x, y),
+                    covariance: positive(Matrix2::new(xx, xy, xy, yy))?,
                 });
             }
             other => return Err(VictoriaReason::Kind(other.to_owned())),
@@ -220,32 +159,14 @@ impl Victoria {
     }
 }
 
-/// The inverse of a planar covariance, and nothing about the other directions.
-fn pose_information(upper_triangle: &[f64; 6]) -> Result<PoseInformation, InvalidInformation> {
-    let [xx, xy, xt, yy, yt, tt] = *upper_triangle;
-    let inverse = Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt)
-        .cholesky()
-        .ok_or(InvalidInformation::Singular)?
-        .inverse();
-    let mut matrix = Matrix6::zeros();
-    for (r, row) in [0, 1, 5].into_iter().enumerate() {
-        for (c, column) in [0, 1, 5].into_iter().enumerate() {
-            matrix[(row, column)] = inverse[(r, c)];
-        }
+/// A covariance, if it is one.
+fn positive<const N: usize>(
+    covariance: SMatrix<f64, N, N>,
+) -> Result<SMatrix<f64, N, N>, VictoriaReason> {
+    match covariance.cholesky() {
+        Some(_) => Ok(covariance),
+        None => Err(VictoriaReason::Covariance),
     }
-    PoseInformation::new(&matrix)
-}
-
-fn position_information(
-    covariance: &Matrix2<f64>,
-) -> Result<PositionInformation, InvalidInformation> {
-    let inverse = covariance
-        .cholesky()
-        .ok_or(InvalidInformation::Singular)?
-        .inverse();
-    let mut matrix = Matrix3::zeros();
-    matrix.fixed_view_mut::<2, 2>(0, 0).copy_from(&inverse);
-    PositionInformation::new(&matrix)
 }
 
 /// The `N` numbers behind the two nodes, which end the line.

@@ -18,7 +18,7 @@ mod run;
 pub use building::Building;
 pub use carried::{CarriedProtocol, CarriedReport, CarriedTrial, run_carried};
 pub use protocol::{InvalidWaking, WakingProtocol};
-pub use report::{WakingReport, WakingTrial};
+pub use report::{Spread, WakingReport, WakingTrial};
 pub use run::{run_waking, time_waking};
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use cognitive_map::Settings;
 use crate::engine::checkpointer::Checkpointer;
 use crate::engine::queue::Inbox;
 use crate::engine::recovery::{self, Loading, RecoveryError};
+use crate::engine::relaxers::Handover;
 use crate::engine::shared::{Shared, Surroundings};
 use crate::engine::unavailable::Unavailable;
 use crate::engine::writer::Writer;
@@ -39,6 +40,7 @@ pub(super) fn load_and_run(
         health,
         commits,
         jobs,
+        relaxers,
         settings,
         ..
     } = around;
@@ -68,7 +70,14 @@ pub(super) fn load_and_run(
                 .revision
                 .store(recovered.map.revision(), Ordering::Release);
             shared.events.begin(recovered.events.clone());
-            let writer = Writer::new(Arc::clone(shared), commits, checkpointer, recovered);
+            let handover = Handover::new(relaxers);
+            let writer = Writer::new(
+                Arc::clone(shared),
+                commits,
+                checkpointer,
+                handover,
+                recovered,
+            );
             let _present = Presence(shared);
             let _ = shared.loaded.set(Ok(()));
             writer.run(inbox);

@@ -30,6 +30,7 @@ use super::episodes::EndedEpisodes;
 use super::message::{Call, ChangeReply};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
+use super::relaxers::Handover;
 use super::sequencer::{Sequencer, Window};
 use super::shared::Shared;
 use super::trajectory;
@@ -54,6 +55,7 @@ pub(crate) struct Writer {
     shared: Arc<Shared>,
     commits: Sender<Commit>,
     checkpointer: Checkpointer,
+    handover: Handover,
     counters: SpaceCounters,
 
     map: CognitiveMap,
@@ -106,6 +108,7 @@ impl Writer {
         shared: Arc<Shared>,
         commits: Sender<Commit>,
         checkpointer: Checkpointer,
+        handover: Handover,
         recovered: Recovered,
     ) -> Self {
         let Recovered {
@@ -122,6 +125,7 @@ impl Writer {
             shared,
             commits,
             checkpointer,
+            handover,
             counters,
             map,
             agents: Vec::new(),
@@ -224,6 +228,7 @@ impl Writer {
         let is_watched = self.shared.live.is_watched();
         for record in &self.records {
             self.map.apply(record, &mut self.events);
+            self.handover.offer(&self.map);
             if is_watched
                 && let Record::Sample { agent, sample, .. } = record
                 && let Some(sighting) = encode::live_sighting(&self.map, *agent, sample)

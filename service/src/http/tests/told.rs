@@ -19,7 +19,10 @@ async fn an_export_tells_the_landmarks_that_the_list_tells() {
             0 => SampleBody::Increment(Increment {
                 translation_m: place,
                 rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
-                noise: None,
+                noise: Some(cogmap_proto::MotionNoise {
+                    translation_sd_m: [0.01; 3],
+                    rotation_sd_rad: [0.01; 3],
+                }),
             }),
             _ => SampleBody::Sighting(Sighting {
                 target: Target::Landmark(format!("post {}", seq / 2 % 3)),

@@ -7,10 +7,11 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Ve
 use super::calibration::{Calibrated, Calibration};
 use super::frame_alignment::{FrameAlignment, pose_by_alignment};
 use super::odometry_history::OdometryHistory;
+use super::odometry_noise::OdometryNoise;
 use super::outcome::Step;
 use super::parameters::Parameters;
 use super::tuning::{POSITION_SD_MAX_M, ROUNDING, RUN_LENGTH_MAX_M, RUN_STEPS_MAX};
-use crate::input::Motion;
+use crate::input::{Label, Motion, Relation};
 use geometry::{MotionSum, PoseCovariance, is_somewhere, positive, se3, symmetric};
 
 /// Components of a body's error: translation and rotation of the pose (right perturbation), then
@@ -43,6 +44,8 @@ pub(super) struct AgentFilter {
     pub(super) history: OdometryHistory,
     /// Whether all motion so far was in the body's x-y plane.
     pub(super) is_planar: bool,
+    /// What its odometry turns out to be worth.
+    pub(super) noise: OdometryNoise,
 }
 
 /// Motion that is not in the covariance yet, about the axes of the pose where it began.
@@ -77,6 +80,7 @@ impl AgentFilter {
             run: Run::default(),
             history: OdometryHistory::default(),
             is_planar: true,
+            noise: OdometryNoise::default(),
         };
         filter
             .at_run_start
@@ -164,8 +168,7 @@ impl AgentFilter {
         let reading = OdometryReading::new(motion, duration_s);
         self.is_planar &= reading.is_planar();
         let increment = reading.corrected_by(&self.calibration);
-        let noise_sd = parameters.motion_noise_sd(motion);
-        let variance = noise_sd.component_mul(&noise_sd);
+        let variance = self.learned_variance(motion, &increment, parameters);
         self.run.append(&reading, &increment, &variance);
         let wander = self.wander(&reading, parameters);
         self.run.wander += wander;
@@ -183,11 +186,28 @@ impl AgentFilter {
             variance,
             calibrated: Calibrated {
                 calibration: self.calibration,
-                variance: SVector::from_fn(|k, _| self.at_run_start[(POSE + k, POSE + k)]),
+                states_noise: motion.noise().is_some(),
                 wander,
                 moving_s: reading.moving_s(),
             },
         }
+    }
+
+    /// Variances of a motion's noise, after what is known of this odometry.
+    #[inline]
+    fn learned_variance(
+        &mut self,
+        motion: &Motion,
+        increment: &Isometry3<f64>,
+        parameters: &Parameters,
+    ) -> Vector6<f64> {
+        let squares = |sd: Vector6<f64>| sd.component_mul(&sd);
+        let assumed = squares(parameters.assumed_noise_sd(motion.increment()));
+        let stated = motion
+            .noise()
+            .map(|_| squares(parameters.motion_noise_sd(motion)));
+        self.noise.append(increment, &assumed, stated.as_ref());
+        self.noise.variance(&assumed, stated.as_ref())
     }
 
     /// What the variances of the calibration gain with a motion, up to where the settings bound
@@ -286,6 +306,27 @@ impl AgentFilter {
         let corrected = self.calibration.components() + error.fixed_rows::<CALIBRATION>(POSE);
         let bounded = corrected.zip_map(&most, |error, most| error.clamp(-most, most));
         self.calibration = Calibration::of_components(&bounded);
+    }
+
+    /// Sets the lasting errors of odometry, within what the settings allow.
+    pub(super) fn set_calibration(&mut self, calibration: &Calibration, parameters: &Parameters) {
+        let most = parameters.calibration_max();
+        let components = calibration.components();
+        let bounded = components.zip_map(&most, |error, most| error.clamp(-most, most));
+        self.calibration = Calibration::of_components(&bounded);
+    }
+
+    /// A landmark was seen: how does that fit with its last sightings and odometry?
+    pub(super) fn learn_noise(&mut self, label: &Label, stamp_ns: i64, relation: &Relation) {
+        let lasting = SVector::<f64, CALIBRATION>::from_fn(|k, _| {
+            let is_out_of_plane = self.is_planar && (k == 2 || k == 3);
+            if is_out_of_plane {
+                0.0
+            } else {
+                self.at_run_start[(POSE + k, POSE + k)]
+            }
+        });
+        self.noise.note(label, stamp_ns, relation, &lasting);
     }
 
     /// Whether the position is out of bounds or of unbounded variance, so that the pose says

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, SVector, Vector3};
 
 use super::tuning::CALIBRATION_FACTOR_MIN;
 use ::state::state_of_struct;
-use geometry::se3;
+use pose_graph::Reading;
 
 /// What odometry gets wrong all the time: reading = true · (1 + error) + bias.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,8 +22,8 @@ pub struct Calibration {
 pub struct Calibrated {
     /// What it was corrected by.
     pub calibration: Calibration,
-    /// Variances of that, in the order of the fields.
-    pub variance: SVector<f64, 5>,
+    /// Whether odometry stated its noise.
+    pub states_noise: bool,
     /// Variances by which the true errors may have changed with the motion.
     pub wander: SVector<f64, 5>,
     /// How long the body moved, and the bias with it \[s\].
@@ -37,7 +37,7 @@ state_of_struct!(Calibration {
 });
 state_of_struct!(Calibrated {
     calibration,
-    variance,
+    states_noise,
     wander,
     moving_s
 });
@@ -61,30 +61,41 @@ impl Calibrated {
         }
     }
 
+    /// What odometry read of a motion that was corrected so, as if it had been an even one.
+    pub(crate) fn reading(&self, motion: &Isometry3<f64>) -> Reading {
+        let by = self.calibration.in_graph();
+        Reading::corrected_to(motion, &by, self.moving_s, CALIBRATION_FACTOR_MIN)
+    }
+
     /// A motion that was corrected so, as it would have been corrected by another calibration.
-    ///
-    /// As if the motion had been an even one, of this twist over the time T that the body moved,
-    /// with the calibration c by which it was corrected and the new one c′:
-    ///
-    /// ```text
-    /// v′ = v (1 − c′_l) / (1 − c_l)      ω′ = (ω + b T) (1 − c′_a) / (1 − c_a) − b′ T
-    /// ```
     pub(crate) fn corrected_by(
         &self,
         motion: &Isometry3<f64>,
         calibration: &Calibration,
     ) -> Isometry3<f64> {
-        let (linear, angular) = se3::log(motion);
-        let then = &self.calibration;
-        let length = (1.0 - calibration.length) / (1.0 - then.length).max(CALIBRATION_FACTOR_MIN);
-        let angle = (1.0 - calibration.angle) / (1.0 - then.angle).max(CALIBRATION_FACTOR_MIN);
-        let angles = (angular + then.bias_rad_s * self.moving_s) * angle;
-        let bias = calibration.bias_rad_s * self.moving_s;
-        se3::exp(&(linear * length), &(angles - bias))
+        self.reading(motion).motion(&calibration.in_graph())
     }
 }
 
 impl Calibration {
+    /// As the solver of pose graphs has it.
+    pub(crate) fn in_graph(&self) -> pose_graph::Calibration {
+        pose_graph::Calibration {
+            length: self.length,
+            angle: self.angle,
+            bias_rad_s: self.bias_rad_s,
+        }
+    }
+
+    /// Of the solver of pose graphs.
+    pub(crate) fn of_graph(calibration: &pose_graph::Calibration) -> Self {
+        Self {
+            length: calibration.length,
+            angle: calibration.angle,
+            bias_rad_s: calibration.bias_rad_s,
+        }
+    }
+
     /// Of its components: length, angle, bias.
     pub(crate) fn of_components(components: &SVector<f64, 5>) -> Self {
         Self {

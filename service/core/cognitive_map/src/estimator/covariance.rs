@@ -94,6 +94,18 @@ impl JointCovariance {
         }
     }
 
+    /// Makes components from `offset` on uncorrelated with everything, with these variances.
+    pub(super) fn isolate<const N: usize>(&mut self, offset: usize, variances: &SVector<f64, N>) {
+        let (dim, entries) = (self.dim, Arc::make_mut(&mut self.entries));
+        for k in offset..offset + N {
+            for other in 0..dim {
+                entries[k * dim + other] = 0.0;
+                entries[other * dim + k] = 0.0;
+            }
+            entries[k * dim + k] = variances[k - offset];
+        }
+    }
+
     /// Makes room for `width` more components, uncorrelated and without variance; answers where.
     pub(super) fn grow(&mut self, width: usize) -> usize {
         let (old, new) = (self.dim, self.dim + width);

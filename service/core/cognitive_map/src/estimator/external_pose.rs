@@ -1,10 +1,12 @@
-//! Fusion of an external pose: one stated by another estimate, which may rest on the same samples.
+//! Fusion of an external estimate, which may rest on the same samples: an agent's pose, and the
+//! lasting errors of its odometry.
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix6, SMatrix, Vector6};
+use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
 use super::agent_filter::AgentFilter;
+use super::calibration::Calibration;
 use super::covariance::Block;
 use super::effect::Effect;
 use super::frame::Frame;
@@ -15,33 +17,46 @@ use super::tuning::{
 };
 use geometry::{PoseCovariance, is_somewhere, se3, symmetric};
 
+/// What another estimate says of an agent.
+#[derive(Clone, Copy, Debug)]
+pub struct ExternalEstimate {
+    /// Its pose, in the frame of the agent.
+    pub pose: Isometry3<f64>,
+    /// Covariance of the pose's error (right perturbation).
+    pub covariance: PoseCovariance,
+    /// The lasting errors of its odometry, and their variances in the order of the components.
+    pub calibration: Option<(Calibration, SVector<f64, 5>)>,
+    /// Whether it prevails where the pose contradicts the present one, because it knows of more:
+    /// odometry was worse than it said, and the present pose is widened first. Otherwise it does
+    /// not count then.
+    pub prevails: bool,
+}
+
 impl Estimator {
-    /// Takes in what an outside estimate says of an agent's pose in its frame, with the covariance
-    /// of its error (right perturbation); answers whether it counts. One that lies too far off does
-    /// not.
+    /// Takes in what an outside estimate says of an agent; answers whether it counts.
     ///
     /// How its error is correlated with that of the present estimate is not known: both may rest
     /// upon the same samples. The pose becomes the covariance intersection (Julier & Uhlmann 1997)
     /// of the two, and everything correlated with it follows; to say the same twice adds nothing.
-    pub fn fuse_pose(
+    ///
+    /// The lasting errors of odometry are taken over as they are.
+    pub fn fuse(
         &mut self,
         agent: u32,
-        pose: &Isometry3<f64>,
-        covariance: &PoseCovariance,
+        external: &ExternalEstimate,
         effects: &mut Vec<Effect>,
     ) -> bool {
         let Some(number) = self.frame_of(agent) else {
             return false;
         };
-        if !is_somewhere(&pose.translation.vector) {
+        if !is_somewhere(&external.pose.translation.vector) {
             return false;
         }
-        let external = ExternalPose { pose, covariance };
         if let Some(detached) = &mut self.slot_mut(agent).detached {
             let state = Arc::clone(&detached.state);
             let mut alone = Frame::default();
             alone.join(agent, state);
-            let is_taken = alone.fuse_pose(0, &external, &self.parameters);
+            let is_taken = alone.fuse(0, external, &self.parameters);
             if let Some(state) = alone.leave(agent)
                 && is_taken
                 && let Some(detached) = &mut self.slot_mut(agent).detached
@@ -57,20 +72,14 @@ impl Estimator {
         };
         let is_taken = frame
             .member(agent)
-            .is_some_and(|index| frame.fuse_pose(index, &external, &self.parameters));
+            .is_some_and(|index| frame.fuse(index, external, &self.parameters));
         self.sweep(number, effects);
         is_taken
     }
 }
 
-/// A pose that another estimate states.
-struct ExternalPose<'a> {
-    pose: &'a Isometry3<f64>,
-    covariance: &'a PoseCovariance,
-}
-
 impl Frame {
-    /// Fuses an external pose of a member; answers whether it was accepted.
+    /// Fuses an external estimate of a member; answers whether it counts.
     ///
     /// With the member's own P and the external Σ, in units of the own deviations, and the
     /// innovation ν:
@@ -79,18 +88,20 @@ impl Frame {
     /// ω of the largest det(ω P⁻¹ + (1 − ω) Σ⁻¹)      G = (1 − ω) (Σ⁻¹ − P⁻¹) = V Λ Vᵀ
     /// a measurement Vᵀ ξ = Λ⁻¹ Vᵀ (1 − ω) Σ⁻¹ ν of covariance Λ⁻¹, where Λ is large enough
     /// ```
-    fn fuse_pose(
-        &mut self,
-        index: usize,
-        external: &ExternalPose<'_>,
-        parameters: &Parameters,
-    ) -> bool {
+    fn fuse(&mut self, index: usize, external: &ExternalEstimate, parameters: &Parameters) -> bool {
         self.flush();
-        let member = &self.members[index];
-        let intersection = Intersection::new(member.filter(), external);
-        if !intersection.is_near(parameters.gate) {
-            return false;
+        if let Some((calibration, variances)) = &external.calibration {
+            self.recalibrate(index, calibration, variances, parameters);
         }
+        let mut intersection = Intersection::new(self.members[index].filter(), external);
+        if !intersection.is_near(parameters.gate) {
+            if !external.prevails {
+                return false;
+            }
+            self.add_to_pose(index, &intersection.missing());
+            intersection = Intersection::new(self.members[index].filter(), external);
+        }
+        let member = &self.members[index];
         let Some((jacobian, residual, variance)) = intersection.measurement() else {
             return false;
         };
@@ -109,6 +120,39 @@ impl Frame {
     }
 }
 
+impl Frame {
+    /// Sets the lasting errors of a member's odometry, which are uncorrelated with everything then.
+    fn recalibrate(
+        &mut self,
+        index: usize,
+        calibration: &Calibration,
+        variances: &SVector<f64, 5>,
+        parameters: &Parameters,
+    ) {
+        let member = &mut self.members[index];
+        self.covariance.isolate(
+            member.offset + 7,
+            &variances.fixed_rows::<4>(1).into_owned(),
+        );
+        let mut calibration = *calibration;
+        calibration.length = member.filter().calibration.length;
+        member
+            .state_mut()
+            .filter
+            .set_calibration(&calibration, parameters);
+        self.tell_members();
+    }
+
+    /// Adds variances to the components of a member's pose.
+    fn add_to_pose(&mut self, index: usize, variances: &Vector6<f64>) {
+        let offset = self.members[index].offset;
+        let own: Matrix6<f64> = self.covariance.block(offset, offset);
+        let wider = own + Matrix6::from_diagonal(variances);
+        self.covariance.set_diagonal(offset, &wider);
+        self.tell_members();
+    }
+}
+
 /// Covariance intersection of an own and an external pose, in units of the own deviations.
 struct Intersection {
     /// Inverse of each own deviation; zero for what is known without error and so is left alone,
@@ -120,9 +164,9 @@ struct Intersection {
 }
 
 impl Intersection {
-    fn new(filter: &AgentFilter, external: &ExternalPose<'_>) -> Self {
+    fn new(filter: &AgentFilter, external: &ExternalEstimate) -> Self {
         let own: Matrix6<f64> = filter.covariance().fixed_view::<6, 6>(0, 0).into_owned();
-        let innovation = se3::twist(&filter.pose.inv_mul(external.pose));
+        let innovation = se3::twist(&filter.pose.inv_mul(&external.pose));
         let scale = own.diagonal().map(|variance| {
             let is_open = variance.is_normal() && variance > 0.0;
             if is_open {
@@ -155,6 +199,19 @@ impl Intersection {
             // Of two errors that may be correlated in any way, the variances' sum counts twice.
             let expected = 2.0 * (self.own[(k, k)] + self.external[(k, k)]);
             self.innovation[k].powi(2) <= gate.powi(2) * expected
+        })
+    }
+
+    /// The variances that the own pose lacks for the innovation to be what is expected of the two.
+    fn missing(&self) -> Vector6<f64> {
+        Vector6::from_fn(|k, _| {
+            let expected = self.own[(k, k)] + self.external[(k, k)];
+            let missing = (self.innovation[k].powi(2) - expected).max(0.0);
+            if self.scale[k] > 0.0 {
+                missing / self.scale[k].powi(2)
+            } else {
+                0.0
+            }
         })
     }
 

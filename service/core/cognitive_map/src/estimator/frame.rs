@@ -241,7 +241,7 @@ impl Frame {
     }
 
     /// Tells the members their own parts of the joint covariance.
-    fn tell_members(&mut self) {
+    pub(super) fn tell_members(&mut self) {
         for member in &mut self.members {
             let own = self.covariance.block(member.offset, member.offset);
             *member.state_mut().filter.covariance_mut() = own;

@@ -31,6 +31,10 @@ impl Estimator {
         if is_aside {
             frame.forget(label);
         }
+        let state = frame.members[observer].state_mut();
+        if !state.is_doubted() {
+            state.filter.learn_noise(called, stamp_ns, relation);
+        }
         let measurement = Measurement {
             observer,
             back: &Isometry3::identity(),

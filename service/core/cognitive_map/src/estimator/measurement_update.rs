@@ -136,7 +136,7 @@ impl Frame {
         let mut variance = Vector6::zeros();
         let noise = PointInnovation::new(measurement.relation, &point).and_then(|innovation| {
             let sensor = &member.state.sensor;
-            let components = sensor.variance(&innovation, measurement.parameters);
+            let components = sensor.variance(&innovation, None, measurement.parameters);
             variance.fixed_rows_mut::<3>(0).copy_from(&components);
             let inverse = innovation.by_point.try_inverse()?;
             Some(inverse * Matrix3::from_diagonal(&components) * inverse.transpose())
@@ -265,9 +265,14 @@ impl Frame {
         let parameters = measurement.parameters;
         let projection = self.covariance.project(blocks);
         let member = self.members[measurement.observer].state_mut();
-        let mut variance = member.sensor.variance(innovation, parameters);
+        let mut variance =
+            member
+                .sensor
+                .variance(innovation, Some((&seen, measurement.stamp_ns)), parameters);
         let mut outcome = Outcome::nothing();
-        outcome.variance.fixed_rows_mut::<3>(0).copy_from(&variance);
+        // The past takes together what was seen from one place, and counts it once.
+        let once = member.sensor.variance(innovation, None, parameters);
+        outcome.variance.fixed_rows_mut::<3>(0).copy_from(&once);
         let spread = projection.spread.diagonal();
         let Some(squares) = scope.judge(
             &innovation.residual,

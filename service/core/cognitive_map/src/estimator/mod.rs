@@ -23,8 +23,9 @@
 //!   agent that comes back counts for a ninth of what it knew.
 //! - **Doubt.** Components far from what is expected lose weight, sightings farther off are
 //!   refused; an agent whose sightings are refused again and again searches farther around, and a
-//!   landmark that only contradicts is forgotten. The noise of each agent's sensor is learned,
-//!   upwards from what it states.
+//!   landmark that only contradicts is forgotten.
+//! - **Noise.** That of each agent's sensor is learned, upwards from what it states; that of its
+//!   odometry, from pairs of sightings (`odometry_noise`).
 //! - **Absurd evidence.** What a doubted agent sees corrects itself alone; one that contradicts
 //!   everything for long, or may be anywhere, is set aside in a frame of its own, with its
 //!   landmarks (`set_aside`).
@@ -57,6 +58,7 @@ mod merging;
 mod motion;
 mod observers;
 mod odometry_history;
+mod odometry_noise;
 mod outcome;
 mod parameters;
 mod placement;
@@ -64,6 +66,7 @@ mod registration;
 mod removal;
 mod sensor;
 mod set_aside;
+mod sighting_pair;
 mod sightings;
 mod state;
 mod tuning;
@@ -71,6 +74,7 @@ mod verdict;
 
 pub use calibration::{Calibrated, Calibration};
 pub use effect::{AgentSighted, Effect, FramesMerged};
+pub use external_pose::ExternalEstimate;
 pub use joint::Estimator;
 pub use level::LevelRow;
 pub(crate) use observers::Observers;

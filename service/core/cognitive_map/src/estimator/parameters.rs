@@ -1,6 +1,6 @@
 //! What the estimation takes for granted about robots and sensors.
 
-use nalgebra::{SVector, Vector6};
+use nalgebra::{Isometry3, SVector, Vector6};
 
 use super::tuning::{
     ANY_TURN_SD_RAD, CALIBRATION_RENEWAL, LASTING_DEVIATIONS_MAX, LASTING_RATIO_MAX, WANDERED_MAX,
@@ -11,7 +11,8 @@ use crate::settings::Settings;
 /// Physical parameters of the estimation, the same for every robot and every sensor.
 ///
 /// They are those of a modest wheeled robot with a camera. What a sample states about its own noise
-/// goes before them, and what the sightings show is learned on top.
+/// goes before them, and what the sightings show is learned on top: the noise of odometry is where
+/// learning begins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameters {
     /// Deviation of odometry's lasting relative error of lengths, e.g. of a wheel's radius.
@@ -61,7 +62,7 @@ impl Parameters {
     }
 
     /// Deviations of the calibration, in the order of the body's error.
-    pub(super) fn calibration_sd(&self) -> SVector<f64, 5> {
+    pub(crate) fn calibration_sd(&self) -> SVector<f64, 5> {
         let bias = self.bias_sd_rad_s;
         SVector::from([self.length_error_sd, self.angle_error_sd, bias, bias, bias])
     }
@@ -126,7 +127,11 @@ impl Parameters {
                 }
             });
         }
-        let increment = motion.increment();
+        self.assumed_noise_sd(motion.increment())
+    }
+
+    /// The same of a motion that states none.
+    pub(super) fn assumed_noise_sd(&self, increment: &Isometry3<f64>) -> Vector6<f64> {
         let lengths = increment.translation.vector;
         let (path_m, angle_rad) = (lengths.norm(), increment.rotation.angle());
         let across = self.translation_sd_per_sqrt_m * path_m.sqrt();

@@ -118,6 +118,7 @@ impl Estimator {
         let slot = self.slot_mut(agent);
         let widen = |state: &mut AgentState| {
             state.filter.history.clear();
+            state.filter.noise.forget_anchors();
             let covariance = state.filter.covariance_mut();
             for k in 0..6 {
                 covariance[(k, k)] += sd[k] * sd[k];

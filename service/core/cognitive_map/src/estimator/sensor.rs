@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use super::innovation::PointInnovation;
 use super::parameters::Parameters;
 use super::tuning::{
-    CORRELATION_INTERVAL_S_MAX, CORRELATION_SQUARE_MIN, LASTING_OVER_STATED_MAX, LEARNED_ERROR_MAX,
-    MEMORY_SIGHTINGS, PRIOR_SIGHTINGS, SENSOR_SCALE_MAX, SENSOR_TARGETS_MAX,
+    CORRELATION_INTERVAL_S_MAX, CORRELATION_SQUARE_MIN, LASTING_OVER_STATED_MAX, LASTING_S,
+    LEARNED_ERROR_MAX, MEMORY_SIGHTINGS, PRIOR_LASTING_SIGHTINGS, PRIOR_SIGHTINGS,
+    SENSOR_SCALE_MAX, SENSOR_TARGETS_MAX, SIGHTING_INTERVAL_S_MIN,
 };
 use nalgebra::Vector3;
 
@@ -39,26 +40,30 @@ impl Default for Sensor {
         Self {
             scales: [1.0; 2],
             counts: [PRIOR_SIGHTINGS; 2],
-            product: PRIOR_SIGHTINGS,
-            square: PRIOR_SIGHTINGS,
+            product: PRIOR_LASTING_SIGHTINGS,
+            square: PRIOR_LASTING_SIGHTINGS,
             latest: BTreeMap::new(),
         }
     }
 }
 
 impl Sensor {
-    /// Variances of a sighting's components.
+    /// Variances of the components of a sighting of a target; `None` of one that is seen for the
+    /// first time.
     ///
     /// Errors of distance that last (a marker seen at a slant, a lens) cannot be averaged away;
     /// they grow with the distance d. How much of such an error is assumed goes by the correlation
-    /// ρ of successive errors of one target, which is learned, from 1 on:
+    /// ρ of successive errors of one target, which is learned, from 1 on. An error that fades over
+    /// a time τ and is seen every Δ seconds counts as an independent one whose variance is larger
+    /// by its power at low frequencies, coth(Δ/2τ), so that looking more often tells no more:
     ///
     /// ```text
-    /// σ_r² = s_r (σ² + ρ min(e d, 3 σ)²)      σ_b² = s_b σ²
+    /// σ_r² = s_r (σ² + ρ min(e d, 3 σ)² coth(Δ/2τ))      σ_b² = s_b σ²
     /// ```
     pub(super) fn variance(
         &self,
         innovation: &PointInnovation,
+        seen: Option<(&SightingTarget, i64)>,
         parameters: &Parameters,
     ) -> Vector3<f64> {
         let stated = innovation.variance;
@@ -67,13 +72,23 @@ impl Sensor {
         }
         let lasting = (parameters.lasting_range_error * innovation.distance_m).powi(2);
         let most = LASTING_OVER_STATED_MAX.powi(2) * stated[0];
-        let range = stated[0] + self.correlation() * lasting.min(most);
+        let repeated = seen.map_or(1.0, |(target, stamp_ns)| self.repeated(target, stamp_ns));
+        let range = stated[0] + self.correlation() * lasting.min(most) * repeated;
         let [by_range, by_bearing] = self.scales;
         Vector3::new(
             range * by_range,
             stated[1] * by_bearing,
             stated[2] * by_bearing,
         )
+    }
+
+    /// By how much a lasting error counts for more, as it was in the latest sighting, too.
+    fn repeated(&self, target: &SightingTarget, stamp_ns: i64) -> f64 {
+        self.latest.get(target).map_or(1.0, |&(before_ns, _)| {
+            let interval_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
+            let interval_s = interval_s.max(SIGHTING_INTERVAL_S_MIN);
+            (0.5 * interval_s / LASTING_S).tanh().recip()
+        })
     }
 
     /// Correlation of successive errors of distance of one target, from 0 to 1.
@@ -143,7 +158,7 @@ mod tests {
         let parameters = Parameters::default();
         for k in 0..3000 {
             let seen = innovation(4.0 + error(k));
-            let variance = sensor.variance(&seen, &parameters);
+            let variance = sensor.variance(&seen, None, &parameters);
             sensor.note(
                 SightingTarget::Landmark(0),
                 i64::from(k) * 1_000_000_000,
@@ -152,7 +167,7 @@ mod tests {
                 &variance,
             );
         }
-        sensor.variance(&innovation(4.0), &parameters)[0]
+        sensor.variance(&innovation(4.0), None, &parameters)[0]
     }
 
     #[test]

@@ -181,6 +181,8 @@ impl Estimator {
         let mut anew = AgentFilter::new(Isometry3::identity(), &Matrix6::zeros(), &self.parameters);
         anew.history = filter.history;
         anew.is_planar = filter.is_planar;
+        anew.noise = filter.noise;
+        anew.noise.forget_anchors();
         let state = AgentState {
             filter: anew,
             sensor,

@@ -76,6 +76,50 @@ pub(super) const WANDERED_MAX: f64 = 2.0;
 /// Source: 1 − [`LASTING_RATIO_MAX`].
 pub(super) const CALIBRATION_FACTOR_MIN: f64 = 0.1;
 
+// --- Noise of odometry ---------------------------------------------------------------------------
+
+/// Landmarks whose sightings are compared at a time. Source: memory; all pairs at a time tell about
+/// the same motion.
+pub(super) const NOISE_TARGETS_MAX: usize = 8;
+/// Longest interval of a pair of sightings \[ns\]. Source: lasting errors of sensors change with
+/// the aspect of what is seen, over some seconds.
+pub(super) const NOISE_PAIR_NS_MAX: i64 = 10_000_000_000;
+/// Sightings after which a landmark is compared with a newer one of its own.
+pub(super) const NOISE_PAIRS_MAX: u32 = 64;
+/// Least noise of odometry's lengths or angles, in that which a sensor states, for a pair to tell
+/// about it.
+pub(super) const NOISE_SHARE_MIN: f64 = 0.5;
+/// Noise of odometry, in that of a pair of sightings, from which on a longer pair says no more.
+pub(super) const NOISE_SATURATED: f64 = 4.0;
+/// Length from which on motion is summed anew \[m\]. Source: digits are lost with the lever.
+pub(super) const NOISE_SUM_LENGTH_MAX_M: f64 = 30.0;
+/// Largest deviation of an angle that is compared \[rad\]. Source: the comparison is linear in it.
+pub(super) const NOISE_ANGLE_SD_MAX_RAD: f64 = 1.0;
+/// What a pair counts for, in its likelihood: its half. Source: pairs of landmarks that are seen
+/// together share the error of the motion. A logarithm of a variance has half a score and half an
+/// information of its square, which is the other half.
+pub(super) const NOISE_PAIR_WEIGHT: f64 = 0.25;
+/// Deviation c from which on an error counts no more, the mean of min(ν², c²) of Gaussian noise
+/// with variance one, and how fast that grows with the logarithm of the variance: with the density
+/// φ and the distribution Φ, 2Φ(c) − 1 − 2cφ(c) for the latter, and 2c²(1 − Φ(c)) more for the
+/// mean.
+pub(super) const NOISE_ROBUST: (f64, f64, f64) = (2.0, 0.920_54, 0.738_54);
+/// Pairs over which the past fades.
+pub(super) const NOISE_MEMORY: f64 = 500.0;
+/// Largest step of the logarithm of a factor.
+pub(super) const NOISE_LOG_STEP_MAX: f64 = 1.0;
+/// Deviations of the logarithms of the factors before anything was seen. Source: kinds of odometry
+/// differ by a factor of three in their deviations, either way; who states the noise of a sensor
+/// knows it to a third.
+pub(super) const NOISE_PRIOR_SD: [f64; 4] = [2.2, 2.2, 0.6, 0.6];
+/// Largest logarithm of a factor, either way: a factor of twenty of deviations.
+pub(super) const NOISE_LOG_SCALE_MAX: f64 = 6.0;
+/// Deviations of its logarithm by which noise beside that which odometry states must be certain.
+pub(super) const NOISE_SURELY_SD: f64 = 2.0;
+/// Part of the logarithm of a factor below one that counts. Source: a pair sees the noise of some
+/// seconds, while errors that change within minutes (slip on another floor) grow faster; *team*.
+pub(super) const NOISE_CAUTION: f64 = 0.25;
+
 // --- Sightings -----------------------------------------------------------------------------------
 
 /// Shortest distance at which a direction means something \[m\].
@@ -84,6 +128,13 @@ pub(super) const DIRECTION_DISTANCE_MIN_M: f64 = 0.02;
 pub(super) const SIGHTING_SD_MIN: f64 = 1e-6;
 /// How long a sighting of an agent waits for that agent's motion, by the observer's clock \[ns\].
 pub(super) const PENDING_NS_MAX: i64 = 2_000_000_000;
+/// How long an error of distance lasts \[s\]: until the robot sees its target from another side.
+/// Source: half of [`CORRELATION_INTERVAL_S_MAX`]; *team*.
+pub(super) const LASTING_S: f64 = 2.0;
+/// Shortest interval between two sightings of one target that is told from none \[s\].
+pub(super) const SIGHTING_INTERVAL_S_MIN: f64 = 1e-3;
+/// Sightings for which the assumption counts that errors of distance last, before any was seen.
+pub(super) const PRIOR_LASTING_SIGHTINGS: f64 = 5.0;
 /// Sightings for which the stated noise counts before any was seen.
 pub(super) const PRIOR_SIGHTINGS: f64 = 15.0;
 /// Sightings over which the past of a sensor fades.

@@ -4,7 +4,7 @@
 use super::CognitiveMap;
 use super::apply::Fold;
 use crate::estimator::{AgentSighted, Effect, FramesMerged};
-use crate::keyframes::{Moment, Refined};
+use crate::keyframes::{Moment, Refined, RelaxationJob};
 use crate::memory::place::PlaceId;
 use pose_graph::PoseGraph;
 
@@ -86,25 +86,18 @@ impl Fold<'_> {
 }
 
 impl Fold<'_> {
-    /// Relaxes the past when enough has come since the last time to pay for it and matches wait,
-    /// and fuses the poses of the agents by those that are accepted.
+    /// Begins to relax the past when enough has come since the last time to pay for it and matches
+    /// wait, and with a later record fuses the poses of the agents by those that are accepted.
     ///
     /// When that is depends on the records alone.
     pub(super) fn relax_matches(&mut self) {
-        if !self.keyframes.graph.is_due() {
-            return;
+        let (agent, stamp_ns) = (self.agent_id.0, self.stamp_ns);
+        for correction in self.keyframes.go_on_relaxing(agent, stamp_ns) {
+            self.estimator
+                .fuse(correction.agent, &correction.estimate, &mut self.effects);
+            self.apply_effects();
         }
-        for correction in self.keyframes.graph.relax() {
-            if let Some(covariance) = correction.covariance {
-                self.estimator.fuse_pose(
-                    correction.agent,
-                    &correction.pose,
-                    &covariance,
-                    &mut self.effects,
-                );
-                self.apply_effects();
-            }
-        }
+        self.keyframes.begin_relaxation(agent, stamp_ns);
     }
 }
 
@@ -122,13 +115,19 @@ impl CognitiveMap {
     /// whole map relaxed. A function of the map alone; takes time in proportion to what is
     /// remembered.
     pub fn refined(&self) -> Refined {
-        self.keyframes.graph.refine()
+        self.keyframes.settled().refine()
     }
 
     /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in
     /// the making as [`refined`](Self::refined).
     pub fn pose_graph(&self) -> PoseGraph {
-        self.keyframes.graph.pose_graph()
+        self.keyframes.settled().pose_graph()
+    }
+
+    /// The relaxation under way, of the map as it was some records ago. The map waits for its
+    /// outcome at a later record, unless somebody [runs](RelaxationJob::run) it before.
+    pub fn relaxation(&self) -> Option<&RelaxationJob> {
+        self.keyframes.relaxation()
     }
 
     /// Number of loop closures that are accepted.

@@ -5,6 +5,7 @@ use nalgebra::Point3;
 use super::apply::Fold;
 use super::tuning::{ANSWER_MIN, DRIFT_MAX, KIDNAPPED_SD};
 use crate::agent::Status;
+use crate::estimator::ExternalEstimate;
 use crate::event::EventKind;
 use crate::input::Descriptor;
 use crate::keyframes::Relocalised;
@@ -122,10 +123,15 @@ impl Fold<'_> {
 
     /// Fuses the pose at which the agent recognised itself; answers whether it was accepted.
     fn fuse(&mut self, found: &Relocalised) -> bool {
-        let (agent, pose, covariance) = (self.agent_id.0, &found.pose, &found.covariance);
+        let estimate = ExternalEstimate {
+            pose: found.pose,
+            covariance: found.covariance,
+            calibration: None,
+            prevails: false,
+        };
         let is_accepted = self
             .estimator
-            .fuse_pose(agent, pose, covariance, &mut self.effects);
+            .fuse(self.agent_id.0, &estimate, &mut self.effects);
         self.apply_effects();
         is_accepted
     }

@@ -40,6 +40,10 @@ pub(super) struct AgentTrack {
     pub(super) since: MotionSum,
     /// Calibration with which that motion was corrected.
     pub(super) calibrated: Calibrated,
+    /// Whether all its odometry so far states its noise.
+    pub(super) states_noise: bool,
+    /// Factor of the noise of odometry's rotations, as closures show it, where it is not stated.
+    pub(super) turn_noise: f64,
     /// The motion since the latest keyframe when it came to rest, with sample and stamp \[ns\].
     pub(super) rest: Isometry3<f64>,
     pub(super) rest_seq: u64,
@@ -62,6 +66,8 @@ state_of_struct!(AgentTrack {
     until_ns,
     since,
     calibrated,
+    states_noise,
+    turn_noise,
     rest,
     rest_seq,
     rest_ns,
@@ -84,6 +90,8 @@ impl AgentTrack {
             until_ns: 0,
             since: MotionSum::default(),
             calibrated: Calibrated::default(),
+            states_noise: true,
+            turn_noise: 1.0,
             rest: Isometry3::identity(),
             rest_seq: 0,
             rest_ns: 0,
@@ -121,6 +129,7 @@ impl AgentTrack {
     ) {
         self.since.append(increment, variance);
         self.calibrated = self.calibrated.then(calibrated);
+        self.states_noise &= calibrated.states_noise;
         self.is_planar &= is_level(increment);
         self.pose = moment.pose;
         (self.seq, self.stamp_ns) = (moment.seq, moment.stamp_ns);

@@ -81,8 +81,18 @@ impl Chains {
         Some(track.own_frame.0.unwrap_or_default() * keyframe.pose)
     }
 
+    /// Puts a keyframe of the map somewhere else. One whose agent has left the map for a frame of
+    /// its own stays.
+    pub(super) fn put(&mut self, number: u32, pose: &Isometry3<f64>, revision: u64) {
+        if self.in_map(number).is_some()
+            && let Some(keyframe) = self.keyframes.get_mut(number, revision)
+        {
+            (keyframe.pose, keyframe.is_in_map) = (*pose, true);
+        }
+    }
+
     /// Moves a keyframe by a motion of the map's frame.
-    fn move_in_map(&mut self, number: u32, moved: &Isometry3<f64>, revision: u64) {
+    pub(super) fn move_in_map(&mut self, number: u32, moved: &Isometry3<f64>, revision: u64) {
         let was = self.in_map(number);
         if let (Some(was), Some(keyframe)) = (was, self.keyframes.get_mut(number, revision)) {
             keyframe.pose = moved * was;
@@ -113,7 +123,9 @@ impl Chains {
             number = previous;
         }
         let pose = self.keyframes.get(newest).map(|keyframe| keyframe.pose);
+        let turn_noise = copy.track(agent).map_or(1.0, |track| track.turn_noise);
         if let (Some(pose), Some(track)) = (pose, self.track_mut(agent, revision)) {
+            track.turn_noise = turn_noise;
             track.pose = pose * track.since.motion();
         }
     }
@@ -128,13 +140,14 @@ impl Chains {
     /// Variances of odometry up to each keyframe since its agent's chain began \[m², rad²\].
     pub(super) fn path_variances(&self) -> Vec<[f64; 2]> {
         let mut path_variances = vec![[0.0; 2]; self.keyframes.numbers() as usize];
-        for (agent, _) in (0..).zip(self.tracks.iter()) {
+        for (agent, track) in (0..).zip(self.tracks.iter()) {
+            let turn_noise = track.turn_noise;
             let mut number = self.first(agent);
             let mut way = [0.0; 2];
             while let Some(keyframe) = self.keyframes.get(number) {
                 let diagonal = keyframe.covariance.matrix().diagonal();
                 way[0] += diagonal.rows(0, 3).max();
-                way[1] += diagonal.rows(3, 3).max();
+                way[1] += diagonal.rows(3, 3).max() * turn_noise * turn_noise;
                 // No motion is known between two stretches.
                 if keyframe.begins {
                     way[0] += tuning::UNKNOWN_MOTION_VARIANCE_M2;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! part  index  bytes
-//! 0     0      what is new, the sweep cursor, vacant numbers
+//! 0     0      what is new, the sweep cursor, vacant numbers, the relaxation under way
 //! 1     page   up to 4 agents
 //! 2     page   up to 32 keyframes
 //! 3     page   up to 64 sightings
@@ -75,6 +75,20 @@ impl KeyframePage {
 #[error("the pages are no map")]
 pub struct CorruptKeyframes;
 
+impl KeyframeGraph {
+    /// Digest of a graph without a relaxation under way, as that of a relaxation is.
+    pub(super) fn digest(&self) -> Digest {
+        let mut out = StateWriter::default();
+        self.chains.sweep.write(&mut out);
+        self.constraints.schedule.write(&mut out);
+        self.sightings.landmarks.slots.vacancy().write(&mut out);
+        for vector in PARTS.iter().filter_map(Stored::in_graph) {
+            vector(self).write_digests(&mut out);
+        }
+        out.digest()
+    }
+}
+
 impl KeyframeMap {
     /// The pages that changed after `since_revision`, the head always among them; 0 gives all.
     pub fn checkpoint(&self, since_revision: u64) -> impl Iterator<Item = KeyframePage> {
@@ -117,6 +131,7 @@ impl KeyframeMap {
         if !graph.sightings.landmarks.sort()
             || !graph.is_sound()
             || !seen.is_sound(graph.chains.tracks.len())
+            || !{ map.pending.iter() }.all(|one| one.outcome().is_sound(graph.chains.tracks.len()))
         {
             return Err(CorruptKeyframes);
         }
@@ -140,6 +155,10 @@ impl KeyframeMap {
     pub fn digest(&self) -> Digest {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
+        if let (Some(pending), Some(meanwhile)) = (&self.pending, &self.graph.meanwhile) {
+            pending.write_digested(&mut out);
+            meanwhile.write(&mut out);
+        }
         for stored in &PARTS {
             match stored {
                 Stored::InGraph(vector, _) => vector(&self.graph).write_digests(&mut out),
@@ -161,6 +180,12 @@ impl KeyframeMap {
     fn head(&self) -> KeyframePage {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
+        let pending = self.pending.as_ref().zip(self.graph.meanwhile.as_deref());
+        pending.is_some().write(&mut out);
+        if let Some((pending, meanwhile)) = pending {
+            pending.write(&mut out);
+            meanwhile.write(&mut out);
+        }
         KeyframePage::new(HEAD, 0, out.into_bytes())
     }
 
@@ -197,6 +222,10 @@ impl KeyframeMap {
         if u64::read(&mut input)? != N_PENDING {
             return Err(CorruptState::Invalid);
         }
+        if bool::read(&mut input)? {
+            self.pending = Some(State::read(&mut input)?);
+            self.graph.meanwhile = Some(Box::new(State::read(&mut input)?));
+        }
         input.end()
     }
 }
@@ -215,6 +244,14 @@ enum Stored {
 type NumberedPages<'a> = Box<dyn Iterator<Item = (usize, Vec<u8>)> + 'a>;
 
 impl Stored {
+    /// The vector of the graph, if it is there.
+    fn in_graph(&self) -> Option<fn(&KeyframeGraph) -> &dyn Pages> {
+        match self {
+            Self::InGraph(vector, _) => Some(*vector),
+            Self::InRecognition(_) => None,
+        }
+    }
+
     /// The pages that changed after a revision.
     fn changed<'a>(&self, map: &'a KeyframeMap, since_revision: u64) -> NumberedPages<'a> {
         match self {

@@ -112,7 +112,7 @@ impl KeyframeGraph {
 
     /// Number of accepted closures.
     pub fn n_closures_accepted(&self) -> usize {
-        self.constraints.count(ClosureState::Accepted)
+        self.constraints.n_accepted()
     }
 
     /// Whether closures are new, and enough records have come in since the last relaxation to pay
@@ -136,7 +136,7 @@ impl KeyframeGraph {
         if schedule.accepted as usize + judged + refuted == 0 {
             return Vec::new();
         }
-        let corrections = coarse.corrections(&problem);
+        let corrections = coarse.corrections(&problem, judged > 0);
         coarse.move_keyframes(&problem);
         self.adopt(coarse.graph());
         corrections

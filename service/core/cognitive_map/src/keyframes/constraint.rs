@@ -56,7 +56,12 @@ impl Constraint {
 
     /// Whether it is a loop closure.
     pub(super) fn is_closure(&self) -> bool {
-        self.is_candidate() || self.state == ClosureState::Accepted
+        self.is_candidate() || self.is_accepted()
+    }
+
+    /// Whether it is a loop closure that counts.
+    pub(super) fn is_accepted(&self) -> bool {
+        self.state == ClosureState::Accepted
     }
 
     /// Whether it is a loop closure that is pending, or was rejected and may be accepted again.

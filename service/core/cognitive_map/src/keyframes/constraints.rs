@@ -2,7 +2,7 @@
 
 use state::{NONE, Slab, state_of_struct};
 
-use super::constraint::{ClosureState, Constraint};
+use super::constraint::Constraint;
 use super::keyframe::{Keyframe, KeyframeSlab};
 use super::list::unlink;
 
@@ -46,10 +46,10 @@ impl Constraints {
         first.map_or(NONE, |(number, _)| number)
     }
 
-    /// Number of constraints in a state.
-    pub(super) fn count(&self, state: ClosureState) -> usize {
+    /// Number of loop closures that count.
+    pub(super) fn n_accepted(&self) -> usize {
         let all = self.slab.iter();
-        all.filter(|(_, constraint)| constraint.state == state)
+        all.filter(|(_, constraint)| constraint.is_accepted())
             .count()
     }
 

@@ -7,6 +7,7 @@ use super::attachments::Attachments;
 use super::chains::Chains;
 use super::constraint::{ClosureState, Constraint};
 use super::constraints::Constraints;
+use super::meanwhile::Meanwhile;
 use super::moment::Moment;
 use super::own_frame::OwnFrame;
 use super::settings::KeyframeSettings;
@@ -33,6 +34,8 @@ pub struct KeyframeGraph {
     pub(super) constraints: Constraints,
     /// Places that keep their pose relative to a keyframe.
     pub(super) attachments: Attachments,
+    /// What has come since a relaxation began that is under way.
+    pub(super) meanwhile: Option<Box<Meanwhile>>,
 }
 
 impl KeyframeGraph {
@@ -45,6 +48,7 @@ impl KeyframeGraph {
             sightings: Sightings::default(),
             constraints: Constraints::default(),
             attachments: Attachments::default(),
+            meanwhile: None,
         }
     }
 
@@ -128,6 +132,7 @@ impl KeyframeGraph {
     /// Detaches an agent: it begins anew in a frame of its own, and what it did in the map no
     /// longer counts there.
     pub fn set_aside(&mut self, agent: u32) {
+        self.cut(agent);
         let Some(track) = self.track_mut(agent) else {
             return;
         };
@@ -143,6 +148,7 @@ impl KeyframeGraph {
     /// Sets the pose of an agent in the map. If it was in the map already, no motion leads there
     /// from what it did before.
     pub fn start_pose(&mut self, moment: &Moment, start: &StartPose) {
+        self.cut(moment.agent);
         let Some(track) = self.chains.track(moment.agent) else {
             return;
         };
@@ -177,15 +183,26 @@ impl KeyframeGraph {
             track.needs_keyframe = true;
             track.since.inflate(&sd.component_mul(sd));
         }
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.inflate(agent, &sd.component_mul(sd));
+        }
     }
 
     /// A new stretch of an agent, there if a pose is given: no motion leads to it.
     pub(super) fn begin_stretch(&mut self, agent: u32, at: Option<&Isometry3<f64>>) {
+        self.cut(agent);
         if let Some(track) = self.track_mut(agent) {
             track.begins_anew = true;
             track.pose = at.copied().unwrap_or(track.pose);
         }
         self.add_keyframe(agent);
+    }
+
+    /// Where an agent was says no longer where it is: for a relaxation under way.
+    pub(super) fn cut(&mut self, agent: u32) {
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.cut(agent);
+        }
     }
 
     /// Notes the present sample and pose of an agent that has not moved.
@@ -218,6 +235,9 @@ impl KeyframeGraph {
             });
             self.add_keyframe(agent);
         }
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.go(agent, increment, variance);
+        }
         let (spacing, attached) = (self.settings.spacing, self.settings.attached_within());
         let Some(track) = self.track_mut(agent) else {
             return;
@@ -245,6 +265,9 @@ impl KeyframeGraph {
         }
         let (pose, is_origin) = (track.pose, track.is_origin);
         let number = self.chains.append(agent, self.revision);
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.keyframes.insert(number);
+        }
         if is_origin {
             let (known, state) = (PoseCovariance::zero(), ClosureState::Origin);
             self.add_constraint(Constraint::to_map(number, pose, &known, state));
@@ -254,6 +277,16 @@ impl KeyframeGraph {
 
     /// Adds a constraint; answers its number, or [`NONE`] if memory is full or an end is gone.
     pub(super) fn add_constraint(&mut self, constraint: Constraint) -> u32 {
+        let number = self.put_constraint(constraint);
+        if let Some(meanwhile) = &mut self.meanwhile {
+            meanwhile.constraints.insert(number);
+        }
+        number
+    }
+
+    /// The same for one that was taken out a moment ago to be changed: it is no other one than
+    /// before, and has the same number, which is the latest that became vacant.
+    pub(super) fn put_constraint(&mut self, constraint: Constraint) -> u32 {
         let (keyframes, most) = (&mut self.chains.keyframes, self.settings.constraints_max);
         self.constraints
             .add(constraint, keyframes, most, self.revision)
@@ -273,5 +306,6 @@ impl KeyframeGraph {
             && self.sightings.is_sound(keyframes)
             && self.constraints.is_sound(keyframes)
             && self.attachments.is_sound(keyframes)
+            && { self.meanwhile.iter() }.all(|since| since.is_sound(self.chains.tracks.len()))
     }
 }

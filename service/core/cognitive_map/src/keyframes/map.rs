@@ -6,6 +6,7 @@ use place_recognition::{Guess, PlaceRecognition, Relocalised, SampleKey, View};
 
 use super::graph::KeyframeGraph;
 use super::moment::Moment;
+use super::pending_relaxation::PendingRelaxation;
 use super::settings::KeyframeSettings;
 use crate::input::{Descriptor, StartPose};
 
@@ -18,6 +19,8 @@ pub struct KeyframeMap {
     /// The graph.
     pub graph: KeyframeGraph,
     pub(super) recognition: PlaceRecognition,
+    /// The relaxation under way; the graph has what has come since it began.
+    pub(super) pending: Option<PendingRelaxation>,
 }
 
 impl KeyframeMap {
@@ -26,6 +29,7 @@ impl KeyframeMap {
         Self {
             graph: KeyframeGraph::new(settings),
             recognition: PlaceRecognition::default(),
+            pending: None,
         }
     }
 

@@ -18,20 +18,23 @@
 //! | attachments | places that move with keyframes | `attachments` |
 //!
 //! A relaxation works on a copy of the graph (`relaxation`), as a problem of least squares
-//! (`problem`); `closures` brings its outcome back.
+//! (`problem`); `closures` brings its outcome back. While samples come in, a relaxation is of the
+//! graph as it was at one record (`relaxation_job`), and comes into force at a later one
+//! (`adoption`), so that no record waits for it; `meanwhile` has what comes in between.
 //!
 //! [`KeyframeMap`] is the graph with place recognition, which closes loops by what was seen.
 
+mod adoption;
 mod agent_track;
 mod attachment;
 mod attachments;
-mod calibration_smoothing;
-mod candidate;
+mod calibrations;
 mod chains;
 mod checkpoint;
 mod closures;
 mod constraint;
 mod constraints;
+mod evidence;
 mod graph;
 mod instant;
 mod keyframe;
@@ -39,15 +42,21 @@ mod keyframe_index;
 mod landmarks;
 mod list;
 mod map;
+mod meanwhile;
 mod moment;
 mod neighbour;
+mod odometry_noise;
 mod own_frame;
+mod pending_relaxation;
 mod places;
 mod pose_lookup;
 mod problem;
 mod refined;
 mod relaxation;
+mod relaxation_job;
+mod relaxation_outcome;
 mod removal;
+mod runs;
 mod settings;
 mod sighted;
 mod sighting;
@@ -62,4 +71,5 @@ pub use moment::Moment;
 pub use place_recognition::{Guess, Relocalised};
 pub use refined::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
 pub use relaxation::Correction;
+pub use relaxation_job::RelaxationJob;
 pub use settings::KeyframeSettings;

@@ -1,15 +1,18 @@
 //! The keyframe graph as a problem of nonlinear least squares.
 
-use nalgebra::{Isometry3, Matrix6, Point3};
+use nalgebra::{Isometry3, Matrix6, Point3, SVector};
 
+use super::calibrations::Calibrations;
 use super::constraint::{ClosureState, Constraint};
 use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
+use super::odometry_noise::with_turn_noise;
 use super::sighting::{Seen, Sighting};
 use super::tuning;
+use crate::estimator::Calibration;
 use geometry::{PoseCovariance, from_planar_part, planar_part};
 use pose_graph::{
-    Freedom, Kernel, Link, LinkId, PointId, PoseGraph, PoseId, PoseInformation,
+    Freedom, Kernel, Lengths, Link, LinkId, Marginals, PointId, PoseGraph, PoseId, PoseInformation,
     PositionInformation, Scale, SightingTarget,
 };
 use state::NONE;
@@ -23,6 +26,16 @@ pub(super) enum Among {
     All,
 }
 
+/// Whether the calibrations of odometry stay as they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Calibrating {
+    /// They stay. While closures are doubted, odometry is all there is to judge them by: free to be
+    /// scaled, a path shrinks to a point at which all closures agree.
+    Held,
+    /// They are estimated.
+    Free,
+}
+
 /// The keyframe graph as a pose graph.
 #[derive(Debug)]
 pub(super) struct Problem {
@@ -33,11 +46,13 @@ pub(super) struct Problem {
     points: Vec<Option<PointId>>,
     /// The link of each constraint.
     links: Vec<Option<LinkId>>,
+    /// The calibrations of odometry.
+    pub(super) calibrations: Calibrations,
 }
 
 impl Problem {
     /// The graph of all agents that are in the map.
-    pub(super) fn new(graph: &KeyframeGraph, among: Among) -> Self {
+    pub(super) fn new(graph: &KeyframeGraph, among: Among, calibrating: Calibrating) -> Self {
         let (chains, constraints) = (&graph.chains, &graph.constraints.slab);
         let landmarks = &graph.sightings.landmarks.slots;
         let mut problem = Self {
@@ -45,13 +60,22 @@ impl Problem {
             poses: vec![None; chains.keyframes.numbers() as usize],
             points: vec![None; landmarks.numbers() as usize],
             links: vec![None; constraints.numbers() as usize],
+            calibrations: Calibrations::default(),
         };
         for (number, keyframe) in chains.keyframes.iter() {
             problem.poses[number as usize] = problem.add_pose(graph, number, keyframe);
         }
-        let motions = chains.recalibrated();
+        if calibrating == Calibrating::Free {
+            let prior_sd = &graph.settings.calibration_sd;
+            let lengths = if graph.constraints.n_accepted() > 0 {
+                Lengths::Known
+            } else {
+                Lengths::Estimated
+            };
+            problem.calibrations = Calibrations::add(chains, prior_sd, lengths, &mut problem.map);
+        }
         for (number, keyframe) in chains.keyframes.iter() {
-            problem.add_motion(graph, number, keyframe, motions[number as usize]);
+            problem.add_motion(graph, number, keyframe);
         }
         for (number, constraint) in constraints.iter() {
             problem.links[number as usize] = problem.add_constraint(graph, constraint, among);
@@ -83,6 +107,21 @@ impl Problem {
         Some(self.map.squared_error(link))
     }
 
+    /// The latest calibration of an agent, with the variances of its components.
+    pub(super) fn calibration(
+        &self,
+        agent: u32,
+        marginals: &Marginals<'_>,
+    ) -> Option<(Calibration, SVector<f64, 5>)> {
+        let latest = self.calibrations.latest(agent)?;
+        let (length, angle, bias) = marginals.calibration(latest)?;
+        let variances = SVector::from([length, angle, bias.x, bias.y, bias.z]);
+        Some((
+            Calibration::of_graph(&self.map.calibration(latest)),
+            variances,
+        ))
+    }
+
     /// Adds a node for a keyframe in the map.
     fn add_pose(
         &mut self,
@@ -107,13 +146,7 @@ impl Problem {
     }
 
     /// Adds a link for the motion to a keyframe.
-    fn add_motion(
-        &mut self,
-        graph: &KeyframeGraph,
-        number: u32,
-        keyframe: &Keyframe,
-        transform: Isometry3<f64>,
-    ) {
+    fn add_motion(&mut self, graph: &KeyframeGraph, number: u32, keyframe: &Keyframe) {
         let Some(track) = graph.chains.track(keyframe.agent) else {
             return;
         };
@@ -121,11 +154,22 @@ impl Problem {
         let Some((from, to)) = ends.filter(|_| !keyframe.begins) else {
             return;
         };
-        let link = Link::Between {
-            from,
-            to,
-            transform,
-            information: information(&keyframe.covariance, track.is_planar),
+        let covariance = with_turn_noise(&keyframe.covariance, track.turn_noise);
+        let information = information(&covariance, track.is_planar);
+        let link = match self.calibrations.of_motion(number) {
+            Some(calibration) => Link::Odometry {
+                from,
+                to,
+                calibration,
+                reading: keyframe.calibrated.reading(&keyframe.motion),
+                information,
+            },
+            None => Link::Between {
+                from,
+                to,
+                transform: keyframe.motion,
+                information,
+            },
         };
         self.map.add_link(link, Kernel::Gaussian).ok();
     }

@@ -73,10 +73,20 @@ impl KeyframeGraph {
         self.relaxed_whole().0.map
     }
 
+    /// The whole past relaxed, with the closures that are accepted by now, or with all of them judged
+    /// anew by all that is known now: whichever makes the measurements more probable.
     fn relaxed_whole(&self) -> (Problem, Relaxed) {
-        let mut copy = RelaxationCopy::whole(self);
-        copy.accept_consistent();
-        let (problem, relaxed, _) = copy.relax();
+        let judged = |mut copy: RelaxationCopy| {
+            copy.accept_consistent();
+            let (problem, relaxed, _) = copy.relax();
+            (copy.log_probability(&problem), problem, relaxed)
+        };
+        let as_it_is = judged(RelaxationCopy::whole(self));
+        if self.constraints.n_accepted() == 0 {
+            return (as_it_is.1, as_it_is.2);
+        }
+        let anew = judged(RelaxationCopy::whole_undecided(self));
+        let (_, problem, relaxed) = if anew.0 > as_it_is.0 { anew } else { as_it_is };
         (problem, relaxed)
     }
 }

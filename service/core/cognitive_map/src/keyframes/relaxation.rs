@@ -1,34 +1,56 @@
 //! A copy of the keyframe graph in which closures are judged and keyframes are moved.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Isometry3;
 
-use super::candidate::{Candidate, agrees_with};
 use super::constraint::{ClosureState, Constraint, composed};
+use super::evidence::{Chance, log_evidence};
 use super::graph::KeyframeGraph;
-use super::problem::{Among, Problem};
+use super::problem::{Among, Calibrating, Problem};
+use super::runs::{Member, Run};
 use super::tuning;
-use geometry::{PoseCovariance, is_somewhere, is_within};
+use crate::estimator::ExternalEstimate;
+use geometry::{is_somewhere, is_within};
 use pose_graph::{Graduation, RelaxationSettings, Relaxed};
 use state::{NONE, Slab};
 
-/// The pose of an agent after a relaxation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a relaxation says of an agent.
+#[derive(Clone, Copy, Debug)]
 pub struct Correction {
     /// Number of the agent.
     pub agent: u32,
-    /// Its pose now, in the map.
-    pub pose: Isometry3<f64>,
-    /// Covariance of that pose; `None` where nothing determines it.
-    pub covariance: Option<PoseCovariance>,
+    /// Its pose now, in the map, and its odometry.
+    pub estimate: ExternalEstimate,
 }
 
 /// A copy of the keyframe graph, which shares all pages that do not change.
 pub(super) struct RelaxationCopy(KeyframeGraph);
 
 impl RelaxationCopy {
+    /// Of a graph as it is.
+    pub(super) fn of(graph: KeyframeGraph) -> Self {
+        Self(graph)
+    }
+
     /// Of the whole graph.
     pub(super) fn whole(graph: &KeyframeGraph) -> Self {
         Self(graph.clone())
+    }
+
+    /// Of the whole graph, as if no closure had been judged and no odometry been learned.
+    pub(super) fn whole_undecided(graph: &KeyframeGraph) -> Self {
+        let mut whole = Self(graph.clone());
+        let accepted: Vec<u32> = whole.accepted().map(|(number, _)| number).collect();
+        for number in accepted {
+            whole.set_state(number, ClosureState::Pending);
+        }
+        for agent in (0..).take(whole.0.chains.tracks.len()) {
+            if let Some(track) = whole.0.track_mut(agent) {
+                track.turn_noise = 1.0;
+            }
+        }
+        whole
     }
 
     /// The coarse graph, which is relaxed while samples come in: one keyframe a step, and those
@@ -65,67 +87,123 @@ impl RelaxationCopy {
         &self.0
     }
 
-    /// Accepts pending closures that agree with the map or with one another; answers their number.
-    /// Moves the keyframes to where all accepted closures have them.
+    /// Accepts pending closures that are evident by the map, or by one another; answers their
+    /// number. Moves the keyframes to where all accepted closures have them.
     pub(super) fn accept_consistent(&mut self) -> usize {
         if self.0.constraints.first_candidate() == NONE {
             return 0;
         }
-        let accepted_alone = Problem::new(&self.0, Among::Accepted);
-        let marginals = accepted_alone.map.marginals();
         // With kernels that begin wide, all closures together find the map that most of them agree
         // with.
-        let mut all = Problem::new(&self.0, Among::All);
+        let mut all = Problem::new(&self.0, Among::All, Calibrating::Held);
         all.map.relax(&from_wide());
-        let gate_chi2 = self.0.settings.closure_gate_chi2;
-        let mut accepted = Vec::new();
-        let mut others = Vec::new();
-        for (number, constraint) in self.closures() {
-            let Some(squared) = all.squared_error(number) else {
-                continue;
-            };
-            if constraint.is_candidate()
-                && agrees_with(constraint, &accepted_alone, &marginals, gate_chi2)
-            {
-                accepted.push(number);
-            } else if squared <= gate_chi2 {
-                others.push((number, constraint));
+        let mut runs = self.pending_runs(&all);
+        let mut n_accepted = 0;
+        for _ in 0..tuning::ACCEPTANCE_ROUNDS_MAX {
+            let mut n_new = self.accept_evident(&runs);
+            if n_new == 0 {
+                n_new = self.accept_together(&runs);
             }
+            if n_new == 0 {
+                break;
+            }
+            n_accepted += n_new;
+            self.settle(&runs);
+            let constraints = &self.0.constraints.slab;
+            let is_pending = |run: &Run| {
+                let middle = constraints.get(run.middle);
+                middle.is_some_and(Constraint::is_candidate)
+            };
+            runs.retain(is_pending);
         }
-        accepted.extend(self.supported(&others, &all));
-        for &number in &accepted {
-            self.set_state(number, ClosureState::Accepted);
-        }
-        if self.fits(&all) {
-            self.move_keyframes(&all);
-        }
-        accepted.len()
+        n_accepted
     }
 
-    /// The candidates among closures with which enough of the closures agree.
-    fn supported(&self, closures: &[(u32, &Constraint)], problem: &Problem) -> Vec<u32> {
+    /// The runs of pending closures that fit a map with all closures.
+    fn pending_runs(&self, all: &Problem) -> Vec<Run> {
+        let gate_chi2 = self.0.settings.closure_gate_chi2;
         let chains = &self.0.chains;
         let path_variances = chains.path_variances();
-        let candidate = |&(number, constraint): &(u32, &Constraint)| {
-            Candidate::new(
-                number,
-                constraint,
-                &chains.keyframes,
-                problem,
-                &path_variances,
-            )
+        let fitting = self.closures().filter_map(|(number, constraint)| {
+            let fits = constraint.is_candidate() && all.squared_error(number)? <= gate_chi2;
+            let member =
+                || Member::new(number, constraint, &chains.keyframes, all, &path_variances);
+            fits.then(member).flatten()
+        });
+        Run::of(fitting.collect(), gate_chi2)
+    }
+
+    /// Accepts the runs that are evident by the map; answers the number of their closures.
+    fn accept_evident(&mut self, runs: &[Run]) -> usize {
+        if runs.is_empty() {
+            return 0;
+        }
+        let evident = self.evidence(runs).into_iter();
+        let evident = evident.filter(|&(index, odds)| odds >= runs[index].log_odds_needed());
+        evident
+            .map(|(index, _)| self.accept_run(&runs[index]))
+            .sum()
+    }
+
+    /// Accepts runs of which each is no more evident than chance, but which are evident together:
+    /// one of them, and those that are evident by it. Answers the number of their closures.
+    fn accept_together(&mut self, runs: &[Run]) -> usize {
+        let mut seeds = self.evidence(runs);
+        seeds.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        for &(seed, odds) in seeds.iter().take(tuning::SEEDS_MAX) {
+            let mut trial = Self(self.0.clone());
+            trial.accept_run(&runs[seed]);
+            trial.relax();
+            let others = trial.evidence(runs).into_iter();
+            let others = others
+                .filter(|&(index, odds)| index != seed && odds >= runs[index].log_odds_needed());
+            let others: Vec<_> = others.collect();
+            let together = odds + others.iter().map(|other| other.1).sum::<f64>();
+            if !others.is_empty() && together >= tuning::ACCEPTED_LOG_ODDS {
+                let others = others.iter().map(|&(index, _)| &runs[index]);
+                let all = std::iter::once(&runs[seed]).chain(others);
+                return all.map(|run| self.accept_run(run)).sum();
+            }
+        }
+        0
+    }
+
+    /// Relaxes the map with closures that have just been accepted, and learns how noisy the
+    /// odometry of their agents is.
+    fn settle(&mut self, runs: &[Run]) {
+        self.relax();
+        let agent = |run: &Run| {
+            let constraint = self.0.constraints.slab.get(run.middle)?;
+            let is_accepted = constraint.state == ClosureState::Accepted;
+            let from = self.0.chains.keyframes.get(constraint.from)?;
+            is_accepted.then_some(from.agent)
         };
-        let mut candidates: Vec<_> = closures.iter().filter_map(candidate).collect();
-        let partners =
-            Candidate::count_partners(&mut candidates, self.0.settings.closure_gate_chi2);
-        let is_supported = |(candidate, n_partners): &(&Candidate, usize)| {
-            let constraint = self.0.constraints.slab.get(candidate.constraint);
-            *n_partners >= tuning::PARTNERS_MIN && constraint.is_some_and(Constraint::is_candidate)
+        let agents: BTreeSet<u32> = runs.iter().filter_map(agent).collect();
+        for agent in agents {
+            self.learn_odometry_noise(agent);
+        }
+    }
+
+    /// The log-odds of each run, by what has been accepted.
+    fn evidence(&self, runs: &[Run]) -> Vec<(usize, f64)> {
+        let problem = Problem::new(&self.0, Among::Accepted, Calibrating::Free);
+        let marginals = problem.map.marginals();
+        let chance = Chance::of(&self.0.chains, &problem);
+        let constraints = &self.0.constraints.slab;
+        let odds = |(index, run): (usize, &Run)| {
+            let constraint = constraints.get(run.middle)?;
+            let odds = log_evidence(constraint, &problem, &marginals, &chance)?;
+            Some((index, odds))
         };
-        let supported = candidates.iter().zip(partners).filter(is_supported);
-        supported
-            .map(|(candidate, _)| candidate.constraint)
-            .collect()
+        runs.iter().enumerate().filter_map(odds).collect()
+    }
+
+    /// Accepts the closures of a run; answers their number.
+    fn accept_run(&mut self, run: &Run) -> usize {
+        for &number in &run.members {
+            self.set_state(number, ClosureState::Accepted);
+        }
+        run.members.len()
     }
 
     /// The relaxed graph, after closures that do not fit into it were rejected; and their number.
@@ -133,17 +211,15 @@ impl RelaxationCopy {
     pub(super) fn relax(&mut self) -> (Problem, Relaxed, usize) {
         let refuted_chi2 = self.0.settings.refuted_chi2();
         let mut n_rejected = 0;
-        let mut rounds = 0;
-        loop {
-            rounds += 1;
-            let mut problem = Problem::new(&self.0, Among::Accepted);
+        for _ in 0..tuning::RELAXATION_ROUNDS_MAX {
+            let mut held = Problem::new(&self.0, Among::Accepted, Calibrating::Held);
             let mut settings = from_wide();
-            if self.fits(&problem) {
+            if self.fits(&held) {
                 settings.graduation = Graduation::None;
             }
-            let relaxed = problem.map.relax(&settings);
+            held.map.relax(&settings);
             let is_too_far = |number: u32| {
-                let squared = problem.squared_error(number);
+                let squared = held.squared_error(number);
                 squared.is_some_and(|squared| squared > refuted_chi2)
             };
             let accepted = self.accepted().map(|(number, _)| number);
@@ -152,15 +228,22 @@ impl RelaxationCopy {
                 self.set_state(number, ClosureState::Refuted);
             }
             n_rejected += refuted.len();
-            if refuted.is_empty() || rounds >= tuning::RELAXATION_ROUNDS_MAX {
-                return (problem, relaxed, n_rejected);
+            self.move_keyframes(&held);
+            if refuted.is_empty() {
+                break;
             }
-            self.move_keyframes(&problem);
         }
+        let mut problem = Problem::new(&self.0, Among::Accepted, Calibrating::Free);
+        let relaxed = problem.map.relax(&RelaxationSettings::default());
+        (problem, relaxed, n_rejected)
     }
 
     /// The poses of the agents in the map in a relaxed graph.
-    pub(super) fn corrections(&self, problem: &Problem) -> Vec<Correction> {
+    ///
+    /// They prevail over what the agents' filters hold where closures were judged by their
+    /// evidence; not where closures were accepted as they came, for a robot that recognises what
+    /// it cannot see may have been carried off.
+    pub(super) fn corrections(&self, problem: &Problem, prevail: bool) -> Vec<Correction> {
         let marginals = problem.map.marginals();
         let mut corrections = Vec::new();
         for (agent, track) in (0..).zip(self.0.chains.tracks.iter()) {
@@ -168,14 +251,17 @@ impl RelaxationCopy {
             let Some(node) = node.filter(|_| !track.needs_keyframe) else {
                 continue;
             };
-            let covariance = marginals.pose(node).map(|covariance| {
-                composed(&covariance, track.since.motion(), &track.since.covariance())
-            });
-            corrections.push(Correction {
-                agent,
-                pose: problem.map.pose(node) * track.since.motion(),
-                covariance,
-            });
+            let Some(covariance) = marginals.pose(node) else {
+                continue;
+            };
+            let since = &track.since;
+            let estimate = ExternalEstimate {
+                pose: problem.map.pose(node) * since.motion(),
+                covariance: composed(&covariance, since.motion(), &since.covariance()),
+                calibration: problem.calibration(agent, &marginals),
+                prevails: prevail,
+            };
+            corrections.push(Correction { agent, estimate });
         }
         corrections
     }
@@ -209,9 +295,9 @@ impl RelaxationCopy {
         all.filter(|(_, constraint)| constraint.is_closure())
     }
 
-    fn accepted(&self) -> impl Iterator<Item = (u32, &Constraint)> {
+    pub(super) fn accepted(&self) -> impl Iterator<Item = (u32, &Constraint)> {
         self.closures()
-            .filter(|(_, constraint)| constraint.state == ClosureState::Accepted)
+            .filter(|(_, constraint)| constraint.is_accepted())
     }
 
     fn set_state(&mut self, number: u32, state: ClosureState) {

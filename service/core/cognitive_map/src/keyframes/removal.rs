@@ -12,6 +12,7 @@ impl KeyframeGraph {
             return;
         };
         let (mut number, session) = (track.newest, track.session + 1);
+        self.cut(agent);
         while let Some(keyframe) = self.chains.keyframes.get(number) {
             let previous = keyframe.previous;
             self.strip(number);

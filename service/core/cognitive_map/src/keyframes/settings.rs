@@ -1,6 +1,9 @@
 //! Limits of the keyframe graph, and what a space sets of it.
 
+use nalgebra::SVector;
+
 use super::tuning::REFUTED_PER_GATE;
+use crate::estimator::Parameters;
 use crate::settings::Settings;
 
 /// Part of the spacing of keyframes up to which a sighting is attached to the latest one: where
@@ -23,6 +26,9 @@ pub struct KeyframeSettings {
     /// Squared Mahalanobis distance up to which a closure agrees with the map or with another
     /// closure.
     pub closure_gate_chi2: f64,
+    /// Standard deviations of odometry's lasting errors: of lengths, of angles, of the bias about
+    /// each axis \[1, 1, rad/s\].
+    pub calibration_sd: SVector<f64, 5>,
 }
 
 impl KeyframeSettings {
@@ -35,6 +41,7 @@ impl KeyframeSettings {
             constraints_max: keyframes_max / 2,
             spacing: (settings.keyframe_spacing_m, settings.keyframe_spacing_rad),
             closure_gate_chi2: settings.closure_gate_chi2,
+            calibration_sd: Parameters::of(settings).calibration_sd(),
         }
     }
 

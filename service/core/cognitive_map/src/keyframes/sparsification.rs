@@ -141,7 +141,7 @@ impl KeyframeGraph {
             let Some(constraint) = self.remove_constraint(first) else {
                 return;
             };
-            self.add_constraint(constraint.moved_to(number, neighbour));
+            self.put_constraint(constraint.moved_to(number, neighbour));
         }
     }
 

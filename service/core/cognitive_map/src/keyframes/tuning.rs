@@ -58,18 +58,35 @@ pub(super) const ROTATION_LEVER_M: f64 = 0.5;
 /// it more than a gate does before it is dropped.
 pub(super) const REFUTED_PER_GATE: f64 = 25.0 / 11.3;
 
-/// Factor by which the map may be less certain than a closure for their agreement alone to count.
-pub(super) const UNCERTAINTY_RATIO_MAX: f64 = 2.0;
-
-/// Standard deviation up to which agreement counts, however certain the closures are: by chance few
-/// places lie so close \[m\].
-pub(super) const CERTAIN_SD_M: f64 = 0.5;
-
-/// Fewest other closures that must agree with one that the map cannot distinguish from a false one.
-pub(super) const PARTNERS_MIN: usize = 2;
-
 /// Earlier closures, in the order of time, with which a closure is compared.
 pub(super) const CLOSURES_COMPARED: usize = 24;
+
+/// Longest way between two closures of a run \[m\].
+pub(super) const RUN_STEP_MAX_M: f64 = 3.0;
+
+/// Way and rotation after which a run ends and another one begins \[m, rad\]: what looks alike for
+/// so long, and beyond a corner, is likely to be the same.
+pub(super) const RUN_LENGTH_MAX_M: f64 = 20.0;
+pub(super) const RUN_TURN_MAX_RAD: f64 = 2.0;
+
+/// Least standard deviation of the places of a map along each axis, where chance is concerned
+/// \[m\]: in a room, any closure lies near any other, and a false one bends little.
+pub(super) const CHANCE_SD_MIN_M: f64 = 5.0;
+
+/// Log of the odds at which runs of closures are accepted: 99 to 1.
+pub(super) const ACCEPTED_LOG_ODDS: f64 = 4.6;
+
+/// Fewest closures of a run that others support; one alone may be any mistake.
+pub(super) const RUN_CLOSURES_MIN: usize = 3;
+
+/// Log of the odds at which fewer are accepted.
+pub(super) const ACCEPTED_ALONE_LOG_ODDS: f64 = 2.0 * ACCEPTED_LOG_ODDS;
+
+/// Seeds that are tried, where no run is evident by itself.
+pub(super) const SEEDS_MAX: usize = 3;
+
+/// Rounds in which runs are accepted by those accepted before.
+pub(super) const ACCEPTANCE_ROUNDS_MAX: usize = 4;
 
 /// Standard deviation of an unknown angle \[rad\].
 pub(super) const UNKNOWN_ANGLE_SD_RAD: f64 = 3.0;
@@ -80,6 +97,18 @@ pub(super) const CLOSURE_SD_MIN: f64 = 1e-3;
 /// Keyframes for each record between two relaxations: so the amortised cost of a relaxation is that
 /// of so many keyframes a record.
 pub(super) const KEYFRAMES_PER_RECORD: usize = 8;
+
+/// Stream time from the record at which a relaxation begins to the one at which it comes into
+/// force \[ns\]: enough for one of ten thousand keyframes, which takes 0.2 s, on a busy machine,
+/// and little enough for a closure to reach the pose within a second.
+pub(super) const RELAXATION_DELAY_NS: i64 = 500_000_000;
+
+/// Most records between the two, whatever their stamps say: two seconds of twenty robots that send
+/// a hundred samples a second.
+pub(super) const RELAXATION_RECORDS_MAX: u32 = 4096;
+
+/// Keyframes that move with one record, once a relaxation is in force: about 0.2 ms.
+pub(super) const KEYFRAMES_MOVED_PER_RECORD: usize = 1024;
 
 /// Most rounds of relaxation and rejection.
 pub(super) const RELAXATION_ROUNDS_MAX: usize = 3;
@@ -93,6 +122,25 @@ pub(super) const COARSE_STEP: (f64, f64) = (1.0, 0.5);
 /// Most pending closures of the coarse graph, the latest ones. Earlier ones have been judged many
 /// times; a refinement of the whole past judges them again.
 pub(super) const COARSE_PENDING_MAX: usize = 512;
+
+// Calibrations of odometry.
+
+/// Motions between keyframes that share a calibration. More would be coupled needlessly in the
+/// solver, and fewer would be as many calibrations as poses.
+pub(super) const CALIBRATED_TOGETHER: u32 = 32;
+
+/// Least change of a calibration from one to the next, as a part of the variance that is expected of
+/// it: for the information to be finite.
+pub(super) const WANDER_MIN: f64 = 1e-6;
+
+/// Least variance of a component of a calibration \[1, 1, rad²/s²\].
+pub(super) const CALIBRATION_VARIANCE_MIN: f64 = 1e-12;
+
+/// Factor of an agent's noise of rotations, as closures may show it.
+pub(super) const TURN_NOISE_BOUNDS: std::ops::RangeInclusive<f64> = 0.01..=10.0;
+
+/// Factor that is one deviation off what is expected of that.
+pub(super) const TURN_NOISE_PRIOR_SD: f64 = 10.0;
 
 // Kernels of the relaxation.
 

@@ -7,5 +7,6 @@
 )]
 
 mod external_pose; // poses told by another estimate
+mod good_sensors; // a robot whose sensors are good, and whose wheels are any
 mod hall; // robots that drive and see
 mod trouble; // liars, slips, moved and mistaken landmarks, silence, walls

@@ -170,7 +170,7 @@ fn a_robot_that_is_carried_off_says_that_it_is_lost_and_is_found() {
         walker.carry(to, 2.5);
         let after = walker.turn(&mut map, &room, 40);
         let lost = after.iter().position(|status| *status == Status::Lost);
-        assert!(lost.is_some_and(|steps| steps < 30), "{seed}: {after:?}");
+        assert!(lost.is_some_and(|steps| steps < 35), "{seed}: {after:?}");
         assert_eq!(after.last(), Some(&Status::Localized), "{seed}: {after:?}");
         assert!(walker.off_m(&map) < 0.25, "{seed}: {}", walker.off_m(&map));
         // Afterwards, too, it is known where it went, and where it was put is not where it came by

@@ -19,6 +19,7 @@ mod objects; // what is taught and known again
 mod percepts; // what places learn of percepts, and what they predict
 mod places; // recruitment, revisits
 mod recall; // recall against an exhaustive scan
+mod relaxation; // loops that close while samples come in
 mod removal; // agents that go, and who comes after them
 mod settings; // what each setting changes
 mod trips; // legs, and every way a trip ends

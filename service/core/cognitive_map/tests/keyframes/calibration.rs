@@ -58,7 +58,7 @@ fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
             } else {
                 Calibration::default()
             },
-            variance: SVector::repeat(if is_known { 1e-8 } else { 1e-2 }),
+            states_noise: true,
             wander: SVector::repeat(1e-12),
             moving_s: 1.0 / RATE_HZ as f64,
         };

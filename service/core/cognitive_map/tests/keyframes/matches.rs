@@ -54,7 +54,7 @@ impl Rounds {
         if self.keyframes.graph.is_due() {
             self.corrections = self.keyframes.graph.relax();
             if let Some(correction) = self.corrections.first() {
-                self.told = correction.pose;
+                self.told = correction.estimate.pose;
             }
         }
     }
@@ -129,7 +129,7 @@ fn true_matches_close_the_loop_whichever_way_the_gyroscope_drifts() {
         });
         assert!(closed.keyframes.graph.n_closures_accepted() > 20);
         assert!(closed.off_m() < 0.35 * alone.off_m(), "{}", closed.off_m());
-        let covariance = closed.corrections[0].covariance.unwrap();
+        let covariance = closed.corrections[0].estimate.covariance;
         assert!(covariance.position_sd_m() < 0.5);
     }
 }

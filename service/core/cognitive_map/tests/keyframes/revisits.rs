@@ -96,7 +96,7 @@ impl Round {
         self.keyframes.view(&view);
         if self.keyframes.graph.is_due() {
             for correction in self.keyframes.graph.relax() {
-                self.told = correction.pose;
+                self.told = correction.estimate.pose;
             }
         }
     }

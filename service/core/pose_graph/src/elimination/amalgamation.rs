@@ -55,7 +55,6 @@ fn collect(mut stages: Vec<Stage>, joined: &[Vec<usize>], is_joined: &[bool]) ->
             let stage = &mut stages[own];
             child.frontal.append(&mut stage.frontal);
             stage.frontal = child.frontal;
-            stage.elements.append(&mut child.elements);
         }
         if !is_joined[own] {
             let mut stage = std::mem::take(&mut stages[own]);

@@ -10,7 +10,7 @@ mod tree;
 pub(crate) use clique::Front;
 pub(crate) use dense::dot;
 pub(crate) use marginal::HalfSolution;
-pub(crate) use tree::{CliqueTree, Equations, Part, slot};
+pub(crate) use tree::{CliqueTree, Equations, slot};
 
 /// The number of what has this index: variables, nodes and links stay far below 2³².
 pub(crate) fn number(index: usize) -> u32 {

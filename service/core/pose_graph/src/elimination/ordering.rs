@@ -8,19 +8,6 @@
 
 use super::number;
 
-/// What is to be ordered: variables 0, 1, … and what couples them.
-#[derive(Debug, Default)]
-pub(super) struct Problem {
-    /// For each variable those that share a link with it; repetitions and the variable itself do no
-    /// harm.
-    pub(super) adjacent: Vec<Vec<u32>>,
-    /// Sets of variables that earlier eliminations have coupled: what stays of a part already
-    /// factored.
-    pub(super) elements: Vec<Vec<u32>>,
-    /// Variables that are to come after all others.
-    pub(super) last: Vec<bool>,
-}
-
 /// Variables that are eliminated together.
 #[derive(Debug, Default)]
 pub(super) struct Stage {
@@ -28,24 +15,19 @@ pub(super) struct Stage {
     pub(super) frontal: Vec<u32>,
     /// Later variables that are coupled with them.
     pub(super) separator: Vec<u32>,
-    /// Elements of the problem that are used up here.
-    pub(super) elements: Vec<u32>,
     /// The stage that takes what this one leaves, by index; `None` at a root.
     pub(super) parent: Option<usize>,
 }
 
-/// Orders the variables of a problem. Stages come children before parents.
-pub(super) fn order(problem: Problem) -> Vec<Stage> {
-    let n_given = problem.elements.len();
-    let mut quotient = Quotient::new(problem);
+/// Orders variables 0, 1, …, given for each those that share a link with it; repetitions and the
+/// variable itself do no harm. Stages come children before parents.
+pub(super) fn order(adjacent: Vec<Vec<u32>>) -> Vec<Stage> {
+    let mut quotient = Quotient::new(adjacent);
     let mut stages: Vec<Stage> = Vec::new();
     while let Some(pivot) = quotient.next_pivot() {
         let mut stage = Stage::default();
-        for element in quotient.eliminate(pivot) {
-            match element.checked_sub(n_given) {
-                None => stage.elements.push(number(element)),
-                Some(child) => stages[child].parent = Some(stages.len()),
-            }
+        for child in quotient.eliminate(pivot) {
+            stages[child].parent = Some(stages.len());
         }
         let element = quotient
             .elements
@@ -75,14 +57,12 @@ struct Group {
     elements: Vec<usize>,
     /// An upper bound of the number of variables coupled with it.
     degree: usize,
-    is_last: bool,
 }
 
 /// The state of the elimination.
 struct Quotient {
     groups: Vec<Group>,
-    /// Groups of each element, first those of the problem, then one for each pivot; empty once used
-    /// up.
+    /// Groups of each element, of which each pivot leaves one; empty once used up.
     elements: Vec<Vec<u32>>,
     /// Number of variables of each element.
     sizes: Vec<usize>,
@@ -95,16 +75,13 @@ struct Quotient {
     /// Groups by degree; an entry whose group has another degree by now, or is gone, is stale.
     buckets: Vec<Vec<u32>>,
     least_degree: usize,
-    last_are_open: bool,
 }
 
 impl Quotient {
-    fn new(problem: Problem) -> Self {
-        let n = problem.adjacent.len();
+    fn new(adjacent: Vec<Vec<u32>>) -> Self {
+        let n = adjacent.len();
         let mut groups: Vec<Group> = Vec::with_capacity(n);
-        for ((mut variables, is_last), own) in
-            problem.adjacent.into_iter().zip(problem.last).zip(0..)
-        {
+        for (mut variables, own) in adjacent.into_iter().zip(0..) {
             variables.sort_unstable();
             variables.dedup();
             variables.retain(|&other| other != own);
@@ -113,27 +90,17 @@ impl Quotient {
                 members,
                 variables,
                 degree,
-                is_last,
                 elements: Vec::new(),
             });
         }
-        let sizes: Vec<usize> = problem.elements.iter().map(Vec::len).collect();
-        for (element, (variables, size)) in problem.elements.iter().zip(&sizes).enumerate() {
-            for &variable in variables {
-                let group = &mut groups[variable as usize];
-                group.elements.push(element);
-                group.degree = (group.degree + size - 1).min(n - 1);
-            }
-        }
         let mut quotient = Self {
-            outside: vec![(0, 0); sizes.len()],
-            sizes,
-            elements: problem.elements,
+            outside: Vec::new(),
+            sizes: Vec::new(),
+            elements: Vec::new(),
             seen: vec![0; n],
             step: 0,
             buckets: vec![Vec::new(); n],
             least_degree: n,
-            last_are_open: false,
             groups,
         };
         for group in (0..n).rev() {
@@ -144,39 +111,25 @@ impl Quotient {
 
     /// Puts a group where its degree says.
     fn offer(&mut self, group: usize) {
-        let Group {
-            degree, is_last, ..
-        } = self.groups[group];
-        if !is_last || self.last_are_open {
-            self.buckets[degree].push(number(group));
-            self.least_degree = self.least_degree.min(degree);
-        }
+        let degree = self.groups[group].degree;
+        self.buckets[degree].push(number(group));
+        self.least_degree = self.least_degree.min(degree);
     }
 
     /// A group of least degree.
     fn next_pivot(&mut self) -> Option<usize> {
-        loop {
-            while self.least_degree < self.buckets.len() {
-                while let Some(group) = self.buckets[self.least_degree].pop() {
-                    let Group {
-                        members, degree, ..
-                    } = &self.groups[group as usize];
-                    if !members.is_empty() && *degree == self.least_degree {
-                        return Some(group as usize);
-                    }
-                }
-                self.least_degree += 1;
-            }
-            if self.last_are_open {
-                return None;
-            }
-            self.last_are_open = true;
-            for group in (0..self.groups.len()).rev() {
-                if self.groups[group].is_last {
-                    self.offer(group);
+        while self.least_degree < self.buckets.len() {
+            while let Some(group) = self.buckets[self.least_degree].pop() {
+                let Group {
+                    members, degree, ..
+                } = &self.groups[group as usize];
+                if !members.is_empty() && *degree == self.least_degree {
+                    return Some(group as usize);
                 }
             }
+            self.least_degree += 1;
         }
+        None
     }
 
     /// Replaces a pivot by the element of all that is coupled with it. Returns the elements used up
@@ -299,10 +252,8 @@ impl Quotient {
                 .take_while(|(other, _)| *other == sum)
             {
                 let (a, b) = (&self.groups[kept as usize], &self.groups[other as usize]);
-                let is_same = a.is_last == b.is_last
-                    && !b.members.is_empty()
-                    && a.elements == b.elements
-                    && a.variables == b.variables;
+                let is_same =
+                    !b.members.is_empty() && a.elements == b.elements && a.variables == b.variables;
                 if is_same {
                     let members = std::mem::take(&mut self.groups[other as usize].members);
                     let kept = &mut self.groups[kept as usize];

@@ -41,9 +41,32 @@ pub fn write_g2o(graph: &PoseGraph) -> String {
         };
     }
     for link in graph.links() {
-        let _ = line(link, is_planar, &mut text);
+        let _ = match motion(graph, link) {
+            Some(between) => line(&between, is_planar, &mut text),
+            None => line(link, is_planar, &mut text),
+        };
     }
     text
+}
+
+/// A motion by odometry as a link between two poses, by its calibration as it is.
+fn motion(graph: &PoseGraph, link: &Link) -> Option<Link> {
+    let Link::Odometry {
+        from,
+        to,
+        calibration,
+        reading,
+        information,
+    } = link
+    else {
+        return None;
+    };
+    Some(Link::Between {
+        from: *from,
+        to: *to,
+        transform: reading.motion(&graph.calibration(*calibration)),
+        information: *information,
+    })
 }
 
 /// The line of a link.

@@ -3,9 +3,10 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 use proptest::prelude::*;
 
+use super::NormalBlocks;
 use crate::link::{Link, SightingTarget};
-use crate::node::{Freedom, Node, PointId, PoseId};
-use crate::{PoseInformation, PositionInformation};
+use crate::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId};
+use crate::{Calibration, CalibrationInformation, PoseInformation, PositionInformation, Reading};
 
 /// A node from, a node to, and a link from the first to the second.
 #[derive(Clone, Debug)]
@@ -13,6 +14,17 @@ struct Case {
     from: Node,
     to: Node,
     link: Link,
+    /// The place of the calibration, of a motion.
+    calibration: Isometry3<f64>,
+}
+
+/// Some lasting errors of odometry.
+fn calibration() -> Calibration {
+    Calibration {
+        length: 0.1,
+        angle: -0.2,
+        bias_rad_s: Vector3::new(0.02, -0.01, 0.03),
+    }
 }
 
 fn pose() -> impl Strategy<Value = Isometry3<f64>> {
@@ -80,6 +92,21 @@ fn cases(
                 information: whole,
             },
         ),
+        (
+            node(to),
+            Link::Odometry {
+                from: a,
+                to: b,
+                calibration: CalibrationId(2),
+                reading: Reading::corrected_to(
+                    &(from.inv_mul(&to) * error),
+                    &calibration(),
+                    0.7,
+                    0.1,
+                ),
+                information: whole,
+            },
+        ),
         (node(to), sighting(SightingTarget::Pose(b))),
         (
             node(to),
@@ -93,6 +120,7 @@ fn cases(
             from: node(from),
             to,
             link,
+            calibration: calibration().place(),
         })
         .collect()
 }
@@ -102,7 +130,24 @@ impl Case {
     fn squared_error(&self, from_step: &Vector6<f64>, to_step: &Vector6<f64>) -> f64 {
         let from = self.from.moved(&self.from.pose, from_step.as_slice());
         let to = self.to.moved(&self.to.pose, to_step.as_slice());
-        self.link.squared_error(&from, &to)
+        self.link.squared_error(|node| self.place(node, &from, &to))
+    }
+
+    /// The blocks at the places of the nodes.
+    fn blocks(&self, weight: f64) -> NormalBlocks {
+        let (from, to) = (&self.from.pose, &self.to.pose);
+        self.link
+            .normal_blocks(|node| self.place(node, from, to), |_| weight)
+    }
+
+    /// The place of a node of the link: the first, the second, or the calibration.
+    fn place<'a>(
+        &'a self,
+        node: u32,
+        from: &'a Isometry3<f64>,
+        to: &'a Isometry3<f64>,
+    ) -> &'a Isometry3<f64> {
+        [from, to, &self.calibration][node as usize]
     }
 }
 
@@ -115,7 +160,7 @@ proptest! {
         seed in prop::array::uniform6(0.3..3.0_f64),
     ) {
         for case in cases(from, to, Isometry3::new(shift.into(), turn.into()), seed) {
-            let blocks = case.link.normal_blocks(&case.from.pose, &case.to.pose, |_| 1.0);
+            let blocks = case.blocks(1.0);
             let zero = Vector6::zeros();
             for axis in 0..6 {
                 let mut step = Vector6::zeros();
@@ -141,7 +186,7 @@ proptest! {
         seed in prop::array::uniform6(0.3..3.0_f64),
     ) {
         for case in cases(from, to, Isometry3::identity(), seed) {
-            let blocks = case.link.normal_blocks(&case.from.pose, &case.to.pose, |_| 1.0);
+            let blocks = case.blocks(1.0);
             let from_step = Vector6::from_column_slice(&steps[..6]) * 1e-5;
             let mut to_step = Vector6::from_column_slice(&steps[6..]) * 1e-5;
             if case.to.is_point() {
@@ -156,17 +201,72 @@ proptest! {
     }
 }
 
+proptest! {
+    /// What a calibration adds to a motion, against difference quotients and the quadratic form.
+    #[test]
+    fn a_calibration_moves_a_motion_as_its_blocks_say(
+        (from, to) in (pose(), pose()),
+        shift in prop::array::uniform3(-0.3..0.3_f64),
+        turn in prop::array::uniform3(-0.3..0.3_f64),
+        seed in prop::array::uniform6(0.3..3.0_f64),
+    ) {
+        let error = Isometry3::new(shift.into(), turn.into());
+        let cases = cases(from, to, error, seed).into_iter();
+        for case in cases.filter(|case| matches!(case.link, Link::Odometry { .. })) {
+            let blocks = case.blocks(1.0).by_calibration.expect("it has a calibration");
+            let node = Node::calibration(&calibration(), Freedom::Full, Lengths::Estimated);
+            let cost = |step: f64, index: usize| {
+                let mut unknowns = [0.0; 5];
+                unknowns[index] = step;
+                let moved = node.moved(&node.pose, &unknowns);
+                let place = |node: u32| [&case.from.pose, &case.to.pose, &moved][node as usize];
+                case.link.squared_error(place)
+            };
+            for (index, &axis) in node.axes().iter().enumerate() {
+                let quotient = (cost(1e-5, index) - cost(-1e-5, index)) / 2e-5;
+                let expected = 2.0 * blocks.gradient[axis];
+                let scale = 1.0 + blocks.gradient.norm() + blocks.own.norm();
+                prop_assert!((quotient - expected).abs() < 1e-5 * scale, "{axis}: {case:?}");
+            }
+        }
+    }
+}
+
+/// A change of a calibration costs its square, by the variance of each component.
+#[test]
+fn a_calibration_costs_its_distance_from_what_is_expected() {
+    let bias = Vector3::repeat(1e-4);
+    let information = CalibrationInformation::of_variances(0.01, 0.04, &bias).unwrap();
+    let (a, b) = (CalibrationId(0), CalibrationId(1));
+    let zero = Calibration::default().place();
+    let at = calibration().place();
+    let place = |node: u32| if node == 0 { &zero } else { &at };
+    let prior = Link::CalibrationPrior {
+        calibration: b,
+        at: Calibration::default(),
+        information,
+    };
+    let wander = Link::CalibrationWander {
+        from: a,
+        to: b,
+        information,
+    };
+    // 0.1² / 0.01 + 0.2² / 0.04 + (0.02² + 0.01² + 0.03²) / 1e-4
+    let expected = 1.0 + 1.0 + 14.0;
+    assert!((prior.squared_error(place) - expected).abs() < 1e-9);
+    assert!((wander.squared_error(place) - expected).abs() < 1e-9);
+    let blocks = wander.normal_blocks(place, |_| 1.0);
+    assert_eq!(blocks.from_gradient, -blocks.to_gradient);
+    assert!(CalibrationInformation::of_variances(0.0, 1.0, &bias).is_err());
+    assert!(CalibrationInformation::of_variances(f64::NAN, 1.0, &bias).is_err());
+}
+
 #[test]
 fn a_weight_multiplies_all_blocks() {
     let error = Isometry3::new(Vector3::new(0.3, 0.1, -0.2), Vector3::new(0.1, 0.2, 0.3));
     let from = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(-0.4, 0.2, 0.1));
     for case in cases(from, from * error, error, [0.5, 0.7, 1.1, 1.3, 1.7, 1.9]) {
-        let whole = case
-            .link
-            .normal_blocks(&case.from.pose, &case.to.pose, |_| 1.0);
-        let half = case
-            .link
-            .normal_blocks(&case.from.pose, &case.to.pose, |_| 0.5);
+        let (whole, half) = (case.blocks(1.0), case.blocks(0.5));
         assert!((whole.to_to - half.to_to * 2.0).norm() < 1e-12);
         assert!((whole.to_from - half.to_from * 2.0).norm() < 1e-12);
         assert!((whole.from_gradient - half.from_gradient * 2.0).norm() < 1e-12);

@@ -7,7 +7,5 @@
 
 mod covariance; // how sure the map is
 mod doubt; // links that are false
-mod incremental; // relaxation as the map grows
-mod innovation; // what a map expects of a measurement
 mod relaxation; // relaxation of a whole map
 mod worlds; // maps with a known truth

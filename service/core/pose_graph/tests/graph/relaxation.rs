@@ -270,3 +270,32 @@ fn an_empty_map_and_a_map_without_links_relax() {
     assert!(map.relax(&from(Start::RotationFirst)).has_converged);
     assert_eq!(map.pose(node), &Isometry3::identity());
 }
+
+/// A link that is switched off says nothing, whatever it joins; switched on again it counts as any
+/// other.
+#[test]
+fn a_link_that_is_switched_off_leaves_no_trace() {
+    let world = Rounds::new(61, Freedom::Planar, 0.05);
+    let (map, nodes) = world.map(&world.dead_reckoned());
+    let relaxed = |mut map: PoseGraph| {
+        map.relax(&RelaxationSettings::default());
+        let poses = nodes.iter().map(|&node| *map.pose(node));
+        poses.collect::<Vec<_>>()
+    };
+    let mut bent = map.clone();
+    let false_link = Link::Between {
+        from: nodes[3],
+        to: nodes[40],
+        transform: Isometry3::identity(),
+        information: Rounds::information(),
+    };
+    let link = bent.add_link(false_link, Kernel::Gaussian).unwrap();
+    let with = relaxed(bent.clone());
+    bent.switch_off(link);
+    assert!(!bent.is_on(link) && bent.digest() != map.digest());
+    let without = relaxed(bent.clone());
+    assert_eq!(without, relaxed(map), "to the last bit");
+    bent.switch_on(link);
+    assert_eq!(relaxed(bent), with);
+    assert_ne!(with, without);
+}

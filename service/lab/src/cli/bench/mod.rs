@@ -3,10 +3,12 @@
 mod descriptors;
 mod http;
 mod ingest;
+mod life;
 mod live;
 mod load;
 mod recall;
 mod step;
+mod touch;
 
 use clap::Subcommand;
 
@@ -18,6 +20,10 @@ pub(in crate::cli) enum BenchCommand {
     Recall(recall::RecallArgs),
     /// Recall of places by a descriptor, at different numbers of places.
     Descriptors(descriptors::DescriptorsArgs),
+    /// A touch and its answer, at different numbers of objects.
+    Touch(touch::TouchArgs),
+    /// Memory and cost of a sample as a team goes on and on.
+    Life(life::LifeArgs),
     /// Samples that become durable, beside the raw rate of the same messages.
     Ingest(ingest::IngestArgs),
     /// Answers to "where is this agent" while samples come in, beside a bare handler.
@@ -32,6 +38,8 @@ pub(super) fn run(command: &BenchCommand) -> anyhow::Result<()> {
         BenchCommand::Step(args) => step::run(args),
         BenchCommand::Recall(args) => recall::run(args),
         BenchCommand::Descriptors(args) => descriptors::run(args),
+        BenchCommand::Touch(args) => touch::run(args),
+        BenchCommand::Life(args) => life::run(args),
         BenchCommand::Ingest(args) => match args.live {
             Some(live_streams) => live::run(args, live_streams.get()),
             None => ingest::run(args),

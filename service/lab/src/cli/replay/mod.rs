@@ -1,18 +1,24 @@
 //! `cogmap-lab replay`: a recorded data set through the map, and the error of what comes out.
 
+mod arguments;
+mod case;
+mod csv;
+mod csv_waking;
+mod errors;
 mod g2o;
+mod known;
 mod mrclam;
-mod mrclam_report;
 mod offline;
 mod online;
 mod outcome;
 mod points;
-mod recorded;
-mod recorded_report;
-mod team_batch;
+mod replayed;
+mod report;
+mod scoring;
+mod setting;
+mod team;
 mod touch;
 mod tuc;
-mod tuc_samples;
 mod victoria;
 
 use clap::Subcommand;
@@ -21,13 +27,14 @@ use clap::Subcommand;
 pub(in crate::cli) enum ReplayCommand {
     /// A set in the format of UTIAS MRCLAM: odometry as motion, measurements as sightings.
     Mrclam(mrclam::MrclamArgs),
-    /// A pose graph: edges from an id to the next as motion, all others as closures that are
-    /// judged.
+    /// A pose graph: relaxed as a whole, or sent pose by pose.
     G2o(g2o::G2oArgs),
     /// A set in the format of TUC: odometry, and place matches of which many are false.
     Tuc(tuc::TucArgs),
     /// Victoria Park as text: odometry as motion, trees as landmarks.
     Victoria(victoria::VictoriaArgs),
+    /// Tables of motion, levels, views and ranges of robots, with their truth.
+    Csv(csv::CsvArgs),
     /// Objects as touches, a place and a level each: learned, and touched again with noise.
     Touch(touch::TouchArgs),
     /// Objects as points with normals: learned from some, and recognised from others in any pose.
@@ -40,6 +47,7 @@ pub(super) fn run(command: &ReplayCommand) -> anyhow::Result<()> {
         ReplayCommand::G2o(args) => g2o::run(args),
         ReplayCommand::Tuc(args) => tuc::run(args),
         ReplayCommand::Victoria(args) => victoria::run(args),
+        ReplayCommand::Csv(args) => csv::run(args),
         ReplayCommand::Touch(args) => touch::run(args),
         ReplayCommand::Points(args) => points::run(args),
     }

@@ -6,8 +6,8 @@ use std::time::Instant;
 use cogmap_proto::{SampleBatch, SpaceSettings};
 use cognitive_map::{AgentId, CognitiveMap, Record};
 
-use super::outcome::{Outcome, RobotOutcome, Timing};
-use super::team_batch::TeamBatch;
+use super::outcome::{Outcome, RobotOutcome};
+use super::team::TeamBatch;
 use cogmap::decode::{core_settings, records_of, trajectory_interval_ns};
 use cogmap::encode::{evidence, stamped};
 use cogmap::engine::{Recorder, refined_trajectories};
@@ -66,7 +66,8 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
         places: map.place_count() as u64,
         trips: map.trip_count() as u64,
         landmarks: map.landmark_count() as u64,
-        timing: Timing::of(times_s),
+        closures: Some(map.closure_count() as u64),
+        times_s,
     })
 }
 

@@ -14,7 +14,7 @@ use zenoh::qos::CongestionControl;
 use zenoh::{Session, Wait};
 
 use super::outcome::{Outcome, RobotOutcome};
-use super::team_batch::TeamBatch;
+use super::team::TeamBatch;
 
 /// Bytes under way: so few of a robot wait at the service in the order in which they came, beside
 /// those of other robots. Of who sends more, the service takes some at a time.
@@ -69,7 +69,8 @@ pub(super) fn replay(
         places: info.places,
         trips: info.trips,
         landmarks: info.landmarks,
-        timing: None,
+        closures: None,
+        times_s: Vec::new(),
     })
 }
 

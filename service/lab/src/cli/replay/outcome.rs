@@ -16,8 +16,10 @@ pub(super) struct Outcome {
     pub(super) places: u64,
     pub(super) trips: u64,
     pub(super) landmarks: u64,
-    /// Of a replay straight into the core.
-    pub(super) timing: Option<Timing>,
+    /// Closures that are believed in the end, of a replay straight into the core.
+    pub(super) closures: Option<u64>,
+    /// What each sample took in the core \[s\]; nothing of a replay through a service.
+    pub(super) times_s: Vec<f64>,
 }
 
 /// What came out of a replay for one robot.

@@ -18,13 +18,16 @@ use super::joint::Estimator;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
 use super::observers::Observers;
 use super::odometry_history::OdometryHistory;
+use super::odometry_noise::OdometryNoise;
 use super::outcome::Evidence;
 use super::parameters::Parameters;
 use super::sensor::{Sensor, SightingTarget};
+use super::sighting_pair::{Anchor, NoisyMotion};
 use super::sightings::{CrossFrameSighting, PendingSighting};
 use super::tuning::{
     ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
-    HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, OBSERVERS_MAX, PENDING_MAX, SENSOR_TARGETS_MAX,
+    HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX, PENDING_MAX,
+    SENSOR_TARGETS_MAX,
 };
 use ::state::{
     Codec, CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum, state_of_struct,
@@ -61,7 +64,31 @@ state_of_struct!(AgentFilter {
     is_stale,
     run,
     history,
-    is_planar
+    is_planar,
+    noise
+});
+state_of_struct!(NoisyMotion {
+    by_lengths,
+    by_angles,
+    as_stated
+});
+state_of_struct!(Anchor {
+    label,
+    stamp_ns,
+    seen,
+    point,
+    spread,
+    is_polar,
+    motion,
+    noise
+});
+state_of_struct!(OdometryNoise {
+    log_scales,
+    information,
+    factors,
+    is_stated,
+    motion,
+    anchors as ListUpTo<NOISE_TARGETS_MAX>
 });
 state_of_struct!(AgentState {
     filter,

@@ -1,0 +1,238 @@
+//! What an agent's odometry turns out to be worth, against what it states or the settings assume.
+//!
+//! Two sightings of one landmark say how the robot moved in between, whatever the map is thought to
+//! be: the second one is expected where the first one and odometry put the landmark. What is
+//! missing there is noise of odometry's lengths and angles and of seen distances and directions,
+//! each in a proportion that the motion in between and the geometry fix:
+//!
+//! ```text
+//! ν = z₂ − h(Δ⁻¹ h⁻¹(z₁))      E ν² = V = Σ_i s_i q_i + r      i = 1 … 4
+//! ```
+//!
+//! The four factors follow the likelihood of the residuals by steps of Fisher scoring in ln s, from
+//! a wide prior. The rest r is what is not known of odometry's lasting errors, and noise that
+//! odometry states:
+//!
+//! ```text
+//! g_i = s_i q_i / V      J ← J + w κ g gᵀ      ln s ← ln s + J⁻¹ w g (min(ν²/V, c²) − κ₀)
+//! ```
+//!
+//! Errors of sensors that last cancel out in a pair. The bound c keeps false sightings from
+//! counting for more than others; κ₀ and κ make that right for Gaussian noise.
+//!
+//! - **Assumed noise** is multiplied by its factor; below one, by a part of it only
+//!   ([`NOISE_CAUTION`]).
+//! - **Stated noise** counts at least. Beside it counts as much of the assumed noise as is certain
+//!   to be there, so that a robot that states too little does not bend the map.
+
+use nalgebra::{Isometry3, Matrix4, SVector, Vector4, Vector6};
+
+use super::sighting_pair::{Anchor, NoisyMotion, Residual};
+use super::tuning::{
+    NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_LOG_SCALE_MAX, NOISE_LOG_STEP_MAX, NOISE_MEMORY,
+    NOISE_PAIR_NS_MAX, NOISE_PAIR_WEIGHT, NOISE_PAIRS_MAX, NOISE_PRIOR_SD, NOISE_ROBUST,
+    NOISE_SATURATED, NOISE_SHARE_MIN, NOISE_SUM_LENGTH_MAX_M, NOISE_SURELY_SD, NOISE_TARGETS_MAX,
+};
+use crate::input::{Label, Relation};
+
+/// What is learned of the noise of an agent's odometry.
+#[derive(Clone, Debug)]
+pub(super) struct OdometryNoise {
+    /// Logarithms of the factors of variances: of lengths and angles that odometry reads, of
+    /// distances and directions that are seen.
+    pub(super) log_scales: Vector4<f64>,
+    /// What pairs of sightings said about them, as information.
+    pub(super) information: Matrix4<f64>,
+    /// What the assumed variances of lengths and of angles count for.
+    pub(super) factors: [f64; 2],
+    /// Whether odometry states its noise.
+    pub(super) is_stated: bool,
+    /// Motion since before the oldest anchor.
+    pub(super) motion: NoisyMotion,
+    /// First sightings of pairs.
+    pub(super) anchors: Vec<Anchor>,
+}
+
+impl Default for OdometryNoise {
+    fn default() -> Self {
+        Self::new(false)
+    }
+}
+
+impl OdometryNoise {
+    /// Of odometry that states its noise, or does not, and of which nothing is known yet.
+    fn new(is_stated: bool) -> Self {
+        let factor = if is_stated { 0.0 } else { 1.0 };
+        Self {
+            log_scales: Vector4::zeros(),
+            information: Matrix4::zeros(),
+            factors: [factor; 2],
+            is_stated,
+            motion: NoisyMotion::default(),
+            anchors: Vec::new(),
+        }
+    }
+
+    /// The variances of a motion with these assumed ones, and with these that it states.
+    #[inline]
+    pub(super) fn variance(
+        &self,
+        assumed: &Vector6<f64>,
+        stated: Option<&Vector6<f64>>,
+    ) -> Vector6<f64> {
+        let learned = Vector6::from_fn(|k, _| assumed[k] * self.factors[k / 3]);
+        stated.map_or(learned, |stated| stated + learned)
+    }
+
+    /// Goes on by a motion, as corrected, with the variances that are assumed and stated.
+    #[inline]
+    pub(super) fn append(
+        &mut self,
+        increment: &Isometry3<f64>,
+        assumed: &Vector6<f64>,
+        stated: Option<&Vector6<f64>>,
+    ) {
+        if self.is_stated != stated.is_some() {
+            *self = Self::new(stated.is_some());
+        }
+        if self.anchors.is_empty() {
+            return;
+        }
+        let [mut lengths, mut angles] = [*assumed; 2];
+        lengths.fixed_rows_mut::<3>(3).fill(0.0);
+        angles.fixed_rows_mut::<3>(0).fill(0.0);
+        self.motion.by_lengths.append(increment, &lengths);
+        self.motion.by_angles.append(increment, &angles);
+        if let Some(stated) = stated {
+            self.motion.as_stated.append(increment, stated);
+        }
+        let lever = &self.motion.motion().translation.vector;
+        if lever.norm_squared() > NOISE_SUM_LENGTH_MAX_M * NOISE_SUM_LENGTH_MAX_M {
+            self.forget_anchors();
+        }
+    }
+
+    /// Forgets what later sightings would be compared with.
+    pub(super) fn forget_anchors(&mut self) {
+        self.anchors.clear();
+        self.motion = NoisyMotion::default();
+    }
+
+    /// A landmark was seen. Of odometry's lasting errors, these are the variances.
+    pub(super) fn note(
+        &mut self,
+        label: &Label,
+        stamp_ns: i64,
+        relation: &Relation,
+        lasting: &SVector<f64, 5>,
+    ) {
+        let is_recent =
+            |anchor: &Anchor| stamp_ns.saturating_sub(anchor.stamp_ns) <= NOISE_PAIR_NS_MAX;
+        self.anchors.retain(is_recent);
+        if self.anchors.is_empty() {
+            self.forget_anchors();
+        }
+        let index = self
+            .anchors
+            .iter()
+            .position(|anchor| anchor.label == *label);
+        let Some(index) = index else {
+            if self.anchors.len() < NOISE_TARGETS_MAX {
+                let anchor = Anchor::new(label, stamp_ns, relation, &self.motion);
+                self.anchors.extend(anchor);
+            }
+            return;
+        };
+        let anchor = &mut self.anchors[index];
+        if anchor.stamp_ns >= stamp_ns {
+            return;
+        }
+        anchor.seen += 1;
+        // Pairs with one anchor share its error: only ones farther and farther apart count.
+        let seen = anchor.seen;
+        if !seen.is_power_of_two() {
+            return;
+        }
+        let residuals = anchor.residuals(stamp_ns, relation, &self.motion, lasting);
+        let is_saturated = residuals.iter().all(|residual| self.is_saturated(residual));
+        // The comparison is linear in angles.
+        let is_linear = |residual: &Residual| {
+            !residual.is_angle || self.expected(residual) <= NOISE_ANGLE_SD_MAX_RAD.powi(2)
+        };
+        if residuals.iter().all(is_linear) {
+            for residual in &residuals {
+                self.learn(residual);
+            }
+        }
+        if is_saturated || seen >= NOISE_PAIRS_MAX {
+            self.anchors.remove(index);
+            let anchor = Anchor::new(label, stamp_ns, relation, &self.motion);
+            self.anchors.extend(anchor);
+        }
+    }
+
+    /// Parts of a residual's variance, as learned.
+    fn weighed(&self, residual: &Residual) -> Vector4<f64> {
+        self.log_scales.map(f64::exp).component_mul(&residual.parts)
+    }
+
+    /// Variance of a residual, as learned.
+    fn expected(&self, residual: &Residual) -> f64 {
+        self.weighed(residual).sum() + residual.rest
+    }
+
+    /// Whether the motion makes most of a residual, so that a longer one would not say more.
+    fn is_saturated(&self, residual: &Residual) -> bool {
+        let weighed = self.weighed(residual);
+        let sensor = weighed[2] + weighed[3];
+        weighed[0] + weighed[1] + residual.rest > NOISE_SATURATED * sensor
+    }
+
+    fn learn(&mut self, residual: &Residual) {
+        let variance = self.expected(residual);
+        let mut share = self.weighed(residual) / variance;
+        let at_least = |k: usize| self.log_scales[k].exp().max(1.0) * residual.parts[k];
+        // What a sensor states covers errors of its own that change with the motion: noise of
+        // odometry that is small beside it cannot be told from them.
+        let sensor = at_least(2) + at_least(3);
+        for k in 0..2 {
+            if at_least(k) < NOISE_SHARE_MIN * sensor {
+                share[k] = 0.0;
+            }
+        }
+        let (most, mean, slope) = NOISE_ROBUST;
+        let surprise = (residual.square / variance).min(most * most) - mean;
+        let information =
+            self.information + share * share.transpose() * (NOISE_PAIR_WEIGHT * slope);
+        let prior = Vector4::from(NOISE_PRIOR_SD).map(|sd| sd.powi(-2));
+        let Some(root) = (information + Matrix4::from_diagonal(&prior)).cholesky() else {
+            return;
+        };
+        let step = root.solve(&(share * (NOISE_PAIR_WEIGHT * surprise)));
+        if !step.iter().all(|step| step.is_finite()) {
+            return;
+        }
+        let most = NOISE_LOG_SCALE_MAX;
+        self.log_scales = self.log_scales.zip_map(&step, |log, step| {
+            let step = step.clamp(-NOISE_LOG_STEP_MAX, NOISE_LOG_STEP_MAX);
+            (log + step).clamp(-most, most)
+        });
+        self.information = information * (1.0 - 1.0 / NOISE_MEMORY);
+        let variances = root.inverse().diagonal();
+        self.factors = [0, 1].map(|k| self.factor(k, variances[k].sqrt()));
+    }
+
+    /// What assumed noise counts for, where the logarithm of its factor is known to a deviation.
+    fn factor(&self, component: usize, sd: f64) -> f64 {
+        let log = self.log_scales[component];
+        if self.is_stated {
+            let surely = |log: f64, sd: f64| (log - NOISE_SURELY_SD * sd).exp();
+            // Before anything was seen, nothing is certain.
+            (surely(log, sd) - surely(0.0, NOISE_PRIOR_SD[component])).max(0.0)
+        } else if log < 0.0 {
+            (log * NOISE_CAUTION).exp()
+        } else {
+            log.exp()
+        }
+    }
+}

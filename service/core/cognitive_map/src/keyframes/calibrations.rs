@@ -1,0 +1,125 @@
+//! The calibrations of the agents' odometry over the past, as nodes of a pose graph.
+
+use nalgebra::{SVector, Vector3};
+
+use super::agent_track::AgentTrack;
+use super::chains::Chains;
+use super::tuning;
+use pose_graph::{
+    CalibrationId, CalibrationInformation, Freedom, Kernel, Lengths, Link, PoseGraph,
+};
+
+/// The calibration nodes of a pose graph.
+#[derive(Debug, Default)]
+pub(super) struct Calibrations {
+    /// By keyframe, that of the motion to it.
+    of_motion: Vec<Option<CalibrationId>>,
+    /// By agent, the latest one.
+    latest: Vec<Option<CalibrationId>>,
+}
+
+impl Calibrations {
+    /// Adds the calibrations of all agents: one for every few motions of an agent, from the first
+    /// one on, which is as the estimator has learned it by now, as far off as the space's settings
+    /// admit; each later one as far from the one before as it may have changed since.
+    ///
+    /// Without lasting errors, by the settings, there are none. Where lengths are known, they are as
+    /// the estimator has learned them by now.
+    pub(super) fn add(
+        chains: &Chains,
+        prior_sd: &SVector<f64, 5>,
+        lengths: Lengths,
+        map: &mut PoseGraph,
+    ) -> Self {
+        let mut all = Self {
+            of_motion: vec![None; chains.keyframes.numbers() as usize],
+            latest: vec![None; chains.tracks.len()],
+        };
+        if prior_sd.iter().all(|sd| *sd == 0.0) {
+            return all;
+        }
+        for (track, agent) in chains.tracks.iter().zip(0..) {
+            if track.is_in_map() {
+                let latest = all.add_agent(chains, (agent, track), prior_sd, lengths, map);
+                all.latest[agent as usize] = latest;
+            }
+        }
+        all
+    }
+
+    /// The calibration of the motion to a keyframe.
+    pub(super) fn of_motion(&self, keyframe: u32) -> Option<CalibrationId> {
+        self.of_motion.get(keyframe as usize).copied().flatten()
+    }
+
+    /// The latest calibration of an agent.
+    pub(super) fn latest(&self, agent: u32) -> Option<CalibrationId> {
+        self.latest.get(agent as usize).copied().flatten()
+    }
+
+    /// Adds the calibrations of an agent; answers the latest.
+    fn add_agent(
+        &mut self,
+        chains: &Chains,
+        (agent, track): (u32, &AgentTrack),
+        prior_sd: &SVector<f64, 5>,
+        lengths: Lengths,
+        map: &mut PoseGraph,
+    ) -> Option<CalibrationId> {
+        let freedom = if track.is_planar {
+            Freedom::Planar
+        } else {
+            Freedom::Full
+        };
+        let learned = track.calibrated.calibration.in_graph();
+        let expected = match lengths {
+            Lengths::Estimated => learned,
+            // What the estimator has learned of rotations may be by closures that are judged here.
+            Lengths::Known => pose_graph::Calibration {
+                length: learned.length,
+                ..pose_graph::Calibration::default()
+            },
+        };
+        let prior = prior_sd.component_mul(prior_sd);
+        let mut newest = None;
+        let (mut n_motions, mut wander) = (0, SVector::zeros());
+        let mut number = chains.first(agent);
+        while let Some(keyframe) = chains.keyframes.get(number) {
+            let calibrated = &keyframe.calibrated;
+            let node = newest.filter(|_| n_motions < tuning::CALIBRATED_TOGETHER);
+            let node = node.unwrap_or_else(|| {
+                let node = map.add_calibration(&expected, freedom, lengths);
+                let link = match newest {
+                    None => Link::CalibrationPrior {
+                        calibration: node,
+                        at: expected,
+                        information: information(&prior),
+                    },
+                    Some(from) => Link::CalibrationWander {
+                        from,
+                        to: node,
+                        information: information(&(wander + prior * tuning::WANDER_MIN)),
+                    },
+                };
+                map.add_link(link, Kernel::Gaussian).ok();
+                (n_motions, wander) = (0, SVector::zeros());
+                node
+            });
+            n_motions += 1;
+            wander += calibrated.wander;
+            newest = Some(node);
+            self.of_motion[number as usize] = newest;
+            number = keyframe.next;
+        }
+        newest
+    }
+}
+
+/// Information of variances of a calibration's components; those that the settings exclude are held
+/// by a variance next to nothing.
+fn information(variances: &SVector<f64, 5>) -> CalibrationInformation {
+    let least = variances.map(|variance| variance.max(tuning::CALIBRATION_VARIANCE_MIN));
+    let bias: Vector3<f64> = least.fixed_rows::<3>(2).into_owned();
+    CalibrationInformation::of_variances(least[0], least[1], &bias)
+        .expect("variances above zero have an inverse")
+}

@@ -1,0 +1,115 @@
+//! What a relaxation of the keyframe graph comes to.
+
+use nalgebra::Isometry3;
+
+use super::agent_track::AgentTrack;
+use super::constraint::{ClosureState, Constraint};
+use super::graph::KeyframeGraph;
+use super::keyframe::Keyframe;
+use super::relaxation::Correction;
+use crate::estimator::ExternalEstimate;
+use state::{CorruptState, Digest, NONE, State, StateReader, StateWriter};
+use state::{read_list, state_of_struct, write_list};
+
+/// What a relaxation changes in the graph that it is of. A pure function of that graph.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RelaxationOutcome {
+    /// The keyframes that lie elsewhere, by number, with their poses in the map.
+    pub(super) poses: Vec<(u32, Isometry3<f64>)>,
+    /// The closures that are in another state, by number.
+    pub(super) states: Vec<(u32, ClosureState)>,
+    /// The agents whose odometry has another noise than it had, with the factors of their
+    /// rotations' noise.
+    pub(super) turn_noises: Vec<(u32, f64)>,
+    /// The poses of the agents, as they were in the graph.
+    pub(super) corrections: Vec<Correction>,
+}
+
+impl RelaxationOutcome {
+    /// Of a graph.
+    pub(super) fn of(graph: &KeyframeGraph) -> Self {
+        let mut relaxed = graph.clone();
+        let corrections = relaxed.relax();
+        let moved = |(number, is): (u32, &Keyframe)| {
+            let was = graph.chains.keyframes.get(number)?;
+            let is_moved = (was.pose, was.is_in_map) != (is.pose, is.is_in_map);
+            (is.is_in_map && is_moved).then_some((number, is.pose))
+        };
+        let judged = |(number, is): (u32, &Constraint)| {
+            let was = graph.constraints.slab.get(number)?;
+            (was.state != is.state).then_some((number, is.state))
+        };
+        let learned = |(agent, (was, is)): (u32, (&AgentTrack, &AgentTrack))| {
+            (was.turn_noise.to_bits() != is.turn_noise.to_bits()).then_some((agent, is.turn_noise))
+        };
+        let tracks = { graph.chains.tracks.iter() }.zip(relaxed.chains.tracks.iter());
+        let turn_noises = (0..).zip(tracks).filter_map(learned).collect();
+        Self {
+            turn_noises,
+            poses: { relaxed.chains.keyframes.iter() }
+                .filter_map(moved)
+                .collect(),
+            states: { relaxed.constraints.slab.iter() }
+                .filter_map(judged)
+                .collect(),
+            corrections,
+        }
+    }
+
+    /// Whether it changes nothing.
+    pub(super) fn is_empty(&self) -> bool {
+        self.poses.is_empty()
+            && self.states.is_empty()
+            && self.turn_noises.is_empty()
+            && self.corrections.is_empty()
+    }
+
+    /// The pose that it gives a keyframe, if it moves it.
+    pub(super) fn pose(&self, keyframe: u32) -> Option<Isometry3<f64>> {
+        let at = self.poses.binary_search_by_key(&keyframe, |pose| pose.0);
+        Some(self.poses[at.ok()?].1)
+    }
+
+    /// Equal outcomes have equal digests.
+    pub(super) fn digest(&self) -> Digest {
+        let mut out = StateWriter::default();
+        self.write(&mut out);
+        out.digest()
+    }
+
+    /// Whether one that was read from a checkpoint of a graph with so many agents is sound.
+    pub(super) fn is_sound(&self, agents: usize) -> bool {
+        let is_agents = |correction: &Correction| (correction.agent as usize) < agents;
+        let are_agents = self.turn_noises.iter().all(|one| (one.0 as usize) < agents);
+        self.poses.is_sorted_by(|a, b| a.0 < b.0)
+            && are_agents
+            && self.corrections.iter().all(is_agents)
+    }
+}
+
+state_of_struct!(Correction { agent, estimate });
+state_of_struct!(ExternalEstimate {
+    pose,
+    covariance,
+    calibration,
+    prevails
+});
+
+impl State for RelaxationOutcome {
+    fn write(&self, out: &mut StateWriter) {
+        write_list(self.poses.iter(), out);
+        write_list(self.states.iter(), out);
+        write_list(self.turn_noises.iter(), out);
+        write_list(self.corrections.iter(), out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        // Each list is as long as the bytes that follow; their number is bounded by the graph's.
+        Ok(Self {
+            poses: read_list(input, NONE)?,
+            states: read_list(input, NONE)?,
+            turn_noises: read_list(input, NONE)?,
+            corrections: read_list(input, NONE)?,
+        })
+    }
+}

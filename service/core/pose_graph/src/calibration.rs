@@ -1,0 +1,135 @@
+//! Lasting errors of odometry, and motion as odometry read it.
+
+use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
+
+use geometry::{log_jacobian, se3};
+
+/// Lasting errors of a robot's odometry: readings are wrong by them again and again.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Calibration {
+    /// Part of a reading by which its length is too large.
+    pub length: f64,
+    /// Part of a reading by which its angle is too large.
+    pub angle: f64,
+    /// Rotation about the body axes that is read where there is none \[rad/s\].
+    pub bias_rad_s: Vector3<f64>,
+}
+
+/// Where the components of a calibration stand in a twist: length, angle, bias.
+pub(super) const CALIBRATION_AXES: [usize; 5] = [0, 1, 3, 4, 5];
+
+/// The same of a robot in the plane, whose bias is that about its z axis.
+pub(super) const PLANAR_CALIBRATION_AXES: [usize; 3] = [0, 1, 5];
+
+impl Calibration {
+    /// Its components in their places in a twist.
+    pub(super) fn components(&self) -> Vector6<f64> {
+        se3::join(
+            &Vector3::new(self.length, self.angle, 0.0),
+            &self.bias_rad_s,
+        )
+    }
+
+    /// Of components in their places in a twist.
+    pub(super) fn of_components(components: &Vector6<f64>) -> Self {
+        let (ratios, bias_rad_s) = se3::split(components);
+        Self {
+            length: ratios.x,
+            angle: ratios.y,
+            bias_rad_s,
+        }
+    }
+
+    /// As the place of a node: the ratios as a translation, the bias as a rotation vector.
+    pub(super) fn place(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Vector3::new(self.length, self.angle, 0.0).into(),
+            UnitQuaternion::from_scaled_axis(self.bias_rad_s),
+        )
+    }
+
+    /// Of the place of a node.
+    pub(super) fn of_place(place: &Isometry3<f64>) -> Self {
+        Self {
+            length: place.translation.x,
+            angle: place.translation.y,
+            bias_rad_s: place.rotation.scaled_axis(),
+        }
+    }
+}
+
+/// An even motion between two poses as odometry read it.
+///
+/// With the errors of lengths and angles c and d, the bias b, the length v and the rotation vector ω
+/// that were read, and the time T over which the body moved, it is
+///
+/// ```text
+/// exp((1 − c) v, (1 − d) ω − T b)
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    linear_m: Vector3<f64>,
+    angular_rad: Vector3<f64>,
+    moving_s: f64,
+}
+
+impl Reading {
+    /// The reading that a calibration corrects to a motion, made over `moving_s`.
+    ///
+    /// A correction by the factor 1 − c of less than `factor_min` counts as one by that.
+    pub fn corrected_to(
+        motion: &Isometry3<f64>,
+        by: &Calibration,
+        moving_s: f64,
+        factor_min: f64,
+    ) -> Self {
+        let (linear, angular) = se3::log(motion);
+        Self {
+            linear_m: linear / (1.0 - by.length).max(factor_min),
+            angular_rad: (angular + by.bias_rad_s * moving_s) / (1.0 - by.angle).max(factor_min),
+            moving_s,
+        }
+    }
+
+    /// The motion, corrected by a calibration.
+    pub fn motion(&self, calibration: &Calibration) -> Isometry3<f64> {
+        let (linear, angular) = self.corrected(calibration);
+        se3::exp(&linear, &angular)
+    }
+
+    /// Length and rotation vector of the motion.
+    fn corrected(&self, calibration: &Calibration) -> (Vector3<f64>, Vector3<f64>) {
+        let linear = self.linear_m * (1.0 - calibration.length);
+        let angular =
+            self.angular_rad * (1.0 - calibration.angle) - calibration.bias_rad_s * self.moving_s;
+        (linear, angular)
+    }
+
+    /// How the logarithm of M⁻¹ D changes with the calibration of the motion M, as if D moved on
+    /// its right: D exp(C c). `error` is M⁻¹ D. The columns are those of [`CALIBRATION_AXES`].
+    ///
+    /// ```text
+    /// C = Ad(error⁻¹) Jᵣ(ξ) | v  0  0  |      ξ = log M
+    ///                       | 0  ω  T  |
+    /// ```
+    pub(super) fn jacobian(
+        &self,
+        calibration: &Calibration,
+        error: &Isometry3<f64>,
+    ) -> Matrix6<f64> {
+        let (linear, angular) = self.corrected(calibration);
+        let mut by_twist = Matrix6::zeros();
+        by_twist
+            .fixed_view_mut::<3, 1>(0, 0)
+            .copy_from(&self.linear_m);
+        by_twist
+            .fixed_view_mut::<3, 1>(3, 1)
+            .copy_from(&self.angular_rad);
+        for k in 3..6 {
+            by_twist[(k, k)] = self.moving_s;
+        }
+        // Half a turn between two poses has no even motion; nothing is learned from it.
+        let right = log_jacobian(&linear, &angular).try_inverse();
+        se3::adjoint(&error.inverse()) * right.unwrap_or_else(Matrix6::zeros) * by_twist
+    }
+}

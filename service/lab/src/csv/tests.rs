@@ -1,0 +1,135 @@
+//! Tables as the format says, and what is sent of them.
+
+use cogmap_proto::{Relation, SampleBody, Target};
+use nalgebra::Vector3;
+
+use super::{Choice, TableError, TableReason, TableSet, Views};
+
+const SAMPLES: &str = "\
+t_s,agent,kind,f1,f2,f3,f4,f5,f6,f7
+0.000,a,descriptor,eye,0
+1.000,a,increment,1.0,0.0,0.000,0.5,0.1,0.000,0.05
+1.000,a,descriptor,eye,1
+1.500,a,level,light,3.5
+20.000,a,velocity,1.0,0,0.1,2.0
+20.000,a,sighting,landmark,tree,range,4.0,0.5
+20.000,a,sighting,own_sample_at_s,1.1
+2.000,b,increment,1,0,0,0,0,0,0
+";
+const TRUTH: &str = "\
+t_s,agent,x,y,z,yaw,quality
+0.000,a,5,6,0,,survey
+2.000,a,7,6,0,0.25,survey
+0.000,c,0,0,0,0,survey
+";
+
+/// A matrix of two views of two numbers, (0, 0) and (3, 4), in half precision.
+fn views() -> Vec<u8> {
+    let header = "{'descr': '<f2', 'fortran_order': False, 'shape': (2, 2), }\n";
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend(u16::try_from(header.len()).unwrap().to_le_bytes());
+    bytes.extend(header.as_bytes());
+    for number in [0x0000_u16, 0x0000, 0x4200, 0x4400] {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes
+}
+
+fn set() -> TableSet {
+    let mut set = TableSet::read(SAMPLES, TRUTH).unwrap();
+    let views = Views::read(&views()).unwrap();
+    set.views.insert("eye".to_owned(), views);
+    set
+}
+
+#[test]
+fn an_agent_sends_its_rows_a_second_later() {
+    let set = set();
+    let truth = set.agents["a"].truth.as_ref().unwrap();
+    let start = truth.start(1_000_000_000).unwrap();
+    assert_eq!(start.translation.vector, Vector3::new(6.0, 6.0, 0.0));
+    assert!((start.rotation.scaled_axis().z - 0.25).abs() < 1e-12);
+    let stream = set.stream("a", Some(&start), &Choice::default()).unwrap();
+    // The view of nothing is not sent.
+    let bodies: Vec<&SampleBody> = stream.samples().iter().map(|sample| &sample.body).collect();
+    assert_eq!(bodies.len(), 7);
+    assert_eq!(stream.samples()[0].stamp_ns, 999_999_999);
+    let SampleBody::Increment(moved) = bodies[1] else {
+        panic!("{:?}", bodies[1])
+    };
+    let noise = moved.noise.unwrap();
+    let off = Vector3::from(noise.translation_sd_m) - Vector3::new(0.1, 0.1, 1e-6);
+    assert!(off.norm() < 1e-12);
+    let SampleBody::Descriptor(view) = bodies[2] else {
+        panic!("{:?}", bodies[2])
+    };
+    assert_eq!(view.vector, [0.6, 0.8]);
+    assert!(matches!(bodies[3], SampleBody::Level(level) if (level.value - 3.5).abs() < 1e-12));
+    assert!(matches!(bodies[4], SampleBody::Velocity(velocity) if velocity.noise.is_none()));
+    assert!(matches!(bodies[5], SampleBody::Sighting(seen)
+        if matches!(seen.relation, Relation::RangeBearing { range_m: 4.0, range_sd_m: 0.5, .. })));
+    assert!(matches!(bodies[6], SampleBody::Sighting(seen) if seen.target == Target::OwnSample(1)));
+    assert_eq!(stream.samples()[6].stamp_ns, 21_000_000_000);
+}
+
+#[test]
+fn a_channel_is_left_out_by_name() {
+    let without = ["eye".to_owned(), "light".to_owned()].into();
+    let stream = set().stream("a", None, &Choice { without }).unwrap();
+    let is_percept = |body: &SampleBody| {
+        matches!(
+            body,
+            SampleBody::Level(_) | SampleBody::Descriptor(_) | SampleBody::StartPose(_)
+        )
+    };
+    assert!(
+        !stream
+            .samples()
+            .iter()
+            .any(|sample| is_percept(&sample.body))
+    );
+    assert_eq!(stream.samples().len(), 4);
+}
+
+#[test]
+fn a_bad_line_is_named() {
+    for (line, expected) in [
+        ("1,b,jump,1,2", TableReason::Kind("jump".to_owned())),
+        ("3,b,level,light,x", TableReason::NotANumber { column: 5 }),
+        (
+            "3,b,increment,1,0,0,0,-1,0,0",
+            TableReason::Negative { column: 8 },
+        ),
+        ("3,b,descriptor,eye,-1", TableReason::NotARow { column: 5 }),
+        ("1,b,level,light,1", TableReason::Backwards),
+        (
+            "3,b,level",
+            TableReason::Columns {
+                expected: 5,
+                found: 3,
+            },
+        ),
+    ] {
+        match TableSet::read(&format!("{SAMPLES}{line}\n"), TRUTH) {
+            Err(TableError::Line {
+                line: 10, reason, ..
+            }) => assert_eq!(reason, expected),
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+    assert!(matches!(
+        TableSet::read("t_s\n", ""),
+        Err(TableError::Empty)
+    ));
+}
+
+#[test]
+fn a_view_that_is_not_there_is_an_error() {
+    let set = TableSet::read(SAMPLES, "").unwrap();
+    let missing = set.stream("a", None, &Choice::default());
+    assert!(matches!(missing, Err(TableError::NoView { row: 0, .. })));
+    let mut short = views();
+    short.pop();
+    assert_eq!(Views::read(&short), None);
+    assert_eq!(Views::read(b"not a matrix"), None);
+}
