@@ -5,7 +5,7 @@ use place_filter::{Field, Found, Kernel, Measured, Seeker, SensedLevel, Support}
 
 use super::apply::Fold;
 use super::tuning::{NEAR_REACHES, OWN_SURER};
-use crate::estimator::LevelRow;
+use crate::estimator::{ExternalEstimate, LevelRow};
 use crate::event::EventKind;
 use crate::input::Level;
 use crate::memory::percept::{PerceptMap, Sensed};
@@ -155,10 +155,13 @@ impl Fold<'_> {
             return;
         };
         let is_known = is_placed && !self.is_lost(&covariance);
-        let is_taken = is_known
-            && self
-                .estimator
-                .fuse_pose(number, &found.pose, &found.covariance, &mut self.effects);
+        let estimate = ExternalEstimate {
+            pose: found.pose,
+            covariance: found.covariance,
+            calibration: None,
+            prevails: false,
+        };
+        let is_taken = is_known && self.estimator.fuse(number, &estimate, &mut self.effects);
         self.apply_effects();
         if is_taken {
             self.agent.filter.end_search();
