@@ -21,8 +21,8 @@ pub trait Field {
     /// What a place remembers of a channel that counts for whoever asks.
     fn support(&self, place: u32, channel: u8) -> Option<Support>;
 
-    /// All places, in order.
-    fn places(&self) -> Box<dyn Iterator<Item = u32> + '_>;
+    /// All places from one on, in order.
+    fn places_from(&self, first: u32) -> Box<dyn Iterator<Item = u32> + '_>;
 
     /// Extent of the box about all places along each axis \[m\].
     fn extent_m(&self) -> Vector3<f64>;

@@ -88,7 +88,13 @@ impl PlaceFilter {
         self.senses.judge(measured)
     }
 
-    /// Where an agent is that is not known about, once that is sure.
+    /// Whether a search goes on with the next record.
+    pub fn is_searching(&self) -> bool {
+        self.search.is_under_way()
+    }
+
+    /// Goes on to search an agent that is not known about, by a part of bounded work; answers where
+    /// it is once that is sure.
     pub fn seek(&mut self, seeker: &Seeker<'_>, field: &dyn Field) -> Option<Found> {
         self.search.seek(&self.window, seeker, field)
     }

@@ -4,6 +4,7 @@ mod field;
 mod filter;
 mod follow;
 mod kernel;
+mod linear;
 mod prediction;
 mod search;
 mod trace;

@@ -62,8 +62,8 @@ pub(crate) fn predict(
             if column == row {
                 entry += kernel.nugget + kernel.squared_slope() * support.spread_m2;
             }
-            for k in 0..column {
-                entry -= lower[row][k] * lower[column][k];
+            for (own, other) in lower[row].iter().zip(&lower[column]).take(column) {
+                entry -= own * other;
             }
             lower[row][column] = if column == row {
                 entry.max(1e-9 * kernel.sill).sqrt()

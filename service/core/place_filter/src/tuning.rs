@@ -11,9 +11,12 @@ pub(crate) mod channel {
     /// Pairs at a distance after which its mean is used.
     pub(crate) const PAIRS_MIN: f64 = 8.0;
     /// Pairs after which further ones replace what was long ago.
-    pub(crate) const PAIRS_MAX: f64 = 2000.0;
+    pub(crate) const PAIRS_MAX: f64 = 20_000.0;
     /// Levels after which the model is fitted again.
     pub(crate) const REFIT: u64 = 32;
+    /// Error of the mean of pairs at a distance, as a part of the variance, that is added to one in
+    /// proportion to it: no field is quite like the model.
+    pub(crate) const SPREAD_MIN: f64 = 0.01;
     /// Distances with enough pairs that a model needs.
     pub(crate) const LAGS_MIN: usize = 4;
     /// A difference counts up to so many deviations of the channel: a sensor's sentinel is none.
@@ -89,26 +92,46 @@ pub(crate) mod follow {
 
 /// Search of an agent that is not known about.
 pub(crate) mod search {
-    /// Nodes between two searches.
-    pub(crate) const FRESH: u32 = 3;
-    /// Nodes of the first one.
+    /// Nodes of the first round.
     pub(crate) const NODES_MIN: usize = 5;
     /// Nodes that are used.
-    pub(crate) const NODES: usize = 14;
+    pub(crate) const NODES: usize = 16;
+    /// Rounds without looking for places, at most, while there is a likely pose.
+    pub(crate) const ROUNDS_PER_SCAN: u32 = 6;
+    /// Places that are looked at with a record.
+    pub(crate) const SCANNED: usize = 2048;
+    /// Nodes at which places are looked for, and the way between two in correlation lengths.
+    pub(crate) const CORNERS: usize = 3;
+    /// See [`CORNERS`].
+    pub(crate) const CORNERS_APART: f64 = 0.6;
+    /// Places at which poses are seeded, for each.
+    pub(crate) const ANCHORS: usize = 64;
+    /// The same with a record.
+    pub(crate) const TURNED: usize = 10;
     /// Nodes by which a seed is judged.
     pub(crate) const CHECKS: usize = 4;
-    /// Places at which poses are seeded.
-    pub(crate) const ANCHORS: usize = 192;
-    /// Headings that are tried at each.
+    /// They are neither nearer nor farther than so many correlation lengths.
+    pub(crate) const CHECK_REACH: [f64; 2] = [0.1, 2.5];
+    /// Distance by which they may be off, as a part of that of the agent from the anchor.
+    pub(crate) const CHECK_BESIDE: f64 = 0.5;
+    /// Headings that are tried at each place.
     pub(crate) const HEADINGS: u32 = 16;
     /// Distance of the agent from the anchor, in correlation lengths.
     pub(crate) const BESIDE: f64 = 0.35;
     /// Seeds that are refined.
-    pub(crate) const SEEDS: usize = 12;
-    /// Hypotheses that are kept.
-    pub(crate) const KEPT: usize = 8;
-    /// Rounds of a refinement.
+    pub(crate) const SEEDS: usize = 14;
+    /// Log odds from which on a pose is worth another look \[nats\].
+    pub(crate) const HOPELESS: f64 = -8.0;
+    /// Poses that are kept.
+    pub(crate) const KEPT: usize = 6;
+    /// Poses that are weighed with a record, and of those that are doubted.
+    pub(crate) const WEIGHED: usize = 1;
+    /// See [`WEIGHED`].
+    pub(crate) const DOUBTED: usize = 2;
+    /// Steps of a refinement.
     pub(crate) const ROUNDS: usize = 3;
+    /// Its longest step \[m\].
+    pub(crate) const STEP_MAX_M: f64 = 1.0;
     /// Poses are the same up to so many correlation lengths, and radians.
     pub(crate) const SAME: (f64, f64) = (0.5, 0.5);
     /// Before a pose is believed, it is shifted so far along each axis, in correlation lengths,
@@ -118,26 +141,57 @@ pub(crate) mod search {
     pub(crate) const TURNS_RAD: [f64; 3] = [1.6, 3.1, -1.6];
     /// A refinement has come to its end with a step of this length \[m, rad\].
     pub(crate) const SETTLED: f64 = 0.1;
-    /// What the map leaves open goes together over this part of a correlation length.
-    pub(crate) const ALIKE: f64 = 0.4;
-    /// A residual counts up to so many deviations, and loses weight from so many (Huber 1964).
-    pub(crate) const FAR_SD: f64 = 4.0;
-    /// See [`FAR_SD`].
+    /// A residual loses weight from so many deviations on (Huber 1964).
     pub(crate) const HUBER_SD: f64 = 2.0;
     /// Probability that a sensor of an agent lies.
     pub(crate) const LIES: f64 = 0.02;
-    /// Standard deviation of the vertical \[rad\].
-    pub(crate) const TILT_SD_RAD: f64 = 0.05;
+    /// Standard deviation of the vertical when a search begins, and at most \[rad\].
+    pub(crate) const TILT_SD_RAD: (f64, f64) = (0.07, 0.4);
+    /// Growth of its variance with the way \[rad²/m\]. Source: a modest gyroscope, a third of a
+    /// degree in a step of 0.1 m.
+    pub(crate) const TILT_PER_M: f64 = 4e-4;
     /// Error of odometry, as a part of the way.
     pub(crate) const DRIFT: f64 = 0.04;
+    /// Part of the errors of slopes that does not count as knowledge.
+    pub(crate) const DOUBT: f64 = 1.0;
     /// Log odds at which a pose is believed: one wrong answer in a thousand \[nats\].
     pub(crate) const SURE: f64 = 6.9;
     /// Least factor of the covariance by the mean of the squared residuals.
     pub(crate) const MISFIT_MIN: f64 = 0.6;
     /// Largest mean of the squared residuals of a pose that is believed, in their variances.
     pub(crate) const MISFIT_MAX: f64 = 2.0;
-    /// Supports of a prediction.
-    pub(crate) const SUPPORTS: usize = 12;
+    /// Most places about a way, where it is weighed and where it is an answer.
+    pub(crate) const SUPPORTS: usize = 48;
+    /// See [`SUPPORTS`].
+    pub(crate) const SUPPORTS_OF_ANSWER: usize = 80;
+    /// Points about a node whose nearest places are asked, and their distance in correlation
+    /// lengths; a node begins so many of them after the next one.
+    pub(crate) const STENCIL: [[f64; 3]; 20] = [
+        [1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [-1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, -1.0],
+        [1.2, 1.2, 1.2],
+        [-1.2, -1.2, 1.2],
+        [1.2, -1.2, -1.2],
+        [-1.2, 1.2, -1.2],
+        [-1.2, -1.2, -1.2],
+        [1.2, 1.2, -1.2],
+        [-1.2, 1.2, 1.2],
+        [1.2, -1.2, 1.2],
+        [2.2, 0.0, 0.0],
+        [0.0, -2.2, 0.0],
+        [0.0, 0.0, 2.2],
+        [-2.2, 0.0, 0.0],
+        [0.0, 2.2, 0.0],
+        [0.0, 0.0, -2.2],
+    ];
+    /// See [`STENCIL`].
+    pub(crate) const STENCIL_TURN: usize = 7;
+    /// See [`STENCIL`].
+    pub(crate) const BESIDE_WAY: f64 = 0.4;
     /// Largest deviation of the heading of an answer \[rad\].
     pub(crate) const HEADING_SD_MAX_RAD: f64 = 0.2;
 }

@@ -81,7 +81,7 @@ impl Variogram {
         let known: Vec<_> = (0..tuning::LAGS)
             .filter(|&lag| self.weights[lag] >= tuning::PAIRS_MIN)
             .map(|lag| {
-                let spread = self.halves[lag] + 0.05 * variance;
+                let spread = self.halves[lag] + tuning::SPREAD_MIN * variance;
                 let weight = self.weights[lag].min(500.0) / (spread * spread);
                 (self.lags_m[lag], self.halves[lag], weight)
             })
@@ -93,8 +93,7 @@ impl Variogram {
         let total: f64 = known.iter().map(|(_, _, weight)| weight).sum();
         let far = (f64::INFINITY, variance, total / known.len() as f64);
         let mut best: Option<(f64, Kernel)> = None;
-        let mut length_m = tuning::LENGTH_MIN_M;
-        for _ in 0..tuning::LENGTHS {
+        let mut attempt = |length_m: f64| {
             let rows = known.iter().chain([&far]).map(|&(lag_m, half, weight)| {
                 let ratio = lag_m / length_m;
                 (1.0 - (-0.5 * ratio * ratio).exp(), half, weight)
@@ -110,7 +109,17 @@ impl Variogram {
                 };
                 best = Some((cost, kernel));
             }
+            best.map_or(length_m, |(_, kernel)| kernel.length_m)
+        };
+        let (mut length_m, mut coarse_m) = (tuning::LENGTH_MIN_M, tuning::LENGTH_MIN_M);
+        for _ in 0..tuning::LENGTHS {
+            coarse_m = attempt(length_m);
             length_m *= tuning::LENGTH_RATIO;
+        }
+        // The same between the neighbours of the best one.
+        for step in 1..tuning::LENGTHS {
+            let part = 2.0 * f64::from(step) / f64::from(tuning::LENGTHS) - 1.0;
+            attempt(coarse_m * tuning::LENGTH_RATIO.powf(part));
         }
         best.map(|(_, kernel)| kernel)
     }

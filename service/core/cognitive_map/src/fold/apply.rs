@@ -113,7 +113,10 @@ impl Fold<'_> {
             self.end_trip(TripEnd::Gap);
         }
         match &sample.body {
-            SampleBody::Motion(motion) => return self.motion(seq, motion),
+            SampleBody::Motion(motion) => {
+                self.motion(seq, motion);
+                return self.go_on_seeking();
+            }
             SampleBody::Level(level) => self.level(level),
             SampleBody::Descriptor(descriptor) => self.descriptor(descriptor),
             SampleBody::Sighting(sighting) => self.sighting(sighting),

@@ -75,21 +75,72 @@ impl Fold<'_> {
         }
         self.agent.filter = filter;
         if !is_complete {
-            return;
+            return self.go_on_seeking();
         }
         let Some((pose, covariance)) = self.estimator.pose(number) else {
             return;
         };
-        let is_placed = self.agent.placed() && !self.is_lost(&covariance);
-        if is_placed {
+        if self.agent.placed() && !self.is_lost(&covariance) {
             self.follow(&pose, &covariance, &in_odom);
         }
+        self.seek_by_levels();
+    }
+
+    /// Goes on with a search that is under way.
+    pub(super) fn go_on_seeking(&mut self) {
+        if self.agent.filter.is_searching() {
+            self.seek_by_levels();
+        }
+    }
+
+    /// Searches for the place of an agent that does not know where it is, by a part.
+    fn seek_by_levels(&mut self) {
+        let number = self.agent_id.0;
+        let Some((pose, covariance)) = self.estimator.pose(number) else {
+            return;
+        };
+        let Some(in_odom) = self.estimator.in_odom(number) else {
+            return;
+        };
         let sd_m = axis_variance_m2(&covariance).sqrt();
+        let is_known = self.agent.placed() && !self.is_lost(&covariance);
         let field = self.levels_of(f64::INFINITY);
-        if !is_placed || self.agent.filter.is_vague(sd_m, &field) {
-            self.seek_by_levels(&in_odom);
-        } else {
+        if is_known && !self.agent.filter.is_vague(sd_m, &field) {
+            return self.agent.filter.end_search();
+        }
+        let level = UnitQuaternion::identity();
+        // One that was in the map is upright as it was, or as when it was put down.
+        let upright = [pose.rotation * in_odom.rotation.inverse(), level];
+        let is_placed = self.agent.placed();
+        let seeker = Seeker {
+            in_odom,
+            upright: if is_placed {
+                &upright[..1]
+            } else {
+                &upright[1..]
+            },
+            is_planar: self.estimator.is_planar(number),
+            sd_max_m: self.settings.field_radius_m,
+        };
+        let mut filter = std::mem::take(&mut self.agent.filter);
+        let found = filter.seek(&seeker, &self.levels_of(f64::INFINITY));
+        self.agent.filter = filter;
+        let Some(found) = found else {
+            return;
+        };
+        let estimate = ExternalEstimate {
+            pose: found.pose,
+            covariance: found.covariance,
+            calibration: None,
+            prevails: false,
+        };
+        let is_taken = is_known && self.estimator.fuse(number, &estimate, &mut self.effects);
+        self.apply_effects();
+        if is_taken {
             self.agent.filter.end_search();
+            self.update_pose();
+        } else {
+            self.found_by_levels(&found);
         }
     }
 
@@ -126,49 +177,6 @@ impl Fold<'_> {
             return self.lose_agent();
         }
         self.update_pose();
-    }
-
-    /// Searches for the place of an agent that does not know where it is.
-    fn seek_by_levels(&mut self, in_odom: &Isometry3<f64>) {
-        let number = self.agent_id.0;
-        let Some((pose, covariance)) = self.estimator.pose(number) else {
-            return;
-        };
-        let level = UnitQuaternion::identity();
-        // One that was in the map is upright as it was, or as when it was put down.
-        let upright = [pose.rotation * in_odom.rotation.inverse(), level];
-        let is_placed = self.agent.placed();
-        let seeker = Seeker {
-            in_odom: *in_odom,
-            upright: if is_placed {
-                &upright[..1]
-            } else {
-                &upright[1..]
-            },
-            is_planar: self.estimator.is_planar(number),
-            sd_max_m: self.settings.field_radius_m,
-        };
-        let mut filter = std::mem::take(&mut self.agent.filter);
-        let found = filter.seek(&seeker, &self.levels_of(f64::INFINITY));
-        self.agent.filter = filter;
-        let Some(found) = found else {
-            return;
-        };
-        let is_known = is_placed && !self.is_lost(&covariance);
-        let estimate = ExternalEstimate {
-            pose: found.pose,
-            covariance: found.covariance,
-            calibration: None,
-            prevails: false,
-        };
-        let is_taken = is_known && self.estimator.fuse(number, &estimate, &mut self.effects);
-        self.apply_effects();
-        if is_taken {
-            self.agent.filter.end_search();
-            self.update_pose();
-        } else {
-            self.found_by_levels(&found);
-        }
     }
 
     /// The agent found where it is.
@@ -234,8 +242,9 @@ impl Field for Levels<'_> {
         })
     }
 
-    fn places(&self) -> Box<dyn Iterator<Item = u32> + '_> {
-        Box::new(self.places.ids().map(|place| place.0))
+    fn places_from(&self, first: u32) -> Box<dyn Iterator<Item = u32> + '_> {
+        let places = self.places.iter_from(PlaceId(first));
+        Box::new(places.map(|(place, _)| place.0))
     }
 
     fn extent_m(&self) -> Vector3<f64> {
