@@ -145,8 +145,8 @@ pub(crate) mod search {
     pub(crate) const HUBER_SD: f64 = 2.0;
     /// Probability that a sensor of an agent lies.
     pub(crate) const LIES: f64 = 0.02;
-    /// Standard deviation of the vertical when a search begins, and at most \[rad\].
-    pub(crate) const TILT_SD_RAD: (f64, f64) = (0.07, 0.4);
+    /// Largest standard deviation of the vertical \[rad\].
+    pub(crate) const TILT_SD_MAX_RAD: f64 = 0.4;
     /// Growth of its variance with the way \[rad²/m\]. Source: a modest gyroscope, a third of a
     /// degree in a step of 0.1 m.
     pub(crate) const TILT_PER_M: f64 = 4e-4;

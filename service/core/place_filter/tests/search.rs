@@ -89,8 +89,8 @@ impl Field for Floor {
     }
 }
 
-/// Walks from somewhere, unknown to it, until it is found; answers where that was and really is, and
-/// the most questions about places that a record took.
+/// Walks from somewhere, unknown to it, until it is found; answers where that was and really is,
+/// and the most questions about places that a record took.
 fn search(floor: &Floor, records: u32) -> (Option<(Found, Isometry3<f64>)>, u32) {
     let from = Isometry3::new(Vector3::new(3.1, 2.3, 0.0), Vector3::z() * 0.8);
     let mut filter = PlaceFilter::default();
@@ -112,6 +112,7 @@ fn search(floor: &Floor, records: u32) -> (Option<(Found, Isometry3<f64>)>, u32)
         let seeker = Seeker {
             in_odom,
             upright: &[UnitQuaternion::identity()],
+            upright_sd_rad: 0.1,
             is_planar: true,
             sd_max_m: 0.25,
         };

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use place_filter::{Field, Found, Kernel, Measured, Seeker, SensedLevel, Support};
 
 use super::apply::Fold;
-use super::tuning::{NEAR_REACHES, OWN_SURER};
+use super::tuning::{NEAR_REACHES, OWN_SURER, UPRIGHT_SD_RAD};
 use crate::estimator::{ExternalEstimate, LevelRow};
 use crate::event::EventKind;
 use crate::input::Level;
@@ -118,6 +118,11 @@ impl Fold<'_> {
                 &upright[..1]
             } else {
                 &upright[1..]
+            },
+            upright_sd_rad: if is_placed {
+                UPRIGHT_SD_RAD.1
+            } else {
+                UPRIGHT_SD_RAD.0
             },
             is_planar: self.estimator.is_planar(number),
             sd_max_m: self.settings.field_radius_m,

@@ -16,8 +16,8 @@ pub(super) struct ChannelOfWay {
     factor: Lower,
     /// Weights of the values that are remembered.
     weights: Vec<f64>,
-    /// Where it was sensed, by motion alone, the way from there to its end \[m\], and the level less
-    /// the channel's mean.
+    /// Where it was sensed, by motion alone, the way from there to its end \[m\], and the level
+    /// less the channel's mean.
     felt: Vec<(Point3<f64>, f64, f64)>,
     /// Log density of these levels outside the map.
     anywhere: f64,
@@ -138,8 +138,8 @@ impl ChannelOfWay {
         })
     }
 
-    /// Where each of its levels was sensed, by motion alone, and how far odometry may be off between
-    /// there and the end of the way \[m\].
+    /// Where each of its levels was sensed, by motion alone, and how far odometry may be off from
+    /// there to the end of the way \[m\].
     pub(super) fn points(&self) -> impl Iterator<Item = (&Point3<f64>, f64)> {
         let felt = self.felt.iter();
         felt.map(|(at, way_m, _)| (at, tuning::DRIFT * way_m))

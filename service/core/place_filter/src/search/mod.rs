@@ -29,6 +29,8 @@ pub struct Seeker<'a> {
     pub in_odom: Isometry3<f64>,
     /// Rotations that may turn the frame of motion upright.
     pub upright: &'a [UnitQuaternion<f64>],
+    /// Standard deviation of that about each axis \[rad\].
+    pub upright_sd_rad: f64,
     /// Whether all of its motion was in the plane.
     pub is_planar: bool,
     /// Largest standard deviation of an answer's position \[m\].

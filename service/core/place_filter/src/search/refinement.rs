@@ -73,7 +73,10 @@ impl<'a> Way<'a> {
             channels: channels(pose, used, field, most),
             seeker,
             upright,
-            tilt_variance: tilt_variance(used.last().map_or(0.0, |node| node.way_m)),
+            tilt_variance: tilt_variance(
+                seeker.upright_sd_rad,
+                used.last().map_or(0.0, |node| node.way_m),
+            ),
             extent_m: field.extent_m(),
         })
     }
@@ -82,7 +85,8 @@ impl<'a> Way<'a> {
     /// (Laplace's approximation):
     ///
     /// ```text
-    /// ln p(levels | map) − ln p(levels | anywhere) ≈ s(x̂) − tilt²/2τ² − u²/2 + ½ ln|2πΣ| + ln p(x)
+    /// ln p(levels | map) − ln p(levels | anywhere)
+    ///     ≈ s(x̂) − tilt²/2τ² − u²/2 + ½ ln|2πΣ| + ln p(x)
     /// s = Σ ln((1 − ε) N(r; 0, C) / N(v; 0, K) + ε)
     /// ```
     ///
@@ -266,9 +270,9 @@ impl<'a> Way<'a> {
 }
 
 /// Variance of the vertical about each axis after a way \[rad²\]: gyroscopes drift.
-fn tilt_variance(way_m: f64) -> f64 {
-    let grown = tuning::TILT_PER_M * way_m;
-    (tuning::TILT_SD_RAD.0.powi(2) + grown).min(tuning::TILT_SD_RAD.1.powi(2))
+fn tilt_variance(sd_rad: f64, way_m: f64) -> f64 {
+    let grown = sd_rad.powi(2) + tuning::TILT_PER_M * way_m;
+    grown.min(tuning::TILT_SD_MAX_RAD.powi(2))
 }
 
 /// Where the vertical of the frame of motion points in the map, beside the vertical.
