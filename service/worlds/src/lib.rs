@@ -23,6 +23,7 @@
 mod dead_reckoning;
 mod eye;
 mod hand;
+mod level_field;
 mod obstacle;
 mod odometry;
 mod patroller;
@@ -40,6 +41,7 @@ mod wire;
 
 pub use dead_reckoning::{DeadReckoning, dead_reckoned};
 pub use eye::Eye;
+pub use level_field::LevelField;
 pub use obstacle::{Beacon, Cube, ObstacleWorld, SIDE_M};
 pub use odometry::{InvalidNoise, Odometer, OdometryNoise};
 pub use pure_walk::PureWalker;

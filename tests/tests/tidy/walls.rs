@@ -3,13 +3,14 @@
 use super::{assert_none, entries, read, root, sources};
 
 /// Manifests whose dependencies each have their reason beside them.
-const MANIFESTS: [&str; 15] = [
+const MANIFESTS: [&str; 16] = [
     "proto/Cargo.toml",
     "service/Cargo.toml",
     "service/core/cognitive_map/Cargo.toml",
     "service/core/geometry/Cargo.toml",
     "service/core/grid/Cargo.toml",
     "service/core/object_recognition/Cargo.toml",
+    "service/core/place_filter/Cargo.toml",
     "service/core/place_recognition/Cargo.toml",
     "service/core/pose_graph/Cargo.toml",
     "service/core/random/Cargo.toml",
@@ -23,7 +24,7 @@ const MANIFESTS: [&str; 15] = [
 
 /// Crates of the core, each with all that it may depend on: the arrows of the core, and the wall
 /// around it.
-const CORE: [(&str, &[&str]); 9] = [
+const CORE: [(&str, &[&str]); 10] = [
     ("random", &[]),
     ("state", &["nalgebra", "thiserror"]),
     ("trajectory", &["geometry", "nalgebra", "thiserror"]),
@@ -33,6 +34,7 @@ const CORE: [(&str, &[&str]); 9] = [
         "pose_graph",
         &["geometry", "nalgebra", "pulp", "state", "thiserror"],
     ),
+    ("place_filter", &["geometry", "nalgebra", "state"]),
     ("place_recognition", &["geometry", "nalgebra", "state"]),
     (
         "object_recognition",
@@ -45,6 +47,7 @@ const CORE: [(&str, &[&str]); 9] = [
             "grid",
             "nalgebra",
             "object_recognition",
+            "place_filter",
             "place_recognition",
             "pose_graph",
             "random",

@@ -1,6 +1,6 @@
 //! The box that explanations of a code are sought in.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 /// The smallest half edge of a box, as a power of two in finest spacings.
 const LEVEL_MIN: i32 = -4;
@@ -22,6 +22,11 @@ impl Extent {
             low: *position,
             high: *position,
         }
+    }
+
+    /// Its edges \[m\].
+    pub fn edges_m(&self) -> Vector3<f64> {
+        self.high - self.low
     }
 
     /// Grows to hold a position.

@@ -1,11 +1,14 @@
 //! The agent of one run: its walk, and what it reads on the way.
 
 use nalgebra::Isometry3;
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
-use super::protocol::{Percept, Protocol, SightingSettings, ViewSettings, Walk};
-use cogmap_worlds::{ObstacleWorld, Odometer, PureWalker, Scenery, Sensor, Step, Walker};
+use super::protocol::{Explored, Percept, Protocol, SightingSettings, ViewSettings, Walk};
+use cogmap_worlds::{
+    LevelField, ObstacleWorld, Odometer, PureWalker, Scenery, Sensor, Step, Walker,
+};
 use cogmap_worlds::{Reading, ReadingBody, ReadingTarget};
 
 /// Time of a step: 10 Hz, which makes 1 m/s.
@@ -15,6 +18,10 @@ const STEP_NS: i64 = 100_000_000;
 const BEARING_PER_NOISE_RAD: f64 = std::f64::consts::PI / 180.0 / 0.05;
 /// Channel of views.
 const CHANNEL: &str = "view";
+/// Channels of levels.
+const LEVELS: u64 = 4;
+/// Streams of an explorer, beyond those of the agent that walks after it.
+const EXPLORER: u64 = 10;
 /// Numbers of a view.
 const VIEW_NUMBERS: usize = 64;
 
@@ -41,6 +48,9 @@ pub(super) struct Agent {
     body: Body,
     odometer: Odometer,
     percept: Percept,
+    /// What is felt, with the deviation of its noise.
+    fields: Vec<LevelField>,
+    level_noise: f64,
     eyes: ChaCha8Rng,
     steps: u64,
 }
@@ -48,10 +58,36 @@ pub(super) struct Agent {
 impl Agent {
     /// An agent in the middle of its room. `None` where the protocol is not valid.
     pub(super) fn new(protocol: &Protocol, seed: u64) -> Option<Self> {
+        let Some(explored) = &protocol.explored else {
+            return Self::with(protocol, seed, 0, protocol.percept, None);
+        };
+        let percept = if explored.correct.sights() {
+            Percept::Sightings(SightingSettings::default())
+        } else {
+            Percept::None
+        };
+        let felt = explored.correct.feels().then_some(explored);
+        Self::with(protocol, seed, 0, percept, felt)
+    }
+
+    /// An agent that explores the room before, and both sights obstacles and feels.
+    pub(super) fn explorer(protocol: &Protocol, seed: u64) -> Option<Self> {
+        let sightings = Percept::Sightings(SightingSettings::default());
+        let felt = protocol.explored.as_ref();
+        Self::with(protocol, seed, EXPLORER, sightings, felt)
+    }
+
+    fn with(
+        protocol: &Protocol,
+        seed: u64,
+        streams: u64,
+        percept: Percept,
+        felt: Option<&Explored>,
+    ) -> Option<Self> {
         let world = protocol.environment.world(seed);
         let stream = |number| {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
-            random.set_stream(number);
+            random.set_stream(streams + number);
             random
         };
         let centre_m = world.centre_m();
@@ -64,7 +100,12 @@ impl Agent {
             scenery: Scenery::new(seed, VIEW_NUMBERS),
             body,
             odometer: Odometer::new(protocol.odometry, stream(2)).ok()?,
-            percept: protocol.percept,
+            percept,
+            fields: felt.map_or_else(Vec::new, |felt| {
+                let field = |channel| LevelField::new(seed, channel, felt.length_m);
+                (0..LEVELS).map(field).collect()
+            }),
+            level_noise: felt.map_or(0.0, |felt| felt.noise),
             eyes: stream(3),
             steps: 0,
         })
@@ -126,6 +167,15 @@ impl Agent {
                 self.look(&sightings, readings);
             }
             _ => {}
+        }
+        let (at_m, stamp_ns) = (self.pose().translation.vector, self.stamp_ns());
+        for (number, field) in self.fields.iter().enumerate() {
+            let error: f64 = self.eyes.sample(StandardNormal);
+            let body = ReadingBody::Level {
+                channel: format!("field-{number}"),
+                value: field.level(&at_m) + self.level_noise * error,
+            };
+            readings.push(Reading { stamp_ns, body });
         }
     }
 

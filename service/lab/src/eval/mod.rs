@@ -60,7 +60,8 @@ pub use experiment::{Experiment, ExperimentError};
 pub use figure::{Figure, FigureError, figures};
 pub use measure::{MEASURES, Measure};
 pub use protocol::{
-    InvalidProtocol, PAPER_P_NEW, Percept, Protocol, SightingSettings, ViewSettings, Walk,
+    Correct, Explored, InvalidProtocol, PAPER_P_NEW, Percept, Protocol, SightingSettings,
+    ViewSettings, Walk,
 };
 pub use quantity::Quantity;
 pub use report::{PaperAte, Report};

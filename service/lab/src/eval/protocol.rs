@@ -32,6 +32,54 @@ pub enum Percept {
     Sightings(SightingSettings),
 }
 
+/// What corrects the pose of an agent, in a room that another one has explored by obstacles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Correct {
+    /// Nothing.
+    None,
+    /// Levels on four channels, which places remember.
+    Places,
+    /// Obstacles.
+    Landmarks,
+    /// Both.
+    All,
+}
+
+/// A room that is explored before the walk.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Explored {
+    /// What corrects the pose of the agent that walks then.
+    pub correct: Correct,
+    /// Steps of the explorer.
+    pub steps: u64,
+    /// Correlation length of the fields \[m\].
+    pub length_m: f64,
+    /// Deviation of a level's noise; that of the fields is 1.
+    pub noise: f64,
+}
+
+impl Correct {
+    /// Its short name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Places => "places",
+            Self::Landmarks => "landmarks",
+            Self::All => "all",
+        }
+    }
+
+    /// Whether levels are felt.
+    pub(super) fn feels(self) -> bool {
+        matches!(self, Self::Places | Self::All)
+    }
+
+    /// Whether obstacles are sighted.
+    pub(super) fn sights(self) -> bool {
+        matches!(self, Self::Landmarks | Self::All)
+    }
+}
+
 /// How the room is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewSettings {
@@ -81,6 +129,8 @@ pub struct Protocol {
     pub percept: Percept,
     /// How bad its odometry is; the paper's is perfect.
     pub odometry: OdometryNoise,
+    /// Whether somebody explored the room before; nobody did in the paper.
+    pub explored: Option<Explored>,
 }
 
 /// Why a protocol cannot be followed.
@@ -106,6 +156,11 @@ pub enum InvalidProtocol {
         "sightings need a range above 0 m, an interval of at least one step and a noise from 0 to 1"
     )]
     Sighting,
+    /// An exploration that makes no sense.
+    #[error(
+        "an explorer makes at least one step, in fields of a length from 0.01 to 1000 m and with noise up to 10"
+    )]
+    Explored,
     /// No places, or too many.
     #[error("a code is measured on 1 to 5000000 places")]
     Places,
@@ -133,6 +188,7 @@ impl Protocol {
             },
             percept: Percept::None,
             odometry: OdometryNoise::none(),
+            explored: None,
         }
     }
 
@@ -145,6 +201,16 @@ impl Protocol {
         self.settings(0)?;
         if self.odometry.check().is_err() {
             return Err(InvalidProtocol::Odometry);
+        }
+        if let Some(explored) = &self.explored {
+            let length = (0.01..=1000.0).contains(&explored.length_m);
+            let noise = (0.0..=10.0).contains(&explored.noise);
+            if !length || !noise || !(1..=STEPS_MAX).contains(&explored.steps) {
+                return Err(InvalidProtocol::Explored);
+            }
+            if self.environment == Environment::GridAligned {
+                return Err(InvalidProtocol::NothingToSight);
+            }
         }
         if let Percept::Descriptor(views) = &self.percept
             && (!(0.0..=1.0).contains(&views.noise) || views.every == 0)

@@ -40,6 +40,9 @@ pub struct Report {
     pub places_max: u32,
     /// `none`, `descriptor` or `sightings`.
     pub percept: &'static str,
+    /// `none`, `places`, `landmarks` or `all`, in a room that was explored before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correct: Option<&'static str>,
     /// Odometry noise, as a share of a step.
     pub translation_noise: f64,
     /// Standard deviation of the constant scale errors of odometry.
@@ -103,6 +106,7 @@ impl Report {
                 Percept::Descriptor(_) => "descriptor",
                 Percept::Sightings(_) => "sightings",
             },
+            correct: protocol.explored.map(|explored| explored.correct.name()),
             translation_noise: protocol.odometry.translation_share,
             scale_bias: protocol.odometry.scale_bias,
             rotation_noise_deg: protocol.odometry.rotation_sd_rad.to_degrees(),

@@ -26,6 +26,8 @@ use trajectory::{StampedPose, Trajectory};
 
 /// The only agent of a map.
 const AGENT: AgentId = AgentId(0);
+/// The one that explores the room before it, if one does.
+const EXPLORER: AgentId = AgentId(1);
 /// Growth is taken over this part of the walk.
 const GROWTH_PARTS: u64 = 10;
 /// Codes are decoded at every step whose number divides by this: to search a whole room costs half
@@ -176,7 +178,7 @@ impl Trial {
             map,
             reckoning: DeadReckoning::default(),
             truth_m: Vec::new(),
-            perceives: protocol.percept != Percept::None,
+            perceives: protocol.percept != Percept::None || protocol.explored.is_some(),
             territory: Territory::new(field_radius_m),
             next_seq: 0,
             steps: 0,
@@ -188,10 +190,41 @@ impl Trial {
             name: Label::new("agent")?,
         };
         trial.map.apply(&enrol, &mut Vec::new());
+        if let Some(explored) = &protocol.explored {
+            let explorer = Agent::explorer(protocol, seed).ok_or(InvalidProtocol::Odometry)?;
+            trial.explore(explorer, explored.steps)?;
+        }
         for reading in trial.agent.start() {
             trial.apply(&reading, &mut Vec::new())?;
         }
         Ok(trial)
+    }
+
+    /// Lets an explorer walk through the room.
+    fn explore(&mut self, mut explorer: Agent, steps: u64) -> Result<(), RunError> {
+        let enrol = Record::Enrol {
+            agent: EXPLORER,
+            name: Label::new("explorer")?,
+        };
+        let mut events = Vec::new();
+        self.map.apply(&enrol, &mut events);
+        let mut readings = explorer.start();
+        let mut seq = 0;
+        for _ in 0..steps {
+            readings.extend(explorer.step());
+            for reading in readings.drain(..) {
+                let record = Record::Sample {
+                    agent: EXPLORER,
+                    session: 1,
+                    seq,
+                    sample: Sample::try_from(&reading)?,
+                };
+                seq += 1;
+                self.map.apply(&record, &mut events);
+            }
+            events.clear();
+        }
+        Ok(())
     }
 
     /// Applies a reading to the map and to dead reckoning.

@@ -16,6 +16,7 @@ use crate::memory::object::Episode;
 use crate::memory::place::PlaceId;
 use crate::memory::trip::{LegUnderWay, Recorder, TripId};
 use grid::{GridModules, GridState, octant};
+use place_filter::PlaceFilter;
 use state::state_of_struct;
 
 /// An agent of a space.
@@ -47,6 +48,8 @@ pub struct Agent {
     /// The episode with an object that is under way.
     pub(crate) episode: Option<Episode>,
     pub(crate) forgotten_matches: u64,
+    /// What it sensed lately, and what that says of where it is.
+    pub(crate) filter: PlaceFilter,
 }
 
 state_of_struct!(Agent {
@@ -65,6 +68,7 @@ state_of_struct!(Agent {
     percepts,
     episode,
     forgotten_matches,
+    filter,
 });
 
 impl Agent {
@@ -86,6 +90,7 @@ impl Agent {
             percepts: 0,
             episode: None,
             forgotten_matches: 0,
+            filter: PlaceFilter::default(),
         }
     }
 

@@ -222,6 +222,11 @@ impl Estimator {
         Some(&self.filter(agent)?.pose)
     }
 
+    /// Whether all motion of an agent so far was in its x-y plane.
+    pub fn is_planar(&self, agent: u32) -> bool {
+        self.filter(agent).is_some_and(|filter| filter.is_planar)
+    }
+
     /// Pose of an agent by motion alone since its session began.
     pub fn in_odom(&self, agent: u32) -> Option<Isometry3<f64>> {
         Some(self.filter(agent)?.history.pose())

@@ -258,3 +258,5 @@ pub(super) const COVARIANCE_ROUNDING: f64 = 1e-10;
 /// variances of whose differences it is made. Source: below that it is rounding; a measurement then
 /// adds at most 10⁴ times what was known (`docs/decisions/0027-covariances-stay-positive.md`).
 pub(super) const CONDITION_MIN: f64 = 1e-8;
+/// Deviations beyond which a level loses weight (Huber 1964). Source: that of sightings.
+pub(super) const LEVEL_HUBER_SD: f64 = 2.0;

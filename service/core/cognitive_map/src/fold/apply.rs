@@ -77,6 +77,7 @@ impl Fold<'_> {
         self.agent.stamp_ns = None;
         self.agent.still_since = None;
         self.agent.announced.restart();
+        self.agent.filter.cut();
         if before.is_some() {
             let (length_m, angle_rad) = (self.settings.restart_sd_m, self.settings.restart_sd_rad);
             let sd = Vector6::from_fn(|k, _| if k < 3 { length_m } else { angle_rad });
@@ -112,7 +113,10 @@ impl Fold<'_> {
             self.end_trip(TripEnd::Gap);
         }
         match &sample.body {
-            SampleBody::Motion(motion) => return self.motion(seq, motion),
+            SampleBody::Motion(motion) => {
+                self.motion(seq, motion);
+                return self.go_on_seeking();
+            }
             SampleBody::Level(level) => self.level(level),
             SampleBody::Descriptor(descriptor) => self.descriptor(descriptor),
             SampleBody::Sighting(sighting) => self.sighting(sighting),
@@ -139,6 +143,7 @@ impl Fold<'_> {
         }
         self.keyframes.start_pose(&self.moment(), start);
         self.keyframes.end_search(self.agent_id.0);
+        self.agent.filter.cut();
         let seq = self.agent.next_seq.saturating_sub(1);
         self.keyframes.confirm_pose(self.agent_id.0, seq);
         *self.is_map_defined = true;

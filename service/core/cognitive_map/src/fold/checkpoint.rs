@@ -46,7 +46,7 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// version 5 no searches, version 6 no other names of landmarks, version 7 none of what was joined
 /// into objects, version 8 no attachments and no kidnap tests, version 9 nobody removed or set
 /// aside, version 10 no relaxation under way and no noise of odometry.
-const VERSION: u16 = 11;
+const VERSION: u16 = 12;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

@@ -6,6 +6,7 @@ mod effects;
 mod enrolment;
 mod forgetting;
 mod header;
+mod levels;
 mod localization;
 mod motion;
 mod objects;

@@ -1,4 +1,4 @@
-//! Levels and descriptors: they teach places, and recognise them.
+//! Descriptors: they teach places, and recognise them.
 
 use nalgebra::Point3;
 
@@ -7,7 +7,7 @@ use super::tuning::{ANSWER_MIN, DRIFT_MAX, KIDNAPPED_SD};
 use crate::agent::Status;
 use crate::estimator::ExternalEstimate;
 use crate::event::EventKind;
-use crate::input::{Descriptor, Level};
+use crate::input::Descriptor;
 use crate::keyframes::Relocalised;
 use crate::memory::percept::Compared;
 use crate::memory::place::{PlaceId, confidence};
@@ -15,20 +15,6 @@ use crate::memory::trip::TripEnd;
 use geometry::PoseCovariance;
 
 impl Fold<'_> {
-    /// A level was sensed, where the sensor is.
-    pub(super) fn level(&mut self, level: &Level) {
-        self.agent.percepts += 1;
-        self.touch(|episode, objects| episode.level(level, objects));
-        let sensor = self.agent.announced.in_map() * Point3::from(*level.offset_m());
-        let Some((place, weight)) = self.answering(&sensor) else {
-            return;
-        };
-        let compared =
-            self.percepts
-                .learn_level(level.channel(), level.value(), place, weight, self.revision);
-        self.compared(place, compared);
-    }
-
     /// A descriptor was seen, where the body is.
     pub(super) fn descriptor(&mut self, descriptor: &Descriptor) {
         self.agent.percepts += 1;
@@ -83,14 +69,14 @@ impl Fold<'_> {
     }
 
     /// Whether an agent in the map is known so little that it may be anywhere.
-    fn is_lost(&self, covariance: &PoseCovariance) -> bool {
+    pub(super) fn is_lost(&self, covariance: &PoseCovariance) -> bool {
         let is_doubted = self.estimator.is_doubted(self.agent_id.0);
         let sd_m = covariance.position_sd_m();
         Status::of(self.agent, sd_m, is_doubted, self.settings) == Status::Lost
     }
 
     /// What the agent sees contradicts its estimate: it may be anywhere from now on.
-    fn lose_agent(&mut self) {
+    pub(super) fn lose_agent(&mut self) {
         let moment = self.moment();
         self.end_trip(TripEnd::Gap);
         self.end_episode();
@@ -168,7 +154,7 @@ impl Fold<'_> {
 
     /// The place that answers at a position, with its confidence; none for an agent that is not
     /// placed, whose positions are those of no map.
-    fn answering(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
+    pub(super) fn answering(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
         if !self.agent.placed() {
             return None;
         }
@@ -178,7 +164,7 @@ impl Fold<'_> {
     }
 
     /// Says how well a percept was expected, if the place remembered anything of its channel.
-    fn compared(&mut self, place: PlaceId, compared: Option<Compared>) {
+    pub(super) fn compared(&mut self, place: PlaceId, compared: Option<Compared>) {
         if let Some(compared) = compared {
             self.emit(EventKind::PerceptCompared {
                 place,

@@ -11,3 +11,12 @@ pub(super) const DRIFT_MAX: f64 = 3.0;
 /// Standard deviation of the position of an agent that was carried off, in the space's `lost_sd_m`.
 /// Without a recorded measurement.
 pub(super) const KIDNAPPED_SD: f64 = 10.0;
+/// Radius about a point in which places are looked for, in the reach of a place. Source: as far as
+/// the index goes without a scan.
+pub(super) const NEAR_REACHES: f64 = 3.4;
+/// A place that the agent itself taught counts if it was surer then by this factor of the variance.
+/// Source: at less, what it tells is mostly the agent's own error.
+pub(super) const OWN_SURER: f64 = 2.0;
+/// Standard deviation of the vertical of an agent that wakes up, put down upright, and of one that
+/// got lost \[rad\]. Source: who is lost for long was often wrong about the vertical before.
+pub(super) const UPRIGHT_SD_RAD: (f64, f64) = (0.07, 0.25);

@@ -156,6 +156,17 @@ impl KeyframeMap {
         self.graph.close_to_recognised(agent, similar, found);
     }
 
+    /// An agent was found by what it feels; `elsewhere` is its pose if it was estimated to be in the
+    /// map already. No motion leads there from what it did before.
+    pub fn found(&mut self, moment: &Moment, elsewhere: Option<&Isometry3<f64>>) {
+        if elsewhere.is_some() {
+            self.recognition.cut(moment.agent);
+            self.graph.begin_stretch(moment.agent, elsewhere);
+        }
+        self.recognition.end_search(moment.agent);
+        self.recognition.confirm_pose(moment.agent, moment.seq);
+    }
+
     /// An agent knows where it is, or begins anew: its search is over.
     pub fn end_search(&mut self, agent: u32) {
         self.recognition.end_search(agent);

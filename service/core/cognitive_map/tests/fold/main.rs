@@ -12,6 +12,7 @@ mod correction; // what others see of an agent
 mod determinism; // the same records, the same map
 mod journal; // arbitrary journals, and a robot to write readable ones
 mod landmarks; // what sightings teach
+mod levels; // where robots are by what they feel
 mod motion; // path integration against closed forms
 mod names; // landmarks that are called by other names
 mod objects; // what is taught and known again

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use cogmap_lab::eval::{
-    Environment, Experiment, PAPER_P_NEW, Percept, Protocol, Report, SightingSettings, Table,
-    ViewSettings, Walk, figures,
+    Correct, Environment, Experiment, Explored, PAPER_P_NEW, Percept, Protocol, Report,
+    SightingSettings, Table, ViewSettings, Walk, figures,
 };
 use cogmap_worlds::OdometryNoise;
 use cognitive_map::{Recruitment, SettingsValues};
@@ -32,6 +32,21 @@ pub(in crate::cli) struct RoomArgs {
     /// What the agent perceives beside its own motion.
     #[arg(long, value_enum, default_value = "none")]
     percept: PerceptKind,
+    /// What corrects the pose, in a room that another agent has explored by its obstacles: four
+    /// channels of levels that places remember, obstacles, or both. The walk is persistent, places
+    /// are recruited where none answers, and odometry errs as in docs/accuracy.md unless it is
+    /// told to err otherwise.
+    #[arg(long, value_enum, conflicts_with = "percept")]
+    correct: Option<CorrectKind>,
+    /// Steps of the explorer, with --correct.
+    #[arg(long, default_value_t = 40_000, value_name = "STEPS")]
+    explorer_steps: u64,
+    /// Distance over which levels change, with --correct [m].
+    #[arg(long, default_value_t = 1.5, value_name = "M")]
+    level_length_m: f64,
+    /// Standard deviation of a level's noise as a share of the field's, with --correct.
+    #[arg(long, default_value_t = 0.1, value_name = "SHARE")]
+    level_noise: f64,
     /// How far obstacles are sighted [m].
     #[arg(long, default_value_t = SightingSettings::default().range_max_m, value_name = "M")]
     sighting_range_m: f64,
@@ -113,6 +128,18 @@ enum WalkKind {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+enum CorrectKind {
+    /// Nothing.
+    None,
+    /// Levels, which places remember.
+    Places,
+    /// Obstacles, as landmarks.
+    Landmarks,
+    /// Both.
+    All,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum PerceptKind {
     /// Nothing.
     None,
@@ -157,15 +184,15 @@ fn protocol(environment: Environment, args: &RoomArgs) -> Protocol {
         environment,
         steps: args.steps.unwrap_or(paper.steps),
         walk: match args.walk {
-            WalkKind::Pure => Walk::Pure,
-            WalkKind::Persistent => Walk::Persistent,
+            WalkKind::Pure if args.correct.is_none() => Walk::Pure,
+            _ => Walk::Persistent,
         },
         settings: SettingsValues {
             recruitment: match args.recruit {
-                Recruit::Bernoulli => Recruitment::Bernoulli {
+                Recruit::Bernoulli if args.correct.is_none() => Recruitment::Bernoulli {
                     probability: args.p_new,
                 },
-                Recruit::Novelty => Recruitment::Novelty,
+                _ => Recruitment::Novelty,
             },
             grid_modules: args.grid_modules.unwrap_or(default.grid_modules),
             grid_spacing_m: args.grid_spacing_m.unwrap_or(default.grid_spacing_m),
@@ -186,12 +213,37 @@ fn protocol(environment: Environment, args: &RoomArgs) -> Protocol {
                 noise: args.percept_noise,
             }),
         },
-        odometry: OdometryNoise {
-            translation_share: args.translation_noise,
-            scale_bias: args.scale_bias,
-            rotation_sd_rad: args.rotation_noise_deg.to_radians(),
-            gyro_bias_rad: args.gyro_bias_deg.to_radians(),
-        },
+        odometry: odometry(args),
+        explored: args.correct.map(|correct| Explored {
+            correct: match correct {
+                CorrectKind::None => Correct::None,
+                CorrectKind::Places => Correct::Places,
+                CorrectKind::Landmarks => Correct::Landmarks,
+                CorrectKind::All => Correct::All,
+            },
+            steps: args.explorer_steps,
+            length_m: args.level_length_m,
+            noise: args.level_noise,
+        }),
+    }
+}
+
+/// How odometry errs: as told, or, where it is asked what corrects it, as in the tables of accuracy.
+fn odometry(args: &RoomArgs) -> OdometryNoise {
+    let told = OdometryNoise {
+        translation_share: args.translation_noise,
+        scale_bias: args.scale_bias,
+        rotation_sd_rad: args.rotation_noise_deg.to_radians(),
+        gyro_bias_rad: args.gyro_bias_deg.to_radians(),
+    };
+    if args.correct.is_none() || told != OdometryNoise::none() {
+        return told;
+    }
+    OdometryNoise {
+        translation_share: 0.05,
+        scale_bias: 0.01,
+        rotation_sd_rad: 0.5_f64.to_radians(),
+        gyro_bias_rad: 0.02_f64.to_radians(),
     }
 }
 

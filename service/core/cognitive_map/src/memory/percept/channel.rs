@@ -1,6 +1,7 @@
 //! Channels: what percepts are sensed on.
 
 use crate::input::Label;
+use place_filter::{Kernel, Variogram};
 use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
 
 /// Least deviation that a level is compared with, as a part of the deviation of its channel's
@@ -44,12 +45,15 @@ pub struct Channel {
     kind: ChannelKind,
     /// Of the latest levels that places remember; empty for descriptors.
     pub(super) levels: Moments,
+    /// How levels go together; empty for descriptors.
+    pub(super) variogram: Variogram,
 }
 
 state_of_struct!(Channel {
     label,
     kind,
-    levels
+    levels,
+    variogram
 });
 
 impl Channel {
@@ -60,7 +64,14 @@ impl Channel {
             label,
             kind,
             levels,
+            variogram: Variogram::default(),
         }
+    }
+
+    /// What the channel tells about a position; `None` while that is not known, or if it is
+    /// nothing.
+    pub(super) fn kernel(&self) -> Option<&Kernel> {
+        self.variogram.kernel()
     }
 
     /// A place has learned a level.

@@ -1,20 +1,50 @@
 //! What places remember of a channel of levels.
 
 use crate::memory::ids::PlaceId;
-use state::{CorruptState, Moments, SparseVec};
+use nalgebra::Vector3;
+use place_filter::Trace;
+use state::{CorruptState, Moments, SparseVec, state_of_struct};
 
 /// Places per page.
 const PAGE: usize = 64;
 
+/// What a place remembers of the channel.
+#[derive(Clone, Debug)]
+pub(crate) struct LevelTrace {
+    /// The levels that were sensed while it answered.
+    pub(crate) levels: Moments,
+    /// The same for who finds out where it is by them.
+    pub(crate) felt: Trace,
+}
+
+state_of_struct!(LevelTrace { levels, felt });
+
+/// A level that was sensed while a place answered.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sensed {
+    /// The place.
+    pub(crate) place: PlaceId,
+    /// Its confidence.
+    pub(crate) weight: f64,
+    /// The level.
+    pub(crate) value: f64,
+    /// Where it was sensed, from the place \[m\].
+    pub(crate) offset_m: Vector3<f64>,
+    /// Variance of that along an axis \[m²\].
+    pub(crate) spread_m2: f64,
+    /// The agent.
+    pub(crate) agent: u32,
+}
+
 /// What all places remember of the channel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LevelMemory {
-    traces: SparseVec<Moments, PAGE>,
+    traces: SparseVec<LevelTrace, PAGE>,
 }
 
 impl LevelMemory {
     /// What places remember, by the identifier of the place.
-    pub(super) fn traces(&self) -> &SparseVec<Moments, PAGE> {
+    pub(super) fn traces(&self) -> &SparseVec<LevelTrace, PAGE> {
         &self.traces
     }
 
@@ -24,20 +54,25 @@ impl LevelMemory {
     }
 
     /// What a place remembers.
-    pub(super) fn get(&self, place: PlaceId) -> Option<&Moments> {
+    pub(super) fn get(&self, place: PlaceId) -> Option<&LevelTrace> {
         self.traces.get(place.0 as usize)
     }
 
     /// Strengthens the association of a place and a level.
-    pub(super) fn strengthen(&mut self, place: PlaceId, value: f64, weight: f64, revision: u64) {
-        let place = place.0 as usize;
-        if let Some(levels) = self.traces.get_mut(place, revision) {
-            levels.add(value, weight);
+    pub(super) fn strengthen(&mut self, sensed: &Sensed, revision: u64) {
+        let place = sensed.place.0 as usize;
+        let (value, weight) = (sensed.value, sensed.weight);
+        let (offset_m, spread_m2) = (sensed.offset_m, sensed.spread_m2);
+        if let Some(trace) = self.traces.get_mut(place, revision) {
+            trace.levels.add(value, weight);
+            trace.felt.learn(value, offset_m, spread_m2, sensed.agent);
             return;
         }
         let mut levels = Moments::default();
         levels.add(value, weight);
-        self.traces.insert(place, levels, revision);
+        let felt = Trace::new(value, offset_m, spread_m2, sensed.agent);
+        self.traces
+            .insert(place, LevelTrace { levels, felt }, revision);
     }
 
     /// Forgets what a place remembers.
@@ -56,7 +91,8 @@ impl LevelMemory {
         value: f64,
         sd_floor: f64,
     ) -> impl Iterator<Item = (PlaceId, f64)> {
-        self.traces.iter().map(move |(place, levels)| {
+        self.traces.iter().map(move |(place, trace)| {
+            let levels = &trace.levels;
             let sd = levels.sd().max(sd_floor);
             let deviations = (value - levels.mean()) / sd;
             let likelihood = sd_floor / sd * (-0.5 * deviations * deviations).exp();

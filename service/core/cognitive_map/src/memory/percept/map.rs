@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use super::descriptor::{Block, DescriptorMemory};
-use super::level::{LEVEL_MAX, LevelMemory, surprise};
+use super::level::{LEVEL_MAX, LevelMemory, LevelTrace, Sensed, surprise};
 use super::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
 use crate::input::{Descriptor, Label};
 use crate::memory::ids::PlaceId;
-use state::{CorruptState, Moments, PageItems, PagedVec, StateWriter};
+use place_filter::{Kernel, Trace};
+use state::{CorruptState, PageItems, PagedVec, StateWriter};
 
 /// Most channels of a space. What is sensed on further ones is counted and stays in the journal.
 const CHANNELS_MAX: usize = 64;
@@ -56,16 +57,20 @@ impl PerceptMap {
         &self.channels
     }
 
-    /// A place that answers with confidence `weight` senses a level: compares, then strengthens the
-    /// association. Nothing to compare the first time.
+    /// A level is sensed while a place answers: compares, then strengthens the association. Nothing
+    /// to compare the first time.
     pub(crate) fn learn_level(
         &mut self,
         label: &Label,
-        value: f64,
-        place: PlaceId,
-        weight: f64,
+        sensed: &Sensed,
         revision: u64,
     ) -> Option<Compared> {
+        let Sensed {
+            place,
+            value,
+            weight,
+            ..
+        } = *sensed;
         if value.abs() > LEVEL_MAX {
             return None;
         }
@@ -75,14 +80,47 @@ impl PerceptMap {
         let Some(Memory::Levels(memory)) = Arc::make_mut(&mut self.memories).get_mut(index) else {
             return None;
         };
-        let compared = memory.get(place).map(|levels| Compared {
+        let compared = memory.get(place).map(|trace| Compared {
             channel,
-            percepts: levels.count(),
-            surprise: surprise(levels, value, record.level_sd_floor()),
+            percepts: trace.levels.count(),
+            surprise: surprise(&trace.levels, value, record.level_sd_floor()),
         });
-        memory.strengthen(place, value, weight, revision);
+        memory.strengthen(sensed, revision);
         record.learn_level(value, weight);
         compared
+    }
+
+    /// The channel of levels of a label; `None` for a level that no place would remember.
+    pub(crate) fn level_channel(&self, label: &Label, value: f64) -> Option<u8> {
+        let is_sense = value.abs() <= LEVEL_MAX;
+        let index = self.find(label, ChannelKind::Level).filter(|_| is_sense)?;
+        u8::try_from(index).ok()
+    }
+
+    /// A channel learns how levels go together: one, and earlier ones with their distances \[m\].
+    pub(crate) fn learn_variogram(
+        &mut self,
+        channel: u8,
+        value: f64,
+        earlier: impl Iterator<Item = (f64, f64)>,
+        revision: u64,
+    ) {
+        if let Some(channel) = self.channels.get_mut(usize::from(channel), revision) {
+            channel.variogram.learn(value, earlier);
+        }
+    }
+
+    /// What a channel tells about a position.
+    pub(crate) fn kernel(&self, channel: u8) -> Option<&Kernel> {
+        self.channels.get(usize::from(channel))?.kernel()
+    }
+
+    /// What a place remembers of a channel, for who finds out where it is.
+    pub(crate) fn trace(&self, place: PlaceId, channel: u8) -> Option<&Trace> {
+        match self.memories.get(usize::from(channel))? {
+            Memory::Levels(memory) => Some(&memory.get(place)?.felt),
+            Memory::Descriptors(_) => None,
+        }
     }
 
     /// A place that answers with confidence `weight` sees a descriptor: compares, then strengthens
@@ -192,7 +230,7 @@ impl PerceptMap {
     pub(crate) fn changed_levels(
         &self,
         since: u64,
-    ) -> impl Iterator<Item = (usize, usize, PageItems<'_, Moments>)> {
+    ) -> impl Iterator<Item = (usize, usize, PageItems<'_, LevelTrace>)> {
         let memories = self.memories.iter().enumerate();
         memories.flat_map(move |(channel, memory)| {
             let Memory::Levels(memory) = memory else {
@@ -307,7 +345,7 @@ impl Memory {
     fn recall(&self, channel: ChannelId, place: PlaceId) -> Option<Remembered> {
         let (percepts, strength, expected) = match self {
             Self::Levels(memory) => {
-                let levels = memory.get(place)?;
+                let levels = &memory.get(place)?.levels;
                 let (mean, sd) = (levels.mean(), levels.sd());
                 let expected = Expected::Level { mean, sd };
                 (levels.count(), levels.weight(), expected)

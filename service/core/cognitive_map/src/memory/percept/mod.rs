@@ -12,6 +12,7 @@ mod map;
 mod sketch;
 
 pub use channel::{Channel, ChannelId, ChannelKind};
+pub(crate) use level::Sensed;
 pub(crate) use map::{CHANNEL_PAGES_MAX, Compared, PerceptMap};
 
 use crate::input::{Descriptor, Label};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::Place;
 use super::code_search::CodeSearch;
@@ -204,6 +204,12 @@ impl PlaceMap {
             .map(|(id, place)| PlaceSummary::of(id, place, self.held.contains_key(&id)))
             .collect();
         self.summaries.set(page, merged(summaries.iter()));
+    }
+
+    /// Extent of the box about all places along each axis \[m\].
+    pub(crate) fn extent_m(&self) -> Vector3<f64> {
+        let all = self.summaries.of_all();
+        all.map_or_else(Vector3::zeros, |all| all.extent.edges_m())
     }
 
     /// A place answers up to this distance \[m\].

@@ -1,0 +1,22 @@
+#![doc = include_str!("../README.md")]
+
+mod field;
+mod filter;
+mod follow;
+mod kernel;
+mod linear;
+mod prediction;
+mod search;
+mod trace;
+mod tuning;
+mod variogram;
+mod window;
+
+pub use field::Field;
+pub use filter::{PlaceFilter, SensedLevel};
+pub use follow::{Measured, Measurement};
+pub use kernel::Kernel;
+pub use prediction::{Prediction, Support};
+pub use search::{Found, Seeker};
+pub use trace::Trace;
+pub use variogram::Variogram;

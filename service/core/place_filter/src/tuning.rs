@@ -1,0 +1,197 @@
+//! Constants: unit, meaning and source of each.
+
+/// What is learned of a channel.
+pub(crate) mod channel {
+    /// Distances at which levels are compared: the least \[m\], and the ratio of one to the next.
+    pub(crate) const LAG_MIN_M: f64 = 0.05;
+    /// See [`LAG_MIN_M`]. Source: the root of two; sixteen of them reach 13 m.
+    pub(crate) const LAG_RATIO: f64 = std::f64::consts::SQRT_2;
+    /// Number of distances.
+    pub(crate) const LAGS: usize = 16;
+    /// Pairs at a distance after which its mean is used.
+    pub(crate) const PAIRS_MIN: f64 = 8.0;
+    /// Pairs after which further ones replace what was long ago.
+    pub(crate) const PAIRS_MAX: f64 = 20_000.0;
+    /// Levels after which the model is fitted again.
+    pub(crate) const REFIT: u64 = 32;
+    /// Error of the mean of pairs at a distance, as a part of the variance, that is added to one in
+    /// proportion to it: no field is quite like the model.
+    pub(crate) const SPREAD_MIN: f64 = 0.01;
+    /// Distances with enough pairs that a model needs.
+    pub(crate) const LAGS_MIN: usize = 4;
+    /// A difference counts up to so many deviations of the channel: a sensor's sentinel is none.
+    pub(crate) const FAR: f64 = 6.0;
+    /// Levels after which one is bounded before it counts.
+    pub(crate) const LEVELS_MIN: u64 = 16;
+    /// Levels over which mean and deviation of a channel are taken, about.
+    pub(crate) const LEVELS: f64 = 20_000.0;
+    /// Shortest correlation length \[m\], number of lengths that are tried, and their ratio.
+    pub(crate) const LENGTH_MIN_M: f64 = 0.15;
+    /// See [`LENGTH_MIN_M`].
+    pub(crate) const LENGTHS: u32 = 24;
+    /// See [`LENGTH_MIN_M`]; the longest is 17 m.
+    pub(crate) const LENGTH_RATIO: f64 = 1.23;
+    /// Least part of the channel's variance that two levels at one place differ by: no sensor is
+    /// exact, and none of the models is.
+    pub(crate) const NUGGET_MIN: f64 = 1e-3;
+    /// Variance of the field, in that of the noise, from which on a channel says something.
+    pub(crate) const TELLS: f64 = 0.25;
+}
+
+/// What places remember.
+pub(crate) mod trace {
+    /// Variance of a position that nobody knows better \[m²\]: 3 cm.
+    pub(crate) const POSITION_M2: f64 = 1e-3;
+    /// Who is less sure of the position by this factor of the variance does not teach.
+    pub(crate) const LESS_SURE: f64 = 4.0;
+    /// Levels that a trace is a mean of, at most: fields change.
+    pub(crate) const LEVELS: f64 = 30.0;
+}
+
+/// Nodes of a way.
+pub(crate) mod window {
+    /// Motion between two nodes, in correlation lengths of the channel with the shortest.
+    pub(crate) const STEP: f64 = 0.2;
+    /// The same at least, at most, and where no channel is known \[m\].
+    pub(crate) const STEP_M: (f64, f64, f64) = (0.1, 0.5, 0.15);
+    /// Most nodes.
+    pub(crate) const NODES: usize = 40;
+    /// Most channels of a node.
+    pub(crate) const CHANNELS: usize = 8;
+}
+
+/// Prediction of a level.
+pub(crate) mod predict {
+    /// Most places that a level is predicted from.
+    pub(crate) const SUPPORTS: usize = 20;
+    /// They are apart by so many correlation lengths, and not farther than so many.
+    pub(crate) const APART: f64 = 0.2;
+    /// See [`APART`].
+    pub(crate) const REACH: f64 = 1.5;
+    /// A prediction that leaves more than this part of the field's variance open says nothing.
+    pub(crate) const OPEN_MAX: f64 = 0.8;
+}
+
+/// Following an agent that is known about.
+pub(crate) mod follow {
+    /// Standard deviation of a position, in correlation lengths, up to which a level corrects it:
+    /// beyond, the field is not straight enough.
+    pub(crate) const NEAR: f64 = 0.5;
+    /// Errors of interpolation are alike over so many correlation lengths.
+    pub(crate) const ALIKE: f64 = 0.8;
+    /// Part by which a level changes what is known of how well levels fit.
+    pub(crate) const RATIO_SHARE: f64 = 0.05;
+    /// One level counts for that up to this.
+    pub(crate) const RATIO_MAX: f64 = 25.0;
+    /// Evidence against a pose by one channel, at most, and by all together, from which on it is
+    /// contradicted \[nats\]. Source: one false alarm in a million; no channel alone.
+    pub(crate) const AGAINST: (f64, f64) = (10.0, 13.8);
+    /// What a single level says, at most \[nats\].
+    pub(crate) const ONE: f64 = 4.0;
+}
+
+/// Search of an agent that is not known about.
+pub(crate) mod search {
+    /// Nodes of the first round.
+    pub(crate) const NODES_MIN: usize = 5;
+    /// Nodes that are used.
+    pub(crate) const NODES: usize = 16;
+    /// Rounds without looking for places, at most, while there is a likely pose.
+    pub(crate) const ROUNDS_PER_SCAN: u32 = 6;
+    /// Places that are looked at with a record.
+    pub(crate) const SCANNED: usize = 2048;
+    /// Nodes at which places are looked for, and the way between two in correlation lengths.
+    pub(crate) const CORNERS: usize = 3;
+    /// See [`CORNERS`].
+    pub(crate) const CORNERS_APART: f64 = 0.6;
+    /// Places at which poses are seeded, for each.
+    pub(crate) const ANCHORS: usize = 64;
+    /// The same with a record.
+    pub(crate) const TURNED: usize = 10;
+    /// Nodes by which a seed is judged.
+    pub(crate) const CHECKS: usize = 4;
+    /// They are neither nearer nor farther than so many correlation lengths.
+    pub(crate) const CHECK_REACH: [f64; 2] = [0.1, 2.5];
+    /// Distance by which they may be off, as a part of that of the agent from the anchor.
+    pub(crate) const CHECK_BESIDE: f64 = 0.5;
+    /// Headings that are tried at each place.
+    pub(crate) const HEADINGS: u32 = 16;
+    /// Distance of the agent from the anchor, in correlation lengths.
+    pub(crate) const BESIDE: f64 = 0.35;
+    /// Seeds that are refined.
+    pub(crate) const SEEDS: usize = 14;
+    /// Log odds from which on a pose is worth another look \[nats\].
+    pub(crate) const HOPELESS: f64 = -8.0;
+    /// Poses that are kept.
+    pub(crate) const KEPT: usize = 6;
+    /// Poses that are weighed with a record, and of those that are doubted.
+    pub(crate) const WEIGHED: usize = 1;
+    /// See [`WEIGHED`].
+    pub(crate) const DOUBTED: usize = 2;
+    /// Steps of a refinement.
+    pub(crate) const ROUNDS: usize = 3;
+    /// Its longest step \[m\].
+    pub(crate) const STEP_MAX_M: f64 = 1.0;
+    /// Poses are the same up to so many correlation lengths, and radians.
+    pub(crate) const SAME: (f64, f64) = (0.5, 0.5);
+    /// Before a pose is believed, it is shifted so far along each axis, in correlation lengths,
+    /// and turned so far \[rad\]: no other may explain about as much.
+    pub(crate) const SHIFTS: [f64; 6] = [-3.0, -1.5, -0.8, 0.8, 1.5, 3.0];
+    /// See [`SHIFTS`].
+    pub(crate) const TURNS_RAD: [f64; 3] = [1.6, 3.1, -1.6];
+    /// A refinement has come to its end with a step of this length \[m, rad\].
+    pub(crate) const SETTLED: f64 = 0.1;
+    /// A residual loses weight from so many deviations on (Huber 1964).
+    pub(crate) const HUBER_SD: f64 = 2.0;
+    /// Probability that a sensor of an agent lies.
+    pub(crate) const LIES: f64 = 0.02;
+    /// Largest standard deviation of the vertical \[rad\].
+    pub(crate) const TILT_SD_MAX_RAD: f64 = 0.4;
+    /// Growth of its variance with the way \[rad²/m\]. Source: a modest gyroscope, a third of a
+    /// degree in a step of 0.1 m.
+    pub(crate) const TILT_PER_M: f64 = 4e-4;
+    /// Error of odometry, as a part of the way.
+    pub(crate) const DRIFT: f64 = 0.04;
+    /// Part of the errors of slopes that does not count as knowledge.
+    pub(crate) const DOUBT: f64 = 1.0;
+    /// Log odds at which a pose is believed: one wrong answer in a thousand \[nats\].
+    pub(crate) const SURE: f64 = 6.9;
+    /// Least factor of the covariance by the mean of the squared residuals.
+    pub(crate) const MISFIT_MIN: f64 = 0.6;
+    /// Largest mean of the squared residuals of a pose that is believed, in their variances.
+    pub(crate) const MISFIT_MAX: f64 = 2.0;
+    /// Most places about a way, where it is weighed and where it is an answer.
+    pub(crate) const SUPPORTS: usize = 48;
+    /// See [`SUPPORTS`].
+    pub(crate) const SUPPORTS_OF_ANSWER: usize = 80;
+    /// Points about a node whose nearest places are asked, and their distance in correlation
+    /// lengths; a node begins so many of them after the next one.
+    pub(crate) const STENCIL: [[f64; 3]; 20] = [
+        [1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [-1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, -1.0],
+        [1.2, 1.2, 1.2],
+        [-1.2, -1.2, 1.2],
+        [1.2, -1.2, -1.2],
+        [-1.2, 1.2, -1.2],
+        [-1.2, -1.2, -1.2],
+        [1.2, 1.2, -1.2],
+        [-1.2, 1.2, 1.2],
+        [1.2, -1.2, 1.2],
+        [2.2, 0.0, 0.0],
+        [0.0, -2.2, 0.0],
+        [0.0, 0.0, 2.2],
+        [-2.2, 0.0, 0.0],
+        [0.0, 2.2, 0.0],
+        [0.0, 0.0, -2.2],
+    ];
+    /// See [`STENCIL`].
+    pub(crate) const STENCIL_TURN: usize = 7;
+    /// See [`STENCIL`].
+    pub(crate) const BESIDE_WAY: f64 = 0.4;
+    /// Largest deviation of the heading of an answer \[rad\].
+    pub(crate) const HEADING_SD_MAX_RAD: f64 = 0.2;
+}
