@@ -105,7 +105,8 @@ impl Anchor {
         let duration_s = (stamp_ns - self.stamp_ns) as f64 * 1e-9;
         let lasting = by_motion * lasting_errors(&moved, duration_s, lasting);
         // A planar robot's elevations are no measurements.
-        let components = (0..3).filter(|&k| k < 2 || innovation.residual[k] != 0.0);
+        let is_planar = self.point.z == 0.0 && seen_at(relation).0.z == 0.0;
+        let components = (0..3).filter(|&k| k < 2 || !is_planar);
         let residual = |k: usize| {
             let noise = |of: &Matrix3x6<f64>| of.row(k).dot(&by_beginning.row(k)).max(0.0);
             let mut parts = Vector4::new(noise(&lengths), noise(&angles), 0.0, 0.0);

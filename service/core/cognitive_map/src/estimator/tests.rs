@@ -187,10 +187,9 @@ proptest! {
         let (there, spread_there) = run(&frame);
         let rest = (frame * here).inv_mul(&there);
         let (length_m, angle_rad) = (rest.translation.vector.norm(), rest.rotation.angle());
-        prop_assert!(length_m < 1e-6 && angle_rad < 1e-6, "{rest}");
+        prop_assert!(length_m < 1e-7 && angle_rad < 1e-7, "{rest}");
         let off = (spread_here.matrix() - spread_there.matrix()).amax();
-        // Rounding of the pairs of sightings that odometry's noise is learned from is part of it.
-        prop_assert!(off < 1e-5 * spread_here.matrix().amax(), "{off}");
+        prop_assert!(off < 1e-7 * spread_here.matrix().amax(), "{off}");
     }
 
     /// Derivatives against differences, on both sides, behind and overhead.
