@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import Callable, Generator, Iterator, List, Optional, Sequence
 
@@ -11,6 +12,12 @@ from server import Server
 
 MakeServer = Callable[..., Server]
 _SERVERS = pytest.StashKey[List[Server]]()
+
+
+def pytest_configure() -> None:
+    """A shell starts what runs in the background with SIGINT ignored, and so would be the programs
+    that the tests start and interrupt."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture
