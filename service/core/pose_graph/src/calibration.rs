@@ -60,8 +60,8 @@ impl Calibration {
 
 /// An even motion between two poses as odometry read it.
 ///
-/// With the errors of lengths and angles c and d, the bias b, the length v and the rotation vector ω
-/// that were read, and the time T over which the body moved, it is
+/// With the errors of lengths and angles c and d, the bias b, the length v and the rotation vector
+/// ω that were read, and the time T over which the body moved, it is
 ///
 /// ```text
 /// exp((1 − c) v, (1 − d) ω − T b)

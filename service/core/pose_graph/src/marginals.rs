@@ -52,8 +52,8 @@ impl Marginals<'_> {
         Some(symmetric(&block))
     }
 
-    /// Variances of a calibration's length, angle and bias \[1, 1, rad²/s²\]; of a planar robot, the
-    /// bias about z alone. `None` if the links leave it free.
+    /// Variances of a calibration's length, angle and bias \[1, 1, rad²/s²\]; of a planar robot,
+    /// the bias about z alone. `None` if the links leave it free.
     pub fn calibration(&self, calibration: CalibrationId) -> Option<(f64, f64, Vector3<f64>)> {
         let half = self.half(calibration.0)?;
         let variances = self
@@ -66,7 +66,8 @@ impl Marginals<'_> {
         ))
     }
 
-    /// Log of the determinant of the normal equations, without directions that the links leave free.
+    /// Log of the determinant of the normal equations, without directions that the links leave
+    /// free.
     pub fn log_determinant(&self) -> f64 {
         self.tree.log_determinant()
     }

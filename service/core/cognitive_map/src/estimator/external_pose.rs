@@ -144,9 +144,9 @@ impl Frame {
         self.tell_members();
     }
 
-    /// Puts a member where an external pose is, far from where it was thought to be, as unsure as that
-    /// makes its own pose. Nobody else moves: an update would, by a derivative that means nothing so
-    /// far away.
+    /// Puts a member where an external pose is, far from where it was thought to be, as unsure as
+    /// that makes its own pose. Nobody else moves: an update would, by a derivative that means
+    /// nothing so far away.
     fn put(&mut self, index: usize, intersection: &Intersection) {
         let member = &mut self.members[index];
         let pose = &mut member.state_mut().filter.pose;

@@ -23,8 +23,8 @@ impl Calibrations {
     /// one on, which is as the estimator has learned it by now, as far off as the space's settings
     /// admit; each later one as far from the one before as it may have changed since.
     ///
-    /// Without lasting errors, by the settings, there are none. Where lengths are known, they are as
-    /// the estimator has learned them by now.
+    /// Without lasting errors, by the settings, there are none. Where lengths are known, they are
+    /// as the estimator has learned them by now.
     pub(super) fn add(
         chains: &Chains,
         prior_sd: &SVector<f64, 5>,

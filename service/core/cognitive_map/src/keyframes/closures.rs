@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
 use place_recognition::{Relocalised, Revisit, SampleKey};
 
 use super::constraint::{ClosureState, Constraint, composed};
+use super::constraints::Schedule;
 use super::graph::KeyframeGraph;
 use super::instant::KeyframeOffset;
 use super::moment::Moment;
@@ -133,13 +134,19 @@ impl KeyframeGraph {
     pub fn relax(&mut self) -> Vec<Correction> {
         let schedule = std::mem::take(&mut self.constraints.schedule);
         let mut coarse = RelaxationCopy::coarse(self);
-        let judged = if coarse.accepted().next().is_none() && coarse.is_noise_open() {
-            coarse.judged_anew()
+        let is_undecided = coarse.accepted().next().is_none();
+        let mut judged = Vec::new();
+        if is_undecided && coarse.is_noise_open() && self.has_many_more_closures(&schedule) {
+            judged = coarse.judged_anew();
+            judged.retain(|copy| copy.accepted().next().is_some());
         } else {
             coarse.accept_consistent();
-            vec![coarse]
-        };
-        let best = RelaxationCopy::most_probable(judged).expect("there is one at least");
+        }
+        let is_nothing_new = is_undecided && coarse.accepted().next().is_none();
+        if is_nothing_new && judged.is_empty() && schedule.accepted == 0 {
+            return Vec::new();
+        }
+        let best = RelaxationCopy::most_probable(coarse, judged);
         let accepted = |copy: &Self| -> BTreeSet<u32> {
             let all = copy.constraints.slab.iter();
             let accepted = all.filter(|(_, constraint)| constraint.is_accepted());
@@ -151,6 +158,16 @@ impl KeyframeGraph {
         }
         self.adopt(best.copy.graph());
         best.corrections(!now.is_subset(&before))
+    }
+
+    /// Whether there are many closures, and their number has grown by two fifths, or a multiple of
+    /// that, with those that came since the last relaxation.
+    fn has_many_more_closures(&self, since: &Schedule) -> bool {
+        let all = self.constraints.slab.iter();
+        let n_now = all.filter(|(_, one)| one.is_closure()).count() as u64;
+        let n_then = n_now.saturating_sub(u64::from(since.new_closures));
+        let half_octaves = |n: u64| (n * n).checked_ilog2();
+        n_now >= tuning::CLOSURES_SUPPOSED_MIN && half_octaves(n_now) != half_octaves(n_then)
     }
 
     /// Moves the keyframes as in a relaxed coarse copy, and adopts the states of its closures.

@@ -156,8 +156,8 @@ impl KeyframeMap {
         self.graph.close_to_recognised(agent, similar, found);
     }
 
-    /// An agent was found by what it feels; `elsewhere` is its pose if it was estimated to be in the
-    /// map already. No motion leads there from what it did before.
+    /// An agent was found by what it feels; `elsewhere` is its pose if it was estimated to be in
+    /// the map already. No motion leads there from what it did before.
     pub fn found(&mut self, moment: &Moment, elsewhere: Option<&Isometry3<f64>>) {
         if elsewhere.is_some() {
             self.recognition.cut(moment.agent);

@@ -73,8 +73,8 @@ impl KeyframeGraph {
         self.relaxed_whole().0.map
     }
 
-    /// The whole past relaxed, with the closures that are accepted by now, or with all of them judged
-    /// anew by all that is known now: whichever makes the measurements more probable.
+    /// The whole past relaxed, with the closures that are accepted by now, or with all of them
+    /// judged anew by all that is known now: whichever makes the measurements more probable.
     fn relaxed_whole(&self) -> (Problem, Relaxed) {
         let mut as_it_is = RelaxationCopy::whole(self);
         let mut all = Vec::new();
@@ -82,8 +82,7 @@ impl KeyframeGraph {
             all = as_it_is.judged_anew();
             as_it_is.accept_consistent();
         }
-        all.insert(0, as_it_is);
-        let best = RelaxationCopy::most_probable(all).expect("there is one at least");
+        let best = RelaxationCopy::most_probable(as_it_is, all);
         (best.problem, best.statistics)
     }
 }

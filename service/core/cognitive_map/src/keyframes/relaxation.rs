@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::Isometry3;
 
+use super::agent_track::AgentTrack;
 use super::constraint::{ClosureState, Constraint, composed};
 use super::evidence::{Chance, log_evidence};
 use super::graph::KeyframeGraph;
@@ -28,8 +29,8 @@ pub struct Correction {
 #[derive(Clone)]
 pub(super) struct RelaxationCopy {
     graph: KeyframeGraph,
-    /// Whether only runs count that are long enough to be no mistake: where the noise of odometry is
-    /// supposed, single closures agree with some supposition.
+    /// Whether only runs count that are long enough to be no mistake: where the noise of odometry
+    /// is supposed, single closures agree with some supposition.
     only_long_runs: bool,
 }
 
@@ -142,7 +143,8 @@ impl RelaxationCopy {
         }
         // With kernels that begin wide, all closures together find the map that most of them agree
         // with.
-        let calibrating = if self.is_noise_open() {
+        let is_other = |track: &AgentTrack| track.turn_noise.to_bits() != 1.0_f64.to_bits();
+        let calibrating = if self.graph.chains.tracks.iter().any(is_other) {
             // Noise that was learned, or is supposed, is what there is beside lasting errors.
             Calibrating::Free
         } else {
@@ -230,6 +232,7 @@ impl RelaxationCopy {
     /// one of them, and those that are evident by it. Answers the number of their closures.
     fn accept_together(&mut self, runs: &[Run]) -> usize {
         let mut seeds = self.evidence(runs);
+        seeds.retain(|&(_, odds)| odds > 0.0);
         seeds.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let n_candidates = { self.closures() }
             .filter(|(_, closure)| closure.is_candidate())
@@ -290,21 +293,26 @@ impl RelaxationCopy {
         run.members.len()
     }
 
-    /// Of copies whose closures were judged in different ways, the one by which the measurements are
-    /// most probable, relaxed; of equal ones the first.
-    pub(super) fn most_probable(copies: Vec<Self>) -> Option<RelaxedCopy> {
-        if copies.len() == 1 {
-            return copies.into_iter().next().map(RelaxedCopy::of);
+    /// Of copies whose closures were judged in different ways, the one by which the measurements
+    /// are most probable, relaxed; of equal ones the first.
+    pub(super) fn most_probable(first: Self, others: Vec<Self>) -> RelaxedCopy {
+        let mut best = RelaxedCopy::of(first);
+        if others.is_empty() {
+            return best;
         }
-        let weighed = copies.into_iter().map(|copy| {
-            let relaxed = RelaxedCopy::of(copy);
-            (relaxed.copy.log_probability(&relaxed.problem), relaxed)
-        });
-        let best = weighed.reduce(|best, other| if other.0 > best.0 { other } else { best });
-        best.map(|(_, relaxed)| relaxed)
+        let mut most = best.copy.log_probability(&best.problem);
+        for other in others {
+            let other = RelaxedCopy::of(other);
+            let log_probability = other.copy.log_probability(&other.problem);
+            if log_probability > most {
+                (best, most) = (other, log_probability);
+            }
+        }
+        best
     }
 
-    /// The relaxed graph, after closures that do not fit into it were rejected. Moves the keyframes.
+    /// The relaxed graph, after closures that do not fit into it were rejected. Moves the
+    /// keyframes.
     fn relax(&mut self) -> (Problem, Relaxed) {
         let refuted_chi2 = self.graph.settings.refuted_chi2();
         let mut rounds_left = tuning::RELAXATION_ROUNDS_MAX;

@@ -105,10 +105,10 @@ impl Run {
 
     /// Log of the odds at which it is accepted.
     pub(super) fn log_odds_needed(&self) -> f64 {
-        if !self.is_long() {
-            tuning::ACCEPTED_ALONE_LOG_ODDS
-        } else {
+        if self.is_long() {
             tuning::ACCEPTED_LOG_ODDS
+        } else {
+            tuning::ACCEPTED_ALONE_LOG_ODDS
         }
     }
 
@@ -116,10 +116,10 @@ impl Run {
     /// candidates there are as many pairs as their square, and where closures are single some pairs
     /// agree by chance.
     pub(super) fn log_odds_needed_together(&self, n_candidates: usize) -> f64 {
-        if !self.is_long() {
-            2.0 * tuning::ACCEPTED_ALONE_LOG_ODDS + 2.0 * (n_candidates as f64).ln()
-        } else {
+        if self.is_long() {
             tuning::ACCEPTED_LOG_ODDS
+        } else {
+            2.0 * tuning::ACCEPTED_ALONE_LOG_ODDS + 2.0 * (n_candidates as f64).ln()
         }
     }
 

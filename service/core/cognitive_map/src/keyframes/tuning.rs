@@ -129,8 +129,8 @@ pub(super) const COARSE_PENDING_MAX: usize = 512;
 /// solver, and fewer would be as many calibrations as poses.
 pub(super) const CALIBRATED_TOGETHER: u32 = 32;
 
-/// Least change of a calibration from one to the next, as a part of the variance that is expected of
-/// it: for the information to be finite.
+/// Least change of a calibration from one to the next, as a part of the variance that is expected
+/// of it: for the information to be finite.
 pub(super) const WANDER_MIN: f64 = 1e-6;
 
 /// Least variance of a component of a calibration \[1, 1, rad²/s²\].
@@ -138,6 +138,9 @@ pub(super) const CALIBRATION_VARIANCE_MIN: f64 = 1e-12;
 
 /// Factor of an agent's noise of rotations, as closures may show it.
 pub(super) const TURN_NOISE_BOUNDS: std::ops::RangeInclusive<f64> = 0.01..=10.0;
+
+/// Fewest closures for which a noise is supposed: fewer hardly tell one from another.
+pub(super) const CLOSURES_SUPPOSED_MIN: u64 = 16;
 
 /// Factors of it with which closures are judged, where the noise is not stated: what is assumed is
 /// that of modest wheels, and good ones have a twentieth of it.

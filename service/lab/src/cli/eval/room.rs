@@ -228,7 +228,8 @@ fn protocol(environment: Environment, args: &RoomArgs) -> Protocol {
     }
 }
 
-/// How odometry errs: as told, or, where it is asked what corrects it, as in the tables of accuracy.
+/// How odometry errs: as told, or, where it is asked what corrects it, as in the tables of
+/// accuracy.
 fn odometry(args: &RoomArgs) -> OdometryNoise {
     let told = OdometryNoise {
         translation_share: args.translation_noise,
