@@ -1,13 +1,10 @@
 //! How noisy an agent's odometry is, as its loop closures show.
 
-use nalgebra::{Matrix6, Vector6};
-
 use super::chains::Chains;
 use super::evidence::Chance;
 use super::problem::{Among, Calibrating, Problem};
 use super::relaxation::RelaxationCopy;
 use super::tuning;
-use geometry::PoseCovariance;
 use pose_graph::RelaxationSettings;
 
 impl RelaxationCopy {
@@ -88,11 +85,4 @@ fn turns(chains: &Chains, agent: u32, is_planar: bool) -> f64 {
         .filter(|(_, keyframe)| !keyframe.begins);
     let axes = if is_planar { 1.0 } else { 3.0 };
     motions.count() as f64 * axes
-}
-
-/// A covariance of a motion, with a factor of the rotation's deviation.
-pub(super) fn with_turn_noise(covariance: &PoseCovariance, factor: f64) -> PoseCovariance {
-    let scale = Vector6::new(1.0, 1.0, 1.0, factor, factor, factor);
-    let scale = Matrix6::from_diagonal(&scale);
-    PoseCovariance::from_upper_part(&(scale * covariance.matrix() * scale))
 }

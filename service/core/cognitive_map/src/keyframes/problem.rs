@@ -1,12 +1,11 @@
 //! The keyframe graph as a problem of nonlinear least squares.
 
-use nalgebra::{Isometry3, Matrix6, Point3, SVector};
+use nalgebra::{Isometry3, Matrix6, Point3, SVector, Vector6};
 
 use super::calibrations::Calibrations;
 use super::constraint::{ClosureState, Constraint};
 use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
-use super::odometry_noise::with_turn_noise;
 use super::sighting::{Seen, Sighting};
 use super::tuning;
 use crate::estimator::Calibration;
@@ -256,4 +255,11 @@ fn information(covariance: &PoseCovariance, is_planar: bool) -> PoseInformation 
     PoseInformation::new(&inverse).unwrap_or_else(|_| {
         PoseInformation::new(&Matrix6::zeros()).expect("no information is no less than none")
     })
+}
+
+/// A covariance of a motion, with a factor of the rotation's deviation.
+fn with_turn_noise(covariance: &PoseCovariance, factor: f64) -> PoseCovariance {
+    let scale = Vector6::new(1.0, 1.0, 1.0, factor, factor, factor);
+    let scale = Matrix6::from_diagonal(&scale);
+    PoseCovariance::from_upper_part(&(scale * covariance.matrix() * scale))
 }
