@@ -78,10 +78,11 @@ impl KeyframeGraph {
     fn relaxed_whole(&self) -> (Problem, Relaxed) {
         let mut as_it_is = RelaxationCopy::whole(self);
         let mut all = Vec::new();
-        if as_it_is.has_closures() {
+        if as_it_is.has_pending() {
+            // What is accepted by views alone was judged by them.
             all = as_it_is.judged_anew();
-            as_it_is.accept_consistent();
         }
+        as_it_is.accept_consistent();
         let best = RelaxationCopy::most_probable(as_it_is, all);
         (best.problem, best.statistics)
     }

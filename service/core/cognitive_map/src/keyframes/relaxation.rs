@@ -66,9 +66,10 @@ impl RelaxationCopy {
         undecided
     }
 
-    /// Whether there are loop closures, of whatever state.
-    pub(super) fn has_closures(&self) -> bool {
-        self.closures().next().is_some()
+    /// Whether there are loop closures that were stated and were not accepted yet.
+    pub(super) fn has_pending(&self) -> bool {
+        self.closures()
+            .any(|(_, closure)| closure.state == ClosureState::Pending)
     }
 
     /// Whether an agent has closures, and odometry whose noise nobody states.
@@ -232,7 +233,6 @@ impl RelaxationCopy {
     /// one of them, and those that are evident by it. Answers the number of their closures.
     fn accept_together(&mut self, runs: &[Run]) -> usize {
         let mut seeds = self.evidence(runs);
-        seeds.retain(|&(_, odds)| odds > 0.0);
         seeds.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let n_candidates = { self.closures() }
             .filter(|(_, closure)| closure.is_candidate())
