@@ -232,6 +232,9 @@ impl RelaxationCopy {
     /// Accepts runs of which each is no more evident than chance, but which are evident together:
     /// one of them, and those that are evident by it. Answers the number of their closures.
     fn accept_together(&mut self, runs: &[Run]) -> usize {
+        if runs.len() < 2 {
+            return 0;
+        }
         let mut seeds = self.evidence(runs);
         seeds.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let n_candidates = { self.closures() }
