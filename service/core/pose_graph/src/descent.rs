@@ -21,6 +21,7 @@ pub(super) struct SteepestDescent {
 impl SteepestDescent {
     /// At the poses of the equations.
     pub(super) fn new(equations: &NormalEquations<'_>) -> Self {
+        equations.keep();
         let n = slot(equations.map.nodes.len(), 0, 1);
         let (mut gradient, mut curvature) = (vec![0.0; n], vec![0.0; n]);
         equations.for_each_link(|[from, to], calibration, blocks| {

@@ -1,5 +1,8 @@
 //! The normal equations of a whole graph.
 
+use std::borrow::Cow;
+use std::cell::OnceCell;
+
 use nalgebra::Isometry3;
 
 use super::elimination::{Equations, Front, number};
@@ -14,6 +17,8 @@ pub(super) struct NormalEquations<'a> {
     pub(super) poses: &'a [Isometry3<f64>],
     /// Of Geman–McClure kernels.
     pub(super) widening: f64,
+    /// The blocks of each link, where they are used again and again.
+    kept: OnceCell<Vec<Option<NormalBlocks>>>,
 }
 
 impl Equations for NormalEquations<'_> {
@@ -32,9 +37,10 @@ impl Equations for NormalEquations<'_> {
     }
 
     fn add(&self, link: u32, front: &mut Front<'_>) {
-        let Some((from, to, blocks)) = self.blocks(link) else {
+        let Some(blocks) = self.blocks(link) else {
             return;
         };
+        let (from, to) = self.map.links[link as usize].link.nodes();
         let axes = |node: u32| self.map.nodes[node as usize].axes();
         let (from, to) = ((from, axes(from)), (to, axes(to)));
         front.add(to, to, &blocks.to_to);
@@ -45,7 +51,7 @@ impl Equations for NormalEquations<'_> {
             front.add_right(from.0, from.1, 0, (-blocks.from_gradient).as_slice());
         }
         let calibration = self.map.links[link as usize].link.calibration();
-        if let Some((node, blocks)) = calibration.zip(blocks.by_calibration) {
+        if let Some((node, blocks)) = calibration.zip(blocks.by_calibration.as_ref()) {
             let own = (node, axes(node));
             front.add(own, own, &blocks.own);
             front.add(from, own, &blocks.from);
@@ -55,26 +61,51 @@ impl Equations for NormalEquations<'_> {
     }
 }
 
-impl NormalEquations<'_> {
-    /// The nodes of a link and its part of the equations; `None` if it is switched off.
-    fn blocks(&self, link: u32) -> Option<(u32, u32, NormalBlocks)> {
+impl<'a> NormalEquations<'a> {
+    /// Of a map whose nodes are at these poses.
+    pub(super) fn new(map: &'a PoseGraph, poses: &'a [Isometry3<f64>], widening: f64) -> Self {
+        Self {
+            map,
+            poses,
+            widening,
+            kept: OnceCell::new(),
+        }
+    }
+
+    /// Linearises all links once, for what goes through them several times.
+    pub(super) fn keep(&self) {
+        let all = || {
+            let links = 0..number(self.map.links.len());
+            links.map(|link| self.linearised(link)).collect()
+        };
+        self.kept.get_or_init(all);
+    }
+
+    /// The blocks of a link; `None` if it is switched off.
+    fn blocks(&self, link: u32) -> Option<Cow<'_, NormalBlocks>> {
+        match self.kept.get() {
+            Some(kept) => kept[link as usize].as_ref().map(Cow::Borrowed),
+            None => self.linearised(link).map(Cow::Owned),
+        }
+    }
+
+    fn linearised(&self, link: u32) -> Option<NormalBlocks> {
         let slot = &self.map.links[link as usize];
-        let (from, to) = slot.link.nodes();
         let blocks = || {
             let weigh = |s| slot.kernel.cost_and_weight(s, self.widening).1;
             slot.link
                 .normal_blocks(|node| &self.poses[node as usize], weigh)
         };
-        slot.is_on.then(|| (from, to, blocks()))
+        slot.is_on.then(blocks)
     }
 
     /// Hands out the nodes and the blocks of every link that is on; and the node of its
     /// calibration, if it has one.
     pub(super) fn for_each_link(&self, mut each: impl FnMut([u32; 2], Option<u32>, &NormalBlocks)) {
-        for link in 0..number(self.map.links.len()) {
-            if let Some((from, to, blocks)) = self.blocks(link) {
-                let calibration = self.map.links[link as usize].link.calibration();
-                each([from, to], calibration, &blocks);
+        for (link, slot) in (0..).zip(&self.map.links) {
+            if let Some(blocks) = self.blocks(link) {
+                let (from, to) = slot.link.nodes();
+                each([from, to], slot.link.calibration(), &blocks);
             }
         }
     }

@@ -24,11 +24,7 @@ impl PoseGraph {
     /// Covariances about the nodes' present places. Factors the whole graph once.
     pub fn marginals(&self) -> Marginals<'_> {
         let poses: Vec<_> = self.nodes.iter().map(|node| node.pose).collect();
-        let equations = NormalEquations {
-            map: self,
-            poses: &poses,
-            widening: 1.0,
-        };
+        let equations = NormalEquations::new(self, &poses, 1.0);
         let mut tree = CliqueTree::structured(&equations, self.nodes.len());
         tree.refactor(&equations, &tree.all());
         Marginals { map: self, tree }

@@ -91,11 +91,7 @@ impl PoseGraph {
     /// Of a part that nothing connects with `map` the directions that no link determines are not
     /// moved.
     pub fn relax(&mut self, settings: &RelaxationSettings) -> Relaxed {
-        let structure = NormalEquations {
-            map: self,
-            poses: &[],
-            widening: 1.0,
-        };
+        let structure = NormalEquations::new(self, &[], 1.0);
         let mut tree = CliqueTree::structured(&structure, self.nodes.len());
         let poses = match settings.start {
             Start::Here => self.nodes.iter().map(|node| node.pose).collect(),
@@ -178,11 +174,10 @@ struct Step {
 impl Descent<'_> {
     /// Solves the normal equations once, and goes as far as the cost sinks.
     fn step(&mut self) -> Step {
-        let equations = NormalEquations {
-            map: self.map,
-            poses: &self.poses,
-            widening: self.widening,
-        };
+        let equations = NormalEquations::new(self.map, &self.poses, self.widening);
+        if self.radius.is_finite() {
+            equations.keep();
+        }
         let n_undetermined = self.tree.refactor(&equations, &self.tree.all());
         let newton = self.tree.solve();
         let cost = self
