@@ -298,3 +298,62 @@ pub(crate) mod kidnap {
     /// \[rad\].
     pub(crate) const TURNED_RAD: f64 = 0.5;
 }
+
+/// The log of views.
+pub(crate) mod log {
+    /// Most views; beyond, every second one is dropped.
+    pub(crate) const VIEWS_MAX: usize = 4096;
+    /// Most numbers of a view as it is logged: longer descriptors are projected.
+    pub(crate) const NUMBERS_MAX: usize = 128;
+    /// Fewest views that say what a channel shows.
+    pub(crate) const VIEWS_MIN: usize = 96;
+    /// Fewest new views for which all are matched again, and one for so many earlier ones: the
+    /// amortised cost of a view then grows linearly with their number.
+    pub(crate) const NEW_MIN: usize = 24;
+    pub(crate) const PER_NEW: usize = 12;
+}
+
+/// The similarity of views, learned for each channel.
+pub(crate) mod similarity {
+    /// Part of the mean variance of neighbours that is added to both covariances.
+    pub(crate) const SHRINKAGE: f64 = 0.05;
+    /// Correlations of components of two views of one place that count.
+    pub(crate) const CORRELATION_MIN: f64 = 0.02;
+    pub(crate) const CORRELATION_MAX: f64 = 0.999;
+    /// Neighbours along the way that count as views of one place.
+    pub(crate) const NEIGHBOUR_LAGS: std::ops::RangeInclusive<isize> = 1..=3;
+    /// Fewest pairs of neighbours.
+    pub(crate) const NEIGHBOURS_MIN: usize = 96;
+    /// Fewest views of a session that has a mean of its own.
+    pub(crate) const SESSION_VIEWS_MIN: usize = 256;
+    /// Neighbours among which the range of a channel is found, and classes of their distances.
+    pub(crate) const RANGE_LAGS: usize = 20;
+    pub(crate) const CLASSES: usize = 20;
+    /// Distance at which a Gaussian has half its height, in its deviations.
+    pub(crate) const HALF_HEIGHT: f64 = 1.18;
+    /// Pairs of far views that are drawn.
+    pub(crate) const FAR_PAIRS: usize = 40_000;
+    /// Fewest views between two that are far from one another, and as a part of all.
+    pub(crate) const FAR_MIN: usize = 50;
+    pub(crate) const FAR_PART: usize = 20;
+    /// Part of the most similar views of a view that its background is the mean of.
+    pub(crate) const BACKGROUND_PART: usize = 10;
+    /// Bounds of the log-odds of one pair.
+    pub(crate) const LOG_ODDS: (f32, f32) = (-6.0, 8.0);
+    /// Views to each side that a sequence takes in.
+    pub(crate) const SEQUENCE: isize = 2;
+    /// Fewest views, and part of a run, that lie between a view and those that it is matched with.
+    pub(crate) const GAP_MIN: usize = 30;
+    pub(crate) const GAP_PART: usize = 40;
+    /// Most matches of a view, and the neighbours of one that count as the same match.
+    pub(crate) const MATCHES: usize = 2;
+    pub(crate) const BESIDE: isize = 4;
+    /// Least probability of a match.
+    pub(crate) const PROBABILITY_MIN: f64 = 0.1;
+    /// Weight of "nowhere" against a view of which nothing is known.
+    pub(crate) const NOWHERE: f64 = 0.5;
+    /// Ranges within which views are matched by a map that has been relaxed.
+    pub(crate) const GATE_RANGES: f64 = 6.0;
+    /// Bounds of the depth of a match: logarithm of its odds.
+    pub(crate) const DEPTH: (f64, f64) = (0.05, 6.0);
+}

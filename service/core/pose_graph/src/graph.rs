@@ -112,6 +112,20 @@ impl PoseGraph {
         Ok(LinkId(id))
     }
 
+    /// Makes a link say something else of the same nodes.
+    ///
+    /// # Errors
+    /// It names other nodes.
+    pub fn restate(&mut self, id: LinkId, link: Link) -> Result<(), InvalidLink> {
+        let slot = &mut self.links[id.0 as usize];
+        let nodes = |link: &Link| (link.nodes(), link.calibration());
+        if nodes(&slot.link) != nodes(&link) {
+            return Err(InvalidLink::UnknownNode);
+        }
+        slot.link = link;
+        Ok(())
+    }
+
     /// Makes a link say nothing.
     pub fn switch_off(&mut self, link: LinkId) {
         self.links[link.0 as usize].is_on = false;

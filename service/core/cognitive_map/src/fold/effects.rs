@@ -115,13 +115,13 @@ impl CognitiveMap {
     /// whole map relaxed. A function of the map alone; takes time in proportion to what is
     /// remembered.
     pub fn refined(&self) -> Refined {
-        self.keyframes.settled().refine()
+        self.keyframes.settled().refine(self.keyframes.views())
     }
 
     /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in
     /// the making as [`refined`](Self::refined).
     pub fn pose_graph(&self) -> PoseGraph {
-        self.keyframes.settled().pose_graph()
+        self.keyframes.settled().pose_graph(self.keyframes.views())
     }
 
     /// The relaxation under way, of the map as it was some records ago. The map waits for its

@@ -19,10 +19,12 @@ impl KeyframeMap {
     /// record [`go_on_relaxing`](Self::go_on_relaxing) brings the outcome into force. `agent` and
     /// `stamp_ns` are those of the present record.
     pub fn begin_relaxation(&mut self, agent: u32, stamp_ns: i64) {
-        if self.pending.is_some() || !self.graph.is_due() {
+        let is_due = self.graph.is_due() || self.recognition.views().is_due();
+        if self.pending.is_some() || !is_due {
             return;
         }
-        let job = RelaxationJob::new(&self.graph);
+        let views = self.recognition.take_due_views();
+        let job = RelaxationJob::new(&self.graph, views);
         self.pending = Some(PendingRelaxation::Awaited(job));
         // What comes from now on is for the next one.
         self.graph.constraints.schedule = Schedule::default();
@@ -102,6 +104,9 @@ impl KeyframeGraph {
             if let Some(constraint) = self.constraints.slab.get_mut(number, revision) {
                 constraint.state = state;
             }
+        }
+        if let Some(matches) = &outcome.matches {
+            self.matches = matches.clone().into();
         }
         for (agent, _) in (0..).zip(0..self.chains.tracks.len()) {
             self.move_latest(agent, outcome);

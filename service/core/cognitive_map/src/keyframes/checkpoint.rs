@@ -13,6 +13,7 @@
 //! 8     page   what an agent has seen that does not know where it is
 //! 9     page   up to 32 attachments of places
 //! 10    page   what an agent has seen that contradicts its estimate
+//! 11    page   up to 16 views of the log
 //! ```
 
 use std::collections::BTreeMap;
@@ -20,10 +21,10 @@ use std::collections::BTreeMap;
 use super::graph::KeyframeGraph;
 use super::map::KeyframeMap;
 use super::settings::KeyframeSettings;
-use place_recognition::Part;
+use place_recognition::{Part, ViewLog, ViewMatch};
 use state::Digest;
 use state::{CorruptState, State, StateReader, StateWriter};
-use state::{PagedVec, write_page};
+use state::{NONE, PagedVec, read_list, write_list, write_page};
 
 /// Number of the head.
 const HEAD: u8 = 0;
@@ -36,7 +37,7 @@ macro_rules! of_graph {
 }
 
 /// The other parts, by number, from 1.
-const PARTS: [Stored; 10] = [
+const PARTS: [Stored; 11] = [
     of_graph!(chains.tracks),
     of_graph!(chains.keyframes.pages),
     of_graph!(sightings.slab.pages),
@@ -47,6 +48,7 @@ const PARTS: [Stored; 10] = [
     Stored::InRecognition(Part::Searches),
     of_graph!(attachments.slab.pages),
     Stored::InRecognition(Part::KidnapTests),
+    Stored::InRecognition(Part::Log),
 ];
 
 /// Number of pending sightings at the end of the head: they are the estimator's.
@@ -77,8 +79,12 @@ pub struct CorruptKeyframes;
 
 impl KeyframeGraph {
     /// Digest of a graph without a relaxation under way, as that of a relaxation is.
-    pub(super) fn digest(&self) -> Digest {
+    pub(super) fn digest(&self, views: Option<&ViewLog>) -> Digest {
         let mut out = StateWriter::default();
+        write_list(self.matches.iter(), &mut out);
+        if let Some(views) = views {
+            views.write_digests(&mut out);
+        }
         self.chains.sweep.write(&mut out);
         self.constraints.schedule.write(&mut out);
         self.sightings.landmarks.slots.vacancy().write(&mut out);
@@ -193,6 +199,7 @@ impl KeyframeMap {
         let graph = &self.graph;
         graph.chains.sweep.write(out);
         graph.constraints.schedule.write(out);
+        write_list(graph.matches.iter(), out);
         self.recognition.write_head(out);
         graph.chains.keyframes.vacancy().write(out);
         graph.sightings.slab.vacancy().write(out);
@@ -208,6 +215,7 @@ impl KeyframeMap {
         let graph = &mut self.graph;
         graph.chains.sweep = State::read(&mut input)?;
         graph.constraints.schedule = State::read(&mut input)?;
+        graph.matches = read_list::<ViewMatch>(&mut input, NONE)?.into();
         self.recognition.read_head(&mut input)?;
         graph.chains.keyframes.set_vacancy(State::read(&mut input)?);
         graph.sightings.slab.set_vacancy(State::read(&mut input)?);

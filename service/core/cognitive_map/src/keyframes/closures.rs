@@ -2,9 +2,10 @@
 //! with the map or with other closures.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
-use place_recognition::{Relocalised, Revisit, SampleKey};
+use place_recognition::{Relocalised, Revisit, SampleKey, ViewLog};
 
 use super::constraint::{ClosureState, Constraint, composed};
 use super::constraints::Schedule;
@@ -131,9 +132,13 @@ impl KeyframeGraph {
     ///
     /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then
     /// the same records give the same map.
-    pub fn relax(&mut self) -> Vec<Correction> {
+    ///
+    /// Views, if any are given, are matched anew before.
+    pub fn relax(&mut self, views: Option<&ViewLog>) -> Vec<Correction> {
         let schedule = std::mem::take(&mut self.constraints.schedule);
         let mut coarse = RelaxationCopy::coarse(self);
+        let is_matched =
+            views.is_some_and(|log| coarse.match_views(log, tuning::LIVE_WIDTHS, &[]));
         let is_undecided = coarse.accepted().next().is_none();
         let mut judged = Vec::new();
         if is_undecided && coarse.is_noise_open() && self.has_many_more_closures(&schedule) {
@@ -143,7 +148,7 @@ impl KeyframeGraph {
             coarse.accept_consistent();
         }
         let is_nothing_new = is_undecided && coarse.accepted().next().is_none();
-        if is_nothing_new && judged.is_empty() && schedule.accepted == 0 {
+        if is_nothing_new && judged.is_empty() && schedule.accepted == 0 && !is_matched {
             return Vec::new();
         }
         let best = RelaxationCopy::most_probable(coarse, judged);
@@ -153,11 +158,11 @@ impl KeyframeGraph {
             accepted.map(|(number, _)| number).collect()
         };
         let (before, now) = (accepted(self), accepted(best.copy.graph()));
-        if schedule.accepted == 0 && before == now {
+        if schedule.accepted == 0 && before == now && !is_matched {
             return Vec::new();
         }
         self.adopt(best.copy.graph());
-        best.corrections(!now.is_subset(&before))
+        best.corrections(is_matched || !now.is_subset(&before))
     }
 
     /// Whether there are many closures, and their number has grown by two fifths, or a multiple of
@@ -174,6 +179,7 @@ impl KeyframeGraph {
     /// Keyframes between two of the copy move with the earlier one.
     fn adopt(&mut self, coarse: &Self) {
         self.constraints.adopt(&coarse.constraints, self.revision);
+        self.matches = Arc::clone(&coarse.matches);
         self.attachments.check_all();
         for (agent, _) in (0..).zip(0..self.chains.tracks.len()) {
             self.chains.adopt(agent, &coarse.chains, self.revision);

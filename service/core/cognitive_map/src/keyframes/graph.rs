@@ -12,6 +12,7 @@ use super::moment::Moment;
 use super::own_frame::OwnFrame;
 use super::settings::KeyframeSettings;
 use super::sightings::Sightings;
+use super::view_matches::ViewMatches;
 use crate::estimator::Calibrated;
 use crate::input::StartPose;
 use geometry::PoseCovariance;
@@ -32,6 +33,8 @@ pub struct KeyframeGraph {
     pub(super) sightings: Sightings,
     /// Start poses and loop closures.
     pub(super) constraints: Constraints,
+    /// Matches of views, by the whole map as it was when they were last matched.
+    pub(super) matches: ViewMatches,
     /// Places that keep their pose relative to a keyframe.
     pub(super) attachments: Attachments,
     /// What has come since a relaxation began that is under way.
@@ -47,6 +50,7 @@ impl KeyframeGraph {
             chains: Chains::default(),
             sightings: Sightings::default(),
             constraints: Constraints::default(),
+            matches: ViewMatches::default(),
             attachments: Attachments::default(),
             meanwhile: None,
         }

@@ -2,7 +2,7 @@
 
 use geometry::PoseCovariance;
 use nalgebra::Isometry3;
-use place_recognition::{Guess, PlaceRecognition, Relocalised, SampleKey, View};
+use place_recognition::{Guess, PlaceRecognition, Relocalised, SampleKey, View, ViewLog};
 
 use super::graph::KeyframeGraph;
 use super::moment::Moment;
@@ -131,6 +131,11 @@ impl KeyframeMap {
     /// known to better than `sd_max_m`.
     pub fn seek(&mut self, view: &View<'_>, sd_max_m: f64) -> Option<Relocalised> {
         self.recognition.seek(view, sd_max_m, &self.graph.chains)
+    }
+
+    /// All that agents of the map saw.
+    pub fn views(&self) -> &ViewLog {
+        self.recognition.views()
     }
 
     /// Whether an agent that was found still searches for its heading.

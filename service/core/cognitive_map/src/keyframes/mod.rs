@@ -63,6 +63,7 @@ mod sighting;
 mod sightings;
 mod sparsification;
 mod tuning;
+mod view_matches;
 
 pub use checkpoint::{CorruptKeyframes, KeyframePage};
 pub use graph::KeyframeGraph;

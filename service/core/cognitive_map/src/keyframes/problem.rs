@@ -45,6 +45,8 @@ pub(super) struct Problem {
     points: Vec<Option<PointId>>,
     /// The link of each constraint.
     links: Vec<Option<LinkId>>,
+    /// The link of each match of views.
+    pub(super) matches: Vec<Option<LinkId>>,
     /// The calibrations of odometry.
     pub(super) calibrations: Calibrations,
 }
@@ -59,6 +61,7 @@ impl Problem {
             poses: vec![None; chains.keyframes.numbers() as usize],
             points: vec![None; landmarks.numbers() as usize],
             links: vec![None; constraints.numbers() as usize],
+            matches: Vec::new(),
             calibrations: Calibrations::default(),
         };
         for (number, keyframe) in chains.keyframes.iter() {
@@ -66,7 +69,8 @@ impl Problem {
         }
         if calibrating == Calibrating::Free {
             let prior_sd = &graph.settings.calibration_sd;
-            let lengths = if graph.constraints.n_accepted() > 0 || among == Among::All {
+            let has_closures = graph.constraints.n_accepted() > 0 || !graph.matches.is_empty();
+            let lengths = if has_closures || among == Among::All {
                 Lengths::Known
             } else {
                 Lengths::Estimated
@@ -82,6 +86,7 @@ impl Problem {
         for (_, sighting) in graph.sightings.slab.iter() {
             problem.add_sighting(sighting);
         }
+        problem.add_matches(graph);
         problem
     }
 

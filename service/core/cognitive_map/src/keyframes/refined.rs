@@ -1,6 +1,7 @@
 //! The refined map: the most likely poses and landmarks, given all that is remembered.
 
 use nalgebra::{Isometry3, Matrix3, Point3};
+use place_recognition::ViewLog;
 
 use super::agent_track::AgentTrack;
 use super::chains::Chains;
@@ -8,6 +9,7 @@ use super::graph::KeyframeGraph;
 use super::landmarks::Landmarks;
 use super::problem::Problem;
 use super::relaxation::RelaxationCopy;
+use super::tuning;
 use crate::input::Label;
 use geometry::{is_somewhere, positive};
 use pose_graph::{PoseGraph, Relaxed};
@@ -57,8 +59,8 @@ pub struct RefinedLandmark {
 
 impl KeyframeGraph {
     /// Relaxes the whole past. A pure function of what was added.
-    pub fn refine(&self) -> Refined {
-        let (problem, relaxed) = self.relaxed_whole();
+    pub fn refine(&self, views: &ViewLog) -> Refined {
+        let (problem, relaxed) = self.relaxed_whole(views);
         let tracks = self.chains.tracks.iter();
         let agents = tracks.map(|track| RefinedAgent::new(track, &self.chains, &problem));
         Refined {
@@ -69,14 +71,17 @@ impl KeyframeGraph {
     }
 
     /// The relaxed pose graph: for other programs.
-    pub fn pose_graph(&self) -> PoseGraph {
-        self.relaxed_whole().0.map
+    pub fn pose_graph(&self, views: &ViewLog) -> PoseGraph {
+        self.relaxed_whole(views).0.map
     }
 
     /// The whole past relaxed, with the closures that are accepted by now, or with all of them
     /// judged anew by all that is known now: whichever makes the measurements more probable.
-    fn relaxed_whole(&self) -> (Problem, Relaxed) {
+    fn relaxed_whole(&self, views: &ViewLog) -> (Problem, Relaxed) {
         let mut as_it_is = RelaxationCopy::whole(self);
+        if !views.is_empty() {
+            as_it_is.match_views(views, tuning::REFINED_WIDTHS, tuning::REFINED_BIASES);
+        }
         let mut all = Vec::new();
         if as_it_is.has_pending() {
             // What is accepted by views alone was judged by them.

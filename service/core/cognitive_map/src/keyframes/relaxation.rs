@@ -11,6 +11,7 @@ use super::graph::KeyframeGraph;
 use super::problem::{Among, Calibrating, Problem};
 use super::runs::{Member, Run};
 use super::tuning;
+use super::view_matches::ViewMatches;
 use crate::estimator::ExternalEstimate;
 use geometry::{is_somewhere, is_within};
 use pose_graph::{Graduation, RelaxationSettings, Relaxed};
@@ -134,6 +135,17 @@ impl RelaxationCopy {
     /// The copy as it is now.
     pub(super) fn graph(&self) -> &KeyframeGraph {
         &self.graph
+    }
+
+    /// Replaces the matches of views.
+    pub(super) fn set_matches(&mut self, matches: ViewMatches) {
+        self.graph.matches = matches;
+    }
+
+    /// Puts a keyframe somewhere else.
+    pub(super) fn put(&mut self, keyframe: u32, pose: &Isometry3<f64>) {
+        let revision = self.graph.revision;
+        self.graph.chains.put(keyframe, pose, revision);
     }
 
     /// Accepts pending closures that are evident by the map, or by one another; answers their

@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
+use place_recognition::ViewLog;
+
 use super::graph::KeyframeGraph;
 use super::relaxation_outcome::RelaxationOutcome;
 use state::Digest;
@@ -24,17 +26,17 @@ struct Shared {
 /// What the outcome is of.
 #[derive(Debug)]
 enum Source {
-    Snapshot(Box<KeyframeGraph>),
+    Snapshot(Box<KeyframeGraph>, Option<ViewLog>),
     /// A snapshot with this digest, of which a checkpoint holds the outcome alone.
     Digest(Digest),
 }
 
 impl RelaxationJob {
-    /// Of a graph, under the revision of its latest change.
-    pub(super) fn new(graph: &KeyframeGraph) -> Self {
+    /// Of a graph, under the revision of its latest change, and of the views that are to be matched.
+    pub(super) fn new(graph: &KeyframeGraph, views: Option<ViewLog>) -> Self {
         Self(Arc::new(Shared {
             revision: graph.revision,
-            source: Source::Snapshot(Box::new(graph.clone())),
+            source: Source::Snapshot(Box::new(graph.clone()), views),
             outcome: OnceLock::new(),
         }))
     }
@@ -66,7 +68,9 @@ impl RelaxationJob {
     /// The outcome.
     pub(super) fn outcome(&self) -> &Arc<RelaxationOutcome> {
         self.0.outcome.get_or_init(|| match &self.0.source {
-            Source::Snapshot(graph) => Arc::new(RelaxationOutcome::of(graph)),
+            Source::Snapshot(graph, views) => {
+                Arc::new(RelaxationOutcome::of(graph, views.as_ref()))
+            }
             Source::Digest(_) => Arc::default(), // never: it came with its outcome
         })
     }
@@ -74,7 +78,7 @@ impl RelaxationJob {
     /// Digest of the snapshot, which determines the outcome and is sooner computed.
     pub(super) fn digest(&self) -> Digest {
         match &self.0.source {
-            Source::Snapshot(graph) => graph.digest(),
+            Source::Snapshot(graph, views) => graph.digest(views.as_ref()),
             Source::Digest(digest) => *digest,
         }
     }

@@ -1,6 +1,7 @@
 //! What a relaxation of the keyframe graph comes to.
 
 use nalgebra::Isometry3;
+use place_recognition::{ViewLog, ViewMatch};
 
 use super::agent_track::AgentTrack;
 use super::constraint::{ClosureState, Constraint};
@@ -21,15 +22,17 @@ pub(super) struct RelaxationOutcome {
     /// The agents whose odometry has another noise than it had, with the factors of their
     /// rotations' noise.
     pub(super) turn_noises: Vec<(u32, f64)>,
+    /// The matches of views, if they have changed.
+    pub(super) matches: Option<Vec<ViewMatch>>,
     /// The poses of the agents, as they were in the graph.
     pub(super) corrections: Vec<Correction>,
 }
 
 impl RelaxationOutcome {
-    /// Of a graph.
-    pub(super) fn of(graph: &KeyframeGraph) -> Self {
+    /// Of a graph, and of the views that are to be matched.
+    pub(super) fn of(graph: &KeyframeGraph, views: Option<&ViewLog>) -> Self {
         let mut relaxed = graph.clone();
-        let corrections = relaxed.relax();
+        let corrections = relaxed.relax(views);
         let moved = |(number, is): (u32, &Keyframe)| {
             let was = graph.chains.keyframes.get(number)?;
             let is_moved = (was.pose, was.is_in_map) != (is.pose, is.is_in_map);
@@ -43,6 +46,7 @@ impl RelaxationOutcome {
             (was.turn_noise.to_bits() != is.turn_noise.to_bits()).then_some((agent, is.turn_noise))
         };
         let tracks = { graph.chains.tracks.iter() }.zip(relaxed.chains.tracks.iter());
+        let are_new = relaxed.matches != graph.matches;
         let turn_noises = (0..).zip(tracks).filter_map(learned).collect();
         Self {
             turn_noises,
@@ -52,6 +56,7 @@ impl RelaxationOutcome {
             states: { relaxed.constraints.slab.iter() }
                 .filter_map(judged)
                 .collect(),
+            matches: are_new.then(|| relaxed.matches.to_vec()),
             corrections,
         }
     }
@@ -61,6 +66,7 @@ impl RelaxationOutcome {
         self.poses.is_empty()
             && self.states.is_empty()
             && self.turn_noises.is_empty()
+            && self.matches.is_none()
             && self.corrections.is_empty()
     }
 
@@ -100,15 +106,20 @@ impl State for RelaxationOutcome {
         write_list(self.poses.iter(), out);
         write_list(self.states.iter(), out);
         write_list(self.turn_noises.iter(), out);
+        self.matches.write(out);
         write_list(self.corrections.iter(), out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         // Each list is as long as the bytes that follow; their number is bounded by the graph's.
+        let (poses, states) = (read_list(input, NONE)?, read_list(input, NONE)?);
+        let turn_noises = read_list(input, NONE)?;
+        let matches = State::read(input)?;
         Ok(Self {
-            poses: read_list(input, NONE)?,
-            states: read_list(input, NONE)?,
-            turn_noises: read_list(input, NONE)?,
+            poses,
+            states,
+            turn_noises,
+            matches,
             corrections: read_list(input, NONE)?,
         })
     }

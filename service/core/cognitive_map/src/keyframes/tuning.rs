@@ -162,3 +162,22 @@ pub(super) const CLOSURE_SCALE: f64 = 3.0;
 
 /// Variance of a motion of which nothing is known \[m²\].
 pub(super) const UNKNOWN_MOTION_VARIANCE_M2: f64 = 1e12;
+
+// Matches of views.
+
+/// Widths of the kernels of matches, in their ranges, one relaxation each: while samples come in,
+/// and for the refined past.
+pub(super) const LIVE_WIDTHS: &[f64] = &[4.0, 2.0, 1.0];
+pub(super) const REFINED_WIDTHS: &[f64] = &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0];
+
+/// The same where views are matched near to where a relaxed map has them, and how often.
+pub(super) const GATED_WIDTHS: &[f64] = &[4.0, 2.0, 1.0];
+pub(super) const GATED_MATCHINGS: usize = 2;
+
+/// Biases of rotations from which a refinement begins, in standard deviations: a robot that has
+/// turned by radians too much before its first loop lies in another basin of attraction.
+pub(super) const REFINED_BIASES: &[f64] = &[0.0, -1.0, 1.0, -2.0, 2.0];
+
+/// Most steps of a relaxation with one width, and its tolerance: the next one begins where it ends.
+pub(super) const MATCHED_STEPS_MAX: usize = 10;
+pub(super) const MATCHED_TOLERANCE: f64 = 1e-3;

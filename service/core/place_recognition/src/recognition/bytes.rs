@@ -9,6 +9,8 @@ use super::PlaceRecognition;
 pub enum Part {
     /// Remembered views, 16 a page.
     Views,
+    /// All views of agents of the map, 16 a page.
+    Log,
     /// The latest views of an agent on a channel.
     Tracks,
     /// The search of an agent that does not know where it is.
@@ -25,6 +27,7 @@ impl PlaceRecognition {
     pub fn pages(&self, part: Part, since_revision: u64) -> Box<dyn Iterator<Item = Page> + '_> {
         match part {
             Part::Views => Box::new(pages_of(&self.views.stored, since_revision)),
+            Part::Log => Box::new(pages_of(&self.views.log.views, since_revision)),
             Part::Tracks => Box::new(pages_of(&self.views.tracks, since_revision)),
             Part::Searches => Box::new(pages_of(&self.searches, since_revision)),
             Part::KidnapTests => Box::new(pages_of(&self.kidnap_tests, since_revision)),
@@ -39,6 +42,7 @@ impl PlaceRecognition {
         let revision = self.revision;
         match part {
             Part::Views => self.views.stored.push_page(bytes, revision),
+            Part::Log => self.views.log.views.push_page(bytes, revision),
             Part::Tracks => self.views.tracks.push_page(bytes, revision),
             Part::Searches => self.searches.push_page(bytes, revision),
             Part::KidnapTests => self.kidnap_tests.push_page(bytes, revision),
@@ -49,6 +53,7 @@ impl PlaceRecognition {
     pub fn write_digests(&self, part: Part, out: &mut StateWriter) {
         match part {
             Part::Views => self.views.stored.write_digests(out),
+            Part::Log => self.views.log.views.write_digests(out),
             Part::Tracks => self.views.tracks.write_digests(out),
             Part::Searches => self.searches.write_digests(out),
             Part::KidnapTests => self.kidnap_tests.write_digests(out),

@@ -11,6 +11,7 @@ pub use revisit::Revisit;
 
 use crate::relocalisation::{KidnapTests, Searches};
 use crate::sequences::ViewMemory;
+use crate::similarity::ViewLog;
 
 /// What agents have seen, and the searches of those that do not know where they are.
 ///
@@ -48,6 +49,20 @@ impl PlaceRecognition {
     /// An agent was put somewhere else: what it sees from now on is not beside what it saw.
     pub fn cut(&mut self, agent: u32) {
         self.views.cut(agent, self.revision);
+    }
+
+    /// All that agents of the map saw.
+    pub fn views(&self) -> &ViewLog {
+        &self.views.log
+    }
+
+    /// The same, if enough of it is new to be matched again; it counts as matched from then on.
+    pub fn take_due_views(&mut self) -> Option<ViewLog> {
+        if !self.views.log.is_due() {
+            return None;
+        }
+        self.views.log.matched();
+        Some(self.views.log.clone())
     }
 
     /// Bytes of memory that the views take.

@@ -6,6 +6,7 @@ use super::sequence_match::SequenceMatch;
 use super::track::ViewTrack;
 use crate::descriptor::angle_rad;
 use crate::keyframes::SampleKey;
+use crate::similarity::{LoggedView, ViewLog, logged};
 use crate::tuning::memory as tuning;
 use crate::view::View;
 use crate::views::{ChannelModel, Distance, Kernel, SimilarView, StoredView};
@@ -19,6 +20,8 @@ pub(crate) struct ViewMemory {
     pub(crate) stored: PagedVec<StoredView, 16>,
     /// Numbers in all descriptors.
     numbers: u64,
+    /// All views of agents of the map.
+    pub(crate) log: ViewLog,
     /// Times that views were renumbered.
     pub(crate) thinnings: u64,
 }
@@ -41,6 +44,16 @@ impl ViewMemory {
             return Vec::new();
         }
         track.last = Some(view.in_odom);
+        let ordinal = track.logged;
+        track.logged = track.logged.saturating_add(1);
+        let seen = LoggedView {
+            channel,
+            sample: view.sample,
+            ordinal,
+            in_odom: view.in_odom,
+            vector: logged(vector),
+        };
+        self.log.add(seen, revision);
         let model = &mut self.channels[usize::from(channel)];
         let (mut is_news, mut is_outlier) = (true, None);
         for (index, recent) in track.recent.iter().enumerate() {
@@ -95,6 +108,7 @@ impl ViewMemory {
                 track.recent.clear();
                 track.matches.clear();
                 track.next = track.next.saturating_add(tuning::APART);
+                track.logged = track.logged.saturating_add(tuning::APART);
             }
         }
     }
@@ -209,6 +223,7 @@ impl ViewMemory {
 
     /// Forgets what an agent saw in a session, from a sample on.
     pub(crate) fn forget_since(&mut self, since: SampleKey, revision: u64) {
+        self.log.forget_since(since, revision);
         let is_gone = |view: &StoredView| view.is_since(since);
         let Some(first) = self.stored.iter().position(is_gone) else {
             return;
@@ -290,17 +305,19 @@ impl ViewMemory {
             numbers.sum::<usize>()
         });
         let recent: usize = recent.sum();
-        self.stored.bytes() + self.tracks.bytes() + 4 * (numbers + recent)
+        self.stored.bytes() + self.tracks.bytes() + self.log.bytes() + 4 * (numbers + recent)
     }
 
     pub(crate) fn write_head(&self, out: &mut StateWriter) {
         Counted::<u64>::write(&self.channels, out);
         self.thinnings.write(out);
+        (self.log.stride, self.log.n_new).write(out);
     }
 
     pub(crate) fn read_head(&mut self, input: &mut StateReader<'_>) -> Result<(), CorruptState> {
         self.channels = Counted::<u64>::read(input)?;
         self.thinnings = State::read(input)?;
+        (self.log.stride, self.log.n_new) = State::read(input)?;
         self.count_numbers();
         Ok(())
     }
@@ -376,7 +393,11 @@ impl ViewMemory {
                 && track.recent.len() <= crate::tuning::track::RECENT_MAX
                 && recent.all(|recent| is_channel(track.channel, recent.vector.len()))
         });
-        views && tracks
+        let length = |channel: u8| {
+            let model = self.channels.get(usize::from(channel))?;
+            Some(usize::from(model.dimension))
+        };
+        views && tracks && self.log.is_sound(agents, length)
     }
 }
 

@@ -15,6 +15,8 @@ pub(crate) struct ViewTrack {
     pub(super) session: u32,
     /// The ordinal of the next view.
     pub(super) next: u32,
+    /// The ordinal of the next view in the log.
+    pub(super) logged: u32,
     /// Pose by motion alone at the latest view.
     pub(super) last: Option<Isometry3<f64>>,
     /// The latest views that were news, the newest last.
@@ -30,6 +32,7 @@ impl ViewTrack {
             channel,
             session,
             next: 0,
+            logged: 0,
             last: None,
             recent: Vec::new(),
             matches: Vec::new(),
@@ -53,6 +56,7 @@ state_of_struct!(ViewTrack {
     channel,
     session,
     next,
+    logged,
     last,
     recent as Counted<u64>,
     matches as Counted<u64>,

@@ -1,0 +1,213 @@
+//! Matches of views: what the whole map says of which views are of one place, and they of it.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use place_recognition::{SampleKey, Similarity, ViewLog, ViewMatch};
+
+use super::chains::Chains;
+use super::graph::KeyframeGraph;
+use super::problem::{Among, Calibrating, Problem};
+use super::relaxation::RelaxationCopy;
+use super::tuning;
+use geometry::is_somewhere;
+use pose_graph::{Kernel, Link, LinkId, PositionInformation, RelaxationSettings, Scale};
+use pose_graph::{Calibration, SightingTarget};
+
+/// The matches of views by which a map is relaxed. Clones share them.
+pub(super) type ViewMatches = Arc<[ViewMatch]>;
+
+/// A copy of the graph, relaxed by matches of views.
+struct Matched {
+    copy: RelaxationCopy,
+    /// Log of how probable the views and the odometry are by it, up to a constant.
+    log_probability: f64,
+}
+
+impl RelaxationCopy {
+    /// Matches the views of a log anew, where the keyframes are now and where they would be by
+    /// odometry with one or another bias, and takes over the map by which views and odometry are
+    /// most probable. One without any match is among them: views that say nothing change nothing.
+    /// Answers whether the matches have changed.
+    pub(super) fn match_views(&mut self, log: &ViewLog, widths: &[f64], biases: &[f64]) -> bool {
+        let channels = Similarity::of_channels(log);
+        if channels.is_empty() {
+            return false;
+        }
+        let before = Arc::clone(&self.graph().matches);
+        let mut best = self.with_matches(Arc::clone(&before), &[1.0], &channels);
+        let mut starts = vec![self.clone()];
+        starts.extend(biases.iter().map(|&bias| self.dead_reckoned(bias)));
+        for start in starts {
+            let unmatched = start.with_matches(Arc::default(), &[1.0], &channels);
+            let matched = start.matched(widths, &channels);
+            for other in [unmatched, matched] {
+                if other.log_probability > best.log_probability {
+                    best = other;
+                }
+            }
+        }
+        *self = best.copy;
+        self.graph().matches != before
+    }
+
+    /// A copy relaxed by matches that were found wherever its keyframes are, and then, twice, by
+    /// those near to where it has them.
+    fn matched(&self, widths: &[f64], channels: &[Similarity<'_>]) -> Matched {
+        let all: Vec<ViewMatch> = channels.iter().flat_map(Similarity::matches).collect();
+        let mut matched = self.with_matches(all.into(), widths, channels);
+        for _ in 0..tuning::GATED_MATCHINGS {
+            let graph = matched.copy.graph();
+            let near = |channel: &Similarity<'_>| channel.matches_near(&positions(graph, channel));
+            let near: Vec<ViewMatch> = channels.iter().flat_map(near).collect();
+            if near.is_empty() {
+                break;
+            }
+            let copy = matched.copy;
+            matched = copy.with_matches(near.into(), tuning::GATED_WIDTHS, channels);
+        }
+        matched
+    }
+
+    /// A copy relaxed by these matches, with kernels that become narrower and never less deep: a
+    /// kernel that begins deep lets all matches together draw the map to a point.
+    fn with_matches(
+        &self,
+        matches: ViewMatches,
+        widths: &[f64],
+        channels: &[Similarity<'_>],
+    ) -> Matched {
+        let mut copy = self.clone();
+        copy.set_matches(matches);
+        let mut problem = Problem::new(copy.graph(), Among::Accepted, Calibrating::Free);
+        for &width in widths {
+            problem.widen_matches(copy.graph(), width);
+            problem.map.relax(&RelaxationSettings {
+                steps_max: tuning::MATCHED_STEPS_MAX,
+                tolerance: tuning::MATCHED_TOLERANCE,
+                ..RelaxationSettings::default()
+            });
+        }
+        copy.move_keyframes(&problem);
+        problem.switch_off_matches();
+        let graph = copy.graph();
+        let evidence: f64 = { channels.iter() }
+            .map(|channel| channel.evidence(&positions(graph, channel)))
+            .sum();
+        let log_probability = evidence - 0.5 * problem.map.chi_squared();
+        Matched {
+            copy,
+            log_probability,
+        }
+    }
+
+    /// A copy whose agents went by odometry alone, with a constant bias of so many of its standard
+    /// deviations about the vertical.
+    fn dead_reckoned(&self, bias: f64) -> Self {
+        let mut copy = self.clone();
+        let sd_rad_s = self.graph().settings.calibration_sd[4];
+        let calibration = Calibration {
+            bias_rad_s: Vector3::z() * (bias * sd_rad_s),
+            ..Calibration::default()
+        };
+        for agent in (0..).take(self.graph().chains.tracks.len()) {
+            for (number, pose) in dead_reckoned(&self.graph().chains, agent, &calibration) {
+                copy.put(number, &pose);
+            }
+        }
+        copy
+    }
+}
+
+/// Where the keyframes of an agent of the map are by its odometry, from the begins of its
+/// stretches on.
+fn dead_reckoned(
+    chains: &Chains,
+    agent: u32,
+    calibration: &Calibration,
+) -> Vec<(u32, Isometry3<f64>)> {
+    let mut poses: Vec<(u32, Isometry3<f64>)> = Vec::new();
+    if !chains.track(agent).is_some_and(|track| track.is_in_map()) {
+        return poses;
+    }
+    let mut number = chains.first(agent);
+    while let Some(keyframe) = chains.keyframes.get(number) {
+        let there = chains.in_map(number).unwrap_or(keyframe.pose);
+        let reading = keyframe.calibrated.reading(&keyframe.motion);
+        let length = keyframe.calibrated.calibration.in_graph().length;
+        let motion = reading.motion(&Calibration {
+            length,
+            ..*calibration
+        });
+        let pose = match poses.last() {
+            Some((_, previous)) if !keyframe.begins => previous * motion,
+            _ => there,
+        };
+        poses.push((number, pose));
+        number = keyframe.next;
+    }
+    poses
+}
+
+/// Where the views of a channel were seen, as a graph has it.
+fn positions(graph: &KeyframeGraph, channel: &Similarity<'_>) -> Vec<Option<Point3<f64>>> {
+    let position = |sample: SampleKey| {
+        let pose = graph.chains.pose_of(&graph.chains.at_sample(sample)?)?;
+        is_somewhere(&pose.translation.vector).then(|| pose.translation.vector.into())
+    };
+    channel.samples().map(position).collect()
+}
+
+impl Problem {
+    /// Adds the links of the graph's matches: both samples are within the range of the channel of
+    /// one another, whatever their headings are.
+    pub(super) fn add_matches(&mut self, graph: &KeyframeGraph) {
+        let links = { graph.matches.iter() }
+            .map(|matched| {
+                let (link, kernel) = self.match_link(graph, matched, 1.0)?;
+                self.map.add_link(link, kernel).ok()
+            })
+            .collect();
+        self.matches = links;
+    }
+
+    /// Says that both samples of each match are within so many ranges of one another.
+    fn widen_matches(&mut self, graph: &KeyframeGraph, width: f64) {
+        for (matched, id) in graph.matches.iter().zip(self.matches.clone()) {
+            let Some((id, (link, _))) = id.zip(self.match_link(graph, matched, width)) else {
+                continue;
+            };
+            self.map.restate(id, link).ok();
+        }
+    }
+
+    fn switch_off_matches(&mut self) {
+        let links: Vec<LinkId> = self.matches.iter().flatten().copied().collect();
+        for link in links {
+            self.map.switch_off(link);
+        }
+    }
+
+    fn match_link(
+        &self,
+        graph: &KeyframeGraph,
+        matched: &ViewMatch,
+        width: f64,
+    ) -> Option<(Link, Kernel)> {
+        let [now, then] = [matched.now, matched.then].map(|sample| graph.chains.at_sample(sample));
+        let (now, then) = (now?, then?);
+        let sd_m = matched.sd_m * width;
+        let covariance = Matrix3::from_diagonal_element(sd_m * sd_m);
+        let link = Link::Sighting {
+            from: self.node(now.keyframe)?,
+            target: SightingTarget::PointOf(
+                self.node(then.keyframe)?,
+                then.motion.translation.vector,
+            ),
+            position: now.motion.translation.vector,
+            information: PositionInformation::of_covariance(&covariance).ok()?,
+        };
+        let scale = Scale::new((2.0 * matched.depth).sqrt()).ok()?;
+        Some((link, Kernel::GemanMcClure(scale)))
+    }
+}

@@ -1,0 +1,208 @@
+//! What the score of two views says: the range within which views are alike, and the log-odds that
+//! two views lie within it of one another.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::runs::Runs;
+use super::two_covariance::single;
+use crate::tuning::similarity as tuning;
+
+/// What was learned of a channel.
+pub(super) struct Learned {
+    /// Distance at which the similarity of views has fallen halfway to that of far ones, as the
+    /// deviation of a Gaussian \[m\].
+    pub(super) range_m: f64,
+    /// Share of the evidence of a view that is its own: neighbours say nearly the same.
+    pub(super) independence: f64,
+    /// Log-odds of all pairs of views.
+    pub(super) log_odds: DMatrix<f32>,
+}
+
+impl Learned {
+    /// From the scores of all pairs of views; `None` if there are no far views, or near ones are no
+    /// more alike.
+    pub(super) fn of(runs: &Runs<'_>, mut scores: DMatrix<f32>) -> Option<Self> {
+        let far = far_pairs(runs);
+        if far.len() < tuning::FAR_PAIRS / 100 {
+            return None;
+        }
+        let range_m = range_m(runs, &scores, &far)?;
+        let backgrounds = backgrounds(runs, &scores);
+        let near = near_pairs(runs, range_m);
+        let feature = |(a, b): (usize, usize)| {
+            let score = f64::from(scores[(a, b)]);
+            Vector3::new(score, backgrounds[a] + backgrounds[b], 1.0)
+        };
+        let [near, distant]: [Vec<_>; 2] =
+            [&near, &far].map(|pairs| pairs.iter().copied().map(feature).collect());
+        let weights = logistic(&near, &distant)?;
+        let [low, high] = [tuning::LOG_ODDS.0, tuning::LOG_ODDS.1];
+        for column in 0..runs.len() {
+            for row in 0..runs.len() {
+                let score = &mut scores[(row, column)];
+                let background = backgrounds[row] + backgrounds[column];
+                let odds = weights.dot(&Vector3::new(f64::from(*score), background, 1.0));
+                *score = single(odds).clamp(low, high);
+            }
+        }
+        Some(Self {
+            range_m,
+            independence: independence(runs, &scores, &far),
+            log_odds: scores,
+        })
+    }
+}
+
+/// Pairs of views that are far from one another along the way, drawn evenly.
+fn far_pairs(runs: &Runs<'_>) -> Vec<(usize, usize)> {
+    let n = runs.len();
+    let least = tuning::FAR_MIN.max(n / tuning::FAR_PART);
+    // Weyl's sequence of two irrational steps covers all pairs evenly.
+    let part = |number: usize, step: f64| (number as f64 * step).fract();
+    let pairs = (1..=tuning::FAR_PAIRS).map(|number| {
+        [0.754_877_666_246_692_7, 0.569_840_290_998_053_2].map(|step| {
+            let at = part(number, step) * n as f64;
+            floor(at).min(n - 1)
+        })
+    });
+    let is_far = |&[a, b]: &[usize; 2]| a.abs_diff(b) > least;
+    pairs.filter(is_far).map(|[a, b]| (a, b)).collect()
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a number of views is neither negative nor large"
+)]
+fn floor(value: f64) -> usize {
+    value as usize
+}
+
+/// The range of a channel, from its views' neighbours along the way.
+fn range_m(runs: &Runs<'_>, scores: &DMatrix<f32>, far: &[(usize, usize)]) -> Option<f64> {
+    let mut pairs: Vec<(f64, f64)> = Vec::new();
+    for index in 0..runs.len() {
+        for lag in 1..=tuning::RANGE_LAGS {
+            let other = index + lag;
+            if other < runs.len() && runs.is_same(index, other) {
+                let score = f64::from(scores[(index, other)]);
+                pairs.push((runs.distance_m(index, other), score));
+            }
+        }
+    }
+    if pairs.len() < tuning::NEIGHBOURS_MIN {
+        return None;
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let size = pairs.len().div_ceil(tuning::CLASSES);
+    let mean = |class: &[(f64, f64)]| {
+        let n = class.len() as f64;
+        let sum = |sum: (f64, f64), pair: &(f64, f64)| (sum.0 + pair.0, sum.1 + pair.1);
+        let (distance, score) = class.iter().fold((0.0, 0.0), sum);
+        (distance / n, score / n)
+    };
+    let classes: Vec<(f64, f64)> = pairs.chunks(size).map(mean).collect();
+    let base = { far.iter() }
+        .map(|&pair| f64::from(scores[pair]))
+        .sum::<f64>()
+        / far.len() as f64;
+    let half = base + 0.5 * (classes[0].1 - base);
+    if half <= base {
+        return None;
+    }
+    let falls = classes.iter().find(|class| class.1 < half);
+    let range_m = match falls {
+        Some(class) => class.0 / tuning::HALF_HEIGHT,
+        None => classes[classes.len() - 1].0,
+    };
+    (range_m > 0.0).then_some(range_m)
+}
+
+/// How alike the most similar far views of each view are: log of their mean odds.
+fn backgrounds(runs: &Runs<'_>, scores: &DMatrix<f32>) -> Vec<f64> {
+    let n = runs.len();
+    let most = 5.max(n / tuning::BACKGROUND_PART);
+    let background = |index: usize| {
+        let column = scores.column(index);
+        let far = (0..n).filter(|other| other.abs_diff(index) > tuning::FAR_MIN);
+        let mut far: Vec<f32> = far.map(|other| column[other]).collect();
+        let n_far = far.len();
+        if n_far > most {
+            far.select_nth_unstable_by(n_far - most, f32::total_cmp);
+            far.drain(..n_far - most);
+        }
+        // One order for one set of values: the sum is the same on any way there.
+        far.sort_unstable_by(f32::total_cmp);
+        let largest = far.last().map_or(0.0, |largest| f64::from(*largest));
+        let sum: f64 = far.iter().map(|s| (f64::from(*s) - largest).exp()).sum();
+        largest + (sum / far.len().max(1) as f64).ln()
+    };
+    (0..n).map(background).collect()
+}
+
+/// Pairs of neighbours along the way within a range.
+fn near_pairs(runs: &Runs<'_>, range_m: f64) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for index in 0..runs.len() {
+        for lag in 2..=tuning::RANGE_LAGS {
+            let other = index + lag;
+            if other < runs.len()
+                && runs.is_same(index, other)
+                && runs.distance_m(index, other) < range_m
+            {
+                pairs.push((index, other));
+            }
+        }
+    }
+    pairs
+}
+
+/// Weights of a logistic regression of near against far pairs, both with the same weight.
+fn logistic(near: &[Vector3<f64>], far: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+    const STEPS: usize = 25;
+    const RIDGE: f64 = 1e-6;
+    if near.is_empty() || far.is_empty() {
+        return None;
+    }
+    let mut weights = Vector3::zeros();
+    for _ in 0..STEPS {
+        let mut gradient = -RIDGE * weights;
+        let mut curvature = Matrix3::from_diagonal_element(RIDGE);
+        for (features, is_near) in [(near, 1.0), (far, 0.0)] {
+            let share = 0.5 / features.len() as f64;
+            for feature in features {
+                let odds = feature.dot(&weights).clamp(-30.0, 30.0);
+                let probability = 1.0 / (1.0 + (-odds).exp());
+                gradient += feature * (share * (is_near - probability));
+                let slope = share * probability * (1.0 - probability);
+                curvature += feature * feature.transpose() * slope;
+            }
+        }
+        weights += curvature.try_inverse()? * gradient;
+    }
+    weights.iter().all(|weight| weight.is_finite()).then_some(weights)
+}
+
+/// (1 − c) / (1 + c) with the correlation c of the log-odds of far pairs and of their successors.
+fn independence(runs: &Runs<'_>, log_odds: &DMatrix<f32>, far: &[(usize, usize)]) -> f64 {
+    let next = |(a, b): (usize, usize)| Some((runs.after(a, 1)?, runs.after(b, 1)?));
+    let (mut n, mut x, mut y, mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for &pair in far {
+        let Some(next) = next(pair) else {
+            continue;
+        };
+        let [a, b] = [pair, next].map(|pair| f64::from(log_odds[pair]));
+        n += 1.0;
+        x += a;
+        y += b;
+        xx += a * a;
+        yy += b * b;
+        xy += a * b;
+    }
+    let spread = ((n * xx - x * x) * (n * yy - y * y)).max(0.0).sqrt();
+    if spread <= 0.0 {
+        return 1.0;
+    }
+    let correlation = ((n * xy - x * y) / spread).clamp(0.0, 0.99);
+    (1.0 - correlation) / (1.0 + correlation)
+}

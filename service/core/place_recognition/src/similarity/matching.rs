@@ -1,0 +1,210 @@
+//! Which views are likely to be of one place.
+
+use nalgebra::{DMatrix, Point3};
+
+use super::log_odds::Learned;
+use super::runs::Runs;
+use super::two_covariance;
+use super::view_log::ViewLog;
+use crate::keyframes::SampleKey;
+use crate::tuning::similarity as tuning;
+use state::state_of_struct;
+
+/// Two samples at which an agent, or two, may have been at one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewMatch {
+    /// The later sample of an agent, or that of the agent with the higher number.
+    pub now: SampleKey,
+    /// The other one.
+    pub then: SampleKey,
+    /// Standard deviation of the distance between them along each axis \[m\].
+    pub sd_m: f64,
+    /// Log of the odds that they are of one place, as it may cost at most to leave that out.
+    pub depth: f64,
+}
+
+state_of_struct!(ViewMatch {
+    now,
+    then,
+    sd_m,
+    depth
+});
+
+/// How alike the views of a channel are.
+#[derive(Debug)]
+pub struct Similarity<'a> {
+    runs: Runs<'a>,
+    /// Range of the channel \[m\].
+    range_m: f64,
+    /// Share of the evidence of a view that is its own.
+    independence: f64,
+    log_odds: DMatrix<f32>,
+    /// The same of whole sequences of views.
+    of_sequences: DMatrix<f32>,
+}
+
+impl<'a> Similarity<'a> {
+    /// Of each channel of a log whose views say something.
+    pub fn of_channels(log: &'a ViewLog) -> Vec<Self> {
+        let channels = log.channels().into_iter();
+        channels
+            .filter_map(|channel| Self::of(log, channel))
+            .collect()
+    }
+
+    fn of(log: &'a ViewLog, channel: u8) -> Option<Self> {
+        let runs = Runs::of(log, channel);
+        if runs.len() < crate::tuning::log::VIEWS_MIN {
+            return None;
+        }
+        let scores = two_covariance::scores(&runs)?;
+        let learned = Learned::of(&runs, scores)?;
+        let of_sequences = of_sequences(&runs, &learned.log_odds);
+        Some(Self {
+            runs,
+            range_m: learned.range_m,
+            independence: learned.independence,
+            log_odds: learned.log_odds,
+            of_sequences,
+        })
+    }
+
+    /// The samples of the views.
+    pub fn samples(&self) -> impl Iterator<Item = SampleKey> + '_ {
+        self.runs.views.iter().map(|view| view.sample)
+    }
+
+    /// Range of the channel: views are alike within it \[m\].
+    pub fn range_m(&self) -> f64 {
+        self.range_m
+    }
+
+    /// The matches of each view with earlier ones, wherever they are.
+    pub fn matches(&self) -> Vec<ViewMatch> {
+        let n = self.runs.len();
+        let mut matches = Vec::new();
+        for index in 0..n {
+            let is_earlier = |other: usize| other < index && self.is_apart(index, other);
+            let candidates: Vec<usize> = (0..n).filter(|&other| is_earlier(other)).collect();
+            let nowhere = tuning::NOWHERE * n as f64;
+            self.best(index, candidates, nowhere, tuning::MATCHES, &mut matches);
+        }
+        matches
+    }
+
+    /// The match of each view with another one, earlier or later, near to which a map has it.
+    pub fn matches_near(&self, positions: &[Option<Point3<f64>>]) -> Vec<ViewMatch> {
+        let gate_m = tuning::GATE_RANGES * self.range_m;
+        let mut matches = Vec::new();
+        for (index, position) in positions.iter().enumerate() {
+            let Some(position) = position else {
+                continue;
+            };
+            let is_near = |other: &Point3<f64>| (position - other).norm() < gate_m;
+            let candidates = positions.iter().enumerate().filter(|(other, at)| {
+                self.is_apart(index, *other) && at.as_ref().is_some_and(is_near)
+            });
+            let candidates: Vec<usize> = candidates.map(|(other, _)| other).collect();
+            let nowhere = tuning::NOWHERE * candidates.len() as f64;
+            self.best(index, candidates, nowhere, 1, &mut matches);
+        }
+        matches
+    }
+
+    /// The best matches of a view among candidates.
+    fn best(
+        &self,
+        index: usize,
+        mut candidates: Vec<usize>,
+        nowhere: f64,
+        most: usize,
+        matches: &mut Vec<ViewMatch>,
+    ) {
+        let odds = |other: usize| f64::from(self.of_sequences[(other, index)]);
+        let whole: f64 = candidates.iter().map(|&other| odds(other).exp()).sum();
+        let whole = whole + nowhere;
+        for _ in 0..most {
+            let best = candidates
+                .iter()
+                .copied()
+                .max_by(|a, b| odds(*a).total_cmp(&odds(*b)).then(b.cmp(a)));
+            let Some(best) = best.filter(|&best| odds(best) > 0.0) else {
+                return;
+            };
+            let is_beside = |other: usize| {
+                self.runs.is_same(best, other)
+                    && best.abs_diff(other) <= tuning::BESIDE.unsigned_abs()
+            };
+            let beside = candidates.iter().filter(|&&other| is_beside(other));
+            let mass: f64 = beside.map(|&other| odds(other).exp()).sum();
+            let probability = mass / whole;
+            if probability > tuning::PROBABILITY_MIN {
+                matches.push(self.matched(index, best, probability));
+            }
+            candidates.retain(|&other| !is_beside(other));
+        }
+    }
+
+    fn matched(&self, now: usize, then: usize, probability: f64) -> ViewMatch {
+        let odds = probability / (1.0 - probability.min(0.999));
+        ViewMatch {
+            now: self.runs.views[now].sample,
+            then: self.runs.views[then].sample,
+            sd_m: 0.5 * self.range_m,
+            depth: odds.ln_1p().clamp(tuning::DEPTH.0, tuning::DEPTH.1),
+        }
+    }
+
+    /// Whether two views are so far from one another along the way that they may be matched.
+    fn is_apart(&self, a: usize, b: usize) -> bool {
+        let gap = tuning::GAP_MIN.max(self.runs.len() / tuning::GAP_PART);
+        !self.runs.is_same(a, b) || a.abs_diff(b) >= gap
+    }
+
+    /// Log of how much more probable the views are where a map has them than anywhere, with what
+    /// they should have been like where the map has others.
+    pub fn evidence(&self, positions: &[Option<Point3<f64>>]) -> f64 {
+        let mut sum = 0.0;
+        for (index, position) in positions.iter().enumerate() {
+            let Some(position) = position else {
+                continue;
+            };
+            let (mut expected, mut found) = (tuning::NOWHERE, tuning::NOWHERE);
+            for (other, at) in positions[..index].iter().enumerate() {
+                let Some(at) = at.as_ref().filter(|_| self.is_apart(index, other)) else {
+                    continue;
+                };
+                let squared = (position - at).norm_squared() / (self.range_m * self.range_m);
+                if squared < 32.0 {
+                    let weight = (-0.5 * squared).exp();
+                    expected += weight;
+                    found += weight * f64::from(self.log_odds[(other, index)]).exp();
+                }
+            }
+            sum += (found / expected).ln();
+        }
+        sum * self.independence.sqrt()
+    }
+}
+
+/// Log-odds of the sequences about all pairs of views: √n times the mean of n pairs, the better of
+/// both directions of travel.
+fn of_sequences(runs: &Runs<'_>, log_odds: &DMatrix<f32>) -> DMatrix<f32> {
+    let n = runs.len();
+    let reach = tuning::SEQUENCE;
+    let scale = two_covariance::single((2.0 * reach as f64 + 1.0).sqrt());
+    DMatrix::from_fn(n, n, |row, column| {
+        let along = |direction: isize| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for lag in -reach..=reach {
+                let pair = runs.after(row, lag).zip(runs.after(column, lag * direction));
+                if let Some(pair) = pair {
+                    sum += log_odds[pair];
+                    count += 1.0;
+                }
+            }
+            sum / count
+        };
+        scale * f32::max(along(1), along(-1))
+    })
+}

@@ -1,0 +1,57 @@
+//! Views in the order in which agents saw them.
+
+use super::view_log::{LoggedView, ViewLog};
+
+/// The views of a channel, by agent, session and time.
+#[derive(Debug)]
+pub(super) struct Runs<'a> {
+    pub(super) views: Vec<&'a LoggedView>,
+    /// The run of each view: within one, neighbours are neighbours along the way.
+    pub(super) run: Vec<u32>,
+}
+
+impl<'a> Runs<'a> {
+    /// The views of a channel.
+    pub(super) fn of(log: &'a ViewLog, channel: u8) -> Self {
+        let views = log.views.iter().filter(|view| view.channel == channel);
+        let mut views: Vec<&LoggedView> = views.collect();
+        views.sort_by_key(|view| (view.sample.agent, view.sample.session, view.ordinal));
+        let mut run = Vec::with_capacity(views.len());
+        let mut number = 0;
+        for (index, view) in views.iter().enumerate() {
+            let goes_on = index.checked_sub(1).is_some_and(|previous| {
+                let previous = views[previous];
+                (previous.sample.agent, previous.sample.session)
+                    == (view.sample.agent, view.sample.session)
+                    && previous.ordinal.saturating_add(log.stride) == view.ordinal
+            });
+            if index > 0 && !goes_on {
+                number += 1;
+            }
+            run.push(number);
+        }
+        Self { views, run }
+    }
+
+    /// Number of views.
+    pub(super) fn len(&self) -> usize {
+        self.views.len()
+    }
+
+    /// Whether two views are of one run.
+    pub(super) fn is_same(&self, a: usize, b: usize) -> bool {
+        self.run[a] == self.run[b]
+    }
+
+    /// The view so many after another one, if it is of the same run.
+    pub(super) fn after(&self, index: usize, lag: isize) -> Option<usize> {
+        let other = index.checked_add_signed(lag)?;
+        (other < self.len() && self.is_same(index, other)).then_some(other)
+    }
+
+    /// Distance between two views of a run by motion alone \[m\].
+    pub(super) fn distance_m(&self, a: usize, b: usize) -> f64 {
+        let [a, b] = [a, b].map(|index| self.views[index].in_odom.translation.vector);
+        (a - b).norm()
+    }
+}
