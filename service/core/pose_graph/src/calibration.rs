@@ -11,21 +11,24 @@ pub struct Calibration {
     pub length: f64,
     /// Part of a reading by which its angle is too large.
     pub angle: f64,
+    /// Rotation about the body's z axis for each metre that it goes, which is not read \[rad/m\]:
+    /// wheels of unequal diameters drive in a circle.
+    pub veer_rad_m: f64,
     /// Rotation about the body axes that is read where there is none \[rad/s\].
     pub bias_rad_s: Vector3<f64>,
 }
 
-/// Where the components of a calibration stand in a twist: length, angle, bias.
-pub(super) const CALIBRATION_AXES: [usize; 5] = [0, 1, 3, 4, 5];
+/// Where the components of a calibration stand in a twist: length, angle, veer, bias.
+pub(super) const CALIBRATION_AXES: [usize; 6] = [0, 1, 2, 3, 4, 5];
 
 /// The same of a robot in the plane, whose bias is that about its z axis.
-pub(super) const PLANAR_CALIBRATION_AXES: [usize; 3] = [0, 1, 5];
+pub(super) const PLANAR_CALIBRATION_AXES: [usize; 4] = [0, 1, 2, 5];
 
 impl Calibration {
     /// Its components in their places in a twist.
     pub(super) fn components(&self) -> Vector6<f64> {
         se3::join(
-            &Vector3::new(self.length, self.angle, 0.0),
+            &Vector3::new(self.length, self.angle, self.veer_rad_m),
             &self.bias_rad_s,
         )
     }
@@ -36,6 +39,7 @@ impl Calibration {
         Self {
             length: ratios.x,
             angle: ratios.y,
+            veer_rad_m: ratios.z,
             bias_rad_s,
         }
     }
@@ -43,7 +47,7 @@ impl Calibration {
     /// As the place of a node: the ratios as a translation, the bias as a rotation vector.
     pub(super) fn place(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
-            Vector3::new(self.length, self.angle, 0.0).into(),
+            Vector3::new(self.length, self.angle, self.veer_rad_m).into(),
             UnitQuaternion::from_scaled_axis(self.bias_rad_s),
         )
     }
@@ -53,6 +57,7 @@ impl Calibration {
         Self {
             length: place.translation.x,
             angle: place.translation.y,
+            veer_rad_m: place.translation.z,
             bias_rad_s: place.rotation.scaled_axis(),
         }
     }
@@ -60,11 +65,11 @@ impl Calibration {
 
 /// An even motion between two poses as odometry read it.
 ///
-/// With the errors of lengths and angles c and d, the bias b, the length v and the rotation vector
-/// ω that were read, and the time T over which the body moved, it is
+/// With the errors of lengths and angles c and d, the veer e, the bias b, the length v and the
+/// rotation vector ω that were read, and the time T over which the body moved, it is
 ///
 /// ```text
-/// exp((1 − c) v, (1 − d) ω − T b)
+/// exp((1 − c) v, (1 − d) ω + |v| e ẑ − T b)
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
@@ -84,9 +89,11 @@ impl Reading {
         factor_min: f64,
     ) -> Self {
         let (linear, angular) = se3::log(motion);
+        let linear_m = linear / (1.0 - by.length).max(factor_min);
+        let lasting = by.bias_rad_s * moving_s - Vector3::z() * (by.veer_rad_m * linear_m.norm());
         Self {
-            linear_m: linear / (1.0 - by.length).max(factor_min),
-            angular_rad: (angular + by.bias_rad_s * moving_s) / (1.0 - by.angle).max(factor_min),
+            linear_m,
+            angular_rad: (angular + lasting) / (1.0 - by.angle).max(factor_min),
             moving_s,
         }
     }
@@ -100,8 +107,9 @@ impl Reading {
     /// Length and rotation vector of the motion.
     fn corrected(&self, calibration: &Calibration) -> (Vector3<f64>, Vector3<f64>) {
         let linear = self.linear_m * (1.0 - calibration.length);
-        let angular =
-            self.angular_rad * (1.0 - calibration.angle) - calibration.bias_rad_s * self.moving_s;
+        let veered = Vector3::z() * (calibration.veer_rad_m * self.linear_m.norm());
+        let angular = self.angular_rad * (1.0 - calibration.angle) + veered
+            - calibration.bias_rad_s * self.moving_s;
         (linear, angular)
     }
 
@@ -109,8 +117,8 @@ impl Reading {
     /// its right: D exp(C c). `error` is M⁻¹ D. The columns are those of [`CALIBRATION_AXES`].
     ///
     /// ```text
-    /// C = Ad(error⁻¹) Jᵣ(ξ) | v  0  0  |      ξ = log M
-    ///                       | 0  ω  T  |
+    /// C = Ad(error⁻¹) Jᵣ(ξ) | v  0   0    0 |      ξ = log M
+    ///                       | 0  ω  −|v|ẑ  T |
     /// ```
     pub(super) fn jacobian(
         &self,
@@ -125,6 +133,7 @@ impl Reading {
         by_twist
             .fixed_view_mut::<3, 1>(3, 1)
             .copy_from(&self.angular_rad);
+        by_twist[(5, 2)] = -self.linear_m.norm();
         for k in 3..6 {
             by_twist[(k, k)] = self.moving_s;
         }

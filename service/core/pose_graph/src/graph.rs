@@ -6,7 +6,7 @@ use super::calibration::Calibration;
 use super::elimination::number;
 use super::kernel::Kernel;
 use super::link::{Link, LinkId};
-use super::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId};
+use super::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId, Veer};
 use state::Digest;
 
 /// A graph of poses and points with the measurements between them.
@@ -64,8 +64,9 @@ impl PoseGraph {
         at: &Calibration,
         freedom: Freedom,
         lengths: Lengths,
+        veer: Veer,
     ) -> CalibrationId {
-        CalibrationId(self.add_node(Node::calibration(at, freedom, lengths)))
+        CalibrationId(self.add_node(Node::calibration(at, freedom, lengths, veer)))
     }
 
     /// Puts a pose somewhere else and says how it may move from now on: so a frame that has turned

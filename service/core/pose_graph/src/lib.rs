@@ -22,5 +22,5 @@ pub use information::{Information, InvalidInformation, PoseInformation, Position
 pub use kernel::{InvalidScale, Kernel, Scale};
 pub use link::{CalibrationInformation, Link, LinkId, SightingTarget};
 pub use marginals::Marginals;
-pub use node::{CalibrationId, Freedom, Lengths, PointId, PoseId};
+pub use node::{CalibrationId, Freedom, Lengths, PointId, PoseId, Veer};
 pub use relaxation::{Graduation, RelaxationSettings, Relaxed, Start};

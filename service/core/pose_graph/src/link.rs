@@ -102,17 +102,18 @@ pub enum Link {
 pub struct CalibrationInformation(Vector6<f64>);
 
 impl CalibrationInformation {
-    /// Of the variances of the length, the angle and the bias \[1, 1, rad²/s²\]. A component of
-    /// which nothing is known has an infinite one.
+    /// Of the variances of the length, the angle, the veer and the bias \[1, 1, rad²/m², rad²/s²\].
+    /// A component of which nothing is known has an infinite one.
     ///
     /// # Errors
     /// A variance is not positive.
     pub fn of_variances(
         length: f64,
         angle: f64,
+        veer: f64,
         bias: &Vector3<f64>,
     ) -> Result<Self, InvalidInformation> {
-        let variances = Vector6::new(length, angle, 1.0, bias.x, bias.y, bias.z);
+        let variances = Vector6::new(length, angle, veer, bias.x, bias.y, bias.z);
         if variances.iter().any(|variance| variance.is_nan()) {
             return Err(InvalidInformation::NotFinite);
         }
@@ -122,9 +123,7 @@ impl CalibrationInformation {
         {
             return Err(InvalidInformation::Singular);
         }
-        let mut diagonal = variances.map(f64::recip);
-        diagonal[2] = 0.0; // no component stands there
-        Ok(Self(diagonal))
+        Ok(Self(variances.map(f64::recip)))
     }
 
     /// By the places of the components in a twist.

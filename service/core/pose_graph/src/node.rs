@@ -61,6 +61,15 @@ pub enum Lengths {
     Estimated,
 }
 
+/// Whether the veer of odometry is calibrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Veer {
+    /// It is as stated.
+    Known,
+    /// It is estimated.
+    Estimated,
+}
+
 /// A node with its place. A point is a pose that keeps the axes of `map`; a calibration is one as
 /// [`Calibration::place`] says.
 #[derive(Clone, Debug)]
@@ -105,11 +114,14 @@ impl Node {
         calibration: &Calibration,
         freedom: Freedom,
         lengths: Lengths,
+        veer: Veer,
     ) -> Self {
-        let whole: &[usize] = match freedom {
-            Freedom::Held => &[],
-            Freedom::Planar => &PLANAR_CALIBRATION_AXES,
-            Freedom::Full => &CALIBRATION_AXES,
+        let whole: &[usize] = match (freedom, veer) {
+            (Freedom::Held, _) => &[],
+            (Freedom::Planar, Veer::Known) => &[0, 1, 5],
+            (Freedom::Planar, Veer::Estimated) => &PLANAR_CALIBRATION_AXES,
+            (Freedom::Full, Veer::Known) => &[0, 1, 3, 4, 5],
+            (Freedom::Full, Veer::Estimated) => &CALIBRATION_AXES,
         };
         let axes = match lengths {
             Lengths::Estimated => whole,

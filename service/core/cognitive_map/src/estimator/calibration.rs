@@ -83,6 +83,7 @@ impl Calibration {
         pose_graph::Calibration {
             length: self.length,
             angle: self.angle,
+            veer_rad_m: 0.0,
             bias_rad_s: self.bias_rad_s,
         }
     }

@@ -6,7 +6,7 @@ use super::agent_track::AgentTrack;
 use super::chains::Chains;
 use super::tuning;
 use pose_graph::{
-    CalibrationId, CalibrationInformation, Freedom, Kernel, Lengths, Link, PoseGraph,
+    CalibrationId, CalibrationInformation, Freedom, Kernel, Lengths, Link, PoseGraph, Veer,
 };
 
 /// The calibration nodes of a pose graph.
@@ -28,7 +28,7 @@ impl Calibrations {
     pub(super) fn add(
         chains: &Chains,
         prior_sd: &SVector<f64, 5>,
-        lengths: Lengths,
+        (lengths, veer): (Lengths, Veer),
         map: &mut PoseGraph,
     ) -> Self {
         let mut all = Self {
@@ -40,7 +40,7 @@ impl Calibrations {
         }
         for (track, agent) in chains.tracks.iter().zip(0..) {
             if track.is_in_map() {
-                let latest = all.add_agent(chains, (agent, track), prior_sd, lengths, map);
+                let latest = all.add_agent(chains, (agent, track), prior_sd, (lengths, veer), map);
                 all.latest[agent as usize] = latest;
             }
         }
@@ -63,7 +63,7 @@ impl Calibrations {
         chains: &Chains,
         (agent, track): (u32, &AgentTrack),
         prior_sd: &SVector<f64, 5>,
-        lengths: Lengths,
+        (lengths, veer): (Lengths, Veer),
         map: &mut PoseGraph,
     ) -> Option<CalibrationId> {
         let freedom = if track.is_planar {
@@ -81,6 +81,10 @@ impl Calibrations {
             },
         };
         let prior = prior_sd.component_mul(prior_sd);
+        let veer_variance = match veer {
+            Veer::Known => f64::INFINITY,
+            Veer::Estimated => tuning::VEER_SD_RAD_M * tuning::VEER_SD_RAD_M,
+        };
         let mut newest = None;
         let (mut n_motions, mut wander) = (0, SVector::zeros());
         let mut number = chains.first(agent);
@@ -88,17 +92,20 @@ impl Calibrations {
             let calibrated = &keyframe.calibrated;
             let node = newest.filter(|_| n_motions < tuning::CALIBRATED_TOGETHER);
             let node = node.unwrap_or_else(|| {
-                let node = map.add_calibration(&expected, freedom, lengths);
+                let node = map.add_calibration(&expected, freedom, lengths, veer);
                 let link = match newest {
                     None => Link::CalibrationPrior {
                         calibration: node,
                         at: expected,
-                        information: information(&prior),
+                        information: information(&prior, veer_variance),
                     },
                     Some(from) => Link::CalibrationWander {
                         from,
                         to: node,
-                        information: information(&(wander + prior * tuning::WANDER_MIN)),
+                        information: information(
+                            &(wander + prior * tuning::WANDER_MIN),
+                            veer_variance * tuning::WANDER_MIN,
+                        ),
                     },
                 };
                 map.add_link(link, Kernel::Gaussian).ok();
@@ -117,9 +124,9 @@ impl Calibrations {
 
 /// Information of variances of a calibration's components; those that the settings exclude are held
 /// by a variance next to nothing.
-fn information(variances: &SVector<f64, 5>) -> CalibrationInformation {
+fn information(variances: &SVector<f64, 5>, veer: f64) -> CalibrationInformation {
     let least = variances.map(|variance| variance.max(tuning::CALIBRATION_VARIANCE_MIN));
     let bias: Vector3<f64> = least.fixed_rows::<3>(2).into_owned();
-    CalibrationInformation::of_variances(least[0], least[1], &bias)
+    CalibrationInformation::of_variances(least[0], least[1], veer, &bias)
         .expect("variances above zero have an inverse")
 }

@@ -12,7 +12,7 @@ use crate::estimator::Calibration;
 use geometry::{PoseCovariance, from_planar_part, planar_part};
 use pose_graph::{
     Freedom, Kernel, Lengths, Link, LinkId, Marginals, PointId, PoseGraph, PoseId, PoseInformation,
-    PositionInformation, Scale, SightingTarget,
+    PositionInformation, Scale, SightingTarget, Veer,
 };
 use state::NONE;
 
@@ -75,7 +75,12 @@ impl Problem {
             } else {
                 Lengths::Estimated
             };
-            problem.calibrations = Calibrations::add(chains, prior_sd, lengths, &mut problem.map);
+            let veer = if graph.matches.is_empty() {
+                Veer::Known
+            } else {
+                Veer::Estimated
+            };
+            problem.calibrations = Calibrations::add(chains, prior_sd, (lengths, veer), &mut problem.map);
         }
         for (number, keyframe) in chains.keyframes.iter() {
             problem.add_motion(graph, number, keyframe);

@@ -80,7 +80,7 @@ impl KeyframeGraph {
     fn relaxed_whole(&self, views: &ViewLog) -> (Problem, Relaxed) {
         let mut as_it_is = RelaxationCopy::whole(self);
         if !views.is_empty() {
-            as_it_is.match_views(views, tuning::REFINED_WIDTHS, tuning::REFINED_BIASES);
+            as_it_is.match_views(views, tuning::REFINED_WIDTHS, tuning::REFINED_VEERS);
         }
         let mut all = Vec::new();
         if as_it_is.has_pending() {

@@ -174,9 +174,13 @@ pub(super) const REFINED_WIDTHS: &[f64] = &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0];
 pub(super) const GATED_WIDTHS: &[f64] = &[4.0, 2.0, 1.0];
 pub(super) const GATED_MATCHINGS: usize = 2;
 
-/// Biases of rotations from which a refinement begins, in standard deviations: a robot that has
+/// Veers of odometry from which a refinement begins, in standard deviations: a robot that has
 /// turned by radians too much before its first loop lies in another basin of attraction.
-pub(super) const REFINED_BIASES: &[f64] = &[0.0, -1.0, 1.0, -2.0, 2.0];
+pub(super) const REFINED_VEERS: &[f64] = &[0.0, -1.0, 1.0, -2.0, 2.0];
+
+/// Standard deviation of the veer that is expected \[rad/m\]: wheels whose diameters differ by a
+/// part in a hundred, half a metre apart.
+pub(super) const VEER_SD_RAD_M: f64 = 0.03;
 
 /// Most steps of a relaxation with one width, and its tolerance: the next one begins where it ends.
 pub(super) const MATCHED_STEPS_MAX: usize = 10;

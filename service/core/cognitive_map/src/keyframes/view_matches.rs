@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3};
 use place_recognition::{SampleKey, Similarity, ViewLog, ViewMatch};
 
 use super::chains::Chains;
@@ -26,25 +26,35 @@ struct Matched {
 
 impl RelaxationCopy {
     /// Matches the views of a log anew, where the keyframes are now and where they would be by
-    /// odometry with one or another bias, and takes over the map by which views and odometry are
+    /// odometry with one or another veer, and takes over the map by which views and odometry are
     /// most probable. One without any match is among them: views that say nothing change nothing.
     /// Answers whether the matches have changed.
-    pub(super) fn match_views(&mut self, log: &ViewLog, widths: &[f64], biases: &[f64]) -> bool {
+    pub(super) fn match_views(&mut self, log: &ViewLog, widths: &[f64], veers: &[f64]) -> bool {
         let channels = Similarity::of_channels(log);
         if channels.is_empty() {
             return false;
         }
         let before = Arc::clone(&self.graph().matches);
-        let mut best = self.with_matches(Arc::clone(&before), &[1.0], &channels);
+        let n_views: usize = channels.iter().map(|channel| channel.samples().count()).sum();
+        let margin = std::env::var("MARGIN").map_or(3.0, |m| m.parse::<f64>().unwrap()) * (n_views as f64).ln();
+        let mut best = self.with_matches(Arc::default(), &[1.0], &channels);
+        let least = best.log_probability;
+        if !before.is_empty() {
+            let as_before = self.with_matches(Arc::clone(&before), &[1.0], &channels);
+            if as_before.log_probability > least {
+                best = as_before;
+            }
+        }
         let mut starts = vec![self.clone()];
-        starts.extend(biases.iter().map(|&bias| self.dead_reckoned(bias)));
+        starts.extend(veers.iter().map(|&veer| self.dead_reckoned(veer)));
         for start in starts {
-            let unmatched = start.with_matches(Arc::default(), &[1.0], &channels);
-            let matched = start.matched(widths, &channels);
-            for other in [unmatched, matched] {
-                if other.log_probability > best.log_probability {
-                    best = other;
-                }
+            let other = start.matched(widths, &channels);
+            if std::env::var("VM").is_ok() {
+                eprintln!("{n_views} {:.2} null {least:.1}  {:.1} ({} matches) best {:.1}", channels[0].range_m(), other.log_probability, other.copy.graph().matches.len(), best.log_probability);
+            }
+            let is_clear = other.log_probability > least + margin;
+            if is_clear && other.log_probability > best.log_probability {
+                best = other;
             }
         }
         *self = best.copy;
@@ -101,13 +111,12 @@ impl RelaxationCopy {
         }
     }
 
-    /// A copy whose agents went by odometry alone, with a constant bias of so many of its standard
-    /// deviations about the vertical.
-    fn dead_reckoned(&self, bias: f64) -> Self {
+    /// A copy whose agents went by odometry alone, with a veer of so many of its standard
+    /// deviations.
+    fn dead_reckoned(&self, veer: f64) -> Self {
         let mut copy = self.clone();
-        let sd_rad_s = self.graph().settings.calibration_sd[4];
         let calibration = Calibration {
-            bias_rad_s: Vector3::z() * (bias * sd_rad_s),
+            veer_rad_m: veer * tuning::VEER_SD_RAD_M,
             ..Calibration::default()
         };
         for agent in (0..).take(self.graph().chains.tracks.len()) {

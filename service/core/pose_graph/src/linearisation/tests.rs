@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::NormalBlocks;
 use crate::link::{Link, SightingTarget};
-use crate::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId};
+use crate::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId, Veer};
 use crate::{Calibration, CalibrationInformation, PoseInformation, PositionInformation, Reading};
 
 /// A node from, a node to, and a link from the first to the second.
@@ -23,6 +23,7 @@ fn calibration() -> Calibration {
     Calibration {
         length: 0.1,
         angle: -0.2,
+        veer_rad_m: 0.05,
         bias_rad_s: Vector3::new(0.02, -0.01, 0.03),
     }
 }
@@ -214,7 +215,12 @@ proptest! {
         let cases = cases(from, to, error, seed).into_iter();
         for case in cases.filter(|case| matches!(case.link, Link::Odometry { .. })) {
             let blocks = case.blocks(1.0).by_calibration.expect("it has a calibration");
-            let node = Node::calibration(&calibration(), Freedom::Full, Lengths::Estimated);
+            let node = Node::calibration(
+                &calibration(),
+                Freedom::Full,
+                Lengths::Estimated,
+                Veer::Estimated,
+            );
             let cost = |step: f64, index: usize| {
                 let mut unknowns = [0.0; 5];
                 unknowns[index] = step;
@@ -236,7 +242,7 @@ proptest! {
 #[test]
 fn a_calibration_costs_its_distance_from_what_is_expected() {
     let bias = Vector3::repeat(1e-4);
-    let information = CalibrationInformation::of_variances(0.01, 0.04, &bias).unwrap();
+    let information = CalibrationInformation::of_variances(0.01, 0.04, 2.5e-3, &bias).unwrap();
     let (a, b) = (CalibrationId(0), CalibrationId(1));
     let zero = Calibration::default().place();
     let at = calibration().place();
@@ -251,14 +257,14 @@ fn a_calibration_costs_its_distance_from_what_is_expected() {
         to: b,
         information,
     };
-    // 0.1² / 0.01 + 0.2² / 0.04 + (0.02² + 0.01² + 0.03²) / 1e-4
-    let expected = 1.0 + 1.0 + 14.0;
+    // 0.1² / 0.01 + 0.2² / 0.04 + 0.05² / 0.0025 + (0.02² + 0.01² + 0.03²) / 1e-4
+    let expected = 1.0 + 1.0 + 1.0 + 14.0;
     assert!((prior.squared_error(place) - expected).abs() < 1e-9);
     assert!((wander.squared_error(place) - expected).abs() < 1e-9);
     let blocks = wander.normal_blocks(place, |_| 1.0);
     assert_eq!(blocks.from_gradient, -blocks.to_gradient);
-    assert!(CalibrationInformation::of_variances(0.0, 1.0, &bias).is_err());
-    assert!(CalibrationInformation::of_variances(f64::NAN, 1.0, &bias).is_err());
+    assert!(CalibrationInformation::of_variances(0.0, 1.0, 1.0, &bias).is_err());
+    assert!(CalibrationInformation::of_variances(f64::NAN, 1.0, 1.0, &bias).is_err());
 }
 
 #[test]
