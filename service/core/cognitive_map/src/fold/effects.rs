@@ -115,7 +115,9 @@ impl CognitiveMap {
     /// whole map relaxed. A function of the map alone; takes time in proportion to what is
     /// remembered.
     pub fn refined(&self) -> Refined {
-        self.keyframes.settled().refine(self.keyframes.views())
+        self.keyframes
+            .settled()
+            .refine_matched(self.keyframes.views())
     }
 
     /// What is remembered of the past, relaxed, as nodes and links: for other programs. As long in

@@ -24,11 +24,12 @@ impl KeyframeMap {
             return;
         }
         let views = self.recognition.take_due_views();
+        let matches_views = views.is_some();
         let job = RelaxationJob::new(&self.graph, views);
         self.pending = Some(PendingRelaxation::Awaited(job));
         // What comes from now on is for the next one.
         self.graph.constraints.schedule = Schedule::default();
-        let mut meanwhile = Meanwhile::default();
+        let mut meanwhile = Meanwhile::new(matches_views);
         meanwhile.note(agent, stamp_ns);
         self.graph.meanwhile = Some(Box::new(meanwhile));
     }

@@ -15,6 +15,7 @@ use super::moment::Moment;
 use super::relaxation::{Correction, RelaxationCopy};
 use super::sighting::{SeenPoint, stated_variance};
 use super::tuning;
+use crate::estimator::Precedence;
 use crate::input::Relation;
 use geometry::{PoseCovariance, se3, symmetric};
 use state::NONE;
@@ -132,13 +133,15 @@ impl KeyframeGraph {
     ///
     /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then
     /// the same records give the same map.
-    ///
-    /// Views, if any are given, are matched anew before.
-    pub fn relax(&mut self, views: Option<&ViewLog>) -> Vec<Correction> {
+    pub fn relax(&mut self) -> Vec<Correction> {
+        self.relax_matched(None)
+    }
+
+    /// The same, after views, if any are given, were matched anew.
+    pub(super) fn relax_matched(&mut self, views: Option<&ViewLog>) -> Vec<Correction> {
         let schedule = std::mem::take(&mut self.constraints.schedule);
         let mut coarse = RelaxationCopy::coarse(self);
-        let is_matched =
-            views.is_some_and(|log| coarse.match_views(log, tuning::LIVE_WIDTHS, &[]));
+        let is_matched = views.is_some_and(|log| coarse.match_views(log, &tuning::LIVE_MATCHING));
         let is_undecided = coarse.accepted().next().is_none();
         let mut judged = Vec::new();
         if is_undecided && coarse.is_noise_open() && self.has_many_more_closures(&schedule) {
@@ -162,7 +165,13 @@ impl KeyframeGraph {
             return Vec::new();
         }
         self.adopt(best.copy.graph());
-        best.corrections(is_matched || !now.is_subset(&before))
+        best.corrections(if is_matched {
+            Precedence::ExternalAlways
+        } else if now.is_subset(&before) {
+            Precedence::Present
+        } else {
+            Precedence::External
+        })
     }
 
     /// Whether there are many closures, and their number has grown by two fifths, or a multiple of

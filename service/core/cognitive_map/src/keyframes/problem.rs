@@ -80,7 +80,8 @@ impl Problem {
             } else {
                 Veer::Estimated
             };
-            problem.calibrations = Calibrations::add(chains, prior_sd, (lengths, veer), &mut problem.map);
+            problem.calibrations =
+                Calibrations::add(chains, prior_sd, (lengths, veer), &mut problem.map);
         }
         for (number, keyframe) in chains.keyframes.iter() {
             problem.add_motion(graph, number, keyframe);

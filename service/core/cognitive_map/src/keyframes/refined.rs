@@ -59,7 +59,12 @@ pub struct RefinedLandmark {
 
 impl KeyframeGraph {
     /// Relaxes the whole past. A pure function of what was added.
-    pub fn refine(&self, views: &ViewLog) -> Refined {
+    pub fn refine(&self) -> Refined {
+        self.refine_matched(&ViewLog::default())
+    }
+
+    /// The same, after views were matched anew.
+    pub fn refine_matched(&self, views: &ViewLog) -> Refined {
         let (problem, relaxed) = self.relaxed_whole(views);
         let tracks = self.chains.tracks.iter();
         let agents = tracks.map(|track| RefinedAgent::new(track, &self.chains, &problem));
@@ -70,7 +75,7 @@ impl KeyframeGraph {
         }
     }
 
-    /// The relaxed pose graph: for other programs.
+    /// The pose graph, relaxed after views were matched anew: for other programs.
     pub fn pose_graph(&self, views: &ViewLog) -> PoseGraph {
         self.relaxed_whole(views).0.map
     }
@@ -80,7 +85,7 @@ impl KeyframeGraph {
     fn relaxed_whole(&self, views: &ViewLog) -> (Problem, Relaxed) {
         let mut as_it_is = RelaxationCopy::whole(self);
         if !views.is_empty() {
-            as_it_is.match_views(views, tuning::REFINED_WIDTHS, tuning::REFINED_VEERS);
+            as_it_is.match_views(views, &tuning::REFINED_MATCHING);
         }
         let mut all = Vec::new();
         if as_it_is.has_pending() {

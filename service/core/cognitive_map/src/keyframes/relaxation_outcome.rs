@@ -32,7 +32,7 @@ impl RelaxationOutcome {
     /// Of a graph, and of the views that are to be matched.
     pub(super) fn of(graph: &KeyframeGraph, views: Option<&ViewLog>) -> Self {
         let mut relaxed = graph.clone();
-        let corrections = relaxed.relax(views);
+        let corrections = relaxed.relax_matched(views);
         let moved = |(number, is): (u32, &Keyframe)| {
             let was = graph.chains.keyframes.get(number)?;
             let is_moved = (was.pose, was.is_in_map) != (is.pose, is.is_in_map);
@@ -98,7 +98,7 @@ state_of_struct!(ExternalEstimate {
     pose,
     covariance,
     calibration,
-    prevails
+    precedence
 });
 
 impl State for RelaxationOutcome {

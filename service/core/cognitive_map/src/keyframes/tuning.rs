@@ -4,6 +4,8 @@
 //! Pairs of a length and an angle bound a motion \[m, rad\]. Limits of memory and what a space
 //! sets are in [`KeyframeSettings`](super::settings::KeyframeSettings).
 
+use super::view_matches::Matching;
+
 // Keyframes and sightings.
 
 /// Motion that counts as rest \[m, rad\].
@@ -103,6 +105,9 @@ pub(super) const KEYFRAMES_PER_RECORD: usize = 8;
 /// and little enough for a closure to reach the pose within a second.
 pub(super) const RELAXATION_DELAY_NS: i64 = 500_000_000;
 
+/// The same where views are matched: four thousand take 1 to 2 s.
+pub(super) const MATCHING_DELAY_NS: i64 = 2_000_000_000;
+
 /// Most records between the two, whatever their stamps say: two seconds of twenty robots that send
 /// a hundred samples a second.
 pub(super) const RELAXATION_RECORDS_MAX: u32 = 4096;
@@ -165,18 +170,25 @@ pub(super) const UNKNOWN_MOTION_VARIANCE_M2: f64 = 1e12;
 
 // Matches of views.
 
-/// Widths of the kernels of matches, in their ranges, one relaxation each: while samples come in,
-/// and for the refined past.
-pub(super) const LIVE_WIDTHS: &[f64] = &[4.0, 2.0, 1.0];
-pub(super) const REFINED_WIDTHS: &[f64] = &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0];
+/// How views are matched while samples come in: what was taken for another place for a while costs
+/// the live pose more than a map that comes late.
+pub(super) const LIVE_MATCHING: Matching = Matching {
+    widths: &[4.0, 2.0, 1.0],
+    veers: &[],
+    proof: 3.0,
+};
 
-/// The same where views are matched near to where a relaxed map has them, and how often.
+/// How views are matched for the refined past. A robot that has turned by radians too much before
+/// its first loop lies in another basin of attraction: so other veers are tried.
+pub(super) const REFINED_MATCHING: Matching = Matching {
+    widths: &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0],
+    veers: &[0.0, -1.0, 1.0, -2.0, 2.0],
+    proof: 1.0,
+};
+
+/// Widths of kernels where views are matched near to where a relaxed map has them, and how often.
 pub(super) const GATED_WIDTHS: &[f64] = &[4.0, 2.0, 1.0];
 pub(super) const GATED_MATCHINGS: usize = 2;
-
-/// Veers of odometry from which a refinement begins, in standard deviations: a robot that has
-/// turned by radians too much before its first loop lies in another basin of attraction.
-pub(super) const REFINED_VEERS: &[f64] = &[0.0, -1.0, 1.0, -2.0, 2.0];
 
 /// Standard deviation of the veer that is expected \[rad/m\]: wheels whose diameters differ by a
 /// part in a hundred, half a metre apart.

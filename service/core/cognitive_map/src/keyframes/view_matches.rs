@@ -5,17 +5,30 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3};
 use place_recognition::{SampleKey, Similarity, ViewLog, ViewMatch};
 
+use super::agent_track::AgentTrack;
 use super::chains::Chains;
 use super::graph::KeyframeGraph;
 use super::problem::{Among, Calibrating, Problem};
 use super::relaxation::RelaxationCopy;
 use super::tuning;
 use geometry::is_somewhere;
-use pose_graph::{Kernel, Link, LinkId, PositionInformation, RelaxationSettings, Scale};
 use pose_graph::{Calibration, SightingTarget};
+use pose_graph::{Kernel, Link, LinkId, PositionInformation, RelaxationSettings, Scale};
 
 /// The matches of views by which a map is relaxed. Clones share them.
 pub(super) type ViewMatches = Arc<[ViewMatch]>;
+
+/// How views are matched.
+#[derive(Debug)]
+pub(super) struct Matching {
+    /// Widths of the kernels of matches, in their ranges, one relaxation each.
+    pub(super) widths: &'static [f64],
+    /// Veers of odometry from which it begins anew, in standard deviations.
+    pub(super) veers: &'static [f64],
+    /// How much more probable another map has to be than that of odometry, in units of what one
+    /// fold of it is expected to gain by chance.
+    pub(super) proof: f64,
+}
 
 /// A copy of the graph, relaxed by matches of views.
 struct Matched {
@@ -26,34 +39,32 @@ struct Matched {
 
 impl RelaxationCopy {
     /// Matches the views of a log anew, where the keyframes are now and where they would be by
-    /// odometry with one or another veer, and takes over the map by which views and odometry are
+    /// odometry with one veer or another, and takes over the map by which views and odometry are
     /// most probable. One without any match is among them: views that say nothing change nothing.
     /// Answers whether the matches have changed.
-    pub(super) fn match_views(&mut self, log: &ViewLog, widths: &[f64], veers: &[f64]) -> bool {
+    ///
+    /// Another map than that of odometry has to be more probable by `proof` times the Bayesian
+    /// information criterion of a fold: it has three degrees of freedom, and of many folds that are
+    /// possible one is always the most probable.
+    pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
         let channels = Similarity::of_channels(log);
         if channels.is_empty() {
             return false;
         }
         let before = Arc::clone(&self.graph().matches);
-        let n_views: usize = channels.iter().map(|channel| channel.samples().count()).sum();
-        let margin = std::env::var("MARGIN").map_or(3.0, |m| m.parse::<f64>().unwrap()) * (n_views as f64).ln();
+        let n_views: usize = { channels.iter() }
+            .map(|channel| channel.samples().count())
+            .sum();
         let mut best = self.with_matches(Arc::default(), &[1.0], &channels);
-        let least = best.log_probability;
-        if !before.is_empty() {
-            let as_before = self.with_matches(Arc::clone(&before), &[1.0], &channels);
-            if as_before.log_probability > least {
-                best = as_before;
-            }
+        let needed = best.log_probability + matching.proof * 1.5 * (n_views as f64).ln();
+        let as_before = self.with_matches(Arc::clone(&before), &[1.0], &channels);
+        if as_before.log_probability > best.log_probability {
+            best = as_before;
         }
-        let mut starts = vec![self.clone()];
-        starts.extend(veers.iter().map(|&veer| self.dead_reckoned(veer)));
-        for start in starts {
-            let other = start.matched(widths, &channels);
-            if std::env::var("VM").is_ok() {
-                eprintln!("{n_views} {:.2} null {least:.1}  {:.1} ({} matches) best {:.1}", channels[0].range_m(), other.log_probability, other.copy.graph().matches.len(), best.log_probability);
-            }
-            let is_clear = other.log_probability > least + margin;
-            if is_clear && other.log_probability > best.log_probability {
+        let by_odometry = matching.veers.iter().map(|&veer| self.dead_reckoned(veer));
+        for start in std::iter::once(self.clone()).chain(by_odometry) {
+            let other = start.matched(matching.widths, &channels);
+            if other.log_probability > needed.max(best.log_probability) {
                 best = other;
             }
         }
@@ -136,7 +147,7 @@ fn dead_reckoned(
     calibration: &Calibration,
 ) -> Vec<(u32, Isometry3<f64>)> {
     let mut poses: Vec<(u32, Isometry3<f64>)> = Vec::new();
-    if !chains.track(agent).is_some_and(|track| track.is_in_map()) {
+    if !chains.track(agent).is_some_and(AgentTrack::is_in_map) {
         return poses;
     }
     let mut number = chains.first(agent);

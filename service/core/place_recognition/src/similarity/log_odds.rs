@@ -180,7 +180,10 @@ fn logistic(near: &[Vector3<f64>], far: &[Vector3<f64>]) -> Option<Vector3<f64>>
         }
         weights += curvature.try_inverse()? * gradient;
     }
-    weights.iter().all(|weight| weight.is_finite()).then_some(weights)
+    weights
+        .iter()
+        .all(|weight| weight.is_finite())
+        .then_some(weights)
 }
 
 /// (1 − c) / (1 + c) with the correlation c of the log-odds of far pairs and of their successors.

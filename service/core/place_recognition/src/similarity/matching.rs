@@ -193,18 +193,27 @@ fn of_sequences(runs: &Runs<'_>, log_odds: &DMatrix<f32>) -> DMatrix<f32> {
     let n = runs.len();
     let reach = tuning::SEQUENCE;
     let scale = two_covariance::single((2.0 * reach as f64 + 1.0).sqrt());
-    DMatrix::from_fn(n, n, |row, column| {
-        let along = |direction: isize| {
-            let (mut sum, mut count) = (0.0, 0.0);
-            for lag in -reach..=reach {
-                let pair = runs.after(row, lag).zip(runs.after(column, lag * direction));
-                if let Some(pair) = pair {
-                    sum += log_odds[pair];
-                    count += 1.0;
+    let mut odds = DMatrix::zeros(n, n);
+    for column in 0..n {
+        for row in 0..=column {
+            let along = |direction: isize| {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for lag in -reach..=reach {
+                    let pair = runs
+                        .after(row, lag)
+                        .zip(runs.after(column, lag * direction));
+                    if let Some(pair) = pair {
+                        sum += log_odds[pair];
+                        count += 1.0;
+                    }
                 }
-            }
-            sum / count
-        };
-        scale * f32::max(along(1), along(-1))
-    })
+                sum / count
+            };
+            // Both orders of a pair are the same sequences.
+            let best = scale * f32::max(along(1), along(-1));
+            odds[(row, column)] = best;
+            odds[(column, row)] = best;
+        }
+    }
+    odds
 }

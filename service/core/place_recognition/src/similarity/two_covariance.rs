@@ -134,7 +134,10 @@ fn within(runs: &Runs<'_>, views: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// In single precision, of which a score needs no more.
-#[expect(clippy::cast_possible_truncation, reason = "a score is no exact number")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a score is no exact number"
+)]
 pub(super) fn single(value: f64) -> f32 {
     value as f32
 }

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Vector6};
 use proptest::prelude::*;
 
 use super::*;
-use crate::estimator::{Calibrated, ExternalEstimate};
+use crate::estimator::{Calibrated, ExternalEstimate, Precedence};
 use crate::input::{PoseNoise, Relation, RelativePose, StartPose};
 use crate::keyframes::constraint::ClosureState;
 use crate::keyframes::keyframe::Keyframe;
@@ -155,12 +155,13 @@ impl Team {
                     pose: shift * newest * track.since.motion(),
                     covariance: PoseCovariance::zero(),
                     calibration: None,
-                    prevails: true,
+                    precedence: Precedence::External,
                 },
             })
         });
         let outcome = RelaxationOutcome {
             turn_noises: vec![(0, 0.5)],
+            matches: None,
             poses: chains.keyframes.iter().filter_map(pose).collect(),
             states: { closures.iter() }
                 .filter(|(_, closure)| closure.is_candidate())
