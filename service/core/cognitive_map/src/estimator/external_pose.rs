@@ -16,7 +16,6 @@ use super::tuning::{
     INTERSECTION_GAIN_MAX, INTERSECTION_GAIN_MIN, INTERSECTION_STEPS, INTERSECTION_VARIANCE_MIN,
 };
 use geometry::{PoseCovariance, is_somewhere, se3, symmetric};
-use state::{CorruptState, State, StateReader, StateWriter};
 
 /// What another estimate says of an agent.
 #[derive(Clone, Copy, Debug)]
@@ -27,41 +26,10 @@ pub struct ExternalEstimate {
     pub covariance: PoseCovariance,
     /// The lasting errors of its odometry, and their variances in the order of the components.
     pub calibration: Option<(Calibration, SVector<f64, 5>)>,
-    /// What it rests upon, beside what the present pose does.
-    pub precedence: Precedence,
-}
-
-/// Which of two estimates counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Precedence {
-    /// The present one, where they contradict one another; elsewhere both.
-    Present,
-    /// The external one, where they contradict one another, because it knows of more: odometry was
-    /// worse than it said, and the present pose is widened. Elsewhere both.
-    External,
-    /// The external one, wherever it is: by it, odometry was wrong in a way that the present one
-    /// knows nothing of.
-    ExternalAlways,
-}
-
-impl State for Precedence {
-    fn write(&self, out: &mut StateWriter) {
-        let number: u8 = match self {
-            Self::Present => 0,
-            Self::External => 1,
-            Self::ExternalAlways => 2,
-        };
-        number.write(out);
-    }
-
-    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        match u8::read(input)? {
-            0 => Ok(Self::Present),
-            1 => Ok(Self::External),
-            2 => Ok(Self::ExternalAlways),
-            _ => Err(CorruptState::Invalid),
-        }
-    }
+    /// Whether it prevails where the pose contradicts the present one, because it knows of more:
+    /// odometry was worse than it said, and the present pose is widened first. Otherwise it does
+    /// not count then.
+    pub prevails: bool,
 }
 
 impl Estimator {
@@ -126,11 +94,10 @@ impl Frame {
             self.recalibrate(index, calibration, variances, parameters);
         }
         let mut intersection = Intersection::new(self.members[index].filter(), external);
-        let is_far = !intersection.is_near(parameters.gate);
-        if is_far && external.precedence == Precedence::Present {
-            return false;
-        }
-        if is_far || external.precedence == Precedence::ExternalAlways {
+        if !intersection.is_near(parameters.gate) {
+            if !external.prevails {
+                return false;
+            }
             self.put(index, &intersection);
             intersection = Intersection::new(self.members[index].filter(), external);
         }

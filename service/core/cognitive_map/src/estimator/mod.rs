@@ -74,7 +74,7 @@ mod verdict;
 
 pub use calibration::{Calibrated, Calibration};
 pub use effect::{AgentSighted, Effect, FramesMerged};
-pub use external_pose::{ExternalEstimate, Precedence};
+pub use external_pose::ExternalEstimate;
 pub use joint::Estimator;
 pub use level::LevelRow;
 pub(crate) use observers::Observers;

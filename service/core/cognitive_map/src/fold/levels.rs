@@ -5,7 +5,7 @@ use place_filter::{Field, Found, Kernel, Measured, Seeker, SensedLevel, Support}
 
 use super::apply::Fold;
 use super::tuning::{NEAR_REACHES, OWN_SURER, UPRIGHT_SD_RAD};
-use crate::estimator::{ExternalEstimate, LevelRow, Precedence};
+use crate::estimator::{ExternalEstimate, LevelRow};
 use crate::event::EventKind;
 use crate::input::Level;
 use crate::memory::percept::{PerceptMap, Sensed};
@@ -137,7 +137,7 @@ impl Fold<'_> {
             pose: found.pose,
             covariance: found.covariance,
             calibration: None,
-            precedence: Precedence::Present,
+            prevails: false,
         };
         let is_taken = is_known && self.estimator.fuse(number, &estimate, &mut self.effects);
         self.apply_effects();

@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use super::apply::Fold;
 use super::tuning::{ANSWER_MIN, DRIFT_MAX, KIDNAPPED_SD};
 use crate::agent::Status;
-use crate::estimator::{ExternalEstimate, Precedence};
+use crate::estimator::ExternalEstimate;
 use crate::event::EventKind;
 use crate::input::Descriptor;
 use crate::keyframes::Relocalised;
@@ -127,7 +127,7 @@ impl Fold<'_> {
             pose: found.pose,
             covariance: found.covariance,
             calibration: None,
-            precedence: Precedence::Present,
+            prevails: false,
         };
         let is_accepted = self
             .estimator

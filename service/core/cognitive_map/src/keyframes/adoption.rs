@@ -27,8 +27,10 @@ impl KeyframeMap {
         let matches_views = views.is_some();
         let job = RelaxationJob::new(&self.graph, views);
         self.pending = Some(PendingRelaxation::Awaited(job));
-        // What comes from now on is for the next one.
-        self.graph.constraints.schedule = Schedule::default();
+        if self.graph.is_due() {
+            // What comes from now on is for the next one.
+            self.graph.constraints.schedule = Schedule::default();
+        }
         let mut meanwhile = Meanwhile::new(matches_views);
         meanwhile.note(agent, stamp_ns);
         self.graph.meanwhile = Some(Box::new(meanwhile));

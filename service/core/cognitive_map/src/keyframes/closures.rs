@@ -15,7 +15,6 @@ use super::moment::Moment;
 use super::relaxation::{Correction, RelaxationCopy};
 use super::sighting::{SeenPoint, stated_variance};
 use super::tuning;
-use crate::estimator::Precedence;
 use crate::input::Relation;
 use geometry::{PoseCovariance, se3, symmetric};
 use state::NONE;
@@ -139,9 +138,13 @@ impl KeyframeGraph {
 
     /// The same, after views, if any are given, were matched anew.
     pub(super) fn relax_matched(&mut self, views: Option<&ViewLog>) -> Vec<Correction> {
-        let schedule = std::mem::take(&mut self.constraints.schedule);
+        let is_due = views.is_none() || self.is_due();
         let mut coarse = RelaxationCopy::coarse(self);
         let is_matched = views.is_some_and(|log| coarse.match_views(log, &tuning::LIVE_MATCHING));
+        if !is_due && !is_matched {
+            return Vec::new(); // closures wait for their own time
+        }
+        let schedule = std::mem::take(&mut self.constraints.schedule);
         let is_undecided = coarse.accepted().next().is_none();
         let mut judged = Vec::new();
         if is_undecided && coarse.is_noise_open() && self.has_many_more_closures(&schedule) {
@@ -165,13 +168,7 @@ impl KeyframeGraph {
             return Vec::new();
         }
         self.adopt(best.copy.graph());
-        best.corrections(if is_matched {
-            Precedence::ExternalAlways
-        } else if now.is_subset(&before) {
-            Precedence::Present
-        } else {
-            Precedence::External
-        })
+        best.corrections(is_matched || !now.is_subset(&before))
     }
 
     /// Whether there are many closures, and their number has grown by two fifths, or a multiple of

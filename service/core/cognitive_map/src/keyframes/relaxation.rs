@@ -12,7 +12,7 @@ use super::problem::{Among, Calibrating, Problem};
 use super::runs::{Member, Run};
 use super::tuning;
 use super::view_matches::ViewMatches;
-use crate::estimator::{ExternalEstimate, Precedence};
+use crate::estimator::ExternalEstimate;
 use geometry::{is_somewhere, is_within};
 use pose_graph::{Graduation, RelaxationSettings, Relaxed};
 use state::{NONE, Slab};
@@ -419,7 +419,7 @@ impl RelaxedCopy {
     /// They prevail over what the agents' filters hold where closures were judged by their
     /// evidence; not where closures were accepted as they came, for a robot that recognises what
     /// it cannot see may have been carried off.
-    pub(super) fn corrections(&self, precedence: Precedence) -> Vec<Correction> {
+    pub(super) fn corrections(&self, prevail: bool) -> Vec<Correction> {
         let problem = &self.problem;
         let marginals = problem.map.marginals();
         let mut corrections = Vec::new();
@@ -436,7 +436,7 @@ impl RelaxedCopy {
                 pose: problem.map.pose(node) * since.motion(),
                 covariance: composed(&covariance, since.motion(), &since.covariance()),
                 calibration: problem.calibration(agent, &marginals),
-                precedence,
+                prevails: prevail,
             };
             corrections.push(Correction { agent, estimate });
         }

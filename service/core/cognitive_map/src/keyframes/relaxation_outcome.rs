@@ -98,7 +98,7 @@ state_of_struct!(ExternalEstimate {
     pose,
     covariance,
     calibration,
-    precedence
+    prevails
 });
 
 impl State for RelaxationOutcome {

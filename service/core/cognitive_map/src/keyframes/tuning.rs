@@ -106,7 +106,7 @@ pub(super) const KEYFRAMES_PER_RECORD: usize = 8;
 pub(super) const RELAXATION_DELAY_NS: i64 = 500_000_000;
 
 /// The same where views are matched: four thousand take 1 to 2 s.
-pub(super) const MATCHING_DELAY_NS: i64 = 2_000_000_000;
+pub(super) const MATCHING_DELAY_NS: i64 = 500_000_000;
 
 /// Most records between the two, whatever their stamps say: two seconds of twenty robots that send
 /// a hundred samples a second.

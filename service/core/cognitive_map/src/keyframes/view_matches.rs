@@ -68,6 +68,9 @@ impl RelaxationCopy {
                 best = other;
             }
         }
+        if before.is_empty() && best.copy.graph().matches.is_empty() {
+            return false;
+        }
         *self = best.copy;
         self.graph().matches != before
     }

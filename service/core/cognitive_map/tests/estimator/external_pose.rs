@@ -1,4 +1,4 @@
-use cognitive_map::estimator::{Calibration, Estimator, ExternalEstimate, Parameters, Precedence};
+use cognitive_map::estimator::{Calibration, Estimator, ExternalEstimate, Parameters};
 use cognitive_map::{Motion, PoseNoise, RangeBearing, Relation, StartPose};
 use geometry::PoseCovariance;
 use nalgebra::{Isometry3, SVector, Vector6};
@@ -11,7 +11,7 @@ fn outside(pose: &Isometry3<f64>, covariance: &PoseCovariance) -> ExternalEstima
         pose: *pose,
         covariance: *covariance,
         calibration: None,
-        precedence: Precedence::Present,
+        prevails: false,
     }
 }
 
@@ -156,7 +156,7 @@ fn a_pose_that_prevails_is_taken_however_far_off_it_is() {
         let mut estimator = driven(true);
         let pose = planar(x, y, turn);
         let estimate = ExternalEstimate {
-            precedence: Precedence::External,
+            prevails: true,
             ..outside(&pose, &told(0.1, 0.02))
         };
         assert!(estimator.fuse(0, &estimate, &mut Vec::new()));

@@ -23,3 +23,4 @@ mod relaxation; // loops that close while samples come in
 mod removal; // agents that go, and who comes after them
 mod settings; // what each setting changes
 mod trips; // legs, and every way a trip ends
+mod views; // what is seen along ways that are driven again

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Vector6};
 use proptest::prelude::*;
 
 use super::*;
-use crate::estimator::{Calibrated, ExternalEstimate, Precedence};
+use crate::estimator::{Calibrated, ExternalEstimate};
 use crate::input::{PoseNoise, Relation, RelativePose, StartPose};
 use crate::keyframes::constraint::ClosureState;
 use crate::keyframes::keyframe::Keyframe;
@@ -155,7 +155,7 @@ impl Team {
                     pose: shift * newest * track.since.motion(),
                     covariance: PoseCovariance::zero(),
                     calibration: None,
-                    precedence: Precedence::External,
+                    prevails: true,
                 },
             })
         });
