@@ -66,9 +66,9 @@ const ESTIMATE: u8 = 9;
 const KEYFRAMES: u8 = 10;
 const OBJECTS: u8 = 32;
 const OBJECT: u8 = 33;
-const WAY_HEAD: u8 = 40;
-const WAYS: u8 = 41;
-const WAYPOINTS: u8 = 42;
+pub(super) const WAY_HEAD: u8 = 40;
+pub(super) const WAYS: u8 = 41;
+pub(super) const WAYPOINTS: u8 = 42;
 
 /// One page of a checkpoint. A later page of the same kind and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -339,42 +339,6 @@ impl CognitiveMap {
         restored.map_err(|_| damaged(OBJECT, 0))
     }
 
-    /// What is not in the pages of ways.
-    fn way_head(&self, since_revision: u64) -> Option<CheckpointPage> {
-        // It changes only where some way does.
-        let is_new = self.ways.changed_ways(since_revision).next().is_some();
-        is_new.then(|| {
-            let mut out = StateWriter::default();
-            self.ways.write_head(&mut out);
-            page_of(WAY_HEAD, 0, out)
-        })
-    }
-
-    /// Reads ways and waypoints; a map in which nobody has travelled has none.
-    fn restore_ways(
-        &mut self,
-        mut pages: BTreeMap<(u8, u32), Vec<u8>>,
-    ) -> Result<(), CorruptCheckpoint> {
-        let damaged = |kind, index| CorruptCheckpoint::DamagedPage { kind, index };
-        let Some(head) = pages.remove(&(WAY_HEAD, 0)) else {
-            let left = pages.keys().next();
-            return left.map_or(Ok(()), |&(kind, index)| Err(damaged(kind, index)));
-        };
-        let mut expected = 0;
-        for ((kind, index), bytes) in pages {
-            expected = if index == 0 { 0 } else { expected };
-            let restored = match kind {
-                WAYS if index == expected => self.ways.push_ways(&bytes, self.revision),
-                WAYPOINTS if index == expected => self.ways.push_waypoints(&bytes, self.revision),
-                _ => Err(CorruptState::Invalid),
-            };
-            restored.map_err(|_| damaged(kind, index))?;
-            expected += 1;
-        }
-        let restored = self.ways.restore(&head, self.revision);
-        restored.map_err(|_| CorruptCheckpoint::DigestMismatch)
-    }
-
     /// Adds a page.
     fn restore_page(&mut self, kind: u8, index: u32, bytes: &[u8]) -> Result<(), CorruptState> {
         let revision = self.revision;
@@ -473,7 +437,7 @@ fn of_sparse<T: State>(kind: u8, index: usize, items: &PageItems<'_, T>) -> Chec
 }
 
 /// A page of bytes.
-fn page_of(kind: u8, index: usize, out: StateWriter) -> CheckpointPage {
+pub(super) fn page_of(kind: u8, index: usize, out: StateWriter) -> CheckpointPage {
     CheckpointPage {
         kind,
         index: u32::try_from(index).expect("2³² items have fewer pages"),

@@ -272,6 +272,11 @@ impl CognitiveMap {
         self.ways.iter().map(|(_, way)| way)
     }
 
+    /// The ways from a number on, by their numbers, which others get once they are forgotten.
+    pub fn ways_from(&self, first: u32) -> impl Iterator<Item = (u32, &Way)> {
+        self.ways.iter_from(first)
+    }
+
     /// The way between two places.
     pub fn way(&self, a: PlaceId, b: PlaceId) -> Option<&Way> {
         self.ways.between(a, b)

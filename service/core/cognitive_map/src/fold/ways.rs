@@ -1,8 +1,13 @@
 //! Ways: what the legs add up to.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Isometry3;
+use state::{CorruptState, StateWriter};
 
 use super::apply::Fold;
+use super::checkpoint::{WAY_HEAD, WAYPOINTS, WAYS, page_of};
+use super::{CheckpointPage, CognitiveMap, CorruptCheckpoint};
 use crate::memory::place::{Place, PlaceId};
 use crate::memory::trip::{Leg, TripId};
 use crate::memory::way::Traversal;
@@ -61,5 +66,43 @@ impl Fold<'_> {
         if waypoint.is_some_and(|waypoint| Place::is_moved(waypoint.pose(), &at)) {
             self.ways.put(place, &at, self.revision);
         }
+    }
+}
+
+impl CognitiveMap {
+    /// What is not in the pages of ways.
+    pub(super) fn way_head(&self, since_revision: u64) -> Option<CheckpointPage> {
+        // It changes only where some way does.
+        let is_new = self.ways.changed_ways(since_revision).next().is_some();
+        is_new.then(|| {
+            let mut out = StateWriter::default();
+            self.ways.write_head(&mut out);
+            page_of(WAY_HEAD, 0, out)
+        })
+    }
+
+    /// Reads ways and waypoints; a map in which nobody has travelled has none.
+    pub(super) fn restore_ways(
+        &mut self,
+        mut pages: BTreeMap<(u8, u32), Vec<u8>>,
+    ) -> Result<(), CorruptCheckpoint> {
+        let damaged = |kind, index| CorruptCheckpoint::DamagedPage { kind, index };
+        let Some(head) = pages.remove(&(WAY_HEAD, 0)) else {
+            let left = pages.keys().next();
+            return left.map_or(Ok(()), |&(kind, index)| Err(damaged(kind, index)));
+        };
+        let mut expected = 0;
+        for ((kind, index), bytes) in pages {
+            expected = if index == 0 { 0 } else { expected };
+            let restored = match kind {
+                WAYS if index == expected => self.ways.push_ways(&bytes, self.revision),
+                WAYPOINTS if index == expected => self.ways.push_waypoints(&bytes, self.revision),
+                _ => Err(CorruptState::Invalid),
+            };
+            restored.map_err(|_| damaged(kind, index))?;
+            expected += 1;
+        }
+        let restored = self.ways.restore(&head, self.revision);
+        restored.map_err(|_| CorruptCheckpoint::DigestMismatch)
     }
 }

@@ -9,8 +9,13 @@ use crate::memory::ids::PlaceId;
 use crate::memory::way::{Edge, WayMap, Waypoint};
 use state::PagedVec;
 
-/// What is bounded of a waypoint: its distances from the pivots, in units of 10 µm.
-type Distances = [u32; PIVOTS];
+/// What is bounded of a waypoint: its distances from the pivots, in units of 10 µm. They fill one
+/// line of the processor's cache, and lie in no second one.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Distances([u32; PIVOTS]);
+
+const NOWHERE: Distances = Distances([u32::MAX; PIVOTS]);
 
 /// Distances along the ways from a few places, the *pivots*, to all others, for
 /// [`routes`](CognitiveMap::routes).
@@ -25,20 +30,10 @@ type Distances = [u32; PIVOTS];
 #[derive(Clone, Debug)]
 pub struct RouteBounds {
     revision: u64,
-    waypoints: PagedVec<Bounded, 64>,
+    distances: PagedVec<Distances, 64>,
+    /// The place of each waypoint: its number may become another one's.
+    places: PagedVec<Option<PlaceId>, 64>,
 }
-
-/// The waypoint of a number, as long as it is that of the same place.
-#[derive(Clone, Debug)]
-struct Bounded {
-    place: Option<PlaceId>,
-    distances: Distances,
-}
-
-const NOWHERE: Bounded = Bounded {
-    place: None,
-    distances: [u32::MAX; PIVOTS],
-};
 
 /// The distances of a goal.
 pub(super) struct Target<'a> {
@@ -49,10 +44,10 @@ pub(super) struct Target<'a> {
 impl Target<'_> {
     /// Lower bound of the length from a waypoint to the goal \[µm\].
     pub(super) fn bound_um(&self, from: u32) -> u64 {
-        let Some(from) = self.bounds.waypoints.get(from as usize) else {
+        let Some(from) = self.bounds.distances.get(from as usize) else {
             return 0;
         };
-        let pairs = from.distances.iter().zip(&self.distances);
+        let pairs = from.0.iter().zip(&self.distances.0);
         let most = pairs.fold(0, |most, (a, b)| a.abs_diff(*b).max(most));
         u64::from(most) * BOUND_UNIT_UM
     }
@@ -64,7 +59,8 @@ impl RouteBounds {
         let ways = &map.ways;
         let mut bounds = Self {
             revision: map.revision(),
-            waypoints: PagedVec::default(),
+            distances: PagedVec::default(),
+            places: PagedVec::default(),
         };
         bounds.follow_numbers(ways);
         let numbers = ways.waypoint_numbers() as usize;
@@ -115,9 +111,11 @@ impl RouteBounds {
         self.follow_numbers(ways);
         for number in &queue {
             let place = ways.waypoint(*number).map(Waypoint::place);
-            let known = self.waypoints.get(*number as usize);
-            if known.is_some_and(|known| known.place != place) {
-                self.put(*number, Bounded { place, ..NOWHERE });
+            if self.places.get(*number as usize) != Some(&place) {
+                self.put(*number, NOWHERE);
+                if let Some(known) = self.places.get_mut(*number as usize, 0) {
+                    *known = place;
+                }
             }
         }
         // What a changed waypoint is nearer to, and what is nearer to it.
@@ -143,56 +141,51 @@ impl RouteBounds {
         let Some(waypoint) = ways.waypoint(from) else {
             return;
         };
-        let Some(here) = self.waypoints.get(from as usize) else {
+        let Some(here) = self.distances.get(from as usize).copied() else {
             return;
         };
-        let here = here.distances;
         for edge in waypoint.edges() {
             let length = units(edge);
-            let through = here.map(|distance| distance.saturating_add(length));
-            let known = self.waypoints.get(edge.to as usize);
-            let Some(known) = known.filter(|known| {
-                let mut pairs = known.distances.iter().zip(&through);
-                pairs.any(|(known, through)| through < known)
-            }) else {
+            let through = here.0.map(|distance| distance.saturating_add(length));
+            let Some(known) = self.distances.get(edge.to as usize) else {
                 continue;
             };
-            let mut nearer = known.clone();
-            for (distance, through) in nearer.distances.iter_mut().zip(&through) {
-                *distance = (*distance).min(*through);
+            let nearer = std::array::from_fn(|pivot| known.0[pivot].min(through[pivot]));
+            if nearer != known.0 {
+                self.put(edge.to, Distances(nearer));
+                queue.push_back(edge.to);
             }
-            self.put(edge.to, nearer);
-            queue.push_back(edge.to);
         }
     }
 
     /// Has an entry for each number.
     fn follow_numbers(&mut self, ways: &WayMap) {
-        for number in self.waypoints.len()..ways.waypoint_numbers() as usize {
+        for number in self.places.len()..ways.waypoint_numbers() as usize {
             let number = u32::try_from(number).expect("waypoints have 32-bit numbers");
             let place = ways.waypoint(number).map(Waypoint::place);
-            self.waypoints.push(Bounded { place, ..NOWHERE }, 0);
+            self.places.push(place, 0);
+            self.distances.push(NOWHERE, 0);
         }
     }
 
-    fn put(&mut self, number: u32, bounded: Bounded) {
-        if let Some(entry) = self.waypoints.get_mut(number as usize, 0) {
-            *entry = bounded;
+    fn put(&mut self, number: u32, distances: Distances) {
+        if let Some(entry) = self.distances.get_mut(number as usize, 0) {
+            *entry = distances;
         }
     }
 
     /// Sets the distances from a pivot.
     fn set(&mut self, pivot: usize, distances: &[u32]) {
         for (number, distance) in distances.iter().enumerate() {
-            if let Some(entry) = self.waypoints.get_mut(number, 0) {
-                entry.distances[pivot] = *distance;
+            if let Some(entry) = self.distances.get_mut(number, 0) {
+                entry.0[pivot] = *distance;
             }
         }
     }
 
     /// What bounds routes to a waypoint.
     pub(super) fn target(&self, goal: u32) -> Option<Target<'_>> {
-        let distances = self.waypoints.get(goal as usize)?.distances;
+        let distances = *self.distances.get(goal as usize)?;
         Some(Target {
             bounds: self,
             distances,

@@ -9,7 +9,7 @@ use super::bounds::{RouteBounds, Target};
 use super::cost::Costs;
 use super::{NoRoute, RouteCost, tuning};
 use crate::memory::ids::PlaceId;
-use crate::memory::way::{Edge, Waypoint};
+use crate::memory::way::Edge;
 
 /// Waypoints from start to goal, with what leads to each.
 pub(super) type Path = Vec<(u32, Hop)>;
@@ -38,15 +38,14 @@ impl Hop {
 /// What a search has found out so far.
 pub(super) struct Search<'a> {
     costs: &'a Costs<'a>,
-    /// Cost from the start, plus one; 0 where no way has been found yet. Zeroed memory costs
-    /// nothing until it is touched.
+    /// Of each waypoint twice the cost from the start, plus two, and plus one once it was gone on
+    /// from; 0 where no way has been found yet. Zeroed memory costs nothing until it is touched.
     reached: Vec<u64>,
     open: BinaryHeap<Reverse<Open>>,
 }
 
-/// A waypoint to go on from: lower bound of a route through it, the cost so far, its number. Of
-/// equal bounds the one farther on comes first.
-type Open = (u64, Reverse<u64>, u32);
+/// A waypoint to go on from: lower bound of a route through it, and its number.
+type Open = (u64, u32);
 
 /// A lower bound of the cost from a waypoint to the goal.
 struct Bound<'a> {
@@ -66,19 +65,23 @@ impl Bound<'_> {
         }
     }
 
-    fn from(&self, number: u32, waypoint: &Waypoint) -> u64 {
-        let straight_m = (waypoint.pose().translation.vector - self.goal).norm();
+    /// That from a waypoint that lies near a position. Where distances from pivots are known the
+    /// straight line adds next to nothing.
+    fn from(&self, number: u32, near: &[f32; 3]) -> u64 {
+        if let Some(target) = &self.target {
+            return target.bound_um(number);
+        }
+        let near = Vector3::from(near.map(f64::from));
+        // Each coordinate is rounded by at most half a bit of its 24.
+        let rounding_m = near.abs().sum() * f64::from(f32::EPSILON);
+        let straight_m = ((near - self.goal).norm() - rounding_m).max(0.0);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "distances are not negative, and the cast saturates"
         )]
         let straight = (straight_m * self.micro_per_m) as u64;
-        let along = self
-            .target
-            .as_ref()
-            .map_or(0, |target| target.bound_um(number));
-        straight.max(along)
+        straight
     }
 }
 
@@ -103,15 +106,18 @@ impl<'a> Search<'a> {
     ) -> Result<Option<u64>, NoRoute> {
         let bound = goal.map_or_else(Bound::none, |goal| self.bound(goal, bounds));
         let found = |search: &Self| goal.and_then(|goal| search.cost_to(goal));
-        self.reach(start, 0, &bound);
+        self.reach(start, 0, 0);
         let mut visited = 0_usize;
-        while let Some(Reverse((least, Reverse(cost), at))) = self.open.pop() {
+        while let Some(Reverse((least, at))) = self.open.pop() {
             if found(self).is_some_and(|found| least > found) {
                 break;
             }
-            if self.cost_to(at) != Some(cost) {
-                continue; // a cheaper way was found since
+            let reached = &mut self.reached[at as usize];
+            if *reached & 1 == 1 {
+                continue; // it was found by a cheaper way before
             }
+            *reached |= 1;
+            let cost = (*reached >> 1) - 1;
             visited += 1;
             if visited.is_multiple_of(tuning::ASK_EVERY) && gives_up() {
                 return Err(NoRoute::GivenUp);
@@ -133,22 +139,20 @@ impl<'a> Search<'a> {
             };
             let there = cost + more;
             if self.cost_to(edge.to).is_none_or(|known| there < known) {
-                self.reach(edge.to, there, bound);
+                let least = there + bound.from(edge.to, &edge.near);
+                self.reach(edge.to, there, least);
             }
         }
     }
 
-    fn reach(&mut self, at: u32, cost: u64, bound: &Bound<'_>) {
-        self.reached[at as usize] = cost + 1;
-        if let Some(waypoint) = self.costs.ways.waypoint(at) {
-            let least = cost + bound.from(at, waypoint);
-            self.open.push(Reverse((least, Reverse(cost), at)));
-        }
+    fn reach(&mut self, at: u32, cost: u64, least: u64) {
+        self.reached[at as usize] = (cost + 1) << 1;
+        self.open.push(Reverse((least, at)));
     }
 
     /// Cost to a waypoint, as far as it is known.
     fn cost_to(&self, at: u32) -> Option<u64> {
-        self.reached[at as usize].checked_sub(1)
+        (self.reached[at as usize] >> 1).checked_sub(1)
     }
 
     fn bound<'b>(&self, goal: u32, bounds: Option<&'b RouteBounds>) -> Bound<'b> {

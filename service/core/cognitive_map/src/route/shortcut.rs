@@ -34,23 +34,24 @@ impl<'a> Corridor<'a> {
         }
     }
 
-    /// Shortens a path by straight lines between its places: of all ways to do so the shortest one
-    /// (dynamic programming over its places, with lines up to the length within which codes are
-    /// unambiguous). `gives_up` is asked now and then; what was shortened until then is kept.
+    /// Shortens a path by straight lines between its places: of all ways to do so the shortest one,
+    /// where a step fewer is worth a millimetre (dynamic programming over its places, with lines up
+    /// to the length within which codes are unambiguous). Where `gives_up` says so, the path stays
+    /// as it is.
     pub(super) fn shorten(&mut self, path: &Path, gives_up: &mut dyn FnMut() -> bool) -> Path {
         let at: Vec<_> = path
             .iter()
             .map(|(number, _)| self.position(*number))
             .collect();
-        // The length from the start, and the place before.
+        // The length from the start with what its steps are worth, and the place before.
         let mut best = vec![(0.0, 0)];
         for to in 1..path.len() {
             let along_um = path[to].1.edge().map_or(0, |edge| edge.length_um);
             let along = along_um as f64 / tuning::MICRO;
-            let mut shortest = (best[to - 1].0 + along, to - 1);
+            let mut shortest = (best[to - 1].0 + along + tuning::STEP_M, to - 1);
             for from in (to.saturating_sub(tuning::SHORTCUT_PLACES_MAX)..to - 1).rev() {
                 let length_m = (at[to] - at[from]).norm();
-                let whole = best[from].0 + length_m;
+                let whole = best[from].0 + length_m + tuning::STEP_M;
                 if whole < shortest.0
                     && length_m <= self.unambiguous_m()
                     && !self.leads_into_avoided(&at[from], &at[to])

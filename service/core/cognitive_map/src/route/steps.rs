@@ -118,10 +118,10 @@ impl CognitiveMap {
 }
 
 impl Steps {
-    /// A step in a straight line beside the ways. One of no length is none.
+    /// A step in a straight line beside the ways. One of less than a micrometre is none.
     fn approach(&mut self, place: Option<crate::PlaceId>, position: Point3<f64>) {
         let length_m = (position - self.at).norm();
-        if length_m > 0.0 {
+        if length_m >= 1.0 / tuning::MICRO {
             let step = self.step_to(position, length_m, StepKind::Approach);
             self.push(RouteStep { place, ..step });
         }

@@ -25,5 +25,7 @@ pub(super) const TOLERANCE_SD: f64 = 2.0;
 /// Places of a path that a shortcut may leave out. Source: with places a field radius apart, as far
 /// as codes of the default spacings are unambiguous.
 pub(super) const SHORTCUT_PLACES_MAX: usize = 32;
+/// What one step fewer is worth \[m\]. Source: robots slow down at goals; far below their size.
+pub(super) const STEP_M: f64 = 1e-3;
 /// Edge of the cubes in which swept ways are looked up \[m\].
 pub(super) const CORRIDOR_CELL_M: f64 = 0.5;

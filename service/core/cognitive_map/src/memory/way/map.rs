@@ -123,7 +123,16 @@ impl WayMap {
 
     /// The ways with their numbers, which others get once they are forgotten.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (u32, &Way)> {
-        self.ways.iter()
+        self.iter_from(0)
+    }
+
+    /// The ways from a number on.
+    pub(crate) fn iter_from(&self, first: u32) -> impl Iterator<Item = (u32, &Way)> {
+        let slots = (first..).zip(self.ways.pages.iter_from(first as usize));
+        slots.filter_map(|(number, slot)| match slot {
+            Slot::Taken(way) => Some((number, way)),
+            Slot::Vacant(_) => None,
+        })
     }
 
     /// Number of waypoint numbers that have been given out.
@@ -236,13 +245,7 @@ impl WayMap {
             return None;
         }
         for (at, to, place) in [(first, second, ends[1]), (second, first, ends[0])] {
-            let edge = Edge {
-                place,
-                to,
-                way: number,
-                travelled: false,
-                length_um: 1,
-            };
+            let edge = Edge::new(place, to, number);
             if let Some(waypoint) = self.waypoints.get_mut(at, revision)
                 && let Err(rank) = waypoint.rank(place)
             {
@@ -296,14 +299,16 @@ impl WayMap {
         self.least.include(way, &places);
         let ends = [0, 1].map(|k| {
             let travelled = way.travelled[k].times() > 0;
-            (way.waypoints[k], way.ends[1 - k], travelled)
+            let there = self.waypoints.get(way.waypoints[1 - k]);
+            let near = there.map_or([0.0; 3], |there| rounded(&there.pose));
+            (way.waypoints[k], way.ends[1 - k], travelled, near)
         });
-        for (at, place, travelled) in ends {
+        for (at, place, travelled, near) in ends {
             if let Some(waypoint) = self.waypoints.get_mut(at, revision)
                 && let Ok(rank) = waypoint.rank(place)
             {
                 let edge = &mut waypoint.edges[rank];
-                (edge.length_um, edge.travelled) = (length_um, travelled);
+                (edge.length_um, edge.travelled, edge.near) = (length_um, travelled, near);
             }
         }
     }
@@ -422,17 +427,17 @@ impl WayMap {
             let Err(rank) = waypoint.rank(place) else {
                 return Err(CorruptState::Invalid);
             };
-            let edge = Edge {
-                place,
-                to: of.waypoints[1 - k],
-                way,
-                travelled: false,
-                length_um: 1,
-            };
+            let edge = Edge::new(place, of.waypoints[1 - k], way);
             waypoint.edges.insert(rank, edge);
         }
         Ok(())
     }
+}
+
+/// A position in single precision.
+fn rounded(pose: &Isometry3<f64>) -> [f32; 3] {
+    #[expect(clippy::cast_possible_truncation, reason = "rounded on purpose")]
+    pose.translation.vector.map(|x| x as f32).into()
 }
 
 /// A ratio, or zero where there is none.

@@ -33,8 +33,24 @@ pub(crate) struct Edge {
     pub(crate) way: u32,
     /// Whether it was travelled in this direction.
     pub(crate) travelled: bool,
+    /// Where it leads, rounded: a search asks it of many places at which it does not look.
+    pub(crate) near: [f32; 3],
     /// Length in whole micrometres, rounded up: one at least.
     pub(crate) length_um: u64,
+}
+
+impl Edge {
+    /// An edge that is not brought up to date with its way yet.
+    pub(super) fn new(place: PlaceId, to: u32, way: u32) -> Self {
+        Self {
+            place,
+            to,
+            way,
+            travelled: false,
+            near: [0.0; 3],
+            length_um: 1,
+        }
+    }
 }
 
 impl Waypoint {
