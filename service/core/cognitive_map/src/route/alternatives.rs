@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Point3;
 
 use super::cost::Costs;
-use super::search::{Path, Search};
+use super::path::Path;
+use super::search::Search;
 use super::shortcut::Corridor;
 use super::{NoRoute, Route, RouteBounds, RouteCost, RouteEnd, RouteOptions, tuning};
 use crate::fold::CognitiveMap;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::search::Path;
+use super::path::Path;
 use super::{Reverse, RouteOptions, tuning};
 use crate::memory::way::{Edge, Way, WayMap, Waypoint};
 

@@ -8,6 +8,7 @@ mod alternatives;
 mod bounds;
 mod cost;
 mod end;
+mod path;
 mod region;
 mod search;
 mod shortcut;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 
-use super::search::{Hop, Path};
+use super::path::{Hop, Path};
 use super::{Region, tuning};
 use crate::fold::CognitiveMap;
 use crate::memory::ids::PlaceId;

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use super::cost::duration_s;
-use super::search::{Hop, Path};
+use super::path::{Hop, Path};
 use super::{Route, RouteEnd, RouteStep, StepKind, tuning};
 use crate::fold::CognitiveMap;
 use crate::memory::way::{Edge, Waypoint};
