@@ -236,9 +236,10 @@ class Client(HttpService):
         path_spacing_m: Optional[float] = None,
     ) -> RouteAnswer:
         """How one gets from `start` to `goal` (`AtAgent`, `AtPlace`, `AtPosition`, …), by ways that
-        the team has gone: the cheapest by `cost`, and up to four `alternatives`. With
-        `shortcuts` it cuts corners within `body_radius_m` [m] of ways. With `path_spacing_m` there are poses along it, so far apart [m]. A service that is at several of
-        these already asks to come back (503)."""
+        the team has gone: the cheapest by `cost`, and up to four `alternatives`. With `shortcuts`
+        it cuts corners within `body_radius_m` [m] of ways. With `path_spacing_m` there are poses
+        along it, so far apart [m]. A service that is at several of these already asks to come back
+        (503)."""
         query = RouteQuery(
             start,
             goal,
