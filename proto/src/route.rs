@@ -23,8 +23,8 @@ pub struct RouteQuery {
     /// What the route is to keep clear of.
     #[serde(default)]
     pub avoid: RouteAvoid,
-    /// Whether it may cut corners, by straight lines that lie wholly within the corridor that bodies
-    /// have swept along the ways; it may not when absent.
+    /// Whether it may cut corners, by straight lines that lie wholly within the corridor that
+    /// bodies have swept along the ways; it may not when absent.
     #[serde(default)]
     pub shortcuts: bool,
     /// Half the width of that corridor \[m\], 0.01 to 1; 0.15 when absent.

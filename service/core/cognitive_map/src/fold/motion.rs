@@ -179,8 +179,8 @@ impl Fold<'_> {
         self.agent.recorder.leg = Some(leg);
     }
 
-    /// Appends a leg to the trip under way, or to a new one; answers the trip, and the number of the
-    /// leg in it.
+    /// Appends a leg to the trip under way, or to a new one; answers the trip, and the number of
+    /// the leg in it.
     fn record(&mut self, leg: Leg, start_stamp_ns: i64) -> Option<(TripId, u32)> {
         let ends = [leg.from(), leg.to()];
         self.travel_again(ends);
