@@ -41,8 +41,8 @@ impl Space {
         .await
     }
 
-    /// What `work` finds out about routes in the map as it is. It is given bounds that make searches
-    /// shorter, and whether to give up.
+    /// What `work` finds out about routes in the map as it is. It is given bounds that make
+    /// searches shorter, and whether to give up.
     ///
     /// # Errors
     /// See [`QuestionError`].

@@ -117,8 +117,8 @@ impl CognitiveMap {
         self.places.bytes()
     }
 
-    /// Bytes of memory that places, trips, ways, what is remembered of percepts and what can be smoothed
-    /// take, reserved ones included: all that budgets bound.
+    /// Bytes of memory that places, trips, ways, what is remembered of percepts and what can be
+    /// smoothed take, reserved ones included: all that budgets bound.
     pub fn memory_bytes(&self) -> usize {
         self.places.bytes()
             + self.trips.bytes()

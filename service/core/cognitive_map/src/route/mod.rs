@@ -47,8 +47,8 @@ pub struct RouteOptions {
     pub avoid_places: BTreeSet<PlaceId>,
     /// Boxes that it does not lead into.
     pub avoid_regions: Vec<Region>,
-    /// Half the width of the bodies that travelled \[m\], where the route may cut corners: by straight
-    /// lines that are wholly within this distance of ways.
+    /// Half the width of the bodies that travelled \[m\], where the route may cut corners: by
+    /// straight lines that are wholly within this distance of ways.
     pub shortcuts_within_m: Option<f64>,
     /// Most other routes to answer, each of which shares at most half its length with any before.
     pub alternatives: usize,
@@ -57,8 +57,8 @@ pub struct RouteOptions {
 /// A route.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Route {
-    /// What it costs, in millionths of the cost's unit; approaches cost nothing. What shortcuts save
-    /// is only in lengths.
+    /// What it costs, in millionths of the cost's unit; approaches cost nothing. What shortcuts
+    /// save is only in lengths.
     pub cost_micro: u64,
     /// Where it begins in `map`.
     pub start: Point3<f64>,

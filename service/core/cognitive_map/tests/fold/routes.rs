@@ -175,7 +175,8 @@ proptest! {
                 prop_assert_eq!(ends, [a.min(b), a.max(b)]);
                 let at = map.place(b).unwrap().position();
                 prop_assert_eq!(&step.position, at);
-                prop_assert!(step.length_m + 1e-5 >= (at - map.place(a).unwrap().position()).norm());
+                let distance_m = (at - map.place(a).unwrap().position()).norm();
+                prop_assert!(step.length_m + 1e-5 >= distance_m);
                 prop_assert!(step.tolerance_m >= 0.125 && step.tolerance_m >= 2.0 * step.sd_m);
                 for (number, known) in seen.iter().enumerate() {
                     if known.contains(&ends) {
