@@ -141,6 +141,7 @@ serve: release ## the service; ARGS="--config service/cogmap.toml"
 bench: release-lab ## the benchmarks, each beside its yardstick; ARGS="--json"
 	$(TARGET)/release/cogmap-lab bench step $(ARGS)
 	$(TARGET)/release/cogmap-lab bench recall $(ARGS)
+	$(TARGET)/release/cogmap-lab bench route $(ARGS)
 	$(TARGET)/release/cogmap-lab bench descriptors $(ARGS)
 	$(TARGET)/release/cogmap-lab bench ingest $(ARGS)
 	$(TARGET)/release/cogmap-lab bench http $(ARGS)

@@ -31,6 +31,7 @@ mod object;
 mod percept;
 mod predict;
 mod query;
+mod route;
 mod sample;
 mod settings;
 mod watermark;
@@ -65,6 +66,10 @@ pub use object::{
 pub use percept::{Descriptor, Level};
 pub use predict::{ExpectedPercept, MotionBody, PredictAnswer, PredictQuery, PredictedPercept};
 pub use query::{PerceptCue, RecallQuery, Verb, WatermarkQuery};
+pub use route::{
+    Route, RouteAnswer, RouteAvoid, RouteBox, RouteCost, RouteEnd, RouteFormat, RoutePose,
+    RouteQuery, RouteReverse, RouteStep, RouteWay, Way, WayTraversals,
+};
 pub use sample::{
     Increment, Marker, MotionNoise, Relation, Sample, SampleBatch, SampleBody, Sighting, StartPose,
     Target, Velocity,

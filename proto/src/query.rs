@@ -17,6 +17,8 @@ pub enum Verb {
     Identify,
     /// [`crate::LocalizeQuery`] → [`crate::Localization`].
     Localize,
+    /// [`crate::RouteQuery`] → [`crate::RouteAnswer`].
+    Route,
 }
 
 impl Verb {
@@ -28,6 +30,7 @@ impl Verb {
             Self::Predict => "predict",
             Self::Identify => "identify",
             Self::Localize => "localize",
+            Self::Route => "route",
         }
     }
 }

@@ -43,7 +43,7 @@ pub struct SpaceSettings {
     #[serde(alias = "anchors_max")]
     pub keyframes_max: u32,
     /// After this many samples of the space, by whichever agent, a use counts half as much for the
-    /// strength of a place or trip.
+    /// strength of a place, trip or way.
     pub strength_half_life_samples: u32,
     /// Closest two poses of a stored trajectory \[s\]: at most this often a row is kept.
     pub trajectory_interval_s: f64,
@@ -74,6 +74,9 @@ pub struct SpaceSettings {
     /// Probability from which on touches are answered with an object, or with none that is known.
     /// Larger where a wrong answer costs more than further touches.
     pub object_answer_probability: f64,
+    /// Most ways, each between two places that legs have joined, at least 1: for one more, the
+    /// weakest is forgotten without which no places are separate.
+    pub ways_max: u32,
 }
 
 /// When a place cell is recruited.
@@ -139,6 +142,7 @@ impl Default for SpaceSettings {
             restart_sd_m: 1.0,
             restart_sd_rad: 0.5,
             object_answer_probability: 0.995,
+            ways_max: 131_072,
         }
     }
 }

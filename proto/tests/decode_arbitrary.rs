@@ -10,8 +10,8 @@ use cogmap_proto::{
     AgentDetail, AgentObject, AgentPage, Codec, DecodeError, Estimate, Event, GridState,
     Identification, IdentifyQuery, IngestAnswer, LandmarkPage, Localization, LocalizeQuery, Name,
     ObjectDetail, ObjectLesson, ObjectPage, PlacePage, PredictAnswer, PredictQuery, Problem,
-    RecallAnswer, RecallQuery, SampleBatch, SpaceList, SpaceSettings, Trajectory, TripDetail,
-    TripPage, Watermark, WatermarkQuery,
+    RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SpaceList, SpaceSettings,
+    Trajectory, TripDetail, TripPage, Watermark, WatermarkQuery,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -48,6 +48,8 @@ fn decode_as_everything(bytes: &[u8]) {
     decode_as::<Problem>(bytes);
     decode_as::<RecallAnswer>(bytes);
     decode_as::<RecallQuery>(bytes);
+    decode_as::<RouteAnswer>(bytes);
+    decode_as::<RouteQuery>(bytes);
     decode_as::<SampleBatch>(bytes);
     decode_as::<SpaceList>(bytes);
     decode_as::<SpaceSettings>(bytes);

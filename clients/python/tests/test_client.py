@@ -112,6 +112,31 @@ def test_recall_sends_only_what_was_asked(server: Server, client: cogmap.Client)
     }
 
 
+def test_a_route_is_asked_for_as_it_is_meant(server: Server, client: cogmap.Client) -> None:
+    server.answer("POST /v1/spaces/lab/route", golden("route_answer"))
+    found = client.route("lab", cogmap.AtAgent("robot-1"), cogmap.AtPlace(3))
+    assert json.loads(server.seen[0].body) == golden("route_query")
+    assert [step.way for step in found.steps] == [
+        cogmap.RouteWay.TRAVELLED,
+        cogmap.RouteWay.APPROACH,
+    ]
+    assert found.path is not None and found.alternatives[0].path is None
+    client.route(
+        "lab",
+        cogmap.AtPosition((12.5, -7.25, 0.125)),
+        cogmap.AtPlace(2**64 - 1),
+        cost=cogmap.RouteCost.RECENCY,
+        reverse=cogmap.RouteReverse.NEVER,
+        avoid_places=[4, 5],
+        avoid_boxes=[cogmap.RouteBox((0.0, -1.5, 0.0), (2.0, 1.5, 2.5))],
+        shortcuts=True,
+        body_radius_m=0.25,
+        alternatives=4,
+        path_spacing_m=0.5,
+    )
+    assert json.loads(server.seen[1].body) == golden("route_query_full")
+
+
 def test_samples_are_localised(server: Server, client: cogmap.Client) -> None:
     server.answer("POST /v1/spaces/lab/localize", golden("localization"))
     query = json.dumps(golden("localize_query")).encode()

@@ -42,6 +42,8 @@ TYPES: Dict[str, type] = {
     "predict_query": PredictQuery,
     "recall_answer": cogmap.RecallAnswer,
     "recall_query": RecallQuery,
+    "route_answer": cogmap.RouteAnswer,
+    "route_query": cogmap.RouteQuery,
     "space_list": cogmap.SpaceList,
     "space_settings": cogmap.SpaceSettings,
     "trajectory": cogmap.Trajectory,

@@ -12,8 +12,8 @@ use cogmap_proto::{
     AgentDetail, AgentObject, AgentPage, AgentSummary, Codec, GridState, Identification,
     IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization, LocalizeQuery, ObjectDetail,
     ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage, PredictAnswer, PredictQuery,
-    RecallAnswer, RecallQuery, SampleBatch, SpaceInfo, SpaceList, SpaceSettings, Trajectory, Trip,
-    TripDetail, TripPage,
+    RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SpaceInfo, SpaceList,
+    SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
 };
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};
@@ -250,6 +250,15 @@ impl Api {
             &agent_path(space, agent, "/predict")?,
             &json(query),
         )
+    }
+
+    /// How one gets from here to there, by ways that the team has gone.
+    ///
+    /// # Errors
+    /// See [`ApiError`]. A lost agent and a goal to which no way leads are conflicts (409); a
+    /// service that is at several of these already asks to come back (503).
+    pub fn route(&self, space: &str, query: &RouteQuery) -> Result<RouteAnswer, ApiError> {
+        self.send(Method::POST, &path(space, "/route")?, &json(query))
     }
 
     /// All places of a space, by id.

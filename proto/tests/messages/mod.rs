@@ -7,6 +7,7 @@ mod answers;
 mod localize;
 mod objects;
 mod published;
+mod routes;
 mod samples;
 
 use std::fmt::Debug;
@@ -37,4 +38,5 @@ pub(crate) fn each(visit: &mut impl Visit) {
     answers::each(visit);
     objects::each(visit);
     localize::each(visit);
+    routes::each(visit);
 }

@@ -27,6 +27,7 @@ mod refinement;
 mod relaxers;
 mod removal;
 mod repair;
+mod route_bounds;
 mod sequencer;
 mod session_bound;
 mod settings;

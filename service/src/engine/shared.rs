@@ -20,6 +20,7 @@ use super::publisher::Publisher;
 use super::question::QuestionRoom;
 use super::refinement::Refinements;
 use super::relaxers::Relaxers;
+use super::route_bounds::RouteBoundsOfSpace;
 use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
 use super::unavailable::Unavailable;
@@ -61,6 +62,8 @@ pub(crate) struct Shared {
     /// The map relaxed for those who asked for the past.
     pub(super) refinements: Refinements,
     pub(super) questions: QuestionRoom,
+    /// What makes the search of routes shorter.
+    pub(super) route_bounds: Arc<RouteBoundsOfSpace>,
     /// Set when the writer ended although the space was not closing.
     pub(super) broken: AtomicBool,
 }
@@ -111,6 +114,7 @@ impl Shared {
             snapshot_requests: Mutex::new(Some(Vec::new())),
             refinements: Refinements::default(),
             questions: around.questions.clone(),
+            route_bounds: Arc::default(),
             broken: AtomicBool::new(false),
         })
     }

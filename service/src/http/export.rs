@@ -9,7 +9,7 @@ use axum::extract::State;
 use axum::http::Response;
 use axum::http::header::{CONTENT_DISPOSITION, HeaderValue};
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
-use cogmap_proto::{AgentSummary, Landmark, Place, SpaceInfo, TripDetail};
+use cogmap_proto::{AgentSummary, Landmark, Place, SpaceInfo, TripDetail, Way};
 use cognitive_map::{CognitiveMap, LandmarkId, PlaceId, TripId};
 use futures_util::stream;
 use pose_graph::g2o::write_g2o;
@@ -78,6 +78,8 @@ pub(crate) struct MapExport {
     places: Vec<Place>,
     /// Its trips, by number, with their legs.
     trips: Vec<TripDetail>,
+    /// Its ways, each between two places.
+    ways: Vec<Way>,
     /// Its landmarks, in the order of learning.
     landmarks: Vec<Landmark>,
 }
@@ -159,7 +161,7 @@ fn cloud_form(query: &ExportQuery, format: ExportFormat) -> Result<CloudForm, Pr
 type Section = fn(&CognitiveMap, &[AgentSummary], u32) -> Vec<(u32, String)>;
 
 /// The lists of the map with their names.
-const SECTIONS: [(&str, Section); 4] = [
+const SECTIONS: [(&str, Section); 5] = [
     ("agents", |_, agents, first| {
         let agents = (0..).zip(agents.iter()).skip(first as usize);
         agents
@@ -178,6 +180,11 @@ const SECTIONS: [(&str, Section); 4] = [
         let trips = map.trips_from(TripId(first)).take(1);
         trips
             .map(|(id, trip)| (id.0, text(&encode::trip_detail(map, id, trip))))
+            .collect()
+    }),
+    ("ways", |map, _, first| {
+        let ways = map.ways_from(first).take(CHUNK_ITEMS);
+        ways.filter_map(|(number, way)| Some((number, text(&encode::way(map, way)?))))
             .collect()
     }),
     ("landmarks", |map, _, first| {

@@ -34,6 +34,7 @@ mod predict;
 mod problem;
 mod recall;
 mod reply;
+mod route;
 mod samples;
 mod settings;
 mod spaces;
@@ -90,6 +91,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(trajectory::get))
         .routes(routes!(recall::post))
         .routes(routes!(localize::post))
+        .routes(routes!(route::post))
         .routes(routes!(predict::post))
         .routes(routes!(places::list))
         .routes(routes!(places::get))

@@ -207,6 +207,7 @@ fn merge_into_array(schema: &mut Value, length: usize) {
 /// Writes the bounds of request bodies into their schemas: the types cannot carry them.
 fn constrain(schemas: &mut Value) {
     constrain_recall(&mut schemas["RecallQuery"]["properties"]);
+    constrain_route(schemas);
     constrain_batch(&mut schemas["SampleBatch"]["properties"]);
     constrain_rotations(&mut schemas["Orientation"]);
     constrain_lists(schemas);
@@ -233,6 +234,18 @@ fn constrain_recall(query: &mut Value) {
     merge(&mut phase["items"], &turns);
     let modules = json!({ "minItems": 1, "maxItems": GRID_MODULES_MAX });
     merge(&mut query["code"], &modules);
+}
+
+fn constrain_route(schemas: &mut Value) {
+    let query = &mut schemas["RouteQuery"]["properties"];
+    let spacing = json!({ "minimum": 0.01, "maximum": 1000.0 });
+    merge(&mut query["spacing_m"], &spacing);
+    let radius = json!({ "minimum": 0.01, "maximum": 1.0 });
+    merge(&mut query["body_radius_m"], &radius);
+    merge(&mut query["alternatives"], &json!({ "maximum": 4 }));
+    let avoid = &mut schemas["RouteAvoid"]["properties"];
+    merge(&mut avoid["places"], &json!({ "maxItems": 1000 }));
+    merge(&mut avoid["boxes"], &json!({ "maxItems": 64 }));
 }
 
 fn constrain_batch(batch: &mut Value) {

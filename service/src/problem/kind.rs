@@ -42,6 +42,10 @@ pub enum Kind {
     TooManySpaces,
     /// It is not known where the agent stands in the map.
     NotPlaced,
+    /// A route is to begin or end where an agent is that is lost.
+    AgentLost,
+    /// No way leads from the start of a route to its goal.
+    NoWay,
     /// The body is too long.
     BodyTooLong,
     /// The codec that the message names is not one that is read here.
@@ -52,6 +56,8 @@ pub enum Kind {
     SessionInFuture,
     /// Settings that break a rule.
     InvalidSettings,
+    /// No place is near where a route is to begin or end.
+    NothingNear,
     /// A question or a batch that can be read, and breaks a rule.
     InvalidQuery,
     /// A fault of the service.
@@ -76,7 +82,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, by status.
-    pub const ALL: [Self; 34] = [
+    pub const ALL: [Self; 37] = [
         Self::InvalidPath,
         Self::InvalidParameter,
         Self::MalformedBody,
@@ -94,6 +100,8 @@ impl Kind {
         Self::TooManyAgents,
         Self::TooManySpaces,
         Self::NotPlaced,
+        Self::AgentLost,
+        Self::NoWay,
         Self::RemovedAgent,
         Self::ForgottenMemory,
         Self::BodyTooLong,
@@ -101,6 +109,7 @@ impl Kind {
         Self::UnknownHost,
         Self::SessionInFuture,
         Self::InvalidSettings,
+        Self::NothingNear,
         Self::InvalidQuery,
         Self::Internal,
         Self::StoreFailed,
@@ -133,6 +142,8 @@ impl Kind {
             Self::TooManyAgents => ("too-many-agents", 409, "Too many agents"),
             Self::TooManySpaces => ("too-many-spaces", 409, "Too many spaces"),
             Self::NotPlaced => ("not-placed", 409, "The agent is lost"),
+            Self::AgentLost => ("agent-lost", 409, "The agent's position is not known"),
+            Self::NoWay => ("no-way", 409, "No way leads there"),
             Self::RemovedAgent => ("removed-agent", 410, "Removed agent"),
             Self::ForgottenMemory => ("forgotten-memory", 410, "Forgotten memory"),
             Self::BodyTooLong => ("body-too-long", 413, "Body too long"),
@@ -140,6 +151,7 @@ impl Kind {
             Self::UnknownHost => ("unknown-host", 421, "Unknown host"),
             Self::SessionInFuture => ("session-in-future", 422, "The session lies in the future"),
             Self::InvalidSettings => ("invalid-settings", 422, "Invalid settings"),
+            Self::NothingNear => ("nothing-near", 422, "No place is near"),
             Self::InvalidQuery => ("invalid-query", 422, "The request breaks a rule"),
             Self::Internal => ("internal", 500, "Fault of the service"),
             Self::StoreFailed => ("store-failed", 500, "The store has failed"),

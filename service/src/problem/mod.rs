@@ -7,7 +7,7 @@ use cogmap_proto::DecodeError;
 pub use kind::Kind;
 
 use crate::decode::{
-    InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidSequence,
+    InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidRoute, InvalidSequence,
 };
 use crate::engine::{IngestError, QuestionError, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
@@ -141,6 +141,25 @@ impl From<InvalidContacts> for Problem {
 impl From<InvalidSequence> for Problem {
     fn from(error: InvalidSequence) -> Self {
         Self::new(Kind::InvalidQuery, error.to_string())
+    }
+}
+
+impl From<InvalidRoute> for Problem {
+    fn from(error: InvalidRoute) -> Self {
+        let kind = match error {
+            InvalidRoute::Query(error) => return error.into(),
+            InvalidRoute::UnknownMemory(_) => Kind::UnknownMemory,
+            InvalidRoute::Forgotten(_) => Kind::ForgottenMemory,
+            InvalidRoute::AgentLost(_) => Kind::AgentLost,
+            InvalidRoute::NothingNear(..) | InvalidRoute::NoPlaces => Kind::NothingNear,
+            InvalidRoute::NoWay(..) => Kind::NoWay,
+            InvalidRoute::GivenUp => Kind::Timeout,
+            InvalidRoute::Number(..)
+            | InvalidRoute::Box(_)
+            | InvalidRoute::TooMany(..)
+            | InvalidRoute::LongPath(_) => Kind::InvalidQuery,
+        };
+        Self::new(kind, error.to_string())
     }
 }
 

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use cogmap_proto::{
-    Codec, IdentifyQuery, LocalizeQuery, PredictQuery, RecallQuery, SESSION_PARAMETER, Verb,
-    WatermarkQuery, query_key,
+    Codec, IdentifyQuery, LocalizeQuery, PredictQuery, RecallQuery, RouteQuery, SESSION_PARAMETER,
+    Verb, WatermarkQuery, query_key,
 };
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
@@ -37,6 +37,7 @@ pub(crate) async fn declare(
         Verb::Predict,
         Verb::Identify,
         Verb::Localize,
+        Verb::Route,
     ] {
         let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(&room));
         let queryable = session
@@ -121,6 +122,10 @@ async fn answer(
             let (map, found) = space.localize(samples).await?;
             let answer = encode::localization(space.name(), &map, &found);
             Ok(codec.encode(&answer))
+        }
+        Verb::Route => {
+            let body: RouteQuery = body(query, codec)?;
+            Ok(codec.encode(&answer::route_in(&space, body).await?))
         }
     }
 }

@@ -8,7 +8,7 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 27] = [
+const ROUTES: [(&str, &[&str]); 28] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
@@ -37,6 +37,7 @@ const ROUTES: [(&str, &[&str]); 27] = [
     ("/v1/spaces/{space}/places", &["get"]),
     ("/v1/spaces/{space}/places/{id}", &["get"]),
     ("/v1/spaces/{space}/recall", &["post"]),
+    ("/v1/spaces/{space}/route", &["post"]),
     ("/v1/spaces/{space}/trips", &["get"]),
     ("/v1/spaces/{space}/trips/{id}", &["get"]),
 ];

@@ -30,6 +30,7 @@ mod localize; // where samples of nobody were taken
 mod percepts; // what was felt and seen, recalled and predicted
 mod replay; // graphs and recordings through the experience map
 mod replay_objects; // objects learned and recognised, from files
+mod routes; // from here to there
 mod uniform; // one mistake, one answer; one event, one id; JSON for who asks
 mod zenoh; // estimates, watermarks, queries, events
 

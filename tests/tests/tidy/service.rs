@@ -7,10 +7,14 @@ const TRANSLATED: [&str; 4] = ["cognitive_map", "geometry", "grid", "object_reco
 
 /// Files of `service/src` beside decode/ and encode/ that name messages of the wire and types of
 /// the core, each with what it needs both for. None of them makes one from the other.
-const NAMES_BOTH: [(&str, &str); 16] = [
+const NAMES_BOTH: [(&str, &str); 17] = [
     (
         "answer/mod.rs",
         "asks the map what decode has read, and hands encode what it says",
+    ),
+    (
+        "answer/route.rs",
+        "does the same with routes, beside the bounds that the space keeps",
     ),
     (
         "cli/export.rs",

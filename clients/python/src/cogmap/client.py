@@ -41,6 +41,16 @@ from .object import (
 from .point_cloud import PointCloud
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
 from .request import json_of, path_of
+from .route import (
+    RouteAnswer,
+    RouteAvoid,
+    RouteBox,
+    RouteCost,
+    RouteEnd,
+    RouteFormat,
+    RouteQuery,
+    RouteReverse,
+)
 from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
 from .settings import SpaceSettings
 from .sse import ServerSentEvent
@@ -209,6 +219,41 @@ class Client(HttpService):
         query = LocalizeQuery(cast(Tuple[Sample, ...], samples))
         path = path_of(space, "localize")
         return self._send(Localization, "POST", path, JSON, json_of("query", query))
+
+    def route(
+        self,
+        space: str,
+        start: RouteEnd,
+        goal: RouteEnd,
+        *,
+        cost: RouteCost = RouteCost.LENGTH,
+        reverse: RouteReverse = RouteReverse.ALLOWED,
+        avoid_places: Iterable[int] = (),
+        avoid_boxes: Iterable[RouteBox] = (),
+        shortcuts: bool = False,
+        body_radius_m: Optional[float] = None,
+        alternatives: int = 0,
+        path_spacing_m: Optional[float] = None,
+    ) -> RouteAnswer:
+        """How one gets from `start` to `goal` (`AtAgent`, `AtPlace`, `AtPosition`, …), by ways that
+        the team has gone: the cheapest by `cost`, and up to four `alternatives`. With `shortcuts`
+        it cuts corners within `body_radius_m` [m] of ways. With `path_spacing_m` there are poses
+        along it, so far apart [m]. A service that is at several of these already asks to come back
+        (503)."""
+        query = RouteQuery(
+            start,
+            goal,
+            cost=cost,
+            reverse=reverse,
+            avoid=RouteAvoid(tuple(avoid_places), tuple(avoid_boxes)),
+            shortcuts=shortcuts,
+            body_radius_m=body_radius_m,
+            alternatives=alternatives,
+            format=RouteFormat.STEPS if path_spacing_m is None else RouteFormat.PATH,
+            spacing_m=path_spacing_m,
+        )
+        path = path_of(space, "route")
+        return self._send(RouteAnswer, "POST", path, JSON, json_of("query", query))
 
     def predict(
         self,

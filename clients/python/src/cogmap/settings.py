@@ -107,3 +107,6 @@ class SpaceSettings:
     restart_sd_rad: float = 0.5
     #: Probability from which on touches are answered with an object, or with none that is known.
     object_answer_probability: float = 0.995
+    #: Most ways between places: for one more, the weakest is forgotten without which no places are
+    #: separate.
+    ways_max: int = 131_072

@@ -9,6 +9,7 @@ mod fold;
 mod input;
 mod label_index;
 mod memory;
+mod route;
 mod settings;
 
 pub use agent::{Agent, Status};
@@ -28,5 +29,10 @@ pub use memory::percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue,
 pub use memory::place::{Place, PlaceId};
 pub use memory::recall::{RecallCue, Recalled, Rivals};
 pub use memory::trip::{Leg, Trip, TripEnd, TripId};
+pub use memory::way::{Traversals, Way, Waypoint};
+pub use route::{
+    NoRoute, NoRouteEnd, Region, Reverse, Route, RouteBounds, RouteCost, RouteEnd, RouteOptions,
+    RouteStep, StepKind,
+};
 pub use settings::{Bound, InvalidSettings, Recruitment, SettingNumber, Settings, SettingsValues};
 pub use state::{Digest, InvalidDigest};

@@ -45,6 +45,7 @@ mod environment;
 mod experiment;
 pub(crate) mod figure;
 mod measure;
+pub mod network;
 pub mod object;
 mod protocol;
 mod quantity;

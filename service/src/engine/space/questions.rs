@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use cognitive_map::{CognitiveMap, Identified, Localization, Sample, Touch};
+use cognitive_map::{CognitiveMap, Identified, Localization, RouteBounds, Sample, Touch};
 use object_recognition::Orientation;
 use tokio::sync::oneshot;
 
@@ -13,6 +13,8 @@ use crate::engine::question::QuestionError;
 /// Longest time until an answer: less than the ten seconds after which Zenoh and the Python client
 /// stop waiting for one.
 const TIME_MAX: Duration = Duration::from_secs(8);
+/// The same for a route: whoever waits for one stands still.
+const ROUTE_TIME_MAX: Duration = Duration::from_secs(2);
 
 impl Space {
     /// Where samples were taken, and the map that says so. What is already in the map answers; it
@@ -37,6 +39,25 @@ impl Space {
             map.localize(samples.iter().take_while(|_| is_wanted()))
         })
         .await
+    }
+
+    /// What `work` finds out about routes in the map as it is. It is given bounds that make
+    /// searches shorter, and whether to give up.
+    ///
+    /// # Errors
+    /// See [`QuestionError`].
+    pub async fn routes<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&CognitiveMap, Option<&RouteBounds>, &mut dyn FnMut() -> bool) -> T
+        + Send
+        + 'static,
+    ) -> Result<T, QuestionError> {
+        let bounds = Arc::clone(&self.shared.route_bounds);
+        let answered = self.ask(ROUTE_TIME_MAX, move |map, is_wanted| {
+            let bounds = bounds.of(map);
+            work(map, bounds.as_ref(), &mut || !is_wanted())
+        });
+        Ok(answered.await?.1)
     }
 
     /// Which object a sequence of contacts is of.

@@ -13,6 +13,7 @@ mod objects;
 mod problems;
 mod removal;
 mod resources;
+mod routes;
 mod running;
 mod told;
 mod trajectories;

@@ -305,6 +305,19 @@ async fn exports_hold_everything() {
         export["agents"],
         rig.get("/v1/spaces/lab/agents").await.good()["agents"]
     );
+    // One chain of places.
+    let ways = export["ways"].as_array().expect("ways");
+    assert_eq!(
+        Some(ways.len() + 1),
+        export["places"].as_array().map(Vec::len)
+    );
+    for way in ways {
+        assert_eq!(
+            (&way["there"]["times"], &way["back"]["times"]),
+            (&1.into(), &0.into())
+        );
+        assert_eq!(way["disagrees"], false);
+    }
     let ids = [&export["landmarks"][0]["id"], &export["landmarks"][1]["id"]];
     assert_eq!(ids, ["post/b", "post a"]);
 
@@ -456,6 +469,7 @@ async fn the_description_lists_every_route_with_every_status() {
         "POST /v1/spaces/{space}/localize",
         "POST /v1/spaces/{space}/objects/identify",
         "POST /v1/spaces/{space}/recall",
+        "POST /v1/spaces/{space}/route",
         "PUT /v1/spaces/{space}",
         "PUT /v1/spaces/{space}/objects/{name}",
     ];

@@ -43,6 +43,8 @@ pub struct Agent {
     /// The place entered last; `None` once no place answers any more. It may have been forgotten.
     pub(crate) entered: Option<PlaceId>,
     pub(crate) recorder: Recorder,
+    /// The first place of the session. It may have been forgotten.
+    pub(crate) home: Option<PlaceId>,
     pub(crate) sightings: u64,
     pub(crate) percepts: u64,
     /// The episode with an object that is under way.
@@ -64,6 +66,7 @@ state_of_struct!(Agent {
     place,
     entered,
     recorder,
+    home,
     sightings,
     percepts,
     episode,
@@ -86,6 +89,7 @@ impl Agent {
             place: None,
             entered: None,
             recorder: Recorder::default(),
+            home: None,
             sightings: 0,
             percepts: 0,
             episode: None,

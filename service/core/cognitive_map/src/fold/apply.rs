@@ -16,6 +16,7 @@ use crate::memory::percept::PerceptMap;
 use crate::memory::place::{PlaceId, PlaceMap};
 use crate::memory::strength::Clock;
 use crate::memory::trip::{TripEnd, TripMap, interval_s};
+use crate::memory::way::WayMap;
 use crate::settings::Settings;
 use grid::GridModules;
 
@@ -28,6 +29,7 @@ pub(super) struct Fold<'a> {
     pub(super) is_map_defined: &'a mut bool,
     pub(super) places: &'a mut PlaceMap,
     pub(super) trips: &'a mut TripMap,
+    pub(super) ways: &'a mut WayMap,
     pub(super) landmarks: &'a mut LandmarkMap,
     pub(super) percepts: &'a mut PerceptMap,
     pub(super) objects: &'a mut ObjectMemory,
@@ -76,6 +78,7 @@ impl Fold<'_> {
         self.agent.next_seq = 0;
         self.agent.stamp_ns = None;
         self.agent.still_since = None;
+        self.agent.home = None;
         self.agent.announced.restart();
         self.agent.filter.cut();
         if before.is_some() {

@@ -15,6 +15,9 @@
 //! 10..  page                      the keyframe graph, by part
 //! 32    0                         objects: counts, names of channels
 //! 33    object                    an object
+//! 40    0                         ways: vacancies, what was spared
+//! 41    page                      up to 16 ways
+//! 42    page                      up to 16 waypoints
 //! ```
 //!
 //! A page is a count (u16) and its items one after the other, little endian, floats as their bits.
@@ -46,7 +49,7 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// version 5 no searches, version 6 no other names of landmarks, version 7 none of what was joined
 /// into objects, version 8 no attachments and no kidnap tests, version 9 nobody removed or set
 /// aside, version 10 no relaxation under way, version 11 no noise of odometry and no searches by
-/// levels, version 12 no log of views.
+/// levels, version 12 no log of views and no ways.
 const VERSION: u16 = 13;
 
 const HEADER: u8 = 0;
@@ -63,6 +66,9 @@ const ESTIMATE: u8 = 9;
 const KEYFRAMES: u8 = 10;
 const OBJECTS: u8 = 32;
 const OBJECT: u8 = 33;
+pub(super) const WAY_HEAD: u8 = 40;
+pub(super) const WAYS: u8 = 41;
+pub(super) const WAYPOINTS: u8 = 42;
 
 /// One page of a checkpoint. A later page of the same kind and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -116,6 +122,8 @@ impl CognitiveMap {
         let trips = self.trips.changed_pages(since);
         let legs = self.trips.changed_legs(since);
         let landmarks = self.landmarks.landmarks().changed_pages(since);
+        let ways = self.ways.changed_ways(since);
+        let waypoints = self.ways.changed_waypoints(since);
         let channels = self.percepts.channels().changed_pages(since);
         let levels = self.percepts.changed_levels(since);
         let descriptors = self.percepts.changed_descriptors(since);
@@ -135,6 +143,9 @@ impl CognitiveMap {
             .chain(self.estimate_page(since))
             .chain(self.keyframe_pages(since))
             .chain(self.object_pages(since))
+            .chain(self.way_head(since))
+            .chain(ways.map(|(page, _, items)| of_items(WAYS, page, items)))
+            .chain(waypoints.map(|(page, _, items)| of_items(WAYPOINTS, page, items)))
     }
 
     /// The map of a checkpoint. It has the digest of the map that wrote it, and goes on like it.
@@ -167,6 +178,8 @@ impl CognitiveMap {
         let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
         map.places.skip_to(count(header.places));
         map.trips.skip_to(count(header.trips));
+        let ways = pages.split_off(&(WAY_HEAD, 0));
+        map.restore_ways(ways)?;
         let objects = pages.split_off(&(OBJECTS, 0));
         map.restore_objects(objects)?;
         let keyframes = pages.split_off(&(KEYFRAMES, 0));
@@ -369,6 +382,7 @@ impl CognitiveMap {
             agent.announced.fits(&self.modules)
                 && agent.holds().into_iter().flatten().all(was_there)
                 && agent.entered.is_none_or(was_there)
+                && agent.home.is_none_or(was_there)
                 && agent
                     .recorder
                     .trip
@@ -386,7 +400,17 @@ impl CognitiveMap {
         let attached = self
             .places()
             .filter(|(_, place)| place.attachment.is_some());
-        let places = places && attached.count() == graph.n_attachments();
+        let forgotten = self.waypoints().filter(|waypoint| {
+            waypoint.attachment.is_some() && self.places.is_forgotten(waypoint.place())
+        });
+        let attached = attached.count() + forgotten.count();
+        let places = places && attached == graph.n_attachments();
+        let ways = self.waypoints().all(|waypoint| {
+            let place = waypoint.place();
+            was_there(place) && { waypoint.attachment }.is_none_or(|attachment| {
+                self.places.is_forgotten(place) && is_attached(place, attachment)
+            })
+        });
         let trips = self.trips().all(|(_, trip)| {
             is_agent(trip.agent())
                 && trip
@@ -394,7 +418,7 @@ impl CognitiveMap {
                     .all(|leg| was_there(leg.from()) && was_there(leg.to()))
         });
         let enrolled = self.estimator.agent_count() == self.agents.len();
-        enrolled && agents && places && trips && self.percepts.knows_only(is_there)
+        enrolled && agents && places && trips && ways && self.percepts.knows_only(is_there)
     }
 }
 
@@ -413,7 +437,7 @@ fn of_sparse<T: State>(kind: u8, index: usize, items: &PageItems<'_, T>) -> Chec
 }
 
 /// A page of bytes.
-fn page_of(kind: u8, index: usize, out: StateWriter) -> CheckpointPage {
+pub(super) fn page_of(kind: u8, index: usize, out: StateWriter) -> CheckpointPage {
     CheckpointPage {
         kind,
         index: u32::try_from(index).expect("2³² items have fewer pages"),

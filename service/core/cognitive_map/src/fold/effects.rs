@@ -105,7 +105,9 @@ impl Fold<'_> {
     /// Moves some of the places that turned out to be elsewhere.
     pub(super) fn move_places(&mut self) {
         for (place, at) in self.keyframes.graph.moved_places() {
-            self.places.put(PlaceId(place), &at, self.revision);
+            let place = PlaceId(place);
+            self.places.put(place, &at, self.revision);
+            self.move_waypoint(place, &at);
         }
     }
 }

@@ -24,7 +24,9 @@ impl Fold<'_> {
             return false;
         };
         self.percepts.forget(place, self.revision);
-        if let Some(attachment) = forgotten.attachment {
+        let attachment = forgotten.attachment;
+        let stays = self.ways.keep_forgotten(place, attachment, self.revision);
+        if let Some(attachment) = attachment.filter(|_| !stays) {
             self.keyframes.graph.detach_place(attachment);
         }
         let position = *forgotten.position();

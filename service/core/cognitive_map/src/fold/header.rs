@@ -66,7 +66,7 @@ macro_rules! digest_in_order {
         let SettingsValues { $($field,)+ $($later,)+ } = $values;
         let mut out = StateWriter::default();
         $(digest_in_order!(@write out, $field $(, $state)?);)+
-        let later = [$(($later, $constant)),+];
+        let later = [$((f64::from(*$later), $constant)),+];
         for (number, (value, constant)) in (0_u8..).zip(later) {
             if value.to_bits() != f64::to_bits(constant) {
                 number.write(&mut out);
@@ -113,6 +113,7 @@ pub(super) fn digest_of(settings: &Settings) -> Digest {
             restart_sd_m was 1.0,
             restart_sd_rad was 0.5,
             object_answer_probability was 0.995,
+            ways_max was 131_072.0,
         ],
     )
 }

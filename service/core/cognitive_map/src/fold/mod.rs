@@ -15,6 +15,7 @@ mod prediction;
 mod queries;
 mod sightings;
 mod tuning;
+mod ways;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -35,6 +36,7 @@ use crate::memory::percept::PerceptMap;
 use crate::memory::place::PlaceMap;
 use crate::memory::strength::Clock;
 use crate::memory::trip::TripMap;
+use crate::memory::way::WayMap;
 use crate::settings::Settings;
 use grid::GridModules;
 use state::PagedVec;
@@ -66,8 +68,9 @@ pub struct CognitiveMap {
     estimator: Arc<Estimator>,
     /// What they did and saw, so that the past can be smoothed.
     keyframes: Arc<KeyframeMap>,
-    places: PlaceMap,
+    pub(crate) places: PlaceMap,
     trips: TripMap,
+    pub(crate) ways: WayMap,
     landmarks: LandmarkMap,
     percepts: PerceptMap,
     objects: ObjectMemory,
@@ -88,6 +91,7 @@ impl CognitiveMap {
             is_map_defined: false,
             agents: PagedVec::default(),
             trips: TripMap::default(),
+            ways: WayMap::default(),
             landmarks: LandmarkMap::default(),
             percepts: PerceptMap::default(),
         }
@@ -193,6 +197,7 @@ impl CognitiveMap {
             is_map_defined: &mut self.is_map_defined,
             places: &mut self.places,
             trips: &mut self.trips,
+            ways: &mut self.ways,
             landmarks: &mut self.landmarks,
             estimator: Arc::make_mut(&mut self.estimator),
             effects: Vec::new(),

@@ -159,31 +159,36 @@ impl Fold<'_> {
     /// The agent is in the field of a place: the leg under way ends here if it started elsewhere,
     /// and the next one starts here.
     fn arrive(&mut self, place: PlaceId) {
+        self.agent.home.get_or_insert(place);
         match &self.agent.recorder.leg {
             Some(leg) if leg.from() == place => return,
             Some(leg) => {
                 let announced = &self.agent.announced;
                 let done = leg.finish(place, self.stamp_ns, announced.in_map());
-                let start_stamp_ns = leg.start_stamp_ns();
-                self.record(done, start_stamp_ns);
+                let (start_stamp_ns, start) = (leg.start_stamp_ns(), *leg.start_in_place());
+                let recorded = self.record(done.clone(), start_stamp_ns);
+                self.travel(&done, &start, recorded);
             }
             None => {}
         }
-        let announced = &self.agent.announced;
-        let leg = LegUnderWay::start(place, self.stamp_ns, announced.in_map());
+        let Some(at) = self.places.get(place).map(Place::pose) else {
+            return;
+        };
+        let in_map = self.agent.announced.in_map();
+        let leg = LegUnderWay::start(place, &at, self.stamp_ns, in_map);
         self.agent.recorder.leg = Some(leg);
     }
 
-    /// Appends a leg to the trip under way, or to a new one.
-    fn record(&mut self, leg: Leg, start_stamp_ns: i64) {
+    /// Appends a leg to the trip under way, or to a new one; answers the trip, and the number of
+    /// the leg in it.
+    fn record(&mut self, leg: Leg, start_stamp_ns: i64) -> Option<(TripId, u32)> {
         let ends = [leg.from(), leg.to()];
         self.travel_again(ends);
         if !self.make_room_for_leg() {
-            return;
+            return None;
         }
-        let Some(trip) = self.trip_under_way(start_stamp_ns) else {
-            return;
-        };
+        let trip = self.trip_under_way(start_stamp_ns)?;
+        let number = self.trips.get(trip).map_or(0, Trip::leg_count);
         let full = self.trips.push_leg(trip, leg, self.stamp_ns, self.revision);
         for place in ends {
             if self.trip_through(place).is_none() {
@@ -193,6 +198,7 @@ impl Fold<'_> {
         if full {
             self.close_trip(TripEnd::Full);
         }
+        Some((trip, u32::try_from(number).ok()?))
     }
 
     /// A leg between two places that the same earlier trip leads through is that trip's, travelled

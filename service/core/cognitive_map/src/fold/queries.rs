@@ -1,6 +1,6 @@
 //! Questions to a map that need no computation.
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 
 use super::CognitiveMap;
 use super::header::Header;
@@ -13,6 +13,7 @@ use crate::memory::place::{Place, PlaceId};
 use crate::memory::recall::{self, RecallCue, Recalled, Rivals};
 use crate::memory::strength::Clock;
 use crate::memory::trip::{Trip, TripId};
+use crate::memory::way::{Way, Waypoint};
 use crate::settings::Settings;
 use geometry::PoseCovariance;
 use grid::GridModules;
@@ -51,6 +52,9 @@ impl CognitiveMap {
         self.estimator.write(&mut out);
         self.keyframes.digest().0.write(&mut out);
         self.objects.write_digests(&mut out);
+        if !self.ways.is_untouched() {
+            self.ways.write_digests(&mut out);
+        }
         out.digest()
     }
 
@@ -113,10 +117,14 @@ impl CognitiveMap {
         self.places.bytes()
     }
 
-    /// Bytes of memory that places, trips, what is remembered of percepts and what can be smoothed
-    /// take, reserved ones included: all that budgets bound.
+    /// Bytes of memory that places, trips, ways, what is remembered of percepts and what can be
+    /// smoothed take, reserved ones included: all that budgets bound.
     pub fn memory_bytes(&self) -> usize {
-        self.places.bytes() + self.trips.bytes() + self.percepts.bytes() + self.keyframes.bytes()
+        self.places.bytes()
+            + self.trips.bytes()
+            + self.ways.bytes()
+            + self.percepts.bytes()
+            + self.keyframes.bytes()
     }
 
     /// Number of places ever recruited, forgotten ones included: the identifier of the next one.
@@ -249,8 +257,61 @@ impl CognitiveMap {
         trip.map_or(0.0, |trip| trip.strength.now(self.clock()))
     }
 
+    /// Number of ways.
+    pub fn way_count(&self) -> usize {
+        self.ways.len()
+    }
+
+    /// Bytes of memory that the ways and all that finds them take, reserved ones included.
+    pub fn way_bytes(&self) -> usize {
+        self.ways.bytes()
+    }
+
+    /// The ways, in no particular order.
+    pub fn ways(&self) -> impl Iterator<Item = &Way> {
+        self.ways.iter().map(|(_, way)| way)
+    }
+
+    /// The ways from a number on, by their numbers, which others get once they are forgotten.
+    pub fn ways_from(&self, first: u32) -> impl Iterator<Item = (u32, &Way)> {
+        self.ways.iter_from(first)
+    }
+
+    /// The way between two places.
+    pub fn way(&self, a: PlaceId, b: PlaceId) -> Option<&Way> {
+        self.ways.between(a, b)
+    }
+
+    /// How the places of a way lie now: the second in the frame of the first.
+    pub fn places_of_way(&self, way: &Way) -> Option<Isometry3<f64>> {
+        self.ways.places_of(way)
+    }
+
+    /// Strength of a way: each traversal counts one when it happens, and half as much after every
+    /// half-life.
+    pub fn way_strength(&self, way: &Way) -> f64 {
+        way.strength.now(self.clock())
+    }
+
+    /// The places that ways lead to, forgotten ones included, in no particular order.
+    pub fn waypoints(&self) -> impl Iterator<Item = &Waypoint> {
+        self.ways.waypoints().map(|(_, waypoint)| waypoint)
+    }
+
+    /// Where ways lead to a place, also to a forgotten one.
+    pub fn waypoint(&self, place: PlaceId) -> Option<&Waypoint> {
+        self.ways.waypoint(self.ways.at(place)?)
+    }
+
+    /// The ways that lead to a place, by the number of the place at their other end.
+    pub fn ways_at(&self, place: PlaceId) -> impl Iterator<Item = &Way> {
+        let edges = self.waypoint(place).map(Waypoint::edges);
+        let edges = edges.unwrap_or_default().iter();
+        edges.filter_map(|edge| self.ways.way(edge.way))
+    }
+
     /// The space's clock.
-    fn clock(&self) -> Clock {
+    pub(super) fn clock(&self) -> Clock {
         Clock::at(self.revision, &self.settings)
     }
 

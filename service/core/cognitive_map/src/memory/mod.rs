@@ -8,3 +8,4 @@ pub(crate) mod place;
 pub(crate) mod recall;
 pub(crate) mod strength;
 pub(crate) mod trip;
+pub(crate) mod way;

@@ -54,6 +54,9 @@ pub struct SettingsValues {
     pub places_max: u32,
     /// Most legs of all trips together: for one more, the weakest trip is forgotten.
     pub legs_max: u32,
+    /// Most ways, each between two places that legs have joined: for one more, the weakest is
+    /// forgotten that is no bridge.
+    pub ways_max: u32,
     /// Most keyframes of all agents, moments of their past that are kept so that it can be
     /// smoothed: for one more, one from which next to nothing is lost is left out.
     pub keyframes_max: u32,
@@ -125,6 +128,7 @@ impl Default for SettingsValues {
             trip_gap_s: 2.0,
             places_max: 65_536,
             legs_max: 65_536,
+            ways_max: 131_072,
             keyframes_max: 65_536,
             strength_half_life_samples: 1_000_000,
             sighting_gate_sd: 4.0,

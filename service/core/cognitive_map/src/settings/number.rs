@@ -32,7 +32,7 @@ macro_rules! number {
 
 impl SettingNumber {
     /// All of them, in the order of the fields.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 28] = [
         Self {
             name: "grid_modules",
             bound: Bound::Whole {
@@ -58,6 +58,7 @@ impl SettingNumber {
         // The place that a leg starts from is held while the next one is recruited.
         number!(places_max, Bound::Whole { min: 2, max: None }),
         number!(legs_max, Bound::Whole { min: 1, max: None }),
+        number!(ways_max, Bound::Whole { min: 1, max: None }),
         number!(
             keyframes_max,
             Bound::Whole {

@@ -198,6 +198,7 @@ fn a_snapshot_keeps_what_it_had() {
 fn memory_and_checkpoints_stay_flat() {
     let (mut map, mut robot) = small(|values| {
         values.legs_max = 300;
+        values.ways_max = 300;
         values.keyframes_max = 300;
     });
     let mut stored: BTreeMap<(u8, u32), usize> = BTreeMap::new();

@@ -267,12 +267,13 @@ pub(crate) fn any_settings() -> impl Strategy<Value = Settings> {
     ];
     let places_max = prop::sample::select(vec![2, 3, 8, 2048]);
     let legs_max = prop::sample::select(vec![1, 2, 9, 65_536]);
+    let ways_max = prop::sample::select(vec![1, 2, 7, 65_536]);
     let half_life = prop::sample::select(vec![1, 20, 1_000_000]);
     (
         any::<u64>(),
         1usize..=6,
         recruitment,
-        (places_max, legs_max, half_life),
+        (places_max, legs_max, ways_max, half_life),
     )
         .prop_map(|(seed, grid_modules, recruitment, budget)| {
             settings(|values| {
@@ -282,6 +283,7 @@ pub(crate) fn any_settings() -> impl Strategy<Value = Settings> {
                 (
                     values.places_max,
                     values.legs_max,
+                    values.ways_max,
                     values.strength_half_life_samples,
                 ) = budget;
             })

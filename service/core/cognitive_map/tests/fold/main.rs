@@ -21,6 +21,8 @@ mod places; // recruitment, revisits
 mod recall; // recall against an exhaustive scan
 mod relaxation; // loops that close while samples come in
 mod removal; // agents that go, and who comes after them
+mod routes; // cheapest routes against another program's
 mod settings; // what each setting changes
 mod trips; // legs, and every way a trip ends
 mod views; // what is seen along ways that are driven again
+mod ways; // what the legs add up to, and which ways go

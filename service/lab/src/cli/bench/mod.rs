@@ -7,6 +7,7 @@ mod life;
 mod live;
 mod load;
 mod recall;
+mod route;
 mod step;
 mod touch;
 
@@ -20,6 +21,8 @@ pub(in crate::cli) enum BenchCommand {
     Recall(recall::RecallArgs),
     /// Recall of places by a descriptor, at different numbers of places.
     Descriptors(descriptors::DescriptorsArgs),
+    /// Routes over ways, at different numbers of places.
+    Route(route::RouteArgs),
     /// A touch and its answer, at different numbers of objects.
     Touch(touch::TouchArgs),
     /// Memory and cost of a sample as a team goes on and on.
@@ -38,6 +41,7 @@ pub(super) fn run(command: &BenchCommand) -> anyhow::Result<()> {
         BenchCommand::Step(args) => step::run(args),
         BenchCommand::Recall(args) => recall::run(args),
         BenchCommand::Descriptors(args) => descriptors::run(args),
+        BenchCommand::Route(args) => route::run(args),
         BenchCommand::Touch(args) => touch::run(args),
         BenchCommand::Life(args) => life::run(args),
         BenchCommand::Ingest(args) => match args.live {

@@ -85,13 +85,17 @@ impl Place {
         self.last_stamp_ns = self.last_stamp_ns.max(stamp_ns);
     }
 
+    /// Whether what lies at a pose has moved noticeably when it lies at another.
+    pub(crate) fn is_moved(from: &Isometry3<f64>, to: &Isometry3<f64>) -> bool {
+        let way = to.translation.vector - from.translation.vector;
+        way.norm_squared() >= NOTICED.0 * NOTICED.0
+            || from.rotation.angle_to(&to.rotation) >= NOTICED.1
+    }
+
     /// The place where it turned out to lie; none where that makes no difference.
     fn moved(&self, at: &Isometry3<f64>) -> Option<Self> {
-        let position = Point3::from(at.translation.vector);
-        let is_same = (position - self.position).norm_squared() < NOTICED.0 * NOTICED.0
-            && self.rotation.angle_to(&at.rotation) < NOTICED.1;
-        (!is_same).then(|| Self {
-            position,
+        Self::is_moved(&self.pose(), at).then(|| Self {
+            position: at.translation.vector.into(),
             rotation: UnitQuaternion::new_normalize(at.rotation.into_inner()),
             ..self.clone()
         })
@@ -105,6 +109,11 @@ impl Place {
     /// Orientation of the founder at the founding, in `map`, likewise.
     pub fn rotation(&self) -> &UnitQuaternion<f64> {
         &self.rotation
+    }
+
+    /// Pose in `map`: position and orientation.
+    pub(crate) fn pose(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(self.position.into(), self.rotation)
     }
 
     /// Standard deviation of the position at the founding, along the axes of `map` \[m\].

@@ -23,6 +23,8 @@ pub(crate) struct LegUnderWay {
     start_stamp_ns: i64,
     /// Position in `map` at the start.
     start_in_map: Point3<f64>,
+    /// Pose at the start in the frame of the place there.
+    start_in_place: Isometry3<f64>,
     /// The motion since the start.
     motion: MotionSum,
     length_m: f64,
@@ -33,17 +35,24 @@ state_of_struct!(LegUnderWay {
     from,
     start_stamp_ns,
     start_in_map,
+    start_in_place,
     motion,
     length_m,
 });
 
 impl LegUnderWay {
-    /// A leg that starts at a place, with the agent's present poses.
-    pub(crate) fn start(from: PlaceId, stamp_ns: i64, in_map: &Isometry3<f64>) -> Self {
+    /// A leg that starts at a place that lies at `place`, with the agent's present pose.
+    pub(crate) fn start(
+        from: PlaceId,
+        place: &Isometry3<f64>,
+        stamp_ns: i64,
+        in_map: &Isometry3<f64>,
+    ) -> Self {
         Self {
             from,
             start_stamp_ns: stamp_ns,
             start_in_map: in_map.translation.vector.into(),
+            start_in_place: place.inv_mul(in_map),
             motion: MotionSum::default(),
             length_m: 0.0,
         }
@@ -52,6 +61,11 @@ impl LegUnderWay {
     /// The place at the start.
     pub(crate) fn from(&self) -> PlaceId {
         self.from
+    }
+
+    /// Pose at the start in the frame of the place there, as both were then.
+    pub(crate) fn start_in_place(&self) -> &Isometry3<f64> {
+        &self.start_in_place
     }
 
     /// Stamp of the start \[ns\].

@@ -1,0 +1,115 @@
+//! What a way costs.
+
+use std::collections::BTreeMap;
+
+use super::path::Path;
+use super::{Reverse, RouteOptions, tuning};
+use crate::memory::way::{Edge, Way, WayMap, Waypoint};
+
+/// What is to be least on a route.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RouteCost {
+    /// Length \[m\].
+    #[default]
+    Length,
+    /// Mean duration \[s\]; of a way that was only travelled the other way, that.
+    Time,
+    /// Variance of the position at the end \[m²\]: that of the mean of what was measured, summed
+    /// over the axes and the ways.
+    Uncertainty,
+    /// Length \[m\], twice as much for each half-life of memories since the way was travelled, in
+    /// samples of the space.
+    Recency,
+}
+
+/// What the ways cost, for one search.
+#[derive(Debug)]
+pub(super) struct Costs<'a> {
+    pub(super) ways: &'a WayMap,
+    pub(super) options: &'a RouteOptions,
+    pub(super) revision: u64,
+    pub(super) half_life: f64,
+    /// How often ways were taken by the routes before.
+    pub(super) penalties: BTreeMap<u32, u64>,
+}
+
+impl Costs<'_> {
+    /// What an edge costs in millionths of the unit, one at least; `None` where it is not to be
+    /// taken.
+    pub(super) fn of(&self, from: &Waypoint, edge: &Edge) -> Option<u64> {
+        let cost = self.plain(from, edge)?;
+        if self.penalties.is_empty() {
+            return Some(cost);
+        }
+        let taken = self.penalties.get(&edge.way).copied().unwrap_or(0);
+        Some(cost + cost * tuning::PENALTY_PERCENT * taken / 100)
+    }
+
+    /// What an edge costs without penalties.
+    fn plain(&self, from: &Waypoint, edge: &Edge) -> Option<u64> {
+        let options = self.options;
+        if !edge.travelled && options.reverse == Reverse::Never {
+            return None;
+        }
+        if !options.avoid_places.is_empty() && options.avoid_places.contains(&edge.place) {
+            return None;
+        }
+        if !options.avoid_regions.is_empty() && self.leads_into_region(from, edge) {
+            return None;
+        }
+        Some(match options.cost {
+            RouteCost::Length => edge.length_um,
+            RouteCost::Time => micro(duration_s(self.ways.way(edge.way)?, from)),
+            RouteCost::Uncertainty => micro(self.ways.way(edge.way)?.position_variance_m2()),
+            RouteCost::Recency => {
+                let way = self.ways.way(edge.way)?;
+                let age = self.revision.saturating_sub(way.last_revision()) as f64;
+                let half_lives = (age / self.half_life).min(tuning::HALF_LIVES_MAX);
+                times(edge.length_um, half_lives.exp2())
+            }
+        })
+    }
+
+    /// What a path costs without penalties.
+    pub(super) fn without_penalties(&self, path: &Path) -> u64 {
+        let edges = path.windows(2).filter_map(|pair| {
+            let from = self.ways.waypoint(pair[0].0)?;
+            self.plain(from, pair[1].1.edge()?)
+        });
+        edges.sum()
+    }
+
+    fn leads_into_region(&self, from: &Waypoint, edge: &Edge) -> bool {
+        let Some(to) = self.ways.waypoint(edge.to) else {
+            return true;
+        };
+        let ends = [from, to].map(|end| end.pose().translation.vector.into());
+        let mut regions = self.options.avoid_regions.iter();
+        // One may leave a region in which the route starts.
+        regions.any(|region| !region.contains(&ends[0]) && region.meets(&ends[0], &ends[1]))
+    }
+}
+
+/// How long a way takes from one of its ends \[s\]: the mean, in the other direction where there is
+/// none in this one.
+pub(super) fn duration_s(way: &Way, from: &Waypoint) -> f64 {
+    let there = way.travelled_from(from.place());
+    let back = way.travelled_from(way.other_end(from.place()));
+    there.mean_s().or(back.mean_s()).unwrap_or(0.0)
+}
+
+/// A quantity in whole millionths of its unit, rounded up, one at least.
+fn micro(quantity: f64) -> u64 {
+    times(1, quantity * tuning::MICRO)
+}
+
+/// A product, rounded up, at least the first factor's unit and at most 2⁴⁰.
+fn times(whole: u64, factor: f64) -> u64 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "costs are not negative, and the cast saturates"
+    )]
+    let product = (whole as f64 * factor).ceil() as u64;
+    product.clamp(1, 1 << 40)
+}
