@@ -4,6 +4,7 @@ use nalgebra::Point3;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
+use crate::interpolation::{LinkGraph, interpolated};
 use crate::model::{LevelMemory, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
 use crate::surfels::map::SurfelMap;
@@ -30,7 +31,11 @@ impl IndexedModel {
     /// Of a model.
     pub(crate) fn new(model: &ObjectModel) -> Self {
         let field_m = FIELD_PER_SPACING * model.spacing_m();
-        let places: Vec<_> = model
+        let felt: Vec<_> = { model.places().iter() }
+            .map(|place| place.position_m)
+            .collect();
+        let graph = LinkGraph::new(&felt);
+        let mut places: Vec<_> = model
             .places()
             .iter()
             .map(|place| IndexedPlace {
@@ -41,6 +46,7 @@ impl IndexedModel {
                 descriptors: place.descriptors.clone(),
             })
             .collect();
+        places.extend(interpolated(model.places(), &graph, model.spacing_m()));
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
         let middle = centroid(positions.iter().map(|position| position.coords));
         let radius_m = positions

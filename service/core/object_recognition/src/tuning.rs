@@ -70,6 +70,45 @@ pub(crate) const WRONG_NORMAL_SHARE: f64 = 0.1;
 /// second number holds where a place's percepts need their lists. Chosen by running time.
 pub(crate) const SPARSE_RATIOS: [usize; 2] = [16, 4];
 
+// What lies between places.
+
+/// Nearest places among which links are sought. Budget.
+pub(crate) const LINK_NEIGHBOURS: usize = 16;
+/// Radius of the ball about the middle of a link that holds no other place, per half its length:
+/// below one, so that few faces of a surface are without a diagonal. A curve that turns by less
+/// than 74° at a place has no link past it. Chosen.
+pub(crate) const LINK_BALL: f64 = 0.75;
+/// Longest link, per typical one: beyond, nothing was explored. Gaps between places that are drawn
+/// at random all over a surface are rarely longer. Chosen.
+pub(crate) const LINK_LENGTH_MAX: f64 = 4.0;
+/// Angle between neighbouring links of a surface's place beyond which the surface is open there
+/// \[rad\]: 160°. Chosen.
+pub(crate) const OPEN_SURFACE_RAD: f64 = 2.8;
+/// Cosine of the angle between two links of a curve's place above which the curve ends there.
+/// Chosen.
+pub(crate) const OPEN_CURVE_COS: f64 = 0.0;
+/// Places by which a curve or a surface is predicted. Budget.
+pub(crate) const KRIGING_CURVE: usize = 6;
+/// See [`KRIGING_CURVE`].
+pub(crate) const KRIGING_SURFACE: usize = 12;
+/// Places by which a field is learned: its variance is then good to a seventh. Budget.
+pub(crate) const FIELD_SAMPLES: usize = 96;
+/// Lengths of a field that are tried, in typical links. Chosen.
+pub(crate) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
+/// Noise of a field that is tried, per its variance. Chosen.
+pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
+/// Nodes and places of a model: a model with more places has no nodes. Budget.
+pub(crate) const NODES_MAX: usize = 1024;
+/// Distance of nodes, in spacings: two places so far apart have none between them. Chosen.
+pub(crate) const NODE_STEP: f64 = 2.0;
+/// Factor by which this distance grows until the nodes fit. Chosen.
+pub(crate) const NODES_GROWTH: f64 = 1.25;
+/// Least distance of two nodes, in steps. Chosen.
+pub(crate) const NODE_APART: f64 = 0.55;
+/// Standard deviation of a contact about its node along the surface, in steps: that of a uniform
+/// field of half a step to each side. Derived.
+pub(crate) const NODE_FIELD: f64 = 0.288_675;
+
 // Translations: the Gaussian sum.
 
 /// Hypotheses kept. Budget.

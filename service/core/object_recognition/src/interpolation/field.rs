@@ -1,0 +1,226 @@
+//! What a model's places say of how a field varies between them.
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use super::graph::LinkGraph;
+use super::kriging::{Kriging, Weights};
+use crate::model::ModelPlace;
+use crate::tuning::{FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE};
+
+/// What varies over a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FieldOf {
+    /// The surface's own place, across it.
+    Place,
+    /// The level of a channel.
+    Level(u16),
+}
+
+/// A Gaussian process over a surface, as far as the places tell it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Field {
+    of: FieldOf,
+    length_m: f64,
+    /// Noise per variance.
+    noise: f64,
+    variance: f64,
+}
+
+/// Where a field is predicted: the middle, and the axes along the surface.
+#[derive(Clone, Debug)]
+pub(super) struct Site {
+    pub(super) middle: Point3<f64>,
+    pub(super) axes: Vec<Vector3<f64>>,
+}
+
+/// A field about a site.
+#[derive(Debug)]
+pub(super) struct LocalField {
+    kriging: Kriging,
+    near: Vec<u32>,
+    variance: f64,
+}
+
+impl Site {
+    /// Places by which a field is predicted here.
+    fn count(&self) -> usize {
+        if self.axes.len() == 1 {
+            KRIGING_CURVE
+        } else {
+            KRIGING_SURFACE
+        }
+    }
+}
+
+impl Field {
+    /// Learned by leave-one-out cross-validation: length and noise are those of the largest
+    /// likelihood of the places, each predicted by the others, and the variance follows.
+    pub(super) fn learned(of: FieldOf, places: &[ModelPlace], graph: &LinkGraph) -> Option<Self> {
+        let step = places.len().div_ceil(FIELD_SAMPLES).max(1);
+        let sites: Vec<(usize, Site)> = (0..places.len())
+            .step_by(step)
+            .filter_map(|own| Some((own, site_of(own, places, graph)?)))
+            .collect();
+        let mut best: Option<(f64, Self)> = None;
+        for length in FIELD_LENGTHS {
+            for noise in FIELD_NOISES {
+                let field = Self {
+                    of,
+                    length_m: length * graph.typical_m,
+                    noise,
+                    variance: 1.0,
+                };
+                if let Some((log, variance)) = field.cross_validated(&sites, places, graph)
+                    && best.is_none_or(|(most, _)| log > most)
+                {
+                    best = Some((log, Self { variance, ..field }));
+                }
+            }
+        }
+        best.map(|(_, field)| field)
+    }
+
+    /// Profile log-likelihood of the places left out one by one, and the variance at which it is
+    /// the largest.
+    fn cross_validated(
+        &self,
+        sites: &[(usize, Site)],
+        places: &[ModelPlace],
+        graph: &LinkGraph,
+    ) -> Option<(f64, f64)> {
+        let (mut count, mut squares, mut logs) = (0.0, 0.0, 0.0);
+        for (own, site) in sites {
+            let near = graph.near[*own].iter().copied();
+            let Some(local) = self.around(site, near, places) else {
+                continue;
+            };
+            let place = &places[*own];
+            let weights = local.kriging.weights(&place.position_m.coords);
+            let Some(residual) = self.residual(&weights, &local, site, place, places) else {
+                continue;
+            };
+            let variance = weights.variance + self.noise;
+            count += 1.0;
+            squares += residual / variance;
+            logs += variance.ln();
+        }
+        if count < 4.0 {
+            return None;
+        }
+        // A floor against values that are all the same.
+        let variance = f64::max(squares / count, 1e-18);
+        Some((-0.5 * (count * variance.ln() + logs), variance))
+    }
+
+    /// Squared difference of a place from its prediction.
+    fn residual(
+        &self,
+        weights: &Weights,
+        local: &LocalField,
+        site: &Site,
+        place: &ModelPlace,
+        places: &[ModelPlace],
+    ) -> Option<f64> {
+        match self.of {
+            FieldOf::Place => {
+                let mut apart = local.position(weights, places) - place.position_m;
+                for axis in &site.axes {
+                    apart -= axis * axis.dot(&apart);
+                }
+                Some(apart.norm_squared())
+            }
+            FieldOf::Level(channel) => {
+                let predicted = local.level(weights, channel, places)?;
+                Some((level(place, channel)? - predicted).powi(2))
+            }
+        }
+    }
+
+    /// The field about a site, from the nearest of these places that have it.
+    pub(super) fn around(
+        &self,
+        site: &Site,
+        near: impl Iterator<Item = u32>,
+        places: &[ModelPlace],
+    ) -> Option<LocalField> {
+        let has = |number: &u32| match self.of {
+            FieldOf::Place => true,
+            FieldOf::Level(channel) => level(&places[*number as usize], channel).is_some(),
+        };
+        let near: Vec<u32> = near.filter(has).take(site.count()).collect();
+        let positions = near
+            .iter()
+            .map(|number| places[*number as usize].position_m.coords);
+        let positions = positions.collect();
+        Some(LocalField {
+            kriging: Kriging::new(positions, &site.axes, self.length_m, self.noise)?,
+            near,
+            variance: self.variance,
+        })
+    }
+}
+
+impl LocalField {
+    /// Weights of the places at a point, and the variance of what is predicted.
+    pub(super) fn at(&self, point: &Point3<f64>) -> (Weights, f64) {
+        let weights = self.kriging.weights(&point.coords);
+        let variance = self.variance * weights.variance;
+        (weights, variance)
+    }
+
+    /// The place that is predicted.
+    pub(super) fn position(&self, weights: &Weights, places: &[ModelPlace]) -> Point3<f64> {
+        let own = weights.of.iter().zip(&self.near);
+        let sum = own.map(|(w, number)| places[*number as usize].position_m.coords * *w);
+        Point3::from(sum.sum::<Vector3<f64>>())
+    }
+
+    /// The level that is predicted.
+    pub(super) fn level(
+        &self,
+        weights: &Weights,
+        channel: u16,
+        places: &[ModelPlace],
+    ) -> Option<f64> {
+        let levels = self
+            .near
+            .iter()
+            .map(|n| level(&places[*n as usize], channel));
+        let levels: Option<Vec<f64>> = levels.collect();
+        Some(weights.mean(levels?.into_iter()))
+    }
+}
+
+/// Mean level of a place on a channel.
+fn level(place: &ModelPlace, channel: u16) -> Option<f64> {
+    let own = place.levels.iter().find(|own| own.channel == channel);
+    own.map(|own| own.mean)
+}
+
+/// The surface about a place: a plane where it has triangles, a line where it has two links.
+fn site_of(own: usize, places: &[ModelPlace], graph: &LinkGraph) -> Option<Site> {
+    let middle = places[own].position_m;
+    let links = graph.links[own].iter();
+    let to: Vec<Vector3<f64>> = links
+        .map(|other| places[*other as usize].position_m - middle)
+        .collect();
+    if to.len() < 2 {
+        return None;
+    }
+    let has_triangle = graph
+        .triangles
+        .iter()
+        .any(|triangle| triangle.iter().any(|corner| *corner as usize == own));
+    let axes = if has_triangle {
+        let spread = to.iter().map(|to| to * to.transpose());
+        let eigen = spread.sum::<nalgebra::Matrix3<f64>>().symmetric_eigen();
+        let normal = eigen.eigenvalues.imin();
+        let along = (0..3).filter(|axis| *axis != normal);
+        along
+            .map(|axis| eigen.eigenvectors.column(axis).into())
+            .collect()
+    } else {
+        vec![Unit::try_new(to[1] - to[0], 1e-12)?.into_inner()]
+    };
+    Some(Site { middle, axes })
+}
