@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
-use crate::interpolation::{LinkGraph, interpolated};
+use crate::interpolation::{LinkGraph, OpenRegion, interpolated};
 use crate::model::{LevelMemory, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
 use crate::surfels::map::SurfelMap;
@@ -22,6 +22,10 @@ pub(crate) struct IndexedModel {
     pub(crate) extent_m: f64,
     /// Area \[m²\]: one spacing squared per place.
     pub(crate) area_m2: f64,
+    /// Typical distance between neighbouring places that were felt \[m\].
+    pub(crate) gap_m: f64,
+    /// Where it goes on beyond what was felt; none of one that was felt all over.
+    pub(crate) open: Option<OpenRegion>,
     /// The surface, if the places have normals.
     pub(crate) surfel_map: Option<SurfelMap>,
     shares: [f64; SHARE_BINS + 1],
@@ -42,6 +46,7 @@ impl IndexedModel {
                 position: place.position_m,
                 normal: place.normal(),
                 variance_m2: field_m * field_m + place.variance_m2 / (place.count * place.count),
+                is_predicted: false,
                 levels: place.levels.clone(),
                 descriptors: place.descriptors.clone(),
             })
@@ -57,9 +62,11 @@ impl IndexedModel {
         Self {
             packed: PackedPlaces::new(&places, model.spacing_m(), extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
+            open: OpenRegion::new(&positions, felt.len(), &graph),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
             surfel_map: SurfelMap::new(model),
             extent_m,
+            gap_m: graph.typical_m,
             places,
         }
     }

@@ -81,12 +81,33 @@ pub(crate) const LINK_BALL: f64 = 0.75;
 /// Longest link, per typical one: beyond, nothing was explored. Gaps between places that are drawn
 /// at random all over a surface are rarely longer. Chosen.
 pub(crate) const LINK_LENGTH_MAX: f64 = 4.0;
-/// Angle between neighbouring links of a surface's place beyond which the surface is open there
+/// Angle between neighbouring links of a surface's place beyond which the surface may be open there
 /// \[rad\]: 160°. Chosen.
 pub(crate) const OPEN_SURFACE_RAD: f64 = 2.8;
-/// Cosine of the angle between two links of a curve's place above which the curve ends there.
+/// Distance from all that was felt beyond which nothing was explored, in typical links. Chosen.
+pub(crate) const EXPLORED_REACH: f64 = 3.0;
+/// Places about a hole in a surface, at least: a smaller one hides nothing. Chosen.
+pub(crate) const RIM_MIN: usize = 5;
+/// Links along a curve within which it leads on, or ends. Chosen.
+pub(crate) const END_LINKS: usize = 3;
+/// Cosine of the angle between two directions along a curve below which one leads on where the other
+/// came from: 104°. Chosen.
+pub(crate) const OPEN_CURVE_COS: f64 = -0.25;
+/// Share of the variance of places across a plane below which they lie in it: a seventh of the
+/// deviation. Chosen.
+pub(crate) const FLAT_SHARE: f64 = 0.02;
+/// Distance within which the errors of what lies between places are common, in typical links: about
+/// one gap. Chosen.
+pub(crate) const ERROR_REACH: f64 = 0.5;
+/// Least share of an object that counts as not explored. Chosen.
+pub(crate) const UNEXPLORED_MIN: f64 = 0.05;
+/// Probability that a walk over what was not explored is still there at the next contact. Chosen.
+pub(crate) const UNEXPLORED_STAY: f64 = 0.95;
+/// Distance from where it begins at which a walk may enter what was explored, in typical links.
 /// Chosen.
-pub(crate) const OPEN_CURVE_COS: f64 = 0.0;
+pub(crate) const ENTRY_REACH: f64 = 1.5;
+/// Places by which it may be entered. Budget.
+pub(crate) const ENTRIES_MAX: usize = 64;
 /// Places by which a curve or a surface is predicted. Budget.
 pub(crate) const KRIGING_CURVE: usize = 6;
 /// See [`KRIGING_CURVE`].

@@ -100,9 +100,9 @@ impl Display for Row {
             percent(self.ever_unknown),
             self.made_up,
             percent(self.strangers.wrong),
-            percent(self.strangers.unknown),
+            percent(self.strangers.unknown_first),
             percent(self.strangers_end.wrong),
-            percent(self.strangers_end.unknown),
+            percent(self.strangers_end.unknown_first),
         )?;
         for (touches, answers) in &self.looks {
             write!(

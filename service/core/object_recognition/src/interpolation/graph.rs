@@ -1,9 +1,12 @@
 //! Links between neighbouring places, without normals and whatever the dimension.
 
-use nalgebra::{Point3, Vector3};
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::tuning::{
-    LINK_BALL, LINK_LENGTH_MAX, LINK_NEIGHBOURS, OPEN_CURVE_COS, OPEN_SURFACE_RAD,
+    END_LINKS, LINK_BALL, LINK_LENGTH_MAX, LINK_NEIGHBOURS, OPEN_CURVE_COS, OPEN_SURFACE_RAD,
+    RIM_MIN,
 };
 
 /// Places that neighbour one another.
@@ -65,51 +68,96 @@ impl LinkGraph {
         }
     }
 
-    /// Whether the surface goes on beyond a place to where nothing was felt.
-    pub(crate) fn is_open(&self, positions: &[Point3<f64>], own: usize) -> bool {
+    /// Places beyond which nothing was felt, in pieces that hang together.
+    ///
+    /// Of a surface they are the ends of links that are the side of one triangle only, of a curve
+    /// the places from which all others about lie on one side.
+    pub(super) fn edges(&self, positions: &[Point3<f64>], is_curve: bool) -> Vec<Vec<u32>> {
+        let mut rim: Vec<Vec<u32>> = vec![Vec::new(); positions.len()];
+        if is_curve {
+            let ends = (0..positions.len()).filter(|own| self.is_end(positions, *own));
+            let ends = ends.filter_map(|own| u32::try_from(own).ok());
+            return ends.map(|end| vec![end]).collect();
+        }
+        let is_side: Vec<bool> = (0..positions.len())
+            .map(|own| self.largest_gap_rad(positions, own) > OPEN_SURFACE_RAD)
+            .collect();
+        for (own, others) in (0u32..).zip(&self.links) {
+            let is_rim = |other: &&u32| is_side[own as usize] && is_side[**other as usize];
+            let above = others.iter().filter(|other| **other > own);
+            for &other in above.filter(is_rim) {
+                let third = |third: &&u32| self.links[other as usize].binary_search(third).is_ok();
+                if others.iter().filter(third).count() == 1 {
+                    rim[own as usize].push(other);
+                    rim[other as usize].push(own);
+                }
+            }
+        }
+        let mut pieces: Vec<Vec<u32>> = Vec::new();
+        let mut is_met = vec![false; positions.len()];
+        for own in 0..rim.len() {
+            let mut open = vec![u32::try_from(own).unwrap_or(u32::MAX)];
+            let mut piece = Vec::new();
+            while let Some(next) = open.pop() {
+                if rim[next as usize].is_empty() || is_met[next as usize] {
+                    continue;
+                }
+                is_met[next as usize] = true;
+                piece.push(next);
+                open.extend(&rim[next as usize]);
+            }
+            if piece.len() >= RIM_MIN {
+                piece.sort_unstable();
+                pieces.push(piece);
+            }
+        }
+        pieces
+    }
+
+    /// Largest angle between neighbouring links of a place, over the plane that fits them \[rad\].
+    fn largest_gap_rad(&self, positions: &[Point3<f64>], own: usize) -> f64 {
         let to = |other: &u32| positions[*other as usize] - positions[own];
         let links: Vec<Vector3<f64>> = self.links[own].iter().map(to).collect();
-        let has_triangle = self
-            .triangles
-            .iter()
-            .any(|triangle| triangle.iter().any(|corner| *corner as usize == own));
-        if has_triangle {
-            return largest_gap_rad(&links) > OPEN_SURFACE_RAD;
-        }
-        // Along a curve one link leads on where the other came from.
-        let cos = |a: &Vector3<f64>, b: &Vector3<f64>| {
-            a.dot(b) / (a.norm() * b.norm()).max(f64::MIN_POSITIVE)
+        let Some(first) = links.first() else {
+            return TAU;
         };
-        let goes_on = links
+        let spread = links
             .iter()
-            .enumerate()
-            .any(|(number, a)| links[..number].iter().any(|b| cos(a, b) < OPEN_CURVE_COS));
-        !goes_on
+            .map(|link| link * link.transpose() / link.norm_squared());
+        let eigen = spread.sum::<Matrix3<f64>>().symmetric_eigen();
+        let normal: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
+        let x = first - normal * normal.dot(first);
+        let y = normal.cross(&x);
+        let mut angles: Vec<f64> = { links.iter() }
+            .map(|link| link.dot(&y).atan2(link.dot(&x)))
+            .collect();
+        angles.sort_by(f64::total_cmp);
+        let last = angles.last().map_or(0.0, |last| last - TAU);
+        let before = std::iter::once(&last).chain(&angles);
+        let gaps = before.zip(&angles).map(|(before, angle)| angle - before);
+        gaps.fold(0.0, f64::max)
     }
-}
 
-/// Largest angle between neighbouring links about a place, over the plane that fits them.
-fn largest_gap_rad(links: &[Vector3<f64>]) -> f64 {
-    let spread = links.iter().map(|link| {
-        let unit = link.normalize();
-        unit * unit.transpose()
-    });
-    let eigen = spread.sum::<nalgebra::Matrix3<f64>>().symmetric_eigen();
-    let normal: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
-    let x = links[0] - normal * normal.dot(&links[0]);
-    let y = normal.cross(&x);
-    let mut angles: Vec<f64> = { links.iter() }
-        .map(|link| link.dot(&y).atan2(link.dot(&x)))
-        .collect();
-    angles.sort_by(f64::total_cmp);
-    let last = angles.last().copied().unwrap_or_default() - std::f64::consts::TAU;
-    let mut before = last;
-    let mut largest: f64 = 0.0;
-    for angle in angles {
-        largest = largest.max(angle - before);
-        before = angle;
+    /// Whether a curve ends at a place: of the places that a few links lead to, no two lie on
+    /// opposite sides.
+    fn is_end(&self, positions: &[Point3<f64>], own: usize) -> bool {
+        let mut met = vec![u32::try_from(own).unwrap_or(u32::MAX)];
+        let mut from = 0;
+        for _ in 0..END_LINKS {
+            for at in from..met.len() {
+                from = at + 1;
+                for other in &self.links[met[at] as usize] {
+                    if !met.contains(other) {
+                        met.push(*other);
+                    }
+                }
+            }
+        }
+        let to = |other: &u32| (positions[*other as usize] - positions[own]).normalize();
+        let to: Vec<Vector3<f64>> = met[1..].iter().map(to).collect();
+        let mut pairs = to.iter().enumerate();
+        !pairs.any(|(number, a)| to[..number].iter().any(|b| a.dot(b) < OPEN_CURVE_COS))
     }
-    largest
 }
 
 /// The nearest places of one, nearest first.

@@ -10,6 +10,8 @@ mod field;
 mod graph;
 mod kriging;
 mod nodes;
+mod open;
 
 pub(crate) use graph::LinkGraph;
 pub(crate) use nodes::interpolated;
+pub(crate) use open::OpenRegion;

@@ -210,6 +210,7 @@ impl LocalFields {
             position,
             normal: nalgebra::Unit::try_new(normals, 1e-9),
             variance_m2: field_m * field_m + across_m2,
+            is_predicted: true,
             levels: self.levels.iter().filter_map(level).collect(),
             descriptors: nearest.map_or_else(Vec::new, |place| place.descriptors.clone()),
         }
