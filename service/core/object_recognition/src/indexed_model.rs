@@ -62,7 +62,7 @@ impl IndexedModel {
         Self {
             packed: PackedPlaces::new(&places, model.spacing_m(), extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
-            open: OpenRegion::new(&positions, felt.len(), &graph),
+            open: OpenRegion::new(&positions, felt.len(), &graph, model.spacing_m()),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
             surfel_map: SurfelMap::new(model),
             extent_m,

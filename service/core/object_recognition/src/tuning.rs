@@ -98,9 +98,12 @@ pub(crate) const OPEN_CURVE_COS: f64 = -0.25;
 pub(crate) const FLAT_SHARE: f64 = 0.02;
 /// Distance within which the errors of what lies between places are common, in typical links: about
 /// one gap. Chosen.
-pub(crate) const ERROR_REACH: f64 = 0.5;
+pub(crate) const ERROR_REACH: f64 = 1.0;
 /// Least share of an object that counts as not explored. Chosen.
 pub(crate) const UNEXPLORED_MIN: f64 = 0.05;
+/// Share of contacts between places that are not as predicted: a corner, an edge or the end of a
+/// pattern may lie there. Chosen.
+pub(crate) const UNEXPECTED_SHARE: f64 = 0.5;
 /// Probability that a walk over what was not explored is still there at the next contact. Chosen.
 pub(crate) const UNEXPLORED_STAY: f64 = 0.95;
 /// Distance from where it begins at which a walk may enter what was explored, in typical links.
@@ -118,6 +121,8 @@ pub(crate) const FIELD_SAMPLES: usize = 96;
 pub(crate) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
 /// Noise of a field that is tried, per its variance. Chosen.
 pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
+/// Places whose errors scale the variance of a field around. Chosen.
+pub(crate) const ERROR_NEIGHBOURS: usize = 6;
 /// Nodes and places of a model: a model with more places has no nodes. Budget.
 pub(crate) const NODES_MAX: usize = 1024;
 /// Distance of nodes, in spacings: two places so far apart have none between them. Chosen.

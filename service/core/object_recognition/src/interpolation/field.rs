@@ -5,7 +5,10 @@ use nalgebra::{Point3, Unit, Vector3};
 use super::graph::LinkGraph;
 use super::kriging::{Kriging, Weights};
 use crate::model::ModelPlace;
-use crate::tuning::{FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE};
+use crate::tuning::{
+    ERROR_NEIGHBOURS, FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE,
+    SHRINKAGE,
+};
 
 /// What varies over a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,13 +20,15 @@ pub(super) enum FieldOf {
 }
 
 /// A Gaussian process over a surface, as far as the places tell it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Field {
     of: FieldOf,
     length_m: f64,
     /// Noise per variance.
     noise: f64,
     variance: f64,
+    /// Squared error of each place, left out, per its expectation.
+    errors: Vec<f64>,
 }
 
 /// Where a field is predicted: the middle, and the axes along the surface.
@@ -69,15 +74,47 @@ impl Field {
                     length_m: length * graph.typical_m,
                     noise,
                     variance: 1.0,
+                    errors: Vec::new(),
                 };
                 if let Some((log, variance)) = field.cross_validated(&sites, places, graph)
-                    && best.is_none_or(|(most, _)| log > most)
+                    && best.as_ref().is_none_or(|(most, _)| log > *most)
                 {
-                    best = Some((log, Self { variance, ..field }));
+                    let errors = Vec::new();
+                    best = Some((
+                        log,
+                        Self {
+                            variance,
+                            errors,
+                            ..field
+                        },
+                    ));
                 }
             }
         }
-        best.map(|(_, field)| field)
+        let (_, mut field) = best?;
+        let errors = (0..places.len()).map(|own| {
+            let site = site_of(own, places, graph)?;
+            let (residual, variance) = field.left_out(own, &site, places, graph)?;
+            Some(residual / (field.variance * variance))
+        });
+        field.errors = errors.map(|error| error.unwrap_or(1.0)).collect();
+        Some(field)
+    }
+
+    /// Squared difference of a place from its prediction by the others, and the variance of that,
+    /// per the field's own.
+    fn left_out(
+        &self,
+        own: usize,
+        site: &Site,
+        places: &[ModelPlace],
+        graph: &LinkGraph,
+    ) -> Option<(f64, f64)> {
+        let local = self.around(site, graph.near[own].iter().copied(), places)?;
+        let place = &places[own];
+        let weights = local.kriging.weights(&place.position_m.coords);
+        let residual = self.residual(&weights, &local, site, place, places)?;
+        Some((residual, weights.variance + self.noise))
     }
 
     /// Profile log-likelihood of the places left out one by one, and the variance at which it is
@@ -90,16 +127,9 @@ impl Field {
     ) -> Option<(f64, f64)> {
         let (mut count, mut squares, mut logs) = (0.0, 0.0, 0.0);
         for (own, site) in sites {
-            let near = graph.near[*own].iter().copied();
-            let Some(local) = self.around(site, near, places) else {
+            let Some((residual, variance)) = self.left_out(*own, site, places, graph) else {
                 continue;
             };
-            let place = &places[*own];
-            let weights = local.kriging.weights(&place.position_m.coords);
-            let Some(residual) = self.residual(&weights, &local, site, place, places) else {
-                continue;
-            };
-            let variance = weights.variance + self.noise;
             count += 1.0;
             squares += residual / variance;
             logs += variance.ln();
@@ -152,10 +182,15 @@ impl Field {
             .iter()
             .map(|number| places[*number as usize].position_m.coords);
         let positions = positions.collect();
+        // What errs more than elsewhere, as at an edge, is less certain around (shrinkage).
+        let some = near.iter().take(ERROR_NEIGHBOURS);
+        let errors = some.filter_map(|number| self.errors.get(*number as usize));
+        let (count, sum) = errors.fold((0.0, 0.0), |(n, sum), error| (n + 1.0, sum + error));
+        let local = (sum + SHRINKAGE) / (count + SHRINKAGE);
         Some(LocalField {
             kriging: Kriging::new(positions, &site.axes, self.length_m, self.noise)?,
             near,
-            variance: self.variance,
+            variance: self.variance * local,
         })
     }
 }

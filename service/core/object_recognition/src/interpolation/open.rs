@@ -7,29 +7,44 @@ use nalgebra::Point3;
 use super::graph::LinkGraph;
 use crate::numeric::centroid;
 use crate::tuning::{
-    ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FIELD_PER_SPACING, FLAT_SHARE, UNEXPLORED_MIN,
+    ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FIELD_PER_SPACING, FLAT_SHARE, NODE_STEP,
+    UNEXPECTED_SHARE, UNEXPLORED_MIN, UNEXPLORED_STAY,
 };
 
-/// The part of space that is nearest to a place beyond which nothing was felt.
+/// The part of space of which a model knows little: beyond the edge of what was felt, and in the
+/// gaps between what was felt.
 #[derive(Clone, Debug)]
 pub(crate) struct OpenRegion {
-    felt: Vec<Point3<f64>>,
-    is_open: Vec<bool>,
-    /// The places and nodes about where it begins.
+    felt: Vec<FeltPlace>,
+    /// The places and nodes about the edge of what was felt.
     entries: Vec<u32>,
     /// Typical distance of places \[m\].
     typical_m: f64,
-    /// Share of the object that was not felt.
+    /// Share of the object that was not felt; 0 where next to nothing is missing.
     pub(crate) unexplored: f64,
 }
 
+/// A place that was felt.
+#[derive(Clone, Copy, Debug)]
+struct FeltPlace {
+    position: Point3<f64>,
+    is_open: bool,
+    /// Squared distance beyond which a gap begins \[m²\].
+    gap_m2: f64,
+}
+
 impl OpenRegion {
-    /// Of places, of which the first `felt` were felt and have these links; none where next to
-    /// nothing is missing.
+    /// Of places, of which the first `felt` were felt and have these links; none of a model that
+    /// was felt all over and without gaps.
     ///
     /// What is missing of a curve is taken for a half circle over each gap between two of its ends;
-    /// what is missing of a surface for a disc with the circumference of its edges.
-    pub(crate) fn new(positions: &[Point3<f64>], felt: usize, graph: &LinkGraph) -> Option<Self> {
+    /// what is missing of a surface for a disc with the circumference of each of its edges.
+    pub(crate) fn new(
+        positions: &[Point3<f64>],
+        felt: usize,
+        graph: &LinkGraph,
+        spacing_m: f64,
+    ) -> Option<Self> {
         if felt < 3 {
             return None;
         }
@@ -46,8 +61,7 @@ impl OpenRegion {
         let edge: Vec<u32> = open.map(|(number, _)| number).collect();
         let count = felt.len() as f64;
         let (missing, known) = if is_curve && !everywhere {
-            let known = graph.typical_m * count;
-            (missing_m(felt, &edge), known)
+            (missing_m(felt, &edge), graph.typical_m * count)
         } else {
             let disc = |around: f64| around * around / (4.0 * PI);
             let holes = pieces.iter().map(|piece| disc(piece.len() as f64));
@@ -55,19 +69,26 @@ impl OpenRegion {
             (missing, count)
         };
         let unexplored = missing / (missing + known).max(f64::MIN_POSITIVE);
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "OPEN n={} tri={} curve={is_curve} every={everywhere} edge={} missing={missing:.3} known={known:.3} share={unexplored:.3} typ={:.4} nodes={}",
-                felt.len(),
-                graph.triangles.len(),
-                edge.len(),
-                graph.typical_m,
-                all.len() - felt.len()
-            );
-        }
-        if unexplored < UNEXPLORED_MIN {
+        let is_open_anywhere = unexplored >= UNEXPLORED_MIN;
+        if !is_open_anywhere && all.len() == felt.len() {
             return None;
         }
+        let gap_m2 = |own: usize| {
+            let links = graph.links[own].iter();
+            let gaps = links.map(|other| (felt[*other as usize] - felt[own]).norm());
+            let mean_m = gaps.sum::<f64>() / graph.links[own].len().max(1) as f64;
+            if mean_m > NODE_STEP * spacing_m {
+                (0.5 * mean_m).powi(2)
+            } else {
+                f64::INFINITY
+            }
+        };
+        let places = felt.iter().enumerate().map(|(own, position)| FeltPlace {
+            position: *position,
+            is_open: is_open[own] && is_open_anywhere,
+            gap_m2: gap_m2(own),
+        });
+        let places: Vec<FeltPlace> = places.collect();
         let near = |position: &Point3<f64>| {
             let mut ends = edge.iter().map(|end| felt[*end as usize] - position);
             ends.any(|apart| apart.norm() < ENTRY_REACH * graph.typical_m)
@@ -76,11 +97,10 @@ impl OpenRegion {
         let entries: Vec<u32> = entries.map(|(number, _)| number).collect();
         let step = entries.len().div_ceil(ENTRIES_MAX).max(1);
         Some(Self {
-            felt: felt.to_vec(),
-            is_open,
+            felt: places,
             entries: entries.into_iter().step_by(step).collect(),
             typical_m: graph.typical_m,
-            unexplored,
+            unexplored: if is_open_anywhere { unexplored } else { 0.0 },
         })
     }
 
@@ -94,16 +114,27 @@ impl OpenRegion {
         (FIELD_PER_SPACING * self.typical_m).powi(2)
     }
 
-    /// Whether a point is nearest to a place beyond which nothing was felt, or far from all places.
-    pub(crate) fn holds(&self, point: &Point3<f64>) -> bool {
-        let mut best = (f64::INFINITY, false);
-        for (position, is_open) in self.felt.iter().zip(&self.is_open) {
-            let square = (position - point).norm_squared();
+    /// Probability that what lies at a point is none of what the model says, as far as it is known
+    /// there at all.
+    pub(crate) fn share(&self, point: &Point3<f64>) -> f64 {
+        let mut best = (f64::INFINITY, None);
+        for place in &self.felt {
+            let square = (place.position - point).norm_squared();
             if square < best.0 {
-                best = (square, *is_open);
+                best = (square, Some(place));
             }
         }
-        best.1 || best.0 > (EXPLORED_REACH * self.typical_m).powi(2)
+        let (square, Some(place)) = best else {
+            return 0.0;
+        };
+        let is_far = square > (EXPLORED_REACH * self.typical_m).powi(2);
+        if place.is_open || is_far && self.unexplored > 0.0 {
+            UNEXPLORED_STAY
+        } else if square > place.gap_m2 {
+            UNEXPECTED_SHARE
+        } else {
+            0.0
+        }
     }
 }
 

@@ -48,8 +48,9 @@ impl<'a> TouchUpdate<'a> {
     ) -> f64 {
         let density = self.unexplored.get(&object);
         let density = density.filter(|density| explored < **density);
-        let is_beyond = |_: &&f64| indexed.open.as_ref().is_some_and(|open| open.holds(point));
-        density.filter(is_beyond).copied().unwrap_or_default()
+        let share = { density.zip(indexed.open.as_ref()) }
+            .map(|(density, open)| density * open.share(point));
+        share.unwrap_or_default()
     }
 }
 

@@ -45,7 +45,7 @@ impl Unexplored {
         let objects = self.logs.keys();
         let densities = objects.filter_map(|object| {
             let log = unknown.get(object)?[0] + share(*object);
-            Some((*object, UNEXPLORED_STAY * log.exp()))
+            Some((*object, log.exp()))
         });
         densities.collect()
     }
@@ -62,7 +62,7 @@ impl Unexplored {
         parts: &mut Vec<TranslationHypothesis>,
     ) {
         for (&object, log) in &self.logs {
-            let Some(indexed) = library.indexed(object) else {
+            let Some(indexed) = library.indexed(object).filter(|_| log.is_finite()) else {
                 continue;
             };
             let (Some(open), Some(bare)) = (&indexed.open, bare(object)) else {
@@ -92,7 +92,8 @@ impl Unexplored {
     /// A contact lay there.
     pub(crate) fn stayed(&mut self, densities: BTreeMap<ObjectId, f64>) {
         for (object, log) in &mut self.logs {
-            *log += densities.get(object).copied().unwrap_or_default().ln();
+            let density = densities.get(object).copied().unwrap_or_default();
+            *log += (UNEXPLORED_STAY * density).ln();
         }
         if self.history.len() <= PREFILTER_CONTACTS_MAX {
             self.history.push(densities);
