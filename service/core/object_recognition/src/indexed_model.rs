@@ -5,6 +5,7 @@ use nalgebra::Point3;
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
 use crate::interpolation::{LinkGraph, OpenRegion, interpolated};
+use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::{LevelMemory, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
 use crate::surfels::map::SurfelMap;
@@ -24,6 +25,8 @@ pub(crate) struct IndexedModel {
     pub(crate) area_m2: f64,
     /// Typical distance between neighbouring places that were felt \[m\].
     pub(crate) gap_m: f64,
+    /// Distributions of its levels, by channel.
+    pub(crate) own_levels: Vec<LevelPrior>,
     /// Where it goes on beyond what was felt; none of one that was felt all over.
     pub(crate) open: Option<OpenRegion>,
     /// The surface, if the places have normals.
@@ -67,6 +70,7 @@ impl IndexedModel {
             surfel_map: SurfelMap::new(model),
             extent_m,
             gap_m: graph.typical_m,
+            own_levels: level_prior(places.iter().flat_map(|place| &place.levels)),
             places,
         }
     }

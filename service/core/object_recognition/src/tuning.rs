@@ -104,8 +104,13 @@ pub(crate) const UNEXPLORED_MIN: f64 = 0.05;
 /// Share of contacts between places that are not as predicted: a corner, an edge or the end of a
 /// pattern may lie there. Chosen.
 pub(crate) const UNEXPECTED_SHARE: f64 = 0.5;
-/// Probability that a walk over what was not explored is still there at the next contact. Chosen.
-pub(crate) const UNEXPLORED_STAY: f64 = 0.95;
+/// Prior probability that an object with an open edge was felt in part only: others have an edge of
+/// their own. Chosen.
+pub(crate) const PARTIAL_PRIOR: f64 = 0.1;
+/// Least probability that a contact is the first one on what was explored. Chosen.
+pub(crate) const ENTER_MIN: f64 = 0.01;
+/// Mean length of what is missing of such an object, per that of what was felt. Chosen.
+pub(crate) const MISSING_PER_KNOWN: f64 = 0.5;
 /// Distance from where it begins at which a walk may enter what was explored, in typical links.
 /// Chosen.
 pub(crate) const ENTRY_REACH: f64 = 1.5;
@@ -121,6 +126,8 @@ pub(crate) const FIELD_SAMPLES: usize = 96;
 pub(crate) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
 /// Noise of a field that is tried, per its variance. Chosen.
 pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
+/// Fewer places tell nothing of what lies between and beyond them. Chosen.
+pub(crate) const BETWEEN_MIN: usize = 10;
 /// Places whose errors scale the variance of a field around. Chosen.
 pub(crate) const ERROR_NEIGHBOURS: usize = 6;
 /// Nodes and places of a model: a model with more places has no nodes. Budget.

@@ -101,6 +101,32 @@ impl Field {
         Some(field)
     }
 
+    /// Whether the places around tell more of a place than the mean of all does.
+    pub(super) fn is_predictable(&self, places: &[ModelPlace], graph: &LinkGraph) -> bool {
+        let FieldOf::Level(channel) = self.of else {
+            return true;
+        };
+        let (mut count, mut error) = (0.0, 0.0);
+        let mut levels = Vec::new();
+        for own in 0..places.len() {
+            levels.extend(level(&places[own], channel));
+            let left_out = site_of(own, places, graph)
+                .and_then(|site| self.left_out(own, &site, places, graph));
+            if let Some((residual, _)) = left_out {
+                count += 1.0;
+                error += residual;
+            }
+        }
+        let n = levels.len().max(1) as f64;
+        let mean = levels.iter().sum::<f64>() / n;
+        let variance = levels
+            .iter()
+            .map(|level| (level - mean).powi(2))
+            .sum::<f64>()
+            / n;
+        error <= variance * count
+    }
+
     /// Squared difference of a place from its prediction by the others, and the variance of that,
     /// per the field's own.
     fn left_out(

@@ -144,14 +144,15 @@ impl LinkGraph {
         let mut met = vec![u32::try_from(own).unwrap_or(u32::MAX)];
         let mut from = 0;
         for _ in 0..END_LINKS {
-            for at in from..met.len() {
-                from = at + 1;
+            let until = met.len();
+            for at in from..until {
                 for other in &self.links[met[at] as usize] {
                     if !met.contains(other) {
                         met.push(*other);
                     }
                 }
             }
+            from = until;
         }
         let to = |other: &u32| (positions[*other as usize] - positions[own]).normalize();
         let to: Vec<Vector3<f64>> = met[1..].iter().map(to).collect();
@@ -200,7 +201,9 @@ fn symmetrise(links: &mut [Vec<u32>]) {
             }
         }
     }
-    links.iter_mut().for_each(|links| links.sort_unstable());
+    for links in links {
+        links.sort_unstable();
+    }
 }
 
 fn triangles(links: &[Vec<u32>]) -> Vec<[u32; 3]> {

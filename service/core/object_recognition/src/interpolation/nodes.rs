@@ -6,7 +6,12 @@ use super::field::{Field, FieldOf, LocalField, Site};
 use super::graph::LinkGraph;
 use crate::indexed_place::IndexedPlace;
 use crate::model::{LevelMemory, ModelPlace};
-use crate::tuning::{KRIGING_SURFACE, NODE_APART, NODE_FIELD, NODE_STEP, NODES_GROWTH, NODES_MAX};
+use crate::tuning::{
+    BETWEEN_MIN, KRIGING_SURFACE, NODE_APART, NODE_FIELD, NODE_STEP, NODES_GROWTH, NODES_MAX,
+};
+
+/// Most parts of the side of a triangle: a thousand points lie on it then.
+const PARTS_MAX: u32 = 46;
 
 /// A place on a link or in a triangle, with the corners by which it is spanned.
 struct Span {
@@ -32,14 +37,20 @@ pub(crate) fn interpolated(
     spacing_m: f64,
 ) -> Vec<IndexedPlace> {
     let room = NODES_MAX.saturating_sub(places.len());
-    if room == 0 || graph.longest_m <= NODE_STEP * spacing_m {
+    let is_finite = graph.longest_m.is_finite() && graph.longest_m > 0.0;
+    if room == 0
+        || places.len() < BETWEEN_MIN
+        || !is_finite
+        || graph.longest_m <= NODE_STEP * spacing_m
+    {
         return Vec::new();
     }
     let Some(fields) = Fields::learned(places, graph) else {
         return Vec::new();
     };
     let sites = sites(places, graph);
-    let mut step_m = NODE_STEP * spacing_m;
+    // Finer steps than these never fit.
+    let mut step_m = f64::max(NODE_STEP * spacing_m, graph.longest_m / NODES_MAX as f64);
     let mut spans = spans(places, &sites, step_m);
     while spans.len() > room {
         step_m *= NODES_GROWTH;
@@ -103,7 +114,9 @@ fn spans(places: &[ModelPlace], sites: &[(Site, Vec<u32>)], step_m: f64) -> Vec<
             .map(|(a, b)| (b - a).norm())
             .fold(0.0, f64::max);
         let parts = (longest_m / step_m).ceil().max(1.0);
-        for shares in shares(at.len(), crate::numeric::floor_u32(parts)) {
+        // A triangle of so many points has too many of them anyway.
+        let parts = crate::numeric::floor_u32(parts).min(PARTS_MAX);
+        for shares in shares(at.len(), parts) {
             let point = at.iter().zip(&shares).map(|(at, share)| at * *share);
             let at = Point3::from(point.sum::<Vector3<f64>>());
             let is_near = |other: &Point3<f64>| (other - at).norm() < near_m;
@@ -141,6 +154,7 @@ fn shares(corners: usize, parts: u32) -> Vec<Vec<f64>> {
 }
 
 impl Fields {
+    /// `None` where neighbours tell nothing of one another: between them may be anything.
     fn learned(places: &[ModelPlace], graph: &LinkGraph) -> Option<Self> {
         let mut channels: Vec<u16> = { places.iter() }
             .flat_map(|place| place.levels.iter().map(|level| level.channel))
@@ -151,10 +165,14 @@ impl Fields {
             let field = Field::learned(FieldOf::Level(channel), places, graph)?;
             Some((channel, field))
         };
-        Some(Self {
+        let fields = Self {
             place: Field::learned(FieldOf::Place, places, graph)?,
             levels: channels.into_iter().filter_map(level).collect(),
-        })
+        };
+        let mut levels = fields.levels.iter();
+        levels
+            .all(|(_, field)| field.is_predictable(places, graph))
+            .then_some(fields)
     }
 
     fn around(&self, site: &Site, places: &[ModelPlace]) -> Option<LocalFields> {

@@ -1,14 +1,14 @@
 //! Where a surface goes on beyond what was felt of it.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
 use nalgebra::Point3;
 
 use super::graph::LinkGraph;
 use crate::numeric::centroid;
 use crate::tuning::{
-    ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FIELD_PER_SPACING, FLAT_SHARE, NODE_STEP,
-    UNEXPECTED_SHARE, UNEXPLORED_MIN, UNEXPLORED_STAY,
+    BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FIELD_PER_SPACING, FLAT_SHARE,
+    MISSING_PER_KNOWN, NODE_STEP, PARTIAL_PRIOR, UNEXPECTED_SHARE, UNEXPLORED_MIN,
 };
 
 /// The part of space of which a model knows little: beyond the edge of what was felt, and in the
@@ -20,8 +20,10 @@ pub(crate) struct OpenRegion {
     entries: Vec<u32>,
     /// Typical distance of places \[m\].
     typical_m: f64,
-    /// Share of the object that was not felt; 0 where next to nothing is missing.
+    /// Probability that a contact is with what was not felt; 0 where next to nothing is missing.
     pub(crate) unexplored: f64,
+    /// Length of what was felt, or the side of a square as large \[m\].
+    known_m: f64,
 }
 
 /// A place that was felt.
@@ -37,7 +39,7 @@ impl OpenRegion {
     /// Of places, of which the first `felt` were felt and have these links; none of a model that
     /// was felt all over and without gaps.
     ///
-    /// What is missing of a curve is taken for a half circle over each gap between two of its ends;
+    /// What is missing of a curve is taken for a straight line over each gap between two of its ends;
     /// what is missing of a surface for a disc with the circumference of each of its edges.
     pub(crate) fn new(
         positions: &[Point3<f64>],
@@ -45,7 +47,7 @@ impl OpenRegion {
         graph: &LinkGraph,
         spacing_m: f64,
     ) -> Option<Self> {
-        if felt < 3 {
+        if felt < BETWEEN_MIN {
             return None;
         }
         let all = positions;
@@ -73,11 +75,12 @@ impl OpenRegion {
         if !is_open_anywhere && all.len() == felt.len() {
             return None;
         }
+        let has_nodes = all.len() > felt.len();
         let gap_m2 = |own: usize| {
             let links = graph.links[own].iter();
             let gaps = links.map(|other| (felt[*other as usize] - felt[own]).norm());
             let mean_m = gaps.sum::<f64>() / graph.links[own].len().max(1) as f64;
-            if mean_m > NODE_STEP * spacing_m {
+            if has_nodes && mean_m > NODE_STEP * spacing_m {
                 (0.5 * mean_m).powi(2)
             } else {
                 f64::INFINITY
@@ -100,7 +103,16 @@ impl OpenRegion {
             felt: places,
             entries: entries.into_iter().step_by(step).collect(),
             typical_m: graph.typical_m,
-            unexplored: if is_open_anywhere { unexplored } else { 0.0 },
+            unexplored: if is_open_anywhere {
+                PARTIAL_PRIOR * unexplored
+            } else {
+                0.0
+            },
+            known_m: if is_curve {
+                graph.typical_m * count
+            } else {
+                graph.typical_m * count.sqrt()
+            },
         })
     }
 
@@ -112,6 +124,12 @@ impl OpenRegion {
     /// Variance of the first contact on what was explored about such a place, per axis \[m²\].
     pub(crate) fn entry_m2(&self) -> f64 {
         (FIELD_PER_SPACING * self.typical_m).powi(2)
+    }
+
+    /// Probability that a walk over what was not felt is still there after a step \[m\]: what is
+    /// missing is about half as long as what was felt.
+    pub(crate) fn stay(&self, step_m: f64) -> f64 {
+        (-step_m / (MISSING_PER_KNOWN * self.known_m).max(f64::MIN_POSITIVE)).exp()
     }
 
     /// Probability that what lies at a point is none of what the model says, as far as it is known
@@ -129,7 +147,7 @@ impl OpenRegion {
         };
         let is_far = square > (EXPLORED_REACH * self.typical_m).powi(2);
         if place.is_open || is_far && self.unexplored > 0.0 {
-            UNEXPLORED_STAY
+            1.0
         } else if square > place.gap_m2 {
             UNEXPECTED_SHARE
         } else {
@@ -147,7 +165,7 @@ fn missing_m(felt: &[Point3<f64>], ends: &[u32]) -> f64 {
         gaps.fold(f64::INFINITY, f64::min)
     };
     let gaps = ends.iter().map(gap).filter(|gap| gap.is_finite());
-    0.5 * FRAC_PI_2 * gaps.sum::<f64>()
+    0.5 * gaps.sum::<f64>()
 }
 
 /// Whether all places lie in a plane.

@@ -30,17 +30,13 @@ impl BackgroundModel {
         pair: (&Contact, &Contact),
         drift_m2: f64,
     ) -> BTreeMap<ObjectId, [f64; 2]> {
-        let logs = background_logs(library, rotations, pair, drift_m2);
-        let increments = logs.into_iter().map(|(object, logs)| {
-            let sums = self.0.entry(object).or_default();
-            let before = log_sum(sums.iter().copied());
-            for (sum, log) in sums.iter_mut().zip(logs) {
+        let all = background_logs(library, rotations, pair, drift_m2);
+        for (object, logs) in &all {
+            for (sum, log) in self.0.entry(*object).or_default().iter_mut().zip(logs) {
                 *sum += log;
             }
-            let whole = log_sum(sums.iter().copied()) - before;
-            (object, [whole, logs[1]])
-        });
-        increments.collect()
+        }
+        all
     }
 
     /// Of all contacts so far.

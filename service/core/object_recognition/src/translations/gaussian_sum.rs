@@ -66,7 +66,9 @@ impl GaussianSum {
             return;
         };
         let unknown = self.unknown(library, before, contact);
-        let densities = self.unexplored.densities(&unknown, share);
+        let densities = self
+            .unexplored
+            .densities(library, (last, contact), &unknown, share);
         let touch = TouchUpdate::new(library, (last, contact), &densities);
         let mut buffers = SplitBuffers::default();
         let mut parts = Vec::with_capacity(2 * self.all.len());
@@ -90,7 +92,7 @@ impl GaussianSum {
         let best = parts.iter().map(|part| part.evidence);
         let best = best.fold(self.prefilter.best_log(), f64::max);
         let (rotations, least) = (&self.rotations, best - PRUNE_NATS);
-        { &self.unexplored }.entered(library, rotations, contact, bare, least, &mut parts);
+        { &self.unexplored }.entered(library, rotations, (last, contact), bare, least, &mut parts);
         self.unexplored.stayed(densities);
         self.all = parts;
         self.merge();

@@ -5,16 +5,18 @@ use std::collections::BTreeMap;
 use nalgebra::UnitQuaternion;
 
 use crate::contact::Contact;
+use crate::level_prior::likelihood_below_one;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::numeric::log_sum;
 use crate::translations::hypothesis::TranslationHypothesis;
-use crate::tuning::{PREFILTER_CONTACTS_MAX, UNEXPLORED_STAY};
+use crate::tuning::{ENTER_MIN, PREFILTER_CONTACTS_MAX};
 
 /// Where an episode may have been that knows no place of an object: on what was not explored of it.
 ///
-/// There a contact is as likely as with an unknown object, so that it says nothing against the
+/// There a contact is as likely as with an unknown object whose percepts are like those of the
+/// library, so that it says nothing against the
 /// object but that so much of it should be missing: each further contact stays there with
-/// probability [`UNEXPLORED_STAY`]. Otherwise it is the first one on what was explored, at its edge.
+/// a probability that falls with the step. Otherwise it is the first one on what was explored, at its edge.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Unexplored {
     /// Log of the mass of the episodes that were nowhere else so far.
@@ -36,16 +38,24 @@ impl Unexplored {
     }
 
     /// Densities of a contact, from log densities of one with an unknown object; those of an object
-    /// are multiplied by e^`share` for its size.
+    /// are multiplied by e^`share` for its size. What was not explored has levels like those of the
+    /// rest.
     pub(crate) fn densities(
         &self,
+        library: &ObjectLibrary,
+        (last, contact): (&Contact, &Contact),
         unknown: &BTreeMap<ObjectId, [f64; 2]>,
         share: impl Fn(ObjectId) -> f64,
     ) -> BTreeMap<ObjectId, f64> {
         let objects = self.logs.keys();
         let densities = objects.filter_map(|object| {
             let log = unknown.get(object)?[0] + share(*object);
-            Some((*object, log.exp()))
+            let indexed = library.indexed(*object)?;
+            let own = &indexed.own_levels;
+            let alike = likelihood_below_one(contact, own, library.level_prior());
+            let step_m = (contact.position_m - last.position_m).norm();
+            let stay = indexed.open.as_ref()?.stay(step_m);
+            Some((*object, stay * alike * log.exp()))
         });
         densities.collect()
     }
@@ -56,7 +66,7 @@ impl Unexplored {
         &self,
         library: &ObjectLibrary,
         rotations: &[UnitQuaternion<f64>],
-        contact: &Contact,
+        (last, contact): (&Contact, &Contact),
         bare: impl Fn(ObjectId) -> Option<f64>,
         least_log: f64,
         parts: &mut Vec<TranslationHypothesis>,
@@ -69,7 +79,9 @@ impl Unexplored {
                 continue;
             };
             let ways = (open.entries().len() * rotations.len()).max(1) as f64;
-            let each = log + bare + (1.0 - UNEXPLORED_STAY).ln() - ways.ln();
+            let step_m = (contact.position_m - last.position_m).norm();
+            let enters = (1.0 - open.stay(step_m)).max(ENTER_MIN);
+            let each = log + bare + enters.ln() - ways.ln();
             for entry in open.entries() {
                 let place = &indexed.places[*entry as usize];
                 let evidence = each + place.percept_log(contact, library.level_prior());
@@ -93,7 +105,7 @@ impl Unexplored {
     pub(crate) fn stayed(&mut self, densities: BTreeMap<ObjectId, f64>) {
         for (object, log) in &mut self.logs {
             let density = densities.get(object).copied().unwrap_or_default();
-            *log += (UNEXPLORED_STAY * density).ln();
+            *log += density.ln();
         }
         if self.history.len() <= PREFILTER_CONTACTS_MAX {
             self.history.push(densities);
