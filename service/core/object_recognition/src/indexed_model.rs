@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
-use crate::interpolation::{LinkGraph, OpenRegion, interpolated};
+use crate::interpolation::{Fields, LinkGraph, OpenRegion, interpolated};
 use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::{LevelMemory, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
@@ -54,7 +54,11 @@ impl IndexedModel {
                 descriptors: place.descriptors.clone(),
             })
             .collect();
-        places.extend(interpolated(model.places(), &graph, model.spacing_m()));
+        let fields = Fields::learned(model.places(), &graph);
+        if let Some(fields) = &fields {
+            let nodes = interpolated(model.places(), &graph, fields, model.spacing_m());
+            places.extend(nodes);
+        }
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
         let middle = centroid(positions.iter().map(|position| position.coords));
         let radius_m = positions
@@ -65,7 +69,8 @@ impl IndexedModel {
         Self {
             packed: PackedPlaces::new(&places, model.spacing_m(), extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
-            open: OpenRegion::new(&positions, felt.len(), &graph, model.spacing_m()),
+            open: fields
+                .and_then(|_| OpenRegion::new(&positions, felt.len(), &graph, model.spacing_m())),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
             surfel_map: SurfelMap::new(model),
             extent_m,

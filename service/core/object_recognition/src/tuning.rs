@@ -128,11 +128,17 @@ pub(crate) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
 pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
 /// Fewer places tell nothing of what lies between and beyond them. Chosen.
 pub(crate) const BETWEEN_MIN: usize = 10;
+/// Share of the variance of a level that neighbours may leave open, at most: beyond, what is felt at
+/// a place says little of what lies beside it. Chosen.
+pub(crate) const UNPREDICTED_MAX: f64 = 0.5;
 /// Places whose errors scale the variance of a field around. Chosen.
 pub(crate) const ERROR_NEIGHBOURS: usize = 6;
 /// Nodes and places of a model: a model with more places has no nodes. Budget.
 pub(crate) const NODES_MAX: usize = 1024;
-/// Distance of nodes, in spacings: two places so far apart have none between them. Chosen.
+/// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept apart
+/// by a spacing lie so far from one another, across the diagonals of a square too. Chosen.
+pub(crate) const DENSE_LINK: f64 = 3.0;
+/// Distance of nodes, in spacings. Chosen.
 pub(crate) const NODE_STEP: f64 = 2.0;
 /// Factor by which this distance grows until the nodes fit. Chosen.
 pub(crate) const NODES_GROWTH: f64 = 1.25;

@@ -7,7 +7,7 @@ use super::kriging::{Kriging, Weights};
 use crate::model::ModelPlace;
 use crate::tuning::{
     ERROR_NEIGHBOURS, FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE,
-    SHRINKAGE,
+    SHRINKAGE, UNPREDICTED_MAX,
 };
 
 /// What varies over a surface.
@@ -101,7 +101,7 @@ impl Field {
         Some(field)
     }
 
-    /// Whether the places around tell more of a place than the mean of all does.
+    /// Whether the places around tell most of what is felt at a place.
     pub(super) fn is_predictable(&self, places: &[ModelPlace], graph: &LinkGraph) -> bool {
         let FieldOf::Level(channel) = self.of else {
             return true;
@@ -124,7 +124,7 @@ impl Field {
             .map(|level| (level - mean).powi(2))
             .sum::<f64>()
             / n;
-        error <= variance * count
+        error <= UNPREDICTED_MAX * variance * count
     }
 
     /// Squared difference of a place from its prediction by the others, and the variance of that,

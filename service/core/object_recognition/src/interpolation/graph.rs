@@ -68,6 +68,11 @@ impl LinkGraph {
         }
     }
 
+    /// Whether the places lie along lines, for the most part.
+    pub(super) fn is_curve(&self) -> bool {
+        2 * self.triangles.len() < self.links.len()
+    }
+
     /// Places beyond which nothing was felt, in pieces that hang together.
     ///
     /// Of a surface they are the ends of links that are the side of one triangle only, of a curve

@@ -13,5 +13,5 @@ mod nodes;
 mod open;
 
 pub(crate) use graph::LinkGraph;
-pub(crate) use nodes::interpolated;
+pub(crate) use nodes::{Fields, interpolated};
 pub(crate) use open::OpenRegion;

@@ -7,7 +7,8 @@ use super::graph::LinkGraph;
 use crate::indexed_place::IndexedPlace;
 use crate::model::{LevelMemory, ModelPlace};
 use crate::tuning::{
-    BETWEEN_MIN, KRIGING_SURFACE, NODE_APART, NODE_FIELD, NODE_STEP, NODES_GROWTH, NODES_MAX,
+    BETWEEN_MIN, DENSE_LINK, KRIGING_SURFACE, NODE_APART, NODE_FIELD, NODE_STEP, NODES_GROWTH,
+    NODES_MAX,
 };
 
 /// Most parts of the side of a triangle: a thousand points lie on it then.
@@ -22,7 +23,7 @@ struct Span {
 }
 
 /// The fields of a model.
-struct Fields {
+pub(crate) struct Fields {
     place: Field,
     levels: Vec<(u16, Field)>,
 }
@@ -34,20 +35,18 @@ struct Fields {
 pub(crate) fn interpolated(
     places: &[ModelPlace],
     graph: &LinkGraph,
+    fields: &Fields,
     spacing_m: f64,
 ) -> Vec<IndexedPlace> {
     let room = NODES_MAX.saturating_sub(places.len());
-    let is_finite = graph.longest_m.is_finite() && graph.longest_m > 0.0;
-    if room == 0
-        || places.len() < BETWEEN_MIN
-        || !is_finite
-        || graph.longest_m <= NODE_STEP * spacing_m
-    {
+    let is_dense = if graph.is_curve() {
+        graph.longest_m <= NODE_STEP * spacing_m
+    } else {
+        graph.typical_m <= DENSE_LINK * spacing_m
+    };
+    if room == 0 || is_dense {
         return Vec::new();
     }
-    let Some(fields) = Fields::learned(places, graph) else {
-        return Vec::new();
-    };
     let sites = sites(places, graph);
     // Finer steps than these never fit.
     let mut step_m = f64::max(NODE_STEP * spacing_m, graph.longest_m / NODES_MAX as f64);
@@ -154,8 +153,13 @@ fn shares(corners: usize, parts: u32) -> Vec<Vec<f64>> {
 }
 
 impl Fields {
-    /// `None` where neighbours tell nothing of one another: between them may be anything.
-    fn learned(places: &[ModelPlace], graph: &LinkGraph) -> Option<Self> {
+    /// `None` where neighbours tell little of one another, so that between them may be anything, and
+    /// of models that have too few or so many places that nothing lies between.
+    pub(crate) fn learned(places: &[ModelPlace], graph: &LinkGraph) -> Option<Self> {
+        let is_finite = graph.longest_m.is_finite() && graph.longest_m > 0.0;
+        if !(BETWEEN_MIN..NODES_MAX).contains(&places.len()) || !is_finite {
+            return None;
+        }
         let mut channels: Vec<u16> = { places.iter() }
             .flat_map(|place| place.levels.iter().map(|level| level.channel))
             .collect();

@@ -52,7 +52,7 @@ impl OpenRegion {
         }
         let all = positions;
         let felt = &positions[..felt];
-        let is_curve = 2 * graph.triangles.len() < felt.len();
+        let is_curve = graph.is_curve();
         let everywhere = is_curve && !is_flat(felt);
         let pieces = graph.edges(felt, is_curve);
         let mut is_open = vec![everywhere; felt.len()];
