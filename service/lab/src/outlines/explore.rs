@@ -26,15 +26,14 @@ pub(super) fn lesson(solid: &Solid, count: usize, random: &mut ChaCha8Rng) -> Ve
 
 /// A run of neighbouring touches from an unknown start: along an outline one way round, elsewhere a
 /// walk that turns a little at each step.
-pub(super) fn walk(
-    solid: &Solid,
-    count: usize,
-    step_m: f64,
-    random: &mut ChaCha8Rng,
-) -> Vec<Felt> {
+pub(super) fn walk(solid: &Solid, count: usize, step_m: f64, random: &mut ChaCha8Rng) -> Vec<Felt> {
     if solid.is_planar() {
         let start_m = random.random_range(0.0..solid.length_m());
-        let step_m = if random.random::<bool>() { step_m } else { -step_m };
+        let step_m = if random.random::<bool>() {
+            step_m
+        } else {
+            -step_m
+        };
         let felt = (0..count).map(|k| solid.along(start_m + k as f64 * step_m));
         return felt.collect();
     }

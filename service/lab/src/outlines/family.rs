@@ -73,7 +73,11 @@ impl Family {
                 bumps: (0..random.random_range(2..=5))
                     .map(|_| {
                         let amplitude_m = random.random_range(-0.015..0.02);
-                        (direction(random), amplitude_m, random.random_range(1.5..4.0))
+                        (
+                            direction(random),
+                            amplitude_m,
+                            random.random_range(1.5..4.0),
+                        )
                     })
                     .collect(),
             },

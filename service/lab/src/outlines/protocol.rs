@@ -87,7 +87,11 @@ impl OutlineProtocol {
             teaching: Teaching::Everywhere,
             objects: 5,
             sets: 8,
-            step_m: if family == Family::Outline { 0.005 } else { 0.01 },
+            step_m: if family == Family::Outline {
+                0.005
+            } else {
+                0.01
+            },
             position_sd_m: 0.001,
             normal_sd_rad: 2.0_f64.to_radians(),
             level_sd: 0.03,

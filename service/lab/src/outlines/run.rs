@@ -38,7 +38,11 @@ pub fn run(protocol: &OutlineProtocol, explored: &impl Fn()) -> Result<Row, Inva
         explorations: protocol.sets * protocol.objects,
         half_touches: 0.0,
         half: Answers::default(),
-        looks: protocol.looks.iter().map(|n| (*n, Answers::default())).collect(),
+        looks: protocol
+            .looks
+            .iter()
+            .map(|n| (*n, Answers::default()))
+            .collect(),
         ever_unknown: 0,
         made_up: 0,
         strangers: Answers::default(),
@@ -86,7 +90,8 @@ impl Row {
             self.made_up += trial.learned;
         } else {
             self.strangers.add(&trial.half);
-            self.strangers_end.add(&trial.looks.last().copied().unwrap_or_default());
+            self.strangers_end
+                .add(&trial.looks.last().copied().unwrap_or_default());
             self.strangers_learned += trial.learned;
         }
     }
@@ -162,7 +167,10 @@ fn touch_again(
     let mut map = map.clone();
     let mut hand = Hand::default();
     let noise = noise(protocol)?;
-    hand.sample(&mut map, SampleBody::Object(ObjectMark::Identify { orientation, noise }));
+    hand.sample(
+        &mut map,
+        SampleBody::Object(ObjectMark::Identify { orientation, noise }),
+    );
     let mut trial = Trial {
         half_touches,
         half: Answers::default(),
@@ -170,7 +178,9 @@ fn touch_again(
         was_unknown: false,
         learned: 0,
     };
-    let mut before = way.first().map_or_else(Default::default, |felt| felt.position_m);
+    let mut before = way
+        .first()
+        .map_or_else(Default::default, |felt| felt.position_m);
     for (count, felt) in (1..).zip(&way) {
         let step = turn * (felt.position_m - before);
         before = felt.position_m;
@@ -179,10 +189,14 @@ fn touch_again(
         hand.sample(&mut map, SampleBody::Motion(motion));
         let noisy = noisy(protocol, felt, random);
         let offset = turn * (noisy.position_m - felt.position_m);
-        let normal = protocol.normals.then(|| (turn * noisy.normal.into_inner()).into());
+        let normal = protocol
+            .normals
+            .then(|| (turn * noisy.normal.into_inner()).into());
         let level = Level::new(Label::new(CHANNEL)?, noisy.level, offset.into(), normal)?;
         let events = hand.sample(&mut map, SampleBody::Level(level));
-        trial.was_unknown |= events.iter().any(|kind| matches!(kind, EventKind::ObjectUnknown));
+        trial.was_unknown |= events
+            .iter()
+            .any(|kind| matches!(kind, EventKind::ObjectUnknown));
         let is_look = protocol.looks.contains(&count);
         if is_look || count == half_touches {
             let answers = answers(&map, truth);
@@ -212,9 +226,7 @@ fn answers(map: &CognitiveMap, truth: Option<ObjectId>) -> Answers {
         right: usize::from(matches!(verdict, Verdict::Object(id) if is_right(id))),
         wrong: usize::from(matches!(verdict, Verdict::Object(id) if !is_right(id))),
         unknown: usize::from(verdict == Verdict::Unknown),
-        first: usize::from(
-            best.is_some_and(|(id, own)| is_right(*id) && *own > posterior.unknown),
-        ),
+        first: usize::from(best.is_some_and(|(id, own)| is_right(*id) && *own > posterior.unknown)),
         unknown_first: usize::from(best.is_none_or(|(_, own)| *own <= posterior.unknown)),
     }
 }
@@ -231,7 +243,11 @@ fn noisy(protocol: &OutlineProtocol, felt: &Felt, random: &mut ChaCha8Rng) -> Fe
 }
 
 fn noise(protocol: &OutlineProtocol) -> Result<TouchNoise, InvalidSample> {
-    TouchNoise::new(protocol.position_sd_m, protocol.normal_sd_rad, protocol.level_sd)
+    TouchNoise::new(
+        protocol.position_sd_m,
+        protocol.normal_sd_rad,
+        protocol.level_sd,
+    )
 }
 
 /// What an agent sends.

@@ -82,7 +82,8 @@ impl Solid {
             lengths_m: Vec::new(),
         };
         if solid.is_planar() {
-            let point = |k: u32| solid.point(&planar(TAU * f64::from(k) / f64::from(OUTLINE_POINTS)));
+            let point =
+                |k: u32| solid.point(&planar(TAU * f64::from(k) / f64::from(OUTLINE_POINTS)));
             let mut length_m = 0.0;
             let lengths = (0..OUTLINE_POINTS).map(|k| {
                 length_m += (point(k + 1) - point(k)).norm();
@@ -117,10 +118,16 @@ impl Solid {
     pub(super) fn along(&self, length_m: f64) -> Felt {
         let at_m = length_m.rem_euclid(self.length_m().max(f64::MIN_POSITIVE));
         let next = self.lengths_m.partition_point(|own| *own < at_m);
-        let before = if next == 0 { 0.0 } else { self.lengths_m[next - 1] };
+        let before = if next == 0 {
+            0.0
+        } else {
+            self.lengths_m[next - 1]
+        };
         let here = self.lengths_m.get(next).copied().unwrap_or(before);
         let part = (at_m - before) / (here - before).max(f64::MIN_POSITIVE);
-        self.felt(&planar(TAU * (next as f64 + part) / f64::from(OUTLINE_POINTS)))
+        self.felt(&planar(
+            TAU * (next as f64 + part) / f64::from(OUTLINE_POINTS),
+        ))
     }
 
     /// A point that is drawn evenly from the whole surface.

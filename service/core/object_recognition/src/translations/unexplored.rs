@@ -47,9 +47,15 @@ impl Unexplored {
         unknown: &BTreeMap<ObjectId, [f64; 2]>,
         share: impl Fn(ObjectId) -> f64,
     ) -> BTreeMap<ObjectId, f64> {
-        let objects = self.logs.keys();
+        // Without the object that explains it best: else its places would speak for all others.
+        let least = unknown.values().map(|logs| logs[0]);
+        let least = least.fold(f64::INFINITY, f64::min);
+        let objects = self
+            .logs
+            .keys()
+            .filter(|object| unknown.contains_key(object));
         let densities = objects.filter_map(|object| {
-            let log = unknown.get(object)?[0] + share(*object);
+            let log = least + share(*object);
             let indexed = library.indexed(*object)?;
             let own = &indexed.own_levels;
             let alike = likelihood_below_one(contact, own, library.level_prior());
