@@ -22,8 +22,8 @@ impl LevelPrior {
     }
 }
 
-/// How much less likely the levels of a contact are of some distributions than of others, at most 1,
-/// and no less than if they were misread.
+/// How much less likely the levels of a contact are of some distributions than of others, at most
+/// 1, and no less than if they were misread.
 pub(crate) fn likelihood_below_one(
     contact: &Contact,
     own: &[LevelPrior],

@@ -90,8 +90,8 @@ pub(crate) const EXPLORED_REACH: f64 = 3.0;
 pub(crate) const RIM_MIN: usize = 5;
 /// Links along a curve within which it leads on, or ends. Chosen.
 pub(crate) const END_LINKS: usize = 3;
-/// Cosine of the angle between two directions along a curve below which one leads on where the other
-/// came from: 104°. Chosen.
+/// Cosine of the angle between two directions along a curve below which one leads on where the
+/// other came from: 104°. Chosen.
 pub(crate) const OPEN_CURVE_COS: f64 = -0.25;
 /// Share of the variance of places across a plane below which they lie in it: a seventh of the
 /// deviation. Chosen.
@@ -128,15 +128,15 @@ pub(crate) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
 pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
 /// Fewer places tell nothing of what lies between and beyond them. Chosen.
 pub(crate) const BETWEEN_MIN: usize = 10;
-/// Share of the variance of a level that neighbours may leave open, at most: beyond, what is felt at
-/// a place says little of what lies beside it. Chosen.
+/// Share of the variance of a level that neighbours may leave open, at most: beyond, what is felt
+/// at a place says little of what lies beside it. Chosen.
 pub(crate) const UNPREDICTED_MAX: f64 = 0.5;
 /// Places whose errors scale the variance of a field around. Chosen.
 pub(crate) const ERROR_NEIGHBOURS: usize = 6;
 /// Nodes and places of a model: a model with more places has no nodes. Budget.
 pub(crate) const NODES_MAX: usize = 1024;
-/// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept apart
-/// by a spacing lie so far from one another, across the diagonals of a square too. Chosen.
+/// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept
+/// apart by a spacing lie so far from one another, across the diagonals of a square too. Chosen.
 pub(crate) const DENSE_LINK: f64 = 3.0;
 /// Distance of nodes, in spacings. Chosen.
 pub(crate) const NODE_STEP: f64 = 2.0;

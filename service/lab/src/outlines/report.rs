@@ -88,7 +88,8 @@ impl Display for Row {
         let name = |value: &dyn fmt::Debug| format!("{value:?}").to_lowercase();
         write!(
             out,
-            "{:<9} {:<7} {:<5} {:>6} {:>5.0} {:>5.0} {:>5.0} {:>5.0} {:>10.0} {:>8} {:>5.0} {:>4.0} {:>4.0} {:>4.0}  ",
+            "{:<9} {:<7} {:<5} {:>6} {:>5.0} {:>5.0} {:>5.0} {:>5.0} {:>10.0} {:>8} \
+             {:>5.0} {:>4.0} {:>4.0} {:>4.0}  ",
             name(&self.family),
             name(&self.levels),
             name(&self.turn),

@@ -153,8 +153,8 @@ fn shares(corners: usize, parts: u32) -> Vec<Vec<f64>> {
 }
 
 impl Fields {
-    /// `None` where neighbours tell little of one another, so that between them may be anything, and
-    /// of models that have too few or so many places that nothing lies between.
+    /// `None` where neighbours tell little of one another, so that between them may be anything,
+    /// and of models that have too few or so many places that nothing lies between.
     pub(crate) fn learned(places: &[ModelPlace], graph: &LinkGraph) -> Option<Self> {
         let is_finite = graph.longest_m.is_finite() && graph.longest_m > 0.0;
         if !(BETWEEN_MIN..NODES_MAX).contains(&places.len()) || !is_finite {

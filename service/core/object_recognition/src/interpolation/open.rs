@@ -39,8 +39,8 @@ impl OpenRegion {
     /// Of places, of which the first `felt` were felt and have these links; none of a model that
     /// was felt all over and without gaps.
     ///
-    /// What is missing of a curve is taken for a straight line over each gap between two of its ends;
-    /// what is missing of a surface for a disc with the circumference of each of its edges.
+    /// What is missing of a curve is taken for a straight line over each gap between two of its
+    /// ends; what is missing of a surface for a disc with the circumference of each of its edges.
     pub(crate) fn new(
         positions: &[Point3<f64>],
         felt: usize,
@@ -156,7 +156,8 @@ impl OpenRegion {
     }
 }
 
-/// Length of what is missing between the ends of curves \[m\]: each goes on to the nearest other one.
+/// Length of what is missing between the ends of curves \[m\]: each goes on to the nearest other
+/// one.
 fn missing_m(felt: &[Point3<f64>], ends: &[u32]) -> f64 {
     let at = |end: u32| felt[end as usize];
     let gap = |end: &u32| {

@@ -9,8 +9,9 @@ use crate::tuning::ERROR_REACH;
 /// Evidence of contacts in a pose, per that of independent ones.
 ///
 /// What is predicted between places errs by the same wherever contacts lie in one gap. With ρ the
-/// correlation of these errors and m their share of a contact's variance, the variance of a sum over
-/// n contacts is t = 1 + m (Σρ/n − 1) times that of independent ones, of which 1/t is the share.
+/// correlation of these errors and m their share of a contact's variance, the variance of a sum
+/// over n contacts is t = 1 + m (Σρ/n − 1) times that of independent ones, of which 1/t is the
+/// share.
 pub(super) fn evidence_share(
     indexed: &IndexedModel,
     map_from_episode: &Isometry3<f64>,

@@ -162,8 +162,8 @@ impl Recognition {
         }
     }
 
-    /// Log-likelihood of an unknown object, as far as independent contacts speak for it: `unknown` by
-    /// all contacts, and that of the best object.
+    /// Log-likelihood of an unknown object, as far as independent contacts speak for it: `unknown`
+    /// by all contacts, and that of the best object.
     fn earned(
         &self,
         library: &ObjectLibrary,

@@ -21,8 +21,8 @@ use crate::tuning::{BACKGROUND_WEIGHT_MIN, OUTLIER_SHARE};
 pub(crate) struct BackgroundModel(BTreeMap<ObjectId, [f64; 2]>);
 
 impl BackgroundModel {
-    /// Adds a contact: see [`background_logs`]. Answers its own log density by object, with percepts
-    /// and without.
+    /// Adds a contact: see [`background_logs`]. Answers its own log density by object, with
+    /// percepts and without.
     pub(crate) fn touch(
         &mut self,
         library: &ObjectLibrary,

@@ -16,7 +16,8 @@ use crate::tuning::{ENTER_MIN, PREFILTER_CONTACTS_MAX};
 /// There a contact is as likely as with an unknown object whose percepts are like those of the
 /// library, so that it says nothing against the
 /// object but that so much of it should be missing: each further contact stays there with
-/// a probability that falls with the step. Otherwise it is the first one on what was explored, at its edge.
+/// a probability that falls with the step. Otherwise it is the first one on what was explored, at
+/// its edge.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Unexplored {
     /// Log of the mass of the episodes that were nowhere else so far.
