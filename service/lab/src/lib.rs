@@ -14,6 +14,7 @@
 //! | [`tuc`] | the TUC data sets: odometry and place matches, many of them false |
 //! | [`victoria`] | Victoria Park, as text with odometry and sightings |
 //! | [`objects`] | objects of coloured voxels, and an end effector that explores them |
+//! | [`outlines`] | random outlines and solids, taught and touched again through the fold |
 //! | [`touch`] | objects as sets of touches |
 //! | [`points`] | objects as points with normals, recognised in any pose |
 //! | [`csv`] | recordings as tables: motion, levels, views and ranges of robots |
@@ -68,6 +69,7 @@ pub mod g2o;
 pub mod mrclam;
 pub mod nees;
 pub mod objects;
+pub mod outlines;
 pub mod paths;
 pub mod points;
 pub mod reference;

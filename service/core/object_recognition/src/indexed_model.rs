@@ -4,6 +4,8 @@ use nalgebra::Point3;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
+use crate::interpolation::{Fields, LinkGraph, OpenRegion, interpolated};
+use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::{LevelMemory, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
 use crate::surfels::map::SurfelMap;
@@ -21,6 +23,12 @@ pub(crate) struct IndexedModel {
     pub(crate) extent_m: f64,
     /// Area \[m²\]: one spacing squared per place.
     pub(crate) area_m2: f64,
+    /// Typical distance between neighbouring places that were felt \[m\].
+    pub(crate) gap_m: f64,
+    /// Distributions of its levels, by channel.
+    pub(crate) own_levels: Vec<LevelPrior>,
+    /// Where it goes on beyond what was felt; none of one that was felt all over.
+    pub(crate) open: Option<OpenRegion>,
     /// The surface, if the places have normals.
     pub(crate) surfel_map: Option<SurfelMap>,
     shares: [f64; SHARE_BINS + 1],
@@ -30,17 +38,27 @@ impl IndexedModel {
     /// Of a model.
     pub(crate) fn new(model: &ObjectModel) -> Self {
         let field_m = FIELD_PER_SPACING * model.spacing_m();
-        let places: Vec<_> = model
+        let felt: Vec<_> = { model.places().iter() }
+            .map(|place| place.position_m)
+            .collect();
+        let graph = LinkGraph::new(&felt);
+        let mut places: Vec<_> = model
             .places()
             .iter()
             .map(|place| IndexedPlace {
                 position: place.position_m,
                 normal: place.normal(),
                 variance_m2: field_m * field_m + place.variance_m2 / (place.count * place.count),
+                is_predicted: false,
                 levels: place.levels.clone(),
                 descriptors: place.descriptors.clone(),
             })
             .collect();
+        let fields = Fields::learned(model.places(), &graph);
+        if let Some(fields) = &fields {
+            let nodes = interpolated(model.places(), &graph, fields, model.spacing_m());
+            places.extend(nodes);
+        }
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
         let middle = centroid(positions.iter().map(|position| position.coords));
         let radius_m = positions
@@ -51,9 +69,13 @@ impl IndexedModel {
         Self {
             packed: PackedPlaces::new(&places, model.spacing_m(), extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
+            open: fields
+                .and_then(|_| OpenRegion::new(&positions, felt.len(), &graph, model.spacing_m())),
             area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
             surfel_map: SurfelMap::new(model),
             extent_m,
+            gap_m: graph.typical_m,
+            own_levels: level_prior(places.iter().flat_map(|place| &place.levels)),
             places,
         }
     }

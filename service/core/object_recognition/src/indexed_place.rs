@@ -15,6 +15,8 @@ pub(crate) struct IndexedPlace {
     /// Variance of a touch of this place about `position`, without the touch's noise, per axis
     /// \[m²\].
     pub(crate) variance_m2: f64,
+    /// Whether it was predicted from the places around, and not felt.
+    pub(crate) is_predicted: bool,
     pub(crate) levels: Vec<LevelMemory>,
     pub(crate) descriptors: Vec<DescriptorReading>,
 }

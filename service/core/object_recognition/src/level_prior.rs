@@ -1,8 +1,8 @@
 //! Distribution of the levels of a channel over all places of a library.
 
-use crate::contact::LevelReading;
+use crate::contact::{Contact, LevelReading};
 use crate::model::LevelMemory;
-use crate::tuning::LEVEL_DENSITY_FLOOR;
+use crate::tuning::{LEVEL_DENSITY_FLOOR, WRONG_PERCEPT_SHARE};
 
 /// Normal distribution of the levels of a channel over all places.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +20,26 @@ impl LevelPrior {
         // The floor takes values far off all others for misreadings.
         ((-0.5 * apart * apart / variance).exp() + LEVEL_DENSITY_FLOOR) / variance.sqrt()
     }
+}
+
+/// How much less likely the levels of a contact are of some distributions than of others, at most
+/// 1, and no less than if they were misread.
+pub(crate) fn likelihood_below_one(
+    contact: &Contact,
+    own: &[LevelPrior],
+    others: &[LevelPrior],
+) -> f64 {
+    let ratios = contact.levels.iter().map(|reading| {
+        let density = |all: &[LevelPrior]| {
+            let found = all.iter().find(|prior| prior.channel == reading.channel);
+            found.map(|prior| prior.density(reading))
+        };
+        let ratio = density(own).zip(density(others));
+        ratio.map_or(1.0, |(own, other)| {
+            (own / other).clamp(WRONG_PERCEPT_SHARE, 1.0)
+        })
+    });
+    ratios.product()
 }
 
 /// Distributions of these levels, one of each channel for each place, by channel.

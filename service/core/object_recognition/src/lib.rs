@@ -4,6 +4,7 @@ mod contact;
 mod index;
 mod indexed_model;
 mod indexed_place;
+mod interpolation;
 mod level_prior;
 mod library;
 mod model;

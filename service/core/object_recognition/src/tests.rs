@@ -265,7 +265,7 @@ fn the_evidence_is_that_of_all_assignments_of_contacts_to_places() {
             .collect();
         let mut translations = GaussianSum::new(rotations.clone());
         for (count, contact) in contacts.iter().enumerate() {
-            translations.touch(&library, &contacts[..count], contact);
+            translations.touch(&library, &contacts[..count], contact, &|_| 0.0);
             let contacts = &contacts[..=count];
             let found = |id: u32| translations.object_logs()[&ObjectId(id)];
             let told = |id: u32| by_assignment(&library, id, &rotations, contacts);

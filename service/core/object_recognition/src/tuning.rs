@@ -70,6 +70,84 @@ pub(crate) const WRONG_NORMAL_SHARE: f64 = 0.1;
 /// second number holds where a place's percepts need their lists. Chosen by running time.
 pub(crate) const SPARSE_RATIOS: [usize; 2] = [16, 4];
 
+// What lies between places.
+
+/// Nearest places among which links are sought. Budget.
+pub(crate) const LINK_NEIGHBOURS: usize = 16;
+/// Radius of the ball about the middle of a link that holds no other place, per half its length:
+/// below one, so that few faces of a surface are without a diagonal. A curve that turns by less
+/// than 74° at a place has no link past it. Chosen.
+pub(crate) const LINK_BALL: f64 = 0.75;
+/// Longest link, per typical one: beyond, nothing was explored. Gaps between places that are drawn
+/// at random all over a surface are rarely longer. Chosen.
+pub(crate) const LINK_LENGTH_MAX: f64 = 4.0;
+/// Angle between neighbouring links of a surface's place beyond which the surface may be open there
+/// \[rad\]: 160°. Chosen.
+pub(crate) const OPEN_SURFACE_RAD: f64 = 2.8;
+/// Distance from all that was felt beyond which nothing was explored, in typical links. Chosen.
+pub(crate) const EXPLORED_REACH: f64 = 3.0;
+/// Places about a hole in a surface, at least: a smaller one hides nothing. Chosen.
+pub(crate) const RIM_MIN: usize = 5;
+/// Links along a curve within which it leads on, or ends. Chosen.
+pub(crate) const END_LINKS: usize = 3;
+/// Cosine of the angle between two directions along a curve below which one leads on where the
+/// other came from: 104°. Chosen.
+pub(crate) const OPEN_CURVE_COS: f64 = -0.25;
+/// Share of the variance of places across a plane below which they lie in it: a seventh of the
+/// deviation. Chosen.
+pub(crate) const FLAT_SHARE: f64 = 0.02;
+/// Distance within which the errors of what lies between places are common, in typical links: about
+/// one gap. Chosen.
+pub(crate) const ERROR_REACH: f64 = 1.0;
+/// Least share of an object that counts as not explored. Chosen.
+pub(crate) const UNEXPLORED_MIN: f64 = 0.05;
+/// Share of contacts between places that are not as predicted: a corner, an edge or the end of a
+/// pattern may lie there. Chosen.
+pub(crate) const UNEXPECTED_SHARE: f64 = 0.5;
+/// Prior probability that an object with an open edge was felt in part only: others have an edge of
+/// their own. Chosen.
+pub(crate) const PARTIAL_PRIOR: f64 = 0.1;
+/// Least probability that a contact is the first one on what was explored. Chosen.
+pub(crate) const ENTER_MIN: f64 = 0.01;
+/// Mean length of what is missing of such an object, per that of what was felt. Chosen.
+pub(crate) const MISSING_PER_KNOWN: f64 = 0.5;
+/// Distance from where it begins at which a walk may enter what was explored, in typical links.
+/// Chosen.
+pub(crate) const ENTRY_REACH: f64 = 1.5;
+/// Places by which it may be entered. Budget.
+pub(crate) const ENTRIES_MAX: usize = 64;
+/// Places by which a curve or a surface is predicted. Budget.
+pub(crate) const KRIGING_CURVE: usize = 6;
+/// See [`KRIGING_CURVE`].
+pub(crate) const KRIGING_SURFACE: usize = 12;
+/// Places by which a field is learned: its variance is then good to a seventh. Budget.
+pub(crate) const FIELD_SAMPLES: usize = 96;
+/// Lengths of a field that are tried, in typical links. Chosen.
+pub(crate) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
+/// Noise of a field that is tried, per its variance. Chosen.
+pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
+/// Fewer places tell nothing of what lies between and beyond them. Chosen.
+pub(crate) const BETWEEN_MIN: usize = 10;
+/// Share of the variance of a level that neighbours may leave open, at most: beyond, what is felt
+/// at a place says little of what lies beside it. Chosen.
+pub(crate) const UNPREDICTED_MAX: f64 = 0.5;
+/// Places whose errors scale the variance of a field around. Chosen.
+pub(crate) const ERROR_NEIGHBOURS: usize = 6;
+/// Nodes and places of a model: a model with more places has no nodes. Budget.
+pub(crate) const NODES_MAX: usize = 1024;
+/// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept
+/// apart by a spacing lie so far from one another, across the diagonals of a square too. Chosen.
+pub(crate) const DENSE_LINK: f64 = 3.0;
+/// Distance of nodes, in spacings. Chosen.
+pub(crate) const NODE_STEP: f64 = 2.0;
+/// Factor by which this distance grows until the nodes fit. Chosen.
+pub(crate) const NODES_GROWTH: f64 = 1.25;
+/// Least distance of two nodes, in steps. Chosen.
+pub(crate) const NODE_APART: f64 = 0.55;
+/// Standard deviation of a contact about its node along the surface, in steps: that of a uniform
+/// field of half a step to each side. Derived.
+pub(crate) const NODE_FIELD: f64 = 0.288_675;
+
 // Translations: the Gaussian sum.
 
 /// Hypotheses kept. Budget.

@@ -8,6 +8,7 @@ use crate::numeric::log_sum;
 use crate::orientation::Orientation;
 use crate::poses::PoseHypotheses;
 use crate::posterior::{Posterior, entropy_nats};
+use crate::recognition::dependence::evidence_share;
 use crate::recognition::likelihoods::{unknown_fit_log, walk_log};
 use crate::surfels::map::SurfelMap;
 use crate::translations::GaussianSum;
@@ -70,7 +71,11 @@ impl Recognition {
         let spread = (self.count - self.aimed) as f64;
         match &mut self.hypotheses {
             Hypotheses::Translations(translations) => {
-                translations.touch(library, &self.contacts, &contact);
+                let log = |indexed: &IndexedModel| -walk_log(indexed, 1, reach_m);
+                let logs = library.indexed_models().map(|(_, indexed)| log(indexed));
+                let mean = logs.sum::<f64>() / library.len().max(1) as f64;
+                let share = |object| library.indexed(object).map_or(0.0, |own| log(own) - mean);
+                translations.touch(library, &self.contacts, &contact, &share);
             }
             Hypotheses::Poses(poses) => {
                 let size_log = |indexed: &IndexedModel, surfel_map: &SurfelMap| {
@@ -113,11 +118,16 @@ impl Recognition {
                 *log = prior;
             }
         } else {
-            none += evidence_share * self.unknown_log(library, best);
             let most = objects
                 .iter()
                 .map(|object| object.1)
                 .fold(f64::NEG_INFINITY, f64::max);
+            none += self.earned(
+                library,
+                best,
+                most,
+                evidence_share * self.unknown_log(library, best),
+            );
             if matches!(self.hypotheses, Hypotheses::Poses(_)) {
                 let strange = unknown_fit_log(fit, self.contacts.len());
                 none = log_sum([none, UNKNOWN_PRIOR.ln() + most + prior + strange].into_iter());
@@ -150,6 +160,30 @@ impl Recognition {
             fit,
             answer_probability: library.answer_probability(),
         }
+    }
+
+    /// Log-likelihood of an unknown object, as far as independent contacts speak for it: `unknown`
+    /// by all contacts, and that of the best object.
+    fn earned(
+        &self,
+        library: &ObjectLibrary,
+        best: Option<ObjectId>,
+        best_log: f64,
+        unknown: f64,
+    ) -> f64 {
+        let (Hypotheses::Translations(translations), Some(best)) = (&self.hypotheses, best) else {
+            return unknown;
+        };
+        if unknown <= best_log || !best_log.is_finite() {
+            return unknown;
+        }
+        let likeliest = translations.heaviest(best, 1);
+        let likeliest = likeliest.first().zip(library.indexed(best));
+        let share = likeliest.map_or(1.0, |(hypothesis, indexed)| {
+            let pose = hypothesis.pose(&translations.rotations);
+            evidence_share(indexed, &pose, &self.contacts)
+        });
+        best_log + share * (unknown - best_log)
     }
 
     /// Whether there is no hypothesis yet.

@@ -1,5 +1,6 @@
 //! An episode of recognition and its answers.
 
+mod dependence;
 mod episode;
 mod likelihoods;
 mod masses;

@@ -21,19 +21,22 @@ use crate::tuning::{BACKGROUND_WEIGHT_MIN, OUTLIER_SHARE};
 pub(crate) struct BackgroundModel(BTreeMap<ObjectId, [f64; 2]>);
 
 impl BackgroundModel {
-    /// Adds a contact: see [`background_logs`].
+    /// Adds a contact: see [`background_logs`]. Answers its own log density by object, with
+    /// percepts and without.
     pub(crate) fn touch(
         &mut self,
         library: &ObjectLibrary,
         rotations: &[UnitQuaternion<f64>],
         pair: (&Contact, &Contact),
         drift_m2: f64,
-    ) {
-        for (object, logs) in background_logs(library, rotations, pair, drift_m2) {
-            for (sum, log) in self.0.entry(object).or_default().iter_mut().zip(logs) {
+    ) -> BTreeMap<ObjectId, [f64; 2]> {
+        let all = background_logs(library, rotations, pair, drift_m2);
+        for (object, logs) in &all {
+            for (sum, log) in self.0.entry(*object).or_default().iter_mut().zip(logs) {
                 *sum += log;
             }
         }
+        all
     }
 
     /// Of all contacts so far.

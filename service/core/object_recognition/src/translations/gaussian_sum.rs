@@ -14,6 +14,7 @@ use crate::translations::mass_histogram::MassHistogram;
 use crate::translations::prefilter::{Prefilter, Seed};
 use crate::translations::split::SplitBuffers;
 use crate::translations::touch_update::TouchUpdate;
+use crate::translations::unexplored::Unexplored;
 use crate::tuning::{
     NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN, PROMOTION_SEEDS,
     PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
@@ -27,6 +28,8 @@ pub(crate) struct GaussianSum {
     all: Vec<TranslationHypothesis>,
     /// The seeds that were not promoted.
     prefilter: Prefilter,
+    /// Episodes that were on nothing explored so far.
+    unexplored: Unexplored,
     /// Log-likelihoods of the contacts under an unknown object, without those that were asked for.
     pub(crate) background: BackgroundModel,
 }
@@ -38,6 +41,7 @@ impl GaussianSum {
             rotations,
             all: Vec::new(),
             prefilter: Prefilter::default(),
+            unexplored: Unexplored::default(),
             background: BackgroundModel::default(),
         }
     }
@@ -47,22 +51,25 @@ impl GaussianSum {
         self.all.is_empty() && self.prefilter.is_empty()
     }
 
-    /// Updates all hypotheses with a contact; `before` are the earlier ones that are kept.
-    pub(crate) fn touch(&mut self, library: &ObjectLibrary, before: &[Contact], contact: &Contact) {
+    /// Updates all hypotheses with a contact; `before` are the earlier ones that are kept. `share`
+    /// is the log of an object's share within a walk's step, per that of a typical one.
+    pub(crate) fn touch(
+        &mut self,
+        library: &ObjectLibrary,
+        before: &[Contact],
+        contact: &Contact,
+        share: &impl Fn(ObjectId) -> f64,
+    ) {
         let Some(last) = before.last() else {
             self.prefilter = Prefilter::new(library, &self.rotations, contact);
+            self.unexplored = Unexplored::new(library);
             return;
         };
-        let touch = TouchUpdate::new(library, last, contact);
-        if contact.reached != Reached::Aimed {
-            let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
-            let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
-            if let Some(nearest) = nearest {
-                let pair = (nearest, contact);
-                let (rotations, drift_m2) = (&self.rotations, touch.drift_m2);
-                self.background.touch(library, rotations, pair, drift_m2);
-            }
-        }
+        let unknown = self.unknown(library, before, contact);
+        let densities = self
+            .unexplored
+            .densities(library, (last, contact), &unknown, share);
+        let touch = TouchUpdate::new(library, (last, contact), &densities);
         let mut buffers = SplitBuffers::default();
         let mut parts = Vec::with_capacity(2 * self.all.len());
         let all = std::mem::take(&mut self.all);
@@ -81,9 +88,36 @@ impl GaussianSum {
         if !self.prefilter.is_empty() {
             self.promote(library, before, &touch, &mut buffers, &mut parts);
         }
+        let bare = |object| Some(unknown.get(&object)?[1] + share(object));
+        let best = parts.iter().map(|part| part.evidence);
+        let best = best.fold(self.prefilter.best_log(), f64::max);
+        let (rotations, least) = (&self.rotations, best - PRUNE_NATS);
+        { &self.unexplored }.entered(library, rotations, (last, contact), bare, least, &mut parts);
+        self.unexplored.stayed(densities);
         self.all = parts;
         self.merge();
         self.prune();
+    }
+
+    /// Log densities of a contact with an unknown object, by the object for which it would be
+    /// taken; none of one that was asked for.
+    fn unknown(
+        &mut self,
+        library: &ObjectLibrary,
+        before: &[Contact],
+        contact: &Contact,
+    ) -> BTreeMap<ObjectId, [f64; 2]> {
+        let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
+        let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        let (Some(nearest), Some(last)) = (nearest, before.last()) else {
+            return BTreeMap::new();
+        };
+        if contact.reached == Reached::Aimed {
+            return BTreeMap::new();
+        }
+        let drift_m2 = (contact.drift_sd_m.powi(2) - last.drift_sd_m.powi(2)).max(0.0);
+        let pair = (nearest, contact);
+        (self.background).touch(library, &self.rotations, pair, drift_m2)
     }
 
     /// Updates the prefilter, and promotes the heaviest of the seeds that the touch supports: from
@@ -102,7 +136,8 @@ impl GaussianSum {
         let first = ContactPercepts::new(&before[0], library.level_prior());
         let touches: Vec<TouchUpdate<'_>> = before
             .windows(2)
-            .map(|two| TouchUpdate::new(library, &two[0], &two[1]))
+            .zip(&self.unexplored.history)
+            .map(|(two, unexplored)| TouchUpdate::new(library, (&two[0], &two[1]), unexplored))
             .collect();
         let touches: Vec<&TouchUpdate<'_>> = touches.iter().chain([touch]).collect();
         let mut replay = |prefilter: &mut Prefilter, seed: &Seed, parts: &mut Vec<_>| {
@@ -211,6 +246,7 @@ impl GaussianSum {
             let sum = sums.entry(object).or_insert(f64::NEG_INFINITY);
             *sum = log_sum([*sum, log].into_iter());
         }
+        self.unexplored.add_to(&mut sums);
         sums
     }
 

@@ -9,6 +9,7 @@ mod prefilter;
 mod prefilter_group;
 mod split;
 mod touch_update;
+mod unexplored;
 
 pub(crate) use gaussian_sum::GaussianSum;
 pub(crate) use hypothesis::TranslationHypothesis;

@@ -54,7 +54,12 @@ impl Prefilter {
         let mut likelihoods = Vec::new();
         for (object, known) in library.all() {
             let places = known.indexed.places.len() * rotations.len();
-            let each = stride as f64 / places.max(1) as f64;
+            let unexplored = known
+                .indexed
+                .open
+                .as_ref()
+                .map_or(0.0, |open| open.unexplored);
+            let each = (1.0 - unexplored) * stride as f64 / places.max(1) as f64;
             for (rotation, turn) in (0u16..).zip(rotations) {
                 let local = percepts.at(&known.indexed, turn);
                 if rotation == 0 || !local.is_rotation_invariant() {

@@ -43,7 +43,8 @@ impl SplitBuffers {
         let densities =
             (self.search).candidates(&indexed.packed, &point, variances, local, candidates);
         let one = share(indexed.places.len()) / TAU.powf(1.5);
-        let outlier = touch.outlier / one;
+        let beyond = touch.beyond(hypothesis.object, indexed, &point, one * densities);
+        let outlier = (touch.outlier + beyond) / one;
         let total = outlier + densities;
         let least = SPLIT_SHARE_MIN * total;
         candidates.retain(|candidate| candidate.density >= least);

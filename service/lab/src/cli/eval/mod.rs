@@ -3,6 +3,7 @@
 
 mod code;
 mod object;
+mod outlines;
 mod progress;
 mod room;
 mod waking;
@@ -21,6 +22,8 @@ pub(in crate::cli) enum EvalCommand {
     Env2(room::RoomArgs),
     /// The third experiment: which of some objects of coloured voxels an end effector touches.
     Env3(object::ObjectArgs),
+    /// Random outlines and solids, taught by few or many contacts: are they known again?
+    Outlines(outlines::OutlinesArgs),
     /// How well a grid code tells places apart: whole, beside the place, noisy, with modules
     /// erased.
     Code(code::CodeArgs),
@@ -34,6 +37,7 @@ pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
         EvalCommand::Env1(args) => room::run(Environment::GridAligned, args),
         EvalCommand::Env2(args) => room::run(Environment::ObstacleRich, args),
         EvalCommand::Env3(args) => object::run(args),
+        EvalCommand::Outlines(args) => outlines::run(args),
         EvalCommand::Code(args) => code::run(args),
         EvalCommand::Waking(args) => waking::run(args),
     }

@@ -1,0 +1,233 @@
+//! Links between neighbouring places, without normals and whatever the dimension.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::tuning::{
+    END_LINKS, LINK_BALL, LINK_LENGTH_MAX, LINK_NEIGHBOURS, OPEN_CURVE_COS, OPEN_SURFACE_RAD,
+    RIM_MIN,
+};
+
+/// Places that neighbour one another.
+///
+/// Two places are linked if a ball about the middle of their segment holds no other place (a
+/// β-skeleton, Kirkpatrick and Radke 1985, with β below one): a closed polygon along a curve, a
+/// triangulation with few holes on a surface. Links that are much longer than the typical one are
+/// none: what lies across was not explored.
+#[derive(Clone, Debug)]
+pub(crate) struct LinkGraph {
+    /// The places linked to each, in ascending order.
+    pub(super) links: Vec<Vec<u32>>,
+    /// The nearest places of each, nearest first.
+    pub(super) near: Vec<Vec<u32>>,
+    /// Triangles of links, with ascending numbers.
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Length of the longest link \[m\].
+    pub(super) longest_m: f64,
+    /// Typical length of a link \[m\].
+    pub(crate) typical_m: f64,
+}
+
+impl LinkGraph {
+    /// Of these places.
+    pub(crate) fn new(positions: &[Point3<f64>]) -> Self {
+        let near: Vec<Vec<u32>> = (0..positions.len())
+            .map(|own| nearest(positions, own))
+            .collect();
+        let mut links: Vec<Vec<u32>> = near
+            .iter()
+            .enumerate()
+            .map(|(own, near)| linked(positions, own, near))
+            .collect();
+        symmetrise(&mut links);
+        let lengths = |links: &[Vec<u32>]| -> Vec<f64> {
+            let pairs = links.iter().enumerate();
+            pairs
+                .flat_map(|(own, others)| {
+                    let length =
+                        move |other: &u32| (positions[own] - positions[*other as usize]).norm();
+                    others.iter().map(length)
+                })
+                .collect()
+        };
+        let typical_m = median(lengths(&links));
+        for (own, others) in links.iter_mut().enumerate() {
+            others.retain(|other| {
+                let length_m = (positions[own] - positions[*other as usize]).norm();
+                length_m <= LINK_LENGTH_MAX * typical_m
+            });
+        }
+        let longest_m = lengths(&links).into_iter().fold(0.0, f64::max);
+        Self {
+            triangles: triangles(&links),
+            links,
+            near,
+            longest_m,
+            typical_m,
+        }
+    }
+
+    /// Whether the places lie along lines, for the most part.
+    pub(super) fn is_curve(&self) -> bool {
+        2 * self.triangles.len() < self.links.len()
+    }
+
+    /// Places beyond which nothing was felt, in pieces that hang together.
+    ///
+    /// Of a surface they are the ends of links that are the side of one triangle only, of a curve
+    /// the places from which all others about lie on one side.
+    pub(super) fn edges(&self, positions: &[Point3<f64>], is_curve: bool) -> Vec<Vec<u32>> {
+        let mut rim: Vec<Vec<u32>> = vec![Vec::new(); positions.len()];
+        if is_curve {
+            let ends = (0..positions.len()).filter(|own| self.is_end(positions, *own));
+            let ends = ends.filter_map(|own| u32::try_from(own).ok());
+            return ends.map(|end| vec![end]).collect();
+        }
+        let is_side: Vec<bool> = (0..positions.len())
+            .map(|own| self.largest_gap_rad(positions, own) > OPEN_SURFACE_RAD)
+            .collect();
+        for (own, others) in (0u32..).zip(&self.links) {
+            let is_rim = |other: &&u32| is_side[own as usize] && is_side[**other as usize];
+            let above = others.iter().filter(|other| **other > own);
+            for &other in above.filter(is_rim) {
+                let third = |third: &&u32| self.links[other as usize].binary_search(third).is_ok();
+                if others.iter().filter(third).count() == 1 {
+                    rim[own as usize].push(other);
+                    rim[other as usize].push(own);
+                }
+            }
+        }
+        let mut pieces: Vec<Vec<u32>> = Vec::new();
+        let mut is_met = vec![false; positions.len()];
+        for own in 0..rim.len() {
+            let mut open = vec![u32::try_from(own).unwrap_or(u32::MAX)];
+            let mut piece = Vec::new();
+            while let Some(next) = open.pop() {
+                if rim[next as usize].is_empty() || is_met[next as usize] {
+                    continue;
+                }
+                is_met[next as usize] = true;
+                piece.push(next);
+                open.extend(&rim[next as usize]);
+            }
+            if piece.len() >= RIM_MIN {
+                piece.sort_unstable();
+                pieces.push(piece);
+            }
+        }
+        pieces
+    }
+
+    /// Largest angle between neighbouring links of a place, over the plane that fits them \[rad\].
+    fn largest_gap_rad(&self, positions: &[Point3<f64>], own: usize) -> f64 {
+        let to = |other: &u32| positions[*other as usize] - positions[own];
+        let links: Vec<Vector3<f64>> = self.links[own].iter().map(to).collect();
+        let Some(first) = links.first() else {
+            return TAU;
+        };
+        let spread = links
+            .iter()
+            .map(|link| link * link.transpose() / link.norm_squared());
+        let eigen = spread.sum::<Matrix3<f64>>().symmetric_eigen();
+        let normal: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
+        let x = first - normal * normal.dot(first);
+        let y = normal.cross(&x);
+        let mut angles: Vec<f64> = { links.iter() }
+            .map(|link| link.dot(&y).atan2(link.dot(&x)))
+            .collect();
+        angles.sort_by(f64::total_cmp);
+        let last = angles.last().map_or(0.0, |last| last - TAU);
+        let before = std::iter::once(&last).chain(&angles);
+        let gaps = before.zip(&angles).map(|(before, angle)| angle - before);
+        gaps.fold(0.0, f64::max)
+    }
+
+    /// Whether a curve ends at a place: of the places that a few links lead to, no two lie on
+    /// opposite sides.
+    fn is_end(&self, positions: &[Point3<f64>], own: usize) -> bool {
+        let mut met = vec![u32::try_from(own).unwrap_or(u32::MAX)];
+        let mut from = 0;
+        for _ in 0..END_LINKS {
+            let until = met.len();
+            for at in from..until {
+                for other in &self.links[met[at] as usize] {
+                    if !met.contains(other) {
+                        met.push(*other);
+                    }
+                }
+            }
+            from = until;
+        }
+        let to = |other: &u32| (positions[*other as usize] - positions[own]).normalize();
+        let to: Vec<Vector3<f64>> = met[1..].iter().map(to).collect();
+        let mut pairs = to.iter().enumerate();
+        !pairs.any(|(number, a)| to[..number].iter().any(|b| a.dot(b) < OPEN_CURVE_COS))
+    }
+}
+
+/// The nearest places of one, nearest first.
+fn nearest(positions: &[Point3<f64>], own: usize) -> Vec<u32> {
+    let mut near: Vec<(f64, u32)> = (0u32..)
+        .zip(positions)
+        .filter(|(number, _)| *number as usize != own)
+        .map(|(number, position)| ((position - positions[own]).norm_squared(), number))
+        .collect();
+    let most = LINK_NEIGHBOURS.min(near.len());
+    let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    if most < near.len() {
+        near.select_nth_unstable_by(most, order);
+        near.truncate(most);
+    }
+    near.sort_unstable_by(order);
+    near.into_iter().map(|(_, number)| number).collect()
+}
+
+fn linked(positions: &[Point3<f64>], own: usize, near: &[u32]) -> Vec<u32> {
+    let is_linked = |other: &&u32| {
+        let ends = [positions[own], positions[**other as usize]];
+        let middle = nalgebra::center(&ends[0], &ends[1]);
+        let radius_m = LINK_BALL * 0.5 * (ends[1] - ends[0]).norm();
+        near.iter()
+            .filter(|third| third != other)
+            .all(|third| (positions[*third as usize] - middle).norm() >= radius_m)
+    };
+    near.iter().filter(is_linked).copied().collect()
+}
+
+/// A link that one end has the other has too.
+fn symmetrise(links: &mut [Vec<u32>]) {
+    for own in 0..links.len() {
+        let number = u32::try_from(own).unwrap_or(u32::MAX);
+        for other in links[own].clone() {
+            let back = &mut links[other as usize];
+            if !back.contains(&number) {
+                back.push(number);
+            }
+        }
+    }
+    for links in links {
+        links.sort_unstable();
+    }
+}
+
+fn triangles(links: &[Vec<u32>]) -> Vec<[u32; 3]> {
+    let mut triangles = Vec::new();
+    for (own, others) in (0u32..).zip(links) {
+        let above = others.partition_point(|other| *other <= own);
+        for (at, second) in others[above..].iter().enumerate() {
+            for third in &others[above + at + 1..] {
+                if links[*second as usize].binary_search(third).is_ok() {
+                    triangles.push([own, *second, *third]);
+                }
+            }
+        }
+    }
+    triangles
+}
+
+/// The upper median; zero of no values.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}

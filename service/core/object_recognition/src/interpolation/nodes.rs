@@ -1,0 +1,240 @@
+//! Nodes: places that were not felt, between places that were.
+
+use nalgebra::{Point3, Vector3};
+
+use super::field::{Field, FieldOf, LocalField, Site};
+use super::graph::LinkGraph;
+use crate::indexed_place::IndexedPlace;
+use crate::model::{LevelMemory, ModelPlace};
+use crate::tuning::{
+    BETWEEN_MIN, DENSE_LINK, KRIGING_SURFACE, NODE_APART, NODE_FIELD, NODE_STEP, NODES_GROWTH,
+    NODES_MAX,
+};
+
+/// Most parts of the side of a triangle: a thousand points lie on it then.
+const PARTS_MAX: u32 = 46;
+
+/// A place on a link or in a triangle, with the corners by which it is spanned.
+struct Span {
+    at: Point3<f64>,
+    corners: Vec<u32>,
+    /// Number of its segment or triangle.
+    site: usize,
+}
+
+/// The fields of a model.
+pub(crate) struct Fields {
+    place: Field,
+    levels: Vec<(u16, Field)>,
+}
+
+/// The nodes between the places of a model that have these links.
+///
+/// There are none where places are dense, and with them no more than `NODES_MAX` in all: their
+/// distance grows until they fit.
+pub(crate) fn interpolated(
+    places: &[ModelPlace],
+    graph: &LinkGraph,
+    fields: &Fields,
+    spacing_m: f64,
+) -> Vec<IndexedPlace> {
+    let room = NODES_MAX.saturating_sub(places.len());
+    let is_dense = if graph.is_curve() {
+        graph.longest_m <= NODE_STEP * spacing_m
+    } else {
+        graph.typical_m <= DENSE_LINK * spacing_m
+    };
+    if room == 0 || is_dense {
+        return Vec::new();
+    }
+    let sites = sites(places, graph);
+    // Finer steps than these never fit.
+    let mut step_m = f64::max(NODE_STEP * spacing_m, graph.longest_m / NODES_MAX as f64);
+    let mut spans = spans(places, &sites, step_m);
+    while spans.len() > room {
+        step_m *= NODES_GROWTH;
+        spans = self::spans(places, &sites, step_m);
+    }
+    let mut nodes = Vec::with_capacity(spans.len());
+    for of_site in spans.chunk_by(|a, b| a.site == b.site) {
+        let site = &sites[of_site[0].site].0;
+        if let Some(local) = fields.around(site, places) {
+            nodes.extend(of_site.iter().map(|span| local.node(span, places, step_m)));
+        }
+    }
+    nodes
+}
+
+/// The segments and triangles that are bridged.
+fn sites(places: &[ModelPlace], graph: &LinkGraph) -> Vec<(Site, Vec<u32>)> {
+    let at = |number: u32| places[number as usize].position_m;
+    let mut sites = Vec::new();
+    for corners in &graph.triangles {
+        let [a, b, c] = corners.map(at);
+        let along = (b - a).normalize();
+        let across = (c - a) - along * along.dot(&(c - a));
+        let Some(across) = across.try_normalize(1e-9) else {
+            continue;
+        };
+        let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+        let axes = vec![along, across];
+        sites.push((Site { middle, axes }, corners.to_vec()));
+    }
+    for (own, links) in (0u32..).zip(&graph.links) {
+        for &other in links.iter().filter(|other| **other > own) {
+            let is_side = graph.links[other as usize]
+                .iter()
+                .any(|third| links.binary_search(third).is_ok());
+            if is_side {
+                continue;
+            }
+            let (a, b) = (at(own), at(other));
+            let middle = nalgebra::center(&a, &b);
+            let Some(along) = (b - a).try_normalize(1e-12) else {
+                continue;
+            };
+            let axes = vec![along];
+            sites.push((Site { middle, axes }, vec![own, other]));
+        }
+    }
+    sites
+}
+
+/// Points of all sites, no two nearer than about a step.
+fn spans(places: &[ModelPlace], sites: &[(Site, Vec<u32>)], step_m: f64) -> Vec<Span> {
+    let mut spans: Vec<Span> = Vec::new();
+    let near_m = NODE_APART * step_m;
+    for (number, (_, corners)) in sites.iter().enumerate() {
+        let at: Vec<Vector3<f64>> = corners
+            .iter()
+            .map(|corner| places[*corner as usize].position_m.coords)
+            .collect();
+        let longest_m = { at.iter().zip(at.iter().cycle().skip(1)) }
+            .map(|(a, b)| (b - a).norm())
+            .fold(0.0, f64::max);
+        let parts = (longest_m / step_m).ceil().max(1.0);
+        // A triangle of so many points has too many of them anyway.
+        let parts = crate::numeric::floor_u32(parts).min(PARTS_MAX);
+        for shares in shares(at.len(), parts) {
+            let point = at.iter().zip(&shares).map(|(at, share)| at * *share);
+            let at = Point3::from(point.sum::<Vector3<f64>>());
+            let is_near = |other: &Point3<f64>| (other - at).norm() < near_m;
+            let is_taken = places.iter().any(|place| is_near(&place.position_m))
+                || spans.iter().any(|span| is_near(&span.at));
+            if !is_taken {
+                spans.push(Span {
+                    at,
+                    corners: corners.clone(),
+                    site: number,
+                });
+            }
+            if spans.len() > NODES_MAX {
+                return spans;
+            }
+        }
+    }
+    spans
+}
+
+/// Barycentric coordinates of an even lattice over two or three corners.
+fn shares(corners: usize, parts: u32) -> Vec<Vec<f64>> {
+    let part = |k: u32| f64::from(k) / f64::from(parts);
+    let mut shares = Vec::new();
+    for a in 0..=parts {
+        if corners == 2 {
+            shares.push(vec![part(a), part(parts - a)]);
+            continue;
+        }
+        for b in 0..=parts - a {
+            shares.push(vec![part(a), part(b), part(parts - a - b)]);
+        }
+    }
+    shares
+}
+
+impl Fields {
+    /// `None` where neighbours tell little of one another, so that between them may be anything,
+    /// and of models that have too few or so many places that nothing lies between.
+    pub(crate) fn learned(places: &[ModelPlace], graph: &LinkGraph) -> Option<Self> {
+        let is_finite = graph.longest_m.is_finite() && graph.longest_m > 0.0;
+        if !(BETWEEN_MIN..NODES_MAX).contains(&places.len()) || !is_finite {
+            return None;
+        }
+        let mut channels: Vec<u16> = { places.iter() }
+            .flat_map(|place| place.levels.iter().map(|level| level.channel))
+            .collect();
+        channels.sort_unstable();
+        channels.dedup();
+        let level = |channel| {
+            let field = Field::learned(FieldOf::Level(channel), places, graph)?;
+            Some((channel, field))
+        };
+        let fields = Self {
+            place: Field::learned(FieldOf::Place, places, graph)?,
+            levels: channels.into_iter().filter_map(level).collect(),
+        };
+        let mut levels = fields.levels.iter();
+        levels
+            .all(|(_, field)| field.is_predictable(places, graph))
+            .then_some(fields)
+    }
+
+    fn around(&self, site: &Site, places: &[ModelPlace]) -> Option<LocalFields> {
+        let apart = |number: &u32| (places[*number as usize].position_m - site.middle).norm();
+        let mut near: Vec<u32> = (0u32..).take(places.len()).collect();
+        let order = |a: &u32, b: &u32| apart(a).total_cmp(&apart(b)).then(a.cmp(b));
+        let most = 2 * KRIGING_SURFACE;
+        if near.len() > most {
+            near.select_nth_unstable_by(most, order);
+            near.truncate(most);
+        }
+        near.sort_unstable_by(order);
+        let level = |(channel, field): &(u16, Field)| {
+            let local = field.around(site, near.iter().copied(), places)?;
+            Some((*channel, local))
+        };
+        Some(LocalFields {
+            place: self.place.around(site, near.iter().copied(), places)?,
+            levels: self.levels.iter().filter_map(level).collect(),
+        })
+    }
+}
+
+/// The fields of a model about a site.
+struct LocalFields {
+    place: LocalField,
+    levels: Vec<(u16, LocalField)>,
+}
+
+impl LocalFields {
+    /// A node, with what is predicted there.
+    fn node(&self, span: &Span, places: &[ModelPlace], step_m: f64) -> IndexedPlace {
+        let (weights, across_m2) = self.place.at(&span.at);
+        let position = self.place.position(&weights, places);
+        let corners = || span.corners.iter().map(|corner| &places[*corner as usize]);
+        let nearest = corners().min_by(|a, b| {
+            let apart = |place: &ModelPlace| (place.position_m - span.at).norm();
+            apart(a).total_cmp(&apart(b))
+        });
+        let field_m = NODE_FIELD * step_m;
+        let level = |(channel, local): &(u16, LocalField)| {
+            let (weights, variance) = local.at(&span.at);
+            Some(LevelMemory {
+                channel: *channel,
+                count: 1.0,
+                mean: local.level(&weights, *channel, places)?,
+                squares: 0.0,
+                noise: variance,
+            })
+        };
+        let normals: Vector3<f64> = corners().map(|place| place.normals / place.count).sum();
+        IndexedPlace {
+            position,
+            normal: nalgebra::Unit::try_new(normals, 1e-9),
+            variance_m2: field_m * field_m + across_m2,
+            is_predicted: true,
+            levels: self.levels.iter().filter_map(level).collect(),
+            descriptors: nearest.map_or_else(Vec::new, |place| place.descriptors.clone()),
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Where a surface goes on beyond what was felt of it.
+
+use std::f64::consts::PI;
+
+use nalgebra::Point3;
+
+use super::graph::LinkGraph;
+use crate::numeric::centroid;
+use crate::tuning::{
+    BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FIELD_PER_SPACING, FLAT_SHARE,
+    MISSING_PER_KNOWN, NODE_STEP, PARTIAL_PRIOR, UNEXPECTED_SHARE, UNEXPLORED_MIN,
+};
+
+/// The part of space of which a model knows little: beyond the edge of what was felt, and in the
+/// gaps between what was felt.
+#[derive(Clone, Debug)]
+pub(crate) struct OpenRegion {
+    felt: Vec<FeltPlace>,
+    /// The places and nodes about the edge of what was felt.
+    entries: Vec<u32>,
+    /// Typical distance of places \[m\].
+    typical_m: f64,
+    /// Probability that a contact is with what was not felt; 0 where next to nothing is missing.
+    pub(crate) unexplored: f64,
+    /// Length of what was felt, or the side of a square as large \[m\].
+    known_m: f64,
+}
+
+/// A place that was felt.
+#[derive(Clone, Copy, Debug)]
+struct FeltPlace {
+    position: Point3<f64>,
+    is_open: bool,
+    /// Squared distance beyond which a gap begins \[m²\].
+    gap_m2: f64,
+}
+
+impl OpenRegion {
+    /// Of places, of which the first `felt` were felt and have these links; none of a model that
+    /// was felt all over and without gaps.
+    ///
+    /// What is missing of a curve is taken for a straight line over each gap between two of its
+    /// ends; what is missing of a surface for a disc with the circumference of each of its edges.
+    pub(crate) fn new(
+        positions: &[Point3<f64>],
+        felt: usize,
+        graph: &LinkGraph,
+        spacing_m: f64,
+    ) -> Option<Self> {
+        if felt < BETWEEN_MIN {
+            return None;
+        }
+        let all = positions;
+        let felt = &positions[..felt];
+        let is_curve = graph.is_curve();
+        let everywhere = is_curve && !is_flat(felt);
+        let pieces = graph.edges(felt, is_curve);
+        let mut is_open = vec![everywhere; felt.len()];
+        for own in pieces.iter().flatten() {
+            is_open[*own as usize] = true;
+        }
+        let open = (0u32..).zip(&is_open).filter(|(_, is_open)| **is_open);
+        let edge: Vec<u32> = open.map(|(number, _)| number).collect();
+        let count = felt.len() as f64;
+        let (missing, known) = if is_curve && !everywhere {
+            (missing_m(felt, &edge), graph.typical_m * count)
+        } else {
+            let disc = |around: f64| around * around / (4.0 * PI);
+            let holes = pieces.iter().map(|piece| disc(piece.len() as f64));
+            let missing = if everywhere { disc(count) } else { holes.sum() };
+            (missing, count)
+        };
+        let unexplored = missing / (missing + known).max(f64::MIN_POSITIVE);
+        let is_open_anywhere = unexplored >= UNEXPLORED_MIN;
+        if !is_open_anywhere && all.len() == felt.len() {
+            return None;
+        }
+        let has_nodes = all.len() > felt.len();
+        let gap_m2 = |own: usize| {
+            let links = graph.links[own].iter();
+            let gaps = links.map(|other| (felt[*other as usize] - felt[own]).norm());
+            let mean_m = gaps.sum::<f64>() / graph.links[own].len().max(1) as f64;
+            if has_nodes && mean_m > NODE_STEP * spacing_m {
+                (0.5 * mean_m).powi(2)
+            } else {
+                f64::INFINITY
+            }
+        };
+        let places = felt.iter().enumerate().map(|(own, position)| FeltPlace {
+            position: *position,
+            is_open: is_open[own] && is_open_anywhere,
+            gap_m2: gap_m2(own),
+        });
+        let places: Vec<FeltPlace> = places.collect();
+        let near = |position: &Point3<f64>| {
+            let mut ends = edge.iter().map(|end| felt[*end as usize] - position);
+            ends.any(|apart| apart.norm() < ENTRY_REACH * graph.typical_m)
+        };
+        let entries = (0u32..).zip(all).filter(|(_, position)| near(position));
+        let entries: Vec<u32> = entries.map(|(number, _)| number).collect();
+        let step = entries.len().div_ceil(ENTRIES_MAX).max(1);
+        Some(Self {
+            felt: places,
+            entries: entries.into_iter().step_by(step).collect(),
+            typical_m: graph.typical_m,
+            unexplored: if is_open_anywhere {
+                PARTIAL_PRIOR * unexplored
+            } else {
+                0.0
+            },
+            known_m: if is_curve {
+                graph.typical_m * count
+            } else {
+                graph.typical_m * count.sqrt()
+            },
+        })
+    }
+
+    /// Places and nodes about where it begins, by their number among both.
+    pub(crate) fn entries(&self) -> &[u32] {
+        &self.entries
+    }
+
+    /// Variance of the first contact on what was explored about such a place, per axis \[m²\].
+    pub(crate) fn entry_m2(&self) -> f64 {
+        (FIELD_PER_SPACING * self.typical_m).powi(2)
+    }
+
+    /// Probability that a walk over what was not felt is still there after a step \[m\]: what is
+    /// missing is about half as long as what was felt.
+    pub(crate) fn stay(&self, step_m: f64) -> f64 {
+        (-step_m / (MISSING_PER_KNOWN * self.known_m).max(f64::MIN_POSITIVE)).exp()
+    }
+
+    /// Probability that what lies at a point is none of what the model says, as far as it is known
+    /// there at all.
+    pub(crate) fn share(&self, point: &Point3<f64>) -> f64 {
+        let mut best = (f64::INFINITY, None);
+        for place in &self.felt {
+            let square = (place.position - point).norm_squared();
+            if square < best.0 {
+                best = (square, Some(place));
+            }
+        }
+        let (square, Some(place)) = best else {
+            return 0.0;
+        };
+        let is_far = square > (EXPLORED_REACH * self.typical_m).powi(2);
+        if place.is_open || is_far && self.unexplored > 0.0 {
+            1.0
+        } else if square > place.gap_m2 {
+            UNEXPECTED_SHARE
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Length of what is missing between the ends of curves \[m\]: each goes on to the nearest other
+/// one.
+fn missing_m(felt: &[Point3<f64>], ends: &[u32]) -> f64 {
+    let at = |end: u32| felt[end as usize];
+    let gap = |end: &u32| {
+        let others = ends.iter().filter(|other| *other != end);
+        let gaps = others.map(|other| (at(*other) - at(*end)).norm());
+        gaps.fold(f64::INFINITY, f64::min)
+    };
+    let gaps = ends.iter().map(gap).filter(|gap| gap.is_finite());
+    0.5 * gaps.sum::<f64>()
+}
+
+/// Whether all places lie in a plane.
+fn is_flat(felt: &[Point3<f64>]) -> bool {
+    let middle = centroid(felt.iter().map(|position| position.coords));
+    let spread = felt.iter().map(|position| {
+        let apart = position.coords - middle;
+        apart * apart.transpose()
+    });
+    let values = spread
+        .sum::<nalgebra::Matrix3<f64>>()
+        .symmetric_eigenvalues();
+    values.min() < FLAT_SHARE * values.max()
+}

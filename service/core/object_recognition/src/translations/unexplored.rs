@@ -1,0 +1,129 @@
+//! Walks over what was not explored of the objects that are known in part.
+
+use std::collections::BTreeMap;
+
+use nalgebra::UnitQuaternion;
+
+use crate::contact::Contact;
+use crate::level_prior::likelihood_below_one;
+use crate::library::{ObjectId, ObjectLibrary};
+use crate::numeric::log_sum;
+use crate::translations::hypothesis::TranslationHypothesis;
+use crate::tuning::{ENTER_MIN, PREFILTER_CONTACTS_MAX};
+
+/// Where an episode may have been that knows no place of an object: on what was not explored of it.
+///
+/// There a contact is as likely as with an unknown object whose percepts are like those of the
+/// library, so that it says nothing against the
+/// object but that so much of it should be missing: each further contact stays there with
+/// a probability that falls with the step. Otherwise it is the first one on what was explored, at
+/// its edge.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Unexplored {
+    /// Log of the mass of the episodes that were nowhere else so far.
+    pub(crate) logs: BTreeMap<ObjectId, f64>,
+    /// Densities of the contacts after the first, as far as seeds may be promoted by them.
+    pub(crate) history: Vec<BTreeMap<ObjectId, f64>>,
+}
+
+impl Unexplored {
+    /// After the first contact.
+    pub(crate) fn new(library: &ObjectLibrary) -> Self {
+        let logs = library
+            .indexed_models()
+            .filter_map(|(object, indexed)| Some((object, indexed.open.as_ref()?.unexplored.ln())));
+        Self {
+            logs: logs.collect(),
+            history: Vec::new(),
+        }
+    }
+
+    /// Densities of a contact, from log densities of one with an unknown object; those of an object
+    /// are multiplied by e^`share` for its size. What was not explored has levels like those of the
+    /// rest.
+    pub(crate) fn densities(
+        &self,
+        library: &ObjectLibrary,
+        (last, contact): (&Contact, &Contact),
+        unknown: &BTreeMap<ObjectId, [f64; 2]>,
+        share: impl Fn(ObjectId) -> f64,
+    ) -> BTreeMap<ObjectId, f64> {
+        // Without the object that explains it best: else its places would speak for all others.
+        let least = unknown.values().map(|logs| logs[0]);
+        let least = least.fold(f64::INFINITY, f64::min);
+        let objects = self
+            .logs
+            .keys()
+            .filter(|object| unknown.contains_key(object));
+        let densities = objects.filter_map(|object| {
+            let log = least + share(*object);
+            let indexed = library.indexed(*object)?;
+            let own = &indexed.own_levels;
+            let alike = likelihood_below_one(contact, own, library.level_prior());
+            let step_m = (contact.position_m - last.position_m).norm();
+            let stay = indexed.open.as_ref()?.stay(step_m);
+            Some((*object, stay * alike * log.exp()))
+        });
+        densities.collect()
+    }
+
+    /// Hypotheses by which a contact is the first one on what was explored. `bare` are the log
+    /// densities of its position.
+    pub(crate) fn entered(
+        &self,
+        library: &ObjectLibrary,
+        rotations: &[UnitQuaternion<f64>],
+        (last, contact): (&Contact, &Contact),
+        bare: impl Fn(ObjectId) -> Option<f64>,
+        least_log: f64,
+        parts: &mut Vec<TranslationHypothesis>,
+    ) {
+        for (&object, log) in &self.logs {
+            let Some(indexed) = library.indexed(object).filter(|_| log.is_finite()) else {
+                continue;
+            };
+            let (Some(open), Some(bare)) = (&indexed.open, bare(object)) else {
+                continue;
+            };
+            let ways = (open.entries().len() * rotations.len()).max(1) as f64;
+            let step_m = (contact.position_m - last.position_m).norm();
+            let enters = (1.0 - open.stay(step_m)).max(ENTER_MIN);
+            let each = log + bare + enters.ln() - ways.ln();
+            for entry in open.entries() {
+                let place = &indexed.places[*entry as usize];
+                let evidence = each + place.percept_log(contact, library.level_prior());
+                if evidence < least_log {
+                    continue;
+                }
+                for (rotation, turn) in (0u16..).zip(rotations) {
+                    parts.push(TranslationHypothesis {
+                        object,
+                        rotation,
+                        translation: place.position.coords - turn * contact.position_m.coords,
+                        variance_m2: contact.variance_m2() + place.variance_m2 + open.entry_m2(),
+                        evidence,
+                    });
+                }
+            }
+        }
+    }
+
+    /// A contact lay there.
+    pub(crate) fn stayed(&mut self, densities: BTreeMap<ObjectId, f64>) {
+        for (object, log) in &mut self.logs {
+            let density = densities.get(object).copied().unwrap_or_default();
+            *log += density.ln();
+        }
+        if self.history.len() <= PREFILTER_CONTACTS_MAX {
+            self.history.push(densities);
+        }
+    }
+
+    /// Adds their masses to those of the objects.
+    pub(crate) fn add_to(&self, sums: &mut BTreeMap<ObjectId, f64>) {
+        for (object, log) in &self.logs {
+            let sum = sums.entry(*object).or_insert(f64::NEG_INFINITY);
+            *sum = log_sum([*sum, *log].into_iter());
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! `cogmap-lab eval outlines`.
+
+use clap::Args;
+use cogmap_lab::outlines::{
+    Family, Levels, OutlineProtocol, Report, Teaching, Turn, run as explore,
+};
+
+use super::progress::Progress;
+use cogmap::cli::output;
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct OutlinesArgs {
+    /// Numbers of contacts by which objects are taught, with commas between.
+    #[arg(long, value_delimiter = ',', default_values_t = [20, 60, 240, 1000], value_name = "N")]
+    taught: Vec<usize>,
+    /// Sets of five objects and five strangers in each row.
+    #[arg(long, default_value_t = 8)]
+    sets: usize,
+    /// Objects are taught by one run of neighbouring touches, instead of all over.
+    #[arg(long)]
+    run: bool,
+    /// Objects may have turned anyhow, and contacts tell the surface's normal.
+    #[arg(long)]
+    turned: bool,
+    /// Seed of objects, explorations and noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &OutlinesArgs) -> anyhow::Result<()> {
+    let mut protocols = Vec::new();
+    for family in Family::ALL {
+        // A line has no normals by which it could be turned back.
+        if args.turned && family == Family::Outline {
+            continue;
+        }
+        for levels in [Levels::Spread, Levels::Same] {
+            for &taught in &args.taught {
+                let turn = if args.turned { Turn::Any } else { Turn::None };
+                let mut protocol = OutlineProtocol::new(family, levels, turn, taught);
+                protocol.sets = args.sets;
+                protocol.seed = args.seed;
+                if args.run {
+                    protocol.teaching = Teaching::Run;
+                }
+                protocol.check()?;
+                protocols.push(protocol);
+            }
+        }
+    }
+    let each = |protocol: &OutlineProtocol| 2 * protocol.sets * protocol.objects;
+    let explorations: usize = protocols.iter().map(each).sum();
+    let progress = Progress::new(explorations as u64, "explorations");
+    let mut report = Report::default();
+    for protocol in &protocols {
+        report.rows.push(explore(protocol, &|| progress.add(1))?);
+    }
+    progress.finish();
+    if args.json {
+        return output::json(&report);
+    }
+    Ok(output::line(report.to_string().trim_end())?)
+}
