@@ -46,8 +46,8 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// version 5 no searches, version 6 no other names of landmarks, version 7 none of what was joined
 /// into objects, version 8 no attachments and no kidnap tests, version 9 nobody removed or set
 /// aside, version 10 no relaxation under way, version 11 no noise of odometry and no searches by
-/// levels.
-const VERSION: u16 = 12;
+/// levels, version 12 no distances alone.
+const VERSION: u16 = 13;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

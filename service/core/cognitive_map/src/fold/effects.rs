@@ -4,6 +4,7 @@
 use super::CognitiveMap;
 use super::apply::Fold;
 use crate::estimator::{AgentSighted, Effect, FramesMerged};
+use crate::input::Relation;
 use crate::keyframes::{Moment, Refined, RelaxationJob};
 use crate::memory::place::PlaceId;
 use pose_graph::PoseGraph;
@@ -37,6 +38,19 @@ impl Fold<'_> {
                     &step.increment,
                     &step.variance,
                     &step.calibrated,
+                ),
+                Effect::LandmarkSighted {
+                    label,
+                    relation: Relation::Range(range),
+                    variance,
+                    at,
+                    ..
+                } => self.keyframes.graph.landmark_range(
+                    &self.moment(),
+                    &label,
+                    &range,
+                    variance.x,
+                    at,
                 ),
                 Effect::LandmarkSighted {
                     label,
