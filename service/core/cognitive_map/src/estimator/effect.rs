@@ -37,6 +37,8 @@ pub enum Effect {
         variance: Vector3<f64>,
         /// Where the landmark is in the body frame by the estimate, once that is known \[m\].
         at: Option<Vector3<f64>>,
+        /// Whether it is new in the agent's frame.
+        is_new: bool,
     },
     /// A sighting of an agent was accepted or refused, once both had moved up to it.
     AgentSighted(AgentSighted),

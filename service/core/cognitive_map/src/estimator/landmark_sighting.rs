@@ -71,6 +71,7 @@ impl Estimator {
                 relation: *relation,
                 variance: outcome.variance.fixed_rows::<3>(0).into_owned(),
                 at,
+                is_new: outcome.verdict == Verdict::Learned,
             });
         }
         LandmarkOutcome {

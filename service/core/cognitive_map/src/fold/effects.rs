@@ -44,14 +44,16 @@ impl Fold<'_> {
                     relation: Relation::Range(range),
                     variance,
                     at,
+                    is_new,
                     ..
-                } => self.keyframes.graph.landmark_range(
-                    &self.moment(),
-                    &label,
-                    &range,
-                    variance.x,
-                    at,
-                ),
+                } => {
+                    let moment = self.moment();
+                    let graph = &mut self.keyframes.graph;
+                    graph.landmark_range(&moment, &label, &range, variance.x, at);
+                    if is_new {
+                        graph.found_by_ranges();
+                    }
+                }
                 Effect::LandmarkSighted {
                     label,
                     relation,

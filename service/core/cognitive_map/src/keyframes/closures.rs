@@ -118,16 +118,17 @@ impl KeyframeGraph {
         self.constraints.n_accepted()
     }
 
-    /// Whether closures are new, and enough records have come in since the last relaxation to pay
+    /// Whether closures are new or landmarks were found by distances, and enough records have come in since the last relaxation to pay
     /// for another one.
     pub fn is_due(&self) -> bool {
         let schedule = &self.constraints.schedule;
-        schedule.new_closures > 0
+        (schedule.new_closures > 0 || schedule.ranged > 0)
             && schedule.records as usize >= self.n_keyframes() / tuning::KEYFRAMES_PER_RECORD
     }
 
     /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses
-    /// of the agents in the map; nothing if no closure was accepted or rejected.
+    /// of the agents in the map; nothing if no closure was accepted or rejected, and no landmark was
+    /// found by distances: before that, they corrected nothing.
     ///
     /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then
     /// the same records give the same map.
@@ -143,7 +144,7 @@ impl KeyframeGraph {
             coarse.accept_consistent();
         }
         let is_nothing_new = is_undecided && coarse.accepted().next().is_none();
-        if is_nothing_new && judged.is_empty() && schedule.accepted == 0 {
+        if is_nothing_new && judged.is_empty() && schedule.accepted == 0 && schedule.ranged == 0 {
             return Vec::new();
         }
         let best = RelaxationCopy::most_probable(coarse, judged);
@@ -153,7 +154,7 @@ impl KeyframeGraph {
             accepted.map(|(number, _)| number).collect()
         };
         let (before, now) = (accepted(self), accepted(best.copy.graph()));
-        if schedule.accepted == 0 && before == now {
+        if schedule.accepted == 0 && schedule.ranged == 0 && before == now {
             return Vec::new();
         }
         self.adopt(best.copy.graph());

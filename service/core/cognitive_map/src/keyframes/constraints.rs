@@ -22,12 +22,15 @@ pub(super) struct Schedule {
     pub(super) new_closures: u32,
     /// Those of them that were accepted at once.
     pub(super) accepted: u32,
+    /// Landmarks of which distances alone are known that were found.
+    pub(super) ranged: u32,
 }
 
 state_of_struct!(Schedule {
     records,
     new_closures,
-    accepted
+    accepted,
+    ranged
 });
 
 impl Constraints {

@@ -40,6 +40,13 @@ impl KeyframeGraph {
         self.observe_landmark(moment, label, &seen);
     }
 
+    /// A landmark was found by distances that had corrected nothing: the past is to be relaxed by
+    /// them.
+    pub fn found_by_ranges(&mut self) {
+        let schedule = &mut self.constraints.schedule;
+        schedule.ranged = schedule.ranged.saturating_add(1);
+    }
+
     /// Adds what an agent measures of a landmark.
     fn observe_landmark(&mut self, moment: &Moment, label: &Label, seen: &Observation) {
         self.note(moment);
