@@ -133,12 +133,10 @@ fn at_least(sd: &Vector6<f64>) -> Vector6<f64> {
 
 /// A distance without a direction.
 fn at_distance(range_m: f64, range_sd_m: f64) -> Relation {
-    Relation::RangeBearing {
+    Relation::Range {
         range_m,
-        azimuth_rad: 0.0,
-        elevation_rad: 0.0,
         range_sd_m,
-        bearing_sd_rad: ANY_DIRECTION_SD_RAD,
+        offset_m: [0.0; 3],
     }
 }
 

@@ -25,7 +25,10 @@ impl KeyframeMap {
         let job = RelaxationJob::new(&self.graph);
         self.pending = Some(PendingRelaxation::Awaited(job));
         // What comes from now on is for the next one.
-        self.graph.constraints.schedule = Schedule::default();
+        self.graph.constraints.schedule = Schedule {
+            keyframes_then: u32::try_from(self.graph.n_keyframes()).unwrap_or(u32::MAX),
+            ..Schedule::default()
+        };
         let mut meanwhile = Meanwhile::default();
         meanwhile.note(agent, stamp_ns);
         self.graph.meanwhile = Some(Box::new(meanwhile));

@@ -122,13 +122,24 @@ impl KeyframeGraph {
     /// for another one.
     pub fn is_due(&self) -> bool {
         let schedule = &self.constraints.schedule;
-        (schedule.new_closures > 0 || schedule.ranged > 0)
+        (schedule.new_closures > 0 || self.has_news_by_ranges())
             && schedule.records as usize >= self.n_keyframes() / tuning::KEYFRAMES_PER_RECORD
     }
 
+    /// Whether distances say more of the past than they did at the last relaxation: a landmark was
+    /// found, or there is half as much of the past again.
+    ///
+    /// The live estimate takes a distance in where it then thinks that everything is, and the first
+    /// ones not at all.
+    fn has_news_by_ranges(&self) -> bool {
+        let schedule = &self.constraints.schedule;
+        let then = schedule.keyframes_then as usize;
+        schedule.found > 0 || (schedule.ranges > 0 && 2 * self.n_keyframes() >= 3 * then)
+    }
+
     /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses
-    /// of the agents in the map; nothing if no closure was accepted or rejected, and no landmark was
-    /// found by distances: before that, they corrected nothing.
+    /// of the agents in the map; nothing if no closure was accepted or rejected, and no distances
+    /// came.
     ///
     /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then
     /// the same records give the same map.
@@ -144,7 +155,7 @@ impl KeyframeGraph {
             coarse.accept_consistent();
         }
         let is_nothing_new = is_undecided && coarse.accepted().next().is_none();
-        if is_nothing_new && judged.is_empty() && schedule.accepted == 0 && schedule.ranged == 0 {
+        if is_nothing_new && judged.is_empty() && schedule.accepted == 0 && schedule.ranges == 0 {
             return Vec::new();
         }
         let best = RelaxationCopy::most_probable(coarse, judged);
@@ -154,7 +165,7 @@ impl KeyframeGraph {
             accepted.map(|(number, _)| number).collect()
         };
         let (before, now) = (accepted(self), accepted(best.copy.graph()));
-        if schedule.accepted == 0 && schedule.ranged == 0 && before == now {
+        if schedule.accepted == 0 && schedule.ranges == 0 && before == now {
             return Vec::new();
         }
         self.adopt(best.copy.graph());

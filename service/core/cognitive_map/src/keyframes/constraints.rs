@@ -23,14 +23,20 @@ pub(super) struct Schedule {
     /// Those of them that were accepted at once.
     pub(super) accepted: u32,
     /// Landmarks of which distances alone are known that were found.
-    pub(super) ranged: u32,
+    pub(super) found: u32,
+    /// Distances of targets whose place is known.
+    pub(super) ranges: u32,
+    /// Keyframes at that relaxation.
+    pub(super) keyframes_then: u32,
 }
 
 state_of_struct!(Schedule {
     records,
     new_closures,
     accepted,
-    ranged
+    found,
+    ranges,
+    keyframes_then
 });
 
 impl Constraints {

@@ -37,14 +37,20 @@ impl KeyframeGraph {
         at: Option<Vector3<f64>>,
     ) {
         let seen = Observation::Range(SeenRange::new(range, variance, at));
+        self.count_range(at.is_some());
         self.observe_landmark(moment, label, &seen);
+    }
+
+    fn count_range(&mut self, is_place_known: bool) {
+        let schedule = &mut self.constraints.schedule;
+        schedule.ranges = schedule.ranges.saturating_add(u32::from(is_place_known));
     }
 
     /// A landmark was found by distances that had corrected nothing: the past is to be relaxed by
     /// them.
     pub fn found_by_ranges(&mut self) {
         let schedule = &mut self.constraints.schedule;
-        schedule.ranged = schedule.ranged.saturating_add(1);
+        schedule.found = schedule.found.saturating_add(1);
     }
 
     /// Adds what an agent measures of a landmark.
@@ -93,6 +99,7 @@ impl KeyframeGraph {
             _ => Observation::Point(SeenPoint::new(relation, variance)),
         };
         let mut seen = seen.before(&here.motion, &here.covariance);
+        let is_range = matches!(seen, Observation::Range(_));
         // Noise of the motion from the keyframe, in the frame of the observer.
         let turn = from.pose.rotation.inverse() * to.pose.rotation * there.motion.rotation;
         let turn = turn.to_rotation_matrix().into_inner();
@@ -102,6 +109,7 @@ impl KeyframeGraph {
         seen.add_noise(&(turn * spread * turn.transpose()));
         let lever = there.motion.translation.vector;
         self.remember_sighting(here.keyframe, Seen::Agent(there.keyframe, lever), seen);
+        self.count_range(is_range);
     }
 
     /// The present instant of an agent: at its latest keyframe if that is near, or at a new one.
