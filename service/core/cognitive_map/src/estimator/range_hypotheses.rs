@@ -12,9 +12,9 @@
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::tuning::{
-    DIRECTION_DISTANCE_MIN_M, RANGE_DOF, RANGE_HEIGHT_SD_M, RANGE_HEIGHTS_M, RANGE_JOIN_MASS,
-    RANGE_JOIN_SAG, RANGE_OUTLYING_SQUARE, RANGE_OVERLAP, RANGE_RING_POINTS, RANGE_SPHERE_POINTS,
-    RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
+    DIRECTION_DISTANCE_MIN_M, RANGE_DOF, RANGE_HEIGHT_MAX_M, RANGE_JOIN_MASS, RANGE_JOIN_SAG,
+    RANGE_LAYER_RAD, RANGE_LAYERS, RANGE_OUTLYING_SQUARE, RANGE_OVERLAP, RANGE_RING_POINTS,
+    RANGE_SPHERE_POINTS, RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
 };
 use crate::input::Range;
 use geometry::{MotionSum, seen_by_pose, symmetric};
@@ -237,19 +237,22 @@ impl PointHypothesis {
 /// robot.
 fn rings(range: &Range, variance: f64) -> Vec<PointHypothesis> {
     let range_m = range.range_m().max(DIRECTION_DISTANCE_MIN_M);
-    let heights = RANGE_HEIGHTS_M
-        .iter()
-        .filter(|&&height| height == 0.0 || height < range_m);
     let mut points = Vec::new();
-    for &height in heights {
-        let radius = (range_m * range_m - height * height).sqrt();
-        let spacing = std::f64::consts::TAU * radius / f64::from(RANGE_RING_POINTS);
-        for k in 0..RANGE_RING_POINTS {
-            let azimuth = std::f64::consts::TAU * f64::from(k) / f64::from(RANGE_RING_POINTS);
-            let (sin, cos) = azimuth.sin_cos();
+    for layer in 0..RANGE_LAYERS {
+        let (sin, cos) = (RANGE_LAYER_RAD * f64::from(layer)).sin_cos();
+        let (height, radius) = (range_m * sin, range_m * cos);
+        if layer > 0 && height > RANGE_HEIGHT_MAX_M {
+            break;
+        }
+        // As dense everywhere, so that every height is as probable.
+        let n = (f64::from(RANGE_RING_POINTS) * cos).ceil();
+        let spacing = std::f64::consts::TAU / n;
+        let upwards = (RANGE_OVERLAP * RANGE_LAYER_RAD * range_m).min(0.5 * RANGE_HEIGHT_MAX_M);
+        let sd = [RANGE_OVERLAP * spacing * radius, upwards];
+        for k in 0..n as u32 {
+            let (sin, cos) = (spacing * f64::from(k)).sin_cos();
             let ahead = Vector3::new(radius * cos, radius * sin, height);
             let along = Vector3::new(-sin, cos, 0.0);
-            let sd = [RANGE_OVERLAP * spacing, RANGE_HEIGHT_SD_M];
             points.push(hypothesis(range, variance, &ahead, &along, sd));
         }
     }

@@ -161,7 +161,7 @@ pub(super) const CIRCLE_VARIANCE_MAX: f64 = 30.0;
 // --- Distances alone
 // ---------------------------------------------------------------------------
 
-/// Landmarks of which an agent knows distances alone. Source: memory; each has up to 256 places of
+/// Landmarks of which an agent knows distances alone. Source: memory; each has up to 288 places of
 /// 104 bytes.
 pub(super) const RANGED_MAX: usize = 32;
 /// Places on a ring about the antenna. Source: with spacing and deviation of an eighth of a radian,
@@ -171,10 +171,13 @@ pub(super) const RANGE_RING_POINTS: u32 = 48;
 pub(super) const RANGE_SPHERE_POINTS: u32 = 256;
 /// Deviation of a place along the ring, in the spacing of two. Source: so that their sum is even.
 pub(super) const RANGE_OVERLAP: f64 = 0.6;
-/// Heights of beacons above an antenna \[m\], and their deviation. Source: rooms; tags on other
-/// robots, on walls, and below ceilings.
-pub(super) const RANGE_HEIGHTS_M: [f64; 3] = [0.0, 1.5, 3.0];
-pub(super) const RANGE_HEIGHT_SD_M: f64 = 0.75;
+/// Elevation of a ring above the one below it \[rad\], and the most rings. Source: half of it is the
+/// deviation, as along a ring of which the points are as far apart twice; up to 75 degrees.
+pub(super) const RANGE_LAYER_RAD: f64 = 0.26;
+pub(super) const RANGE_LAYERS: u32 = 6;
+/// Greatest height of a beacon above an antenna \[m\]. Source: rooms; tags on robots, on walls, and
+/// below ceilings.
+pub(super) const RANGE_HEIGHT_MAX_M: f64 = 3.0;
 /// Degrees of freedom of the noise of distances (Student's t). Source: walls in between and
 /// reflections; Lange, Little & Taylor 1989.
 pub(super) const RANGE_DOF: f64 = 4.0;

@@ -30,7 +30,7 @@ use super::sightings::{CrossFrameSighting, PendingSighting};
 use super::tuning::{
     ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
     HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX, PENDING_MAX,
-    RANGE_HEIGHTS_M, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGED_MAX, SENSOR_TARGETS_MAX,
+    RANGE_LAYERS, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGED_MAX, SENSOR_TARGETS_MAX,
 };
 use ::state::{
     Codec, CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum, state_of_struct,
@@ -44,7 +44,7 @@ const AGENTS_MAX: usize = 1 << 24;
 const FRAMES_MAX: usize = AGENTS_MAX + 1;
 /// Most places where a landmark may be of which distances alone are known.
 const RANGE_POINTS_MAX: usize = {
-    let rings = RANGE_HEIGHTS_M.len() * RANGE_RING_POINTS as usize;
+    let rings = (RANGE_LAYERS * RANGE_RING_POINTS) as usize;
     let sphere = RANGE_SPHERE_POINTS as usize;
     if rings > sphere { rings } else { sphere }
 };
