@@ -13,8 +13,9 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::tuning::{
     DIRECTION_DISTANCE_MIN_M, RANGE_DOF, RANGE_HEIGHT_MAX_M, RANGE_JOIN_MASS, RANGE_JOIN_SAG,
-    RANGE_LAYER_RAD, RANGE_LAYERS, RANGE_OUTLYING_SQUARE, RANGE_OVERLAP, RANGE_RING_POINTS,
-    RANGE_SPHERE_POINTS, RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
+    RANGE_LAYER_RAD, RANGE_LAYERS, RANGE_OUTLYING_SQUARE, RANGE_OVERLAP, RANGE_REFLECTED,
+    RANGE_REFLECTION_MAX_M, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGE_TRIAL_MIN,
+    RANGE_WEIGHT_MIN,
 };
 use crate::input::Range;
 use geometry::{MotionSum, seen_by_pose, symmetric};
@@ -47,18 +48,24 @@ pub(super) struct RangedPoint {
     pub(super) covariance: Matrix3<f64>,
 }
 
-/// The distance of an uncertain point from the antenna, to second order.
+/// The distance of an uncertain point from the antenna.
 ///
 /// With the direction u and the curvature C = (1 − uuᵀ) / d of the distance, of a point with the
 /// covariance P (the second-order filter of Athans, Wishner & Bertolini 1968):
 ///
 /// ```text
-/// E d = d̂ + ½ tr(C P)      var d = uᵀ P u + ½ tr((C P)²)
+/// E d = d̂ + b      b = ½ tr(C P)      var d = uᵀ P u + ½ tr((C P)²)
 /// ```
+///
+/// Where the covariance may be too wide, b is, too, and in one direction: there it counts as noise,
+/// b² beside the variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ExpectedRange {
     pub(super) direction: Vector3<f64>,
     pub(super) mean_m: f64,
+    /// The distance of the point that is expected, and b² \[m, m²\].
+    pub(super) distance_m: f64,
+    pub(super) bias_square: f64,
     /// Part of the variance that is linear in the point's error \[m²\].
     pub(super) linear: f64,
     /// The part that is not \[m²\].
@@ -78,6 +85,8 @@ impl ExpectedRange {
         Some(Self {
             direction,
             mean_m: distance_m + 0.5 * bent.trace(),
+            distance_m,
+            bias_square: (0.5 * bent.trace()).powi(2),
             linear: direction.dot(&(covariance * direction)),
             curved: 0.5 * (bent * bent).trace().max(0.0),
         })
@@ -223,14 +232,27 @@ impl PointHypothesis {
         let innovation = range.range_m() - expected.mean_m;
         let noise = variance + expected.curved;
         let square = innovation * innovation / (expected.linear + noise);
-        self.log_weight -= 0.5 * (expected.linear + noise).ln()
-            + 0.5 * (RANGE_DOF + 1.0) * (square / RANGE_DOF).ln_1p();
+        self.log_weight += log_density(innovation, expected.linear + noise);
         let total = expected.linear + noise * loss_of_weight(square);
         let gain = self.covariance * expected.direction / total;
         self.position += gain * innovation;
         self.covariance = symmetric(&(self.covariance - gain * gain.transpose() * total));
         square
     }
+}
+
+/// Log of the density of an innovation with this variance [1/m]: mostly Student's t with four
+/// degrees of freedom, and sometimes anything that is too long.
+fn log_density(innovation: f64, variance: f64) -> f64 {
+    let square = innovation * innovation / variance;
+    let direct =
+        0.375 * (1.0 + square / RANGE_DOF).powf(-0.5 * (RANGE_DOF + 1.0)) / variance.sqrt();
+    let reflected = if innovation > 0.0 {
+        RANGE_REFLECTION_MAX_M.recip()
+    } else {
+        0.0
+    };
+    ((1.0 - RANGE_REFLECTED) * direct + RANGE_REFLECTED * reflected).ln()
 }
 
 /// Rings about the antenna, in planes above it. What lies below it looks the same to a planar
@@ -249,8 +271,8 @@ fn rings(range: &Range, variance: f64) -> Vec<PointHypothesis> {
         let spacing = std::f64::consts::TAU / n;
         let upwards = (RANGE_OVERLAP * RANGE_LAYER_RAD * range_m).min(0.5 * RANGE_HEIGHT_MAX_M);
         let sd = [RANGE_OVERLAP * spacing * radius, upwards];
-        for k in 0..n as u32 {
-            let (sin, cos) = (spacing * f64::from(k)).sin_cos();
+        for k in (0..RANGE_RING_POINTS).map(f64::from).take_while(|&k| k < n) {
+            let (sin, cos) = (spacing * k).sin_cos();
             let ahead = Vector3::new(radius * cos, radius * sin, height);
             let along = Vector3::new(-sin, cos, 0.0);
             points.push(hypothesis(range, variance, &ahead, &along, sd));

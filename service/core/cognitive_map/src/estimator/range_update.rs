@@ -160,8 +160,9 @@ impl Frame {
             jacobian: expected.direction.transpose() * block.jacobian,
         });
         let projection = self.covariance.project(&along);
-        let spread = projection.spread[(0, 0)] + expected.curved;
-        let residual = range.range_m() - expected.mean_m;
+        let curved = expected.curved + expected.bias_square;
+        let spread = projection.spread[(0, 0)] + curved;
+        let residual = range.range_m() - expected.distance_m;
         let square = residual * residual / (spread + variance);
         let member = self.members[measurement.observer].state_mut();
         if residual > 0.0 && square > RANGE_TOO_LONG_SQUARE {
@@ -188,7 +189,7 @@ impl Frame {
         member
             .range_sensor
             .note(seen, stamp_ns, sd_m, residual[0], spread);
-        let weighted = (variance + expected.curved) * loss_of_weight(square);
+        let weighted = (variance + curved) * loss_of_weight(square);
         let weighted = Vector1::new(weighted);
         self.take_in(measurement, projection, &residual, &weighted, scope);
         outcome.verdict = Verdict::Accepted {

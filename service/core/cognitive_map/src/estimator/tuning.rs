@@ -181,12 +181,16 @@ pub(super) const RANGE_HEIGHT_MAX_M: f64 = 3.0;
 /// Degrees of freedom of the noise of distances (Student's t). Source: walls in between and
 /// reflections; Lange, Little & Taylor 1989.
 pub(super) const RANGE_DOF: f64 = 4.0;
+/// Part of the distances that are supposed to be those of reflections where nothing is known yet,
+/// and by how much they are too long at most \[m\]. Source: halls.
+pub(super) const RANGE_REFLECTED: f64 = 0.1;
+pub(super) const RANGE_REFLECTION_MAX_M: f64 = 20.0;
 /// Weight below which a place is dropped.
 pub(super) const RANGE_WEIGHT_MIN: f64 = 1e-5;
 /// Weight of the places about the best one from which on it is the landmark's.
 pub(super) const RANGE_JOIN_MASS: f64 = 0.99;
 /// Largest sag of an arc of its deviation, in deviations of a distance.
-pub(super) const RANGE_JOIN_SAG: f64 = 0.25;
+pub(super) const RANGE_JOIN_SAG: f64 = 0.1;
 /// Factor of the variances of a landmark that is learned by distances. Source: errors of distances
 /// last, and Gaussians that are left out have tails.
 pub(super) const RANGE_JOIN_WIDENING: f64 = 4.0;

@@ -127,14 +127,15 @@ impl KeyframeGraph {
     }
 
     /// Whether distances say more of the past than they did at the last relaxation: a landmark was
-    /// found, or there is half as much of the past again.
+    /// found, or the past has grown by a third.
     ///
     /// The live estimate takes a distance in where it then thinks that everything is, and the first
     /// ones not at all.
     fn has_news_by_ranges(&self) -> bool {
         let schedule = &self.constraints.schedule;
         let then = schedule.keyframes_then as usize;
-        schedule.found > 0 || (schedule.ranges > 0 && 2 * self.n_keyframes() >= 3 * then)
+        let has_grown = self.n_keyframes() as f64 >= tuning::RANGES_GROWTH * then as f64;
+        schedule.found > 0 || (schedule.ranges > 0 && has_grown)
     }
 
     /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses

@@ -27,6 +27,10 @@ pub(super) const RANGES_AGREE_SD: f64 = 3.0;
 /// such a point is ever off, and for heights those of rooms.
 pub(super) const RANGED_POINT_SD_M: (f64, f64) = (100.0, 3.0);
 
+/// Growth of the number of keyframes after which distances relax the past again. Source: so the work
+/// of all relaxations is some four times that of the last one.
+pub(super) const RANGES_GROWTH: f64 = 1.3;
+
 // Attachments.
 
 /// Most attachments that are checked with one record. The work after a relaxation is spread, so
