@@ -20,8 +20,6 @@ const GAP_NS: i64 = 10_000_000_000;
 const POSITION_SD_M: f64 = 0.5;
 /// … and in heading \[rad\].
 const HEADING_SD_RAD: f64 = 0.2;
-/// Standard deviation of a direction that was not measured \[rad\].
-const ANY_DIRECTION_SD_RAD: f64 = 3.0;
 
 /// What of a set is sent.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -11,9 +11,9 @@ use super::invalid::{METRES_MAX, bounded, deviations};
 /// of another agent's body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    range_m: f64,
-    range_sd_m: f64,
-    antenna_m: Vector3<f64>,
+    distance_m: f64,
+    sd_m: f64,
+    antenna: Vector3<f64>,
 }
 
 impl Range {
@@ -28,24 +28,24 @@ impl Range {
             return Err(InvalidSample::NumberOutOfRange);
         }
         Ok(Self {
-            range_m,
-            range_sd_m,
-            antenna_m: bounded(antenna_m, METRES_MAX)?,
+            distance_m: range_m,
+            sd_m: range_sd_m,
+            antenna: bounded(antenna_m, METRES_MAX)?,
         })
     }
 
     /// Distance \[m\].
     pub fn range_m(&self) -> f64 {
-        self.range_m
+        self.distance_m
     }
 
     /// Standard deviation of the distance \[m\].
     pub fn range_sd_m(&self) -> f64 {
-        self.range_sd_m
+        self.sd_m
     }
 
     /// Where the antenna is in the body frame: its lever arm \[m\].
     pub fn antenna_m(&self) -> &Vector3<f64> {
-        &self.antenna_m
+        &self.antenna
     }
 }
