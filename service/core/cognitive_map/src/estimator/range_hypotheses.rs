@@ -12,10 +12,10 @@
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::tuning::{
-    DIRECTION_DISTANCE_MIN_M, RANGE_DOF, RANGE_HEIGHT_MAX_M, RANGE_JOIN_MASS, RANGE_JOIN_SAG,
-    RANGE_LAYER_RAD, RANGE_LAYERS, RANGE_OUTLYING_SQUARE, RANGE_OVERLAP, RANGE_REFLECTED,
-    RANGE_REFLECTION_MAX_M, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGE_TRIAL_MIN,
-    RANGE_WEIGHT_MIN,
+    DIRECTION_DISTANCE_MIN_M, RANGE_DOF, RANGE_HEIGHT_MAX_M, RANGE_JOIN_ANGLE_RAD, RANGE_JOIN_MASS,
+    RANGE_JOIN_SAG, RANGE_LAYER_RAD, RANGE_LAYERS, RANGE_OUTLYING_SQUARE, RANGE_OVERLAP,
+    RANGE_REFLECTED, RANGE_REFLECTION_MAX_M, RANGE_RING_POINTS, RANGE_SPHERE_POINTS,
+    RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
 };
 use crate::input::Range;
 use geometry::{MotionSum, seen_by_pose, symmetric};
@@ -36,6 +36,8 @@ pub(super) struct RangeHypotheses {
     pub(super) motion: MotionSum,
     /// The distance of the agent that was taken in last.
     pub(super) used: u64,
+    /// The way since the first distance \[m\].
+    pub(super) path_m: f64,
     /// Distances that were taken in after the first, and how many of them fit none of the places.
     pub(super) taken: u32,
     pub(super) outlying: u32,
@@ -110,6 +112,7 @@ impl RangeHypotheses {
         Self {
             points,
             motion: MotionSum::default(),
+            path_m: 0.0,
             used: 0,
             taken: 0,
             outlying: 0,
@@ -138,6 +141,7 @@ impl RangeHypotheses {
     /// Moves the places to the body frame as it is now.
     fn carry_over_motion(&mut self) {
         let motion = std::mem::take(&mut self.motion);
+        self.path_m += motion.motion().translation.vector.norm();
         let back = motion.motion().inverse();
         let turn = back.rotation.to_rotation_matrix().into_inner();
         let noise = *motion.covariance().matrix();
@@ -170,7 +174,8 @@ impl RangeHypotheses {
 
     /// The one place that is left, if it is certain enough for the joint estimate, which is linear:
     /// an arc of its deviation σ must differ from its tangent, by σ²/2d, by less than a part of the
-    /// deviation of a distance.
+    /// deviation of a distance. A way longer than the distance hardly tells more than odometry loses
+    /// meanwhile: then a wider arc will do, up to an angle.
     pub(super) fn decided(
         &self,
         range: &Range,
@@ -185,7 +190,10 @@ impl RangeHypotheses {
             .iter()
             .reduce(|best, next| if later(best, next) { next } else { best })?;
         let distance_m = (best.position - range.antenna_m()).norm();
-        let most = 2.0 * RANGE_JOIN_SAG * distance_m * variance.sqrt();
+        let linear = 2.0 * RANGE_JOIN_SAG * distance_m * variance.sqrt();
+        let ways = (self.path_m / distance_m.max(DIRECTION_DISTANCE_MIN_M)).max(1.0);
+        let widest = (RANGE_JOIN_ANGLE_RAD * distance_m).powi(2);
+        let most = (linear * ways * ways).min(widest.max(linear));
         let flat = |apart: Vector3<f64>| {
             if is_planar {
                 apart.xy().norm_squared()

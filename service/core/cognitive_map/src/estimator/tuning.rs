@@ -191,6 +191,9 @@ pub(super) const RANGE_WEIGHT_MIN: f64 = 1e-5;
 pub(super) const RANGE_JOIN_MASS: f64 = 0.99;
 /// Largest sag of an arc of its deviation, in deviations of a distance.
 pub(super) const RANGE_JOIN_SAG: f64 = 0.1;
+/// Largest deviation of the direction of a landmark that joins after a long way \[rad\]. Source: its
+/// arc differs from its tangent by a hundredth of the distance.
+pub(super) const RANGE_JOIN_ANGLE_RAD: f64 = 0.15;
 /// Factor of the variances of a landmark that is learned by distances. Source: errors of distances
 /// last, and Gaussians that are left out have tails.
 pub(super) const RANGE_JOIN_WIDENING: f64 = 4.0;

@@ -26,7 +26,7 @@ impl KeyframeMap {
         self.pending = Some(PendingRelaxation::Awaited(job));
         // What comes from now on is for the next one.
         self.graph.constraints.schedule = Schedule {
-            keyframes_then: u32::try_from(self.graph.n_keyframes()).unwrap_or(u32::MAX),
+            keyframes_then: self.graph.keyframes_with_ranges(),
             ..Schedule::default()
         };
         let mut meanwhile = Meanwhile::default();

@@ -138,6 +138,15 @@ impl KeyframeGraph {
         schedule.found > 0 || (schedule.ranges > 0 && has_grown)
     }
 
+    /// Number of keyframes, where distances say anything of the past; 0 without any.
+    pub(super) fn keyframes_with_ranges(&self) -> u32 {
+        let schedule = &self.constraints.schedule;
+        if schedule.ranges == 0 && schedule.keyframes_then == 0 {
+            return 0;
+        }
+        u32::try_from(self.n_keyframes()).unwrap_or(u32::MAX)
+    }
+
     /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses
     /// of the agents in the map; nothing if no closure was accepted or rejected, and no distances
     /// came.

@@ -107,6 +107,7 @@ state_of_struct!(PointHypothesis {
 state_of_struct!(RangeHypotheses {
     points as ListUpTo<RANGE_POINTS_MAX>,
     motion,
+    path_m,
     used,
     taken,
     outlying
