@@ -174,8 +174,8 @@ impl RangeHypotheses {
 
     /// The one place that is left, if it is certain enough for the joint estimate, which is linear:
     /// an arc of its deviation σ must differ from its tangent, by σ²/2d, by less than a part of the
-    /// deviation of a distance. A way longer than the distance hardly tells more than odometry loses
-    /// meanwhile: then a wider arc will do, up to an angle.
+    /// deviation of a distance. A way longer than the distance hardly tells more than odometry
+    /// loses meanwhile: then a wider arc will do, up to an angle.
     pub(super) fn decided(
         &self,
         range: &Range,
