@@ -12,10 +12,10 @@
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::tuning::{
-    DIRECTION_DISTANCE_MIN_M, RANGE_DOF, RANGE_HEIGHT_MAX_M, RANGE_JOIN_ANGLE_RAD, RANGE_JOIN_MASS,
-    RANGE_JOIN_SAG, RANGE_LAYER_RAD, RANGE_LAYERS, RANGE_OUTLYING_SQUARE, RANGE_OVERLAP,
-    RANGE_REFLECTED, RANGE_REFLECTION_MAX_M, RANGE_RING_POINTS, RANGE_SPHERE_POINTS,
-    RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
+    DIRECTION_DISTANCE_MIN_M, RANGE_CURVED_MAX, RANGE_DOF, RANGE_HEIGHT_MAX_M,
+    RANGE_JOIN_ANGLE_RAD, RANGE_JOIN_MASS, RANGE_JOIN_SAG, RANGE_LAYER_RAD, RANGE_LAYERS,
+    RANGE_OUTLYING_SQUARE, RANGE_OVERLAP, RANGE_REFLECTED, RANGE_REFLECTION_MAX_M,
+    RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
 };
 use crate::input::Range;
 use geometry::{MotionSum, seen_by_pose, symmetric};
@@ -64,7 +64,6 @@ pub(super) struct RangedPoint {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ExpectedRange {
     pub(super) direction: Vector3<f64>,
-    pub(super) mean_m: f64,
     /// The distance of the point that is expected, and b² \[m, m²\].
     pub(super) distance_m: f64,
     pub(super) bias_square: f64,
@@ -86,7 +85,6 @@ impl ExpectedRange {
         let bent = across * covariance / distance_m;
         Some(Self {
             direction,
-            mean_m: distance_m + 0.5 * bent.trace(),
             distance_m,
             bias_square: (0.5 * bent.trace()).powi(2),
             linear: direction.dot(&(covariance * direction)),
@@ -237,8 +235,10 @@ impl PointHypothesis {
         let Some(expected) = ExpectedRange::new(&apart, &self.covariance) else {
             return f64::INFINITY;
         };
-        let innovation = range.range_m() - expected.mean_m;
-        let noise = variance + expected.curved;
+        let innovation = range.range_m() - expected.distance_m;
+        // A place wider than its ring is round would learn nothing any more, and grow for ever.
+        let curved = (expected.curved + expected.bias_square).min(RANGE_CURVED_MAX * variance);
+        let noise = variance + curved;
         let square = innovation * innovation / (expected.linear + noise);
         self.log_weight += log_density(innovation, expected.linear + noise);
         let total = expected.linear + noise * loss_of_weight(square);

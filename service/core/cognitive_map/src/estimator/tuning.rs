@@ -185,6 +185,8 @@ pub(super) const RANGE_DOF: f64 = 4.0;
 /// and by how much they are too long at most \[m\]. Source: halls.
 pub(super) const RANGE_REFLECTED: f64 = 0.1;
 pub(super) const RANGE_REFLECTION_MAX_M: f64 = 20.0;
+/// Most of a distance's variance, in its own, by which the ring at a place is round.
+pub(super) const RANGE_CURVED_MAX: f64 = 3.0;
 /// Weight below which a place is dropped.
 pub(super) const RANGE_WEIGHT_MIN: f64 = 1e-5;
 /// Weight of the places about the best one from which on it is the landmark's.
