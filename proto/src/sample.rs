@@ -153,6 +153,16 @@ pub enum Relation {
         /// Noise of the relation, in the target's frame.
         noise: MotionNoise,
     },
+    /// Distance of the target alone, as ultra-wideband radios measure it.
+    Range {
+        /// Distance \[m\].
+        range_m: f64,
+        /// Standard deviation of the distance \[m\].
+        range_sd_m: f64,
+        /// Position of the antenna in the body frame \[m\].
+        #[serde(default)]
+        offset_m: [f64; 3],
+    },
 }
 
 /// Where the agent stands in the space's `map` frame, told from outside.

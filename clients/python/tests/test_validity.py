@@ -28,6 +28,7 @@ _TAGGED: Dict[str, type] = {
     "agent": cogmap.AgentTarget,
     "own_sample": cogmap.OwnSampleTarget,
     "position": cogmap.Position,
+    "range": cogmap.Range,
     "range_bearing": cogmap.RangeBearing,
     "pose": cogmap.RelativePose,
     "object": cogmap.ObjectMark,

@@ -59,7 +59,10 @@ pub(crate) fn bytes_max(sample: &Sample, codec: Codec) -> usize {
         SampleBody::Sighting(sighting) => match (&sighting.target, &sighting.relation) {
             (
                 Target::Landmark(label) | Target::Agent(label),
-                Relation::Position { .. } | Relation::RangeBearing { .. } | Relation::Pose { .. },
+                Relation::Position { .. }
+                | Relation::RangeBearing { .. }
+                | Relation::Pose { .. }
+                | Relation::Range { .. },
             ) => (label.len(), 0),
             (Target::OwnSample(_), _) => (0, 0),
         },

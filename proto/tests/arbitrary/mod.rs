@@ -150,6 +150,11 @@ fn relations(floats: &Floats) -> impl Strategy<Value = Relation> + use<> {
                 }
             }
         ),
+        (one(), one(), three()).prop_map(|(range_m, range_sd_m, offset_m)| Relation::Range {
+            range_m,
+            range_sd_m,
+            offset_m,
+        }),
     ]
 }
 

@@ -155,6 +155,11 @@ fn sightings() -> Vec<SampleBody> {
             rotation_xyzw: [0.0, 0.0, -0.6, 0.8],
             noise: NOISE,
         },
+        Relation::Range {
+            range_m: 12.5,
+            range_sd_m: 0.1,
+            offset_m: [0.25, 0.0, 0.5],
+        },
     ];
     let mut bodies = Vec::new();
     for target in &targets {

@@ -2,7 +2,8 @@
 
 use cogmap_proto as wire;
 use cognitive_map::{
-    InvalidSample, Label, PoseNoise, RangeBearing, Relation, RelativePose, RelativePosition, Target,
+    InvalidSample, Label, PoseNoise, Range, RangeBearing, Relation, RelativePose, RelativePosition,
+    Target,
 };
 
 pub(super) fn target(target: &wire::Target) -> Result<Target, InvalidSample> {
@@ -40,5 +41,10 @@ pub(super) fn relation(relation: &wire::Relation) -> Result<Relation, InvalidSam
             let noise = PoseNoise::new(noise.translation_sd_m, noise.rotation_sd_rad)?;
             Relation::Pose(RelativePose::new(translation_m, rotation_xyzw, noise)?)
         }
+        wire::Relation::Range {
+            range_m,
+            range_sd_m,
+            offset_m,
+        } => Relation::Range(Range::new(range_m, range_sd_m, offset_m)?),
     })
 }

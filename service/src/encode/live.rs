@@ -21,7 +21,10 @@ pub(crate) fn live_sighting(
     };
     let agent = map.agent(id).filter(|agent| agent.placed())?;
     let pose = agent.pose();
-    let to = pose * Point3::from(in_body(&sighting.relation));
+    let to = match in_body(&sighting.relation) {
+        Some(seen) => pose * Point3::from(seen),
+        None => estimated(map, &sighting.target)?,
+    };
     Some(wire::LiveSighting {
         agent: agent.name().as_str().to_owned(),
         stamp_ns: sample.stamp_ns,
@@ -31,9 +34,24 @@ pub(crate) fn live_sighting(
     })
 }
 
-/// Position of a target in the body frame \[m\].
-fn in_body(relation: &Relation) -> Vector3<f64> {
-    match relation {
+/// Where a target is estimated to be in `map`, once that is known.
+fn estimated(map: &CognitiveMap, target: &Target) -> Option<Point3<f64>> {
+    match target {
+        Target::Landmark(label) => {
+            let (_, landmark) = map.landmark_by_label(label.as_str())?;
+            Some(*landmark.position())
+        }
+        Target::Agent(name) => {
+            let agent = map.agent(map.agent_by_name(name)?)?;
+            { agent.placed() }.then(|| agent.pose().translation.vector.into())
+        }
+        Target::OwnSample(_) => None,
+    }
+}
+
+/// Position of a target in the body frame \[m\]; `None` of a distance alone.
+fn in_body(relation: &Relation) -> Option<Vector3<f64>> {
+    Some(match relation {
         Relation::Position(seen) => *seen.translation_m(),
         Relation::RangeBearing(seen) => {
             let (azimuth, elevation) = (seen.azimuth_rad(), seen.elevation_rad());
@@ -46,7 +64,8 @@ fn in_body(relation: &Relation) -> Vector3<f64> {
             seen.range_m() * direction
         }
         Relation::Pose(seen) => seen.pose().translation.vector,
-    }
+        Relation::Range(_) => return None,
+    })
 }
 
 /// Sizes of a space.

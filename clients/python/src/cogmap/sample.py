@@ -232,7 +232,25 @@ class RelativePose:
         one_of("noise", self.noise, (MotionNoise,))
 
 
-Relation = Union[Position, RangeBearing, RelativePose]
+@dataclass(frozen=True)
+class Range:
+    """Distance of the target alone, as ultra-wideband radios measure it."""
+
+    TAG: ClassVar[str] = "range"
+    #: Distance [m].
+    range_m: float
+    #: Standard deviation of the distance [m].
+    range_sd_m: float
+    #: Position of the antenna in the body frame [m].
+    offset_m: Vec3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("range_m", "range_sd_m"):
+            _set(self, name, within(name, getattr(self, name), 0.0, METRES_MAX))
+        _set(self, "offset_m", vec3("offset_m", self.offset_m))
+
+
+Relation = Union[Position, RangeBearing, RelativePose, Range]
 
 
 @dataclass(frozen=True)

@@ -146,7 +146,7 @@ class Sampler(ABC):
             target: A landmark by its label, an `AgentTarget` by its name, or an `OwnSampleTarget`:
                 where this agent was at an earlier sample, a loop closure found outside.
             relation: Where it was seen in the body frame, and how exactly: a `Position` [m], a
-                `RangeBearing` [m, rad] or a `RelativePose`.
+                `RangeBearing` [m, rad], a `RelativePose`, or a `Range` [m] alone.
             stamp_ns: When it was seen, on the sensor's clock [ns].
         """
         if isinstance(target, str):

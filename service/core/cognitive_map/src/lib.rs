@@ -19,8 +19,9 @@ pub use fold::{
 };
 pub use input::{
     AgentId, Descriptor, InvalidSample, Label, Lesson, Level, Marker, Motion, NoisyPose,
-    ObjectMark, PoseNoise, RangeBearing, Record, Relation, RelativePose, RelativePosition, Sample,
-    SampleBody, Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel, TouchNoise,
+    ObjectMark, PoseNoise, Range, RangeBearing, Record, Relation, RelativePose, RelativePosition,
+    Sample, SampleBody, Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel,
+    TouchNoise,
 };
 pub use keyframes::{Guess, RelaxationJob};
 pub use memory::landmark::{Landmark, LandmarkId};

@@ -87,6 +87,23 @@ impl MotionSum {
         rotation
     }
 
+    /// Goes on by another sum of motions, whose error is independent of this one's.
+    pub fn extend(&mut self, next: &Self) {
+        let lever = self.motion.translation.vector.cross_matrix();
+        let turn = self.motion.rotation.to_rotation_matrix().into_inner();
+        let about = |block: &Matrix3<f64>| turn * block * turn.transpose();
+        // Ad(T) = | R  t×R ; 0  R |
+        let (position, cross, turned) =
+            (about(&next.position), about(&next.cross), about(&next.turn));
+        let crossed = lever * cross.transpose();
+        self.position +=
+            symmetric(&(position + crossed + crossed.transpose() - lever * turned * lever));
+        self.cross += cross + lever * turned;
+        self.turn += symmetric(&turned);
+        self.motion *= next.motion;
+        self.motion.rotation.renormalize_fast();
+    }
+
     /// Adds independent errors at the end of the motion, with these variances.
     pub fn inflate(&mut self, variance: &Vector6<f64>) {
         let rotation = self.motion.rotation.to_rotation_matrix().into_inner();
@@ -155,6 +172,23 @@ mod tests {
             let variance = Vector6::new(1e-4, 2e-4, 3e-5, 4e-4, 1e-5, (1.0 + at) * 1e-6);
             (se3::exp(&linear, &angular), variance)
         })
+    }
+
+    /// A sum that goes on by another one is that of all their steps.
+    #[test]
+    fn sums_follow_one_another() {
+        let mut whole = MotionSum::default();
+        let mut parts = [MotionSum::default(), MotionSum::default()];
+        for (index, (increment, variance)) in steps().enumerate() {
+            whole.append(&increment, &variance);
+            parts[usize::from(index >= 77)].append(&increment, &variance);
+        }
+        let [mut first, second] = parts;
+        first.extend(&second);
+        let apart = whole.motion().inv_mul(first.motion());
+        assert!(se3::twist(&apart).norm() < 1e-12);
+        let (all, both) = (whole.at_the_beginning(), first.at_the_beginning());
+        assert!((all - both).norm() < 1e-12 * all.norm(), "{all} {both}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Information matrices: inverses of the covariances of measurements.
 
-use nalgebra::{Cholesky, Matrix3, SMatrix};
+use nalgebra::{Cholesky, Matrix1, Matrix3, SMatrix};
 
 use geometry::{PoseCovariance, symmetric};
 
@@ -32,6 +32,9 @@ pub type PoseInformation = Information<6>;
 
 /// Information about a position, 3×3 \[1/m²\].
 pub type PositionInformation = Information<3>;
+
+/// Information about a distance \[1/m²\].
+pub type RangeInformation = Information<1>;
 
 impl<const N: usize> Information<N> {
     /// From a matrix, of which the lower triangle counts.
@@ -65,6 +68,16 @@ impl PositionInformation {
     /// It is not finite or has no inverse.
     pub fn of_covariance(covariance: &Matrix3<f64>) -> Result<Self, InvalidInformation> {
         inverse(covariance).map(Self)
+    }
+}
+
+impl RangeInformation {
+    /// The inverse of a variance \[m²\].
+    ///
+    /// # Errors
+    /// It is not finite or has no inverse.
+    pub fn of_variance(variance_m2: f64) -> Result<Self, InvalidInformation> {
+        inverse(&Matrix1::new(variance_m2)).map(Self)
     }
 }
 

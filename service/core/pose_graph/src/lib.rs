@@ -13,12 +13,15 @@ mod linearisation;
 mod link;
 mod marginals;
 mod node;
+mod range_blocks;
 mod relaxation;
 mod rotation_first;
 
 pub use calibration::{Calibration, Reading};
 pub use graph::{InvalidLink, PoseGraph};
-pub use information::{Information, InvalidInformation, PoseInformation, PositionInformation};
+pub use information::{
+    Information, InvalidInformation, PoseInformation, PositionInformation, RangeInformation,
+};
 pub use kernel::{InvalidScale, Kernel, Scale};
 pub use link::{CalibrationInformation, Link, LinkId, SightingTarget};
 pub use marginals::Marginals;

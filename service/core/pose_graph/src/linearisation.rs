@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use super::calibration::{Calibration, Reading};
 use super::link::{Link, SightingTarget};
+use super::range_blocks::{RangeError, range_blocks};
 use geometry::{from_blocks, log_jacobian, se3};
 
 /// Normal equations of one link at given poses: to second order in the motions δ of its nodes the
@@ -70,6 +71,16 @@ impl Link {
             } => {
                 let residual = seen(from, to, &target.lever()) - position;
                 residual.dot(&(information.matrix() * residual))
+            }
+            Self::Range {
+                antenna,
+                target,
+                range_m,
+                information,
+                ..
+            } => {
+                let residual = RangeError::new((from, to), antenna, *target).distance_m - range_m;
+                residual * residual * information.matrix()[(0, 0)]
             }
             Self::Odometry {
                 reading,
@@ -169,12 +180,22 @@ impl Link {
                 target,
                 ..
             } => sighting_blocks((from, to), *target, position, information.matrix(), weigh),
+            Self::Range {
+                antenna,
+                target,
+                range_m,
+                information,
+                ..
+            } => {
+                let error = RangeError::new((from, to), antenna, *target);
+                range_blocks(&error, *range_m, information.matrix()[(0, 0)], weigh)
+            }
         }
     }
 }
 
 impl NormalBlocks {
-    fn zero() -> Self {
+    pub(super) fn zero() -> Self {
         Self {
             from_from: Matrix6::zeros(),
             to_from: Matrix6::zeros(),

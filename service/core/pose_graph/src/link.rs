@@ -3,7 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 
 use super::calibration::{Calibration, Reading};
-use super::information::{InvalidInformation, PoseInformation, PositionInformation};
+use super::information::{
+    InvalidInformation, PoseInformation, PositionInformation, RangeInformation,
+};
 use super::node::{CalibrationId, PointId, PoseId};
 
 /// A link in a pose graph.
@@ -18,6 +20,7 @@ pub struct LinkId(pub(super) u32);
 /// | `PointPrior` | p − z |
 /// | `Between` | log(Z⁻¹ T_from⁻¹ T_to) |
 /// | `Sighting` | T_from⁻¹ p − z, with the target's position p = T_target l |
+/// | `Range` | \|p − T_from a\| − z, with the target's position p and the antenna a |
 /// | `Odometry` | log(M(c)⁻¹ T_from⁻¹ T_to), with the motion M that the calibration c corrects the reading to |
 /// | `CalibrationPrior` | c − z |
 /// | `CalibrationWander` | c_to − c_from |
@@ -62,6 +65,19 @@ pub enum Link {
         position: Vector3<f64>,
         /// Information in the axes of the pose.
         information: PositionInformation,
+    },
+    /// A distance alone, as ultra-wideband radios measure it.
+    Range {
+        /// The pose that measured.
+        from: PoseId,
+        /// The antenna in the frame of that pose \[m\].
+        antenna: Vector3<f64>,
+        /// What it was measured to.
+        target: SightingTarget,
+        /// The distance from the antenna to the target \[m\].
+        range_m: f64,
+        /// Information about the distance.
+        information: RangeInformation,
     },
     /// The motion from one pose to another, as odometry with unknown lasting errors read it.
     Odometry {
@@ -179,7 +195,9 @@ impl Link {
                 ..
             } => (node, node),
             Self::Between { from, to, .. } | Self::Odometry { from, to, .. } => (from.0, to.0),
-            Self::Sighting { from, target, .. } => (from.0, target.node()),
+            Self::Sighting { from, target, .. } | Self::Range { from, target, .. } => {
+                (from.0, target.node())
+            }
             Self::CalibrationWander { from, to, .. } => (from.0, to.0),
         }
     }
@@ -192,6 +210,7 @@ impl Link {
             }
             Self::Between { .. }
             | Self::Sighting { .. }
+            | Self::Range { .. }
             | Self::Odometry { .. }
             | Self::CalibrationWander { .. } => true,
         }

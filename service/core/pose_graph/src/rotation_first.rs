@@ -131,6 +131,7 @@ fn rotation_weight(link: &Link) -> f64 {
         | Link::Odometry { information, .. } => information.matrix().diagonal().rows(3, 3).sum(),
         Link::PointPrior { .. }
         | Link::Sighting { .. }
+        | Link::Range { .. }
         | Link::CalibrationPrior { .. }
         | Link::CalibrationWander { .. } => 0.0,
     }
@@ -144,7 +145,8 @@ fn position_weight(link: &Link) -> f64 {
         Link::PointPrior { information, .. } | Link::Sighting { information, .. } => {
             information.matrix().trace()
         }
-        Link::CalibrationPrior { .. } | Link::CalibrationWander { .. } => 0.0,
+        // A distance says nothing linear about positions.
+        Link::Range { .. } | Link::CalibrationPrior { .. } | Link::CalibrationWander { .. } => 0.0,
     }
 }
 

@@ -20,8 +20,6 @@ const GAP_NS: i64 = 10_000_000_000;
 const POSITION_SD_M: f64 = 0.5;
 /// … and in heading \[rad\].
 const HEADING_SD_RAD: f64 = 0.2;
-/// Standard deviation of a direction that was not measured \[rad\].
-const ANY_DIRECTION_SD_RAD: f64 = 3.0;
 
 /// What of a set is sent.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -133,12 +131,10 @@ fn at_least(sd: &Vector6<f64>) -> Vector6<f64> {
 
 /// A distance without a direction.
 fn at_distance(range_m: f64, range_sd_m: f64) -> Relation {
-    Relation::RangeBearing {
+    Relation::Range {
         range_m,
-        azimuth_rad: 0.0,
-        elevation_rad: 0.0,
         range_sd_m,
-        bearing_sd_rad: ANY_DIRECTION_SD_RAD,
+        offset_m: [0.0; 3],
     }
 }
 

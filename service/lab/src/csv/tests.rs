@@ -67,7 +67,7 @@ fn an_agent_sends_its_rows_a_second_later() {
     assert!(matches!(bodies[3], SampleBody::Level(level) if (level.value - 3.5).abs() < 1e-12));
     assert!(matches!(bodies[4], SampleBody::Velocity(velocity) if velocity.noise.is_none()));
     assert!(matches!(bodies[5], SampleBody::Sighting(seen)
-        if matches!(seen.relation, Relation::RangeBearing { range_m: 4.0, range_sd_m: 0.5, .. })));
+        if matches!(seen.relation, Relation::Range { range_m: 4.0, range_sd_m: 0.5, .. })));
     assert!(matches!(bodies[6], SampleBody::Sighting(seen) if seen.target == Target::OwnSample(1)));
     assert_eq!(stream.samples()[6].stamp_ns, 21_000_000_000);
 }

@@ -3,12 +3,11 @@
 use nalgebra::{Isometry3, Point3};
 
 use super::effect::{AgentSighted, Effect};
-use super::innovation::seen_at;
+use super::innovation::{as_far_as_it_says, seen_at};
 use super::joint::Estimator;
 use super::measurement_update::Measurement;
 use super::sightings::{CrossFrameSighting, PendingSighting};
 use super::tuning::{CROSS_SIGHTINGS_APART_M, CROSS_SIGHTINGS_MAX, PENDING_MAX, PENDING_NS_MAX};
-use super::verdict::Verdict;
 use crate::input::Relation;
 
 impl Estimator {
@@ -34,7 +33,7 @@ impl Estimator {
             observer: agent,
             target,
             stamp_ns,
-            relation: *relation,
+            relation: as_far_as_it_says(relation),
         });
         self.take_in_pending(effects);
     }
@@ -95,7 +94,9 @@ impl Estimator {
         };
         if number == target_number {
             self.update_by_agent(pending, &ends, effects);
-        } else if self.keep_cross_sighting(self.cross_sighting(&pending.relation, &ends)) {
+        } else if let Some(sighting) = self.cross_sighting(&pending.relation, &ends)
+            && self.keep_cross_sighting(sighting)
+        {
             self.merge_with(pending.observer, None, effects);
         }
     }
@@ -118,7 +119,12 @@ impl Estimator {
         let Some(frame) = self.frames.get_mut(number, 0) else {
             return;
         };
-        let outcome = frame.update_by_member(&measurement, target, &ends.backs[1]);
+        let outcome = match &pending.relation {
+            Relation::Range(range) => {
+                frame.update_by_member_range(&measurement, range, target, &ends.backs[1])
+            }
+            _ => frame.update_by_member(&measurement, target, &ends.backs[1]),
+        };
         let refused = frame.members[observer].state.refused;
         self.count(pending.observer, outcome.verdict, refused);
         effects.push(Effect::AgentSighted(AgentSighted {
@@ -126,29 +132,30 @@ impl Estimator {
             target: pending.target,
             stamp_ns: pending.stamp_ns,
             relation: pending.relation,
-            accepted: outcome.verdict != Verdict::Refused,
+            accepted: outcome.verdict.is_accepted(),
             variance: outcome.variance,
         }));
         self.sweep(number, effects);
         self.judge_evidence(pending.observer, effects);
     }
 
-    /// Where the target of a sighting was in its own frame and in its observer's.
-    fn cross_sighting(&self, relation: &Relation, ends: &Ends) -> CrossFrameSighting {
+    /// Where the target of a sighting was in its own frame and in its observer's; `None` of a
+    /// distance alone, which does not say where.
+    fn cross_sighting(&self, relation: &Relation, ends: &Ends) -> Option<CrossFrameSighting> {
         let pose_then = |end: usize| {
             let frame = self.frame(ends.frames[end]);
             frame.members[ends.members[end]].filter().pose * ends.backs[end].inverse()
         };
-        let (point, noise) = seen_at(relation);
+        let (point, noise) = seen_at(relation)?;
         let lasting = self.parameters.lasting_range_error * point.norm();
-        CrossFrameSighting {
+        Some(CrossFrameSighting {
             frames: ends.frames,
             points: [
                 pose_then(0) * Point3::from(point),
                 pose_then(1).translation.vector.into(),
             ],
             variance: noise.trace() / 3.0 + lasting * lasting / 2.0,
-        }
+        })
     }
 
     /// Keeps a sighting across frames; answers whether it did. Sightings from one place share their

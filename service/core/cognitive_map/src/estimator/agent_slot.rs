@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use super::agent_filter::AgentFilter;
 use super::outcome::Evidence;
+use super::range_sensor::RangeSensor;
+use super::ranging::Ranging;
 use super::sensor::Sensor;
 use super::tuning::RETURN_WIDENING;
 
@@ -12,11 +14,16 @@ use super::tuning::RETURN_WIDENING;
 pub(super) struct AgentState {
     pub(super) filter: AgentFilter,
     pub(super) sensor: Sensor,
+    pub(super) range_sensor: RangeSensor,
+    /// The landmarks of which it knows distances alone.
+    pub(super) ranging: Ranging,
     /// Sightings refused one after the other since it was put somewhere or widened last. The
     /// published [`Evidence::refused_in_a_row`] is this number as of its latest sighting.
     pub(super) refused: u32,
     /// How much its recent sightings contradict the estimate (see `set_aside`).
     pub(super) doubt: u32,
+    /// Distances in a row that were too long.
+    pub(super) too_long: u32,
 }
 
 /// Slot of an agent.
@@ -41,6 +48,14 @@ pub(super) struct Detached {
     pub(super) was_joint: bool,
 }
 
+impl AgentState {
+    /// The numbers of landmarks change.
+    pub(super) fn forget_targets(&mut self) {
+        self.sensor.latest.clear();
+        self.range_sensor.latest.clear();
+    }
+}
+
 impl AgentSlot {
     /// Of a new agent.
     pub(super) fn new(frame: usize, filter: AgentFilter) -> Self {
@@ -51,8 +66,11 @@ impl AgentSlot {
             detached: Some(Detached::new(Arc::new(AgentState {
                 filter,
                 sensor: Sensor::default(),
+                range_sensor: RangeSensor::default(),
+                ranging: Ranging::default(),
                 refused: 0,
                 doubt: 0,
+                too_long: 0,
             }))),
         }
     }

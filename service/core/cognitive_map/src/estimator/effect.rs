@@ -35,6 +35,10 @@ pub enum Effect {
         /// lengths \[m²\]. They hold what the agent's sensor was learned to get wrong, and not the
         /// loss of weight of an outlying component.
         variance: Vector3<f64>,
+        /// Where the landmark is in the body frame by the estimate, once that is known \[m\].
+        at: Option<Vector3<f64>>,
+        /// Whether it is new in the agent's frame.
+        is_new: bool,
     },
     /// A sighting of an agent was accepted or refused, once both had moved up to it.
     AgentSighted(AgentSighted),

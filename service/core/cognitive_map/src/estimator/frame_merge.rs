@@ -122,7 +122,7 @@ impl Frame {
             let state = member.state_mut();
             state.filter.pose = alignment.pose * state.filter.pose;
             // Numbers of landmarks change.
-            state.sensor.latest.clear();
+            state.forget_targets();
             self.members.push(member);
         }
     }

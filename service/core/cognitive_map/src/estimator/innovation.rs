@@ -2,8 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3};
 
-use super::tuning::{DIRECTION_DISTANCE_MIN_M, SIGHTING_SD_MIN};
-use crate::input::{RangeBearing, Relation, RelativePose, RelativePosition};
+use super::tuning::{
+    CIRCLE_VARIANCE_MAX, DIRECTION_DISTANCE_MIN_M, SIGHTING_SD_MIN, VAGUE_BEARING_SD_RAD,
+};
+use crate::input::{Range, RangeBearing, Relation, RelativePose, RelativePosition};
 use geometry::se3;
 
 /// A sighting of a point, linearised about where the observer and the point are thought to be.
@@ -24,7 +26,8 @@ pub(super) struct PointInnovation {
 }
 
 impl PointInnovation {
-    /// Of a sighting, if the point is expected at d. `None` where it has no direction.
+    /// Of a sighting, if the point is expected at d. `None` where it has no direction, and of a
+    /// distance alone.
     pub(super) fn new(relation: &Relation, expected: &Vector3<f64>) -> Option<Self> {
         match relation {
             Relation::Position(seen) => Some(Self::of_position(seen, expected)),
@@ -41,6 +44,7 @@ impl PointInnovation {
                     is_polar: false,
                 })
             }
+            Relation::Range(_) => None,
         }
     }
 
@@ -85,30 +89,63 @@ impl PointInnovation {
         let bearing = seen.bearing_sd_rad();
         // Azimuth turns the direction by cos ε of it; overhead the second order is left.
         let across = bearing * cos_elevation.hypot(bearing.min(1.0));
+        let mut variance = variances(&Vector3::new(seen.range_sd_m(), across, bearing));
+        for k in 1..3 {
+            variance[k] = on_the_circle(variance[k]);
+        }
         Some(Self {
             residual,
             by_point,
-            variance: variances(&Vector3::new(seen.range_sd_m(), across, bearing)),
+            variance,
             distance_m,
             is_polar: true,
         })
     }
 }
 
-/// Where a sighting puts its target, in the observer's frame, and the covariance there.
-pub(super) fn seen_at(relation: &Relation) -> (Vector3<f64>, Matrix3<f64>) {
+/// A sighting without the direction that it hardly states: a distance alone.
+///
+/// Of a bearing with a deviation of some radians, the linear update would make as much as of a
+/// length with such a deviation, while on the circle it says next to nothing; and where the target
+/// is new, no Gaussian has the shape of a ring.
+pub(super) fn as_far_as_it_says(relation: &Relation) -> Relation {
+    let Relation::RangeBearing(seen) = relation else {
+        return *relation;
+    };
+    if seen.bearing_sd_rad() < VAGUE_BEARING_SD_RAD {
+        return *relation;
+    }
+    let range = Range::new(seen.range_m(), seen.range_sd_m(), [0.0; 3]);
+    range.map_or(*relation, Relation::Range)
+}
+
+/// The variance on a line of what an angle with this variance says, which the circle wraps around:
+/// the inverse of the Fisher information of the wrapped normal distribution, to first order in
+/// small variances and in small resultants,
+///
+/// ```text
+/// 1/I = sinh σ²      I → 1/σ²  for σ → 0      I → 2 exp(−σ²)  for σ → ∞
+/// ```
+pub(super) fn on_the_circle(variance: f64) -> f64 {
+    variance.min(CIRCLE_VARIANCE_MAX).sinh()
+}
+
+/// Where a sighting puts its target, in the observer's frame, and the covariance there; `None` of a
+/// distance alone.
+pub(super) fn seen_at(relation: &Relation) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let point = match relation {
         Relation::Position(seen) => *seen.translation_m(),
         Relation::RangeBearing(seen) => {
             seen.directions().0 * seen.range_m().max(DIRECTION_DISTANCE_MIN_M)
         }
         Relation::Pose(seen) => seen.pose().translation.vector,
+        Relation::Range(_) => return None,
     };
     let covariance = PointInnovation::new(relation, &point).and_then(|innovation| {
         let inverse = innovation.by_point.try_inverse()?;
         Some(inverse * Matrix3::from_diagonal(&innovation.variance) * inverse.transpose())
     });
-    (point, covariance.unwrap_or_else(Matrix3::identity))
+    Some((point, covariance.unwrap_or_else(Matrix3::identity)))
 }
 
 /// A sighting of a full pose, linearised: residual of the target's pose, derivatives by the errors
@@ -124,7 +161,10 @@ pub(super) fn pose_innovation(
     let by_observer = -se3::adjoint(&expected.inverse());
     let sd = seen.noise().sd();
     let floor = SVector::<f64, 6>::repeat(SIGHTING_SD_MIN);
-    let variance = sd.component_mul(sd) + floor.component_mul(&floor);
+    let mut variance = sd.component_mul(sd) + floor.component_mul(&floor);
+    for k in 3..6 {
+        variance[k] = on_the_circle(variance[k]);
+    }
     (residual, by_observer, SMatrix::identity(), variance)
 }
 

@@ -1,8 +1,9 @@
 //! Sightings of landmarks.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 
 use super::effect::Effect;
+use super::innovation::as_far_as_it_says;
 use super::joint::Estimator;
 use super::measurement_update::Measurement;
 use super::outcome::LandmarkOutcome;
@@ -19,6 +20,7 @@ impl Estimator {
         relation: &Relation,
         effects: &mut Vec<Effect>,
     ) -> LandmarkOutcome {
+        let relation = &as_far_as_it_says(relation);
         let Some((number, observer)) = self.join_estimate(agent) else {
             return LandmarkOutcome::default();
         };
@@ -32,7 +34,7 @@ impl Estimator {
             frame.forget(label);
         }
         let state = frame.members[observer].state_mut();
-        if !state.is_doubted() {
+        if !state.is_doubted() && !matches!(relation, Relation::Range(_)) {
             state.filter.learn_noise(called, stamp_ns, relation);
         }
         let measurement = Measurement {
@@ -42,10 +44,15 @@ impl Estimator {
             relation,
             parameters: &self.parameters,
         };
-        let outcome = frame.update_by_landmark(&measurement, label);
+        let outcome = match relation {
+            Relation::Range(range) => frame.update_by_landmark_range(&measurement, range, label),
+            _ => frame.update_by_landmark(&measurement, label),
+        };
         let refused = frame.members[observer].state.refused;
         self.count(agent, outcome.verdict, refused);
-        self.associations.weigh(called, outcome.verdict, refused);
+        if outcome.verdict != Verdict::Reflected {
+            self.associations.weigh(called, outcome.verdict, refused);
+        }
         self.sweep(number, effects);
         self.judge_evidence(agent, effects);
         if self.frame_of(agent) == Some(number) {
@@ -54,20 +61,34 @@ impl Estimator {
         if self.frame_of(agent) == Some(number) {
             self.associate_landmarks(number, agent, effects);
         }
-        let accepted = outcome.verdict != Verdict::Refused;
-        if accepted {
+        if outcome.verdict.is_accepted() {
+            // It may just have turned out to be another landmark's.
+            let label = self.associations.name_of(called).clone();
+            let at = self.seen_from(agent, &label);
             effects.push(Effect::LandmarkSighted {
                 agent,
-                // It may just have turned out to be another landmark's.
-                label: self.associations.name_of(called).clone(),
+                label,
                 relation: *relation,
                 variance: outcome.variance.fixed_rows::<3>(0).into_owned(),
+                at,
+                is_new: outcome.verdict == Verdict::Learned,
             });
         }
         LandmarkOutcome {
             is_new: outcome.verdict == Verdict::Learned,
-            accepted,
+            accepted: outcome.verdict.is_accepted() && outcome.verdict != Verdict::Pending,
         }
+    }
+
+    /// Where a landmark is in the body frame of an agent of its frame.
+    fn seen_from(&self, agent: u32, label: &Label) -> Option<Vector3<f64>> {
+        let frame = self.frames.get(self.frame_of(agent)?)?;
+        let position = frame.landmarks.get(label)?.position;
+        Some(
+            self.in_frame(agent)?
+                .inverse_transform_point(&position)
+                .coords,
+        )
     }
 
     /// Counts what became of a sighting.
@@ -75,13 +96,13 @@ impl Estimator {
         let evidence = &mut self.slot_mut(agent).evidence;
         evidence.refused_in_a_row = refused;
         match verdict {
-            Verdict::Learned => {}
+            Verdict::Learned | Verdict::Pending => {}
             Verdict::Accepted { nis, components } => {
                 evidence.accepted += 1;
                 evidence.nis += nis;
                 evidence.components += u64::from(components);
             }
-            Verdict::Refused => evidence.refused += 1,
+            Verdict::Refused | Verdict::Reflected => evidence.refused += 1,
         }
     }
 }

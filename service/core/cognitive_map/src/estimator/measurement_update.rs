@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 
 use super::agent_slot::AgentState;
 use super::covariance::{Block, Projection};
@@ -131,8 +131,9 @@ impl Frame {
             return self.update_by_landmark(measurement, label);
         }
         let member = &self.members[measurement.observer];
-        let past = PastPose::new(member, measurement.back);
-        let (point, stated) = seen_at(measurement.relation);
+        let Some((point, stated)) = seen_at(measurement.relation) else {
+            return Outcome::nothing();
+        };
         let mut variance = Vector6::zeros();
         let noise = PointInnovation::new(measurement.relation, &point).and_then(|innovation| {
             let sensor = &member.state.sensor;
@@ -141,9 +142,27 @@ impl Frame {
             let inverse = innovation.by_point.try_inverse()?;
             Some(inverse * Matrix3::from_diagonal(&components) * inverse.transpose())
         });
+        let noise = noise.unwrap_or(stated);
+        Outcome {
+            verdict: self.learn_landmark(measurement, label, &point, &noise),
+            variance,
+        }
+    }
+
+    /// A landmark turned out to be at a point of the observer's frame, with this covariance there
+    /// beside that of the observer's pose.
+    pub(super) fn learn_landmark(
+        &mut self,
+        measurement: &Measurement<'_>,
+        label: &Label,
+        point: &Vector3<f64>,
+        noise: &Matrix3<f64>,
+    ) -> Verdict {
+        let member = &self.members[measurement.observer];
+        let past = PastPose::new(member, measurement.back);
         let world = past.pose.rotation.to_rotation_matrix().into_inner();
-        let noise = world * noise.unwrap_or(stated) * world.transpose();
-        let by_pose = -(world * seen_by_pose(&point));
+        let noise = world * noise * world.transpose();
+        let by_pose = -(world * seen_by_pose(point));
         let offset = self
             .covariance
             .append(&[past.block(&by_pose)], &symmetric(&noise));
@@ -154,17 +173,16 @@ impl Frame {
             Observers::default()
         };
         observers.note(self.members[measurement.observer].agent);
-        let position = past.pose * Point3::from(point);
+        let position = past.pose * Point3::from(*point);
         self.insert_landmark(label, position, offset, observers);
-        let verdict = match self.archive.remove(label) {
+        match self.archive.remove(label) {
             None => Verdict::Learned,
             Some(archived) => self.fuse_archived(measurement, offset, &archived),
-        };
-        Outcome { verdict, variance }
+        }
     }
 
     /// Restores an archived landmark with its own covariance, correlated with nothing.
-    fn restore(&mut self, label: &Label, archived: &ArchivedLandmark) {
+    pub(super) fn restore(&mut self, label: &Label, archived: &ArchivedLandmark) {
         let offset = self.covariance.grow(LANDMARK_DIM);
         self.covariance.set_diagonal(offset, &archived.covariance);
         let mut observers = Observers::default();
@@ -335,7 +353,7 @@ impl Frame {
     }
 
     /// Corrects what a sighting may correct, with these variances of its components.
-    fn take_in<const M: usize>(
+    pub(super) fn take_in<const M: usize>(
         &mut self,
         measurement: &Measurement<'_>,
         projection: Projection<M>,
@@ -351,7 +369,7 @@ impl Frame {
     }
 
     /// Lets an agent whose sightings contradict the estimate search farther around.
-    fn widen_if_refused(&mut self, observer: usize) {
+    pub(super) fn widen_if_refused(&mut self, observer: usize) {
         if self.members[observer].state.refused >= REFUSED_TO_WIDEN {
             self.members[observer].state_mut().refused = 0;
             self.widen(observer, WIDENED_SD.0, WIDENED_SD.1);
@@ -361,17 +379,17 @@ impl Frame {
 
 /// What a sighting may do.
 #[derive(Clone, Debug)]
-struct CorrectionScope {
+pub(super) struct CorrectionScope {
     /// The components that it corrects.
-    corrected: Range<usize>,
+    pub(super) corrected: Range<usize>,
     /// Whether it speaks for or against its observer.
-    counts: bool,
+    pub(super) counts: bool,
 }
 
 impl CorrectionScope {
     /// The squared innovations in units of their variances, if none is beyond the gate: one that is
     /// not a number is, too. Counts for or against the observer.
-    fn judge<const M: usize>(
+    pub(super) fn judge<const M: usize>(
         &self,
         residual: &SVector<f64, M>,
         expected: &SVector<f64, M>,
@@ -390,15 +408,15 @@ impl CorrectionScope {
 
 /// A member at an instant.
 #[derive(Clone, Debug)]
-struct PastPose {
-    pose: Isometry3<f64>,
+pub(super) struct PastPose {
+    pub(super) pose: Isometry3<f64>,
     /// Jacobian of the pose error then with respect to the pose error now.
     by_now: Matrix6<f64>,
     offset: usize,
 }
 
 impl PastPose {
-    fn new(member: &Member, back: &Isometry3<f64>) -> Self {
+    pub(super) fn new(member: &Member, back: &Isometry3<f64>) -> Self {
         Self {
             pose: member.filter().pose * back.inverse(),
             by_now: se3::adjoint(back),
@@ -406,7 +424,7 @@ impl PastPose {
         }
     }
 
-    fn block<const M: usize>(&self, jacobian: &SMatrix<f64, M, 6>) -> Block<M> {
+    pub(super) fn block<const M: usize>(&self, jacobian: &SMatrix<f64, M, 6>) -> Block<M> {
         Block {
             offset: self.offset,
             width: 6,

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::agent_slot::AgentState;
 use super::effect::Effect;
 use super::joint::Estimator;
 use super::outcome::Step;
@@ -31,12 +32,15 @@ impl Estimator {
         } else {
             return Step::none();
         };
-        let filter = &mut state.filter;
+        let AgentState {
+            filter, ranging, ..
+        } = state;
         let duration_s = filter.history.stamp_ns().map_or(0.0, |before| {
             let interval_s = stamp_ns.saturating_sub(before) as f64 * 1e-9;
             interval_s.clamp(0.0, MOTION_INTERVAL_S_MAX)
         });
         let step = filter.step(motion, duration_s, &self.parameters);
+        ranging.go(&step.increment, &step.variance);
         filter.history.advance(stamp_ns, motion.increment());
         effects.push(Effect::Moved { agent, step });
         if filter.is_nowhere() {

@@ -119,6 +119,7 @@ impl Estimator {
         let widen = |state: &mut AgentState| {
             state.filter.history.clear();
             state.filter.noise.forget_anchors();
+            state.ranging.clear();
             let covariance = state.filter.covariance_mut();
             for k in 0..6 {
                 covariance[(k, k)] += sd[k] * sd[k];
@@ -147,17 +148,16 @@ impl Estimator {
         };
         self.depart(from);
         self.frame_mut(MAP).population += 1;
-        let AgentState {
-            filter, mut sensor, ..
-        } = Arc::unwrap_or_clone(state);
+        let mut state = Arc::unwrap_or_clone(state);
         // Numbers of landmarks change.
-        sensor.latest.clear();
+        state.forget_targets();
         let state = AgentState {
-            filter: filter.placed(*pose, covariance),
-            sensor,
+            filter: state.filter.placed(*pose, covariance),
             refused: 0,
             // Who was doubted stays so until what it sees fits.
             doubt,
+            too_long: 0,
+            ..state
         };
         let slot = self.slot_mut(agent);
         slot.frame = MAP;

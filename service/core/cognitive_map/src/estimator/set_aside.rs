@@ -173,11 +173,10 @@ impl Estimator {
             population: 1,
             ..Frame::default()
         };
-        let AgentState {
-            filter, mut sensor, ..
-        } = Arc::unwrap_or_clone(state);
+        let mut state = Arc::unwrap_or_clone(state);
         // Numbers of landmarks change.
-        sensor.latest.clear();
+        state.forget_targets();
+        let filter = state.filter;
         let mut anew = AgentFilter::new(Isometry3::identity(), &Matrix6::zeros(), &self.parameters);
         anew.history = filter.history;
         anew.is_planar = filter.is_planar;
@@ -185,9 +184,13 @@ impl Estimator {
         anew.noise.forget_anchors();
         let state = AgentState {
             filter: anew,
-            sensor,
+            sensor: state.sensor,
+            range_sensor: state.range_sensor,
+            // All that they know is relative to the agent.
+            ranging: state.ranging,
             refused: 0,
             doubt: 0,
+            too_long: 0,
         };
         let slot = self.slot_mut(agent);
         slot.frame = number;

@@ -64,7 +64,7 @@ impl Anchor {
         relation: &Relation,
         motion: &NoisyMotion,
     ) -> Option<Self> {
-        let (point, _) = seen_at(relation);
+        let (point, _) = seen_at(relation)?;
         let innovation = PointInnovation::new(relation, &point)?;
         let sd = innovation.variance.map(f64::sqrt);
         Some(Self {
@@ -105,7 +105,8 @@ impl Anchor {
         let duration_s = (stamp_ns - self.stamp_ns) as f64 * 1e-9;
         let lasting = by_motion * lasting_errors(&moved, duration_s, lasting);
         // A planar robot's elevations are no measurements.
-        let is_planar = self.point.z == 0.0 && seen_at(relation).0.z == 0.0;
+        let is_planar =
+            self.point.z == 0.0 && seen_at(relation).is_some_and(|(seen, _)| seen.z == 0.0);
         let components = (0..3).filter(|&k| k < 2 || !is_planar);
         let residual = |k: usize| {
             let noise = |of: &Matrix3x6<f64>| of.row(k).dot(&by_beginning.row(k)).max(0.0);

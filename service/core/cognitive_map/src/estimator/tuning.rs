@@ -150,6 +150,69 @@ pub(super) const CORRELATION_INTERVAL_S_MAX: f64 = 4.0;
 /// Least sum of squares that a correlation is the quotient of.
 pub(super) const CORRELATION_SQUARE_MIN: f64 = 1e-12;
 
+/// Deviation of a bearing from which on a sighting counts as a distance alone \[rad\]. Source: of
+/// an angle on the circle, one radian of noise leaves nine tenths of the information that it would
+/// have on a line, and two leave a tenth; an arc of one radian is no tangent any more.
+pub(super) const VAGUE_BEARING_SD_RAD: f64 = 1.0;
+
+/// Largest variance of an angle that is told from a larger one \[rad²\]: it says nothing.
+pub(super) const CIRCLE_VARIANCE_MAX: f64 = 30.0;
+
+// --- Distances alone
+// ---------------------------------------------------------------------------
+
+/// Landmarks of which an agent knows distances alone. Source: memory; each has up to 288 places of
+/// 104 bytes.
+pub(super) const RANGED_MAX: usize = 32;
+/// Places on a ring about the antenna. Source: with spacing and deviation of an eighth of a radian,
+/// an arc differs from its tangent by a hundredth of its radius.
+pub(super) const RANGE_RING_POINTS: u32 = 48;
+/// Places on a sphere about it, a fifth of a radian apart. Source: work.
+pub(super) const RANGE_SPHERE_POINTS: u32 = 256;
+/// Deviation of a place along the ring, in the spacing of two. Source: so that their sum is even.
+pub(super) const RANGE_OVERLAP: f64 = 0.6;
+/// Elevation of a ring above the one below it \[rad\], and the most rings. Source: half of it is the
+/// deviation, as along a ring of which the points are as far apart twice; up to 75 degrees.
+pub(super) const RANGE_LAYER_RAD: f64 = 0.26;
+pub(super) const RANGE_LAYERS: u32 = 6;
+/// Greatest height of a beacon above an antenna \[m\]. Source: rooms; tags on robots, on walls, and
+/// below ceilings.
+pub(super) const RANGE_HEIGHT_MAX_M: f64 = 3.0;
+/// Degrees of freedom of the noise of distances (Student's t). Source: walls in between and
+/// reflections; Lange, Little & Taylor 1989.
+pub(super) const RANGE_DOF: f64 = 4.0;
+/// Part of the distances that are supposed to be those of reflections where nothing is known yet,
+/// and by how much they are too long at most \[m\]. Source: halls.
+pub(super) const RANGE_REFLECTED: f64 = 0.1;
+pub(super) const RANGE_REFLECTION_MAX_M: f64 = 20.0;
+/// Most of a distance's variance, in its own, by which the ring at a place is round.
+pub(super) const RANGE_CURVED_MAX: f64 = 3.0;
+/// Weight below which a place is dropped.
+pub(super) const RANGE_WEIGHT_MIN: f64 = 1e-5;
+/// Weight of the places about the best one from which on it is the landmark's.
+pub(super) const RANGE_JOIN_MASS: f64 = 0.99;
+/// Largest sag of an arc of its deviation, in deviations of a distance.
+pub(super) const RANGE_JOIN_SAG: f64 = 0.1;
+/// Largest deviation of the direction of a landmark that joins after a long way \[rad\]. Source: its
+/// arc differs from its tangent by a hundredth of the distance.
+pub(super) const RANGE_JOIN_ANGLE_RAD: f64 = 0.15;
+/// Factor of the variances of a landmark that is learned by distances. Source: errors of distances
+/// last, and Gaussians that are left out have tails.
+pub(super) const RANGE_JOIN_WIDENING: f64 = 4.0;
+/// Squared innovation beyond which a distance fits no place: three deviations.
+pub(super) const RANGE_OUTLYING_SQUARE: f64 = 9.0;
+/// Distances after which the places begin anew if most have fitted none of them.
+pub(super) const RANGE_TRIAL_MIN: u32 = 8;
+/// Squared innovation beyond which a distance that is too long is that of a reflection.
+pub(super) const RANGE_TOO_LONG_SQUARE: f64 = 25.0;
+/// Distances in a row that are too long, from which on they contradict the estimate as any other
+/// sighting does. Source: where half are reflected, that many are once in a hundred thousand times.
+pub(super) const RANGES_TOO_LONG_MAX: u32 = 16;
+/// Correlation of the errors of successive distances of one target, before any was seen, and the
+/// largest one that counts.
+pub(super) const RANGE_PRIOR_CORRELATION: f64 = 0.5;
+pub(super) const RANGE_CORRELATION_MAX: f64 = 0.98;
+
 // --- Outliers and contradictions -----------------------------------------------------------------
 
 /// Refused sightings in a row after which an agent's pose becomes less certain. Source: *hall*, an
@@ -183,6 +246,9 @@ pub(super) const DOUBT_ON_RETURN: u32 = 2 * DOUBT_MIN;
 /// and the others' variances would have to grow by an eighth each time. They stay as they are: what
 /// they miss is small, and a growth with every return would not end.
 pub(super) const RETURN_WIDENING: f64 = 3.0;
+/// Factor of the variances of an archived landmark whose distance alone is measured: the weight ½
+/// of covariance intersection.
+pub(super) const ARCHIVE_WIDENING: f64 = 2.0;
 /// Least variance and information of a component that an archived landmark gains \[m², 1/m²\].
 pub(super) const ARCHIVE_GAIN_MIN_M2: f64 = 1e-9;
 /// Normalised distance between an archived landmark and its new sighting from which on the archived

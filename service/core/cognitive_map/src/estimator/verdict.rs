@@ -16,6 +16,17 @@ pub(super) enum Verdict {
     },
     /// It did not.
     Refused,
+    /// A distance was too long, as that of a reflection is: it says nothing, against nobody.
+    Reflected,
+    /// It waits for others that say where the target is.
+    Pending,
+}
+
+impl Verdict {
+    /// Whether what was seen is worth to be remembered.
+    pub(super) fn is_accepted(self) -> bool {
+        !matches!(self, Self::Refused | Self::Reflected)
+    }
 }
 
 /// A sighting's verdict, and the variances it was weighed with.

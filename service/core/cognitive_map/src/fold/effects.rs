@@ -4,6 +4,7 @@
 use super::CognitiveMap;
 use super::apply::Fold;
 use crate::estimator::{AgentSighted, Effect, FramesMerged};
+use crate::input::Relation;
 use crate::keyframes::{Moment, Refined, RelaxationJob};
 use crate::memory::place::PlaceId;
 use pose_graph::PoseGraph;
@@ -38,6 +39,21 @@ impl Fold<'_> {
                     &step.variance,
                     &step.calibrated,
                 ),
+                Effect::LandmarkSighted {
+                    label,
+                    relation: Relation::Range(range),
+                    variance,
+                    at,
+                    is_new,
+                    ..
+                } => {
+                    let moment = self.moment();
+                    let graph = &mut self.keyframes.graph;
+                    graph.landmark_range(&moment, &label, &range, variance.x, at);
+                    if is_new {
+                        graph.found_by_ranges();
+                    }
+                }
                 Effect::LandmarkSighted {
                     label,
                     relation,

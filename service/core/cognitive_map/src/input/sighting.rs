@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::invalid::{METRES_MAX, bounded, deviations};
-use super::{InvalidSample, Label, NoisyPose, PoseNoise};
+use super::{InvalidSample, Label, NoisyPose, PoseNoise, Range};
 use state::{CorruptState, State, StateReader, StateWriter};
 
 /// A target seen from the body.
@@ -35,6 +35,8 @@ pub enum Relation {
     RangeBearing(RangeBearing),
     /// A full pose.
     Pose(RelativePose),
+    /// A distance alone.
+    Range(Range),
 }
 
 /// A position relative to the body.
@@ -166,6 +168,10 @@ impl State for Relation {
                 2u8.write(out);
                 (*seen.pose(), *seen.noise().sd()).write(out);
             }
+            Self::Range(seen) => {
+                3u8.write(out);
+                (seen.range_m(), (seen.range_sd_m(), *seen.antenna_m())).write(out);
+            }
         }
     }
 
@@ -187,6 +193,10 @@ impl State for Relation {
                 PoseNoise::new(linear, angular)
                     .and_then(|noise| RelativePose::new(at.into(), turn.into(), noise))
                     .map(|checked| Self::Pose(checked.exactly(pose)))
+            }
+            3 => {
+                let (range, (sd, antenna)) = <(f64, (f64, [f64; 3]))>::read(input)?;
+                Range::new(range, sd, antenna).map(Self::Range)
             }
             _ => return Err(CorruptState::Invalid),
         };

@@ -29,7 +29,10 @@ impl KeyframeMap {
         self.pending = Some(PendingRelaxation::Awaited(job));
         if self.graph.is_due() {
             // What comes from now on is for the next one.
-            self.graph.constraints.schedule = Schedule::default();
+            self.graph.constraints.schedule = Schedule {
+                keyframes_then: self.graph.keyframes_with_ranges(),
+                ..Schedule::default()
+            };
         }
         let mut meanwhile = Meanwhile::new(matches_views);
         meanwhile.note(agent, stamp_ns);

@@ -161,6 +161,11 @@ impl KeyframeMap {
     pub fn digest(&self) -> Digest {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
+        // A map without views has the digest that it had before there was a log.
+        let has_views = !self.recognition.views().is_empty() || !self.graph.matches.is_empty();
+        if has_views {
+            self.write_views(&mut out);
+        }
         if let (Some(pending), Some(meanwhile)) = (&self.pending, &self.graph.meanwhile) {
             pending.write_digested(&mut out);
             meanwhile.write(&mut out);
@@ -168,6 +173,7 @@ impl KeyframeMap {
         for stored in &PARTS {
             match stored {
                 Stored::InGraph(vector, _) => vector(&self.graph).write_digests(&mut out),
+                Stored::InRecognition(Part::Log) if !has_views => {}
                 Stored::InRecognition(part) => self.recognition.write_digests(*part, &mut out),
             }
         }
@@ -186,6 +192,7 @@ impl KeyframeMap {
     fn head(&self) -> KeyframePage {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
+        self.write_views(&mut out);
         let pending = self.pending.as_ref().zip(self.graph.meanwhile.as_deref());
         pending.is_some().write(&mut out);
         if let Some((pending, meanwhile)) = pending {
@@ -199,7 +206,6 @@ impl KeyframeMap {
         let graph = &self.graph;
         graph.chains.sweep.write(out);
         graph.constraints.schedule.write(out);
-        write_list(graph.matches.iter(), out);
         self.recognition.write_head(out);
         graph.chains.keyframes.vacancy().write(out);
         graph.sightings.slab.vacancy().write(out);
@@ -210,12 +216,17 @@ impl KeyframeMap {
         N_PENDING.write(out);
     }
 
+    /// Writes the matches of views, and what the log has in no page.
+    fn write_views(&self, out: &mut StateWriter) {
+        write_list(self.graph.matches.iter(), out);
+        self.recognition.views().write_head(out);
+    }
+
     fn read_head(&mut self, bytes: &[u8]) -> Result<(), CorruptState> {
         let mut input = StateReader::new(bytes);
         let graph = &mut self.graph;
         graph.chains.sweep = State::read(&mut input)?;
         graph.constraints.schedule = State::read(&mut input)?;
-        graph.matches = read_list::<ViewMatch>(&mut input, NONE)?.into();
         self.recognition.read_head(&mut input)?;
         graph.chains.keyframes.set_vacancy(State::read(&mut input)?);
         graph.sightings.slab.set_vacancy(State::read(&mut input)?);
@@ -230,6 +241,8 @@ impl KeyframeMap {
         if u64::read(&mut input)? != N_PENDING {
             return Err(CorruptState::Invalid);
         }
+        graph.matches = read_list::<ViewMatch>(&mut input, NONE)?.into();
+        self.recognition.read_log_head(&mut input)?;
         if bool::read(&mut input)? {
             self.pending = Some(State::read(&mut input)?);
             self.graph.meanwhile = Some(Box::new(State::read(&mut input)?));

@@ -119,16 +119,38 @@ impl KeyframeGraph {
         self.constraints.n_accepted()
     }
 
-    /// Whether closures are new, and enough records have come in since the last relaxation to pay
-    /// for another one.
+    /// Whether closures are new or landmarks were found by distances, and enough records have come
+    /// in since the last relaxation to pay for another one.
     pub fn is_due(&self) -> bool {
         let schedule = &self.constraints.schedule;
-        schedule.new_closures > 0
+        (schedule.new_closures > 0 || self.has_news_by_ranges())
             && schedule.records as usize >= self.n_keyframes() / tuning::KEYFRAMES_PER_RECORD
     }
 
+    /// Whether distances say more of the past than they did at the last relaxation: a landmark was
+    /// found, or the past has grown by a third.
+    ///
+    /// The live estimate takes a distance in where it then thinks that everything is, and the first
+    /// ones not at all.
+    fn has_news_by_ranges(&self) -> bool {
+        let schedule = &self.constraints.schedule;
+        let then = schedule.keyframes_then as usize;
+        let has_grown = self.n_keyframes() as f64 >= tuning::RANGES_GROWTH * then as f64;
+        schedule.found > 0 || (schedule.ranges > 0 && has_grown)
+    }
+
+    /// Number of keyframes, where distances say anything of the past; 0 without any.
+    pub(super) fn keyframes_with_ranges(&self) -> u32 {
+        let schedule = &self.constraints.schedule;
+        if schedule.ranges == 0 && schedule.keyframes_then == 0 {
+            return 0;
+        }
+        u32::try_from(self.n_keyframes()).unwrap_or(u32::MAX)
+    }
+
     /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses
-    /// of the agents in the map; nothing if no closure was accepted or rejected.
+    /// of the agents in the map; nothing if no closure was accepted or rejected, and no distances
+    /// came.
     ///
     /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then
     /// the same records give the same map.
@@ -154,7 +176,8 @@ impl KeyframeGraph {
             coarse.accept_consistent();
         }
         let is_nothing_new = is_undecided && coarse.accepted().next().is_none();
-        if is_nothing_new && judged.is_empty() && schedule.accepted == 0 && !is_matched {
+        let is_settled = schedule.accepted == 0 && schedule.ranges == 0 && !is_matched;
+        if is_nothing_new && judged.is_empty() && is_settled {
             return Vec::new();
         }
         let best = RelaxationCopy::most_probable(coarse, judged);
@@ -164,7 +187,7 @@ impl KeyframeGraph {
             accepted.map(|(number, _)| number).collect()
         };
         let (before, now) = (accepted(self), accepted(best.copy.graph()));
-        if schedule.accepted == 0 && before == now && !is_matched {
+        if is_settled && before == now {
             return Vec::new();
         }
         self.adopt(best.copy.graph());

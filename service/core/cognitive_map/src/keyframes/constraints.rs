@@ -1,6 +1,6 @@
 //! The constraints of the keyframe graph, each in the lists of its two keyframes.
 
-use state::{NONE, Slab, state_of_struct};
+use state::{CorruptState, NONE, Slab, State, StateReader, StateWriter};
 
 use super::constraint::Constraint;
 use super::keyframe::{Keyframe, KeyframeSlab};
@@ -22,13 +22,52 @@ pub(super) struct Schedule {
     pub(super) new_closures: u32,
     /// Those of them that were accepted at once.
     pub(super) accepted: u32,
+    /// Landmarks of which distances alone are known that were found.
+    pub(super) found: u32,
+    /// Distances of targets whose place is known.
+    pub(super) ranges: u32,
+    /// Keyframes at that relaxation.
+    pub(super) keyframes_then: u32,
 }
 
-state_of_struct!(Schedule {
-    records,
-    new_closures,
-    accepted
-});
+/// Bit of the number of accepted closures that says that what is known of distances follows:
+/// without any, a schedule has the bytes that it had before there were distances.
+const HAS_RANGES: u32 = 1 << 31;
+
+impl State for Schedule {
+    fn write(&self, out: &mut StateWriter) {
+        let ranges = [self.found, self.ranges, self.keyframes_then];
+        let follows = ranges != [0; 3];
+        let flag = if follows { HAS_RANGES } else { 0 };
+        self.records.write(out);
+        self.new_closures.write(out);
+        (self.accepted.min(HAS_RANGES - 1) | flag).write(out);
+        if follows {
+            ranges.write(out);
+        }
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        let (records, new_closures) = (u32::read(input)?, u32::read(input)?);
+        let accepted = u32::read(input)?;
+        let mut ranges = [0; 3];
+        if accepted & HAS_RANGES != 0 {
+            ranges = State::read(input)?;
+            if ranges == [0; 3] {
+                return Err(CorruptState::Invalid);
+            }
+        }
+        let [found, ranges, keyframes_then] = ranges;
+        Ok(Self {
+            records,
+            new_closures,
+            accepted: accepted & !HAS_RANGES,
+            found,
+            ranges,
+            keyframes_then,
+        })
+    }
+}
 
 impl Constraints {
     /// The constraints that end at a keyframe.

@@ -91,14 +91,14 @@ impl Sighting {
     /// The sighting as the neighbour of its keyframe would have made it.
     pub(super) fn seen_from(&self, neighbour: &Neighbour) -> Self {
         let (motion, covariance) = (&neighbour.motion, &neighbour.covariance);
-        let point = if neighbour.is_previous {
-            self.point.before(motion, covariance)
+        let seen = if neighbour.is_previous {
+            self.seen.before(motion, covariance)
         } else {
-            self.point.after(motion, covariance)
+            self.seen.after(motion, covariance)
         };
         Self {
             keyframe: neighbour.number,
-            point,
+            seen,
             ..self.clone()
         }
     }
@@ -124,7 +124,7 @@ impl Sighting {
             (place, noise)
         };
         moved.shown = Seen::Agent(neighbour.number, place.coords);
-        moved.point.fresh += symmetric(&noise);
+        moved.seen.add_noise(&symmetric(&noise));
         moved
     }
 }

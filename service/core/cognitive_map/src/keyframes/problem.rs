@@ -1,18 +1,19 @@
 //! The keyframe graph as a problem of nonlinear least squares.
 
-use nalgebra::{Isometry3, Matrix6, Point3, SVector, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SVector, Vector3, Vector6};
 
 use super::calibrations::Calibrations;
 use super::constraint::{ClosureState, Constraint};
 use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
+use super::observation::Observation;
 use super::sighting::{Seen, Sighting};
 use super::tuning;
 use crate::estimator::Calibration;
 use geometry::{PoseCovariance, from_planar_part, planar_part};
 use pose_graph::{
     Freedom, Kernel, Lengths, Link, LinkId, Marginals, PointId, PoseGraph, PoseId, PoseInformation,
-    PositionInformation, Scale, SightingTarget, Veer,
+    PositionInformation, RangeInformation, Scale, SightingTarget, Veer,
 };
 use state::NONE;
 
@@ -88,6 +89,9 @@ impl Problem {
         }
         for (number, constraint) in constraints.iter() {
             problem.links[number as usize] = problem.add_constraint(graph, constraint, among);
+        }
+        for (_, sighting) in graph.sightings.slab.iter() {
+            problem.add_landmark(sighting);
         }
         for (_, sighting) in graph.sightings.slab.iter() {
             problem.add_sighting(sighting);
@@ -222,24 +226,64 @@ impl Problem {
         self.map.add_link(link, kernel).ok()
     }
 
+    /// Adds a node for the landmark of a sighting that says where it is.
+    fn add_landmark(&mut self, sighting: &Sighting) -> Option<()> {
+        let Seen::Landmark(number) = sighting.shown else {
+            return None;
+        };
+        let from = self.node(sighting.keyframe)?;
+        let position = match &sighting.seen {
+            Observation::Point(point) => point.position,
+            Observation::Range(range) => range.at?,
+        };
+        if self.point(number).is_none() {
+            let at = self.map.pose(from) * Point3::from(position);
+            let point = self.map.add_point(at, Freedom::Full);
+            self.points[number as usize] = Some(point);
+            if matches!(sighting.seen, Observation::Range(_)) {
+                self.add_point_prior(point, at);
+            }
+        }
+        Some(())
+    }
+
+    /// Adds a prior of a point of which perhaps distances alone are known: of what lies in their
+    /// plane, robots that stay in it do not see the height.
+    fn add_point_prior(&mut self, point: PointId, at: Point3<f64>) {
+        let (across, height) = tuning::RANGED_POINT_SD_M;
+        let variances = Vector3::new(across, across, height).map(|sd| sd * sd);
+        let covariance = Matrix3::from_diagonal(&variances);
+        let prior =
+            PositionInformation::of_covariance(&covariance).map(|information| Link::PointPrior {
+                point,
+                at,
+                information,
+            });
+        if let Ok(prior) = prior {
+            self.map.add_link(prior, Kernel::Gaussian).ok();
+        }
+    }
+
     fn add_sighting(&mut self, sighting: &Sighting) -> Option<LinkId> {
         let from = self.node(sighting.keyframe)?;
-        let position = sighting.point.position;
         let target = match sighting.shown {
             Seen::Agent(target, lever) => SightingTarget::PointOf(self.node(target)?, lever),
-            Seen::Landmark(number) => {
-                let point = &mut self.points[number as usize];
-                let at = self.map.pose(from) * Point3::from(position);
-                let add = || self.map.add_point(at, Freedom::Full);
-                SightingTarget::Point(*point.get_or_insert_with(add))
-            }
+            Seen::Landmark(number) => SightingTarget::Point(self.point(number)?),
         };
-        let information = PositionInformation::of_covariance(&sighting.point.covariance()).ok()?;
-        let link = Link::Sighting {
-            from,
-            target,
-            position,
-            information,
+        let link = match &sighting.seen {
+            Observation::Point(point) => Link::Sighting {
+                from,
+                target,
+                position: point.position,
+                information: PositionInformation::of_covariance(&point.covariance()).ok()?,
+            },
+            Observation::Range(range) => Link::Range {
+                from,
+                antenna: range.antenna,
+                target,
+                range_m: range.range_m,
+                information: RangeInformation::of_variance(range.variance()).ok()?,
+            },
         };
         let kernel =
             Kernel::Cauchy(Scale::new(tuning::SIGHTING_SCALE).expect("a positive constant"));

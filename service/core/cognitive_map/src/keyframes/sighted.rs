@@ -5,8 +5,10 @@ use nalgebra::Vector3;
 use super::graph::KeyframeGraph;
 use super::instant::KeyframeOffset;
 use super::moment::Moment;
+use super::observation::Observation;
+use super::seen_range::SeenRange;
 use super::sighting::{Seen, SeenPoint, Sighting};
-use crate::input::{Label, Relation};
+use crate::input::{Label, Range, Relation};
 use state::NONE;
 
 impl KeyframeGraph {
@@ -20,13 +22,46 @@ impl KeyframeGraph {
         relation: &Relation,
         variance: &Vector3<f64>,
     ) {
+        let seen = Observation::Point(SeenPoint::new(relation, variance));
+        self.observe_landmark(moment, label, &seen);
+    }
+
+    /// Adds a distance of a landmark, with its variance \[m²\], and where the landmark is in the body
+    /// frame by the estimate. One whose place was never known is kept, and does not count.
+    pub fn landmark_range(
+        &mut self,
+        moment: &Moment,
+        label: &Label,
+        range: &Range,
+        variance: f64,
+        at: Option<Vector3<f64>>,
+    ) {
+        let seen = Observation::Range(SeenRange::new(range, variance, at));
+        self.count_range(at.is_some());
+        self.observe_landmark(moment, label, &seen);
+    }
+
+    fn count_range(&mut self, is_place_known: bool) {
+        let schedule = &mut self.constraints.schedule;
+        schedule.ranges = schedule.ranges.saturating_add(u32::from(is_place_known));
+    }
+
+    /// A landmark was found by distances that had corrected nothing: the past is to be relaxed by
+    /// them.
+    pub fn found_by_ranges(&mut self) {
+        let schedule = &mut self.constraints.schedule;
+        schedule.found = schedule.found.saturating_add(1);
+    }
+
+    /// Adds what an agent measures of a landmark.
+    fn observe_landmark(&mut self, moment: &Moment, label: &Label, seen: &Observation) {
         self.note(moment);
         let Some(here) = self.here(moment.agent) else {
             return;
         };
-        let point = SeenPoint::new(relation, variance).before(&here.motion, &here.covariance);
+        let seen = seen.before(&here.motion, &here.covariance);
         if let Some(landmark) = self.sightings.landmarks.show(label, self.revision) {
-            self.remember_sighting(here.keyframe, Seen::Landmark(landmark), point);
+            self.remember_sighting(here.keyframe, Seen::Landmark(landmark), seen);
         }
     }
 
@@ -49,21 +84,32 @@ impl KeyframeGraph {
         let Some(there) = self.at_stamp(target, stamp_ns) else {
             return; // too long ago
         };
-        let mut point = SeenPoint::new(relation, variance).before(&here.motion, &here.covariance);
         let keyframes = &self.chains.keyframes;
         let (Some(from), Some(to)) = (keyframes.get(here.keyframe), keyframes.get(there.keyframe))
         else {
             return;
         };
+        let seen = match relation {
+            Relation::Range(range) => {
+                let shown = to.pose * there.motion;
+                let seen = (from.pose * here.motion).inverse() * shown;
+                let at = Some(seen.translation.vector);
+                Observation::Range(SeenRange::new(range, variance[0], at))
+            }
+            _ => Observation::Point(SeenPoint::new(relation, variance)),
+        };
+        let mut seen = seen.before(&here.motion, &here.covariance);
+        let is_range = matches!(seen, Observation::Range(_));
         // Noise of the motion from the keyframe, in the frame of the observer.
         let turn = from.pose.rotation.inverse() * to.pose.rotation * there.motion.rotation;
         let turn = turn.to_rotation_matrix().into_inner();
         let spread = { there.covariance.matrix() }
             .fixed_view::<3, 3>(0, 0)
             .into_owned();
-        point.fresh += turn * spread * turn.transpose();
+        seen.add_noise(&(turn * spread * turn.transpose()));
         let lever = there.motion.translation.vector;
-        self.remember_sighting(here.keyframe, Seen::Agent(there.keyframe, lever), point);
+        self.remember_sighting(here.keyframe, Seen::Agent(there.keyframe, lever), seen);
+        self.count_range(is_range);
     }
 
     /// The present instant of an agent: at its latest keyframe if that is near, or at a new one.
@@ -97,7 +143,7 @@ impl KeyframeGraph {
     }
 
     /// Adds a sighting; where memory is full, another one makes room for it.
-    fn remember_sighting(&mut self, keyframe: u32, shown: Seen, point: SeenPoint) {
+    fn remember_sighting(&mut self, keyframe: u32, shown: Seen, seen: Observation) {
         let is_full = |this: &Self| this.n_sightings() >= this.settings.sightings_max as usize;
         if is_full(self) {
             self.sparsify();
@@ -110,7 +156,7 @@ impl KeyframeGraph {
             next: NONE,
             shown,
             next_shown: NONE,
-            point,
+            seen,
         };
         if !self.add_sighting(sighting)
             && let Seen::Landmark(landmark) = shown

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
+use super::observation::Observation;
 use super::tuning;
 use crate::input::Relation;
 use geometry::{PoseCovariance, beside, symmetric};
@@ -16,7 +17,7 @@ pub(super) enum Seen {
     Agent(u32, Vector3<f64>),
 }
 
-/// A position seen from a keyframe.
+/// A position or a distance measured at a keyframe.
 #[derive(Clone, Debug)]
 pub(super) struct Sighting {
     /// The keyframe from which, and the next sighting made there.
@@ -25,7 +26,7 @@ pub(super) struct Sighting {
     pub(super) shown: Seen,
     /// The next sighting that shows the same keyframe.
     pub(super) next_shown: u32,
-    pub(super) point: SeenPoint,
+    pub(super) seen: Observation,
 }
 
 /// A position in the frame of a keyframe \[m\], with the covariance of its error \[m²\].
@@ -49,7 +50,7 @@ state_of_struct!(Sighting {
     next,
     shown,
     next_shown,
-    point
+    seen
 });
 
 impl State for Seen {
@@ -112,6 +113,8 @@ impl SeenPoint {
                     Vector3::new(1.0, range_m * range_m, range_m * range_m),
                 )
             }
+            // In any direction.
+            Relation::Range(seen) => (*seen.antenna_m(), Matrix3::identity(), Vector3::repeat(1.0)),
         };
         let fresh = stated_variance(relation).inf(variance);
         let lasting = variance - fresh;
@@ -180,7 +183,8 @@ impl SeenPoint {
     }
 }
 
-/// Variances of a relation's components as it states them \[m², or m², rad², rad²\].
+/// Variances of a relation's components as it states them \[m², or m², rad², rad²\]; of a distance
+/// alone, those of a point that lies so far off in any direction.
 pub(super) fn stated_variance(relation: &Relation) -> Vector3<f64> {
     let sd = match relation {
         Relation::Position(seen) => *seen.sd_m(),
@@ -189,6 +193,7 @@ pub(super) fn stated_variance(relation: &Relation) -> Vector3<f64> {
             let bearing = seen.bearing_sd_rad();
             Vector3::new(seen.range_sd_m(), bearing, bearing)
         }
+        Relation::Range(seen) => Vector3::repeat(seen.range_m().hypot(seen.range_sd_m())),
     };
     sd.component_mul(&sd)
 }

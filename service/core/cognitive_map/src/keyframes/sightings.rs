@@ -49,7 +49,7 @@ impl Sightings {
             least_certain: NONE,
         };
         for (number, sighting) in self.made_at(keyframe) {
-            let spread = sighting.point.covariance().trace();
+            let spread = sighting.seen.spread();
             if spread > crowd.spread {
                 (crowd.spread, crowd.least_certain) = (spread, number);
             }
@@ -59,7 +59,7 @@ impl Sightings {
     }
 
     /// Adds a sighting, of at most `most`, to the lists of its keyframe and of the one that it
-    /// shows. It is merged with one of the same landmark; in a full list it replaces the least
+    /// shows. It is merged with one of the same landmark, if both are of one kind; in a full list it replaces the least
     /// certain one. Answers whether there is one more.
     pub(super) fn add(
         &mut self,
@@ -74,11 +74,14 @@ impl Sightings {
         let is_same = |other: &Sighting| {
             matches!(other.shown, Seen::Landmark(_)) && other.shown == sighting.shown
         };
-        let same = self.made_at(keyframe).find(|(_, other)| is_same(other));
-        if let Some((number, other)) = same {
-            let mean = other.point.mean(&sighting.point);
-            if let (Some(point), Some(other)) = (mean, self.slab.get_mut(number, revision)) {
-                other.point = point;
+        let same = |(number, other): (u32, &Sighting)| {
+            let mean = is_same(other).then(|| other.seen.mean(&sighting.seen));
+            Some((number, mean.flatten()?))
+        };
+        let mean = self.made_at(keyframe).find_map(same);
+        if let Some((number, mean)) = mean {
+            if let Some(other) = self.slab.get_mut(number, revision) {
+                other.seen = mean;
             }
             return false;
         }
@@ -86,7 +89,7 @@ impl Sightings {
         let is_full = crowd.count as usize >= tuning::SIGHTINGS_PER_KEYFRAME_MAX
             || self.slab.len() >= most as usize;
         if is_full {
-            let spread = sighting.point.covariance().trace();
+            let spread = sighting.seen.spread();
             if crowd.least_certain == NONE || spread >= crowd.spread {
                 return false;
             }

@@ -6,7 +6,7 @@ use super::constraint::{ClosureState, composed};
 use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
 use super::neighbour::Neighbour;
-use super::sighting::{Seen, Sighting, lever_covariance};
+use super::sighting::{Seen, Sighting};
 use super::tuning;
 use geometry::PoseCovariance;
 use state::NONE;
@@ -66,12 +66,11 @@ impl KeyframeGraph {
         let covariance = &neighbour.covariance;
         let mut loss = self.chains.unevenness_without(keyframe) / tuning::UNEVENNESS_M;
         for (_, sighting) in self.sightings.made_at(keyframe) {
-            let spread = lever_covariance(&sighting.point.position, covariance).trace();
-            loss += spread / sighting.point.covariance().trace();
+            loss += sighting.seen.loss(covariance);
         }
         for sighting in self.sightings.showing(keyframe) {
             let spread = covariance.matrix().fixed_view::<3, 3>(0, 0).trace();
-            loss += spread / sighting.point.covariance().trace();
+            loss += spread / sighting.seen.spread();
         }
         let lever = neighbour.motion_to_removed().translation.vector.norm();
         for constraint in self.constraints.of(number, keyframe) {

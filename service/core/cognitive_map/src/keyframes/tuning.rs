@@ -20,6 +20,19 @@ pub(super) const LOOK_BACK_MAX: usize = 256;
 /// Most sightings of a keyframe.
 pub(super) const SIGHTINGS_PER_KEYFRAME_MAX: usize = 32;
 
+/// Deviations by which two distances from one place may differ to be taken together. Source: one
+/// that was reflected stays apart.
+pub(super) const RANGES_AGREE_SD: f64 = 3.0;
+
+/// Deviations of the position and the height of a point of which distances alone may be known, from
+/// where the estimate had it \[m\]. Source: so that the equations have one solution; more than what
+/// such a point is ever off, and for heights those of rooms.
+pub(super) const RANGED_POINT_SD_M: (f64, f64) = (100.0, 3.0);
+
+/// Growth of the number of keyframes after which distances relax the past again. Source: so the work
+/// of all relaxations is some four times that of the last one.
+pub(super) const RANGES_GROWTH: f64 = 1.3;
+
 // Attachments.
 
 /// Most attachments that are checked with one record. The work after a relaxation is spread, so

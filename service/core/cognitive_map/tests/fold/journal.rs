@@ -2,7 +2,7 @@
 
 use cognitive_map::{
     AgentId, CognitiveMap, Descriptor, Event, EventKind, InvalidSample, Label, Lesson, Level,
-    Marker, Motion, ObjectMark, PoseNoise, RangeBearing, Record, Recruitment, Relation,
+    Marker, Motion, ObjectMark, PoseNoise, Range, RangeBearing, Record, Recruitment, Relation,
     RelativePose, RelativePosition, Sample, SampleBody, Settings, SettingsValues, Sighting,
     SkipReason, Spacing, StartPose, Target, Touch, TouchNoise,
 };
@@ -433,6 +433,9 @@ fn sightings() -> impl Strategy<Value = Sighting> {
         (at(), at(), sd()).prop_map(|(at, turn, sd)| {
             let noise = PoseNoise::new([sd; 3], [sd; 3]).unwrap();
             Relation::Pose(RelativePose::new(at, xyzw(turn), noise).unwrap())
+        }),
+        (0.0..9.0f64, at(), sd()).prop_map(|(range, antenna, sd)| {
+            Relation::Range(Range::new(range, sd, antenna).unwrap())
         }),
     ];
     (target, relation).prop_map(|(target, relation)| Sighting { target, relation })

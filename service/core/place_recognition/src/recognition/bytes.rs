@@ -73,6 +73,14 @@ impl PlaceRecognition {
         self.views.read_head(input)
     }
 
+    /// Reads what the log of views has in no page.
+    ///
+    /// # Errors
+    /// The bytes are no such head.
+    pub fn read_log_head(&mut self, input: &mut StateReader<'_>) -> Result<(), CorruptState> {
+        self.views.log.read_head(input)
+    }
+
     /// Whether everything that the state names is there, among so many agents.
     pub fn is_sound(&self, agents: usize) -> bool {
         let is_channel = |channel, length| self.views.is_channel(channel, length);

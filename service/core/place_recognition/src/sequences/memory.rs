@@ -311,13 +311,11 @@ impl ViewMemory {
     pub(crate) fn write_head(&self, out: &mut StateWriter) {
         Counted::<u64>::write(&self.channels, out);
         self.thinnings.write(out);
-        (self.log.stride, self.log.n_new).write(out);
     }
 
     pub(crate) fn read_head(&mut self, input: &mut StateReader<'_>) -> Result<(), CorruptState> {
         self.channels = Counted::<u64>::read(input)?;
         self.thinnings = State::read(input)?;
-        (self.log.stride, self.log.n_new) = State::read(input)?;
         self.count_numbers();
         Ok(())
     }

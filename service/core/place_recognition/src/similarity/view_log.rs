@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 
 use crate::keyframes::SampleKey;
 use crate::tuning::log as tuning;
-use state::{Counted, PagedVec, State, StateWriter, state_of_struct};
+use state::{CorruptState, Counted, PagedVec, State, StateReader, StateWriter, state_of_struct};
 
 /// A view of the log.
 #[derive(Clone, Debug)]
@@ -117,6 +117,17 @@ impl ViewLog {
         channels.sort_unstable();
         channels.dedup();
         channels
+    }
+
+    /// Writes what is in no page.
+    pub fn write_head(&self, out: &mut StateWriter) {
+        (self.stride, self.n_new).write(out);
+    }
+
+    /// Reads what [`write_head`](Self::write_head) wrote.
+    pub(crate) fn read_head(&mut self, input: &mut StateReader<'_>) -> Result<(), CorruptState> {
+        (self.stride, self.n_new) = State::read(input)?;
+        Ok(())
     }
 
     /// Writes the digests of its pages.

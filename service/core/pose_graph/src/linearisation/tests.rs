@@ -6,7 +6,10 @@ use proptest::prelude::*;
 use super::NormalBlocks;
 use crate::link::{Link, SightingTarget};
 use crate::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId, Veer};
-use crate::{Calibration, CalibrationInformation, PoseInformation, PositionInformation, Reading};
+use crate::{
+    Calibration, CalibrationInformation, PoseInformation, PositionInformation, RangeInformation,
+    Reading,
+};
 
 /// A node from, a node to, and a link from the first to the second.
 #[derive(Clone, Debug)]
@@ -66,6 +69,19 @@ fn cases(
         position: position(target),
         information: position_information,
     };
+    let antenna = Vector3::new(-0.2, 0.1, 0.7);
+    let range = |target: SightingTarget| Link::Range {
+        from: a,
+        antenna,
+        target,
+        range_m: (from
+            .inverse_transform_point(&(to * Point3::from(target.lever())))
+            .coords
+            - antenna)
+            .norm()
+            + error.translation.vector.x,
+        information: RangeInformation::of_variance(0.04 * seed[0]).expect("a positive variance"),
+    };
     let at: Point3<f64> = (to.translation.vector + error.translation.vector).into();
     let links = [
         (
@@ -113,7 +129,13 @@ fn cases(
             node(to),
             sighting(SightingTarget::PointOf(b, Vector3::new(0.4, -0.3, 0.2))),
         ),
-        (point, sighting(SightingTarget::Point(PointId(1)))),
+        (point.clone(), sighting(SightingTarget::Point(PointId(1)))),
+        (node(to), range(SightingTarget::Pose(b))),
+        (
+            node(to),
+            range(SightingTarget::PointOf(b, Vector3::new(0.4, -0.3, 0.2))),
+        ),
+        (point, range(SightingTarget::Point(PointId(1)))),
     ];
     links
         .into_iter()
@@ -277,4 +299,23 @@ fn a_weight_multiplies_all_blocks() {
         assert!((whole.to_from - half.to_from * 2.0).norm() < 1e-12);
         assert!((whole.from_gradient - half.from_gradient * 2.0).norm() < 1e-12);
     }
+}
+
+/// Two antennas in one place are at no distance; in no direction are they nearer.
+#[test]
+fn a_distance_of_zero_has_no_direction() {
+    let here = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(-0.4, 0.2, 0.1));
+    let link = Link::Range {
+        from: PoseId(0),
+        antenna: Vector3::zeros(),
+        target: SightingTarget::Pose(PoseId(1)),
+        range_m: 2.0,
+        information: RangeInformation::of_variance(0.25).unwrap(),
+    };
+    assert!((link.squared_error(|_| &here) - 16.0).abs() < 1e-12);
+    let blocks = link.normal_blocks(|_| &here, |_| 1.0);
+    assert_eq!(blocks.to_gradient, Vector6::zeros());
+    assert_eq!(blocks.from_from, Matrix6::zeros());
+    assert!(RangeInformation::of_variance(0.0).is_err());
+    assert!(RangeInformation::of_variance(f64::NAN).is_err());
 }

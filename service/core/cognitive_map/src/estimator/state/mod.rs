@@ -21,13 +21,16 @@ use super::odometry_history::OdometryHistory;
 use super::odometry_noise::OdometryNoise;
 use super::outcome::Evidence;
 use super::parameters::Parameters;
+use super::range_hypotheses::{PointHypothesis, RangeHypotheses};
+use super::range_sensor::RangeSensor;
+use super::ranging::Ranging;
 use super::sensor::{Sensor, SightingTarget};
 use super::sighting_pair::{Anchor, NoisyMotion};
 use super::sightings::{CrossFrameSighting, PendingSighting};
 use super::tuning::{
     ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
     HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX, PENDING_MAX,
-    SENSOR_TARGETS_MAX,
+    RANGE_LAYERS, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGED_MAX, SENSOR_TARGETS_MAX,
 };
 use ::state::{
     Codec, CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum, state_of_struct,
@@ -39,6 +42,12 @@ const DIM_MAX: usize = MEMBERS_MAX * BODY_DIM + LANDMARKS_MAX * LANDMARK_DIM;
 const AGENTS_MAX: usize = 1 << 24;
 /// Most frames: the map's, and one for each agent.
 const FRAMES_MAX: usize = AGENTS_MAX + 1;
+/// Most places where a landmark may be of which distances alone are known.
+const RANGE_POINTS_MAX: usize = {
+    let rings = (RANGE_LAYERS * RANGE_RING_POINTS) as usize;
+    let sphere = RANGE_SPHERE_POINTS as usize;
+    if rings > sphere { rings } else { sphere }
+};
 /// Most archived landmarks of a frame.
 const ARCHIVED_MAX: usize = ARCHIVE_PARTS * ARCHIVE_PART_MAX;
 
@@ -90,11 +99,39 @@ state_of_struct!(OdometryNoise {
     motion,
     anchors as ListUpTo<NOISE_TARGETS_MAX>
 });
+state_of_struct!(PointHypothesis {
+    log_weight,
+    position,
+    covariance
+});
+state_of_struct!(RangeHypotheses {
+    points as ListUpTo<RANGE_POINTS_MAX>,
+    motion,
+    path_m,
+    used,
+    taken,
+    outlying
+});
+state_of_struct!(Ranging {
+    landmarks as MapUpTo<RANGED_MAX>,
+    since,
+    taken
+});
+state_of_struct!(RangeSensor {
+    scale,
+    count,
+    product,
+    square,
+    latest as MapUpTo<SENSOR_TARGETS_MAX>
+});
 state_of_struct!(AgentState {
     filter,
     sensor,
+    range_sensor,
+    ranging,
     refused,
-    doubt
+    doubt,
+    too_long
 });
 state_of_struct!(ArchivedLandmark {
     position,

@@ -1,0 +1,75 @@
+//! The landmarks of which an agent knows nothing but distances.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector6};
+
+use super::range_hypotheses::{RangeHypotheses, RangedPoint};
+use super::tuning::RANGED_MAX;
+use crate::input::{Label, Range};
+use geometry::MotionSum;
+
+/// Where the landmarks may be of which an agent knows nothing but distances. A clone shares them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Ranging {
+    pub(super) landmarks: Arc<BTreeMap<Label, RangeHypotheses>>,
+    /// Motion since the latest distance to any of them.
+    pub(super) since: MotionSum,
+    /// Distances taken in.
+    pub(super) taken: u64,
+}
+
+impl Ranging {
+    /// The agent moved, with these variances of the error on the right of the increment.
+    #[inline]
+    pub(super) fn go(&mut self, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
+        if !self.landmarks.is_empty() {
+            self.since.append(increment, variance);
+        }
+    }
+
+    /// Forgets them all: how the agent moved is not known.
+    pub(super) fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Forgets a landmark, whose position is known.
+    pub(super) fn forget(&mut self, label: &Label) {
+        if self.landmarks.contains_key(label) {
+            Arc::make_mut(&mut self.landmarks).remove(label);
+        }
+    }
+
+    /// A distance to a landmark, with its variance \[m²\]; answers where the landmark is, once that
+    /// is known.
+    pub(super) fn take_in(
+        &mut self,
+        label: &Label,
+        range: &Range,
+        variance: f64,
+        is_planar: bool,
+    ) -> Option<RangedPoint> {
+        self.taken += 1;
+        let landmarks = Arc::make_mut(&mut self.landmarks);
+        let since = std::mem::take(&mut self.since);
+        for landmark in landmarks.values_mut() {
+            landmark.motion.extend(&since);
+        }
+        if let Some(landmark) = landmarks.get_mut(label) {
+            landmark.update(range, variance, is_planar);
+            landmark.used = self.taken;
+            return landmark.decided(range, variance, is_planar);
+        }
+        if landmarks.len() >= RANGED_MAX {
+            let oldest = landmarks.iter().min_by_key(|(_, landmark)| landmark.used);
+            if let Some(oldest) = oldest.map(|(label, _)| label.clone()) {
+                landmarks.remove(&oldest);
+            }
+        }
+        let mut landmark = RangeHypotheses::new(range, variance, is_planar);
+        landmark.used = self.taken;
+        landmarks.insert(label.clone(), landmark);
+        None
+    }
+}
