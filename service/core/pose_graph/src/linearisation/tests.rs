@@ -46,6 +46,30 @@ fn information(seed: [f64; 6]) -> Matrix6<f64> {
     root * root.transpose()
 }
 
+/// All kinds of distances between these poses, with an error \[m\].
+fn ranges(from: Isometry3<f64>, to: Isometry3<f64>, error_m: f64, seed: f64) -> [(Node, Link); 3] {
+    let (a, b) = (PoseId(0), PoseId(1));
+    let antenna = Vector3::new(-0.2, 0.1, 0.7);
+    let range = |target: SightingTarget| {
+        let seen = from.inverse_transform_point(&(to * Point3::from(target.lever())));
+        Link::Range {
+            from: a,
+            antenna,
+            target,
+            range_m: (seen.coords - antenna).norm() + error_m,
+            information: RangeInformation::of_variance(0.04 * seed).expect("a positive variance"),
+        }
+    };
+    let node = || Node::pose(to, Freedom::Full);
+    let point = Node::point(to.translation.vector.into(), Freedom::Full);
+    let lever = Vector3::new(0.4, -0.3, 0.2);
+    [
+        (node(), range(SightingTarget::Pose(b))),
+        (node(), range(SightingTarget::PointOf(b, lever))),
+        (point, range(SightingTarget::Point(PointId(1)))),
+    ]
+}
+
 /// All kinds of links between these poses, measured as they are (`error` zero) or with an error.
 fn cases(
     from: Isometry3<f64>,
@@ -68,19 +92,6 @@ fn cases(
         target,
         position: position(target),
         information: position_information,
-    };
-    let antenna = Vector3::new(-0.2, 0.1, 0.7);
-    let range = |target: SightingTarget| Link::Range {
-        from: a,
-        antenna,
-        target,
-        range_m: (from
-            .inverse_transform_point(&(to * Point3::from(target.lever())))
-            .coords
-            - antenna)
-            .norm()
-            + error.translation.vector.x,
-        information: RangeInformation::of_variance(0.04 * seed[0]).expect("a positive variance"),
     };
     let at: Point3<f64> = (to.translation.vector + error.translation.vector).into();
     let links = [
@@ -129,16 +140,10 @@ fn cases(
             node(to),
             sighting(SightingTarget::PointOf(b, Vector3::new(0.4, -0.3, 0.2))),
         ),
-        (point.clone(), sighting(SightingTarget::Point(PointId(1)))),
-        (node(to), range(SightingTarget::Pose(b))),
-        (
-            node(to),
-            range(SightingTarget::PointOf(b, Vector3::new(0.4, -0.3, 0.2))),
-        ),
-        (point, range(SightingTarget::Point(PointId(1)))),
+        (point, sighting(SightingTarget::Point(PointId(1)))),
     ];
-    links
-        .into_iter()
+    { links.into_iter() }
+        .chain(ranges(from, to, error.translation.vector.x, seed[0]))
         .map(|(to, link)| Case {
             from: node(from),
             to,
