@@ -127,7 +127,7 @@ pub(crate) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
 /// Noise of a field that is tried, per its variance. Chosen.
 pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
 /// Fewer places tell nothing of what lies between and beyond them. Chosen.
-pub(crate) const BETWEEN_MIN: usize = 10;
+pub(crate) const BETWEEN_MIN: usize = 20;
 /// Share of the variance of a level that neighbours may leave open, at most: beyond, what is felt
 /// at a place says little of what lies beside it. Chosen.
 pub(crate) const UNPREDICTED_MAX: f64 = 0.5;

@@ -309,8 +309,8 @@ pub(crate) mod log {
     pub(crate) const VIEWS_MIN: usize = 96;
     /// Fewest new views for which all are matched again, and one for so many earlier ones: the
     /// amortised cost of a view then grows linearly with their number.
-    pub(crate) const NEW_MIN: usize = 24;
-    pub(crate) const PER_NEW: usize = 12;
+    pub(crate) const NEW_MIN: usize = 48;
+    pub(crate) const PER_NEW: usize = 4;
 }
 
 /// The similarity of views, learned for each channel.

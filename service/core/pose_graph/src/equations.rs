@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 
 use super::elimination::{Equations, Front, number};
 use super::graph::PoseGraph;
-use super::linearisation::NormalBlocks;
+use super::normal_blocks::NormalBlocks;
 
 /// The map's links, linearised at given poses of its nodes.
 #[derive(Debug)]

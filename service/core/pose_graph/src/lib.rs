@@ -13,6 +13,7 @@ mod linearisation;
 mod link;
 mod marginals;
 mod node;
+mod normal_blocks;
 mod range_blocks;
 mod relaxation;
 mod rotation_first;

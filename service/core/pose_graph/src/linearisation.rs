@@ -4,38 +4,9 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use super::calibration::{Calibration, Reading};
 use super::link::{Link, SightingTarget};
+use super::normal_blocks::{CalibrationBlocks, NormalBlocks};
 use super::range_blocks::{RangeError, range_blocks};
 use geometry::{from_blocks, log_jacobian, se3};
-
-/// Normal equations of one link at given poses: to second order in the motions δ of its nodes the
-/// link costs
-///
-/// ```text
-/// s + 2 Σ gₐᵀ δₐ + Σ δₐᵀ Hₐᵦ δᵦ
-/// ```
-///
-/// Points fill the first three rows.
-#[derive(Clone, Debug)]
-pub(super) struct NormalBlocks {
-    pub(super) from_from: Matrix6<f64>,
-    /// Rows of the node that was measured, columns of the one that measured.
-    pub(super) to_from: Matrix6<f64>,
-    pub(super) to_to: Matrix6<f64>,
-    pub(super) from_gradient: Vector6<f64>,
-    pub(super) to_gradient: Vector6<f64>,
-    /// Of a motion: what its calibration adds.
-    pub(super) by_calibration: Option<CalibrationBlocks>,
-}
-
-/// The blocks of a link's calibration.
-#[derive(Clone, Debug)]
-pub(super) struct CalibrationBlocks {
-    pub(super) own: Matrix6<f64>,
-    /// Rows of the node, columns of the calibration.
-    pub(super) from: Matrix6<f64>,
-    pub(super) to: Matrix6<f64>,
-    pub(super) gradient: Vector6<f64>,
-}
 
 impl Link {
     /// s = rᵀ Ω r at these places of its nodes.
@@ -190,19 +161,6 @@ impl Link {
                 let error = RangeError::new((from, to), antenna, *target);
                 range_blocks(&error, *range_m, information.matrix()[(0, 0)], weigh)
             }
-        }
-    }
-}
-
-impl NormalBlocks {
-    pub(super) fn zero() -> Self {
-        Self {
-            from_from: Matrix6::zeros(),
-            to_from: Matrix6::zeros(),
-            to_to: Matrix6::zeros(),
-            from_gradient: Vector6::zeros(),
-            to_gradient: Vector6::zeros(),
-            by_calibration: None,
         }
     }
 }

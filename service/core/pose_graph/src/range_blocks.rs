@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
-use super::linearisation::NormalBlocks;
 use super::link::SightingTarget;
+use super::normal_blocks::NormalBlocks;
 use geometry::se3;
 
 /// Distance below which it has no direction \[m\].

@@ -171,8 +171,8 @@ pub(super) const RANGE_RING_POINTS: u32 = 48;
 pub(super) const RANGE_SPHERE_POINTS: u32 = 256;
 /// Deviation of a place along the ring, in the spacing of two. Source: so that their sum is even.
 pub(super) const RANGE_OVERLAP: f64 = 0.6;
-/// Elevation of a ring above the one below it \[rad\], and the most rings. Source: half of it is the
-/// deviation, as along a ring of which the points are as far apart twice; up to 75 degrees.
+/// Elevation of a ring above the one below it \[rad\], and the most rings. Source: half of it is
+/// the deviation, as along a ring of which the points are as far apart twice; up to 75 degrees.
 pub(super) const RANGE_LAYER_RAD: f64 = 0.26;
 pub(super) const RANGE_LAYERS: u32 = 6;
 /// Greatest height of a beacon above an antenna \[m\]. Source: rooms; tags on robots, on walls, and
@@ -193,8 +193,8 @@ pub(super) const RANGE_WEIGHT_MIN: f64 = 1e-5;
 pub(super) const RANGE_JOIN_MASS: f64 = 0.99;
 /// Largest sag of an arc of its deviation, in deviations of a distance.
 pub(super) const RANGE_JOIN_SAG: f64 = 0.1;
-/// Largest deviation of the direction of a landmark that joins after a long way \[rad\]. Source: its
-/// arc differs from its tangent by a hundredth of the distance.
+/// Largest deviation of the direction of a landmark that joins after a long way \[rad\]. Source:
+/// its arc differs from its tangent by a hundredth of the distance.
 pub(super) const RANGE_JOIN_ANGLE_RAD: f64 = 0.15;
 /// Factor of the variances of a landmark that is learned by distances. Source: errors of distances
 /// last, and Gaussians that are left out have tails.

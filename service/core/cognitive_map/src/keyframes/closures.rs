@@ -13,7 +13,7 @@ use super::graph::KeyframeGraph;
 use super::instant::KeyframeOffset;
 use super::moment::Moment;
 use super::relaxation::{Correction, RelaxationCopy};
-use super::sighting::{SeenPoint, stated_variance};
+use super::seen_point::{SeenPoint, stated_variance};
 use super::tuning;
 use crate::input::Relation;
 use geometry::{PoseCovariance, se3, symmetric};

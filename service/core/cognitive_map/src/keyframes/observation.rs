@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3};
 
+use super::seen_point::{SeenPoint, lever_covariance};
 use super::seen_range::SeenRange;
-use super::sighting::{SeenPoint, lever_covariance};
 use geometry::PoseCovariance;
 use state::state_of_enum;
 

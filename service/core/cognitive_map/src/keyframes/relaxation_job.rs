@@ -32,7 +32,8 @@ enum Source {
 }
 
 impl RelaxationJob {
-    /// Of a graph, under the revision of its latest change, and of the views that are to be matched.
+    /// Of a graph, under the revision of its latest change, and of the views that are to be
+    /// matched.
     pub(super) fn new(graph: &KeyframeGraph, views: Option<ViewLog>) -> Self {
         Self(Arc::new(Shared {
             revision: graph.revision,

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::sighting::lever_covariance;
+use super::seen_point::lever_covariance;
 use super::tuning;
 use crate::input::Range;
 use geometry::PoseCovariance;
@@ -18,8 +18,8 @@ pub(super) struct SeenRange {
     pub(super) fresh: f64,
     /// Variance of the bias, which is the same each time from the same place \[m²\].
     pub(super) lasting: f64,
-    /// Where the target was in that frame, as the estimate had it then, if it was known \[m\]: where
-    /// a relaxation begins.
+    /// Where the target was in that frame, as the estimate had it then, if it was known \[m\]:
+    /// where a relaxation begins.
     pub(super) at: Option<Vector3<f64>>,
 }
 
@@ -140,7 +140,8 @@ mod tests {
         ] {
             let distance = (moved.at.unwrap() - moved.antenna).norm();
             assert!((distance - seen.range_m).abs() < 1e-12);
-            // Along one direction, a motion of 0.1 m, and turns of 0.1 about levers of 0.6 m and 4 m.
+            // Along one direction, a motion of 0.1 m, and turns of 0.1 about levers of 0.6 m and 4
+            // m.
             let gained = moved.fresh - seen.fresh;
             assert!((0.01..0.5).contains(&gained), "{gained}");
             assert!((moved.lasting - seen.lasting).abs() < 1e-15);

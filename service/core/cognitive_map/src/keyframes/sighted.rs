@@ -6,8 +6,9 @@ use super::graph::KeyframeGraph;
 use super::instant::KeyframeOffset;
 use super::moment::Moment;
 use super::observation::Observation;
+use super::seen_point::SeenPoint;
 use super::seen_range::SeenRange;
-use super::sighting::{Seen, SeenPoint, Sighting};
+use super::sighting::{Seen, Sighting};
 use crate::input::{Label, Range, Relation};
 use state::NONE;
 
@@ -26,8 +27,8 @@ impl KeyframeGraph {
         self.observe_landmark(moment, label, &seen);
     }
 
-    /// Adds a distance of a landmark, with its variance \[m²\], and where the landmark is in the body
-    /// frame by the estimate. One whose place was never known is kept, and does not count.
+    /// Adds a distance of a landmark, with its variance \[m²\], and where the landmark is in the
+    /// body frame by the estimate. One whose place was never known is kept, and does not count.
     pub fn landmark_range(
         &mut self,
         moment: &Moment,

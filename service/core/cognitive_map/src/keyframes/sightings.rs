@@ -59,8 +59,8 @@ impl Sightings {
     }
 
     /// Adds a sighting, of at most `most`, to the lists of its keyframe and of the one that it
-    /// shows. It is merged with one of the same landmark, if both are of one kind; in a full list it replaces the least
-    /// certain one. Answers whether there is one more.
+    /// shows. It is merged with one of the same landmark, if both are of one kind; in a full list
+    /// it replaces the least certain one. Answers whether there is one more.
     pub(super) fn add(
         &mut self,
         sighting: Sighting,

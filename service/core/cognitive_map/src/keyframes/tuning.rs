@@ -4,7 +4,7 @@
 //! Pairs of a length and an angle bound a motion \[m, rad\]. Limits of memory and what a space
 //! sets are in [`KeyframeSettings`](super::settings::KeyframeSettings).
 
-use super::view_matches::Matching;
+use super::matching::Matching;
 
 // Keyframes and sightings.
 
@@ -29,8 +29,8 @@ pub(super) const RANGES_AGREE_SD: f64 = 3.0;
 /// such a point is ever off, and for heights those of rooms.
 pub(super) const RANGED_POINT_SD_M: (f64, f64) = (100.0, 3.0);
 
-/// Growth of the number of keyframes after which distances relax the past again. Source: so the work
-/// of all relaxations is some four times that of the last one.
+/// Growth of the number of keyframes after which distances relax the past again. Source: so the
+/// work of all relaxations is some four times that of the last one.
 pub(super) const RANGES_GROWTH: f64 = 1.3;
 
 // Attachments.
@@ -186,6 +186,7 @@ pub(super) const UNKNOWN_MOTION_VARIANCE_M2: f64 = 1e12;
 /// How views are matched while samples come in: what was taken for another place for a while costs
 /// the live pose more than a map that comes late.
 pub(super) const LIVE_MATCHING: Matching = Matching {
+    views_max: 1024,
     widths: &[4.0, 2.0, 1.0],
     veers: &[],
     proof: 3.0,
@@ -194,6 +195,7 @@ pub(super) const LIVE_MATCHING: Matching = Matching {
 /// How views are matched for the refined past. A robot that has turned by radians too much before
 /// its first loop lies in another basin of attraction: so other veers are tried.
 pub(super) const REFINED_MATCHING: Matching = Matching {
+    views_max: usize::MAX,
     widths: &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0],
     veers: &[0.0, -1.0, 1.0, -2.0, 2.0],
     proof: 1.0,

@@ -8,27 +8,13 @@ use place_recognition::{SampleKey, Similarity, ViewLog, ViewMatch};
 use super::agent_track::AgentTrack;
 use super::chains::Chains;
 use super::graph::KeyframeGraph;
+use super::matching::{Matching, ViewMatches};
 use super::problem::{Among, Calibrating, Problem};
 use super::relaxation::RelaxationCopy;
 use super::tuning;
 use geometry::is_somewhere;
 use pose_graph::{Calibration, SightingTarget};
 use pose_graph::{Kernel, Link, LinkId, PositionInformation, RelaxationSettings, Scale};
-
-/// The matches of views by which a map is relaxed. Clones share them.
-pub(super) type ViewMatches = Arc<[ViewMatch]>;
-
-/// How views are matched.
-#[derive(Debug)]
-pub(super) struct Matching {
-    /// Widths of the kernels of matches, in their ranges, one relaxation each.
-    pub(super) widths: &'static [f64],
-    /// Veers of odometry from which it begins anew, in standard deviations.
-    pub(super) veers: &'static [f64],
-    /// How much more probable another map has to be than that of odometry, in units of what one
-    /// fold of it is expected to gain by chance.
-    pub(super) proof: f64,
-}
 
 /// A copy of the graph, relaxed by matches of views.
 struct Matched {
@@ -47,7 +33,7 @@ impl RelaxationCopy {
     /// information criterion of a fold: it has three degrees of freedom, and of many folds that are
     /// possible one is always the most probable.
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
-        let channels = Similarity::of_channels(log);
+        let channels = Similarity::of_channels(log, matching.views_max);
         if channels.is_empty() {
             return false;
         }

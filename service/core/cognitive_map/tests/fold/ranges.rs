@@ -85,7 +85,8 @@ impl Ranger {
         (self.robot.position(&self.map).coords - self.truth.translation.vector).norm()
     }
 
-    /// How far a beacon is from where it is estimated in the plane; `None` of one that is not known.
+    /// How far a beacon is from where it is estimated in the plane; `None` of one that is not
+    /// known.
     fn beacon_error_m(&self, beacon: usize) -> Option<f64> {
         let (name, at) = BEACONS[beacon];
         let (_, landmark) = self.map.landmark_by_label(name)?;

@@ -44,16 +44,17 @@ pub struct Similarity<'a> {
 }
 
 impl<'a> Similarity<'a> {
-    /// Of each channel of a log whose views say something.
-    pub fn of_channels(log: &'a ViewLog) -> Vec<Self> {
+    /// Of each channel of a log whose views say something, by at most so many views of each, evenly
+    /// thinned.
+    pub fn of_channels(log: &'a ViewLog, most: usize) -> Vec<Self> {
         let channels = log.channels().into_iter();
         channels
-            .filter_map(|channel| Self::of(log, channel))
+            .filter_map(|channel| Self::of(log, channel, most))
             .collect()
     }
 
-    fn of(log: &'a ViewLog, channel: u8) -> Option<Self> {
-        let runs = Runs::of(log, channel);
+    fn of(log: &'a ViewLog, channel: u8, most: usize) -> Option<Self> {
+        let runs = Runs::of(log, channel, most);
         if runs.len() < crate::tuning::log::VIEWS_MIN {
             return None;
         }

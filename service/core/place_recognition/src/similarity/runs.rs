@@ -11,10 +11,15 @@ pub(super) struct Runs<'a> {
 }
 
 impl<'a> Runs<'a> {
-    /// The views of a channel.
-    pub(super) fn of(log: &'a ViewLog, channel: u8) -> Self {
+    /// At most so many views of a channel, evenly thinned.
+    pub(super) fn of(log: &'a ViewLog, channel: u8, most: usize) -> Self {
         let views = log.views.iter().filter(|view| view.channel == channel);
         let mut views: Vec<&LoggedView> = views.collect();
+        let mut stride = log.stride;
+        while views.len() > most {
+            stride = stride.saturating_mul(2);
+            views.retain(|view| view.ordinal.is_multiple_of(stride));
+        }
         views.sort_by_key(|view| (view.sample.agent, view.sample.session, view.ordinal));
         let mut run = Vec::with_capacity(views.len());
         let mut number = 0;
@@ -23,7 +28,7 @@ impl<'a> Runs<'a> {
                 let previous = views[previous];
                 (previous.sample.agent, previous.sample.session)
                     == (view.sample.agent, view.sample.session)
-                    && previous.ordinal.saturating_add(log.stride) == view.ordinal
+                    && previous.ordinal.saturating_add(stride) == view.ordinal
             });
             if index > 0 && !goes_on {
                 number += 1;

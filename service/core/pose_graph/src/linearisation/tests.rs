@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 use proptest::prelude::*;
 
-use super::NormalBlocks;
 use crate::link::{Link, SightingTarget};
 use crate::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId, Veer};
+use crate::normal_blocks::NormalBlocks;
 use crate::{
     Calibration, CalibrationInformation, PoseInformation, PositionInformation, RangeInformation,
     Reading,
@@ -249,7 +249,7 @@ proptest! {
                 Veer::Estimated,
             );
             let cost = |step: f64, index: usize| {
-                let mut unknowns = [0.0; 5];
+                let mut unknowns = [0.0; 6];
                 unknowns[index] = step;
                 let moved = node.moved(&node.pose, &unknowns);
                 let place = |node: u32| [&case.from.pose, &case.to.pose, &moved][node as usize];

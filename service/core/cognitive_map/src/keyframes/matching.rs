@@ -1,0 +1,22 @@
+//! How views are matched, and the matches.
+
+use std::sync::Arc;
+
+use place_recognition::ViewMatch;
+
+/// The matches of views by which a map is relaxed. Clones share them.
+pub(super) type ViewMatches = Arc<[ViewMatch]>;
+
+/// How views are matched.
+#[derive(Debug)]
+pub(super) struct Matching {
+    /// Most views of a channel, evenly thinned beyond: the cost grows with their square.
+    pub(super) views_max: usize,
+    /// Widths of the kernels of matches, in their ranges, one relaxation each.
+    pub(super) widths: &'static [f64],
+    /// Veers of odometry from which it begins anew, in standard deviations.
+    pub(super) veers: &'static [f64],
+    /// How much more probable another map has to be than that of odometry, in units of what one
+    /// fold of it is expected to gain by chance.
+    pub(super) proof: f64,
+}
