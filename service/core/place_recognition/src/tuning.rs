@@ -310,7 +310,7 @@ pub(crate) mod log {
     /// Fewest new views for which all are matched again, and one for so many earlier ones: the
     /// amortised cost of a view then grows linearly with their number.
     pub(crate) const NEW_MIN: usize = 48;
-    pub(crate) const PER_NEW: usize = 4;
+    pub(crate) const PER_NEW: usize = 2;
 }
 
 /// The similarity of views, learned for each channel.

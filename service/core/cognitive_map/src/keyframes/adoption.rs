@@ -19,11 +19,16 @@ impl KeyframeMap {
     /// record [`go_on_relaxing`](Self::go_on_relaxing) brings the outcome into force. `agent` and
     /// `stamp_ns` are those of the present record.
     pub fn begin_relaxation(&mut self, agent: u32, stamp_ns: i64) {
-        let is_due = self.graph.is_due() || self.recognition.views().is_due();
+        let has_views = !self.graph.is_tied_by_sightings() && self.recognition.views().is_due();
+        let is_due = self.graph.is_due() || has_views;
         if self.pending.is_some() || !is_due {
             return;
         }
-        let views = self.recognition.take_due_views();
+        let views = if has_views {
+            self.recognition.take_due_views()
+        } else {
+            None
+        };
         let matches_views = views.is_some();
         let job = RelaxationJob::new(&self.graph, views);
         self.pending = Some(PendingRelaxation::Awaited(job));

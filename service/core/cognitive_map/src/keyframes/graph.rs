@@ -13,6 +13,7 @@ use super::moment::Moment;
 use super::own_frame::OwnFrame;
 use super::settings::KeyframeSettings;
 use super::sightings::Sightings;
+use super::tuning;
 use crate::estimator::Calibrated;
 use crate::input::StartPose;
 use geometry::PoseCovariance;
@@ -70,6 +71,11 @@ impl KeyframeGraph {
     /// Number of sightings, those joined into one counted once.
     pub fn n_sightings(&self) -> usize {
         self.sightings.slab.len()
+    }
+
+    /// Whether so much is sighted that the map needs no views to hold together.
+    pub(super) fn is_tied_by_sightings(&self) -> bool {
+        self.n_sightings() * tuning::KEYFRAMES_PER_SIGHTING >= self.n_keyframes()
     }
 
     /// Adds an agent in a frame of its own; answers its number, counted from 0.

@@ -84,7 +84,7 @@ impl KeyframeGraph {
     /// judged anew by all that is known now: whichever makes the measurements more probable.
     fn relaxed_whole(&self, views: &ViewLog) -> (Problem, Relaxed) {
         let mut as_it_is = RelaxationCopy::whole(self);
-        if !views.is_empty() {
+        if !views.is_empty() && !self.is_tied_by_sightings() {
             as_it_is.match_views(views, &tuning::REFINED_MATCHING);
         }
         let mut all = Vec::new();

@@ -118,7 +118,7 @@ pub(super) const KEYFRAMES_PER_RECORD: usize = 8;
 /// and little enough for a closure to reach the pose within a second.
 pub(super) const RELAXATION_DELAY_NS: i64 = 500_000_000;
 
-/// The same where views are matched: four thousand take 1 to 2 s.
+/// The same where views are matched.
 pub(super) const MATCHING_DELAY_NS: i64 = 500_000_000;
 
 /// Most records between the two, whatever their stamps say: two seconds of twenty robots that send
@@ -182,6 +182,10 @@ pub(super) const CLOSURE_SCALE: f64 = 3.0;
 pub(super) const UNKNOWN_MOTION_VARIANCE_M2: f64 = 1e12;
 
 // Matches of views.
+
+/// Keyframes for each sighting up to which sightings hold a map together: they say to decimetres
+/// what views say to metres.
+pub(super) const KEYFRAMES_PER_SIGHTING: usize = 4;
 
 /// How views are matched while samples come in: what was taken for another place for a while costs
 /// the live pose more than a map that comes late.
