@@ -29,7 +29,6 @@ impl KeyframeMap {
         } else {
             None
         };
-        let matches_views = views.is_some();
         let job = RelaxationJob::new(&self.graph, views);
         self.pending = Some(PendingRelaxation::Awaited(job));
         if self.graph.is_due() {
@@ -39,7 +38,7 @@ impl KeyframeMap {
                 ..Schedule::default()
             };
         }
-        let mut meanwhile = Meanwhile::new(matches_views);
+        let mut meanwhile = Meanwhile::default();
         meanwhile.note(agent, stamp_ns);
         self.graph.meanwhile = Some(Box::new(meanwhile));
     }

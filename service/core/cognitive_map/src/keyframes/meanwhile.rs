@@ -11,8 +11,6 @@ use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 /// What has come since a relaxation began, of the graph as it was then.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Meanwhile {
-    /// Whether views are matched, which takes longer.
-    matches_views: bool,
     /// Records.
     records: u32,
     /// What agents have done, by number.
@@ -45,14 +43,6 @@ impl Default for AgentSince {
 }
 
 impl Meanwhile {
-    /// Nothing yet, since a relaxation of which it is known whether it matches views.
-    pub(super) fn new(matches_views: bool) -> Self {
-        Self {
-            matches_views,
-            ..Self::default()
-        }
-    }
-
     /// Counts a record of an agent, with its stamp.
     pub(super) fn note(&mut self, agent: u32, stamp_ns: i64) {
         self.records = self.records.saturating_add(1);
@@ -65,12 +55,7 @@ impl Meanwhile {
     pub(super) fn is_over(&self, agent: u32, stamp_ns: i64) -> bool {
         let first_ns = self.agents.get(&agent).and_then(|since| since.first_ns);
         let passed_ns = first_ns.map_or(0, |first_ns| stamp_ns.saturating_sub(first_ns));
-        let delay_ns = if self.matches_views {
-            tuning::MATCHING_DELAY_NS
-        } else {
-            tuning::RELAXATION_DELAY_NS
-        };
-        passed_ns >= delay_ns || self.records >= tuning::RELAXATION_RECORDS_MAX
+        passed_ns >= tuning::RELAXATION_DELAY_NS || self.records >= tuning::RELAXATION_RECORDS_MAX
     }
 
     /// An agent moved.
@@ -106,7 +91,7 @@ impl Meanwhile {
 
 impl State for Meanwhile {
     fn write(&self, out: &mut StateWriter) {
-        (self.matches_views, self.records).write(out);
+        self.records.write(out);
         let count = u32::try_from(self.agents.len()).expect("agents are numbered by u32");
         count.write(out);
         for (agent, since) in &self.agents {
@@ -119,12 +104,11 @@ impl State for Meanwhile {
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let (matches_views, records) = State::read(input)?;
+        let records = State::read(input)?;
         let agents: Vec<(u32, AgentSince)> = State::read(input)?;
         let keyframes: Vec<u32> = State::read(input)?;
         let constraints: Vec<u32> = State::read(input)?;
         Ok(Self {
-            matches_views,
             records,
             agents: agents.into_iter().collect(),
             keyframes: keyframes.into_iter().collect(),

@@ -118,9 +118,6 @@ pub(super) const KEYFRAMES_PER_RECORD: usize = 8;
 /// and little enough for a closure to reach the pose within a second.
 pub(super) const RELAXATION_DELAY_NS: i64 = 500_000_000;
 
-/// The same where views are matched.
-pub(super) const MATCHING_DELAY_NS: i64 = 500_000_000;
-
 /// Most records between the two, whatever their stamps say: two seconds of twenty robots that send
 /// a hundred samples a second.
 pub(super) const RELAXATION_RECORDS_MAX: u32 = 4096;

@@ -43,9 +43,11 @@ impl RelaxationCopy {
             .sum();
         let mut best = self.with_matches(Arc::default(), &[1.0], &channels);
         let needed = best.log_probability + matching.proof * 1.5 * (n_views as f64).ln();
-        let as_before = self.with_matches(Arc::clone(&before), &[1.0], &channels);
-        if as_before.log_probability > best.log_probability {
-            best = as_before;
+        if !before.is_empty() {
+            let as_before = self.with_matches(Arc::clone(&before), &[1.0], &channels);
+            if as_before.log_probability > best.log_probability {
+                best = as_before;
+            }
         }
         let by_odometry = matching.veers.iter().map(|&veer| self.dead_reckoned(veer));
         for start in std::iter::once(self.clone()).chain(by_odometry) {
