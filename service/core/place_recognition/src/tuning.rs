@@ -308,9 +308,10 @@ pub(crate) mod log {
     /// Fewest views that say what a channel shows.
     pub(crate) const VIEWS_MIN: usize = 96;
     /// Fewest new views for which all are matched again, and one for so many earlier ones: the
-    /// amortised cost of a view then grows linearly with their number.
-    pub(crate) const NEW_MIN: usize = 48;
-    pub(crate) const PER_NEW: usize = 2;
+    /// amortised cost of a view then grows linearly with their number. A robot that comes back is
+    /// corrected before its heading has drifted much further.
+    pub(crate) const NEW_MIN: usize = 16;
+    pub(crate) const PER_NEW: usize = 20;
 }
 
 /// The similarity of views, learned for each channel.

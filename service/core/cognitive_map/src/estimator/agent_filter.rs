@@ -305,7 +305,7 @@ impl AgentFilter {
         let most = parameters.calibration_max();
         let corrected = self.calibration.components() + error.fixed_rows::<CALIBRATION>(POSE);
         let bounded = corrected.zip_map(&most, |error, most| error.clamp(-most, most));
-        self.calibration = Calibration::of_components(&bounded);
+        self.calibration = self.calibration.with_components(&bounded);
     }
 
     /// Sets the lasting errors of odometry, within what the settings allow.
@@ -313,7 +313,7 @@ impl AgentFilter {
         let most = parameters.calibration_max();
         let components = calibration.components();
         let bounded = components.zip_map(&most, |error, most| error.clamp(-most, most));
-        self.calibration = Calibration::of_components(&bounded);
+        self.calibration = calibration.with_components(&bounded);
     }
 
     /// A landmark was seen: how does that fit with its last sightings and odometry?
@@ -435,7 +435,8 @@ impl OdometryReading {
     #[inline]
     fn corrected_by(&self, calibration: &Calibration) -> Isometry3<f64> {
         let by_bias = self.time_s.component_mul(&calibration.bias_rad_s);
-        let correction = -(self.angles * calibration.angle + by_bias);
+        let veered = Vector3::z() * (calibration.veer_rad_m * self.lengths.norm());
+        let correction = veered - (self.angles * calibration.angle + by_bias);
         let rotation = self.rotation * UnitQuaternion::from_scaled_axis(correction);
         let lengths = self.lengths * (1.0 - calibration.length);
         Isometry3::from_parts(lengths.into(), rotation)

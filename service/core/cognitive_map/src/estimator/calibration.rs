@@ -13,6 +13,9 @@ pub struct Calibration {
     pub length: f64,
     /// Relative error of angles.
     pub angle: f64,
+    /// Rotation about the body's z axis for each metre that it goes, which is not read \[rad/m\].
+    /// The estimator does not estimate it: it is what the whole map says.
+    pub veer_rad_m: f64,
     /// Bias about the body axes \[rad/s\].
     pub bias_rad_s: Vector3<f64>,
 }
@@ -33,6 +36,7 @@ pub struct Calibrated {
 state_of_struct!(Calibration {
     length,
     angle,
+    veer_rad_m,
     bias_rad_s
 });
 state_of_struct!(Calibrated {
@@ -83,7 +87,7 @@ impl Calibration {
         pose_graph::Calibration {
             length: self.length,
             angle: self.angle,
-            veer_rad_m: 0.0,
+            veer_rad_m: self.veer_rad_m,
             bias_rad_s: self.bias_rad_s,
         }
     }
@@ -93,20 +97,22 @@ impl Calibration {
         Self {
             length: calibration.length,
             angle: calibration.angle,
+            veer_rad_m: calibration.veer_rad_m,
             bias_rad_s: calibration.bias_rad_s,
         }
     }
 
-    /// Of its components: length, angle, bias.
-    pub(crate) fn of_components(components: &SVector<f64, 5>) -> Self {
+    /// With other components: length, angle, bias.
+    pub(crate) fn with_components(&self, components: &SVector<f64, 5>) -> Self {
         Self {
             length: components[0],
             angle: components[1],
             bias_rad_s: components.fixed_rows::<3>(2).into_owned(),
+            ..*self
         }
     }
 
-    /// Its components: length, angle, bias.
+    /// Its components that the estimator estimates: length, angle, bias.
     pub(crate) fn components(&self) -> SVector<f64, 5> {
         let bias = &self.bias_rad_s;
         SVector::from([self.length, self.angle, bias.x, bias.y, bias.z])

@@ -49,8 +49,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// version 5 no searches, version 6 no other names of landmarks, version 7 none of what was joined
 /// into objects, version 8 no attachments and no kidnap tests, version 9 nobody removed or set
 /// aside, version 10 no relaxation under way, version 11 no noise of odometry and no searches by
-/// levels, version 12 no log of views, no ways and no distances alone.
-const VERSION: u16 = 13;
+/// levels, version 12 no log of views, no ways and no distances alone, version 13 no veers and no
+/// stretches of logged views.
+const VERSION: u16 = 14;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

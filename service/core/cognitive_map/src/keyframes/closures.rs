@@ -11,6 +11,7 @@ use super::constraint::{ClosureState, Constraint, composed};
 use super::constraints::Schedule;
 use super::graph::KeyframeGraph;
 use super::instant::KeyframeOffset;
+use super::matching::Matching;
 use super::moment::Moment;
 use super::relaxation::{Correction, RelaxationCopy};
 use super::seen_point::{SeenPoint, stated_variance};
@@ -162,7 +163,7 @@ impl KeyframeGraph {
     pub(super) fn relax_matched(&mut self, views: Option<&ViewLog>) -> Vec<Correction> {
         let is_due = views.is_none() || self.is_due();
         let mut coarse = RelaxationCopy::coarse(self);
-        let is_matched = views.is_some_and(|log| coarse.match_views(log, &tuning::LIVE_MATCHING));
+        let is_matched = views.is_some_and(|log| coarse.match_views(log, Matching::live(log)));
         if !is_due && !is_matched {
             return Vec::new(); // closures wait for their own time
         }

@@ -1,6 +1,7 @@
 //! The keyframe graph, and what is added to it.
 
 use nalgebra::{Isometry3, Vector6};
+use place_recognition::ViewMatch;
 
 use super::agent_track::{AgentTrack, is_level};
 use super::attachments::Attachments;
@@ -316,6 +317,7 @@ impl KeyframeGraph {
             && self.sightings.is_sound(keyframes)
             && self.constraints.is_sound(keyframes)
             && self.attachments.is_sound(keyframes)
+            && self.matches.iter().all(ViewMatch::is_sound)
             && { self.meanwhile.iter() }.all(|since| since.is_sound(self.chains.tracks.len()))
     }
 }

@@ -9,6 +9,7 @@ use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
 use super::relaxation::Correction;
 use crate::estimator::ExternalEstimate;
+use geometry::is_somewhere;
 use state::{CorruptState, Digest, NONE, State, StateReader, StateWriter};
 use state::{read_list, state_of_struct, write_list};
 
@@ -85,11 +86,19 @@ impl RelaxationOutcome {
 
     /// Whether one that was read from a checkpoint of a graph with so many agents is sound.
     pub(super) fn is_sound(&self, agents: usize) -> bool {
-        let is_agents = |correction: &Correction| (correction.agent as usize) < agents;
+        let is_pose = |pose: &Isometry3<f64>| {
+            is_somewhere(&pose.translation.vector)
+                && pose.rotation.coords.iter().all(|x| x.is_finite())
+        };
+        let is_correction = |correction: &Correction| {
+            (correction.agent as usize) < agents && is_pose(&correction.estimate.pose)
+        };
         let are_agents = self.turn_noises.iter().all(|one| (one.0 as usize) < agents);
         self.poses.is_sorted_by(|a, b| a.0 < b.0)
+            && self.poses.iter().all(|(_, pose)| is_pose(pose))
+            && self.matches.iter().flatten().all(ViewMatch::is_sound)
             && are_agents
-            && self.corrections.iter().all(is_agents)
+            && self.corrections.iter().all(is_correction)
     }
 }
 

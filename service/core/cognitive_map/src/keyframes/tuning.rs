@@ -184,13 +184,18 @@ pub(super) const UNKNOWN_MOTION_VARIANCE_M2: f64 = 1e12;
 /// what views say to metres.
 pub(super) const KEYFRAMES_PER_SIGHTING: usize = 4;
 
-/// How views are matched while samples come in: what was taken for another place for a while costs
-/// the live pose more than a map that comes late.
+/// How views are matched while samples come in, from where the map has them.
 pub(super) const LIVE_MATCHING: Matching = Matching {
     views_max: 1024,
     widths: &[4.0, 2.0, 1.0],
     veers: &[],
-    proof: 3.0,
+};
+
+/// The same whenever their number has grown by two fifths: a map that was taken for another one
+/// stays near to it otherwise.
+pub(super) const LIVE_MATCHING_ANEW: Matching = Matching {
+    views_max: 512,
+    ..REFINED_MATCHING
 };
 
 /// How views are matched for the refined past. A robot that has turned by radians too much before
@@ -199,7 +204,6 @@ pub(super) const REFINED_MATCHING: Matching = Matching {
     views_max: usize::MAX,
     widths: &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0],
     veers: &[0.0, -1.0, 1.0, -2.0, 2.0],
-    proof: 1.0,
 };
 
 /// Widths of kernels where views are matched near to where a relaxed map has them, and how often.

@@ -29,9 +29,9 @@ impl RelaxationCopy {
     /// most probable. One without any match is among them: views that say nothing change nothing.
     /// Answers whether the matches have changed.
     ///
-    /// Another map than that of odometry has to be more probable by `proof` times the Bayesian
-    /// information criterion of a fold: it has three degrees of freedom, and of many folds that are
-    /// possible one is always the most probable.
+    /// Another map than that of odometry has to be more probable by the Bayesian information
+    /// criterion of a fold: it has three degrees of freedom, and of many folds that are possible
+    /// one is always the most probable.
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
         let channels = Similarity::of_channels(log, matching.views_max);
         if channels.is_empty() {
@@ -42,7 +42,7 @@ impl RelaxationCopy {
             .map(|channel| channel.samples().count())
             .sum();
         let mut best = self.with_matches(Arc::default(), &[1.0], &channels);
-        let needed = best.log_probability + matching.proof * 1.5 * (n_views as f64).ln();
+        let needed = best.log_probability + 1.5 * (n_views as f64).ln();
         if !before.is_empty() {
             let as_before = self.with_matches(Arc::clone(&before), &[1.0], &channels);
             if as_before.log_probability > best.log_probability {

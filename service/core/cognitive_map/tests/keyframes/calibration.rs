@@ -51,6 +51,7 @@ fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
             length: sense * LENGTH,
             angle: sense * ANGLE,
             bias_rad_s: Vector3::new(0.0, 0.0, sense * BIAS_RAD_S),
+            ..Calibration::default()
         };
         let calibrated = Calibrated {
             calibration: if is_known {

@@ -61,8 +61,9 @@ impl PlaceRecognition {
         if !self.views.log.is_due() {
             return None;
         }
+        let due = self.views.log.clone();
         self.views.log.matched();
-        Some(self.views.log.clone())
+        Some(due)
     }
 
     /// Bytes of memory that the views take.

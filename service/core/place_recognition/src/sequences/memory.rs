@@ -44,12 +44,13 @@ impl ViewMemory {
             return Vec::new();
         }
         track.last = Some(view.in_odom);
-        let ordinal = track.logged;
+        let (ordinal, stretch) = (track.logged, track.stretch);
         track.logged = track.logged.saturating_add(1);
         let seen = LoggedView {
             channel,
             sample: view.sample,
             ordinal,
+            stretch,
             in_odom: view.in_odom,
             vector: logged(vector),
         };
@@ -108,7 +109,7 @@ impl ViewMemory {
                 track.recent.clear();
                 track.matches.clear();
                 track.next = track.next.saturating_add(tuning::APART);
-                track.logged = track.logged.saturating_add(tuning::APART);
+                track.stretch = track.stretch.saturating_add(1);
             }
         }
     }

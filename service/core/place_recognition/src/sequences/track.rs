@@ -17,6 +17,8 @@ pub(crate) struct ViewTrack {
     pub(super) next: u32,
     /// The ordinal of the next view in the log.
     pub(super) logged: u32,
+    /// The number of the stretch under way: the agent was put elsewhere between two of them.
+    pub(super) stretch: u32,
     /// Pose by motion alone at the latest view.
     pub(super) last: Option<Isometry3<f64>>,
     /// The latest views that were news, the newest last.
@@ -33,6 +35,7 @@ impl ViewTrack {
             session,
             next: 0,
             logged: 0,
+            stretch: 0,
             last: None,
             recent: Vec::new(),
             matches: Vec::new(),
@@ -57,6 +60,7 @@ state_of_struct!(ViewTrack {
     session,
     next,
     logged,
+    stretch,
     last,
     recent as Counted<u64>,
     matches as Counted<u64>,

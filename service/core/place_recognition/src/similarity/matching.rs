@@ -23,6 +23,13 @@ pub struct ViewMatch {
     pub depth: f64,
 }
 
+impl ViewMatch {
+    /// Whether a match that was read from a checkpoint is one.
+    pub fn is_sound(&self) -> bool {
+        self.sd_m.is_finite() && self.sd_m > 0.0 && self.depth.is_finite() && self.depth >= 0.0
+    }
+}
+
 state_of_struct!(ViewMatch {
     now,
     then,

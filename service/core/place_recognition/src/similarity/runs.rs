@@ -20,14 +20,22 @@ impl<'a> Runs<'a> {
             stride = stride.saturating_mul(2);
             views.retain(|view| view.ordinal.is_multiple_of(stride));
         }
-        views.sort_by_key(|view| (view.sample.agent, view.sample.session, view.ordinal));
+        views.sort_by_key(|view| {
+            (
+                view.sample.agent,
+                view.sample.session,
+                view.stretch,
+                view.ordinal,
+            )
+        });
         let mut run = Vec::with_capacity(views.len());
         let mut number = 0;
         for (index, view) in views.iter().enumerate() {
             let goes_on = index.checked_sub(1).is_some_and(|previous| {
                 let previous = views[previous];
-                (previous.sample.agent, previous.sample.session)
-                    == (view.sample.agent, view.sample.session)
+                let way =
+                    |view: &LoggedView| (view.sample.agent, view.sample.session, view.stretch);
+                way(previous) == way(view)
                     && previous.ordinal.saturating_add(stride) == view.ordinal
             });
             if index > 0 && !goes_on {

@@ -14,6 +14,8 @@ pub(crate) struct LoggedView {
     pub(crate) sample: SampleKey,
     /// Its number among the agent's views of the channel; neighbours differ by the log's stride.
     pub(crate) ordinal: u32,
+    /// The number of its stretch among those between which the agent was put elsewhere.
+    pub(crate) stretch: u32,
     /// Pose by motion alone since the session began.
     pub(crate) in_odom: Isometry3<f64>,
     /// The descriptor, or its random projection where it has many numbers.
@@ -24,6 +26,7 @@ state_of_struct!(LoggedView {
     channel,
     sample,
     ordinal,
+    stretch,
     in_odom,
     vector as Counted<u16>,
 });
@@ -101,6 +104,17 @@ impl ViewLog {
             && self.n_new as usize >= tuning::NEW_MIN.max(n_old / tuning::PER_NEW)
     }
 
+    /// Whether, with the new views, it has become longer by two fifths, or by a power of that,
+    /// since they were last matched.
+    pub fn is_much_longer(&self) -> bool {
+        let half_octaves = |n: usize| {
+            let n = n.saturating_mul(self.stride as usize);
+            n.saturating_mul(n).checked_ilog2()
+        };
+        let n_old = self.views.len().saturating_sub(self.n_new as usize);
+        half_octaves(self.views.len()) != half_octaves(n_old)
+    }
+
     /// All views count as matched.
     pub fn matched(&mut self) {
         self.n_new = 0;
@@ -140,7 +154,10 @@ impl ViewLog {
     pub(crate) fn is_sound(&self, agents: usize, length: impl Fn(u8) -> Option<usize>) -> bool {
         let is_sound = |view: &LoggedView| {
             let length = length(view.channel).map(|length| length.min(tuning::NUMBERS_MAX));
-            (view.sample.agent as usize) < agents && length == Some(view.vector.len())
+            (view.sample.agent as usize) < agents
+                && length == Some(view.vector.len())
+                && view.vector.iter().all(|number| number.is_finite())
+                && view.in_odom.to_homogeneous().iter().all(|x| x.is_finite())
         };
         self.stride > 0 && self.views.iter().all(is_sound)
     }
