@@ -15,6 +15,7 @@
 mod answer;
 mod bounded;
 mod cbor;
+mod channel;
 mod codec;
 mod encoding;
 mod error;
@@ -41,6 +42,7 @@ pub use answer::{
     Landmark, LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer, RecalledPlace, Rivals,
     SpaceInfo, SpaceList, StampedPose, Trajectory, Trip, TripDetail, TripPage,
 };
+pub use channel::{Channel, ChannelKind, ChannelList, LearnedChannel};
 pub use codec::Codec;
 pub use encoding::{CBOR, JSON, POSTCARD_V1};
 pub use error::DecodeError;

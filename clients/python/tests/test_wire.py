@@ -30,6 +30,7 @@ TYPES: Dict[str, type] = {
     "identification": cogmap.Identification,
     "identify_query": cogmap.IdentifyQuery,
     "ingest_answer": cogmap.IngestAnswer,
+    "channel_list": cogmap.ChannelList,
     "landmark_page": cogmap.LandmarkPage,
     "localization": cogmap.Localization,
     "localize_query": cogmap.LocalizeQuery,

@@ -9,11 +9,11 @@ use std::time::Duration;
 
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
-    AgentDetail, AgentObject, AgentPage, AgentSummary, Codec, GridState, Identification,
-    IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization, LocalizeQuery, ObjectDetail,
-    ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage, PredictAnswer, PredictQuery,
-    RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SpaceInfo, SpaceList,
-    SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
+    AgentDetail, AgentObject, AgentPage, AgentSummary, Channel, ChannelList, Codec, GridState,
+    Identification, IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization,
+    LocalizeQuery, ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage,
+    PredictAnswer, PredictQuery, RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch,
+    SpaceInfo, SpaceList, SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
 };
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};
@@ -297,6 +297,15 @@ impl Api {
         self.pages(&path(space, "/landmarks")?, |page: LandmarkPage| {
             (page.landmarks, page.next)
         })
+    }
+
+    /// The channels of percepts of a space, and what was learned of their views.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn channels(&self, space: &str) -> Result<Vec<Channel>, ApiError> {
+        let list: ChannelList = self.get(&path(space, "/channels")?)?;
+        Ok(list.channels)
     }
 
     /// All objects of a space, by name.

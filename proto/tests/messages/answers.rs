@@ -1,10 +1,11 @@
 //! Answers of the HTTP interface, and the settings of a space.
 
 use cogmap_proto::{
-    AgentDetail, AgentPage, AgentSummary, Evidence, ExpectedPercept, GridModuleState, GridState,
-    IngestAnswer, Landmark, LandmarkPage, Leg, NoiseSettings, Place, PlacePage, PredictAnswer,
-    PredictedPercept, Problem, RecallAnswer, RecalledPlace, Recruitment, Rivals, SpaceInfo,
-    SpaceList, SpaceSettings, StampedPose, Status, Trajectory, Trip, TripDetail, TripPage,
+    AgentDetail, AgentPage, AgentSummary, Channel, ChannelKind, ChannelList, Evidence,
+    ExpectedPercept, GridModuleState, GridState, IngestAnswer, Landmark, LandmarkPage,
+    LearnedChannel, Leg, NoiseSettings, Place, PlacePage, PredictAnswer, PredictedPercept, Problem,
+    RecallAnswer, RecalledPlace, Recruitment, Rivals, SpaceInfo, SpaceList, SpaceSettings,
+    StampedPose, Status, Trajectory, Trip, TripDetail, TripPage,
 };
 
 use super::Visit;
@@ -34,6 +35,7 @@ pub(super) fn each(visit: &mut impl Visit) {
     visit.message("trip_page", &trips());
     visit.message("trip_detail", &trip_detail());
     visit.message("landmark_page", &landmarks());
+    visit.message("channel_list", &channels());
     visit.message("problem", &problem());
 }
 
@@ -361,6 +363,32 @@ fn landmarks() -> LandmarkPage {
         frame: "map".to_owned(),
         landmarks: vec![landmark],
         next: None,
+    }
+}
+
+fn channels() -> ChannelList {
+    let learned = LearnedChannel {
+        views: 512,
+        range_m: 2.5,
+        information_nats: 3.25,
+        independence: 0.5,
+    };
+    let view = Channel {
+        name: "laser".to_owned(),
+        kind: ChannelKind::Descriptor,
+        dimension: Some(60),
+        views: Some(700),
+        learned: Some(learned),
+    };
+    let level = Channel {
+        name: "lumière".to_owned(),
+        kind: ChannelKind::Level,
+        dimension: None,
+        views: None,
+        learned: None,
+    };
+    ChannelList {
+        channels: vec![view, level],
     }
 }
 

@@ -3,6 +3,7 @@
 //! [`decode`](crate::decode) is the other way.
 
 mod agent;
+mod channel;
 mod episode;
 mod event;
 mod grid;
@@ -22,6 +23,7 @@ mod trip;
 
 pub use agent::evidence;
 pub(crate) use agent::{estimate, odometry};
+pub use channel::channels;
 pub(crate) use episode::{LatestEpisode, ended_episode};
 pub(crate) use event::{event_records, skip_reason};
 pub use grid::grid_state;

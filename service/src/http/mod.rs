@@ -5,6 +5,7 @@
 
 mod activity;
 mod agents;
+mod channels;
 mod cloud;
 mod compression;
 mod cors;
@@ -97,6 +98,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(places::get))
         .routes(routes!(trips::list))
         .routes(routes!(trips::get))
+        .routes(routes!(channels::list))
         .routes(routes!(landmarks::list))
         .routes(routes!(landmarks::get))
         .routes(routes!(objects::list))

@@ -22,6 +22,7 @@ const ROUTES: [(&str, &[&str]); 28] = [
     ("/v1/spaces/{space}/agents/{agent}/predict", &["post"]),
     ("/v1/spaces/{space}/agents/{agent}/samples", &["post"]),
     ("/v1/spaces/{space}/agents/{agent}/trajectory", &["get"]),
+    ("/v1/spaces/{space}/channels", &["get"]),
     ("/v1/spaces/{space}/events", &["get"]),
     ("/v1/spaces/{space}/export", &["get"]),
     ("/v1/spaces/{space}/landmarks", &["get"]),

@@ -34,6 +34,7 @@ from .answer import (
     TripPage,
     Watermark,
 )
+from .channel import Channel, ChannelKind, ChannelList, LearnedChannel
 from .client import Client
 from .credentials import Credentials
 from .errors import (
@@ -192,6 +193,9 @@ __all__ = [
     "AtTrip",
     "Bernoulli",
     "CalledFromCallback",
+    "Channel",
+    "ChannelKind",
+    "ChannelList",
     "Client",
     "ClockWarning",
     "Closed",
@@ -230,6 +234,7 @@ __all__ = [
     "LandmarkPage",
     "LandmarkTarget",
     "LearnObject",
+    "LearnedChannel",
     "Leg",
     "Level",
     "LiveAgent",

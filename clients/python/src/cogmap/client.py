@@ -22,6 +22,7 @@ from .answer import (
     TripDetail,
     TripPage,
 )
+from .channel import Channel, ChannelList
 from .errors import ApiError, InvalidValue
 from .event import Event, EventPage, EventRecord, MissedEvents
 from .http_service import HttpService, Query
@@ -312,6 +313,10 @@ class Client(HttpService):
     def landmark(self, space: str, label: str) -> Landmark:
         """A landmark, by its label."""
         return self._get(Landmark, path_of(space, "landmarks", label))
+
+    def channels(self, space: str) -> Tuple[Channel, ...]:
+        """The channels of percepts of a space, and what was learned of their views."""
+        return self._get(ChannelList, path_of(space, "channels")).channels
 
     # Objects
 

@@ -23,7 +23,7 @@ pub use input::{
     Sample, SampleBody, Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel,
     TouchNoise,
 };
-pub use keyframes::{Guess, RelaxationJob};
+pub use keyframes::{Guess, LearnedChannel, RelaxationJob, ViewChannel};
 pub use memory::landmark::{Landmark, LandmarkId};
 pub use memory::object::{Identified, KnownObject};
 pub use memory::percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};

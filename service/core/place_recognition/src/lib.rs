@@ -15,5 +15,5 @@ mod views;
 pub use descriptor::dot;
 pub use keyframes::{Keyframes, SampleKey};
 pub use recognition::{Guess, Part, PlaceRecognition, Relocalised, Revisit};
-pub use similarity::{Similarity, ViewLog, ViewMatch};
+pub use similarity::{LearnedChannel, Similarity, ViewLog, ViewMatch};
 pub use view::View;

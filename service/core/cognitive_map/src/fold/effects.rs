@@ -5,7 +5,7 @@ use super::CognitiveMap;
 use super::apply::Fold;
 use crate::estimator::{AgentSighted, Effect, FramesMerged};
 use crate::input::Relation;
-use crate::keyframes::{Moment, Refined, RelaxationJob};
+use crate::keyframes::{Moment, Refined, RelaxationJob, ViewChannel};
 use crate::memory::place::PlaceId;
 use pose_graph::PoseGraph;
 
@@ -148,6 +148,12 @@ impl CognitiveMap {
     /// outcome at a later record, unless somebody [runs](RelaxationJob::run) it before.
     pub fn relaxation(&self) -> Option<&RelaxationJob> {
         self.keyframes.relaxation()
+    }
+
+    /// The channels on which agents of the map have seen something. Takes time in proportion to
+    /// the number of views that are logged.
+    pub fn view_channels(&self) -> impl Iterator<Item = ViewChannel<'_>> {
+        self.keyframes.view_channels()
     }
 
     /// Number of loop closures that are accepted.

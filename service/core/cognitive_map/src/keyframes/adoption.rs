@@ -118,6 +118,9 @@ impl KeyframeGraph {
         if let Some(matches) = &outcome.matches {
             self.matches = matches.clone().into();
         }
+        if let Some(learned) = &outcome.learned {
+            self.learned = learned.clone().into();
+        }
         for (agent, _) in (0..).zip(0..self.chains.tracks.len()) {
             self.move_latest(agent, outcome);
         }

@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use super::graph::KeyframeGraph;
 use super::map::KeyframeMap;
 use super::settings::KeyframeSettings;
-use place_recognition::{Part, ViewLog, ViewMatch};
+use place_recognition::{LearnedChannel, Part, ViewLog, ViewMatch};
 use state::Digest;
 use state::{CorruptState, State, StateReader, StateWriter};
 use state::{NONE, PagedVec, read_list, write_list, write_page};
@@ -82,6 +82,7 @@ impl KeyframeGraph {
     pub(super) fn digest(&self, views: Option<&ViewLog>) -> Digest {
         let mut out = StateWriter::default();
         write_list(self.matches.iter(), &mut out);
+        write_list(self.learned.iter(), &mut out);
         if let Some(views) = views {
             views.write_digests(&mut out);
         }
@@ -219,6 +220,7 @@ impl KeyframeMap {
     /// Writes the matches of views, and what the log has in no page.
     fn write_views(&self, out: &mut StateWriter) {
         write_list(self.graph.matches.iter(), out);
+        write_list(self.graph.learned.iter(), out);
         self.recognition.views().write_head(out);
     }
 
@@ -242,6 +244,7 @@ impl KeyframeMap {
             return Err(CorruptState::Invalid);
         }
         graph.matches = read_list::<ViewMatch>(&mut input, NONE)?.into();
+        graph.learned = read_list::<LearnedChannel>(&mut input, NONE)?.into();
         self.recognition.read_log_head(&mut input)?;
         if bool::read(&mut input)? {
             self.pending = Some(State::read(&mut input)?);

@@ -164,6 +164,7 @@ impl KeyframeGraph {
         let is_due = views.is_none() || self.is_due();
         let mut coarse = RelaxationCopy::coarse(self);
         let is_matched = views.is_some_and(|log| coarse.match_views(log, Matching::live(log)));
+        self.learned = Arc::clone(&coarse.graph().learned);
         if !is_due && !is_matched {
             return Vec::new(); // closures wait for their own time
         }

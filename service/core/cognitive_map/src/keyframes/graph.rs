@@ -1,7 +1,9 @@
 //! The keyframe graph, and what is added to it.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Vector6};
-use place_recognition::ViewMatch;
+use place_recognition::{LearnedChannel, ViewMatch};
 
 use super::agent_track::{AgentTrack, is_level};
 use super::attachments::Attachments;
@@ -37,6 +39,8 @@ pub struct KeyframeGraph {
     pub(super) constraints: Constraints,
     /// Matches of views, by the whole map as it was when they were last matched.
     pub(super) matches: ViewMatches,
+    /// What was learned of the channels of views when they were last matched.
+    pub(super) learned: Arc<[LearnedChannel]>,
     /// Places that keep their pose relative to a keyframe.
     pub(super) attachments: Attachments,
     /// What has come since a relaxation began that is under way.
@@ -53,6 +57,7 @@ impl KeyframeGraph {
             sightings: Sightings::default(),
             constraints: Constraints::default(),
             matches: ViewMatches::default(),
+            learned: Arc::default(),
             attachments: Attachments::default(),
             meanwhile: None,
         }
@@ -318,6 +323,7 @@ impl KeyframeGraph {
             && self.constraints.is_sound(keyframes)
             && self.attachments.is_sound(keyframes)
             && self.matches.iter().all(ViewMatch::is_sound)
+            && self.learned.iter().all(LearnedChannel::is_sound)
             && { self.meanwhile.iter() }.all(|since| since.is_sound(self.chains.tracks.len()))
     }
 }

@@ -67,14 +67,16 @@ mod sighting;
 mod sightings;
 mod sparsification;
 mod tuning;
+mod view_channel;
 mod view_matches;
 
 pub use checkpoint::{CorruptKeyframes, KeyframePage};
 pub use graph::KeyframeGraph;
 pub use map::KeyframeMap;
 pub use moment::Moment;
-pub use place_recognition::{Guess, Relocalised};
+pub use place_recognition::{Guess, LearnedChannel, Relocalised};
 pub use refined::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
 pub use relaxation::Correction;
 pub use relaxation_job::RelaxationJob;
 pub use settings::KeyframeSettings;
+pub use view_channel::ViewChannel;

@@ -1,8 +1,10 @@
 //! A copy of the keyframe graph in which closures are judged and keyframes are moved.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use nalgebra::Isometry3;
+use place_recognition::LearnedChannel;
 
 use super::agent_track::AgentTrack;
 use super::constraint::{ClosureState, Constraint, composed};
@@ -135,6 +137,11 @@ impl RelaxationCopy {
     /// The copy as it is now.
     pub(super) fn graph(&self) -> &KeyframeGraph {
         &self.graph
+    }
+
+    /// Replaces what was learned of the channels of views.
+    pub(super) fn set_learned(&mut self, learned: Arc<[LearnedChannel]>) {
+        self.graph.learned = learned;
     }
 
     /// Replaces the matches of views.

@@ -1,7 +1,7 @@
 //! What a relaxation of the keyframe graph comes to.
 
 use nalgebra::Isometry3;
-use place_recognition::{ViewLog, ViewMatch};
+use place_recognition::{LearnedChannel, ViewLog, ViewMatch};
 
 use super::agent_track::AgentTrack;
 use super::constraint::{ClosureState, Constraint};
@@ -25,6 +25,8 @@ pub(super) struct RelaxationOutcome {
     pub(super) turn_noises: Vec<(u32, f64)>,
     /// The matches of views, if they have changed.
     pub(super) matches: Option<Vec<ViewMatch>>,
+    /// What was learned of the channels of views, if that has changed.
+    pub(super) learned: Option<Vec<LearnedChannel>>,
     /// The poses of the agents, as they were in the graph.
     pub(super) corrections: Vec<Correction>,
 }
@@ -58,6 +60,7 @@ impl RelaxationOutcome {
                 .filter_map(judged)
                 .collect(),
             matches: are_new.then(|| relaxed.matches.to_vec()),
+            learned: (relaxed.learned != graph.learned).then(|| relaxed.learned.to_vec()),
             corrections,
         }
     }
@@ -97,6 +100,7 @@ impl RelaxationOutcome {
         self.poses.is_sorted_by(|a, b| a.0 < b.0)
             && self.poses.iter().all(|(_, pose)| is_pose(pose))
             && self.matches.iter().flatten().all(ViewMatch::is_sound)
+            && self.learned.iter().flatten().all(LearnedChannel::is_sound)
             && are_agents
             && self.corrections.iter().all(is_correction)
     }
@@ -116,6 +120,7 @@ impl State for RelaxationOutcome {
         write_list(self.states.iter(), out);
         write_list(self.turn_noises.iter(), out);
         self.matches.write(out);
+        self.learned.write(out);
         write_list(self.corrections.iter(), out);
     }
 
@@ -123,12 +128,13 @@ impl State for RelaxationOutcome {
         // Each list is as long as the bytes that follow; their number is bounded by the graph's.
         let (poses, states) = (read_list(input, NONE)?, read_list(input, NONE)?);
         let turn_noises = read_list(input, NONE)?;
-        let matches = State::read(input)?;
+        let (matches, learned) = State::read(input)?;
         Ok(Self {
             poses,
             states,
             turn_noises,
             matches,
+            learned,
             corrections: read_list(input, NONE)?,
         })
     }

@@ -34,6 +34,7 @@ impl RelaxationCopy {
     /// one is always the most probable.
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
         let channels = Similarity::of_channels(log, matching.views_max);
+        self.set_learned(channels.iter().map(|channel| *channel.learned()).collect());
         if channels.is_empty() {
             return false;
         }

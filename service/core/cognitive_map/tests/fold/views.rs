@@ -1,7 +1,8 @@
 //! What is seen along ways that are driven again: as a laser sees a hall with pillars.
 
 use cognitive_map::{
-    AgentId, CognitiveMap, Descriptor, Motion, PoseNoise, Record, Sample, SampleBody, Settings,
+    AgentId, CognitiveMap, Descriptor, LearnedChannel, Motion, PoseNoise, Record, Sample,
+    SampleBody, Settings,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector2, Vector3};
 use random::Seeded;
@@ -213,4 +214,29 @@ fn a_restart_while_views_are_matched_makes_no_difference() {
     for every in [13, 101] {
         assert!(fold(every) == alone, "every {every} records");
     }
+}
+
+/// What a map has learned of the only channel of a drive.
+fn learned(views: Views) -> Option<LearnedChannel> {
+    let (mut map, mut events) = (CognitiveMap::new(Settings::default()), Vec::new());
+    for record in &drive(views, 1.5).records {
+        map.apply(record, &mut events);
+    }
+    let channel = map.view_channels().next().unwrap();
+    assert_eq!((channel.name, channel.dimension), ("laser", 48));
+    assert!(channel.views > 100, "{}", channel.views);
+    channel.learned
+}
+
+#[test]
+fn the_range_of_a_channel_is_learned_and_noise_has_none() {
+    let laser = learned(Views::Hall).unwrap();
+    assert!((1.0..8.0).contains(&laser.range_m), "{laser:?}");
+    assert!(laser.information_nats > 1.0, "{laser:?}");
+    assert!((0.0..=1.0).contains(&laser.independence), "{laser:?}");
+    let noise = learned(Views::Noise);
+    assert!(
+        noise.is_none_or(|noise| noise.information_nats < 0.05),
+        "{noise:?}"
+    );
 }

@@ -56,7 +56,17 @@ impl PlaceRecognition {
         &self.views.log
     }
 
-    /// The same, if enough of it is new to be matched again; it counts as matched from then on.
+    /// The channels of views: number, name, numbers of a view, and how many of its views are
+    /// logged.
+    pub fn channels(&self) -> impl Iterator<Item = (u8, &str, u16, usize)> {
+        (0..).zip(&self.views.channels).map(|(number, channel)| {
+            let logged = self.views.log.views.iter();
+            let n_logged = logged.filter(|view| view.channel == number).count();
+            (number, &*channel.name, channel.dimension, n_logged)
+        })
+    }
+
+    /// All that agents of the map saw, if enough of it is new to be matched again; it counts as matched from then on.
     pub fn take_due_views(&mut self) -> Option<ViewLog> {
         if !self.views.log.is_due() {
             return None;

@@ -15,7 +15,7 @@ use state::{Codec, CorruptState, Counted, PagedVec, State, StateReader, StateWri
 /// The remembered views of all agents.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ViewMemory {
-    channels: Vec<ChannelModel>,
+    pub(crate) channels: Vec<ChannelModel>,
     pub(crate) tracks: PagedVec<ViewTrack, 1>,
     pub(crate) stored: PagedVec<StoredView, 16>,
     /// Numbers in all descriptors.

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::runs::Runs;
-use super::two_covariance::single;
+use super::two_covariance::{self, single};
 use crate::tuning::similarity as tuning;
 
 /// What was learned of a channel.
@@ -29,10 +29,7 @@ impl Learned {
         let range_m = range_m(runs, &scores, &far)?;
         let backgrounds = backgrounds(runs, &scores);
         let near = near_pairs(runs, range_m);
-        let feature = |(a, b): (usize, usize)| {
-            let score = f64::from(scores[(a, b)]);
-            Vector3::new(score, backgrounds[a] + backgrounds[b], 1.0)
-        };
+        let feature = |pair| feature(pair, &scores, &backgrounds);
         let [near, distant]: [Vec<_>; 2] =
             [&near, &far].map(|pairs| pairs.iter().copied().map(feature).collect());
         let weights = logistic(&near, &distant)?;
@@ -51,6 +48,37 @@ impl Learned {
             log_odds: scores,
         })
     }
+}
+
+/// What the log-odds of two views depend on: their score, and how alike everything is to them.
+fn feature((a, b): (usize, usize), scores: &DMatrix<f32>, backgrounds: &[f64]) -> Vector3<f64> {
+    let score = f64::from(scores[(a, b)]);
+    Vector3::new(score, backgrounds[a] + backgrounds[b], 1.0)
+}
+
+/// Mean log-odds of neighbours within a range \[nats\], of the later half of the views by what is
+/// learned of the earlier half: what was learned of the same pairs would flatter it.
+pub(super) fn information_nats(runs: &Runs<'_>, range_m: f64) -> f64 {
+    validated_nats(runs, range_m).unwrap_or(0.0)
+}
+
+fn validated_nats(runs: &Runs<'_>, range_m: f64) -> Option<f64> {
+    let half = runs.len() / 2;
+    let scores = two_covariance::scores(runs, 0..half)?;
+    let backgrounds = backgrounds(runs, &scores);
+    let (near, far) = (near_pairs(runs, range_m), far_pairs(runs));
+    let features = |pairs: &[(usize, usize)], is_later: bool| -> Vec<Vector3<f64>> {
+        let all = pairs.iter().copied();
+        let those = all.filter(|&(a, b)| (a >= half) == is_later && (b >= half) == is_later);
+        those
+            .map(|pair| feature(pair, &scores, &backgrounds))
+            .collect()
+    };
+    let weights = logistic(&features(&near, false), &features(&far, false))?;
+    let later = features(&near, true);
+    let [low, high] = [tuning::LOG_ODDS.0, tuning::LOG_ODDS.1].map(f64::from);
+    let odds = later.iter().map(|one| weights.dot(one).clamp(low, high));
+    (!later.is_empty()).then(|| odds.sum::<f64>() / later.len() as f64)
 }
 
 /// Pairs of views that are far from one another along the way, drawn evenly.

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, Point3};
 
-use super::log_odds::Learned;
+use super::learned_channel::LearnedChannel;
+use super::log_odds::{Learned, information_nats};
 use super::runs::Runs;
 use super::two_covariance;
 use super::view_log::ViewLog;
@@ -41,10 +42,7 @@ state_of_struct!(ViewMatch {
 #[derive(Debug)]
 pub struct Similarity<'a> {
     runs: Runs<'a>,
-    /// Range of the channel \[m\].
-    range_m: f64,
-    /// Share of the evidence of a view that is its own.
-    independence: f64,
+    learned: LearnedChannel,
     log_odds: DMatrix<f32>,
     /// The same of whole sequences of views.
     of_sequences: DMatrix<f32>,
@@ -65,13 +63,18 @@ impl<'a> Similarity<'a> {
         if runs.len() < crate::tuning::log::VIEWS_MIN {
             return None;
         }
-        let scores = two_covariance::scores(&runs)?;
+        let scores = two_covariance::scores(&runs, 0..runs.len())?;
         let learned = Learned::of(&runs, scores)?;
         let of_sequences = of_sequences(&runs, &learned.log_odds);
         Some(Self {
+            learned: LearnedChannel {
+                channel,
+                views: u32::try_from(runs.len()).unwrap_or(u32::MAX),
+                range_m: learned.range_m,
+                information_nats: information_nats(&runs, learned.range_m),
+                independence: learned.independence,
+            },
             runs,
-            range_m: learned.range_m,
-            independence: learned.independence,
             log_odds: learned.log_odds,
             of_sequences,
         })
@@ -82,9 +85,9 @@ impl<'a> Similarity<'a> {
         self.runs.views.iter().map(|view| view.sample)
     }
 
-    /// Range of the channel: views are alike within it \[m\].
-    pub fn range_m(&self) -> f64 {
-        self.range_m
+    /// What was learned of the channel.
+    pub fn learned(&self) -> &LearnedChannel {
+        &self.learned
     }
 
     /// The matches of each view with earlier ones, wherever they are.
@@ -102,7 +105,7 @@ impl<'a> Similarity<'a> {
 
     /// The match of each view with another one, earlier or later, near to which a map has it.
     pub fn matches_near(&self, positions: &[Option<Point3<f64>>]) -> Vec<ViewMatch> {
-        let gate_m = tuning::GATE_RANGES * self.range_m;
+        let gate_m = tuning::GATE_RANGES * self.learned.range_m;
         let mut matches = Vec::new();
         for (index, position) in positions.iter().enumerate() {
             let Some(position) = position else {
@@ -158,7 +161,7 @@ impl<'a> Similarity<'a> {
         ViewMatch {
             now: self.runs.views[now].sample,
             then: self.runs.views[then].sample,
-            sd_m: 0.5 * self.range_m,
+            sd_m: 0.5 * self.learned.range_m,
             depth: odds.ln_1p().clamp(tuning::DEPTH.0, tuning::DEPTH.1),
         }
     }
@@ -182,7 +185,8 @@ impl<'a> Similarity<'a> {
                 let Some(at) = at.as_ref().filter(|_| self.is_apart(index, other)) else {
                     continue;
                 };
-                let squared = (position - at).norm_squared() / (self.range_m * self.range_m);
+                let squared =
+                    (position - at).norm_squared() / (self.learned.range_m * self.learned.range_m);
                 if squared < 32.0 {
                     let weight = (-0.5 * squared).exp();
                     expected += weight;
@@ -191,7 +195,7 @@ impl<'a> Similarity<'a> {
             }
             sum += (found / expected).ln();
         }
-        sum * self.independence.sqrt()
+        sum * self.learned.independence.sqrt()
     }
 }
 

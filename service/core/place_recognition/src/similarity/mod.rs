@@ -1,12 +1,14 @@
 //! How alike views are as a function of where they were taken, learned for each channel from the
 //! views themselves; and which of them are likely to be of one place.
 
+mod learned_channel;
 mod log_odds;
 mod matching;
 mod runs;
 mod two_covariance;
 mod view_log;
 
+pub use learned_channel::LearnedChannel;
 pub use matching::{Similarity, ViewMatch};
 pub use view_log::ViewLog;
 pub(crate) use view_log::{LoggedView, logged};

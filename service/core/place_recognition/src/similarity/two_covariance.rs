@@ -1,5 +1,7 @@
 //! The two-covariance model of a channel.
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use super::runs::Runs;
@@ -17,12 +19,12 @@ use crate::tuning::similarity as tuning;
 /// S = Σ [ r/(1−r²) z₁ z₂ − r²/(2 (1−r²)) (z₁² + z₂²) − ½ ln(1 − r²) ]
 /// ```
 ///
-/// `None` if neighbours are no more alike than others.
-pub(super) fn scores(runs: &Runs<'_>) -> Option<DMatrix<f32>> {
+/// W and T are those of the views of a range. `None` if neighbours are no more alike than others.
+pub(super) fn scores(runs: &Runs<'_>, learned_from: Range<usize>) -> Option<DMatrix<f32>> {
     let views = centred(runs);
-    let n = runs.len();
-    let within = within(runs, &views)?;
-    let total = views.tr_mul(&views) / n as f64;
+    let within = within(runs, &views, &learned_from)?;
+    let known = views.rows(learned_from.start, learned_from.len());
+    let total = known.tr_mul(&known) / known.nrows() as f64;
     let shrunk = tuning::SHRINKAGE * within.trace() / within.nrows() as f64;
     let shrink = |matrix: DMatrix<f64>| {
         let ridge = DMatrix::from_diagonal_element(matrix.nrows(), matrix.nrows(), shrunk);
@@ -116,12 +118,17 @@ fn centred(runs: &Runs<'_>) -> DMatrix<f64> {
     rows
 }
 
-/// Half the covariance of what neighbours differ by; `None` if there are too few.
-fn within(runs: &Runs<'_>, views: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// Half the covariance of what neighbours in a range differ by; `None` if there are too few.
+fn within(
+    runs: &Runs<'_>,
+    views: &DMatrix<f64>,
+    learned_from: &Range<usize>,
+) -> Option<DMatrix<f64>> {
     let mut differences = Vec::new();
-    for index in 0..runs.len() {
+    for index in learned_from.clone() {
         for lag in tuning::NEIGHBOUR_LAGS {
-            if let Some(other) = runs.after(index, lag) {
+            let other = runs.after(index, lag);
+            if let Some(other) = other.filter(|other| learned_from.contains(other)) {
                 differences.push(views.row(other) - views.row(index));
             }
         }

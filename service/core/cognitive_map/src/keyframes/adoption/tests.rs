@@ -162,6 +162,7 @@ impl Team {
         let outcome = RelaxationOutcome {
             turn_noises: vec![(0, 0.5)],
             matches: None,
+            learned: None,
             poses: chains.keyframes.iter().filter_map(pose).collect(),
             states: { closures.iter() }
                 .filter(|(_, closure)| closure.is_candidate())

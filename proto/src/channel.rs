@@ -1,0 +1,55 @@
+//! What is known of the channels of percepts.
+
+use serde::{Deserialize, Serialize};
+
+/// What a channel carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum ChannelKind {
+    /// Scalars.
+    Level,
+    /// Views: vectors of length 1.
+    Descriptor,
+}
+
+/// A channel of percepts. Percepts of one name and of different kinds or lengths are different
+/// channels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct Channel {
+    /// Its name.
+    pub name: String,
+    /// What it carries.
+    pub kind: ChannelKind,
+    /// How many numbers a view has; absent for levels.
+    pub dimension: Option<u32>,
+    /// How many views are logged, to be matched with one another; absent for levels.
+    pub views: Option<u64>,
+    /// What was learned of the channel when its views were last matched; absent for levels, while
+    /// there are few views, and where they say nothing of where they were seen.
+    pub learned: Option<LearnedChannel>,
+}
+
+/// What was learned of a channel of views from them alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct LearnedChannel {
+    /// How many views it was learned from.
+    pub views: u64,
+    /// Within this distance views are alike \[m\].
+    pub range_m: f64,
+    /// Mean log of the likelihood ratio of two views to be within the range of one another \[nats\]:
+    /// of neighbours along the way, against far ones.
+    pub information_nats: f64,
+    /// Share of the evidence of a view that is its own, 0 to 1: neighbours say nearly the same.
+    pub independence: f64,
+}
+
+/// The channels of a space.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct ChannelList {
+    /// In the order in which something was first remembered of them.
+    pub channels: Vec<Channel>,
+}
