@@ -33,13 +33,15 @@ mod predict;
 mod query;
 mod route;
 mod sample;
+mod sequence;
 mod settings;
 mod watermark;
 
 pub use answer::{
-    AgentDetail, AgentPage, AgentSummary, Evidence, GridModuleState, GridState, IngestAnswer,
-    Landmark, LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer, RecalledPlace, Rivals,
-    SpaceInfo, SpaceList, StampedPose, Trajectory, Trip, TripDetail, TripPage,
+    AgentAt, AgentDetail, AgentPage, AgentSummary, Evidence, GridModuleState, GridState,
+    IngestAnswer, Landmark, LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer,
+    RecalledPlace, Rivals, SpaceInfo, SpaceList, StampedPose, Trajectory, Trip, TripDetail,
+    TripPage,
 };
 pub use codec::Codec;
 pub use encoding::{CBOR, JSON, POSTCARD_V1};
@@ -74,5 +76,6 @@ pub use sample::{
     Increment, Marker, MotionNoise, Relation, Sample, SampleBatch, SampleBody, Sighting, StartPose,
     Target, Velocity,
 };
+pub use sequence::{NextPlace, SequenceAnswer, SequenceElement, SequenceQuery, SequenceTrip};
 pub use settings::{NoiseSettings, Recruitment, SpaceSettings};
 pub use watermark::{Rejection, SeqRange, SkipReason, Watermark};

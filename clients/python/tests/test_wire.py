@@ -44,6 +44,8 @@ TYPES: Dict[str, type] = {
     "recall_query": RecallQuery,
     "route_answer": cogmap.RouteAnswer,
     "route_query": cogmap.RouteQuery,
+    "sequence_answer": cogmap.SequenceAnswer,
+    "sequence_query": cogmap.SequenceQuery,
     "space_list": cogmap.SpaceList,
     "space_settings": cogmap.SpaceSettings,
     "trajectory": cogmap.Trajectory,

@@ -15,6 +15,7 @@ mod place;
 mod prediction;
 mod recall;
 mod route;
+mod sequence;
 mod space;
 mod surprise;
 mod trajectory;
@@ -34,8 +35,9 @@ pub use place::place;
 pub use prediction::prediction;
 pub use recall::recall;
 pub use route::{fits_in_path, routes, way};
+pub use sequence::sequence;
 pub use space::space_info;
-pub use trajectory::{stamped, trajectory};
+pub use trajectory::{agent_at, stamped, trajectory};
 pub use trip::{leg, trip, trip_detail};
 
 /// Frame of all positions in answers.

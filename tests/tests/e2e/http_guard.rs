@@ -8,7 +8,7 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 28] = [
+const ROUTES: [(&str, &[&str]); 30] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
@@ -21,6 +21,7 @@ const ROUTES: [(&str, &[&str]); 28] = [
     ("/v1/spaces/{space}/agents/{agent}/object", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/predict", &["post"]),
     ("/v1/spaces/{space}/agents/{agent}/samples", &["post"]),
+    ("/v1/spaces/{space}/agents/{agent}/at", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/trajectory", &["get"]),
     ("/v1/spaces/{space}/events", &["get"]),
     ("/v1/spaces/{space}/export", &["get"]),
@@ -38,6 +39,7 @@ const ROUTES: [(&str, &[&str]); 28] = [
     ("/v1/spaces/{space}/places/{id}", &["get"]),
     ("/v1/spaces/{space}/recall", &["post"]),
     ("/v1/spaces/{space}/route", &["post"]),
+    ("/v1/spaces/{space}/sequence", &["post"]),
     ("/v1/spaces/{space}/trips", &["get"]),
     ("/v1/spaces/{space}/trips/{id}", &["get"]),
 ];

@@ -165,6 +165,7 @@ from .sample import (
     TouchNoise,
     Velocity,
 )
+from .sequence import NextPlace, SequenceAnswer, SequenceElement, SequenceQuery, SequenceTrip
 from .settings import Bernoulli, NoiseSettings, Novelty, Recruitment, SpaceSettings
 from .trajectory import StampedPose, Trajectory
 from .vector import quaternion_from_yaw
@@ -245,6 +246,7 @@ __all__ = [
     "MarkerPassed",
     "MissedEvents",
     "MotionNoise",
+    "NextPlace",
     "NextTouch",
     "NoTurn",
     "NoiseSettings",
@@ -308,6 +310,10 @@ __all__ = [
     "SampleBody",
     "SamplesSkipped",
     "SeqRange",
+    "SequenceAnswer",
+    "SequenceElement",
+    "SequenceQuery",
+    "SequenceTrip",
     "SessionEnd",
     "SessionStarted",
     "SessionSuperseded",

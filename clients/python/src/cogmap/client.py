@@ -42,6 +42,8 @@ from .point_cloud import PointCloud
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
 from .request import json_of, path_of
 from .route import (
+    AtPercept,
+    AtPlace,
     RouteAnswer,
     RouteAvoid,
     RouteBox,
@@ -51,7 +53,16 @@ from .route import (
     RouteQuery,
     RouteReverse,
 )
-from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
+from .sample import (
+    Descriptor,
+    Level,
+    NoTurn,
+    Orientation,
+    Sample,
+    SampleBatch,
+    TouchNoise,
+)
+from .sequence import SequenceAnswer, SequenceElement, SequenceQuery
 from .settings import SpaceSettings
 from .sse import ServerSentEvent
 from .trajectory import StampedPose, Trajectory
@@ -59,6 +70,15 @@ from .vector import vec3
 from .wire import CBOR, JSON, decode, encode, to_wire
 
 _log = logging.getLogger("cogmap")
+
+
+def _element(element: Union[int, PerceptCue, SequenceElement]) -> SequenceElement:
+    """An element of a sequence: a number is a place, and a percept was sensed at one."""
+    if isinstance(element, (AtPlace, AtPercept)):
+        return element
+    if isinstance(element, (Level, Descriptor)):
+        return AtPercept(element)
+    return AtPlace(element)
 
 
 class Client(HttpService):
@@ -254,6 +274,25 @@ class Client(HttpService):
         )
         path = path_of(space, "route")
         return self._send(RouteAnswer, "POST", path, JSON, json_of("query", query))
+
+    def sequence(
+        self,
+        space: str,
+        cue: Iterable[Union[int, PerceptCue, SequenceElement]],
+        *,
+        error_rate: Optional[float] = None,
+        none_prior: Optional[float] = None,
+        limit: Optional[int] = None,
+    ) -> SequenceAnswer:
+        """Which trips the last places of somebody look like, and what comes next. `cue` has the
+        places by number, or what was sensed there (`Level`, `Descriptor`), oldest first;
+        `error_rate` of them are wrong, and `none_prior` says how likely nobody has travelled
+        such a sequence. A service that is at several of these already asks to come back (503)."""
+        query = SequenceQuery(
+            tuple(_element(element) for element in cue), error_rate, none_prior, limit
+        )
+        path = path_of(space, "sequence")
+        return self._send(SequenceAnswer, "POST", path, JSON, json_of("query", query))
 
     def predict(
         self,
