@@ -23,6 +23,7 @@ mod store; // damage on the disk, repair and backups
 mod cli; // the commands
 mod demo; // robots that are lost and found, and a cup that is recognised
 mod eval; // the experiments
+mod exports; // ways for other programs, and maps as they were
 mod http; // samples in, answers out
 mod http_guard; // who is let in, and how the service goes
 mod http_ingest; // samples over HTTP alone

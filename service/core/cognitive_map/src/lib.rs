@@ -36,7 +36,7 @@ pub use memory::trip::{Leg, Trip, TripEnd, TripId};
 pub use memory::way::{Traversals, Way, Waypoint};
 pub use route::{
     NoRoute, NoRouteEnd, Region, Reverse, Route, RouteBounds, RouteCost, RouteEnd, RouteOptions,
-    RouteStep, StepKind,
+    RouteStep, StepKind, ThinnedTraversal, ThinnedWay,
 };
 pub use settings::{Bound, InvalidSettings, Recruitment, SettingNumber, Settings, SettingsValues};
 pub use state::{Digest, InvalidDigest};

@@ -171,7 +171,9 @@ impl<'a> Forward<'a> {
             })
             .collect();
         next.sort_by(|a, b| likelier(a.probability, b.probability));
-        let others = next.iter().skip(limit).map(|other| other.probability).sum();
+        // The sum of none would be the negative zero.
+        let further = next.iter().skip(limit);
+        let others = further.fold(0.0, |sum, other| sum + other.probability);
         next.truncate(limit);
         let mut trips: Vec<_> = { trips.into_iter() }
             .map(|(trip, (mass, _, leg))| SequenceMatch {
