@@ -167,13 +167,14 @@ from .sample import (
 )
 from .sequence import NextPlace, SequenceAnswer, SequenceElement, SequenceQuery, SequenceTrip
 from .settings import Bernoulli, NoiseSettings, Novelty, Recruitment, SpaceSettings
-from .trajectory import StampedPose, Trajectory
+from .trajectory import AgentAt, StampedPose, Trajectory
 from .vector import quaternion_from_yaw
 
 __version__ = "0.1.0"
 
 __all__ = [
     "DEFAULT_ENDPOINT",
+    "AgentAt",
     "AgentDetail",
     "AgentEnrolled",
     "AgentObject",

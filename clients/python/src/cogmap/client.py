@@ -65,7 +65,7 @@ from .sample import (
 from .sequence import SequenceAnswer, SequenceElement, SequenceQuery
 from .settings import SpaceSettings
 from .sse import ServerSentEvent
-from .trajectory import StampedPose, Trajectory
+from .trajectory import AgentAt, StampedPose, Trajectory
 from .vector import vec3
 from .wire import CBOR, JSON, decode, encode, to_wire
 
@@ -167,6 +167,25 @@ class Client(HttpService):
     def grid(self, space: str, agent: str) -> GridState:
         """Grid-cell state of an agent."""
         return self._get(GridState, path_of(space, "agents", agent, "grid"))
+
+    def agent_at(
+        self,
+        space: str,
+        agent: str,
+        stamp_ns: int,
+        *,
+        refined: bool = False,
+        session: Optional[int] = None,
+    ) -> AgentAt:
+        """Where an agent was at a stamp, as it was known then; with `refined` by all that has been
+        seen since. Of its current session, or of `session`, which is for causal poses only. A stamp
+        that is not known breaks a rule (422)."""
+        query: Query = {
+            "stamp_ns": stamp_ns,
+            "trajectory": "refined" if refined else "causal",
+            "session": session,
+        }
+        return self._get(AgentAt, path_of(space, "agents", agent, "at"), query)
 
     def trajectory(
         self,
@@ -461,18 +480,30 @@ class Client(HttpService):
         *,
         agent: Optional[str] = None,
         session: Optional[int] = None,
+        tolerance_m: Optional[float] = None,
+        reverse: Optional[RouteReverse] = None,
     ) -> bytes:
         """A space as a file.
 
         Args:
             space: Name of the space.
             format: `json` (the whole map), `ply` (the places as a point cloud), `tum` (the causal
-                trajectory of an agent) or `g2o` (what agents did and saw as a graph of poses and
-                landmarks, relaxed).
+                trajectory of an agent), `g2o` (what agents did and saw as a graph of poses and
+                landmarks, relaxed), `graphml` or `nav2` (the ways as a graph: in GraphML, and in
+                the GeoJSON of Nav2's Route Server).
             agent: Whose trajectory; `tum` needs it.
             session: Which run of the agent; the current one when absent.
+            tolerance_m: How far places may lie from the edge that stands for a chain of ways, in
+                `graphml` and `nav2` [m]; 0.1 when absent.
+            reverse: With `NEVER` only directions in which somebody travelled are in these.
         """
-        query: Query = {"format": format, "agent": agent, "session": session}
+        query: Query = {
+            "format": format,
+            "agent": agent,
+            "session": session,
+            "tolerance_m": tolerance_m,
+            "reverse": None if reverse is None else reverse.value,
+        }
         return self._request("GET", path_of(space, "export"), query, accept="*/*")
 
     def point_cloud(self, space: str, *, since_revision: Optional[int] = None) -> PointCloud:
