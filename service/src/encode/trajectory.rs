@@ -5,7 +5,6 @@ use cogmap_proto as wire;
 use nalgebra::Isometry3;
 
 use super::FRAME;
-use crate::engine::Around;
 
 /// A page of a trajectory: refined by the map of a revision, or causal where there is none.
 pub fn trajectory(
@@ -29,19 +28,25 @@ pub fn trajectory(
 }
 
 /// Where an agent was at a stamp between two poses.
-pub fn agent_at(agent: &str, around: &Around, stamp_ns: i64) -> wire::AgentAt {
-    let at = around.before.between(&around.after, stamp_ns);
+pub fn agent_at(
+    agent: &str,
+    session: u64,
+    revision: Option<u64>,
+    [before, after]: [&StampedPose; 2],
+    stamp_ns: i64,
+) -> wire::AgentAt {
+    let at = before.between(after, stamp_ns);
     wire::AgentAt {
         agent: agent.to_owned(),
-        session: around.session,
+        session,
         frame: FRAME.to_owned(),
-        trajectory: kind(around.revision).to_owned(),
+        trajectory: kind(revision).to_owned(),
         stamp_ns,
         translation_m: at.pose.translation.vector.into(),
         rotation_xyzw: at.pose.rotation.coords.into(),
-        before_ns: around.before.stamp_ns,
-        after_ns: around.after.stamp_ns,
-        map_revision: around.revision,
+        before_ns: before.stamp_ns,
+        after_ns: after.stamp_ns,
+        map_revision: revision,
     }
 }
 

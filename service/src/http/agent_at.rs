@@ -52,6 +52,8 @@ pub(crate) async fn get(
         }
         TrajectoryKind::Refined => space.refined_poses_around(name, stamp_ns).await?,
     };
-    let answer: AgentAt = encode::agent_at(name, &around, stamp_ns);
+    let poses = [&around.before, &around.after];
+    let (session, revision) = (around.session, around.revision);
+    let answer: AgentAt = encode::agent_at(name, session, revision, poses, stamp_ns);
     Ok(reply::json(&answer))
 }

@@ -24,10 +24,9 @@ from .answer import (
 )
 from .errors import ApiError, InvalidValue
 from .event import Event, EventPage, EventRecord, MissedEvents
-from .http_service import HttpService, Query
+from .http_service import Query
 from .landmark import Landmark, LandmarkPage
 from .live import LaggedTicks, LiveTick
-from .localize import Localization, LocalizeQuery
 from .object import (
     AgentObject,
     Contact,
@@ -40,48 +39,20 @@ from .object import (
 )
 from .point_cloud import PointCloud
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
+from .questions import Questions
 from .request import json_of, path_of
-from .route import (
-    AtPercept,
-    AtPlace,
-    RouteAnswer,
-    RouteAvoid,
-    RouteBox,
-    RouteCost,
-    RouteEnd,
-    RouteFormat,
-    RouteQuery,
-    RouteReverse,
-)
-from .sample import (
-    Descriptor,
-    Level,
-    NoTurn,
-    Orientation,
-    Sample,
-    SampleBatch,
-    TouchNoise,
-)
-from .sequence import SequenceAnswer, SequenceElement, SequenceQuery
+from .route import RouteReverse
+from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
 from .settings import SpaceSettings
 from .sse import ServerSentEvent
-from .trajectory import AgentAt, StampedPose, Trajectory
+from .trajectory import StampedPose, Trajectory
 from .vector import vec3
 from .wire import CBOR, JSON, decode, encode, to_wire
 
 _log = logging.getLogger("cogmap")
 
 
-def _element(element: Union[int, PerceptCue, SequenceElement]) -> SequenceElement:
-    """An element of a sequence: a number is a place, and a percept was sensed at one."""
-    if isinstance(element, (AtPlace, AtPercept)):
-        return element
-    if isinstance(element, (Level, Descriptor)):
-        return AtPercept(element)
-    return AtPlace(element)
-
-
-class Client(HttpService):
+class Client(Questions):
     """Asks a cogmap service over HTTP.
 
     Holds no connection between calls, so it may be shared by threads. Lists that the service
@@ -168,25 +139,6 @@ class Client(HttpService):
         """Grid-cell state of an agent."""
         return self._get(GridState, path_of(space, "agents", agent, "grid"))
 
-    def agent_at(
-        self,
-        space: str,
-        agent: str,
-        stamp_ns: int,
-        *,
-        refined: bool = False,
-        session: Optional[int] = None,
-    ) -> AgentAt:
-        """Where an agent was at a stamp, as it was known then; with `refined` by all that has been
-        seen since. Of its current session, or of `session`, which is for causal poses only. A stamp
-        that is not known breaks a rule (422)."""
-        query: Query = {
-            "stamp_ns": stamp_ns,
-            "trajectory": "refined" if refined else "causal",
-            "session": session,
-        }
-        return self._get(AgentAt, path_of(space, "agents", agent, "at"), query)
-
     def trajectory(
         self,
         space: str,
@@ -250,68 +202,6 @@ class Client(HttpService):
         body = {name: value for name, value in to_wire(query).items() if value is not None}
         path = path_of(space, "recall")
         return self._send(RecallAnswer, "POST", path, JSON, json_of("query", body))
-
-    def localize(self, space: str, samples: Iterable[Sample]) -> Localization:
-        """Where a sequence of samples of one robot was taken, 1 to 4096 of them. They need no agent
-        and change nothing. Start poses and episodes with objects are refused; a service that is at
-        several of these already asks to come back (503)."""
-        query = LocalizeQuery(cast(Tuple[Sample, ...], samples))
-        path = path_of(space, "localize")
-        return self._send(Localization, "POST", path, JSON, json_of("query", query))
-
-    def route(
-        self,
-        space: str,
-        start: RouteEnd,
-        goal: RouteEnd,
-        *,
-        cost: RouteCost = RouteCost.LENGTH,
-        reverse: RouteReverse = RouteReverse.ALLOWED,
-        avoid_places: Iterable[int] = (),
-        avoid_boxes: Iterable[RouteBox] = (),
-        shortcuts: bool = False,
-        body_radius_m: Optional[float] = None,
-        alternatives: int = 0,
-        path_spacing_m: Optional[float] = None,
-    ) -> RouteAnswer:
-        """How one gets from `start` to `goal` (`AtAgent`, `AtPlace`, `AtPosition`, …), by ways that
-        the team has gone: the cheapest by `cost`, and up to four `alternatives`. With `shortcuts`
-        it cuts corners within `body_radius_m` [m] of ways. With `path_spacing_m` there are poses
-        along it, so far apart [m]. A service that is at several of these already asks to come back
-        (503)."""
-        query = RouteQuery(
-            start,
-            goal,
-            cost=cost,
-            reverse=reverse,
-            avoid=RouteAvoid(tuple(avoid_places), tuple(avoid_boxes)),
-            shortcuts=shortcuts,
-            body_radius_m=body_radius_m,
-            alternatives=alternatives,
-            format=RouteFormat.STEPS if path_spacing_m is None else RouteFormat.PATH,
-            spacing_m=path_spacing_m,
-        )
-        path = path_of(space, "route")
-        return self._send(RouteAnswer, "POST", path, JSON, json_of("query", query))
-
-    def sequence(
-        self,
-        space: str,
-        cue: Iterable[Union[int, PerceptCue, SequenceElement]],
-        *,
-        error_rate: Optional[float] = None,
-        none_prior: Optional[float] = None,
-        limit: Optional[int] = None,
-    ) -> SequenceAnswer:
-        """Which trips the last places of somebody look like, and what comes next. `cue` has the
-        places by number, or what was sensed there (`Level`, `Descriptor`), oldest first;
-        `error_rate` of them are wrong, and `none_prior` says how likely nobody has travelled
-        such a sequence. A service that is at several of these already asks to come back (503)."""
-        query = SequenceQuery(
-            tuple(_element(element) for element in cue), error_rate, none_prior, limit
-        )
-        path = path_of(space, "sequence")
-        return self._send(SequenceAnswer, "POST", path, JSON, json_of("query", query))
 
     def predict(
         self,

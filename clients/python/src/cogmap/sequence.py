@@ -5,11 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional, Tuple, Union
 
+from .query import PerceptCue
 from .route import AtPercept, AtPlace
+from .sample import Descriptor, Level
 from .scalar import COUNT_RANGE, all_of, number, whole
 
 #: One element of a sequence: a place, or what was sensed at one.
 SequenceElement = Union[AtPlace, AtPercept]
+#: The same, where a number is a place, and a percept was sensed at one.
+AnyElement = Union[int, PerceptCue, SequenceElement]
+
+
+def element(element: AnyElement) -> SequenceElement:
+    """An element as it is sent."""
+    if isinstance(element, (AtPlace, AtPercept)):
+        return element
+    if isinstance(element, (Level, Descriptor)):
+        return AtPercept(element)
+    return AtPlace(element)
 
 
 @dataclass(frozen=True)

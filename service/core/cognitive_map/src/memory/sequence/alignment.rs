@@ -27,6 +27,9 @@ const SLIP: f64 = 0.002;
 /// Probability that the sequence goes on elsewhere, as where its beginning is older than the trip.
 const JUMP: f64 = 0.005;
 
+/// By how many places the position goes on, with which probability.
+const STEPS: [(usize, f64); 3] = [(0, SLIP), (1, 1.0 - 2.0 * SLIP - JUMP), (2, SLIP)];
+
 /// Probabilities up to a common factor.
 struct Forward<'a> {
     windows: &'a [Window],
@@ -91,20 +94,30 @@ impl<'a> Forward<'a> {
     fn step(&mut self) {
         let mut moved = vec![0.0; self.positions.len()];
         let mut jumps = JUMP * (self.nobody + self.elsewhere);
+        let mut elsewhere = (1.0 - JUMP) * self.elsewhere;
         let mut first = 0;
         for window in self.windows {
-            let n_places = window.places.len();
-            let end = first + n_places;
+            let end = first + window.places.len();
+            let goes_on = matches!(window.after, After::Place(_));
             for at in first..end {
                 let here = self.positions[at];
                 jumps += JUMP * here;
-                let ways = [(0, SLIP), (1, 1.0 - 2.0 * SLIP - JUMP), (2, SLIP)];
-                for (places, probability) in ways {
-                    if at + places < end {
-                        moved[at + places] += probability * here;
-                    } else {
-                        jumps += probability * here;
+                for (places, probability) in STEPS {
+                    match moved[..end].get_mut(at + places) {
+                        Some(to) => *to += probability * here,
+                        // It leaves the window, or the trip.
+                        None if goes_on => elsewhere += probability * here,
+                        None => jumps += probability * here,
                     }
+                }
+            }
+            // Others come from before the window.
+            let before =
+                self.elsewhere * self.starts[first] / self.start_elsewhere.max(self.starts[first]);
+            for (places, probability) in STEPS {
+                for to in 0..places.min(window.first as usize).min(end - first) {
+                    moved[first + to] += probability * before;
+                    elsewhere -= probability * before;
                 }
             }
             first = end;
@@ -113,7 +126,7 @@ impl<'a> Forward<'a> {
             *at += jumps * start;
         }
         self.positions = moved;
-        self.elsewhere = (1.0 - JUMP) * self.elsewhere + jumps * self.start_elsewhere;
+        self.elsewhere = elsewhere.max(0.0) + jumps * self.start_elsewhere;
         self.nobody = (1.0 - JUMP) * self.nobody + jumps * self.none_prior;
     }
 
