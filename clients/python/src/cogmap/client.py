@@ -42,7 +42,7 @@ from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
 from .questions import Questions
 from .request import json_of, path_of
 from .route import RouteReverse
-from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
+from .sample import NoTurn, Orientation, SampleBatch, TouchNoise
 from .settings import SpaceSettings
 from .sse import ServerSentEvent
 from .trajectory import StampedPose, Trajectory
