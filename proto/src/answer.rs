@@ -123,6 +123,33 @@ pub struct StampedPose {
     pub rotation_xyzw: [f64; 4],
 }
 
+/// Where an agent was at a time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct AgentAt {
+    /// Agent.
+    pub agent: String,
+    /// Session of the agent.
+    pub session: u64,
+    /// Frame; always `map`.
+    pub frame: String,
+    /// `causal`: as it was known then. `refined`: by all that has been seen since.
+    pub trajectory: String,
+    /// The stamp that was asked about \[ns\].
+    pub stamp_ns: i64,
+    /// Position \[m\].
+    pub translation_m: [f64; 3],
+    /// Orientation, unit quaternion `[x, y, z, w]`.
+    pub rotation_xyzw: [f64; 4],
+    /// Stamp of the latest known pose that is not after it \[ns\].
+    pub before_ns: i64,
+    /// Stamp of the earliest known pose that is not before it \[ns\]. Between the two the agent is
+    /// taken to have moved evenly.
+    pub after_ns: i64,
+    /// Number of records that a refined pose takes into account; absent of a causal one.
+    pub map_revision: Option<u64>,
+}
+
 /// Grid-cell state of an agent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]

@@ -34,13 +34,15 @@ mod predict;
 mod query;
 mod route;
 mod sample;
+mod sequence;
 mod settings;
 mod watermark;
 
 pub use answer::{
-    AgentDetail, AgentPage, AgentSummary, Evidence, GridModuleState, GridState, IngestAnswer,
-    Landmark, LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer, RecalledPlace, Rivals,
-    SpaceInfo, SpaceList, StampedPose, Trajectory, Trip, TripDetail, TripPage,
+    AgentAt, AgentDetail, AgentPage, AgentSummary, Evidence, GridModuleState, GridState,
+    IngestAnswer, Landmark, LandmarkPage, Leg, Place, PlacePage, Problem, RecallAnswer,
+    RecalledPlace, Rivals, SpaceInfo, SpaceList, StampedPose, Trajectory, Trip, TripDetail,
+    TripPage,
 };
 pub use channel::{Channel, ChannelKind, ChannelList, LearnedChannel};
 pub use codec::Codec;
@@ -76,5 +78,6 @@ pub use sample::{
     Increment, Marker, MotionNoise, Relation, Sample, SampleBatch, SampleBody, Sighting, StartPose,
     Target, Velocity,
 };
+pub use sequence::{NextPlace, SequenceAnswer, SequenceElement, SequenceQuery, SequenceTrip};
 pub use settings::{NoiseSettings, Recruitment, SpaceSettings};
 pub use watermark::{Rejection, SeqRange, SkipReason, Watermark};

@@ -19,6 +19,8 @@ pub enum Verb {
     Localize,
     /// [`crate::RouteQuery`] → [`crate::RouteAnswer`].
     Route,
+    /// [`crate::SequenceQuery`] → [`crate::SequenceAnswer`].
+    Sequence,
 }
 
 impl Verb {
@@ -31,6 +33,7 @@ impl Verb {
             Self::Identify => "identify",
             Self::Localize => "localize",
             Self::Route => "route",
+            Self::Sequence => "sequence",
         }
     }
 }

@@ -7,11 +7,11 @@ mod messages;
 use std::fmt::Debug;
 
 use cogmap_proto::{
-    AgentDetail, AgentObject, AgentPage, Codec, DecodeError, Estimate, Event, GridState,
+    AgentAt, AgentDetail, AgentObject, AgentPage, Codec, DecodeError, Estimate, Event, GridState,
     Identification, IdentifyQuery, IngestAnswer, LandmarkPage, Localization, LocalizeQuery, Name,
     ObjectDetail, ObjectLesson, ObjectPage, PlacePage, PredictAnswer, PredictQuery, Problem,
-    RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SpaceList, SpaceSettings,
-    Trajectory, TripDetail, TripPage, Watermark, WatermarkQuery,
+    RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SequenceAnswer, SequenceQuery,
+    SpaceList, SpaceSettings, Trajectory, TripDetail, TripPage, Watermark, WatermarkQuery,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -50,6 +50,9 @@ fn decode_as_everything(bytes: &[u8]) {
     decode_as::<RecallQuery>(bytes);
     decode_as::<RouteAnswer>(bytes);
     decode_as::<RouteQuery>(bytes);
+    decode_as::<SequenceAnswer>(bytes);
+    decode_as::<AgentAt>(bytes);
+    decode_as::<SequenceQuery>(bytes);
     decode_as::<SampleBatch>(bytes);
     decode_as::<SpaceList>(bytes);
     decode_as::<SpaceSettings>(bytes);

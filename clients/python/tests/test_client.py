@@ -137,6 +137,32 @@ def test_a_route_is_asked_for_as_it_is_meant(server: Server, client: cogmap.Clie
     assert json.loads(server.seen[1].body) == golden("route_query_full")
 
 
+def test_a_sequence_is_asked_about_as_it_is_meant(server: Server, client: cogmap.Client) -> None:
+    server.answer("POST /v1/spaces/lab/sequence", golden("sequence_answer"))
+    found = client.sequence("lab", [3, 4])
+    assert json.loads(server.seen[0].body) == golden("sequence_query")
+    likelihoods = [next.probability for next in found.next]
+    assert sum(likelihoods) + found.others + found.none == 1.0
+    assert (found.trips[0].trip, found.trips[0].agent, found.trips[0].leg) == (17, "robot-1", 6)
+    last = cogmap.AtPlace(2**64 - 1)
+    felt = cogmap.Level("touch", 0.75)
+    client.sequence("lab", (last, felt), error_rate=0.25, none_prior=0.5, limit=3)
+    assert json.loads(server.seen[1].body) == golden("sequence_query_full")
+
+
+def test_where_an_agent_was_is_asked(server: Server, client: cogmap.Client) -> None:
+    server.answer("GET /v1/spaces/lab/agents/ada/at", golden("agent_at"))
+    at = client.agent_at("lab", "ada", 1_800_000_000_610_000_000, session=3)
+    assert at.position == (12.5, -7.25, 0.125) and at.map_revision is None
+    assert server.seen[0].query == {
+        "stamp_ns": "1800000000610000000",
+        "trajectory": "causal",
+        "session": "3",
+    }
+    client.agent_at("lab", "ada", -5, refined=True)
+    assert server.seen[1].query == {"stamp_ns": "-5", "trajectory": "refined"}
+
+
 def test_samples_are_localised(server: Server, client: cogmap.Client) -> None:
     server.answer("POST /v1/spaces/lab/localize", golden("localization"))
     query = json.dumps(golden("localize_query")).encode()

@@ -18,6 +18,7 @@ GOLDEN = Path(__file__).resolve().parents[3] / "proto" / "golden"
 
 #: The message of a golden file, by the longest of these that its name begins with.
 TYPES: Dict[str, type] = {
+    "agent_at": cogmap.AgentAt,
     "agent_detail": cogmap.AgentDetail,
     "agent_object": cogmap.AgentObject,
     "agent_page": cogmap.AgentPage,
@@ -45,6 +46,8 @@ TYPES: Dict[str, type] = {
     "recall_query": RecallQuery,
     "route_answer": cogmap.RouteAnswer,
     "route_query": cogmap.RouteQuery,
+    "sequence_answer": cogmap.SequenceAnswer,
+    "sequence_query": cogmap.SequenceQuery,
     "space_list": cogmap.SpaceList,
     "space_settings": cogmap.SpaceSettings,
     "trajectory": cogmap.Trajectory,

@@ -9,11 +9,12 @@ use std::time::Duration;
 
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
-    AgentDetail, AgentObject, AgentPage, AgentSummary, Channel, ChannelList, Codec, GridState,
-    Identification, IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization,
+    AgentAt, AgentDetail, AgentObject, AgentPage, AgentSummary, Channel, ChannelList, Codec,
+    GridState, Identification, IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization,
     LocalizeQuery, ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage,
     PredictAnswer, PredictQuery, RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch,
-    SpaceInfo, SpaceList, SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
+    SequenceAnswer, SequenceQuery, SpaceInfo, SpaceList, SpaceSettings, Trajectory, Trip,
+    TripDetail, TripPage,
 };
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};
@@ -178,6 +179,32 @@ impl Api {
         self.whole_trajectory(space, agent, "refined")
     }
 
+    /// Where an agent was at a stamp \[ns\], as it was known then.
+    ///
+    /// # Errors
+    /// See [`ApiError`]. A stamp that its current session does not reach to breaks a rule (422).
+    pub fn agent_at(&self, space: &str, agent: &str, stamp_ns: i64) -> Result<AgentAt, ApiError> {
+        self.get(&agent_path(
+            space,
+            agent,
+            &format!("/at?stamp_ns={stamp_ns}"),
+        )?)
+    }
+
+    /// Where an agent was at a stamp \[ns\], by all that has been seen since.
+    ///
+    /// # Errors
+    /// See [`ApiError`]. A stamp that its past does not reach to breaks a rule (422).
+    pub fn refined_agent_at(
+        &self,
+        space: &str,
+        agent: &str,
+        stamp_ns: i64,
+    ) -> Result<AgentAt, ApiError> {
+        let rest = format!("/at?stamp_ns={stamp_ns}&trajectory=refined");
+        self.get(&agent_path(space, agent, &rest)?)
+    }
+
     /// All pages of a trajectory.
     fn whole_trajectory(
         &self,
@@ -259,6 +286,14 @@ impl Api {
     /// service that is at several of these already asks to come back (503).
     pub fn route(&self, space: &str, query: &RouteQuery) -> Result<RouteAnswer, ApiError> {
         self.send(Method::POST, &path(space, "/route")?, &json(query))
+    }
+
+    /// Which trips the last places of somebody look like, and what comes next.
+    ///
+    /// # Errors
+    /// See [`ApiError`]. A service that is at several of these already asks to come back (503).
+    pub fn sequence(&self, space: &str, query: &SequenceQuery) -> Result<SequenceAnswer, ApiError> {
+        self.send(Method::POST, &path(space, "/sequence")?, &json(query))
     }
 
     /// All places of a space, by id.

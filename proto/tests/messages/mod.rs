@@ -9,6 +9,7 @@ mod objects;
 mod published;
 mod routes;
 mod samples;
+mod sequences;
 
 use std::fmt::Debug;
 
@@ -39,4 +40,5 @@ pub(crate) fn each(visit: &mut impl Visit) {
     objects::each(visit);
     localize::each(visit);
     routes::each(visit);
+    sequences::each(visit);
 }

@@ -1,12 +1,14 @@
 //! `cogmap export`: what a store holds, read while no service runs on it.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
 
 use super::output;
 use crate::decode::{core_settings, records_of, trajectory_interval_ns};
+use crate::encode;
 use crate::engine::Recorder;
 use crate::journal::entries;
 use crate::store::{Journal, LocalJournal, SpaceNumber};
@@ -18,6 +20,14 @@ use trajectory::write_tum;
 pub(super) enum ExportCommand {
     /// The journal of a space, one JSON object for each entry; up to the damage where there is one.
     Journal(Source),
+    /// A space's map as one JSON object, as it is served over HTTP: as it is now, or as it was.
+    Map {
+        #[command(flatten)]
+        source: Source,
+        /// Number of records that the map is to include; all of the journal when absent.
+        #[arg(long, value_name = "REVISION")]
+        as_of: Option<u64>,
+    },
     /// The causal trajectory of an agent's latest session, as TUM lines `t x y z qx qy qz qw`.
     Trajectory {
         #[command(flatten)]
@@ -42,6 +52,7 @@ pub(super) struct Source {
 pub(super) fn run(command: &ExportCommand) -> anyhow::Result<()> {
     match command {
         ExportCommand::Journal(source) => journal(source),
+        ExportCommand::Map { source, as_of } => map(source, *as_of),
         ExportCommand::Trajectory { source, agent } => trajectory(source, agent),
     }
 }
@@ -70,6 +81,47 @@ fn journal(source: &Source) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// The journal does not reach to the revision that is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the journal has the map as of 0 to {reaches}, not as of {asked}")]
+struct BeyondJournal {
+    asked: u64,
+    reaches: u64,
+}
+
+/// The journal is the ground state, so the map of any revision is folded from it.
+fn map(source: &Source, as_of: Option<u64>) -> anyhow::Result<()> {
+    let (store, space, settings) = open(source)?;
+    let mut map = CognitiveMap::new(core_settings(&settings)?);
+    let mut events = Vec::new();
+    let asked = as_of.unwrap_or(u64::MAX);
+    for block in store.journal(space, 0) {
+        if map.revision() >= asked {
+            break;
+        }
+        let (number, bytes) = block?;
+        for entry in entries(&bytes).with_context(|| format!("read block {number}"))? {
+            records_of(&entry, |record| {
+                // A record adds one at most.
+                if map.revision() < asked {
+                    map.apply(&record, &mut events);
+                    events.clear();
+                }
+            });
+        }
+    }
+    let reaches = map.revision();
+    if let Some(asked) = as_of.filter(|asked| *asked > reaches) {
+        return Err(BeyondJournal { asked, reaches }.into());
+    }
+    let agents = encode::agent_summaries(&source.space, &map);
+    let name = source.space.clone();
+    for text in encode::map_export(name, settings, Arc::new(map), agents) {
+        output::text(&text)?;
+    }
+    Ok(output::line("")?)
 }
 
 /// The journal is the ground state, so the trajectory is folded from it anew.

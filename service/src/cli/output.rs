@@ -18,6 +18,17 @@ pub fn line(text: &str) -> io::Result<()> {
     }
 }
 
+/// Writes a text to standard output, as it is. A closed pipe is no failure.
+///
+/// # Errors
+/// Standard output takes nothing more.
+pub fn text(text: &str) -> io::Result<()> {
+    match write!(io::stdout().lock(), "{text}") {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => result,
+    }
+}
+
 /// Writes an object as one line of JSON.
 ///
 /// # Errors

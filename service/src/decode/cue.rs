@@ -1,7 +1,7 @@
 //! Cues that places are recalled by.
 
 use cogmap_proto::limits::{METRES_MAX, PAGE_ITEMS_MAX};
-use cogmap_proto::{Name, NameError, RecallQuery};
+use cogmap_proto::{Name, NameError, PerceptCue, RecallQuery};
 use cognitive_map::{AgentId, CognitiveMap, InvalidSample, RecallCue};
 use grid::{InvalidCode, PartialCode, Phase};
 use nalgebra::{Point3, Vector3};
@@ -67,14 +67,8 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<RecallCue, Invalid
         .as_deref()
         .map(|phases| code(map, phases))
         .transpose()?;
-    let percept = query.percept.as_ref().map(|cue| {
-        let read = percept::percept(cue);
-        read.map_err(|error| InvalidQuery::Percept(fault::in_percept(cue), error))
-    });
+    let percept = { query.percept.as_ref() }.map(|percept| checked_percept(map, percept));
     let percept = percept.transpose()?;
-    if let Some(percept) = &percept {
-        check_cue(map, percept)?;
-    }
     let limit = query.limit.unwrap_or(LIMIT_DEFAULT) as usize;
     if !(1..=PAGE_ITEMS_MAX).contains(&limit) {
         return Err(InvalidQuery::Limit(limit));
@@ -91,6 +85,17 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<RecallCue, Invalid
         until_ns: query.until_ns,
         limit,
     })
+}
+
+/// A percept to recall by, of a channel that the space knows.
+pub(super) fn checked_percept(
+    map: &CognitiveMap,
+    cue: &PerceptCue,
+) -> Result<cognitive_map::PerceptCue, InvalidQuery> {
+    let read = percept::percept(cue);
+    let percept = read.map_err(|error| InvalidQuery::Percept(fault::in_percept(cue), error))?;
+    check_cue(map, &percept)?;
+    Ok(percept)
 }
 
 fn position(metres: [f64; 3]) -> Result<Point3<f64>, InvalidQuery> {

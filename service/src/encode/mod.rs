@@ -11,15 +11,18 @@ mod identification;
 mod landmark;
 mod live;
 mod localization;
+mod map_export;
 mod object;
 mod place;
 mod prediction;
 mod recall;
 mod route;
+mod sequence;
 mod space;
 mod surprise;
 mod trajectory;
 mod trip;
+mod way_graph;
 
 pub use agent::evidence;
 pub(crate) use agent::{estimate, odometry};
@@ -31,14 +34,17 @@ pub use identification::{agent_object, identification};
 pub use landmark::landmark;
 pub(crate) use live::{live_counts, live_sighting};
 pub use localization::localization;
+pub use map_export::{agent_summaries, map_export};
 pub use object::{object_detail, object_summary};
 pub use place::place;
 pub use prediction::prediction;
 pub use recall::recall;
 pub use route::{fits_in_path, routes, way};
+pub use sequence::sequence;
 pub use space::space_info;
-pub use trajectory::{stamped, trajectory};
+pub use trajectory::{agent_at, stamped, trajectory};
 pub use trip::{leg, trip, trip_detail};
+pub use way_graph::{graphml, nav2};
 
 /// Frame of all positions in answers.
 pub const FRAME: &str = "map";

@@ -61,7 +61,7 @@ pub use refinement::{SharedText, refined_trajectories};
 pub use repair::{AgentLoss, LostBlocks, MissingSamples, RepairReport, repair};
 pub use settings::EngineSettings;
 pub use space::{LiveFollower, Space};
-pub use trajectory::{Chunk, Recorder, TrajectoryPage};
+pub use trajectory::{Around, Chunk, Recorder, TrajectoryPage};
 pub use unavailable::{TrajectoryError, Unavailable};
 
 use crate::decode::{core_settings, trajectory_interval_ns};

@@ -50,6 +50,43 @@ pub struct TrajectoryPage {
     pub next_from_ns: Option<i64>,
 }
 
+/// The poses on both sides of a stamp.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Around {
+    /// Session of a causal trajectory; the current one where it is refined.
+    pub session: u64,
+    /// Revision of the relaxed map that a refined trajectory is of; none of a causal one.
+    pub revision: Option<u64>,
+    /// The latest one that is not after the stamp.
+    pub before: StampedPose,
+    /// The earliest one that is not before it.
+    pub after: StampedPose,
+}
+
+impl Around {
+    /// The ones among rows in the order of their stamps; `None` where they do not reach.
+    pub(crate) fn of(
+        rows: &[StampedPose],
+        session: u64,
+        revision: Option<u64>,
+        stamp_ns: i64,
+    ) -> Option<Self> {
+        let next = rows.partition_point(|row| row.stamp_ns < stamp_ns);
+        let after = *rows.get(next)?;
+        let before = if after.stamp_ns == stamp_ns {
+            after
+        } else {
+            *rows.get(next.checked_sub(1)?)?
+        };
+        Some(Self {
+            session,
+            revision,
+            before,
+            after,
+        })
+    }
+}
+
 /// Chunk bytes that cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("malformed trajectory chunk")]

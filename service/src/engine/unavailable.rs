@@ -33,6 +33,9 @@ pub enum TrajectoryError {
         "the agent has been removed; causal trajectories of its sessions can be read by their number"
     )]
     RemovedAgent,
+    /// The trajectory does not reach to the stamp: the stamps of its first and last pose \[ns\].
+    #[error("{}", out_of_range(.0.as_ref()))]
+    OutOfRange(Option<(i64, i64)>),
     /// The stored part cannot be read.
     #[error(transparent)]
     Derived(#[from] DerivedError),
@@ -42,4 +45,11 @@ pub enum TrajectoryError {
     /// The map cannot be read.
     #[error(transparent)]
     Unavailable(#[from] Unavailable),
+}
+
+fn out_of_range(range: Option<&(i64, i64)>) -> String {
+    match range {
+        Some((first, last)) => format!("stamp_ns must be {first} to {last}, which is known"),
+        None => "nothing is known of where the agent was in that session".to_owned(),
+    }
 }

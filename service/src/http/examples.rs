@@ -24,6 +24,7 @@ pub(crate) fn of(operation: &str) -> Option<Value> {
                 "relation": { "position": { "translation_m": [2, 0, 0], "sd_m": [0.1, 0.1, 0.1] } }
             } } },
         ] }),
+        "sequence" => json!({ "cue": [{ "place": 0 }, { "place": 1 }] }),
         "route" => json!({ "from": { "agent": "ada" }, "to": { "place": 0 } }),
         "predict" => json!({ "motion": step, "channel": "touch" }),
         "teach_object" => json!({ "spacing_m": 0.02, "contacts": [

@@ -1,6 +1,7 @@
 //! Export of a space's map.
 
 use std::io;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use ::trajectory::write_tum;
@@ -10,7 +11,7 @@ use axum::http::Response;
 use axum::http::header::{CONTENT_DISPOSITION, HeaderValue};
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{AgentSummary, Landmark, Place, SpaceInfo, TripDetail, Way};
-use cognitive_map::{CognitiveMap, LandmarkId, PlaceId, TripId};
+use cognitive_map::Reverse;
 use futures_util::stream;
 use pose_graph::g2o::write_g2o;
 use serde::{Deserialize, Serialize};
@@ -28,8 +29,10 @@ use crate::answer::agent_once_named;
 use crate::encode;
 use crate::engine::Space;
 
-/// Items that are written at once: an answer of any length takes the memory of this many.
-const CHUNK_ITEMS: usize = 256;
+/// Legal tolerances of thinned ways \[m\].
+const TOLERANCES_M: RangeInclusive<f64> = 0.0..=100.0;
+/// The tolerance when the query names none \[m\].
+const TOLERANCE_M: f64 = 0.1;
 
 /// Form of an export.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, ToSchema)]
@@ -44,6 +47,21 @@ pub(crate) enum ExportFormat {
     Tum,
     /// What agents did and saw as a graph of poses and landmarks, relaxed.
     G2o,
+    /// The ways as a graph in the `GraphML` format.
+    Graphml,
+    /// The ways as a graph for the Route Server of Nav2 (`GeoJSON`).
+    Nav2,
+}
+
+/// Which directions of ways to export.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum ExportReverse {
+    /// Both.
+    #[default]
+    Allowed,
+    /// Only those in which somebody travelled all of it.
+    Never,
 }
 
 /// What to export.
@@ -51,8 +69,9 @@ pub(crate) enum ExportFormat {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct ExportQuery {
-    /// `json` (the map; when absent), `ply` (the places), `tum` (the trajectory of `agent`) or
-    /// `g2o` (what agents did and saw as a graph of poses and landmarks, relaxed).
+    /// `json` (the map; when absent), `ply` (the places), `tum` (the trajectory of `agent`), `g2o`
+    /// (what agents did and saw as a graph of poses and landmarks, relaxed), `graphml` or `nav2`
+    /// (the ways as a graph: in `GraphML`, and in the `GeoJSON` of the Route Server of Nav2).
     #[param(inline)]
     format: Option<ExportFormat>,
     /// Name of the agent, for `tum`.
@@ -65,6 +84,14 @@ pub(crate) struct ExportQuery {
     /// Only places that were recruited, moved, visited or forgotten after this revision of the map,
     /// for binary `ply`; others may be among them.
     since_revision: Option<u64>,
+    /// How far places may lie from the edge that stands for a chain of ways \[m\], for `graphml`
+    /// and `nav2`; 0.1 when absent.
+    #[param(minimum = 0, maximum = 100)]
+    tolerance_m: Option<f64>,
+    /// `allowed` (when absent), or `never` for only those directions in which somebody travelled,
+    /// for `graphml` and `nav2`.
+    #[param(inline)]
+    reverse: Option<ExportReverse>,
 }
 
 /// A whole map.
@@ -100,7 +127,8 @@ pub(crate) struct MapExport {
     responses(
         (status = 200, description = "The map", content(
             (MapExport = "application/json"), (String = "text/plain"),
-            (Vec<u8> = "application/octet-stream"))),
+            (Vec<u8> = "application/octet-stream"),
+            (String = "application/graphml+xml"), (String = "application/geo+json"))),
         (status = 404, description = "There is no such space or agent"),
         (status = 410, description = "The agent has been removed: name one of its sessions"),
         (status = 422, description = "Parameters do not go together, such as `agent` with another format than `tum`")))]
@@ -115,6 +143,7 @@ pub(crate) async fn get(
         return Err(Problem::new(Kind::InvalidQuery, detail));
     }
     let form = cloud_form(&query, format)?;
+    let (tolerance_m, reverse) = thinning(&query, format)?;
     let long = &service.long;
     let (mut response, file) = match format {
         ExportFormat::Json => (map(long, &space).await?, format!("{}.json", space.name())),
@@ -122,6 +151,22 @@ pub(crate) async fn get(
         ExportFormat::Ply => {
             let cloud = cloud::body(long, &space, form).await?;
             (cloud, format!("{}.ply", space.name()))
+        }
+        ExportFormat::Graphml | ExportFormat::Nav2 => {
+            let map = space.snapshot().await?;
+            let name = space.name().to_owned();
+            let is_nav2 = format == ExportFormat::Nav2;
+            let room = long.enter()?;
+            let text = long.make(move || {
+                if is_nav2 {
+                    encode::nav2(&name, &map, tolerance_m, reverse)
+                } else {
+                    encode::graphml(&map, tolerance_m, reverse)
+                }
+            });
+            let (body, (media_type, ending)) = (Body::from(text.await?), graph_type(is_nav2));
+            let answer = reply::with_type(media_type, holding(body, room));
+            (answer, format!("{}.{ending}", space.name()))
         }
         ExportFormat::Tum => {
             let detail = "format=tum needs agent";
@@ -156,84 +201,48 @@ fn cloud_form(query: &ExportQuery, format: ExportFormat) -> Result<CloudForm, Pr
     }
 }
 
-/// A list of an export that can be written from any of its items on: their numbers, and them as
-/// JSON.
-type Section = fn(&CognitiveMap, &[AgentSummary], u32) -> Vec<(u32, String)>;
+/// Media type of a graph of ways, and how its files end.
+fn graph_type(is_nav2: bool) -> (&'static str, &'static str) {
+    if is_nav2 {
+        ("application/geo+json", "geojson")
+    } else {
+        ("application/graphml+xml", "graphml")
+    }
+}
 
-/// The lists of the map with their names.
-const SECTIONS: [(&str, Section); 5] = [
-    ("agents", |_, agents, first| {
-        let agents = (0..).zip(agents.iter()).skip(first as usize);
-        agents
-            .take(CHUNK_ITEMS)
-            .map(|(at, agent)| (at, text(agent)))
-            .collect()
-    }),
-    ("places", |map, _, first| {
-        let places = map.places_from(PlaceId(first)).take(CHUNK_ITEMS);
-        places
-            .map(|(id, place)| (id.0, text(&encode::place(map, id, place))))
-            .collect()
-    }),
-    ("trips", |map, _, first| {
-        // A trip has up to a thousand legs.
-        let trips = map.trips_from(TripId(first)).take(1);
-        trips
-            .map(|(id, trip)| (id.0, text(&encode::trip_detail(map, id, trip))))
-            .collect()
-    }),
-    ("ways", |map, _, first| {
-        let ways = map.ways_from(first).take(CHUNK_ITEMS);
-        ways.filter_map(|(number, way)| Some((number, text(&encode::way(map, way)?))))
-            .collect()
-    }),
-    ("landmarks", |map, _, first| {
-        let known = (first..).map_while(|id| Some((id, map.landmark(LandmarkId(id))?)));
-        // One with several names once, and those that are set aside not at all.
-        let told = known.filter(|(id, landmark)| {
-            let named = map.landmark_by_label(landmark.label().as_str());
-            named.is_some_and(|(named, _)| named.0 == *id)
-        });
-        told.take(CHUNK_ITEMS)
-            .map(|(id, landmark)| (id, text(&encode::landmark(landmark))))
-            .collect()
-    }),
-];
+/// How ways are to be thinned, and in which directions.
+fn thinning(query: &ExportQuery, format: ExportFormat) -> Result<(f64, Reverse), Problem> {
+    let refused = |detail: String| Err(Problem::new(Kind::InvalidQuery, detail));
+    let is_graph = matches!(format, ExportFormat::Graphml | ExportFormat::Nav2);
+    if !is_graph && (query.tolerance_m.is_some() || query.reverse.is_some()) {
+        let detail = "`tolerance_m` and `reverse` are for format=graphml and format=nav2 only";
+        return refused(detail.to_owned());
+    }
+    let tolerance_m = query.tolerance_m.unwrap_or(TOLERANCE_M);
+    // A comparison with NaN is false.
+    if !TOLERANCES_M.contains(&tolerance_m) {
+        let (min, max) = (TOLERANCES_M.start(), TOLERANCES_M.end());
+        return refused(format!(
+            "tolerance_m must be {min} to {max} m, not {tolerance_m}"
+        ));
+    }
+    let reverse = match query.reverse.unwrap_or_default() {
+        ExportReverse::Allowed => Reverse::Allowed,
+        ExportReverse::Never => Reverse::Never,
+    };
+    Ok((tolerance_m, reverse))
+}
 
 async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, Problem> {
     let room = long.enter()?;
     let map = space.snapshot().await?;
-    let head = {
-        let (space, map) = (Arc::clone(space), Arc::clone(&map));
-        std::iter::once_with(move || {
-            let info = encode::space_info(space.name(), space.settings(), &map);
-            format!("{{\"space\":{}", text(&info))
-        })
-    };
     let views = space.agents_after(None, usize::MAX);
-    let agents: Arc<[_]> = views
-        .iter()
-        .map(|view| AgentSummary {
-            name: view.name().to_owned(),
-            estimate: view.estimate(),
-        })
-        .collect();
-    let lists = SECTIONS.into_iter().flat_map(move |(name, section)| {
-        let (map, agents) = (Arc::clone(&map), Arc::clone(&agents));
-        let (mut first, mut separator) = (Some(0), "");
-        let items = std::iter::from_fn(move || {
-            let (numbers, items): (Vec<_>, Vec<_>) =
-                section(&map, &agents, first?).into_iter().unzip();
-            // Numbers have gaps where something was forgotten.
-            first = numbers.last()?.checked_add(1);
-            let written = format!("{separator}{}", items.join(","));
-            separator = ",";
-            Some(written)
-        });
-        let open = std::iter::once(format!(",\"{name}\":["));
-        open.chain(items).chain(std::iter::once("]".to_owned()))
+    let agents = views.iter().map(|view| AgentSummary {
+        name: view.name().to_owned(),
+        estimate: view.estimate(),
     });
-    let texts = head.chain(lists).chain(std::iter::once("}".to_owned()));
+    let (name, settings) = (space.name().to_owned(), space.settings().clone());
+    let texts = encode::map_export(name, settings, map, agents.collect());
     Ok(reply::with_type("application/json", long.body(room, texts)))
 }
 
@@ -279,8 +288,4 @@ async fn trajectory(
         }
     });
     Ok(reply::with_type(TUM, Body::from_stream(pages)))
-}
-
-fn text<T: Serialize>(message: &T) -> String {
-    serde_json::to_string(message).expect("plain data encodes")
 }

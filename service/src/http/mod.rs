@@ -4,6 +4,7 @@
 //! document; `guard` stands before all handlers.
 
 mod activity;
+mod agent_at;
 mod agents;
 mod channels;
 mod cloud;
@@ -37,6 +38,7 @@ mod recall;
 mod reply;
 mod route;
 mod samples;
+mod sequence;
 mod settings;
 mod spaces;
 mod state;
@@ -90,9 +92,11 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(agents::list))
         .routes(routes!(agents::grid))
         .routes(routes!(trajectory::get))
+        .routes(routes!(agent_at::get))
         .routes(routes!(recall::post))
         .routes(routes!(localize::post))
         .routes(routes!(route::post))
+        .routes(routes!(sequence::post))
         .routes(routes!(predict::post))
         .routes(routes!(places::list))
         .routes(routes!(places::get))

@@ -56,6 +56,8 @@ pub enum Kind {
     SessionInFuture,
     /// Settings that break a rule.
     InvalidSettings,
+    /// A trajectory does not reach to the stamp that is asked about.
+    StampOutOfRange,
     /// No place is near where a route is to begin or end.
     NothingNear,
     /// A question or a batch that can be read, and breaks a rule.
@@ -82,7 +84,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, by status.
-    pub const ALL: [Self; 37] = [
+    pub const ALL: [Self; 38] = [
         Self::InvalidPath,
         Self::InvalidParameter,
         Self::MalformedBody,
@@ -109,6 +111,7 @@ impl Kind {
         Self::UnknownHost,
         Self::SessionInFuture,
         Self::InvalidSettings,
+        Self::StampOutOfRange,
         Self::NothingNear,
         Self::InvalidQuery,
         Self::Internal,
@@ -151,6 +154,7 @@ impl Kind {
             Self::UnknownHost => ("unknown-host", 421, "Unknown host"),
             Self::SessionInFuture => ("session-in-future", 422, "The session lies in the future"),
             Self::InvalidSettings => ("invalid-settings", 422, "Invalid settings"),
+            Self::StampOutOfRange => ("stamp-out-of-range", 422, "Nothing is known of that time"),
             Self::NothingNear => ("nothing-near", 422, "No place is near"),
             Self::InvalidQuery => ("invalid-query", 422, "The request breaks a rule"),
             Self::Internal => ("internal", 500, "Fault of the service"),

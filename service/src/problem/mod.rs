@@ -7,7 +7,8 @@ use cogmap_proto::DecodeError;
 pub use kind::Kind;
 
 use crate::decode::{
-    InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidRoute, InvalidSequence,
+    InvalidChannel, InvalidContacts, InvalidPrediction, InvalidQuery, InvalidRoute,
+    InvalidSequence, InvalidSequenceQuery,
 };
 use crate::engine::{IngestError, QuestionError, SpaceError, TrajectoryError, Unavailable};
 use crate::store::StoreError;
@@ -144,6 +145,18 @@ impl From<InvalidSequence> for Problem {
     }
 }
 
+impl From<InvalidSequenceQuery> for Problem {
+    fn from(error: InvalidSequenceQuery) -> Self {
+        let kind = match error {
+            InvalidSequenceQuery::Query(error) => return error.into(),
+            InvalidSequenceQuery::UnknownPlace(..) => Kind::UnknownMemory,
+            InvalidSequenceQuery::GivenUp => Kind::Timeout,
+            InvalidSequenceQuery::Number(..) => Kind::InvalidQuery,
+        };
+        Self::new(kind, error.to_string())
+    }
+}
+
 impl From<InvalidRoute> for Problem {
     fn from(error: InvalidRoute) -> Self {
         let kind = match error {
@@ -201,6 +214,7 @@ impl From<TrajectoryError> for Problem {
     fn from(error: TrajectoryError) -> Self {
         match error {
             TrajectoryError::UnknownAgent => Self::new(Kind::UnknownAgent, error.to_string()),
+            TrajectoryError::OutOfRange(_) => Self::new(Kind::StampOutOfRange, error.to_string()),
             TrajectoryError::RemovedAgent => Self::new(Kind::RemovedAgent, error.to_string()),
             TrajectoryError::Derived(error) => {
                 tracing::error!(%error, "read a trajectory");

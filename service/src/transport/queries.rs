@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cogmap_proto::{
     Codec, IdentifyQuery, LocalizeQuery, PredictQuery, RecallQuery, RouteQuery, SESSION_PARAMETER,
-    Verb, WatermarkQuery, query_key,
+    SequenceQuery, Verb, WatermarkQuery, query_key,
 };
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
@@ -38,6 +38,7 @@ pub(crate) async fn declare(
         Verb::Identify,
         Verb::Localize,
         Verb::Route,
+        Verb::Sequence,
     ] {
         let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(&room));
         let queryable = session
@@ -126,6 +127,10 @@ async fn answer(
         Verb::Route => {
             let body: RouteQuery = body(query, codec)?;
             Ok(codec.encode(&answer::route_in(&space, body).await?))
+        }
+        Verb::Sequence => {
+            let body: SequenceQuery = body(query, codec)?;
+            Ok(codec.encode(&answer::sequence_in(&space, body).await?))
         }
     }
 }

@@ -8,7 +8,7 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 28] = [
+const ROUTES: [(&str, &[&str]); 30] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
@@ -17,6 +17,7 @@ const ROUTES: [(&str, &[&str]); 28] = [
     ("/v1/spaces/{space}", &["delete", "get", "put"]),
     ("/v1/spaces/{space}/agents", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}", &["delete", "get"]),
+    ("/v1/spaces/{space}/agents/{agent}/at", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/grid", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/object", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/predict", &["post"]),
@@ -39,6 +40,7 @@ const ROUTES: [(&str, &[&str]); 28] = [
     ("/v1/spaces/{space}/places/{id}", &["get"]),
     ("/v1/spaces/{space}/recall", &["post"]),
     ("/v1/spaces/{space}/route", &["post"]),
+    ("/v1/spaces/{space}/sequence", &["post"]),
     ("/v1/spaces/{space}/trips", &["get"]),
     ("/v1/spaces/{space}/trips/{id}", &["get"]),
 ];

@@ -23,6 +23,7 @@ mod store; // damage on the disk, repair and backups
 mod cli; // the commands
 mod demo; // robots that are lost and found, and a cup that is recognised
 mod eval; // the experiments
+mod exports; // ways for other programs, and maps as they were
 mod http; // samples in, answers out
 mod http_guard; // who is let in, and how the service goes
 mod http_ingest; // samples over HTTP alone
@@ -31,6 +32,7 @@ mod percepts; // what was felt and seen, recalled and predicted
 mod replay; // graphs and recordings through the experience map
 mod replay_objects; // objects learned and recognised, from files
 mod routes; // from here to there
+mod sequences; // what comes next, and where somebody was
 mod uniform; // one mistake, one answer; one event, one id; JSON for who asks
 mod zenoh; // estimates, watermarks, queries, events
 

@@ -7,7 +7,7 @@ const TRANSLATED: [&str; 4] = ["cognitive_map", "geometry", "grid", "object_reco
 
 /// Files of `service/src` beside decode/ and encode/ that name messages of the wire and types of
 /// the core, each with what it needs both for. None of them makes one from the other.
-const NAMES_BOTH: [(&str, &str); 17] = [
+const NAMES_BOTH: [(&str, &str); 18] = [
     (
         "answer/mod.rs",
         "asks the map what decode has read, and hands encode what it says",
@@ -16,6 +16,7 @@ const NAMES_BOTH: [(&str, &str); 17] = [
         "answer/route.rs",
         "does the same with routes, beside the bounds that the space keeps",
     ),
+    ("answer/sequence.rs", "does the same with sequences"),
     (
         "cli/export.rs",
         "reads the settings that a space was stored with, and folds its journal",

@@ -166,14 +166,16 @@ from .sample import (
     TouchNoise,
     Velocity,
 )
+from .sequence import NextPlace, SequenceAnswer, SequenceElement, SequenceQuery, SequenceTrip
 from .settings import Bernoulli, NoiseSettings, Novelty, Recruitment, SpaceSettings
-from .trajectory import StampedPose, Trajectory
+from .trajectory import AgentAt, StampedPose, Trajectory
 from .vector import quaternion_from_yaw
 
 __version__ = "0.1.0"
 
 __all__ = [
     "DEFAULT_ENDPOINT",
+    "AgentAt",
     "AgentDetail",
     "AgentEnrolled",
     "AgentObject",
@@ -250,6 +252,7 @@ __all__ = [
     "MarkerPassed",
     "MissedEvents",
     "MotionNoise",
+    "NextPlace",
     "NextTouch",
     "NoTurn",
     "NoiseSettings",
@@ -313,6 +316,10 @@ __all__ = [
     "SampleBody",
     "SamplesSkipped",
     "SeqRange",
+    "SequenceAnswer",
+    "SequenceElement",
+    "SequenceQuery",
+    "SequenceTrip",
     "SessionEnd",
     "SessionStarted",
     "SessionSuperseded",

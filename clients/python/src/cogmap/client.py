@@ -25,10 +25,9 @@ from .answer import (
 from .channel import Channel, ChannelList
 from .errors import ApiError, InvalidValue
 from .event import Event, EventPage, EventRecord, MissedEvents
-from .http_service import HttpService, Query
+from .http_service import Query
 from .landmark import Landmark, LandmarkPage
 from .live import LaggedTicks, LiveTick
-from .localize import Localization, LocalizeQuery
 from .object import (
     AgentObject,
     Contact,
@@ -41,18 +40,10 @@ from .object import (
 )
 from .point_cloud import PointCloud
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
+from .questions import Questions
 from .request import json_of, path_of
-from .route import (
-    RouteAnswer,
-    RouteAvoid,
-    RouteBox,
-    RouteCost,
-    RouteEnd,
-    RouteFormat,
-    RouteQuery,
-    RouteReverse,
-)
-from .sample import NoTurn, Orientation, Sample, SampleBatch, TouchNoise
+from .route import RouteReverse
+from .sample import NoTurn, Orientation, SampleBatch, TouchNoise
 from .settings import SpaceSettings
 from .sse import ServerSentEvent
 from .trajectory import StampedPose, Trajectory
@@ -62,7 +53,7 @@ from .wire import CBOR, JSON, decode, encode, to_wire
 _log = logging.getLogger("cogmap")
 
 
-class Client(HttpService):
+class Client(Questions):
     """Asks a cogmap service over HTTP.
 
     Holds no connection between calls, so it may be shared by threads. Lists that the service
@@ -212,49 +203,6 @@ class Client(HttpService):
         body = {name: value for name, value in to_wire(query).items() if value is not None}
         path = path_of(space, "recall")
         return self._send(RecallAnswer, "POST", path, JSON, json_of("query", body))
-
-    def localize(self, space: str, samples: Iterable[Sample]) -> Localization:
-        """Where a sequence of samples of one robot was taken, 1 to 4096 of them. They need no agent
-        and change nothing. Start poses and episodes with objects are refused; a service that is at
-        several of these already asks to come back (503)."""
-        query = LocalizeQuery(cast(Tuple[Sample, ...], samples))
-        path = path_of(space, "localize")
-        return self._send(Localization, "POST", path, JSON, json_of("query", query))
-
-    def route(
-        self,
-        space: str,
-        start: RouteEnd,
-        goal: RouteEnd,
-        *,
-        cost: RouteCost = RouteCost.LENGTH,
-        reverse: RouteReverse = RouteReverse.ALLOWED,
-        avoid_places: Iterable[int] = (),
-        avoid_boxes: Iterable[RouteBox] = (),
-        shortcuts: bool = False,
-        body_radius_m: Optional[float] = None,
-        alternatives: int = 0,
-        path_spacing_m: Optional[float] = None,
-    ) -> RouteAnswer:
-        """How one gets from `start` to `goal` (`AtAgent`, `AtPlace`, `AtPosition`, …), by ways that
-        the team has gone: the cheapest by `cost`, and up to four `alternatives`. With `shortcuts`
-        it cuts corners within `body_radius_m` [m] of ways. With `path_spacing_m` there are poses
-        along it, so far apart [m]. A service that is at several of these already asks to come back
-        (503)."""
-        query = RouteQuery(
-            start,
-            goal,
-            cost=cost,
-            reverse=reverse,
-            avoid=RouteAvoid(tuple(avoid_places), tuple(avoid_boxes)),
-            shortcuts=shortcuts,
-            body_radius_m=body_radius_m,
-            alternatives=alternatives,
-            format=RouteFormat.STEPS if path_spacing_m is None else RouteFormat.PATH,
-            spacing_m=path_spacing_m,
-        )
-        path = path_of(space, "route")
-        return self._send(RouteAnswer, "POST", path, JSON, json_of("query", query))
 
     def predict(
         self,
@@ -427,18 +375,30 @@ class Client(HttpService):
         *,
         agent: Optional[str] = None,
         session: Optional[int] = None,
+        tolerance_m: Optional[float] = None,
+        reverse: Optional[RouteReverse] = None,
     ) -> bytes:
         """A space as a file.
 
         Args:
             space: Name of the space.
             format: `json` (the whole map), `ply` (the places as a point cloud), `tum` (the causal
-                trajectory of an agent) or `g2o` (what agents did and saw as a graph of poses and
-                landmarks, relaxed).
+                trajectory of an agent), `g2o` (what agents did and saw as a graph of poses and
+                landmarks, relaxed), `graphml` or `nav2` (the ways as a graph: in GraphML, and in
+                the GeoJSON of Nav2's Route Server).
             agent: Whose trajectory; `tum` needs it.
             session: Which run of the agent; the current one when absent.
+            tolerance_m: How far places may lie from the edge that stands for a chain of ways, in
+                `graphml` and `nav2` [m]; 0.1 when absent.
+            reverse: With `NEVER` only directions in which somebody travelled are in these.
         """
-        query: Query = {"format": format, "agent": agent, "session": session}
+        query: Query = {
+            "format": format,
+            "agent": agent,
+            "session": session,
+            "tolerance_m": tolerance_m,
+            "reverse": None if reverse is None else reverse.value,
+        }
         return self._request("GET", path_of(space, "export"), query, accept="*/*")
 
     def point_cloud(self, space: str, *, since_revision: Optional[int] = None) -> PointCloud:

@@ -26,6 +26,35 @@ class StampedPose(PoseReadings):
 
 
 @dataclass(frozen=True)
+class AgentAt(PoseReadings):
+    """Where an agent was at a time."""
+
+    agent: str
+    #: Session of the agent.
+    session: int
+    #: Frame; always `map`.
+    frame: str
+    #: `causal`: as it was known then. `refined`: by all that has been seen since.
+    trajectory: str
+    #: The time that was asked about, on the sensor's clock [ns].
+    stamp_ns: int
+    #: Position [m].
+    translation_m: Vec3
+    #: Orientation, unit quaternion `[x, y, z, w]`.
+    rotation_xyzw: Quaternion
+    #: Stamp of the latest known pose that is not after it [ns].
+    before_ns: int
+    #: Stamp of the earliest known pose that is not before it [ns]. Between the two the agent is
+    #: taken to have moved evenly.
+    after_ns: int
+    #: Number of records that a refined pose takes into account; absent of a causal one.
+    map_revision: Optional[int] = None
+
+    def __str__(self) -> str:
+        return f"{self._pose_text()} at {self.stamp_ns} ns"
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """A trajectory. `len` and iteration are over its poses."""
 

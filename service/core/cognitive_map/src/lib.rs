@@ -29,11 +29,14 @@ pub use memory::object::{Identified, KnownObject};
 pub use memory::percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
 pub use memory::place::{Place, PlaceId};
 pub use memory::recall::{RecallCue, Recalled, Rivals};
+pub use memory::sequence::{
+    NextPlace, SequenceCue, SequenceElement, SequenceMatch, SequenceRecall,
+};
 pub use memory::trip::{Leg, Trip, TripEnd, TripId};
 pub use memory::way::{Traversals, Way, Waypoint};
 pub use route::{
     NoRoute, NoRouteEnd, Region, Reverse, Route, RouteBounds, RouteCost, RouteEnd, RouteOptions,
-    RouteStep, StepKind,
+    RouteStep, StepKind, ThinnedTraversal, ThinnedWay,
 };
 pub use settings::{Bound, InvalidSettings, Recruitment, SettingNumber, Settings, SettingsValues};
 pub use state::{Digest, InvalidDigest};

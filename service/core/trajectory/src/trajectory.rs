@@ -1,5 +1,6 @@
 //! Positions over time.
 
+use geometry::se3;
 use nalgebra::{Isometry3, Vector3};
 
 /// Step of the grid on which trajectories are compared: 10 Hz \[ns\].
@@ -12,6 +13,24 @@ pub struct StampedPose {
     pub stamp_ns: i64,
     /// Pose of the body in the frame of the trajectory.
     pub pose: Isometry3<f64>,
+}
+
+impl StampedPose {
+    /// The pose at a stamp between this one and a later one: the body moves evenly, along a screw.
+    /// At a stamp beside them, and where they have the same stamp, it is that of the nearer one.
+    #[must_use]
+    pub fn between(&self, later: &Self, stamp_ns: i64) -> Self {
+        let share = fraction(self.stamp_ns, later.stamp_ns, stamp_ns);
+        let pose = if stamp_ns <= self.stamp_ns || self.stamp_ns >= later.stamp_ns {
+            self.pose
+        } else if stamp_ns >= later.stamp_ns {
+            later.pose
+        } else {
+            let twist = se3::twist(&self.pose.inv_mul(&later.pose));
+            se3::plus(&self.pose, &(twist * share))
+        };
+        Self { stamp_ns, pose }
+    }
 }
 
 /// A position at a time.
@@ -153,6 +172,28 @@ pub fn fraction(start_ns: i64, end_ns: i64, stamp_ns: i64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn between_two_poses_the_body_moves_evenly() {
+        let pose = |stamp_ns, x_m: f64, y_m: f64, yaw_rad: f64| StampedPose {
+            stamp_ns,
+            pose: Isometry3::new(Vector3::new(x_m, y_m, 0.0), Vector3::z() * yaw_rad),
+        };
+        // A quarter of a circle of radius 1, to the left.
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let (start, end) = (pose(100, 0.0, 0.0, 0.0), pose(300, 1.0, 1.0, quarter));
+        for stamp_ns in [100, 150, 200, 299, 300] {
+            let angle = quarter * (stamp_ns - 100) as f64 / 200.0;
+            let expected = pose(stamp_ns, angle.sin(), 1.0 - angle.cos(), angle);
+            let found = start.between(&end, stamp_ns);
+            assert_eq!(found.stamp_ns, stamp_ns);
+            let off = found.pose.to_homogeneous() - expected.pose.to_homogeneous();
+            assert!(off.norm() < 1e-12, "{stamp_ns}: {off}");
+        }
+        assert_eq!(start.between(&end, 0).pose, start.pose);
+        assert_eq!(start.between(&end, i64::MAX).pose, end.pose);
+        assert_eq!(start.between(&start, 100).pose, start.pose);
+    }
 
     fn at(stamp_ns: i64, x: f64) -> StampedPosition {
         StampedPosition {

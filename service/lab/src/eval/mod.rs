@@ -51,6 +51,7 @@ mod protocol;
 mod quantity;
 mod report;
 mod run;
+pub mod sequences;
 mod statistic;
 mod table;
 mod tally;

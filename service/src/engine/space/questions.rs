@@ -13,7 +13,7 @@ use crate::engine::question::QuestionError;
 /// Longest time until an answer: less than the ten seconds after which Zenoh and the Python client
 /// stop waiting for one.
 const TIME_MAX: Duration = Duration::from_secs(8);
-/// The same for a route: whoever waits for one stands still.
+/// The same for a route or a sequence: whoever waits for one stands still.
 const ROUTE_TIME_MAX: Duration = Duration::from_secs(2);
 
 impl Space {
@@ -56,6 +56,20 @@ impl Space {
         let answered = self.ask(ROUTE_TIME_MAX, move |map, is_wanted| {
             let bounds = bounds.of(map);
             work(map, bounds.as_ref(), &mut || !is_wanted())
+        });
+        Ok(answered.await?.1)
+    }
+
+    /// What `work` finds out about sequences in the map as it is. It is told whether to give up.
+    ///
+    /// # Errors
+    /// See [`QuestionError`].
+    pub async fn sequence<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&CognitiveMap, &mut dyn FnMut() -> bool) -> T + Send + 'static,
+    ) -> Result<T, QuestionError> {
+        let answered = self.ask(ROUTE_TIME_MAX, move |map, is_wanted| {
+            work(map, &mut || !is_wanted())
         });
         Ok(answered.await?.1)
     }

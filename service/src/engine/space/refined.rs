@@ -7,7 +7,7 @@ use cognitive_map::CognitiveMap;
 
 use super::Space;
 use crate::engine::refinement::{Graph, Refinement, SharedText, refined_trajectories};
-use crate::engine::trajectory::TrajectoryPage;
+use crate::engine::trajectory::{Around, TrajectoryPage};
 use crate::engine::unavailable::{TrajectoryError, Unavailable};
 
 /// How long the later pages of a trajectory are those of the relaxation that its first page came
@@ -46,6 +46,26 @@ impl Space {
             poses,
             next_from_ns: asked.get(limit).map(|row| row.stamp_ns),
         })
+    }
+
+    /// The poses of an agent's refined trajectory on both sides of a stamp; the same one twice
+    /// where there is one at the stamp. The map is relaxed for it as for the first page of one.
+    ///
+    /// # Errors
+    /// There is no such agent, its past does not reach there, or the space cannot be read.
+    pub async fn refined_poses_around(
+        &self,
+        agent: &str,
+        stamp_ns: i64,
+    ) -> Result<Around, TrajectoryError> {
+        let view = self.agent(agent).ok_or_else(|| self.no_agent(agent))?;
+        let refinement = self.refinement(false).await?;
+        let rows = refinement.agents.get(agent).map_or(&[][..], Vec::as_slice);
+        let session = view.watermark().session;
+        let found = Around::of(rows, session, Some(refinement.revision), stamp_ns);
+        let range = rows.first().zip(rows.last());
+        let range = range.map(|(first, last)| (first.stamp_ns, last.stamp_ns));
+        found.ok_or(TrajectoryError::OutOfRange(range))
     }
 
     /// What `write` makes of the map by relaxing it. The map is relaxed for one at a time, and all

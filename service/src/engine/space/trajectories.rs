@@ -7,7 +7,7 @@ use cognitive_map::AgentId;
 
 use super::Space;
 use crate::engine::agent_view::AgentView;
-use crate::engine::trajectory::{TrajectoryPage, chunk_rows};
+use crate::engine::trajectory::{Around, TrajectoryPage, chunk_rows};
 use crate::engine::unavailable::TrajectoryError;
 use crate::store::{DerivedError, SpaceNumber, Store};
 
@@ -28,19 +28,7 @@ impl Space {
         to_ns: Option<i64>,
         limit: usize,
     ) -> Result<TrajectoryPage, TrajectoryError> {
-        let view = self.agent(agent);
-        let present = view.as_deref().map(Part::of_view);
-        let former = self.shared().former(agent);
-        let session = match (&present, session) {
-            (Some(present), session) => session.unwrap_or(present.session),
-            (None, Some(session)) if !former.is_empty() => session,
-            (None, _) => return Err(self.no_agent(agent)),
-        };
-        // The latest agent of that name that had such a session.
-        let former = former.into_iter().rev();
-        let parts: Vec<Part> = { present.into_iter() }
-            .chain(former.map(Part::of_former))
-            .collect();
+        let (session, parts) = self.parts(agent, session)?;
         let shared = Arc::clone(self.shared());
         let work = move || {
             let window = Window {
@@ -54,6 +42,45 @@ impl Space {
         tokio::task::spawn_blocking(work)
             .await
             .map_err(|_| TrajectoryError::Interrupted)?
+    }
+
+    /// The poses of an agent's causal trajectory on both sides of a stamp, of its current session
+    /// when none is named; the same one twice where there is one at the stamp.
+    ///
+    /// # Errors
+    /// There is no such agent, the session does not reach there, or the store cannot be read.
+    pub async fn poses_around(
+        &self,
+        agent: &str,
+        session: Option<u64>,
+        stamp_ns: i64,
+    ) -> Result<Around, TrajectoryError> {
+        let (session, parts) = self.parts(agent, session)?;
+        let shared = Arc::clone(self.shared());
+        let work = move || around(&*shared.store, shared.number, &parts, session, stamp_ns);
+        tokio::task::spawn_blocking(work)
+            .await
+            .map_err(|_| TrajectoryError::Interrupted)?
+    }
+
+    /// The session that is asked for, and where an agent of that name may have rows of it.
+    fn parts(
+        &self,
+        agent: &str,
+        session: Option<u64>,
+    ) -> Result<(u64, Vec<Part>), TrajectoryError> {
+        let view = self.agent(agent);
+        let present = view.as_deref().map(Part::of_view);
+        let former = self.shared().former(agent);
+        let session = match (&present, session) {
+            (Some(present), session) => session.unwrap_or(present.session),
+            (None, Some(session)) if !former.is_empty() => session,
+            (None, _) => return Err(self.no_agent(agent)),
+        };
+        // The latest agent of that name that had such a session.
+        let former = former.into_iter().rev();
+        let parts = { present.into_iter() }.chain(former.map(Part::of_former));
+        Ok((session, parts.collect()))
     }
 
     /// Why there is no agent of a name.
@@ -120,6 +147,47 @@ impl Part {
             .chunks(space, self.agent, session, i64::MIN, 1)?
             .is_empty())
     }
+}
+
+/// The rows on both sides of a stamp, of the first of the parts that had such a session.
+fn around(
+    store: &dyn Store,
+    space: SpaceNumber,
+    parts: &[Part],
+    session: u64,
+    stamp_ns: i64,
+) -> Result<Around, TrajectoryError> {
+    let mut of_session = None;
+    for part in parts {
+        if of_session.is_none() && part.had(session, store, space)? {
+            of_session = Some(part);
+        }
+    }
+    let Some(part) = of_session else {
+        return Err(TrajectoryError::OutOfRange(None));
+    };
+    let rows_from = |from_ns: i64, n: usize| -> Result<Vec<StampedPose>, TrajectoryError> {
+        let mut rows = Vec::new();
+        for (_, bytes) in store.chunks(space, part.agent, session, from_ns, n)? {
+            let chunk = chunk_rows(&bytes).map_err(|error| DerivedError(error.to_string()))?;
+            rows.extend(chunk);
+        }
+        if part.session == session {
+            let latest_ns = rows.last().map(|row| row.stamp_ns);
+            let fresh = part.fresh.iter();
+            rows.extend(fresh.filter(|row| latest_ns.is_none_or(|latest| row.stamp_ns > latest)));
+        }
+        Ok(rows)
+    };
+    // The last chunk that begins before the stamp and the one after it, and what is in none yet.
+    let near = rows_from(stamp_ns, 2)?;
+    if let Some(found) = Around::of(&near, session, None, stamp_ns) {
+        return Ok(found);
+    }
+    let (begin, end) = (rows_from(i64::MIN, 1)?, rows_from(i64::MAX, 1)?);
+    let range = begin.first().zip(end.last());
+    let range = range.map(|(first, last)| (first.stamp_ns, last.stamp_ns));
+    Err(TrajectoryError::OutOfRange(range))
 }
 
 /// Rows of a session with `from_ns <= stamp < to_ns`, at most `limit` of them: of the first of the

@@ -13,6 +13,7 @@ mod objects;
 mod percepts;
 mod prediction;
 mod queries;
+mod sequence;
 mod sightings;
 mod tuning;
 mod ways;

@@ -6,6 +6,7 @@ pub(crate) mod object;
 pub(crate) mod percept;
 pub(crate) mod place;
 pub(crate) mod recall;
+pub(crate) mod sequence;
 pub(crate) mod strength;
 pub(crate) mod trip;
 pub(crate) mod way;

@@ -13,6 +13,7 @@ mod region;
 mod search;
 mod shortcut;
 mod steps;
+mod thinned;
 mod tuning;
 
 use std::collections::BTreeSet;
@@ -23,6 +24,7 @@ pub use bounds::RouteBounds;
 pub use cost::RouteCost;
 pub use end::{NoRouteEnd, RouteEnd};
 pub use region::Region;
+pub use thinned::{ThinnedTraversal, ThinnedWay};
 
 use crate::memory::ids::{PlaceId, TripId};
 

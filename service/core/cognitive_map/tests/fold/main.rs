@@ -23,7 +23,9 @@ mod recall; // recall against an exhaustive scan
 mod relaxation; // loops that close while samples come in
 mod removal; // agents that go, and who comes after them
 mod routes; // cheapest routes against another program's
+mod sequences; // which trips the last places look like, and what comes next
 mod settings; // what each setting changes
+mod thinned; // chains of ways as single edges
 mod trips; // legs, and every way a trip ends
 mod views; // what is seen along ways that are driven again
 mod ways; // what the legs add up to, and which ways go

@@ -6,6 +6,8 @@ mod object;
 mod outlines;
 mod progress;
 mod room;
+mod sequences;
+mod service;
 mod waking;
 
 pub(super) use object::Turns;
@@ -27,6 +29,9 @@ pub(in crate::cli) enum EvalCommand {
     /// How well a grid code tells places apart: whole, beside the place, noisy, with modules
     /// erased.
     Code(code::CodeArgs),
+    /// Trips that cross themselves, and cues of a few places of them: is it told what comes next,
+    /// and as likely as it is?
+    Sequences(sequences::SequencesArgs),
     /// Robots that wake up somewhere in a room that a team-mate has explored: are they found, how
     /// soon, and how far off?
     Waking(waking::WakingArgs),
@@ -39,6 +44,7 @@ pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
         EvalCommand::Env3(args) => object::run(args),
         EvalCommand::Outlines(args) => outlines::run(args),
         EvalCommand::Code(args) => code::run(args),
+        EvalCommand::Sequences(args) => sequences::run(args),
         EvalCommand::Waking(args) => waking::run(args),
     }
 }

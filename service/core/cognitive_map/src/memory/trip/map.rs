@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use super::occurrences::Occurrences;
 use super::{Leg, TRIPS_MAX, Trip, TripEnd};
 use crate::memory::ids::TripId;
 use crate::memory::strength::{Clock, Strength};
@@ -29,6 +30,8 @@ pub(crate) struct TripMap {
     under_way: Arc<BTreeSet<TripId>>,
     /// The trips forgotten last, oldest first.
     forgotten: SparseVec<Forgotten, 64>,
+    /// Where they lead through each place.
+    occurrences: Occurrences,
 }
 
 /// The weakest of some trips, the lowest identifier of equally weak ones.
@@ -85,7 +88,13 @@ impl TripMap {
     /// Bytes of memory that the trips take with their legs, reserved ones included.
     pub(crate) fn bytes(&self) -> usize {
         let legs = self.trips.iter().map(|(_, trip)| trip.legs.bytes());
-        legs.sum::<usize>() + self.trips.bytes() + self.summaries.bytes() + self.forgotten.bytes()
+        let lists = self.summaries.bytes() + self.forgotten.bytes() + self.occurrences.bytes();
+        legs.sum::<usize>() + self.trips.bytes() + lists
+    }
+
+    /// Where they lead through each place.
+    pub(crate) fn occurrences(&self) -> &Occurrences {
+        &self.occurrences
     }
 
     /// Adds a trip of no legs yet. None when there have been as many as a space can have.
@@ -110,8 +119,15 @@ impl TripMap {
         let Some(record) = self.trips.get_mut(trip.0 as usize, revision) else {
             return false;
         };
+        let (from, to) = (leg.from(), leg.to());
         record.push(leg, stamp_ns, revision);
         self.legs += 1;
+        // As many as a trip has legs at most.
+        let position = u32::try_from(record.leg_count()).unwrap_or(u32::MAX);
+        if position == 1 {
+            self.occurrences.push(from, trip, 0);
+        }
+        self.occurrences.push(to, trip, position);
         record.is_full()
     }
 
@@ -149,6 +165,7 @@ impl TripMap {
         let index = trip.0 as usize;
         let record = self.trips.remove(index, revision)?;
         self.legs -= record.leg_count();
+        self.occurrences.forget(trip);
         if record.ended.is_none() {
             Arc::make_mut(&mut self.under_way).remove(&trip);
         }
@@ -251,6 +268,13 @@ impl TripMap {
         let under_way = self.iter_from(TripId(0));
         let under_way = under_way.filter(|(_, trip)| trip.ended.is_none());
         self.under_way = Arc::new(under_way.map(|(id, _)| id).collect());
+        let mut occurrences = Occurrences::default();
+        for (id, trip) in self.iter_from(TripId(0)) {
+            for (position, place) in (0..).zip(trip.places()) {
+                occurrences.push(place, id, position);
+            }
+        }
+        self.occurrences = occurrences;
     }
 }
 

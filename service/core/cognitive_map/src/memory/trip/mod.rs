@@ -2,6 +2,7 @@
 
 mod leg;
 mod map;
+mod occurrences;
 mod recorder;
 
 pub use crate::memory::ids::TripId;
@@ -10,6 +11,7 @@ pub(crate) use map::TripMap;
 pub(crate) use recorder::{LegUnderWay, Recorder, interval_s};
 
 use crate::input::AgentId;
+use crate::memory::ids::PlaceId;
 use crate::memory::strength::{Clock, Strength};
 use state::{
     Codec, CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum, state_of_struct,
@@ -136,6 +138,18 @@ impl Trip {
     /// The legs, in the order of travel.
     pub fn legs(&self) -> impl Iterator<Item = &Leg> {
         self.legs.iter()
+    }
+
+    /// The places that it leads through: where its first leg begins, then the end of each.
+    pub fn places(&self) -> impl Iterator<Item = PlaceId> {
+        self.places_from(0)
+    }
+
+    /// The places from a position on; 0 is where the first leg begins.
+    pub(crate) fn places_from(&self, position: usize) -> impl Iterator<Item = PlaceId> {
+        let start = (position == 0).then(|| self.legs.get(0).map(Leg::from));
+        let ends = self.legs.iter_from(position.saturating_sub(1));
+        start.flatten().into_iter().chain(ends.map(Leg::to))
     }
 
     /// Appends a checkpoint's page of legs.
