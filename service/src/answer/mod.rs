@@ -5,7 +5,7 @@ mod named;
 mod route;
 
 pub use named::{agent_named, agent_once_named, any_space_named, nobody_named, space_named};
-pub use route::{route, route_in};
+pub use route::{errand_in, route, route_in};
 
 use cogmap_proto::{
     AgentObject, EndedEpisode, PredictAnswer, PredictQuery, RecallAnswer, RecallQuery,

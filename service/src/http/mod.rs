@@ -5,6 +5,7 @@
 
 mod activity;
 mod agents;
+mod blockages;
 mod cloud;
 mod compression;
 mod cors;
@@ -15,6 +16,7 @@ mod events;
 mod examples;
 mod export;
 mod extract;
+mod following;
 mod guard;
 mod health;
 mod held;
@@ -29,6 +31,7 @@ mod long;
 mod objects;
 mod openapi;
 mod page;
+mod pins;
 mod places;
 mod predict;
 mod problem;
@@ -92,11 +95,15 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(recall::post))
         .routes(routes!(localize::post))
         .routes(routes!(route::post))
+        .routes(routes!(blockages::list, blockages::post))
+        .routes(routes!(blockages::delete))
+        .routes(routes!(following::get, following::put, following::delete))
         .routes(routes!(predict::post))
         .routes(routes!(places::list))
         .routes(routes!(places::get))
         .routes(routes!(trips::list))
         .routes(routes!(trips::get))
+        .routes(routes!(pins::put, pins::delete))
         .routes(routes!(landmarks::list))
         .routes(routes!(landmarks::get))
         .routes(routes!(objects::list))

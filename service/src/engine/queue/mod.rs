@@ -12,6 +12,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use cogmap_proto::{Codec, Contact, ContactLevel, Sample};
+use cognitive_map::Instruction;
 
 use super::message::{Call, ObjectRequest, Request};
 use super::sequencer::Weight;
@@ -122,7 +123,7 @@ impl Queue {
         let agent = match &call {
             Call::Samples(request) => &*request.agent,
             // A removal does not wait behind what the agent itself has sent.
-            Call::Object(_) | Call::Removal(_) => "",
+            Call::Object(_) | Call::Removal(_) | Call::Instruction(_) => "",
         };
         let (mut waiting, lane) = self.0.room_for(agent, bytes)?;
         waiting.lanes.push_call(lane, call, bytes);
@@ -281,6 +282,16 @@ fn size_of_call(call: &Call) -> usize {
             name.as_str().len() + 2 * contacts.map(size_of_contact).sum::<usize>()
         }
         Call::Removal(request) => request.agent.len(),
+        Call::Instruction(request) => size_of_instruction(&request.instruction),
+    }
+}
+
+fn size_of_instruction(instruction: &Instruction) -> usize {
+    match instruction {
+        Instruction::Follow(_, errand) => {
+            size_of_val(&errand.avoid_places[..]) + size_of_val(&errand.avoid_regions[..])
+        }
+        _ => 0,
     }
 }
 

@@ -9,7 +9,8 @@
 //! - Agents keep their numbers. One whose enrolment is lost is enrolled again where the hole was,
 //!   under its name if the checkpoint knows it, else under a placeholder.
 //! - A number that was enrolled again although its removal is lost is removed first.
-//! - Lessons about objects are numbered anew, for the numbers count those before.
+//! - Lessons about objects and instructions are numbered anew, for the numbers count those before;
+//!   blockages keep theirs.
 
 #[cfg(test)]
 mod tests;
@@ -109,6 +110,7 @@ pub fn repair(store: &LocalStore, space: &StoredSpace) -> Result<Option<RepairRe
         checkpoint: agents_of_checkpoint(store, space),
         agents: Vec::new(),
         lessons: 0,
+        instructions: 0,
         holes: false,
         blocks_kept: 0,
         samples_kept: 0,
@@ -185,6 +187,8 @@ struct Repair<'a> {
     agents: Vec<KnownAgent>,
     /// Lessons in the new journal.
     lessons: u64,
+    /// Instructions in it.
+    instructions: u64,
     /// Whether a hole has been met.
     holes: bool,
     blocks_kept: u64,
@@ -332,6 +336,18 @@ impl Repair<'_> {
                     number,
                     name,
                     lesson,
+                }
+            }
+            Entry::Instruct {
+                number,
+                instruction,
+            } => {
+                fits = number == self.instructions;
+                let number = self.instructions;
+                self.instructions += 1;
+                Entry::Instruct {
+                    number,
+                    instruction,
                 }
             }
             Entry::Remove { agent } => {
