@@ -9,11 +9,12 @@ use std::time::Duration;
 
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
-    AgentDetail, AgentObject, AgentPage, AgentSummary, Codec, GridState, Identification,
-    IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization, LocalizeQuery, ObjectDetail,
-    ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage, PredictAnswer, PredictQuery,
-    RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SpaceInfo, SpaceList,
-    SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
+    AgentDetail, AgentObject, AgentPage, AgentSummary, Blockage, BlockageList, BlockageRequest,
+    Codec, FollowRequest, FollowedRoute, GridState, Identification, IdentifyQuery, IngestAnswer,
+    Landmark, LandmarkPage, Localization, LocalizeQuery, ObjectDetail, ObjectLesson, ObjectPage,
+    ObjectSummary, Place, PlacePage, PredictAnswer, PredictQuery, RecallAnswer, RecallQuery,
+    RouteAnswer, RouteQuery, SampleBatch, SpaceInfo, SpaceList, SpaceSettings, Trajectory, Trip,
+    TripDetail, TripPage,
 };
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};

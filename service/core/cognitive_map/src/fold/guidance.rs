@@ -209,7 +209,9 @@ impl CognitiveMap {
             return;
         }
         let at = Point3::from(known.pose().translation.vector);
-        let progress = following.progress(&at, |step| self.leads_to(step));
+        let progress = following.progress(&at, self.settings.field_radius_m, |step| {
+            self.leads_to(step)
+        });
         if let Some(off_m) = progress.off_m {
             let tells = |route: &Route| {
                 Some(RouteLeft {

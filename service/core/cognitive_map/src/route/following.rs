@@ -100,16 +100,18 @@ impl Following {
     }
 
     /// How far an agent has come that is at a position; `now_at` says where a step leads now, for
-    /// the past may have been relaxed since the route was made.
+    /// the past may have been relaxed since the route was made. How unsure the agent is does not
+    /// count: one that is would arrive long before it is there.
     pub(crate) fn progress(
         &self,
         at: &Point3<f64>,
+        field_radius_m: f64,
         now_at: impl Fn(&RouteStep) -> Point3<f64>,
     ) -> Progress {
         let (mut next, count) = (self.next as usize, self.steps.len());
         let within = |next: usize| {
             let step = &self.steps[next];
-            (now_at(step) - at).norm() <= step.tolerance_m
+            (now_at(step) - at).norm() <= tuning::TOLERANCE_PER_FIELD_RADIUS * field_radius_m
         };
         while next < count && within(next) {
             next += 1;
@@ -125,12 +127,12 @@ impl Following {
             self.steps[k].off_m(&from, &now_at(&self.steps[k]), at)
         };
         // The first of the steps ahead on whose way the agent is: routes may cross themselves.
-        let on = (next..last).find(|&k| off_m(k) <= self.steps[k].tolerance_m);
+        let on = (next..last).find(|&k| off_m(k) <= field_radius_m);
         if let Some(next) = on {
             return Progress { next, off_m: None };
         }
         let off_m = (next..last).map(off_m).fold(f64::INFINITY, f64::min);
-        let leaves = tuning::LEFT_TOLERANCES * self.steps[next].tolerance_m;
+        let leaves = tuning::LEFT_FIELD_RADII * field_radius_m;
         Progress {
             next,
             off_m: (off_m > leaves).then_some(off_m),

@@ -32,6 +32,5 @@ pub(super) const CORRIDOR_CELL_M: f64 = 0.5;
 /// Steps ahead of the one that an agent is on, among which it is looked for: it may cut a corner, or
 /// its samples may be far apart.
 pub(super) const STEPS_AHEAD: usize = 8;
-/// Tolerances of a step beyond which an agent has left its route. Source: two, so that one that
-/// keeps to a step's tolerance and is a tolerance unsure has not.
-pub(super) const LEFT_TOLERANCES: f64 = 2.0;
+/// Field radii beyond which an agent has left its route. Source: so far away no place of it answers.
+pub(super) const LEFT_FIELD_RADII: f64 = 2.0;

@@ -235,7 +235,6 @@ fn a_blockage_on_a_route_leads_another_way() {
     );
     operator.says(&mut map, Instruction::Unblock(BlockageId(1)));
     let ahead = place_at(&map, 2.0, 0.0);
-    eprintln!("{ahead:?} {:?}", map.followed(robot.id));
     let events = operator.blocks(&mut map, Blocked::Place(ahead));
     let [EventKind::RouteLeft(left)] = &events[..] else {
         panic!("{events:?}");
