@@ -6,6 +6,7 @@ mod object;
 mod outlines;
 mod progress;
 mod room;
+mod routes;
 mod waking;
 
 pub(super) use object::Turns;
@@ -27,6 +28,9 @@ pub(in crate::cli) enum EvalCommand {
     /// How well a grid code tells places apart: whole, beside the place, noisy, with modules
     /// erased.
     Code(code::CodeArgs),
+    /// Routes in a hall, an office and a maze, through the HTTP of a service: are they found, are they
+    /// the shortest, and does a robot that follows them arrive?
+    Routes(routes::RoutesArgs),
     /// Robots that wake up somewhere in a room that a team-mate has explored: are they found, how
     /// soon, and how far off?
     Waking(waking::WakingArgs),
@@ -39,6 +43,7 @@ pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
         EvalCommand::Env3(args) => object::run(args),
         EvalCommand::Outlines(args) => outlines::run(args),
         EvalCommand::Code(args) => code::run(args),
+        EvalCommand::Routes(args) => routes::run(args),
         EvalCommand::Waking(args) => waking::run(args),
     }
 }
