@@ -3,8 +3,8 @@
 use cogmap_proto as wire;
 use cogmap_proto::limits::METRES_MAX;
 use cognitive_map::{
-    AgentId, Ball, Blockage, BlockageId, Blocked, CognitiveMap, Errand, Goal, Instruction, PlaceId,
-    Region, Retrace, TripId,
+    AgentId, BLOCKAGES_MAX, Ball, Blockage, BlockageId, Blocked, CognitiveMap, Errand, Goal,
+    Instruction, PlaceId, Region, Retrace, TripId,
 };
 
 use super::route::{InvalidRoute, cost, end, options_of, retrace, reverse, unknown};
@@ -13,14 +13,26 @@ use crate::journal::{JournaledBlocked, JournaledErrand, JournaledGoal, Journaled
 /// Least and largest radius of a blockage \[m\].
 const RADII_M: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
 
-/// What is blocked.
+/// A blockage, which has no number of its own yet.
 ///
 /// # Errors
-/// Says which rule the request breaks, or what in it is unknown.
-pub fn blocked(
+/// Says which rule the request breaks, what in it is unknown, or that there are too many.
+pub fn blockage(
     map: &CognitiveMap,
     request: &wire::BlockageRequest,
-) -> Result<Blocked, InvalidRoute> {
+) -> Result<Blockage, InvalidRoute> {
+    let blocked = blocked(map, request)?;
+    if map.blockages().len() >= BLOCKAGES_MAX {
+        return Err(InvalidRoute::TooManyBlockages(BLOCKAGES_MAX));
+    }
+    Ok(Blockage {
+        id: BlockageId(0),
+        blocked,
+        until_ns: request.until_ns,
+    })
+}
+
+fn blocked(map: &CognitiveMap, request: &wire::BlockageRequest) -> Result<Blocked, InvalidRoute> {
     let place = |number: u64| {
         let place = u32::try_from(number).ok().map(PlaceId);
         let place = place.filter(|place| (place.0 as usize) < map.places_recruited());

@@ -25,7 +25,7 @@ mod trajectory;
 pub use bounds::{Bound, setting_bounds};
 pub use channel::InvalidChannel;
 pub use cue::{InvalidQuery, cue, unknown_agent};
-pub use instruction::{blocked, errand};
+pub use instruction::{blockage, errand};
 pub use journal::records_of;
 pub use lesson::{InvalidContacts, lesson, touches_to_identify};
 pub use localize::{InvalidSequence, samples_to_localize};

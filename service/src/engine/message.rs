@@ -37,6 +37,18 @@ pub(crate) struct InstructionRequest {
     pub(crate) reply: oneshot::Sender<Result<u64, IngestError>>,
 }
 
+impl InstructionRequest {
+    /// Memory that it takes beside itself \[bytes\].
+    pub(crate) fn bytes(&self) -> usize {
+        match &self.instruction {
+            Instruction::Follow(_, errand) => {
+                size_of_val(&errand.avoid_places[..]) + size_of_val(&errand.avoid_regions[..])
+            }
+            _ => 0,
+        }
+    }
+}
+
 /// Whoever waits for a change that is no sample to be durable.
 pub(crate) type ChangeReply = oneshot::Sender<Result<(), IngestError>>;
 

@@ -1,5 +1,6 @@
 //! A space, as everyone but its writer sees it.
 
+mod instructions;
 mod live;
 mod loading;
 mod questions;
@@ -11,14 +12,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
 use cogmap_proto::{Codec, EventId, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings};
-use cognitive_map::{CognitiveMap, Instruction, Label, Lesson, Settings};
+use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
 use tokio::sync::oneshot;
 
 pub use live::LiveFollower;
 
 use super::agent_view::AgentView;
 use super::events::EventFollower;
-use super::message::{Call, IngestError, InstructionRequest, ObjectRequest, Request};
+use super::message::{Call, IngestError, ObjectRequest, Request};
 use super::question::QuestionRoom;
 use super::queue::{NotQueued, Queue, queue};
 use super::refinement::Refinements;
@@ -215,17 +216,6 @@ impl Space {
     /// See [`IngestError`].
     pub async fn forget_object(&self, name: &Label) -> Result<(), IngestError> {
         self.change_object(name, None).await
-    }
-
-    /// Takes an instruction, and answers its number when it is durable. A blockage goes by it.
-    ///
-    /// # Errors
-    /// See [`IngestError`].
-    pub async fn instruct(&self, instruction: Instruction) -> Result<u64, IngestError> {
-        let (reply, answer) = oneshot::channel();
-        let request = InstructionRequest { instruction, reply };
-        self.call(Call::Instruction(request))?;
-        answer.await.unwrap_or(Err(IngestError::Closed))
     }
 
     async fn change_object(

@@ -3,13 +3,12 @@
 use axum::body::Body;
 use axum::http::{Response, StatusCode};
 use cogmap_proto::{Blockage, BlockageList, BlockageRequest};
-use cognitive_map::{BLOCKAGES_MAX, BlockageId, Instruction};
 
 use super::extract::{IdParams, Json, NoQuery, SpaceOfPath, SpaceParam};
 use super::places::{MemoryOfPath, unknown};
 use super::problem::Problem;
 use super::reply;
-use crate::decode::{self, InvalidRoute};
+use crate::decode;
 use crate::encode;
 
 /// The blockages of a space.
@@ -42,18 +41,7 @@ pub(crate) async fn post(
     Json(request): Json<BlockageRequest>,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    let blocked = decode::blocked(&map, &request)?;
-    if map.blockages().len() >= BLOCKAGES_MAX {
-        return Err(InvalidRoute::TooManyBlockages(BLOCKAGES_MAX).into());
-    }
-    // The number is given when it is journaled.
-    let mut blockage = cognitive_map::Blockage {
-        id: BlockageId(0),
-        blocked,
-        until_ns: request.until_ns,
-    };
-    let number = space.instruct(Instruction::Block(blockage)).await?;
-    blockage.id = BlockageId(number);
+    let blockage = space.block(decode::blockage(&map, &request)?).await?;
     let mut response = reply::json(&encode::blockage(&blockage));
     *response.status_mut() = StatusCode::CREATED;
     Ok(response)
@@ -71,10 +59,8 @@ pub(crate) async fn delete(
     _: NoQuery,
 ) -> Result<StatusCode, Problem> {
     let map = space.snapshot().await?;
-    let id = BlockageId(id);
-    if !map.blockages().iter().any(|blockage| blockage.id == id) {
-        return Err(unknown("blockage"));
-    }
-    space.instruct(Instruction::Unblock(id)).await?;
+    let known = map.blockages().iter().find(|known| known.id.0 == id);
+    let known = known.ok_or_else(|| unknown("blockage"))?;
+    space.unblock(known.id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -3,7 +3,6 @@
 use axum::body::Body;
 use axum::http::{Response, StatusCode};
 use cogmap_proto::{FollowRequest, FollowedRoute};
-use cognitive_map::Instruction;
 
 use super::extract::{AgentOfPath, AgentParams, Json, NoQuery};
 use super::problem::Problem;
@@ -50,7 +49,7 @@ pub(crate) async fn put(
 ) -> Result<Response<Body>, Problem> {
     let agent = view.id();
     let errand = answer::errand_in(&space, agent, request).await?;
-    space.instruct(Instruction::Follow(agent, errand)).await?;
+    space.lead(agent, errand).await?;
     let map = space.snapshot().await?;
     Ok(reply::json(&encode::followed_route(
         space.name(),
@@ -74,7 +73,6 @@ pub(crate) async fn delete(
     if map.followed(view.id()).is_none() {
         return Err(InvalidRoute::FollowsNone(view.name().to_owned()).into());
     }
-    let stop = Instruction::StopFollowing(view.id());
-    space.instruct(stop).await?;
+    space.stop_leading(view.id()).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -1,7 +1,7 @@
 //! Trips that are never to be forgotten.
 
 use axum::http::StatusCode;
-use cognitive_map::{CognitiveMap, Instruction, TripId};
+use cognitive_map::{CognitiveMap, TripId};
 
 use super::extract::{IdParams, NoQuery};
 use super::places::{MemoryOfPath, forgotten, unknown};
@@ -29,7 +29,7 @@ pub(crate) async fn put(
         );
         return Err(Problem::new(Kind::TooManyPins, detail));
     }
-    space.instruct(Instruction::Pin(trip)).await?;
+    space.pin(trip, true).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -48,7 +48,7 @@ pub(crate) async fn delete(
     let map = space.snapshot().await?;
     let trip = trip(&map, id)?;
     if map.is_pinned(trip) {
-        space.instruct(Instruction::Unpin(trip)).await?;
+        space.pin(trip, false).await?;
     }
     Ok(StatusCode::NO_CONTENT)
 }

@@ -12,7 +12,6 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use cogmap_proto::{Codec, Contact, ContactLevel, Sample};
-use cognitive_map::Instruction;
 
 use super::message::{Call, ObjectRequest, Request};
 use super::sequencer::Weight;
@@ -282,16 +281,7 @@ fn size_of_call(call: &Call) -> usize {
             name.as_str().len() + 2 * contacts.map(size_of_contact).sum::<usize>()
         }
         Call::Removal(request) => request.agent.len(),
-        Call::Instruction(request) => size_of_instruction(&request.instruction),
-    }
-}
-
-fn size_of_instruction(instruction: &Instruction) -> usize {
-    match instruction {
-        Instruction::Follow(_, errand) => {
-            size_of_val(&errand.avoid_places[..]) + size_of_val(&errand.avoid_regions[..])
-        }
-        _ => 0,
+        Call::Instruction(request) => request.bytes(),
     }
 }
 
