@@ -19,8 +19,8 @@ pub struct BlockageRequest {
     /// Its other end.
     #[serde(default)]
     pub to: Option<u64>,
-    /// The middle of a ball in `map` \[m\], which blocks all ways whose straight lines meet it; with
-    /// `radius_m`.
+    /// The middle of a ball in `map` \[m\], which blocks all ways whose straight lines meet it;
+    /// with `radius_m`.
     #[serde(default)]
     pub at_m: Option<[f64; 3]>,
     /// The radius of the ball \[m\], 0.01 to 1000.

@@ -24,8 +24,8 @@ from .answer import (
 )
 from .errors import ApiError, InvalidValue
 from .event import Event, EventPage, EventRecord, MissedEvents
-from .http_service import HttpService, Query
-from .guidance import Blockage, BlockageList, BlockageRequest, FollowedRoute, FollowRequest
+from .guidance_client import GuidanceClient
+from .http_service import Query
 from .landmark import Landmark, LandmarkPage
 from .live import LaggedTicks, LiveTick
 from .localize import Localization, LocalizeQuery
@@ -62,7 +62,7 @@ from .wire import CBOR, JSON, decode, encode, to_wire
 _log = logging.getLogger("cogmap")
 
 
-class Client(HttpService):
+class Client(GuidanceClient):
     """Asks a cogmap service over HTTP.
 
     Holds no connection between calls, so it may be shared by threads. Lists that the service
@@ -255,55 +255,6 @@ class Client(HttpService):
         )
         path = path_of(space, "route")
         return self._send(RouteAnswer, "POST", path, JSON, json_of("query", query))
-
-    def follow_route(
-        self,
-        space: str,
-        agent: str,
-        goal: RouteEnd,
-        *,
-        cost: RouteCost = RouteCost.LENGTH,
-        reverse: RouteReverse = RouteReverse.ALLOWED,
-        avoid_places: Iterable[int] = (),
-        avoid_boxes: Iterable[RouteBox] = (),
-    ) -> FollowedRoute:
-        """Lets an agent follow a route to `goal` from where it is, in place of any that it follows.
-        Events tell its progress; when it leaves the route, or a blockage comes onto it, it gets
-        another one."""
-        avoid = RouteAvoid(tuple(avoid_places), tuple(avoid_boxes))
-        request = FollowRequest(goal, cost, reverse, avoid)
-        path = path_of(space, "agents", agent, "route")
-        return self._send(FollowedRoute, "PUT", path, JSON, json_of("request", request))
-
-    def followed_route(self, space: str, agent: str) -> FollowedRoute:
-        """What is left of the route that an agent follows."""
-        return self._get(FollowedRoute, path_of(space, "agents", agent, "route"))
-
-    def stop_following(self, space: str, agent: str) -> None:
-        """Lets an agent follow its route no more."""
-        self._request("DELETE", path_of(space, "agents", agent, "route"))
-
-    def blockages(self, space: str) -> Tuple[Blockage, ...]:
-        """The blockages of a space, by number."""
-        return self._get(BlockageList, path_of(space, "blockages")).blockages
-
-    def block(self, space: str, request: BlockageRequest) -> Blockage:
-        """Says where nobody gets through: no route leads there until that is taken back, its time
-        has come, or somebody travels there."""
-        path = path_of(space, "blockages")
-        return self._send(Blockage, "POST", path, JSON, json_of("request", request))
-
-    def unblock(self, space: str, blockage: int) -> None:
-        """Ends a blockage."""
-        self._request("DELETE", path_of(space, "blockages", str(blockage)))
-
-    def pin_trip(self, space: str, trip: int) -> None:
-        """Pins a trip, which then is never forgotten."""
-        self._request("PUT", path_of(space, "trips", str(trip), "pin"))
-
-    def unpin_trip(self, space: str, trip: int) -> None:
-        """Lets a trip be forgotten like others."""
-        self._request("DELETE", path_of(space, "trips", str(trip), "pin"))
 
     def predict(
         self,

@@ -5,7 +5,7 @@ use super::{NoRoute, NoRouteEnd, Route, RouteBounds, RouteEnd, RouteOptions};
 use crate::fold::CognitiveMap;
 use crate::input::{AgentId, Retrace};
 use crate::memory::ids::{PlaceId, TripId};
-use crate::memory::trip::Trip;
+use crate::memory::trip::{Leg, LegUnderWay, Trip};
 
 /// How far back.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,9 +23,12 @@ impl CognitiveMap {
     /// The trip is unknown or forgotten.
     pub fn route_end_of_retrace(&self, retrace: &Retrace) -> Result<RouteEnd, NoRouteEnd> {
         let trip = self.trip(retrace.trip);
-        let last = trip.and_then(|trip| match retrace.backward {
-            true => trip.leg(0).map(|leg| leg.from()),
-            false => trip.leg(trip.leg_count() - 1).map(|leg| leg.to()),
+        let last = trip.and_then(|trip| {
+            if retrace.backward {
+                trip.leg(0).map(Leg::from)
+            } else {
+                trip.legs().last().map(Leg::to)
+            }
         });
         match last {
             Some(place) => Ok(RouteEnd {
@@ -53,7 +56,7 @@ impl CognitiveMap {
         gives_up: &mut dyn FnMut() -> bool,
     ) -> Result<Route, NoRoute> {
         let costs = self.costs(options);
-        let along = self.along(retrace);
+        let along = self.along(*retrace);
         let at = self.position_of(from);
         let distances = (0..).zip(&along).filter_map(|(rank, place): (usize, _)| {
             let there = self.waypoint(*place)?.pose().translation.vector;
@@ -106,7 +109,7 @@ impl CognitiveMap {
     }
 
     /// The places of a trip, in the order in which they are to be come to.
-    fn along(&self, retrace: &Retrace) -> Vec<PlaceId> {
+    fn along(&self, retrace: Retrace) -> Vec<PlaceId> {
         let legs = self.trip(retrace.trip).into_iter().flat_map(Trip::legs);
         let mut places: Vec<_> = legs.flat_map(|leg| [leg.from(), leg.to()]).collect();
         places.dedup();
@@ -132,7 +135,7 @@ impl CognitiveMap {
         let under_way = known.recorder.leg.as_ref();
         let mut left = match back {
             Back::Seconds(seconds) => seconds,
-            Back::Metres(metres) => metres - under_way.map_or(0.0, |leg| leg.length_m()),
+            Back::Metres(metres) => metres - under_way.map_or(0.0, LegUnderWay::length_m),
         };
         let mut place = None;
         let mut until_ns = known.stamp_ns().unwrap_or(0);

@@ -282,9 +282,10 @@ fn a_trip_is_retraced_from_the_nearest_point_on_it() {
         let route = map.retraced(&from, &retrace, &options, None, &mut || false);
         let route = route.unwrap();
         let trip = map.trip(trip).unwrap();
-        let end = match backward {
-            true => trip.leg(0).unwrap().from(),
-            false => trip.legs().last().unwrap().to(),
+        let end = if backward {
+            trip.leg(0).unwrap().from()
+        } else {
+            trip.legs().last().unwrap().to()
         };
         assert_eq!(route.steps.last().unwrap().place, Some(end));
         route.length_m

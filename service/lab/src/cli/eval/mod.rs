@@ -28,8 +28,8 @@ pub(in crate::cli) enum EvalCommand {
     /// How well a grid code tells places apart: whole, beside the place, noisy, with modules
     /// erased.
     Code(code::CodeArgs),
-    /// Routes in a hall, an office and a maze, through the HTTP of a service: are they found, are they
-    /// the shortest, and does a robot that follows them arrive?
+    /// Routes in a hall, an office and a maze, through the HTTP of a service: are they found, are
+    /// they the shortest, and does a robot that follows them arrive?
     Routes(routes::RoutesArgs),
     /// Robots that wake up somewhere in a room that a team-mate has explored: are they found, how
     /// soon, and how far off?
