@@ -287,8 +287,8 @@ pub(super) fn end(
             (home, "home of the agent", format!("{name:?}"))
         }
         wire::RouteEnd::Back(of) => {
-            let back = back(field, of)?;
-            let end = map.route_end_back(agent(map, &of.agent)?, back);
+            let agent = agent(map, &of.agent)?;
+            let end = map.route_end_back(agent, back(field, of)?);
             (end, "way of the agent", format!("{:?}", of.agent))
         }
         wire::RouteEnd::Retrace(of) => {
@@ -300,7 +300,12 @@ pub(super) fn end(
             (map.route_end_at(place), "place", place.0.to_string())
         }
     };
-    found.map_err(|error| match error {
+    found.map_err(|error| no_end(field, error, what, &name))
+}
+
+/// Why a route cannot begin or end somewhere.
+fn no_end(field: &'static str, error: NoRouteEnd, what: &str, name: &str) -> InvalidRoute {
+    match error {
         NoRouteEnd::Unknown => unknown(what, &name),
         NoRouteEnd::Forgotten => {
             InvalidRoute::Forgotten(format!("{field}: the {what} {name} has been forgotten"))
@@ -309,7 +314,7 @@ pub(super) fn end(
             nearest: Some((place, distance_m)),
         } => InvalidRoute::NothingNear(field, place.0, distance_m),
         NoRouteEnd::NothingNear { nearest: None } => InvalidRoute::NoPlaces,
-    })
+    }
 }
 
 pub(super) fn unknown(what: &str, name: &impl std::fmt::Display) -> InvalidRoute {

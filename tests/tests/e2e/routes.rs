@@ -173,7 +173,10 @@ fn a_followed_route_and_its_blockages_outlive_a_restart_and_are_told_on_every_do
     server.run();
     let api = server.api();
     assert_eq!(api.followed_route("default", AGENT).unwrap(), other);
-    assert_eq!(api.blockages("default").unwrap(), [blockage.clone()]);
+    assert_eq!(
+        api.blockages("default").unwrap(),
+        std::slice::from_ref(&blockage)
+    );
     api.unblock("default", blockage.id).unwrap();
     assert_eq!(api.blockages("default").unwrap(), []);
     let still = Increment {

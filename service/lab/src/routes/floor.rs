@@ -160,7 +160,7 @@ fn maze(random: &mut ChaCha8Rng) -> Vec<Wall> {
     const EDGE: usize = 8;
     let size_m = SIDE_M / EDGE as f64;
     let mut opened = std::collections::BTreeSet::new();
-    let mut seen = vec![false; EDGE * EDGE];
+    let mut seen = [false; EDGE * EDGE];
     let mut open = vec![0_usize];
     seen[0] = true;
     while let Some(&cell) = open.last() {

@@ -18,12 +18,12 @@ mod tests;
 use std::borrow::Cow;
 use std::path::PathBuf;
 
-use cogmap_proto::{SkipReason, SpaceSettings};
+use cogmap_proto::{ObjectLesson, SkipReason, SpaceSettings};
 use cognitive_map::CognitiveMap;
 use serde::Serialize;
 
 use crate::decode::core_settings;
-use crate::journal::{BlockWriter, CorruptBlock, Entry, entries};
+use crate::journal::{BlockWriter, CorruptBlock, Entry, JournaledInstruction, entries};
 use crate::store::{
     Damage, Derived, Flaw, LocalJournal, LocalStore, Replacement, StoreError, StoredSpace,
 };
@@ -331,24 +331,14 @@ impl Repair<'_> {
                 lesson,
             } => {
                 fits = number == self.lessons;
-                let number = self.next_lesson();
-                Entry::Teach {
-                    number,
-                    name,
-                    lesson,
-                }
+                self.next_teaching(name, lesson)
             }
             Entry::Instruct {
                 number,
                 instruction,
             } => {
                 fits = number == self.instructions;
-                let number = self.instructions;
-                self.instructions += 1;
-                Entry::Instruct {
-                    number,
-                    instruction,
-                }
+                self.next_instruction(instruction)
             }
             Entry::Remove { agent } => {
                 self.enrol_to(agent.saturating_add(1), before);
@@ -378,6 +368,24 @@ impl Repair<'_> {
                 known.enrol_again(name);
             }
             None => self.agents.push(KnownAgent::named(agent, name)),
+        }
+    }
+
+    fn next_teaching(&mut self, name: Cow<'static, str>, lesson: ObjectLesson) -> Entry<'static> {
+        let number = self.next_lesson();
+        Entry::Teach {
+            number,
+            name,
+            lesson,
+        }
+    }
+
+    fn next_instruction(&mut self, instruction: JournaledInstruction) -> Entry<'static> {
+        let number = self.instructions;
+        self.instructions += 1;
+        Entry::Instruct {
+            number,
+            instruction,
         }
     }
 
