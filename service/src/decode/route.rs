@@ -61,7 +61,8 @@ pub enum InvalidRoute {
     /// No way leads there: the nearest place to the goal that can be reached, its distance, and the
     /// blockages on the way that there would be.
     #[error(
-        "no way leads there; the nearest place that can be reached is {0}, {1:.3} m from it{across}",
+        "no way leads there; the nearest place that can be reached is {0}, {1:.3} m from \
+         it{across}",
         across = across(.2)
     )]
     NoWay(u32, f64, Vec<u64>),
