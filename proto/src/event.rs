@@ -6,6 +6,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use crate::guidance::RouteFailure;
+use crate::route::RouteStep;
 use crate::watermark::SkipReason;
 
 /// Which event of its space one is. Made of the record that brought it about, so it is the same
@@ -258,6 +260,37 @@ pub enum EventKind {
     /// The agent was removed, by whoever runs the service or to make room. What it did in the map
     /// stays; a message under its name enrols another agent.
     AgentRemoved {},
+    /// The agent came to a step of the route that it follows.
+    RouteProgress {
+        /// The place there; null beside the places.
+        place: Option<u64>,
+        /// Number of steps that are left.
+        steps_left: u64,
+        /// Length that is left \[m\].
+        left_m: f64,
+    },
+    /// The agent was off its route, or a blockage came onto it: it follows another one from here.
+    RouteLeft {
+        /// How far off it was \[m\]; null where it was on the route.
+        off_m: Option<f64>,
+        /// The blockage that came onto the route; null where none did.
+        blockage: Option<u64>,
+        /// Length of the new route \[m\].
+        length_m: f64,
+        /// Number of its steps.
+        steps_left: u64,
+        /// The first 64 of them; the route of the agent tells all.
+        steps: Vec<RouteStep>,
+    },
+    /// The agent has arrived where its route leads.
+    RouteDone {},
+    /// The agent follows no route any more, without having arrived.
+    RouteFailed {
+        /// Why.
+        reason: RouteFailure,
+        /// The blockages on the way that there would be.
+        blockages: Vec<u64>,
+    },
 }
 
 /// What kind of percept a channel carries.

@@ -22,6 +22,7 @@ mod error;
 mod estimate;
 mod event;
 mod field;
+mod guidance;
 mod key;
 pub mod limits;
 mod live;
@@ -54,6 +55,9 @@ pub use event::{
     TripEnd,
 };
 pub use field::at_field;
+pub use guidance::{
+    Blockage, BlockageList, BlockageRequest, FollowRequest, FollowedRoute, RouteFailure,
+};
 pub use key::{
     AgentKey, KeyError, SESSION_PARAMETER, durable_key, estimate_key, events_key, json_key,
     query_key, samples_key,
@@ -71,8 +75,9 @@ pub use percept::{Descriptor, Level};
 pub use predict::{ExpectedPercept, MotionBody, PredictAnswer, PredictQuery, PredictedPercept};
 pub use query::{PerceptCue, RecallQuery, Verb, WatermarkQuery};
 pub use route::{
-    Route, RouteAnswer, RouteAvoid, RouteBox, RouteCost, RouteEnd, RouteFormat, RoutePose,
-    RouteQuery, RouteReverse, RouteStep, RouteWay, Way, WayTraversals,
+    RetraceDirection, Route, RouteAnswer, RouteAvoid, RouteBack, RouteBox, RouteCost, RouteEnd,
+    RouteFormat, RoutePose, RouteQuery, RouteRetrace, RouteReverse, RouteStep, RouteWay, Way,
+    WayTraversals,
 };
 pub use sample::{
     Increment, Marker, MotionNoise, Relation, Sample, SampleBatch, SampleBody, Sighting, StartPose,

@@ -61,6 +61,49 @@ pub enum RouteEnd {
     Home(String),
     /// The place that a percept recalls best.
     Percept(PerceptCue),
+    /// Where an agent was in this session so long ago, or so far back along its path.
+    Back(RouteBack),
+    /// The end of a trip, by its own legs from the point on it that is nearest; only as a goal.
+    Retrace(RouteRetrace),
+}
+
+/// Where an agent was: by time or by path, exactly one of them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct RouteBack {
+    /// The agent, by name.
+    pub agent: String,
+    /// So long ago \[s\].
+    #[serde(default)]
+    pub s: Option<f64>,
+    /// So far back along its path \[m\].
+    #[serde(default)]
+    pub m: Option<f64>,
+}
+
+/// A trip that is travelled again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct RouteRetrace {
+    /// Its number.
+    pub trip: u64,
+    /// In which direction; forward when absent.
+    #[serde(default)]
+    pub direction: RetraceDirection,
+}
+
+/// In which direction a trip is travelled again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum RetraceDirection {
+    /// To where it ended.
+    #[default]
+    Forward,
+    /// To where it began.
+    Backward,
 }
 
 /// What is to be least on a route.

@@ -7,11 +7,12 @@ mod messages;
 use std::fmt::Debug;
 
 use cogmap_proto::{
-    AgentAt, AgentDetail, AgentObject, AgentPage, Codec, DecodeError, Estimate, Event, GridState,
-    Identification, IdentifyQuery, IngestAnswer, LandmarkPage, Localization, LocalizeQuery, Name,
-    ObjectDetail, ObjectLesson, ObjectPage, PlacePage, PredictAnswer, PredictQuery, Problem,
-    RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SequenceAnswer, SequenceQuery,
-    SpaceList, SpaceSettings, Trajectory, TripDetail, TripPage, Watermark, WatermarkQuery,
+    AgentAt, AgentDetail, AgentObject, AgentPage, BlockageList, BlockageRequest, Codec,
+    DecodeError, Estimate, Event, FollowRequest, FollowedRoute, GridState, Identification,
+    IdentifyQuery, IngestAnswer, LandmarkPage, Localization, LocalizeQuery, Name, ObjectDetail,
+    ObjectLesson, ObjectPage, PlacePage, PredictAnswer, PredictQuery, Problem, RecallAnswer,
+    RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SequenceAnswer, SequenceQuery, SpaceList,
+    SpaceSettings, Trajectory, TripDetail, TripPage, Watermark, WatermarkQuery,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -29,8 +30,12 @@ fn decode_as_everything(bytes: &[u8]) {
     decode_as::<AgentDetail>(bytes);
     decode_as::<AgentObject>(bytes);
     decode_as::<AgentPage>(bytes);
+    decode_as::<BlockageList>(bytes);
+    decode_as::<BlockageRequest>(bytes);
     decode_as::<Estimate>(bytes);
     decode_as::<Event>(bytes);
+    decode_as::<FollowRequest>(bytes);
+    decode_as::<FollowedRoute>(bytes);
     decode_as::<GridState>(bytes);
     decode_as::<Identification>(bytes);
     decode_as::<IdentifyQuery>(bytes);

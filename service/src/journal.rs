@@ -8,14 +8,18 @@
 //!        | 3 number:varint name:string lesson              a lesson about an object
 //!        | 4 number:varint name:string                     an object to forget
 //!        | 5 agent:varint                                  an agent that is removed
+//!        | 6 number:varint instruction                     a blockage, a route, a pin
 //! ```
 //!
 //! All of it is postcard of [`Entry`], so a batch that came as postcard and is accepted whole goes
 //! to disk as the bytes that came. The format is kept readable for ever: a change is a new version.
 
+mod instruction;
+
 use std::borrow::Cow;
 
 use cogmap_proto::{Codec, ObjectLesson, SampleBatch, SkipReason};
+pub use instruction::{JournaledBlocked, JournaledErrand, JournaledGoal, JournaledInstruction};
 use serde::{Deserialize, Serialize};
 
 /// Version of blocks that this build writes.
@@ -71,6 +75,13 @@ pub enum Entry<'a> {
     Remove {
         /// Its number.
         agent: u32,
+    },
+    /// Somebody said what routes are to heed.
+    Instruct {
+        /// Number of instructions before it.
+        number: u64,
+        /// What was said.
+        instruction: JournaledInstruction,
     },
 }
 

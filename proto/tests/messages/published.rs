@@ -3,7 +3,7 @@
 use cogmap_proto::{
     Descriptor, Estimate, Event, EventId, EventKind, EventPage, EventRecord, Increment, Level,
     MissedEvents, MotionBody, PerceptCue, PerceptKind, PredictQuery, RecallQuery, Rejection,
-    SeqRange, SkipReason, Status, TripEnd, Velocity, Watermark, WatermarkQuery,
+    RouteFailure, SeqRange, SkipReason, Status, TripEnd, Velocity, Watermark, WatermarkQuery,
 };
 
 use super::Visit;
@@ -42,7 +42,8 @@ pub(super) fn each(visit: &mut impl Visit) {
     visit.message("estimate_lost", &estimate(Status::Lost));
     visit.message("watermark", &watermark());
     visit.message("watermark_gap_rejections", &watermark_with_gap());
-    for (name, kind) in event_kinds().into_iter().chain(object_events()) {
+    let kinds = event_kinds().into_iter().chain(object_events());
+    for (name, kind) in kinds.chain(route_events()) {
         visit.message(&format!("event_{name}"), &event(kind));
     }
     let id = |revision, index| EventId { revision, index };
@@ -166,6 +167,37 @@ fn event(kind: EventKind) -> Event {
         stamp_ns: 1_800_000_000_610_000_000,
         kind,
     }
+}
+
+fn route_events() -> [(&'static str, EventKind); 4] {
+    [
+        (
+            "route_progress",
+            EventKind::RouteProgress {
+                place: Some(3),
+                steps_left: 4,
+                left_m: 2.25,
+            },
+        ),
+        (
+            "route_left",
+            EventKind::RouteLeft {
+                off_m: Some(0.75),
+                blockage: None,
+                length_m: 4.5,
+                steps_left: 2,
+                steps: super::routes::steps(),
+            },
+        ),
+        ("route_done", EventKind::RouteDone {}),
+        (
+            "route_failed",
+            EventKind::RouteFailed {
+                reason: RouteFailure::NoWay,
+                blockages: vec![3, 5],
+            },
+        ),
+    ]
 }
 
 fn object_events() -> [(&'static str, EventKind); 7] {

@@ -1,8 +1,9 @@
 //! Routes: what is asked and what is answered.
 
 use cogmap_proto::{
-    Level, PerceptCue, Route, RouteAnswer, RouteAvoid, RouteBox, RouteCost, RouteEnd, RouteFormat,
-    RoutePose, RouteQuery, RouteReverse, RouteStep, RouteWay,
+    Blockage, BlockageList, BlockageRequest, FollowRequest, FollowedRoute, Level, PerceptCue,
+    RetraceDirection, Route, RouteAnswer, RouteAvoid, RouteBack, RouteBox, RouteCost, RouteEnd,
+    RouteFormat, RoutePose, RouteQuery, RouteRetrace, RouteReverse, RouteStep, RouteWay,
 };
 
 use super::Visit;
@@ -21,6 +22,21 @@ pub(super) fn each(visit: &mut impl Visit) {
         ("home", RouteEnd::Home("robot-1".to_owned())),
         ("landmark", RouteEnd::Landmark("dock".to_owned())),
         ("percept", RouteEnd::Percept(level)),
+        (
+            "back",
+            RouteEnd::Back(RouteBack {
+                agent: "robot-1".to_owned(),
+                s: Some(30.0),
+                m: None,
+            }),
+        ),
+        (
+            "retrace",
+            RouteEnd::Retrace(RouteRetrace {
+                trip: 17,
+                direction: RetraceDirection::Backward,
+            }),
+        ),
     ];
     for (name, to) in ends {
         visit.message(
@@ -30,6 +46,61 @@ pub(super) fn each(visit: &mut impl Visit) {
     }
     visit.message("route_answer", &answer());
     visit.message("route_answer_there", &there());
+    each_of_guidance(visit);
+}
+
+/// The steps of a route.
+pub(super) fn steps() -> Vec<RouteStep> {
+    answer().steps
+}
+
+fn each_of_guidance(visit: &mut impl Visit) {
+    let request = BlockageRequest {
+        at_m: Some([1.5, -2.0, 0.0]),
+        radius_m: Some(0.25),
+        until_ns: Some(1_700_000_000_000_000_000),
+        ..BlockageRequest::default()
+    };
+    visit.message("blockage_request", &request);
+    let blockage = Blockage {
+        id: 3,
+        place: None,
+        from: Some(4),
+        to: Some(5),
+        at_m: None,
+        radius_m: None,
+        until_ns: None,
+    };
+    visit.message("blockage", &blockage);
+    let ball = Blockage {
+        id: 4,
+        from: None,
+        to: None,
+        at_m: request.at_m,
+        radius_m: request.radius_m,
+        until_ns: request.until_ns,
+        ..blockage
+    };
+    let blockages = vec![blockage, ball];
+    visit.message("blockage_list", &BlockageList { blockages });
+    let follow = FollowRequest {
+        to: RouteEnd::Place(3),
+        cost: RouteCost::Time,
+        reverse: RouteReverse::Never,
+        avoid: full().avoid,
+    };
+    visit.message("follow_request", &follow);
+    let followed = FollowedRoute {
+        space: "office".to_owned(),
+        agent: "robot-1".to_owned(),
+        frame: "map".to_owned(),
+        map_revision: 4711,
+        length_m: 4.5,
+        duration_s: 9.0,
+        steps_done: 2,
+        steps: answer().steps,
+    };
+    visit.message("followed_route", &followed);
 }
 
 fn query() -> RouteQuery {

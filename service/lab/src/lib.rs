@@ -73,6 +73,7 @@ pub mod outlines;
 pub mod paths;
 pub mod points;
 pub mod reference;
+pub mod routes;
 pub mod stream;
 pub mod touch;
 pub mod tuc;

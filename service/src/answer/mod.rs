@@ -6,7 +6,7 @@ mod route;
 mod sequence;
 
 pub use named::{agent_named, agent_once_named, any_space_named, nobody_named, space_named};
-pub use route::{route, route_in};
+pub use route::{errand_in, route, route_in};
 pub use sequence::{sequence, sequence_in};
 
 use cogmap_proto::{

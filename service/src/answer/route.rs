@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use cogmap_proto::{RouteAnswer, RouteQuery};
-use cognitive_map::{CognitiveMap, NoRoute, RouteBounds};
+use cogmap_proto::{FollowRequest, RouteAnswer, RouteEnd, RouteFormat, RouteQuery};
+use cognitive_map::{AgentId, CognitiveMap, Errand, NoRoute, RouteBounds};
 
 use crate::decode::{self, InvalidRoute};
 use crate::encode;
@@ -36,13 +36,13 @@ pub fn route(
 ) -> Result<RouteAnswer, InvalidRoute> {
     let question = decode::route(map, query)?;
     let (from, to, options) = (&question.from, &question.to, &question.options);
-    let found = map.routes(from, to, options, bounds, gives_up);
-    let found = found.map_err(|error| match error {
-        NoRoute::NoWay {
-            nearest: (place, distance_m),
-        } => InvalidRoute::NoWay(place.0, distance_m),
-        NoRoute::GivenUp => InvalidRoute::GivenUp,
-    })?;
+    let found = match &question.retrace {
+        Some(retrace) => map
+            .retraced(from, retrace, options, bounds, gives_up)
+            .map(|route| vec![route]),
+        None => map.routes(from, to, options, bounds, gives_up),
+    };
+    let found = found.map_err(no_route)?;
     if let Some(spacing_m) = question.spacing_m {
         let mut lengths = found.iter().map(|route| route.length_m);
         if !lengths.all(|length_m| encode::fits_in_path(length_m, spacing_m)) {
@@ -50,4 +50,50 @@ pub fn route(
         }
     }
     Ok(encode::routes(space, map, &found, question.spacing_m))
+}
+
+/// Why there is no route, as it is answered.
+fn no_route(error: NoRoute) -> InvalidRoute {
+    match error {
+        NoRoute::NoWay {
+            nearest: (place, distance_m),
+            blockages,
+        } => {
+            let blockages = blockages.into_iter().map(|blockage| blockage.0);
+            InvalidRoute::NoWay(place.0, distance_m, blockages.collect())
+        }
+        NoRoute::GivenUp => InvalidRoute::GivenUp,
+    }
+}
+
+/// Where an agent is to go and how, where a way leads there now.
+///
+/// # Errors
+/// Says which rule the request breaks, what in it is unknown, or that no way leads there; or the
+/// space cannot be asked, or not now.
+pub async fn errand_in(
+    space: &Arc<Space>,
+    agent: AgentId,
+    request: FollowRequest,
+) -> Result<Errand, Problem> {
+    let found = space.routes(move |map, bounds, gives_up| {
+        let name = map
+            .agent(agent)
+            .map(|agent| agent.name().as_str().to_owned());
+        let query = RouteQuery {
+            from: RouteEnd::Agent(name.unwrap_or_default()),
+            to: request.to.clone(),
+            cost: request.cost,
+            reverse: request.reverse,
+            avoid: request.avoid.clone(),
+            shortcuts: false,
+            body_radius_m: None,
+            alternatives: 0,
+            format: RouteFormat::Steps,
+            spacing_m: None,
+        };
+        route("", map, &query, bounds, gives_up)?;
+        decode::errand(map, &request)
+    });
+    Ok(found.await??)
 }

@@ -6,6 +6,7 @@
 use cogmap_proto as wire;
 use cognitive_map::{AgentId, InvalidSample, Label, Record, SkipReason};
 
+use super::instruction::journaled_instruction;
 use super::lesson::journaled_lesson;
 use super::sample::journaled_sample;
 use crate::journal::Entry;
@@ -46,6 +47,18 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
                     number: *number,
                     name,
                     lesson,
+                });
+            }
+        }
+        Entry::Instruct {
+            number,
+            instruction,
+        } => {
+            // Only instructions that passed are journaled.
+            if let Some(instruction) = journaled_instruction(instruction) {
+                take(Record::Instruct {
+                    number: *number,
+                    instruction,
                 });
             }
         }

@@ -3,8 +3,8 @@
 use cogmap_proto as wire;
 use cogmap_proto::limits::{METRES_MAX, PAGE_ITEMS_MAX};
 use cognitive_map::{
-    AgentId, CognitiveMap, NoRouteEnd, PlaceId, RecallCue, Region, Reverse, RouteCost, RouteEnd,
-    RouteOptions, Status, TripId,
+    AgentId, Back, CognitiveMap, NoRouteEnd, PlaceId, RecallCue, Region, Retrace, Reverse,
+    RouteCost, RouteEnd, RouteOptions, Status, TripId,
 };
 use nalgebra::Point3;
 
@@ -24,6 +24,9 @@ const SPACINGS_M: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
 const BODY_RADIUS_M: f64 = 0.15;
 /// Least and largest of it \[m\].
 const BODY_RADII_M: std::ops::RangeInclusive<f64> = 0.01..=1.0;
+
+/// Most seconds or metres that one may go back.
+const BACK_MAX: f64 = 1e9;
 
 /// Why there is no route.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -55,15 +58,47 @@ pub enum InvalidRoute {
     /// There are no places at all.
     #[error("the space has no places yet")]
     NoPlaces,
-    /// No way leads there: the nearest place to the goal that can be reached, and its distance.
-    #[error("no way leads there; the nearest place that can be reached is {0}, {1:.3} m from it")]
-    NoWay(u32, f64),
+    /// No way leads there: the nearest place to the goal that can be reached, its distance, and the
+    /// blockages on the way that there would be.
+    #[error(
+        "no way leads there; the nearest place that can be reached is {0}, {1:.3} m from \
+         it{across}",
+        across = across(.2)
+    )]
+    NoWay(u32, f64, Vec<u64>),
+    /// Neither a time nor a length is given, or both.
+    #[error("{0}.back: give either s or m")]
+    WhichBack(&'static str),
+    /// A trip is to be retraced to somewhere.
+    #[error("from: a route may end with a retraced trip, not begin with one")]
+    RetraceFrom,
+    /// What is blocked is not said, or in more than one way.
+    #[error("give exactly one of: place; from and to; at_m and radius_m")]
+    WhichBlockage,
+    /// There are as many blockages as there may be.
+    #[error("the space has {0} blockages, the most that there may be")]
+    TooManyBlockages(usize),
+    /// The agent follows no route.
+    #[error("the agent {0:?} follows no route")]
+    FollowsNone(String),
     /// The search took too long.
     #[error("no route was found in time")]
     GivenUp,
     /// The path would have too many poses.
     #[error("spacing_m is {0}, which gives more poses than an answer may hold")]
     LongPath(f64),
+}
+
+/// What is said of blockages on a way.
+fn across(blockages: &[u64]) -> String {
+    match blockages {
+        [] => String::new(),
+        [one] => format!("; blockage {one} is on the way"),
+        some => {
+            let numbers: Vec<_> = some.iter().map(u64::to_string).collect();
+            format!("; blockages {} are on the way", numbers.join(", "))
+        }
+    }
 }
 
 /// A route that is asked for, as the map takes it.
@@ -73,6 +108,8 @@ pub struct RouteQuestion {
     pub from: RouteEnd,
     /// Where it ends.
     pub to: RouteEnd,
+    /// The trip that leads there, if one is to be travelled again.
+    pub retrace: Option<Retrace>,
     /// What it is to be like.
     pub options: RouteOptions,
     /// Distance of the poses of its path \[m\], if one is asked for.
@@ -90,9 +127,17 @@ pub fn route(map: &CognitiveMap, query: &wire::RouteQuery) -> Result<RouteQuesti
     }
     let spacing_m = metres("spacing_m", query.spacing_m, SPACING_M, &SPACINGS_M)?;
     let options = options(map, query)?;
+    if matches!(query.from, wire::RouteEnd::Retrace(_)) {
+        return Err(InvalidRoute::RetraceFrom);
+    }
+    let retraced = match &query.to {
+        wire::RouteEnd::Retrace(of) => Some(retrace(of)?),
+        _ => None,
+    };
     Ok(RouteQuestion {
         from: end(map, "from", &query.from)?,
         to: end(map, "to", &query.to)?,
+        retrace: retraced,
         options,
         spacing_m: (query.format == wire::RouteFormat::Path).then_some(spacing_m),
     })
@@ -116,9 +161,22 @@ fn metres(
 }
 
 fn options(map: &CognitiveMap, query: &wire::RouteQuery) -> Result<RouteOptions, InvalidRoute> {
-    let avoid = &query.avoid;
     let radius_m = query.body_radius_m;
     let radius_m = metres("body_radius_m", radius_m, BODY_RADIUS_M, &BODY_RADII_M)?;
+    Ok(RouteOptions {
+        shortcuts_within_m: query.shortcuts.then_some(radius_m),
+        alternatives: query.alternatives as usize,
+        ..options_of(map, query.cost, query.reverse, &query.avoid)?
+    })
+}
+
+/// What a route is to be like, without shortcuts and alternatives.
+pub(super) fn options_of(
+    map: &CognitiveMap,
+    least: wire::RouteCost,
+    backwards: wire::RouteReverse,
+    avoid: &wire::RouteAvoid,
+) -> Result<RouteOptions, InvalidRoute> {
     if avoid.places.len() > PAGE_ITEMS_MAX {
         return Err(InvalidRoute::TooMany("avoid.places", PAGE_ITEMS_MAX));
     }
@@ -135,25 +193,57 @@ fn options(map: &CognitiveMap, query: &wire::RouteQuery) -> Result<RouteOptions,
         Region::new(corners.min_m, corners.max_m).ok_or(InvalidRoute::Box(at))
     });
     Ok(RouteOptions {
-        cost: match query.cost {
-            wire::RouteCost::Length => RouteCost::Length,
-            wire::RouteCost::Time => RouteCost::Time,
-            wire::RouteCost::Uncertainty => RouteCost::Uncertainty,
-            wire::RouteCost::Recency => RouteCost::Recency,
-        },
-        reverse: match query.reverse {
-            wire::RouteReverse::Allowed => Reverse::Allowed,
-            wire::RouteReverse::Never => Reverse::Never,
-        },
+        cost: cost(least),
+        reverse: reverse(backwards),
         avoid_places: places.collect::<Result<_, _>>()?,
         avoid_regions: boxes.collect::<Result<_, _>>()?,
-        shortcuts_within_m: query.shortcuts.then_some(radius_m),
-        alternatives: query.alternatives as usize,
+        ..RouteOptions::default()
     })
 }
 
+/// What is to be least.
+pub(super) fn cost(cost: wire::RouteCost) -> RouteCost {
+    match cost {
+        wire::RouteCost::Length => RouteCost::Length,
+        wire::RouteCost::Time => RouteCost::Time,
+        wire::RouteCost::Uncertainty => RouteCost::Uncertainty,
+        wire::RouteCost::Recency => RouteCost::Recency,
+    }
+}
+
+/// Whether ways may be taken backwards.
+pub(super) fn reverse(reverse: wire::RouteReverse) -> Reverse {
+    match reverse {
+        wire::RouteReverse::Allowed => Reverse::Allowed,
+        wire::RouteReverse::Never => Reverse::Never,
+    }
+}
+
+/// A trip that is to be travelled again.
+pub(super) fn retrace(of: &wire::RouteRetrace) -> Result<Retrace, InvalidRoute> {
+    let trip = u32::try_from(of.trip).map_err(|_| unknown("trip", &of.trip))?;
+    Ok(Retrace {
+        trip: TripId(trip),
+        backward: of.direction == wire::RetraceDirection::Backward,
+    })
+}
+
+/// How far back.
+fn back(field: &'static str, back: &wire::RouteBack) -> Result<Back, InvalidRoute> {
+    let (quantity, back) = match (back.s, back.m) {
+        (Some(seconds), None) => (seconds, Back::Seconds(seconds)),
+        (None, Some(metres)) => (metres, Back::Metres(metres)),
+        _ => return Err(InvalidRoute::WhichBack(field)),
+    };
+    if (0.0..=BACK_MAX).contains(&quantity) {
+        return Ok(back);
+    }
+    let rule = format!("0 to {BACK_MAX:e}, not {quantity}");
+    Err(InvalidRoute::Number("back", rule))
+}
+
 /// An end of a route; `field` is its name.
-fn end(
+pub(super) fn end(
     map: &CognitiveMap,
     field: &'static str,
     end: &wire::RouteEnd,
@@ -197,12 +287,26 @@ fn end(
             let home = map.route_end_home(agent(map, name)?);
             (home, "home of the agent", format!("{name:?}"))
         }
+        wire::RouteEnd::Back(of) => {
+            let agent = agent(map, &of.agent)?;
+            let end = map.route_end_back(agent, back(field, of)?);
+            (end, "way of the agent", format!("{:?}", of.agent))
+        }
+        wire::RouteEnd::Retrace(of) => {
+            let end = map.route_end_of_retrace(&retrace(of)?);
+            (end, "trip", of.trip.to_string())
+        }
         wire::RouteEnd::Percept(percept) => {
             let place = recalled(map, percept)?;
             (map.route_end_at(place), "place", place.0.to_string())
         }
     };
-    found.map_err(|error| match error {
+    found.map_err(|error| no_end(field, error, what, &name))
+}
+
+/// Why a route cannot begin or end somewhere.
+fn no_end(field: &'static str, error: NoRouteEnd, what: &str, name: &str) -> InvalidRoute {
+    match error {
         NoRouteEnd::Unknown => unknown(what, &name),
         NoRouteEnd::Forgotten => {
             InvalidRoute::Forgotten(format!("{field}: the {what} {name} has been forgotten"))
@@ -211,10 +315,10 @@ fn end(
             nearest: Some((place, distance_m)),
         } => InvalidRoute::NothingNear(field, place.0, distance_m),
         NoRouteEnd::NothingNear { nearest: None } => InvalidRoute::NoPlaces,
-    })
+    }
 }
 
-fn unknown(what: &str, name: &impl std::fmt::Display) -> InvalidRoute {
+pub(super) fn unknown(what: &str, name: &impl std::fmt::Display) -> InvalidRoute {
     InvalidRoute::UnknownMemory(format!("the space has no {what} {name}"))
 }
 

@@ -5,6 +5,7 @@ use cognitive_map::{
     ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, Label, SkipReason,
 };
 
+use super::guidance::route_event;
 use super::surprise::is_surprising;
 use super::trip::trip_end;
 
@@ -93,6 +94,10 @@ fn event_kind(map: &CognitiveMap, kind: &EventKind) -> Option<wire::EventKind> {
         | EventKind::ObjectNotLearned { .. }
         | EventKind::ObjectsMerged { .. }
         | EventKind::ObjectSplit { .. } => object_event(kind)?,
+        EventKind::RouteProgress { .. }
+        | EventKind::RouteLeft(_)
+        | EventKind::RouteDone
+        | EventKind::RouteFailed { .. } => route_event(map, kind)?,
         EventKind::MarkerPassed { label } => wire::EventKind::MarkerPassed {
             label: label.as_str().to_owned(),
         },

@@ -49,7 +49,7 @@ fn route(map: &CognitiveMap, route: &Route, spacing_m: Option<f64>) -> wire::Rou
     }
 }
 
-fn step(map: &CognitiveMap, step: &RouteStep) -> wire::RouteStep {
+pub(super) fn step(map: &CognitiveMap, step: &RouteStep) -> wire::RouteStep {
     let leg = step.leg.filter(|(trip, _)| map.trip(*trip).is_some());
     wire::RouteStep {
         place: step.place.map(|place| place.0.into()),

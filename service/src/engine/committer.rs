@@ -13,7 +13,7 @@ use cogmap_proto::IngestAnswer;
 use super::agent_view::AgentView;
 use super::counters::CommitCounters;
 use super::health::Health;
-use super::message::{ChangeReply, IngestError, Reply};
+use super::message::{Change, IngestError, Reply};
 use super::publisher::Publisher;
 use crate::store::Store;
 
@@ -24,8 +24,8 @@ pub(crate) struct Commit {
     pub(crate) samples: u64,
     pub(crate) marks: Vec<Mark>,
     pub(crate) answers: Vec<Answer>,
-    /// Those who wait for a change of objects or agents.
-    pub(crate) changes: Vec<ChangeReply>,
+    /// Those who wait for a change that is no sample.
+    pub(crate) changes: Vec<Change>,
 }
 
 /// Samples of an agent's session below `next` are in the store.
@@ -122,8 +122,8 @@ fn acknowledge(commit: Commit, publisher: &dyn Publisher, counters: &CommitCount
             duplicates,
         }));
     }
-    for reply in commit.changes {
-        let _ = reply.send(Ok(()));
+    for change in commit.changes {
+        change.answer(Ok(()));
     }
 }
 
@@ -132,7 +132,7 @@ fn refuse(commit: Commit, health: &Health) {
         let refusal = health.refusal().unwrap_or(IngestError::Closed);
         let _ = answer.reply.send(Err(refusal));
     }
-    for reply in commit.changes {
-        let _ = reply.send(Err(health.refusal().unwrap_or(IngestError::Closed)));
+    for change in commit.changes {
+        change.answer(Err(health.refusal().unwrap_or(IngestError::Closed)));
     }
 }

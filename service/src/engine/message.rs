@@ -1,7 +1,7 @@
 //! Samples that someone waits for, and what the waiting can end with.
 
 use cogmap_proto::{IngestAnswer, ObjectLesson, Sample, SampleBatch, SampleBody, Target};
-use cognitive_map::{Label, Lesson};
+use cognitive_map::{Instruction, Label, Lesson};
 use tokio::sync::oneshot;
 
 use super::sequencer::Weight;
@@ -30,8 +30,46 @@ pub(crate) struct RemovalRequest {
     pub(crate) reply: ChangeReply,
 }
 
+/// An instruction, for whose durability someone waits.
+#[derive(Debug)]
+pub(crate) struct InstructionRequest {
+    pub(crate) instruction: Instruction,
+    pub(crate) reply: oneshot::Sender<Result<u64, IngestError>>,
+}
+
+impl InstructionRequest {
+    /// Memory that it takes beside itself \[bytes\].
+    pub(crate) fn bytes(&self) -> usize {
+        match &self.instruction {
+            Instruction::Follow(_, errand) => {
+                size_of_val(&errand.avoid_places[..]) + size_of_val(&errand.avoid_regions[..])
+            }
+            _ => 0,
+        }
+    }
+}
+
 /// Whoever waits for a change that is no sample to be durable.
 pub(crate) type ChangeReply = oneshot::Sender<Result<(), IngestError>>;
+
+/// A change that is no sample, for whose durability someone waits.
+#[derive(Debug)]
+pub(crate) enum Change {
+    /// One of objects or agents.
+    Made(ChangeReply),
+    /// An instruction of this number.
+    Instructed(oneshot::Sender<Result<u64, IngestError>>, u64),
+}
+
+impl Change {
+    /// Answers that it is durable, or why it is not. Whoever asked may have gone.
+    pub(crate) fn answer(self, made: Result<(), IngestError>) {
+        match self {
+            Self::Made(reply) => drop(reply.send(made)),
+            Self::Instructed(reply, number) => drop(reply.send(made.map(|()| number))),
+        }
+    }
+}
 
 /// What someone waits for.
 #[derive(Debug)]
@@ -39,6 +77,7 @@ pub(crate) enum Call {
     Samples(Request),
     Object(ObjectRequest),
     Removal(RemovalRequest),
+    Instruction(InstructionRequest),
 }
 
 /// Whoever waits for samples to be durable.

@@ -1,5 +1,6 @@
 //! A space, as everyone but its writer sees it.
 
+mod instructions;
 mod live;
 mod loading;
 mod questions;

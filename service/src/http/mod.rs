@@ -6,6 +6,7 @@
 mod activity;
 mod agent_at;
 mod agents;
+mod blockages;
 mod channels;
 mod cloud;
 mod compression;
@@ -17,6 +18,7 @@ mod events;
 mod examples;
 mod export;
 mod extract;
+mod following;
 mod guard;
 mod health;
 mod held;
@@ -31,6 +33,7 @@ mod long;
 mod objects;
 mod openapi;
 mod page;
+mod pins;
 mod places;
 mod predict;
 mod problem;
@@ -97,12 +100,16 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(localize::post))
         .routes(routes!(route::post))
         .routes(routes!(sequence::post))
+        .routes(routes!(blockages::list, blockages::post))
+        .routes(routes!(blockages::delete))
+        .routes(routes!(following::get, following::put, following::delete))
         .routes(routes!(predict::post))
         .routes(routes!(places::list))
         .routes(routes!(places::get))
         .routes(routes!(trips::list))
         .routes(routes!(trips::get))
         .routes(routes!(channels::list))
+        .routes(routes!(pins::put, pins::delete))
         .routes(routes!(landmarks::list))
         .routes(routes!(landmarks::get))
         .routes(routes!(objects::list))

@@ -39,7 +39,8 @@ const OF_AGENT: [(&str, &str); 1] = [("410", "The agent has been removed")];
 const CHANGING: [(&str, &str); 1] = [("403", "The request comes from a page of another host")];
 
 /// Lengths of arrays, by the names of the fields that hold them.
-const LENGTHS: [(&str, usize); 24] = [
+const LENGTHS: [(&str, usize); 25] = [
+    ("at_m", 3),
     ("translation_m", 3),
     ("rotation_xyzw", 4),
     ("translation_sd_m", 3),
@@ -243,6 +244,11 @@ fn constrain_route(schemas: &mut Value) {
     let radius = json!({ "minimum": 0.01, "maximum": 1.0 });
     merge(&mut query["body_radius_m"], &radius);
     merge(&mut query["alternatives"], &json!({ "maximum": 4 }));
+    let blockage = &mut schemas["BlockageRequest"]["properties"];
+    let radius = json!({ "minimum": 0.01, "maximum": 1000.0 });
+    merge(&mut blockage["radius_m"], &radius);
+    let metres = json!({ "minimum": -METRES_MAX, "maximum": METRES_MAX });
+    merge(&mut blockage["at_m"]["items"], &metres);
     let avoid = &mut schemas["RouteAvoid"]["properties"];
     merge(&mut avoid["places"], &json!({ "maxItems": 1000 }));
     merge(&mut avoid["boxes"], &json!({ "maxItems": 64 }));

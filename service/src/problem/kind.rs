@@ -46,6 +46,10 @@ pub enum Kind {
     AgentLost,
     /// No way leads from the start of a route to its goal.
     NoWay,
+    /// The space has its full number of blockages.
+    TooManyBlockages,
+    /// Pinned trips would take more than half the budget of legs.
+    TooManyPins,
     /// The body is too long.
     BodyTooLong,
     /// The codec that the message names is not one that is read here.
@@ -84,7 +88,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, by status.
-    pub const ALL: [Self; 38] = [
+    pub const ALL: [Self; 40] = [
         Self::InvalidPath,
         Self::InvalidParameter,
         Self::MalformedBody,
@@ -104,6 +108,8 @@ impl Kind {
         Self::NotPlaced,
         Self::AgentLost,
         Self::NoWay,
+        Self::TooManyBlockages,
+        Self::TooManyPins,
         Self::RemovedAgent,
         Self::ForgottenMemory,
         Self::BodyTooLong,
@@ -147,6 +153,8 @@ impl Kind {
             Self::NotPlaced => ("not-placed", 409, "The agent is lost"),
             Self::AgentLost => ("agent-lost", 409, "The agent's position is not known"),
             Self::NoWay => ("no-way", 409, "No way leads there"),
+            Self::TooManyBlockages => ("too-many-blockages", 409, "Too many blockages"),
+            Self::TooManyPins => ("too-many-pins", 409, "Too many pinned trips"),
             Self::RemovedAgent => ("removed-agent", 410, "Removed agent"),
             Self::ForgottenMemory => ("forgotten-memory", 410, "Forgotten memory"),
             Self::BodyTooLong => ("body-too-long", 413, "Body too long"),

@@ -161,15 +161,19 @@ impl From<InvalidRoute> for Problem {
     fn from(error: InvalidRoute) -> Self {
         let kind = match error {
             InvalidRoute::Query(error) => return error.into(),
-            InvalidRoute::UnknownMemory(_) => Kind::UnknownMemory,
+            InvalidRoute::UnknownMemory(_) | InvalidRoute::FollowsNone(_) => Kind::UnknownMemory,
             InvalidRoute::Forgotten(_) => Kind::ForgottenMemory,
             InvalidRoute::AgentLost(_) => Kind::AgentLost,
             InvalidRoute::NothingNear(..) | InvalidRoute::NoPlaces => Kind::NothingNear,
             InvalidRoute::NoWay(..) => Kind::NoWay,
+            InvalidRoute::TooManyBlockages(_) => Kind::TooManyBlockages,
             InvalidRoute::GivenUp => Kind::Timeout,
             InvalidRoute::Number(..)
             | InvalidRoute::Box(_)
             | InvalidRoute::TooMany(..)
+            | InvalidRoute::WhichBack(_)
+            | InvalidRoute::RetraceFrom
+            | InvalidRoute::WhichBlockage
             | InvalidRoute::LongPath(_) => Kind::InvalidQuery,
         };
         Self::new(kind, error.to_string())

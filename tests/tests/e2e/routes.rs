@@ -2,12 +2,16 @@
 //! restart.
 
 use std::collections::BTreeMap;
+use std::sync::mpsc::channel;
 
+use cogmap_client::{Api, ApiError};
 use cogmap_proto::{
-    Codec, Increment, Problem, RouteAnswer, RouteAvoid, RouteCost, RouteEnd, RouteFormat,
-    RouteQuery, RouteReverse, Sample, SampleBody, query_key,
+    BlockageRequest, Codec, Event, EventKind, FollowRequest, Increment, Problem, RouteAnswer,
+    RouteAvoid, RouteBack, RouteCost, RouteEnd, RouteFormat, RouteQuery, RouteReverse, Sample,
+    SampleBody, events_key, query_key,
 };
-use cogmap_tests::{RawPublisher, Server, batch};
+use cogmap_tests::{LONG, RawPublisher, Server, batch};
+use zenoh::Wait;
 
 const AGENT: &str = "ada";
 
@@ -112,4 +116,151 @@ fn a_route_is_the_shortest_of_the_exported_ways_on_every_door_and_after_a_restar
     for (query, answer) in answers {
         assert_eq!(server.api().route("default", &query).unwrap(), answer);
     }
+}
+
+#[test]
+fn a_followed_route_and_its_blockages_outlive_a_restart_and_are_told_on_every_door() {
+    let mut server = Server::start(&[]);
+    let api = server.api();
+    let samples = round_the_block();
+    let last_ns = samples.last().unwrap().stamp_ns;
+    api.post_samples("default", AGENT, &batch(1, 0, samples.clone()))
+        .unwrap();
+    let events = RawPublisher::connect(&server.endpoint());
+    let (note, told) = channel();
+    events
+        .session()
+        .declare_subscriber(events_key("default"))
+        .callback(move |sample| {
+            let event: Event = Codec::Cbor.decode(&sample.payload().to_bytes()).unwrap();
+            // The test may have heard enough.
+            let _ = note.send(event);
+        })
+        .background()
+        .wait()
+        .unwrap();
+    let request = FollowRequest {
+        to: RouteEnd::Place(9),
+        cost: RouteCost::Length,
+        reverse: RouteReverse::Allowed,
+        avoid: RouteAvoid::default(),
+    };
+    let route = api.follow_route("default", AGENT, &request).unwrap();
+    assert!(route.steps.len() > 3 && route.steps_done == 0);
+    let ahead = route.steps[1].place;
+    let place = BlockageRequest {
+        place: ahead,
+        ..BlockageRequest::default()
+    };
+    let blockage = api.block("default", &place).unwrap();
+    let other = api.followed_route("default", AGENT).unwrap();
+    assert!(other.steps.iter().all(|step| step.place != ahead));
+    let is_new_route = |event: &Event| {
+        matches!(&event.kind, EventKind::RouteLeft { blockage: Some(id), steps, .. }
+            if *id == blockage.id && !steps.is_empty())
+    };
+    while !is_new_route(&told.recv_timeout(LONG).expect("the new route is told")) {}
+    let page = server.http().get("/v1/spaces/default/events?format=json");
+    let page = page.json(200);
+    let kinds = page["events"].as_array().unwrap().iter();
+    assert!(
+        kinds
+            .clone()
+            .any(|one| one["event"]["kind"].get("route_left").is_some())
+    );
+
+    server.kill();
+    server.run();
+    let api = server.api();
+    assert_eq!(api.followed_route("default", AGENT).unwrap(), other);
+    assert_eq!(
+        api.blockages("default").unwrap(),
+        std::slice::from_ref(&blockage)
+    );
+    api.unblock("default", blockage.id).unwrap();
+    assert_eq!(api.blockages("default").unwrap(), []);
+    let still = Increment {
+        translation_m: [0.0; 3],
+        rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+        noise: None,
+    };
+    let sample = Sample {
+        stamp_ns: last_ns + 1,
+        body: SampleBody::Increment(still),
+    };
+    api.post_samples("default", AGENT, &batch(2, 0, vec![sample]))
+        .unwrap();
+    let over = api.followed_route("default", AGENT).unwrap_err();
+    assert!(over.to_string().contains("follows no route"), "{over}");
+}
+
+#[test]
+fn instructions_that_make_no_sense_are_refused() {
+    let server = Server::start(&[]);
+    let api = server.api();
+    api.post_samples("default", AGENT, &batch(1, 0, round_the_block()))
+        .unwrap();
+    let refused = |result: Result<(), ApiError>| match result {
+        Err(ApiError::Problem(problem)) => (problem.status, problem.kind),
+        other => panic!("{other:?}"),
+    };
+    let block = |request: &BlockageRequest| refused(api.block("default", request).map(drop));
+    let none = BlockageRequest::default();
+    let (unknown, invalid) = ("/problems/unknown-memory", "/problems/invalid-query");
+    assert_eq!(block(&none), (422, invalid.to_owned()));
+    let place = |place| BlockageRequest {
+        place: Some(place),
+        ..none.clone()
+    };
+    assert_eq!(block(&place(9_999)), (404, unknown.to_owned()));
+    for radius_m in [None, Some(-1.0), Some(1e9)] {
+        let ball = BlockageRequest {
+            at_m: Some([0.0; 3]),
+            radius_m,
+            ..none.clone()
+        };
+        assert_eq!(block(&ball), (422, invalid.to_owned()), "{radius_m:?}");
+    }
+    assert_eq!(
+        refused(api.unblock("default", 7)),
+        (404, unknown.to_owned())
+    );
+    let follow = |api: &Api, to: RouteEnd| {
+        let request = FollowRequest {
+            to,
+            cost: RouteCost::Length,
+            reverse: RouteReverse::Allowed,
+            avoid: RouteAvoid::default(),
+        };
+        refused(api.follow_route("default", AGENT, &request).map(drop))
+    };
+    let back = RouteBack {
+        agent: AGENT.to_owned(),
+        s: Some(1.0),
+        m: Some(1.0),
+    };
+    for (to, expected) in [
+        (RouteEnd::Place(9_999), (404, unknown)),
+        (
+            RouteEnd::PositionM([1e6; 3]),
+            (422, "/problems/nothing-near"),
+        ),
+        (RouteEnd::Back(back), (422, invalid)),
+        (
+            RouteEnd::Home("nobody".to_owned()),
+            (404, "/problems/unknown-agent"),
+        ),
+    ] {
+        assert_eq!(follow(&api, to), (expected.0, expected.1.to_owned()));
+    }
+    assert_eq!(
+        refused(api.followed_route("default", AGENT).map(drop)),
+        (404, unknown.to_owned())
+    );
+    assert_eq!(
+        refused(api.pin_trip("default", 9_999)),
+        (404, unknown.to_owned())
+    );
+    api.pin_trip("default", 0).unwrap();
+    api.unpin_trip("default", 0).unwrap();
 }

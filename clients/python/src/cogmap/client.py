@@ -25,6 +25,7 @@ from .answer import (
 from .channel import Channel, ChannelList
 from .errors import ApiError, InvalidValue
 from .event import Event, EventPage, EventRecord, MissedEvents
+from .guidance_client import GuidanceClient
 from .http_service import Query
 from .landmark import Landmark, LandmarkPage
 from .live import LaggedTicks, LiveTick
@@ -53,7 +54,7 @@ from .wire import CBOR, JSON, decode, encode, to_wire
 _log = logging.getLogger("cogmap")
 
 
-class Client(Questions):
+class Client(Questions, GuidanceClient):
     """Asks a cogmap service over HTTP.
 
     Holds no connection between calls, so it may be shared by threads. Lists that the service

@@ -7,6 +7,8 @@ from enum import Enum
 from typing import Any, ClassVar, Dict, Optional, Tuple, Union
 
 from .answer import SkipReason, TripEnd
+from .guidance import RouteFailure
+from .route import RouteStep
 from .vector import Vec3
 
 
@@ -233,6 +235,53 @@ class ObjectSplit:
 
 
 @dataclass(frozen=True)
+class RouteProgress:
+    """The agent came to a step of the route that it follows."""
+
+    TAG: ClassVar[str] = "route_progress"
+    #: The place there; none beside the places.
+    place: Optional[int]
+    #: Number of steps that are left.
+    steps_left: int
+    #: Length that is left [m].
+    left_m: float
+
+
+@dataclass(frozen=True)
+class RouteLeft:
+    """The agent was off its route, or a blockage came onto it: it follows another one from here."""
+
+    TAG: ClassVar[str] = "route_left"
+    #: How far off it was [m]; none where it was on the route.
+    off_m: Optional[float]
+    #: The blockage that came onto the route, if one did.
+    blockage: Optional[int]
+    #: Length of the new route [m].
+    length_m: float
+    #: Number of its steps.
+    steps_left: int
+    #: The first 64 of them.
+    steps: Tuple[RouteStep, ...]
+
+
+@dataclass(frozen=True)
+class RouteDone:
+    """The agent has arrived where its route leads."""
+
+    TAG: ClassVar[str] = "route_done"
+
+
+@dataclass(frozen=True)
+class RouteFailed:
+    """The agent follows no route any more, without having arrived."""
+
+    TAG: ClassVar[str] = "route_failed"
+    reason: RouteFailure
+    #: The blockages on the way that there would be.
+    blockages: Tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class UnknownKind:
     """Something that this version of the package has no word for."""
 
@@ -264,6 +313,10 @@ EventKind = Union[
     ObjectNotLearned,
     ObjectsMerged,
     ObjectSplit,
+    RouteProgress,
+    RouteLeft,
+    RouteDone,
+    RouteFailed,
     UnknownKind,
 ]
 

@@ -99,8 +99,48 @@ class AtPercept:
         one_of("percept", self.percept, get_args(PerceptCue))
 
 
+@dataclass(frozen=True)
+class AtBack:
+    """Where an agent was in this session so long ago, `s` [s], or so far back along its path, `m`
+    [m]: one of the two."""
+
+    TAG: ClassVar[str] = "back"
+    agent: str
+    s: Optional[float] = None
+    m: Optional[float] = None
+
+    def __post_init__(self) -> None:
+        check_name("agent", self.agent)
+        for name in ("s", "m"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, number(name, getattr(self, name)))
+
+
+class RetraceDirection(str, Enum):
+    """In which direction a trip is travelled again."""
+
+    #: To where it ended.
+    FORWARD = "forward"
+    #: To where it began.
+    BACKWARD = "backward"
+
+
+@dataclass(frozen=True)
+class Retrace:
+    """The end of a trip, by its own legs from the point on it that is nearest; only as a goal."""
+
+    TAG: ClassVar[str] = "retrace"
+    trip: int
+    direction: RetraceDirection = RetraceDirection.FORWARD
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "trip", whole("trip", self.trip, COUNT_RANGE))
+
+
 #: Where a route begins or ends.
-RouteEnd = Union[AtPlace, AtPosition, AtAgent, AtLandmark, AtTrip, AtHome, AtPercept]
+RouteEnd = Union[
+    AtPlace, AtPosition, AtAgent, AtLandmark, AtTrip, AtHome, AtPercept, AtBack, Retrace
+]
 
 
 class RouteCost(str, Enum):

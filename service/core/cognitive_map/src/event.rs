@@ -4,10 +4,12 @@ use nalgebra::Point3;
 
 use crate::input::Label;
 use crate::input::{AgentId, SkipReason};
+use crate::memory::blockage::BlockageId;
 use crate::memory::landmark::LandmarkId;
 use crate::memory::percept::ChannelId;
 use crate::memory::place::PlaceId;
 use crate::memory::trip::{TripEnd, TripId};
+use crate::route::Route;
 use object_recognition::{ObjectId, Posterior};
 
 /// One event.
@@ -180,9 +182,53 @@ pub enum EventKind {
         /// least; for a descriptor one minus the cosine, 0 to 2.
         surprise: f64,
     },
+    /// The agent came to a step of the route that it follows.
+    RouteProgress {
+        /// The place there; `None` beside the places.
+        place: Option<PlaceId>,
+        /// Number of steps that are left.
+        steps_left: usize,
+        /// Length of the way that is left \[m\].
+        rest_m: f64,
+    },
+    /// The route that the agent follows leads nowhere from where it is now; it follows another one.
+    RouteLeft(Box<RouteLeft>),
+    /// The agent has arrived where its route leads.
+    RouteDone,
+    /// The agent follows no route any more, without having arrived.
+    RouteFailed {
+        /// Why.
+        failure: RouteFailure,
+    },
     /// The agent was removed: by that name the space knows nobody any more.
     AgentRemoved {
         /// Its name.
         name: Label,
     },
+}
+
+/// Why an agent follows another route than before, and which.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RouteLeft {
+    /// How far off the route it was \[m\]; `None` where it was on it.
+    pub off_m: Option<f64>,
+    /// The blockage that came onto it; `None` where none did.
+    pub blockage: Option<BlockageId>,
+    /// The route that it follows from here on.
+    pub route: Route,
+}
+
+/// Why an agent follows no route any more.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RouteFailure {
+    /// No way leads there any more; the blockages on that which would.
+    NoWay(Vec<BlockageId>),
+    /// The goal has been forgotten.
+    GoalForgotten,
+    /// No place is near the agent.
+    NothingNear,
+    /// It is not known where the agent is.
+    AgentLost,
+    /// The agent has begun another session.
+    SessionEnded,
 }

@@ -6,6 +6,7 @@ pub mod keyframes;
 mod agent;
 mod event;
 mod fold;
+mod guidance;
 mod input;
 mod label_index;
 mod memory;
@@ -13,17 +14,18 @@ mod route;
 mod settings;
 
 pub use agent::{Agent, Status};
-pub use event::{Event, EventKind};
+pub use event::{Event, EventKind, RouteFailure, RouteLeft};
 pub use fold::{
     CheckpointPage, CognitiveMap, CorruptCheckpoint, Localization, Predicted, Prediction,
 };
 pub use input::{
-    AgentId, Descriptor, InvalidSample, Label, Lesson, Level, Marker, Motion, NoisyPose,
-    ObjectMark, PoseNoise, Range, RangeBearing, Record, Relation, RelativePose, RelativePosition,
-    Sample, SampleBody, Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel,
-    TouchNoise,
+    AgentId, Descriptor, Errand, Goal, Instruction, InvalidSample, Label, Lesson, Level, Marker,
+    Motion, NoisyPose, ObjectMark, PoseNoise, Range, RangeBearing, Record, Relation, RelativePose,
+    RelativePosition, Retrace, Sample, SampleBody, Sighting, SkipReason, Spacing, StartPose,
+    Target, Touch, TouchLevel, TouchNoise,
 };
 pub use keyframes::{Guess, LearnedChannel, RelaxationJob, ViewChannel};
+pub use memory::blockage::{BLOCKAGES_MAX, Ball, Blockage, BlockageId, Blocked};
 pub use memory::landmark::{Landmark, LandmarkId};
 pub use memory::object::{Identified, KnownObject};
 pub use memory::percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
@@ -35,8 +37,8 @@ pub use memory::sequence::{
 pub use memory::trip::{Leg, Trip, TripEnd, TripId};
 pub use memory::way::{Traversals, Way, Waypoint};
 pub use route::{
-    NoRoute, NoRouteEnd, Region, Reverse, Route, RouteBounds, RouteCost, RouteEnd, RouteOptions,
-    RouteStep, StepKind, ThinnedTraversal, ThinnedWay,
+    Back, Following, NoRoute, NoRouteEnd, Region, Reverse, Route, RouteBounds, RouteCost, RouteEnd,
+    RouteOptions, RouteStep, StepKind, ThinnedTraversal, ThinnedWay,
 };
 pub use settings::{Bound, InvalidSettings, Recruitment, SettingNumber, Settings, SettingsValues};
 pub use state::{Digest, InvalidDigest};

@@ -122,7 +122,7 @@ impl Queue {
         let agent = match &call {
             Call::Samples(request) => &*request.agent,
             // A removal does not wait behind what the agent itself has sent.
-            Call::Object(_) | Call::Removal(_) => "",
+            Call::Object(_) | Call::Removal(_) | Call::Instruction(_) => "",
         };
         let (mut waiting, lane) = self.0.room_for(agent, bytes)?;
         waiting.lanes.push_call(lane, call, bytes);
@@ -281,6 +281,7 @@ fn size_of_call(call: &Call) -> usize {
             name.as_str().len() + 2 * contacts.map(size_of_contact).sum::<usize>()
         }
         Call::Removal(request) => request.agent.len(),
+        Call::Instruction(request) => request.bytes(),
     }
 }
 

@@ -9,7 +9,8 @@
 //! - Agents keep their numbers. One whose enrolment is lost is enrolled again where the hole was,
 //!   under its name if the checkpoint knows it, else under a placeholder.
 //! - A number that was enrolled again although its removal is lost is removed first.
-//! - Lessons about objects are numbered anew, for the numbers count those before.
+//! - Lessons about objects and instructions are numbered anew, for the numbers count those before;
+//!   blockages keep theirs.
 
 #[cfg(test)]
 mod tests;
@@ -17,12 +18,12 @@ mod tests;
 use std::borrow::Cow;
 use std::path::PathBuf;
 
-use cogmap_proto::{SkipReason, SpaceSettings};
+use cogmap_proto::{ObjectLesson, SkipReason, SpaceSettings};
 use cognitive_map::CognitiveMap;
 use serde::Serialize;
 
 use crate::decode::core_settings;
-use crate::journal::{BlockWriter, CorruptBlock, Entry, entries};
+use crate::journal::{BlockWriter, CorruptBlock, Entry, JournaledInstruction, entries};
 use crate::store::{
     Damage, Derived, Flaw, LocalJournal, LocalStore, Replacement, StoreError, StoredSpace,
 };
@@ -109,6 +110,7 @@ pub fn repair(store: &LocalStore, space: &StoredSpace) -> Result<Option<RepairRe
         checkpoint: agents_of_checkpoint(store, space),
         agents: Vec::new(),
         lessons: 0,
+        instructions: 0,
         holes: false,
         blocks_kept: 0,
         samples_kept: 0,
@@ -185,6 +187,8 @@ struct Repair<'a> {
     agents: Vec<KnownAgent>,
     /// Lessons in the new journal.
     lessons: u64,
+    /// Instructions in it.
+    instructions: u64,
     /// Whether a hole has been met.
     holes: bool,
     blocks_kept: u64,
@@ -327,12 +331,14 @@ impl Repair<'_> {
                 lesson,
             } => {
                 fits = number == self.lessons;
-                let number = self.next_lesson();
-                Entry::Teach {
-                    number,
-                    name,
-                    lesson,
-                }
+                self.next_teaching(name, lesson)
+            }
+            Entry::Instruct {
+                number,
+                instruction,
+            } => {
+                fits = number == self.instructions;
+                self.next_instruction(instruction)
             }
             Entry::Remove { agent } => {
                 self.enrol_to(agent.saturating_add(1), before);
@@ -362,6 +368,24 @@ impl Repair<'_> {
                 known.enrol_again(name);
             }
             None => self.agents.push(KnownAgent::named(agent, name)),
+        }
+    }
+
+    fn next_teaching(&mut self, name: Cow<'static, str>, lesson: ObjectLesson) -> Entry<'static> {
+        let number = self.next_lesson();
+        Entry::Teach {
+            number,
+            name,
+            lesson,
+        }
+    }
+
+    fn next_instruction(&mut self, instruction: JournaledInstruction) -> Entry<'static> {
+        let number = self.instructions;
+        self.instructions += 1;
+        Entry::Instruct {
+            number,
+            instruction,
         }
     }
 

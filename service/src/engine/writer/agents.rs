@@ -10,7 +10,7 @@ use super::{AgentSlot, Writer};
 use crate::engine::agent_view::AgentView;
 use crate::engine::counters::Drop;
 use crate::engine::episodes::EndedEpisodes;
-use crate::engine::message::{IngestError, RemovalRequest};
+use crate::engine::message::{Change, IngestError, RemovalRequest};
 use crate::engine::sequencer::{Sequencer, Window};
 use crate::engine::shared::Shared;
 use crate::engine::trajectory::Recorder;
@@ -131,7 +131,7 @@ impl Writer {
         match refusal.map_or(found, Err) {
             Ok(slot) => {
                 self.remove(slot);
-                self.changes.push(reply);
+                self.changes.push(Change::Made(reply));
             }
             Err(refusal) => {
                 // Whoever asked may have gone.

@@ -5,6 +5,7 @@
 //! round; the committer makes the block durable beside the next one.
 
 mod agents;
+mod instructions;
 mod journal;
 mod objects;
 mod pace;
@@ -27,7 +28,7 @@ use super::checkpointer::{Beside, Checkpointer};
 use super::committer::{Answer, Commit};
 use super::counters::SpaceCounters;
 use super::episodes::EndedEpisodes;
-use super::message::{Call, ChangeReply};
+use super::message::{Call, Change};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
 use super::relaxers::Handover;
@@ -70,6 +71,8 @@ pub(crate) struct Writer {
     interval_ns: i64,
     /// Number of the next lesson about an object, or wish to forget one.
     next_lesson: u64,
+    /// Number of the next instruction.
+    next_instruction: u64,
     /// How many samples of all agents wait for earlier ones, and what they take.
     waiting: Window,
     pace: Pace,
@@ -78,7 +81,7 @@ pub(crate) struct Writer {
     block: BlockWriter,
     records: Vec<Record>,
     answers: Vec<Answer>,
-    changes: Vec<ChangeReply>,
+    changes: Vec<Change>,
     /// What the record under way brings about.
     events: Vec<Event>,
     /// What the round has brought about that is published.
@@ -120,7 +123,7 @@ impl Writer {
         } = recovered;
         let counters = SpaceCounters::new(&shared.name, &shared.live);
         let interval_ns = shared.interval_ns;
-        let next_lesson = map.lessons();
+        let (next_lesson, next_instruction) = (map.lessons(), map.instructions());
         let mut writer = Self {
             shared,
             commits,
@@ -135,6 +138,7 @@ impl Writer {
             next_block,
             interval_ns,
             next_lesson,
+            next_instruction,
             waiting: Window::NONE,
             pace: Pace::new(),
             block: BlockWriter::new(),
@@ -189,6 +193,9 @@ impl Writer {
                 Some(Message::Call(Call::Samples(request))) => self.receive_request(request, now),
                 Some(Message::Call(Call::Object(request))) => self.receive_object(request),
                 Some(Message::Call(Call::Removal(request))) => self.receive_removal(request),
+                Some(Message::Call(Call::Instruction(request))) => {
+                    self.receive_instruction(request);
+                }
                 None => break,
             }
             if self.pace.is_over(self.records.len(), now.elapsed()) {

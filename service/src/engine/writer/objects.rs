@@ -4,7 +4,7 @@ use cognitive_map::Record;
 
 use super::Writer;
 use crate::engine::counters::Drop;
-use crate::engine::message::ObjectRequest;
+use crate::engine::message::{Change, ObjectRequest};
 use crate::journal::Entry;
 
 impl Writer {
@@ -43,6 +43,6 @@ impl Writer {
             Record::ForgetObject { number, name }
         };
         self.records.push(record);
-        self.changes.push(reply);
+        self.changes.push(Change::Made(reply));
     }
 }

@@ -1,12 +1,14 @@
 //! The fold of one record: sessions, skips, samples, and the agent's place in the map.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{Point3, Vector6};
 
 use crate::agent::Agent;
 use crate::estimator::{Effect, Estimator};
 use crate::event::{Event, EventKind};
+use crate::guidance::Guidance;
 use crate::input::{AgentId, SkipReason};
 use crate::input::{Label, Marker, Sample, SampleBody, StartPose};
 use crate::keyframes::KeyframeMap;
@@ -33,6 +35,7 @@ pub(super) struct Fold<'a> {
     pub(super) landmarks: &'a mut LandmarkMap,
     pub(super) percepts: &'a mut PerceptMap,
     pub(super) objects: &'a mut ObjectMemory,
+    pub(super) guidance: &'a mut Arc<Guidance>,
     pub(super) estimator: &'a mut Estimator,
     /// What the latest call of the estimator brought about, until it is applied.
     pub(super) effects: Vec<Effect>,

@@ -18,6 +18,7 @@
 //! 40    0                         ways: vacancies, what was spared
 //! 41    page                      up to 16 ways
 //! 42    page                      up to 16 waypoints
+//! 43    0                         instructions: blockages, followed routes, pinned trips
 //! ```
 //!
 //! A page is a count (u16) and its items one after the other, little endian, floats as their bits.
@@ -49,8 +50,8 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// version 5 no searches, version 6 no other names of landmarks, version 7 none of what was joined
 /// into objects, version 8 no attachments and no kidnap tests, version 9 nobody removed or set
 /// aside, version 10 no relaxation under way, version 11 no noise of odometry and no searches by
-/// levels, version 12 no log of views, no ways and no distances alone, version 13 no veers and no
-/// stretches of logged views.
+/// levels, version 12 no log of views, no ways and no distances alone, version 13 no veers, no
+/// stretches of logged views and no instructions.
 const VERSION: u16 = 14;
 
 const HEADER: u8 = 0;
@@ -70,6 +71,7 @@ const OBJECT: u8 = 33;
 pub(super) const WAY_HEAD: u8 = 40;
 pub(super) const WAYS: u8 = 41;
 pub(super) const WAYPOINTS: u8 = 42;
+pub(super) const GUIDANCE: u8 = 43;
 
 /// One page of a checkpoint. A later page of the same kind and index replaces an earlier one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -147,6 +149,7 @@ impl CognitiveMap {
             .chain(self.way_head(since))
             .chain(ways.map(|(page, _, items)| of_items(WAYS, page, items)))
             .chain(waypoints.map(|(page, _, items)| of_items(WAYPOINTS, page, items)))
+            .chain(self.guidance_page(since))
     }
 
     /// The map of a checkpoint. It has the digest of the map that wrote it, and goes on like it.
@@ -179,6 +182,7 @@ impl CognitiveMap {
         let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
         map.places.skip_to(count(header.places));
         map.trips.skip_to(count(header.trips));
+        let guidance = pages.remove(&(GUIDANCE, 0));
         let ways = pages.split_off(&(WAY_HEAD, 0));
         map.restore_ways(ways)?;
         let objects = pages.split_off(&(OBJECTS, 0));
@@ -186,6 +190,7 @@ impl CognitiveMap {
         let keyframes = pages.split_off(&(KEYFRAMES, 0));
         map.restore_keyframes(keyframes)?;
         let trips = map.restore_memories(pages)?;
+        map.restore_guidance(guidance.as_deref())?;
         // A trip's page repeats the digests of its legs, which are read from their own pages.
         let again = map.trips.changed_pages(0);
         let again = again.map(|(page, items)| of_sparse(TRIPS, page, &items).bytes);

@@ -5,6 +5,7 @@ mod checkpoint;
 mod effects;
 mod enrolment;
 mod forgetting;
+mod guidance;
 mod header;
 mod levels;
 mod localization;
@@ -28,6 +29,7 @@ pub use prediction::{Predicted, Prediction};
 use crate::agent::Agent;
 use crate::estimator::{Estimator, Parameters};
 use crate::event::Event;
+use crate::guidance::Guidance;
 use crate::input::Label;
 use crate::input::{AgentId, Record, SkipReason};
 use crate::keyframes::{KeyframeMap, KeyframeSettings};
@@ -75,6 +77,8 @@ pub struct CognitiveMap {
     landmarks: LandmarkMap,
     percepts: PerceptMap,
     objects: ObjectMemory,
+    /// Blockages, and the routes that agents follow.
+    guidance: Arc<Guidance>,
 }
 
 impl CognitiveMap {
@@ -95,6 +99,7 @@ impl CognitiveMap {
             ways: WayMap::default(),
             landmarks: LandmarkMap::default(),
             percepts: PerceptMap::default(),
+            guidance: Arc::default(),
         }
     }
 
@@ -102,14 +107,22 @@ impl CognitiveMap {
     ///
     /// Every record is legal. One that says nothing new has no effect at all: the enrolment of an
     /// agent that is there (or is neither next in line nor vacant, or has another one's name), the
-    /// removal of one that is not, a lesson that is not next in line, a sample of an unknown or
-    /// removed agent, of an earlier session, or with a sequence number that has been applied or
-    /// skipped. A sample whose number is ahead first skips the missing ones as
-    /// [`SkipReason::Lost`]. Work and memory per sample are bounded, whatever the size of the map.
+    /// removal of one that is not, a lesson or an instruction that is not next in line, a sample of
+    /// an unknown or removed agent, of an earlier session, or with a sequence number that has been
+    /// applied or skipped. A sample whose number is ahead first skips the missing ones as
+    /// [`SkipReason::Lost`]. Work and memory per sample are bounded, whatever the size of the map;
+    /// one by which an agent leaves the route that it follows takes a search among the ways.
     pub fn apply(&mut self, record: &Record, events: &mut Vec<Event>) {
         match record {
             Record::Enrol { agent, name } => self.enrol(*agent, name, events),
-            Record::Remove { agent } => self.remove(*agent, events),
+            Record::Remove { agent } => {
+                self.remove(*agent, events);
+                self.stop_following(*agent);
+            }
+            Record::Instruct {
+                number,
+                instruction,
+            } => self.instruct(*number, instruction, events),
             Record::Sample {
                 agent,
                 session,
@@ -126,8 +139,10 @@ impl CognitiveMap {
                 fold.drop_forgotten();
                 fold.enter_session(*session, Some(sample.stamp_ns));
                 fold.skip(*seq, SkipReason::Lost);
+                fold.end_blockages_by(sample.stamp_ns);
                 fold.sample(*seq, sample);
                 fold.finish();
+                self.go_along(*agent, events);
             }
             Record::Skip {
                 agent,
@@ -206,6 +221,7 @@ impl CognitiveMap {
             names: &self.names,
             percepts: &mut self.percepts,
             objects: &mut self.objects,
+            guidance: &mut self.guidance,
             agent_id,
             held: agent.holds(),
             stamp_ns: agent.stamp_ns.unwrap_or(0),

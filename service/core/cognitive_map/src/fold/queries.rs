@@ -55,6 +55,9 @@ impl CognitiveMap {
         if !self.ways.is_untouched() {
             self.ways.write_digests(&mut out);
         }
+        if !self.guidance.is_untouched() {
+            self.write_guidance(&mut out);
+        }
         out.digest()
     }
 

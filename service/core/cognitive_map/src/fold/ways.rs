@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use state::{CorruptState, StateWriter};
 
 use super::apply::Fold;
@@ -25,6 +25,8 @@ impl Fold<'_> {
         let (Some(from), Some(to)) = (from, to) else {
             return;
         };
+        let positions = [&from, &to].map(|end| Point3::from(end.translation.vector));
+        self.end_blockages_between((leg.from(), &positions[0]), (leg.to(), &positions[1]));
         let end = to.inv_mul(self.agent.announced.in_map());
         let mut traversal = Traversal::of(leg, start, &end, self.stamp_ns);
         traversal.leg = recorded;

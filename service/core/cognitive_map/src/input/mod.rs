@@ -3,6 +3,8 @@
 //! Constructors refuse what could not have been sensed, so an invalid sample can't exist further
 //! in.
 
+mod agent_id;
+mod instruction;
 mod invalid;
 mod label;
 mod motion;
@@ -15,6 +17,8 @@ mod sample;
 mod sighting;
 mod touch;
 
+pub use agent_id::AgentId;
+pub use instruction::{Errand, Goal, Instruction, Retrace};
 pub use invalid::InvalidSample;
 pub use label::Label;
 pub use motion::{Motion, StartPose};
@@ -22,7 +26,7 @@ pub use noisy_pose::{NoisyPose, PoseNoise};
 pub use object_mark::{ObjectMark, Spacing, TouchNoise};
 pub use percept::{Descriptor, Level};
 pub use range::Range;
-pub use record::{AgentId, Record, SkipReason};
+pub use record::{Record, SkipReason};
 pub use sample::{Marker, Sample, SampleBody};
 pub use sighting::{RangeBearing, Relation, RelativePose, RelativePosition, Sighting, Target};
 pub use touch::{Lesson, Touch, TouchLevel};

@@ -1,12 +1,6 @@
 //! Records: the journal's entries, in the order in which the fold meets them.
 
-use super::{InvalidSample, Label, Lesson, Sample};
-use state::state_of_newtype;
-
-/// An agent of a space, counted from 0 in the order of enrolment. The number of a removed agent
-/// that was never in the map goes to a later one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct AgentId(pub u32);
+use super::{AgentId, Instruction, InvalidSample, Label, Lesson, Sample};
 
 /// One entry of the journal.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,6 +52,13 @@ pub enum Record {
         /// Its name.
         name: Label,
     },
+    /// Somebody said what routes are to heed.
+    Instruct {
+        /// Number of the space's instructions before it.
+        number: u64,
+        /// What was said.
+        instruction: Instruction,
+    },
     /// An agent is removed: its name is free, and what it did in the map stays.
     Remove {
         /// The agent.
@@ -75,5 +76,3 @@ pub enum SkipReason {
     /// It never came.
     Lost,
 }
-
-state_of_newtype!(AgentId);

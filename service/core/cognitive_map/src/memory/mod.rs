@@ -1,5 +1,6 @@
 //! Memory: what agents have learned of the world, apart from where they are.
 
+pub(crate) mod blockage;
 pub(crate) mod ids;
 pub(crate) mod landmark;
 pub(crate) mod object;

@@ -10,6 +10,7 @@ use super::search::Search;
 use super::shortcut::Corridor;
 use super::{NoRoute, Route, RouteBounds, RouteCost, RouteEnd, RouteOptions, tuning};
 use crate::fold::CognitiveMap;
+use crate::memory::blockage::BlockageId;
 
 /// A route that was found, with its cost.
 struct Found {
@@ -41,13 +42,7 @@ impl CognitiveMap {
         bounds: Option<&RouteBounds>,
         gives_up: &mut dyn FnMut() -> bool,
     ) -> Result<Vec<Route>, NoRoute> {
-        let mut costs = Costs {
-            ways: &self.ways,
-            options,
-            revision: self.revision(),
-            half_life: f64::from(self.settings().strength_half_life_samples),
-            penalties: BTreeMap::new(),
-        };
+        let mut costs = self.costs(options);
         if from.place == to.place {
             return Ok(vec![self.route_along(&Vec::new(), 0, from, to)]);
         }
@@ -68,6 +63,7 @@ impl CognitiveMap {
         question.find_others(&mut costs, &mut found, gives_up)?;
         if let Some(radius_m) = options.shortcuts_within_m {
             let mut corridor = Corridor::new(self, radius_m, &options.avoid_regions);
+            corridor.keep_clear_of(costs.blockages);
             for route in &mut found {
                 route.path = corridor.shorten(&route.path, gives_up);
                 if options.cost == RouteCost::Length {
@@ -79,8 +75,65 @@ impl CognitiveMap {
         Ok(routes.collect())
     }
 
+    /// What ways cost, as the options have it.
+    pub(super) fn costs<'a>(&'a self, options: &'a RouteOptions) -> Costs<'a> {
+        Costs {
+            ways: &self.ways,
+            options,
+            revision: self.revision(),
+            half_life: f64::from(self.settings().strength_half_life_samples),
+            penalties: BTreeMap::new(),
+            blockages: self.blockages(),
+        }
+    }
+
+    /// The cheapest path between two waypoints, with its cost.
+    pub(super) fn cheapest_path(
+        &self,
+        costs: &Costs<'_>,
+        [start, goal]: [u32; 2],
+        bounds: Option<&RouteBounds>,
+        gives_up: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<(Path, u64)>, NoRoute> {
+        let bounds = bounds.filter(|bounds| bounds.revision() == self.revision());
+        let question = Question {
+            start,
+            goal,
+            bounds,
+        };
+        let found = question.answer(costs, gives_up)?;
+        Ok(found.map(|found| (found.path, found.cost)))
+    }
+
+    /// The blockages on the way that would lead from one end to another without any.
+    fn blockages_between(
+        &self,
+        costs: &Costs<'_>,
+        from: &RouteEnd,
+        to: &RouteEnd,
+        gives_up: &mut dyn FnMut() -> bool,
+    ) -> Result<Vec<BlockageId>, NoRoute> {
+        let ends = self.ways.at(from.place).zip(self.ways.at(to.place));
+        let Some((start, goal)) = ends.filter(|_| !costs.blockages.is_empty()) else {
+            return Ok(Vec::new());
+        };
+        let free = Costs {
+            blockages: &[],
+            ..self.costs(costs.options)
+        };
+        let path = self.cheapest_path(&free, [start, goal], None, gives_up)?;
+        let path = path.map(|(path, _)| path).unwrap_or_default();
+        let mut blockages = BTreeSet::new();
+        for pair in path.windows(2) {
+            if let (Some(before), Some(edge)) = (self.ways.waypoint(pair[0].0), pair[1].1.edge()) {
+                blockages.extend(costs.blocked(before, edge).map(|blockage| blockage.id));
+            }
+        }
+        Ok(blockages.into_iter().collect())
+    }
+
     /// That there is no way, with the place nearest to the goal to which there is one.
-    fn nearest_reachable(
+    pub(super) fn nearest_reachable(
         &self,
         costs: &Costs<'_>,
         from: &RouteEnd,
@@ -89,15 +142,22 @@ impl CognitiveMap {
     ) -> NoRoute {
         let goal = self.position_of(to);
         let start = (from.place, (self.position_of(from) - goal).norm());
+        let blockages = match self.blockages_between(costs, from, to, gives_up) {
+            Ok(blockages) => blockages,
+            Err(given_up) => return given_up,
+        };
         let Some(number) = self.ways.at(from.place) else {
-            return NoRoute::NoWay { nearest: start };
+            return NoRoute::NoWay {
+                nearest: start,
+                blockages,
+            };
         };
         let mut search = Search::new(costs);
         if let Err(given_up) = search.run(number, None, None, gives_up) {
             return given_up;
         }
         let nearest = search.nearest_reached(&goal).unwrap_or(start);
-        NoRoute::NoWay { nearest }
+        NoRoute::NoWay { nearest, blockages }
     }
 
     /// Where an end is in `map`.

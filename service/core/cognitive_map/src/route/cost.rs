@@ -2,25 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::path::Path;
-use super::{Reverse, RouteOptions, tuning};
-use crate::memory::way::{Edge, Way, WayMap, Waypoint};
+use nalgebra::Point3;
 
-/// What is to be least on a route.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RouteCost {
-    /// Length \[m\].
-    #[default]
-    Length,
-    /// Mean duration \[s\]; of a way that was only travelled the other way, that.
-    Time,
-    /// Variance of the position at the end \[m²\]: that of the mean of what was measured, summed
-    /// over the axes and the ways.
-    Uncertainty,
-    /// Length \[m\], twice as much for each half-life of memories since the way was travelled, in
-    /// samples of the space.
-    Recency,
-}
+use super::options::{Reverse, RouteCost, RouteOptions};
+use super::path::Path;
+use super::tuning;
+use crate::memory::blockage::Blockage;
+use crate::memory::way::{Edge, Way, WayMap, Waypoint};
 
 /// What the ways cost, for one search.
 #[derive(Debug)]
@@ -31,6 +19,8 @@ pub(super) struct Costs<'a> {
     pub(super) half_life: f64,
     /// How often ways were taken by the routes before.
     pub(super) penalties: BTreeMap<u32, u64>,
+    /// What is blocked.
+    pub(super) blockages: &'a [Blockage],
 }
 
 impl Costs<'_> {
@@ -57,6 +47,9 @@ impl Costs<'_> {
         if !options.avoid_regions.is_empty() && self.leads_into_region(from, edge) {
             return None;
         }
+        if !self.blockages.is_empty() && self.blocked(from, edge).next().is_some() {
+            return None;
+        }
         Some(match options.cost {
             RouteCost::Length => edge.length_um,
             RouteCost::Time => micro(duration_s(self.ways.way(edge.way)?, from)),
@@ -77,6 +70,18 @@ impl Costs<'_> {
             self.plain(from, pair[1].1.edge()?)
         });
         edges.sum()
+    }
+
+    /// The blockages of an edge.
+    pub(super) fn blocked(&self, from: &Waypoint, edge: &Edge) -> impl Iterator<Item = &Blockage> {
+        let to = self.ways.waypoint(edge.to);
+        let at = |end: &Waypoint| Point3::from(end.pose().translation.vector);
+        let ends = to.map(|to| [(from.place(), at(from)), (to.place(), at(to))]);
+        self.blockages.iter().filter(move |blockage| {
+            ends.is_none_or(|[(from, from_m), (to, to_m)]| {
+                blockage.blocked.blocks((from, &from_m), (to, &to_m))
+            })
+        })
     }
 
     fn leads_into_region(&self, from: &Waypoint, edge: &Edge) -> bool {

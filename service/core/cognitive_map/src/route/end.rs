@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use crate::fold::CognitiveMap;
-use crate::input::AgentId;
+use crate::input::{AgentId, Goal};
 use crate::memory::ids::{PlaceId, TripId};
 
 /// Where a route begins or ends: at a place, or beside one.
@@ -31,6 +31,12 @@ pub enum NoRouteEnd {
 }
 
 impl RouteEnd {
+    /// The same as the goal of an errand.
+    pub fn goal(&self) -> Goal {
+        self.position
+            .map_or(Goal::Place(self.place), Goal::Position)
+    }
+
     /// The place, or that beside which it is.
     pub fn place(&self) -> PlaceId {
         self.place

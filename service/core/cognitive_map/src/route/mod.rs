@@ -8,53 +8,30 @@ mod alternatives;
 mod bounds;
 mod cost;
 mod end;
+mod following;
+mod options;
 mod path;
 mod region;
+mod retrace;
 mod search;
 mod shortcut;
 mod steps;
 mod thinned;
 mod tuning;
 
-use std::collections::BTreeSet;
-
 use nalgebra::{Point3, UnitQuaternion};
 
 pub use bounds::RouteBounds;
-pub use cost::RouteCost;
 pub use end::{NoRouteEnd, RouteEnd};
+pub use following::Following;
+pub use options::{Reverse, RouteCost, RouteOptions};
 pub use region::Region;
+pub use retrace::Back;
 pub use thinned::{ThinnedTraversal, ThinnedWay};
 
+use crate::memory::blockage::BlockageId;
 use crate::memory::ids::{PlaceId, TripId};
-
-/// Whether ways may be taken in a direction in which nobody has travelled them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Reverse {
-    /// They may.
-    #[default]
-    Allowed,
-    /// They may not.
-    Never,
-}
-
-/// What a route is to be like.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct RouteOptions {
-    /// What is to be least.
-    pub cost: RouteCost,
-    /// Whether ways may be taken backwards.
-    pub reverse: Reverse,
-    /// Places that it does not lead through.
-    pub avoid_places: BTreeSet<PlaceId>,
-    /// Boxes that it does not lead into.
-    pub avoid_regions: Vec<Region>,
-    /// Half the width of the bodies that travelled \[m\], where the route may cut corners: by
-    /// straight lines that are wholly within this distance of ways.
-    pub shortcuts_within_m: Option<f64>,
-    /// Most other routes to answer, each of which shares at most half its length with any before.
-    pub alternatives: usize,
-}
+use state::{state_of_enum, state_of_struct};
 
 /// A route.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,14 +94,36 @@ pub enum StepKind {
 }
 
 /// Why there is no route.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum NoRoute {
     /// No way leads there, as the options have it.
     NoWay {
         /// The place nearest to the goal that can be reached, with its distance from the goal
         /// \[m\].
         nearest: (PlaceId, f64),
+        /// The blockages on the way there that would be, if they ended.
+        blockages: Vec<BlockageId>,
     },
     /// The search was given up.
     GivenUp,
 }
+
+state_of_enum!(StepKind {
+    Travelled = 0,
+    Reversed = 1,
+    Shortcut = 2,
+    Approach = 3,
+});
+state_of_struct!(RouteStep {
+    place,
+    position,
+    rotation,
+    tolerance_m,
+    sd_m,
+    length_m,
+    duration_s,
+    kind,
+    traversals,
+    last_stamp_ns,
+    leg,
+});

@@ -2,6 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
+use state::state_of_struct;
+
 /// A box along the axes of `map`, its faces included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
@@ -19,6 +21,11 @@ impl Region {
             min: min_m.into(),
             max: max_m.into(),
         })
+    }
+
+    /// The corners with the least and with the largest coordinates \[m\].
+    pub fn corners_m(&self) -> [[f64; 3]; 2] {
+        [self.min.into(), self.max.into()]
     }
 
     /// Whether a point lies within.
@@ -44,6 +51,8 @@ impl Region {
         enters <= leaves
     }
 }
+
+state_of_struct!(Region { min, max });
 
 #[cfg(test)]
 mod tests {

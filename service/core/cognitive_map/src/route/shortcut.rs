@@ -7,6 +7,7 @@ use nalgebra::{Point3, Vector3};
 use super::path::{Hop, Path};
 use super::{Region, tuning};
 use crate::fold::CognitiveMap;
+use crate::memory::blockage::{Blockage, Blocked};
 use crate::memory::ids::PlaceId;
 use crate::memory::way::{Way, micrometres};
 
@@ -20,6 +21,7 @@ pub(super) struct Corridor<'a> {
     map: &'a CognitiveMap,
     radius_m: f64,
     avoided: &'a [Region],
+    blockages: &'a [Blockage],
     cells: BTreeMap<Cell, Vec<Piece>>,
 }
 
@@ -30,8 +32,14 @@ impl<'a> Corridor<'a> {
             map,
             radius_m,
             avoided,
+            blockages: &[],
             cells: BTreeMap::new(),
         }
+    }
+
+    /// Keeps lines clear of blockages: no blocked way says that bodies get through.
+    pub(super) fn keep_clear_of(&mut self, blockages: &'a [Blockage]) {
+        self.blockages = blockages;
     }
 
     /// Shortens a path by straight lines between its places: of all ways to do so the shortest one,
@@ -124,7 +132,11 @@ impl<'a> Corridor<'a> {
     fn leads_into_avoided(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         // One may leave a region in which the route starts.
         let leads_into = |region: &Region| !region.contains(from) && region.meets(from, to);
-        self.avoided.iter().any(leads_into)
+        let crosses = |blockage: &Blockage| match &blockage.blocked {
+            Blocked::Ball(ball) => !ball.contains(from) && ball.meets(from, to),
+            Blocked::Place(_) | Blocked::Way(_) => false,
+        };
+        self.avoided.iter().any(leads_into) || self.blockages.iter().any(crosses)
     }
 
     /// Length of a path \[µm\].
@@ -178,7 +190,7 @@ impl<'a> Corridor<'a> {
 
     /// The ways in and about a cell.
     fn cell(&mut self, cell: Cell) -> &[Piece] {
-        let (map, radius_m) = (self.map, self.radius_m);
+        let (map, radius_m, blockages) = (self.map, self.radius_m, self.blockages);
         self.cells.entry(cell).or_insert_with(|| {
             let centre = cell.map(|index| (index as f64 + 0.5) * tuning::CORRIDOR_CELL_M);
             let half_m = 0.5 * 3.0_f64.sqrt() * tuning::CORRIDOR_CELL_M;
@@ -187,7 +199,9 @@ impl<'a> Corridor<'a> {
             let mut pieces: BTreeMap<[PlaceId; 2], Piece> = BTreeMap::new();
             for (place, _) in places {
                 for way in map.ways_at(place) {
-                    if let Some(piece) = swept(map, way) {
+                    if let Some(piece) = swept(map, way)
+                        && !is_blocked(blockages, way, &piece)
+                    {
                         pieces.insert(way.ends(), piece);
                     }
                 }
@@ -204,6 +218,14 @@ fn swept(map: &CognitiveMap, way: &Way) -> Option<Piece> {
     let straight_m = (to - from).norm();
     // Agents enter a place up to a field radius from where it lies.
     (way.shortest_m() <= straight_m + map.settings().field_radius_m).then_some((from, to))
+}
+
+/// Whether nobody gets through a way, in one direction or the other.
+fn is_blocked(blockages: &[Blockage], way: &Way, (a, b): &Piece) -> bool {
+    let ends = way.ends();
+    let (first, second) = ((ends[0], a), (ends[1], b));
+    let mut blocked = blockages.iter().map(|blockage| &blockage.blocked);
+    blocked.any(|what| what.blocks(first, second) || what.blocks(second, first))
 }
 
 fn cell_of(point: &Point3<f64>) -> Cell {

@@ -29,3 +29,9 @@ pub(super) const SHORTCUT_PLACES_MAX: usize = 32;
 pub(super) const STEP_M: f64 = 1e-3;
 /// Edge of the cubes in which swept ways are looked up \[m\].
 pub(super) const CORRIDOR_CELL_M: f64 = 0.5;
+/// Steps ahead of the one that an agent is on, among which it is looked for: it may cut a corner,
+/// or its samples may be far apart.
+pub(super) const STEPS_AHEAD: usize = 8;
+/// Field radii beyond which an agent has left its route. Source: so far away none of its places
+/// answers.
+pub(super) const LEFT_FIELD_RADII: f64 = 2.0;

@@ -1,10 +1,11 @@
 //! Journals: arbitrary ones, and a robot to write readable ones.
 
 use cognitive_map::{
-    AgentId, CognitiveMap, Descriptor, Event, EventKind, InvalidSample, Label, Lesson, Level,
-    Marker, Motion, ObjectMark, PoseNoise, Range, RangeBearing, Record, Recruitment, Relation,
-    RelativePose, RelativePosition, Sample, SampleBody, Settings, SettingsValues, Sighting,
-    SkipReason, Spacing, StartPose, Target, Touch, TouchNoise,
+    AgentId, Ball, Blockage, BlockageId, Blocked, CognitiveMap, Descriptor, Errand, Event,
+    EventKind, Goal, Instruction, InvalidSample, Label, Lesson, Level, Marker, Motion, ObjectMark,
+    PlaceId, PoseNoise, Range, RangeBearing, Record, Recruitment, Relation, RelativePose,
+    RelativePosition, Retrace, Reverse, RouteCost, Sample, SampleBody, Settings, SettingsValues,
+    Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchNoise, TripId,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use object_recognition::Orientation;
@@ -194,6 +195,8 @@ enum Entry {
     NextSession {
         agent: u32,
     },
+    /// The next instruction.
+    Instruct(Instruction),
     /// Whatever, in whatever order.
     Junk(Record),
 }
@@ -208,6 +211,7 @@ pub(crate) fn journals() -> impl Strategy<Value = Vec<Record>> {
             })
             .collect();
         let mut next = [(1u64, 0u64, 0i64); 3];
+        let mut instructions = 0;
         for entry in entries {
             match entry {
                 Entry::Sample {
@@ -251,6 +255,14 @@ pub(crate) fn journals() -> impl Strategy<Value = Vec<Record>> {
                 Entry::NextSession { agent } => {
                     let (session, seq, stamp_ns) = &mut next[agent as usize];
                     (*session, *seq, *stamp_ns) = (*session + 1, 0, 0);
+                }
+                Entry::Instruct(instruction) => {
+                    let number = instructions;
+                    instructions += 1;
+                    records.push(Record::Instruct {
+                        number,
+                        instruction,
+                    });
                 }
                 Entry::Junk(record) => records.push(record),
             }
@@ -301,6 +313,51 @@ fn entries() -> impl Strategy<Value = Entry> {
             .prop_map(|(agent, ahead, len, reason)| Entry::Skip { agent, ahead, len, reason }),
         1 => agent.prop_map(|agent| Entry::NextSession { agent }),
         3 => junk().prop_map(Entry::Junk),
+        3 => instructions().prop_map(Entry::Instruct),
+    ]
+}
+
+fn instructions() -> impl Strategy<Value = Instruction> {
+    let place = || (0u32..8).prop_map(PlaceId);
+    let trip = || (0u32..4).prop_map(TripId);
+    let agent = || (0u32..3).prop_map(AgentId);
+    let at = || prop::array::uniform3(-1.0..1.0f64).prop_map(Point3::from);
+    let blocked = prop_oneof![
+        place().prop_map(Blocked::Place),
+        prop::array::uniform2(place()).prop_map(Blocked::Way),
+        (at(), 0.0..0.5f64).prop_map(|(at, radius_m)| Blocked::Ball(Ball { at, radius_m })),
+    ];
+    let until_ns = prop::option::of(0..10_000_000_000_i64);
+    let block = (0u64..4, blocked, until_ns).prop_map(|(id, blocked, until_ns)| {
+        Instruction::Block(Blockage {
+            id: BlockageId(id),
+            blocked,
+            until_ns,
+        })
+    });
+    let goal = prop_oneof![
+        place().prop_map(Goal::Place),
+        at().prop_map(Goal::Position),
+        (trip(), any::<bool>())
+            .prop_map(|(trip, backward)| Goal::Retrace(Retrace { trip, backward })),
+    ];
+    let follow = (agent(), goal).prop_map(|(agent, goal)| {
+        let errand = Errand {
+            goal,
+            cost: RouteCost::Length,
+            reverse: Reverse::Allowed,
+            avoid_places: vec![PlaceId(7)],
+            avoid_regions: Vec::new(),
+        };
+        Instruction::Follow(agent, errand)
+    });
+    prop_oneof![
+        3 => block,
+        1 => (0u64..4).prop_map(|id| Instruction::Unblock(BlockageId(id))),
+        6 => follow,
+        1 => agent().prop_map(Instruction::StopFollowing),
+        2 => trip().prop_map(Instruction::Pin),
+        1 => trip().prop_map(Instruction::Unpin),
     ]
 }
 

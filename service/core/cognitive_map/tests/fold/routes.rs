@@ -144,7 +144,7 @@ proptest! {
         };
         let Ok(found) = found else {
             prop_assert!(!costs.contains_key(&to.0));
-            let Err(NoRoute::NoWay { nearest: (place, distance_m) }) = found else {
+            let Err(NoRoute::NoWay { nearest: (place, distance_m), .. }) = found else {
                 panic!("nobody gave up");
             };
             let at = |place| map.place(place).unwrap().position();
@@ -295,7 +295,7 @@ fn a_route_leads_round_what_is_avoided() {
         avoid_regions: vec![region, wall],
         ..RouteOptions::default()
     };
-    let Err(NoRoute::NoWay { nearest }) = routes(&map, &from, &to, &options) else {
+    let Err(NoRoute::NoWay { nearest, .. }) = routes(&map, &from, &to, &options) else {
         panic!("there is no way");
     };
     let nearest = map.place(nearest.0).unwrap().position();

@@ -89,7 +89,7 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<()> {
 }
 
 /// A service under load.
-pub(super) struct Bench {
+pub(in crate::cli) struct Bench {
     runtime: tokio::runtime::Runtime,
     service: Service,
     session: Session,
@@ -99,7 +99,7 @@ pub(super) struct Bench {
 }
 
 impl Bench {
-    pub(super) fn start(directory: Option<std::path::PathBuf>) -> anyhow::Result<Self> {
+    pub(in crate::cli) fn start(directory: Option<std::path::PathBuf>) -> anyhow::Result<Self> {
         let temporary = directory.is_none();
         let directory = directory.unwrap_or_else(|| {
             std::env::temp_dir().join(format!("cogmap-bench-{}", std::process::id()))
@@ -128,16 +128,16 @@ impl Bench {
         })
     }
 
-    pub(super) fn runtime(&self) -> &tokio::runtime::Runtime {
+    pub(in crate::cli) fn runtime(&self) -> &tokio::runtime::Runtime {
         &self.runtime
     }
 
-    pub(super) fn service(&self) -> &Service {
+    pub(in crate::cli) fn service(&self) -> &Service {
         &self.service
     }
 
     /// A space of its own for each measurement.
-    pub(super) fn space(&self, name: &str) -> anyhow::Result<Arc<Space>> {
+    pub(in crate::cli) fn space(&self, name: &str) -> anyhow::Result<Arc<Space>> {
         let name: Name = name.parse()?;
         Ok(self
             .service
@@ -203,7 +203,7 @@ impl Bench {
         rate
     }
 
-    pub(super) fn stop(self) {
+    pub(in crate::cli) fn stop(self) {
         self.runtime.block_on(self.service.stop());
         if self.temporary {
             // Left-overs in the temporary directory are no failure of the measurement.

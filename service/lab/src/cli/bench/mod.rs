@@ -11,6 +11,8 @@ mod route;
 mod step;
 mod touch;
 
+pub(super) use ingest::Bench;
+
 use clap::Subcommand;
 
 #[derive(Debug, Subcommand)]

@@ -6,6 +6,7 @@ mod object;
 mod outlines;
 mod progress;
 mod room;
+mod routes;
 mod sequences;
 mod service;
 mod waking;
@@ -32,6 +33,9 @@ pub(in crate::cli) enum EvalCommand {
     /// Trips that cross themselves, and cues of a few places of them: is it told what comes next,
     /// and as likely as it is?
     Sequences(sequences::SequencesArgs),
+    /// Routes in a hall, an office and a maze, through the HTTP of a service: are they found, are
+    /// they the shortest, and does a robot that follows them arrive?
+    Routes(routes::RoutesArgs),
     /// Robots that wake up somewhere in a room that a team-mate has explored: are they found, how
     /// soon, and how far off?
     Waking(waking::WakingArgs),
@@ -45,6 +49,7 @@ pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
         EvalCommand::Outlines(args) => outlines::run(args),
         EvalCommand::Code(args) => code::run(args),
         EvalCommand::Sequences(args) => sequences::run(args),
+        EvalCommand::Routes(args) => routes::run(args),
         EvalCommand::Waking(args) => waking::run(args),
     }
 }

@@ -28,6 +28,8 @@ pub(crate) struct TripMap {
     summaries: SummaryTree<Weakest>,
     /// The trips under way: at most one for each agent.
     under_way: Arc<BTreeSet<TripId>>,
+    /// The trips that are never forgotten.
+    pinned: Arc<BTreeSet<TripId>>,
     /// The trips forgotten last, oldest first.
     forgotten: SparseVec<Forgotten, 64>,
     /// Where they lead through each place.
@@ -155,9 +157,34 @@ impl TripMap {
         self.summaries.of_all().map(|weakest| weakest.1)
     }
 
-    /// The trip under way that began first.
+    /// The trip under way that began first, of those that may be forgotten.
     pub(crate) fn first_under_way(&self) -> Option<TripId> {
-        self.under_way.first().copied()
+        let mut under_way = self.under_way.iter();
+        under_way.find(|trip| !self.is_pinned(**trip)).copied()
+    }
+
+    /// Whether a trip is never to be forgotten.
+    pub(crate) fn is_pinned(&self, trip: TripId) -> bool {
+        self.pinned.contains(&trip)
+    }
+
+    /// The trips that are never to be forgotten.
+    pub(crate) fn pinned(&self) -> impl Iterator<Item = TripId> {
+        self.pinned.iter().copied()
+    }
+
+    /// Says whether a trip is never to be forgotten.
+    pub(crate) fn pin(&mut self, trip: TripId, is_pinned: bool) {
+        if self.get(trip).is_none() || self.is_pinned(trip) == is_pinned {
+            return;
+        }
+        let pinned = Arc::make_mut(&mut self.pinned);
+        if is_pinned {
+            pinned.insert(trip);
+        } else {
+            pinned.remove(&trip);
+        }
+        self.summarise(trip);
     }
 
     /// Removes a trip. The agent that is under way on it will notice.
@@ -187,6 +214,7 @@ impl TripMap {
     fn summarise(&mut self, trip: TripId) {
         let page = trip.0 as usize / PAGE;
         let ended = numbered(self.trips.iter_page(page)).filter(|(_, trip)| trip.ended.is_some());
+        let ended = ended.filter(|(id, _)| !self.pinned.contains(id));
         let weakest: Vec<_> = ended.map(|(id, trip)| Weakest(trip.strength, id)).collect();
         self.summaries.set(page, merged(weakest.iter()));
     }

@@ -68,6 +68,11 @@ impl LegUnderWay {
         &self.start_in_place
     }
 
+    /// Length of the path so far \[m\].
+    pub(crate) fn length_m(&self) -> f64 {
+        self.length_m
+    }
+
     /// Stamp of the start \[ns\].
     pub(crate) fn start_stamp_ns(&self) -> i64 {
         self.start_stamp_ns

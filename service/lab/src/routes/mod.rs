@@ -1,0 +1,7 @@
+//! Worlds in which routes are asked for and followed: floors of a building, and a robot on them.
+
+mod floor;
+mod robot;
+
+pub use floor::{Floor, FloorKind};
+pub use robot::PlanarRobot;
