@@ -39,8 +39,9 @@ pub struct LearnedChannel {
     pub views: u64,
     /// Within this distance views are alike \[m\].
     pub range_m: f64,
-    /// Mean log of the likelihood ratio of two views to be within the range of one another \[nats\]:
-    /// of neighbours along the way, against far ones.
+    /// Mean log of the likelihood ratio of two neighbours along the way to be within the range of
+    /// one another, against far ones \[nats\]. Of the later half of the views, by what the earlier
+    /// half teaches; not above zero where views say nothing.
     pub information_nats: f64,
     /// Share of the evidence of a view that is its own, 0 to 1: neighbours say nearly the same.
     pub independence: f64,

@@ -8,7 +8,7 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 31] = [
+const ROUTES: [(&str, &[&str]); 35] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
@@ -21,8 +21,14 @@ const ROUTES: [(&str, &[&str]); 31] = [
     ("/v1/spaces/{space}/agents/{agent}/grid", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/object", &["get"]),
     ("/v1/spaces/{space}/agents/{agent}/predict", &["post"]),
+    (
+        "/v1/spaces/{space}/agents/{agent}/route",
+        &["delete", "get", "put"],
+    ),
     ("/v1/spaces/{space}/agents/{agent}/samples", &["post"]),
     ("/v1/spaces/{space}/agents/{agent}/trajectory", &["get"]),
+    ("/v1/spaces/{space}/blockages", &["get", "post"]),
+    ("/v1/spaces/{space}/blockages/{id}", &["delete"]),
     ("/v1/spaces/{space}/channels", &["get"]),
     ("/v1/spaces/{space}/events", &["get"]),
     ("/v1/spaces/{space}/export", &["get"]),
@@ -43,6 +49,7 @@ const ROUTES: [(&str, &[&str]); 31] = [
     ("/v1/spaces/{space}/sequence", &["post"]),
     ("/v1/spaces/{space}/trips", &["get"]),
     ("/v1/spaces/{space}/trips/{id}", &["get"]),
+    ("/v1/spaces/{space}/trips/{id}/pin", &["delete", "put"]),
 ];
 
 #[test]

@@ -419,10 +419,13 @@ fn assert_references(root: &Value, value: &Value) {
 }
 
 /// All operations, by method and path.
-const OPERATIONS: [&str; 35] = [
+const OPERATIONS: [&str; 44] = [
     "DELETE /v1/spaces/{space}",
     "DELETE /v1/spaces/{space}/agents/{agent}",
+    "DELETE /v1/spaces/{space}/agents/{agent}/route",
+    "DELETE /v1/spaces/{space}/blockages/{id}",
     "DELETE /v1/spaces/{space}/objects/{name}",
+    "DELETE /v1/spaces/{space}/trips/{id}/pin",
     "GET /healthz",
     "GET /metrics",
     "GET /readyz",
@@ -434,7 +437,10 @@ const OPERATIONS: [&str; 35] = [
     "GET /v1/spaces/{space}/agents/{agent}/at",
     "GET /v1/spaces/{space}/agents/{agent}/grid",
     "GET /v1/spaces/{space}/agents/{agent}/object",
+    "GET /v1/spaces/{space}/agents/{agent}/route",
     "GET /v1/spaces/{space}/agents/{agent}/trajectory",
+    "GET /v1/spaces/{space}/blockages",
+    "GET /v1/spaces/{space}/channels",
     "GET /v1/spaces/{space}/events",
     "GET /v1/spaces/{space}/export",
     "GET /v1/spaces/{space}/landmarks",
@@ -448,13 +454,16 @@ const OPERATIONS: [&str; 35] = [
     "GET /v1/spaces/{space}/trips/{id}",
     "POST /v1/spaces/{space}/agents/{agent}/predict",
     "POST /v1/spaces/{space}/agents/{agent}/samples",
+    "POST /v1/spaces/{space}/blockages",
     "POST /v1/spaces/{space}/localize",
     "POST /v1/spaces/{space}/objects/identify",
     "POST /v1/spaces/{space}/recall",
     "POST /v1/spaces/{space}/route",
     "POST /v1/spaces/{space}/sequence",
     "PUT /v1/spaces/{space}",
+    "PUT /v1/spaces/{space}/agents/{agent}/route",
     "PUT /v1/spaces/{space}/objects/{name}",
+    "PUT /v1/spaces/{space}/trips/{id}/pin",
 ];
 
 #[tokio::test]

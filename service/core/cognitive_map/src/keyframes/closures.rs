@@ -163,7 +163,7 @@ impl KeyframeGraph {
     pub(super) fn relax_matched(&mut self, views: Option<&ViewLog>) -> Vec<Correction> {
         let is_due = views.is_none() || self.is_due();
         let mut coarse = RelaxationCopy::coarse(self);
-        let is_matched = views.is_some_and(|log| coarse.match_views(log, Matching::live(log)));
+        let is_matched = views.is_some_and(|log| coarse.match_views(log, live_matching(log)));
         self.learned = Arc::clone(&coarse.graph().learned);
         if !is_due && !is_matched {
             return Vec::new(); // closures wait for their own time
@@ -215,6 +215,15 @@ impl KeyframeGraph {
         for (agent, _) in (0..).zip(0..self.chains.tracks.len()) {
             self.chains.adopt(agent, &coarse.chains, self.revision);
         }
+    }
+}
+
+/// How the views of a log are matched while samples come in.
+fn live_matching(log: &ViewLog) -> &'static Matching {
+    if log.is_much_longer() {
+        &tuning::LIVE_MATCHING_ANEW
+    } else {
+        &tuning::LIVE_MATCHING
     }
 }
 

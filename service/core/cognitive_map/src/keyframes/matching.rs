@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use place_recognition::{ViewLog, ViewMatch};
-
-use super::tuning;
+use place_recognition::ViewMatch;
 
 /// The matches of views by which a map is relaxed. Clones share them.
 pub(super) type ViewMatches = Arc<[ViewMatch]>;
@@ -18,15 +16,4 @@ pub(super) struct Matching {
     pub(super) widths: &'static [f64],
     /// Veers of odometry from which it begins anew, in standard deviations.
     pub(super) veers: &'static [f64],
-}
-
-impl Matching {
-    /// How the views of a log are matched while samples come in.
-    pub(super) fn live(log: &ViewLog) -> &'static Self {
-        if log.is_much_longer() {
-            &tuning::LIVE_MATCHING_ANEW
-        } else {
-            &tuning::LIVE_MATCHING
-        }
-    }
 }

@@ -66,7 +66,8 @@ impl PlaceRecognition {
         })
     }
 
-    /// All that agents of the map saw, if enough of it is new to be matched again; it counts as matched from then on.
+    /// All that agents of the map saw, if enough of it is new to be matched again; it counts as
+    /// matched from then on.
     pub fn take_due_views(&mut self) -> Option<ViewLog> {
         if !self.views.log.is_due() {
             return None;
