@@ -26,7 +26,7 @@ pub(crate) fn of(operation: &str) -> Option<Value> {
         ] }),
         "sequence" => json!({ "cue": [{ "place": 0 }, { "place": 1 }] }),
         "route" => json!({ "from": { "agent": "ada" }, "to": { "place": 0 } }),
-        "block" => json!({ "at_m": [2, 0, 0], "radius_m": 0.5 }),
+        "block" => json!({ "at_m": [2, 5, 0], "radius_m": 0.5 }),
         "follow_route" => json!({ "to": { "place": 0 }, "cost": "time" }),
         "predict" => json!({ "motion": step, "channel": "touch" }),
         "teach_object" => json!({ "spacing_m": 0.02, "contacts": [
