@@ -77,6 +77,9 @@ pub struct SpaceSettings {
     /// Most ways, each between two places that legs have joined, at least 1: for one more, the
     /// weakest is forgotten without which no places are separate.
     pub ways_max: u32,
+    /// Whether an episode that is to recognise an object learns it where it turns out to be
+    /// unknown.
+    pub learns_unknown_objects: bool,
 }
 
 /// When a place cell is recruited.
@@ -143,6 +146,7 @@ impl Default for SpaceSettings {
             restart_sd_rad: 0.5,
             object_answer_probability: 0.995,
             ways_max: 131_072,
+            learns_unknown_objects: true,
         }
     }
 }

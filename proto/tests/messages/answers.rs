@@ -82,6 +82,7 @@ fn bernoulli() -> SpaceSettings {
         restart_sd_rad: 0.125,
         object_answer_probability: 0.999,
         ways_max: 2_000_000,
+        learns_unknown_objects: false,
     }
 }
 

@@ -84,6 +84,7 @@ fn space_rows() -> String {
         }
         let rule = match &*name {
             "seed" => "any whole number".to_owned(),
+            "learns_unknown_objects" => "true or false".to_owned(),
             "recruitment" => {
                 "`{ novelty = {} }`, or `{ bernoulli = { probability = 0.1 } }`".to_owned()
             }

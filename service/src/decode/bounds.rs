@@ -50,10 +50,10 @@ mod tests {
     fn the_message_and_the_map_have_the_same_settings() {
         let bounds: BTreeMap<_, _> = setting_bounds().collect();
         let told = flat(&SpaceSettings::default());
-        // The seed may be any number, and recruitment is none.
-        let numbers = told.iter().filter(|(name, _)| {
+        // The seed may be any number, and recruitment and a choice are none.
+        let numbers = told.iter().filter(|(name, value)| {
             let name = name.as_str();
-            name != "seed" && name != "recruitment"
+            name != "seed" && name != "recruitment" && !value.is_boolean()
         });
         let names: Vec<_> = numbers.map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, bounds.into_keys().collect::<Vec<_>>());

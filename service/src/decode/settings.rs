@@ -49,6 +49,7 @@ pub fn core_settings(settings: &SpaceSettings) -> Result<cognitive_map::Settings
         restart_sd_rad: settings.restart_sd_rad,
         object_answer_probability: settings.object_answer_probability,
         ways_max: settings.ways_max,
+        learns_unknown_objects: settings.learns_unknown_objects,
     })
 }
 

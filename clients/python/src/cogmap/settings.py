@@ -110,3 +110,5 @@ class SpaceSettings:
     #: Most ways between places: for one more, the weakest is forgotten without which no places are
     #: separate.
     ways_max: int = 131_072
+    #: Whether an episode that is to recognise an object learns it where it turns out to be unknown.
+    learns_unknown_objects: bool = True

@@ -51,7 +51,7 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// into objects, version 8 no attachments and no kidnap tests, version 9 nobody removed or set
 /// aside, version 10 no relaxation under way, version 11 no noise of odometry and no searches by
 /// levels, version 12 no log of views, no ways and no distances alone, version 13 no veers, no
-/// stretches of logged views and no instructions.
+/// stretches of logged views, no instructions and no episodes that learn nothing.
 const VERSION: u16 = 14;
 
 const HEADER: u8 = 0;

@@ -114,6 +114,7 @@ pub(super) fn digest_of(settings: &Settings) -> Digest {
             restart_sd_rad was 0.5,
             object_answer_probability was 0.995,
             ways_max was 131_072.0,
+            learns_unknown_objects was 1.0,
         ],
     )
 }

@@ -26,7 +26,9 @@ impl Fold<'_> {
             }
             ObjectMark::Identify { orientation, noise } => {
                 let model = Spacing::default().model();
-                Some(Episode::identify(model, orientation.clone(), *noise))
+                let learns = self.settings.learns_unknown_objects;
+                let episode = Episode::identify(model, orientation.clone(), *noise);
+                Some(episode.learning(learns))
             }
         };
     }

@@ -81,6 +81,8 @@ pub struct SettingsValues {
     pub restart_sd_rad: f64,
     /// Probability from which on an episode of touches is answered with an object, or with none.
     pub object_answer_probability: f64,
+    /// Whether an episode that is to recognise learns an object that turns out to be unknown.
+    pub learns_unknown_objects: bool,
 }
 
 /// When a place cell is recruited.
@@ -139,6 +141,7 @@ impl Default for SettingsValues {
             restart_sd_m: 1.0,
             restart_sd_rad: 0.5,
             object_answer_probability: object_recognition::ANSWER_PROBABILITY,
+            learns_unknown_objects: true,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use cognitive_map::{
     CognitiveMap, Event, EventKind, Lesson, Motion, ObjectMark, PoseNoise, Record, Sample,
-    SampleBody, Settings, SkipReason, Spacing, Touch, TouchLevel, TouchNoise,
+    SampleBody, Settings, SettingsValues, SkipReason, Spacing, Touch, TouchLevel, TouchNoise,
 };
 use object_recognition::{Orientation, Verdict};
 
@@ -374,6 +374,25 @@ fn lesson(rod: &[f64]) -> Lesson {
         Touch::new(at, noise()).unwrap().with_levels(vec![felt])
     });
     Lesson::new(Spacing::new(0.01).unwrap(), touches.collect())
+}
+
+#[test]
+fn nothing_unknown_is_learned_where_the_settings_say_so() {
+    let learned = |learns| {
+        let values = SettingsValues {
+            learns_unknown_objects: learns,
+            ..SettingsValues::default()
+        };
+        let (mut map, mut hand) = taught(Settings::new(values).unwrap());
+        let before = map.object_count();
+        let strange = RODS[2].1.map(|level| level + 20.0);
+        hand.sample(&mut map, identify());
+        let events = feel(&mut map, &mut hand, &strange, &UP);
+        assert!(events.contains(&EventKind::ObjectUnknown), "{events:?}");
+        hand.sample(&mut map, end());
+        map.object_count() - before
+    };
+    assert_eq!([true, false].map(learned), [1, 0]);
 }
 
 #[test]

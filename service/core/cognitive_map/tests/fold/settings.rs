@@ -27,7 +27,7 @@ fn a_new_map_with_the_defaults_has_the_digest_that_it_always_had() {
 
 #[test]
 fn every_setting_that_was_a_constant_counts_for_the_digest() {
-    let changes: [fn(&mut SettingsValues); 8] = [
+    let changes: [fn(&mut SettingsValues); 9] = [
         |values| values.sighting_gate_sd = 3.0,
         |values| values.sighting_huber_sd = 3.0,
         |values| values.closure_gate_chi2 = 3.0,
@@ -36,6 +36,7 @@ fn every_setting_that_was_a_constant_counts_for_the_digest() {
         |values| values.restart_sd_m = 0.75,
         |values| values.restart_sd_rad = 0.75,
         |values| values.object_answer_probability = 0.75,
+        |values| values.learns_unknown_objects = false,
     ];
     let mut digests: Vec<_> = changes
         .map(|change| CognitiveMap::new(settings(change)).digest().to_string())
@@ -43,7 +44,7 @@ fn every_setting_that_was_a_constant_counts_for_the_digest() {
     digests.push(CognitiveMap::new(settings(|_| ())).digest().to_string());
     digests.sort();
     digests.dedup();
-    assert_eq!(digests.len(), 9, "{digests:?}");
+    assert_eq!(digests.len(), 10, "{digests:?}");
 }
 
 #[test]

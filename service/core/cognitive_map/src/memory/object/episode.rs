@@ -26,8 +26,8 @@ const REFLECTIONS_MAX: usize = 4;
 pub(super) enum Purpose {
     /// To teach an object: of this name, or of whichever it is.
     Learn(Option<Label>),
-    /// To recognise one.
-    Identify,
+    /// To recognise one, and to learn one that is unknown or not.
+    Identify { learns: bool },
 }
 
 /// An agent's episode with an object.
@@ -99,7 +99,22 @@ impl Episode {
         orientation: Orientation,
         noise: TouchNoise,
     ) -> Self {
-        Self::new(Purpose::Identify, model, orientation, noise)
+        Self::new(
+            Purpose::Identify { learns: true },
+            model,
+            orientation,
+            noise,
+        )
+    }
+
+    /// The same, with this said of whether it learns an object that is unknown.
+    #[must_use]
+    pub(crate) fn learning(self, learns: bool) -> Self {
+        let purpose = match self.purpose {
+            Purpose::Identify { .. } => Purpose::Identify { learns },
+            Purpose::Learn(name) => Purpose::Learn(name),
+        };
+        Self { purpose, ..self }
     }
 
     fn new(
@@ -200,13 +215,13 @@ impl Episode {
                     _ => None,
                 }
             }
-            Purpose::Identify => match self.verdict {
+            Purpose::Identify { learns } => match self.verdict {
                 Verdict::Object(id) => {
                     memory.used(id, now, revision);
                     None
                 }
-                Verdict::Unknown => self.found(None, memory, (now, revision)),
-                Verdict::Undecided => None,
+                Verdict::Unknown if *learns => self.found(None, memory, (now, revision)),
+                Verdict::Unknown | Verdict::Undecided => None,
             },
         };
         match learned {
@@ -237,7 +252,7 @@ impl Episode {
             };
             news.push(News::Insight(insight));
         }
-        if !matches!(self.purpose, Purpose::Identify) {
+        if !matches!(self.purpose, Purpose::Identify { .. }) {
             return (news, None);
         }
         let posterior = self.posterior(memory);

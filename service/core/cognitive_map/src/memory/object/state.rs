@@ -29,9 +29,11 @@ state_of_struct!(Joining {
 });
 impl State for Episode {
     fn write(&self, out: &mut StateWriter) {
-        let (teaches, name): (bool, Option<Label>) = match &self.purpose {
-            Purpose::Learn(name) => (true, name.clone()),
-            Purpose::Identify => (false, None),
+        // What it is for: 0 to recognise, 1 to teach, 2 to recognise and learn nothing.
+        let (teaches, name): (u8, Option<Label>) = match &self.purpose {
+            Purpose::Learn(name) => (1, name.clone()),
+            Purpose::Identify { learns: true } => (0, None),
+            Purpose::Identify { learns: false } => (2, None),
         };
         (teaches, name).write(out);
         self.orientation.write(out);
@@ -46,9 +48,10 @@ impl State for Episode {
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         let purpose = match State::read(input)? {
-            (true, name) => Purpose::Learn(name),
-            (false, None) => Purpose::Identify,
-            (false, Some(_)) => return Err(CorruptState::Invalid),
+            (1, name) => Purpose::Learn(name),
+            (0, None) => Purpose::Identify { learns: true },
+            (2, None) => Purpose::Identify { learns: false },
+            (0u8 | 2.., _) => return Err(CorruptState::Invalid),
         };
         let orientation = State::read(input)?;
         let noise = State::read(input)?;
@@ -60,7 +63,9 @@ impl State for Episode {
         let verdict = State::read(input)?;
         let episode = match purpose {
             Purpose::Learn(name) => Self::learn(name, model, orientation, noise),
-            Purpose::Identify => Self::identify(model, orientation, noise),
+            Purpose::Identify { learns } => {
+                Self::identify(model, orientation, noise).learning(learns)
+            }
         };
         Ok(Self {
             travel,
