@@ -96,9 +96,9 @@ impl Site {
         self.nobody().user(name, &format!("change-me-{name}"))
     }
 
-    fn builder(&self, agent: &str, credentials: Credentials) -> RobotBuilder {
+    fn builder(&self, agent: &str, credentials: Credentials, wait: Duration) -> RobotBuilder {
         let settings = RobotSettings {
-            connect_timeout: SHORT,
+            connect_timeout: wait,
             ..RobotSettings::default()
         };
         Robot::builder("default", agent)
@@ -108,7 +108,7 @@ impl Site {
     }
 
     fn robot(&self, agent: &str, credentials: Credentials) -> Robot {
-        let robot = self.builder(agent, credentials).connect();
+        let robot = self.builder(agent, credentials, LONG).connect();
         robot.expect("the service lets it in")
     }
 
@@ -242,14 +242,14 @@ fn whoever_is_not_known_is_not_let_in() {
         ),
     ];
     for (what, credentials) in strangers {
-        let refused = site.builder("ada", credentials).connect();
+        let refused = site.builder("ada", credentials, SHORT).connect();
         assert!(
             matches!(refused, Err(ClientError::Connect { .. })),
             "{what}"
         );
     }
     // Who gets in without a name is nobody, and nobody may say anything.
-    if let Ok(robot) = site.builder("ada", site.nobody()).connect() {
+    if let Ok(robot) = site.builder("ada", site.nobody(), SHORT).connect() {
         drive(&robot);
         robot.flush(SHORT).unwrap_err();
     }
@@ -274,7 +274,7 @@ fn robots_may_show_certificates_instead_of_passwords() {
     drive(&carol);
     carol.flush(LONG).unwrap();
     assert_eq!(site.agents(), ["carol"]);
-    if let Ok(robot) = site.builder("carol", site.nobody()).connect() {
+    if let Ok(robot) = site.builder("carol", site.nobody(), SHORT).connect() {
         drive(&robot);
         robot.flush(SHORT).unwrap_err();
     }

@@ -13,6 +13,7 @@ mod determinism; // the same records, the same map
 mod guidance; // blockages, routes that are followed, pinned trips
 mod journal; // arbitrary journals, and a robot to write readable ones
 mod landmarks; // what sightings teach
+mod lessons; // objects that are taught at once
 mod levels; // where robots are by what they feel
 mod motion; // path integration against closed forms
 mod names; // landmarks that are called by other names

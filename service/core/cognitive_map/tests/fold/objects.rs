@@ -1,8 +1,8 @@
 //! Objects: taught, known again, learned on the spot, forgotten.
 
 use cognitive_map::{
-    CognitiveMap, Event, EventKind, Lesson, Motion, ObjectMark, PoseNoise, Record, Sample,
-    SampleBody, Settings, SettingsValues, SkipReason, Spacing, Touch, TouchLevel, TouchNoise,
+    CognitiveMap, Event, EventKind, Motion, ObjectMark, PoseNoise, Record, Sample, SampleBody,
+    Settings, SettingsValues, SkipReason, Spacing, TouchNoise,
 };
 use object_recognition::{Orientation, Verdict};
 
@@ -29,11 +29,11 @@ pub(crate) const RODS: [(&str, [f64; 12]); 3] = [
         ],
     ),
 ];
-const PITCH_M: f64 = 0.02;
+pub(crate) const PITCH_M: f64 = 0.02;
 /// From one end to the other.
 pub(crate) const UP: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
-fn noise() -> TouchNoise {
+pub(crate) fn noise() -> TouchNoise {
     TouchNoise::new(0.001, 0.02, 0.2).unwrap()
 }
 
@@ -366,16 +366,6 @@ fn a_visit_to_what_was_known_before_does_not_undo_what_was_added() {
     assert_eq!(map.object_count(), 3);
 }
 
-/// A lesson of a rod.
-fn lesson(rod: &[f64]) -> Lesson {
-    let touches = rod.iter().zip(0..).map(|(value, k)| {
-        let felt = TouchLevel::new(label("touch"), *value, 0.2).unwrap();
-        let at = [f64::from(k) * PITCH_M, 0.0, 0.0];
-        Touch::new(at, noise()).unwrap().with_levels(vec![felt])
-    });
-    Lesson::new(Spacing::new(0.01).unwrap(), touches.collect())
-}
-
 #[test]
 fn nothing_unknown_is_learned_where_the_settings_say_so() {
     let learned = |learns| {
@@ -393,51 +383,6 @@ fn nothing_unknown_is_learned_where_the_settings_say_so() {
         map.object_count() - before
     };
     assert_eq!([true, false].map(learned), [1, 0]);
-}
-
-#[test]
-fn a_lesson_teaches_at_once_and_what_is_forgotten_is_unknown() {
-    let mut map = CognitiveMap::new(Settings::default());
-    for ((name, rod), number) in RODS.iter().zip(0..) {
-        let (name, lesson) = (label(name), lesson(rod));
-        let record = Record::TeachObject {
-            number,
-            name,
-            lesson,
-        };
-        run(&mut map, &[record]);
-    }
-    let order = [2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
-    let felt = order.map(|k: u8| (k, RODS[1].1[usize::from(k)]));
-    let asked: Vec<Touch> = felt
-        .map(|(k, value)| {
-            let felt = TouchLevel::new(label("touch"), value, 0.2).unwrap();
-            let at = [f64::from(k) * PITCH_M - 7.0, 1.0, 2.0];
-            Touch::new(at, noise()).unwrap().with_levels(vec![felt])
-        })
-        .to_vec();
-    let knife = map.object_by_name(&label("knife")).unwrap();
-    let posterior = map.identify(&Orientation::Known, &asked).posterior;
-    assert_eq!(posterior.verdict(), Verdict::Object(knife));
-    let name = label("knife");
-    let forgetting = Record::ForgetObject {
-        number: 3,
-        name: name.clone(),
-    };
-    run(&mut map, std::slice::from_ref(&forgetting));
-    assert!(map.object_by_name(&name).is_none() && map.object_count() == 2);
-    let posterior = map.identify(&Orientation::Known, &asked).posterior;
-    assert_ne!(posterior.verdict(), Verdict::Object(knife));
-    // The name may be given again; the number is another one.
-    let lesson = lesson(&RODS[1].1);
-    let teaching = Record::TeachObject {
-        number: 4,
-        name: name.clone(),
-        lesson,
-    };
-    // What comes again has been heard.
-    run(&mut map, &[teaching, forgetting]);
-    assert_ne!(map.object_by_name(&name), Some(knife));
 }
 
 #[test]
