@@ -291,6 +291,21 @@ pub enum EventKind {
         /// The blockages on the way that there would be.
         blockages: Vec<u64>,
     },
+    /// Loops have closed: the agent's pose is corrected by the past relaxed. It comes for each
+    /// agent of the map, whoever closed them, with each relaxation.
+    LoopsClosed {
+        /// Number of loop closures by which the past is relaxed: matches of samples, and revisits
+        /// that were recognised.
+        closures: u64,
+        /// Number of matches of views by which it is.
+        view_matches: u64,
+        /// How far the agent's position has moved \[m\]. Its pose in `odom` goes on smoothly.
+        moved_m: f64,
+        /// How far the agent has turned \[rad\], 0 to π.
+        turned_rad: f64,
+        /// Its position in `map` since \[m\].
+        translation_m: [f64; 3],
+    },
 }
 
 /// What kind of percept a channel carries.

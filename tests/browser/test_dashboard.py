@@ -6,6 +6,7 @@ import json
 import urllib.request
 from typing import Sequence
 
+import cogmap
 from arm import FELT, Arm
 from driver import Driver, Driving
 from conftest import MakeServer, Open
@@ -103,6 +104,31 @@ def test_a_position_recalls_places(service: Server, open_page: Open) -> None:
         page.page.fill(f"input[aria-label='{axis} in metres']", value)
     page.page.click(".cue button")
     eventually("the typed position", lambda: page.stats()["recalled"][:1] == [expected.place.id])
+    assert page.complaints == []
+
+
+def test_routes_and_blockages_are_drawn(service: Server, open_page: Open) -> None:
+    ada = Driver(service, "ada")
+    ada.drive(STEPS)
+    page = open_page(service)
+    page.until_places(10)
+    page.settle()
+    client = service.client()
+    asked = client.route("default", cogmap.AtAgent("ada"), cogmap.AtPlace(3))
+    page.page.mouse.click(*page.place_on_screen(3))
+    page.until("the place", selected={"kind": "place", "id": 3})
+    page.page.get_by_role("button", name="Route here").click()
+    page.until("the route", routeSteps=len(asked.steps))
+    eventually("its length", lambda: "m from ada" in page.text(".place-panel .way"))
+    page.page.keyboard.press("Escape")
+    page.until("nothing chosen", routeSteps=None)
+
+    # A robot follows a route, and something stands in its way elsewhere.
+    client.follow_route("default", "ada", cogmap.AtPlace(8))
+    client.block("default", cogmap.BlockageRequest(at_m=(50.0, 0.0, 0.5), radius_m=1.0))
+    ada.drive(STEPS)
+    page.until("the blockage", blockages=1)
+    page.until("the route that is followed", following=["ada"])
     assert page.complaints == []
 
 

@@ -4,6 +4,7 @@ import { Inspector } from "./inspector";
 import { followKeys } from "./keys";
 import { Memory, type ShownEvent } from "./memory/memory";
 import { AgentList } from "./panel/agent_list";
+import { ChannelList } from "./panel/channel_list";
 import { EventFeed } from "./panel/event_feed";
 import { HealthStrip } from "./panel/health_strip";
 import { Help } from "./panel/help";
@@ -42,6 +43,7 @@ export class App {
   private readonly objects = new ObjectList((name) =>
     this.inspector.choose({ kind: "object", name }),
   );
+  private readonly channels = new ChannelList();
   private readonly legend = new Legend((colour) => this.colourPlaces(colour));
   private readonly feed = new EventFeed();
   private readonly timeline = new Timeline(() => this.showTime());
@@ -59,6 +61,7 @@ export class App {
         agents: this.agentList.element,
         legend: this.legend.element,
         objects: this.objects.element,
+        channels: this.channels.element,
         feed: this.feed.element,
         timeline: this.timeline.element,
         notice: this.notice.element,
@@ -232,6 +235,7 @@ export class App {
     this.agentList.update(memory, palette, picked, focus.followed);
     this.legend.update(memory, palette, this.placeColour);
     this.objects.update(memory, focus.selected?.kind === "object" ? focus.selected.name : null);
+    this.channels.update(memory);
     this.timeline.update(memory, palette);
     this.inspector.fill();
     this.stage.frames.add(performance.now() - began);

@@ -20,6 +20,9 @@ export function figures(app: App) {
         drawCalls: stage.drawCalls,
         selected: stage.focus.selected,
         recalled: stage.focus.recalled?.places.map(({ place }) => place.id) ?? null,
+        routeSteps: stage.focus.route?.steps.length ?? null,
+        following: [...(memory?.wayfinding.followed.keys() ?? [])],
+        blockages: memory?.wayfinding.blockages.length ?? 0,
         time: stage.focus.time,
         view: stage.view,
       };

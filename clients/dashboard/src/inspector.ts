@@ -6,7 +6,7 @@ import type { Memory } from "./memory/memory";
 import { AgentPanel } from "./panel/agent_panel";
 import type { Layout } from "./panel/layout";
 import { ObjectPanel } from "./panel/object_panel";
-import { PlacePanel } from "./panel/place_panel";
+import { nearest, PlacePanel, routeInWords } from "./panel/place_panel";
 import { RecallPanel } from "./panel/recall_panel";
 import { Problem } from "./problem";
 import { agentColour } from "./scene/palette";
@@ -31,10 +31,11 @@ export class Inspector {
   readonly panels: HTMLElement[];
   isAiming = false;
   private readonly agentPanel: AgentPanel;
-  private readonly placePanel = new PlacePanel(
-    (at) => void this.recall(at),
-    () => this.choose(null),
-  );
+  private readonly placePanel = new PlacePanel({
+    recall: (at) => void this.recall(at),
+    route: (place) => void this.route(place),
+    close: () => this.choose(null),
+  });
   private readonly objectPanel = new ObjectPanel(() => this.choose(null));
   private readonly recallPanel: RecallPanel;
   private memory: Memory | null = null;
@@ -82,6 +83,7 @@ export class Inspector {
   choose(picked: Picked | null): void {
     const focus = this.stage.focus;
     focus.selected = picked;
+    focus.route = null;
     if (picked?.kind === "agent") {
       if (this.lastAgent !== picked.name) {
         this.grid = this.detail = focus.fields = null;
@@ -147,6 +149,34 @@ export class Inspector {
       }
     } catch (error) {
       this.recallPanel.show(at, [], Problem.from(error).message);
+    }
+    this.stage.invalidate();
+  }
+
+  /** Asks for a route to a place, from the agent that was chosen last or else is nearest. */
+  private async route(place: number): Promise<void> {
+    const memory = this.memory;
+    const at = memory?.cloud.positionOf(place) ?? null;
+    if (memory === null || at === null) {
+      return;
+    }
+    const last = memory.agents.get(this.lastAgent ?? "");
+    const agent = last?.live.status === "lost" ? undefined : last;
+    const name = (agent ?? nearest(memory, at))?.name;
+    if (name === undefined) {
+      this.placePanel.route = "No agent knows where it is.";
+      return;
+    }
+    const selected = this.stage.focus.selected;
+    try {
+      const route = await memory.space.route(name, place);
+      if (this.stage.focus.selected === selected) {
+        const steps = route.steps.map(({ translation_m }) => translation_m);
+        this.stage.focus.route = { agent: name, steps };
+        this.placePanel.route = routeInWords(name, route);
+      }
+    } catch (error) {
+      this.placePanel.route = Problem.from(error).message;
     }
     this.stage.invalidate();
   }

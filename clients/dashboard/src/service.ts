@@ -7,7 +7,10 @@ import { token } from "./token";
 import type {
   AgentDetail,
   AgentObject,
+  Blockage,
+  Channel,
   EventRecord,
+  FollowedRoute,
   GridState,
   Landmark,
   Leg,
@@ -17,6 +20,7 @@ import type {
   Prediction,
   Quat,
   RecalledPlace,
+  Route,
   SpaceInfo,
   Trajectory,
   Trip,
@@ -114,6 +118,23 @@ export class Space {
   async recall(positionM: Vec3, limit: number): Promise<RecalledPlace[]> {
     const body = { position_m: positionM, limit };
     return (await post<{ places: RecalledPlace[] }>(`${this.base}/recall`, body)).places;
+  }
+
+  /** The shortest route over the team's ways, from where an agent is to a place. */
+  route(agent: string, place: number): Promise<Route> {
+    return post(`${this.base}/route`, { from: { agent }, to: { place } });
+  }
+
+  followedRoute(agent: string): Promise<FollowedRoute> {
+    return get(`${this.agentPath(agent)}/route`);
+  }
+
+  async blockages(): Promise<Blockage[]> {
+    return (await get<{ blockages: Blockage[] }>(`${this.base}/blockages`)).blockages;
+  }
+
+  async channels(): Promise<Channel[]> {
+    return (await get<{ channels: Channel[] }>(`${this.base}/channels`)).channels;
   }
 
   agent(name: string): Promise<AgentDetail> {

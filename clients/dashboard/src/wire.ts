@@ -220,3 +220,41 @@ export interface AgentObject {
     identification: Identification | null;
   } | null;
 }
+
+/** A step of a route: where it leads. */
+export interface RouteStep {
+  place: number | null;
+  translation_m: Vec3;
+}
+
+export interface Route {
+  length_m: number;
+  duration_s: number;
+  sd_m: number;
+  steps: RouteStep[];
+}
+
+/** What is left of the route that an agent follows. */
+export interface FollowedRoute {
+  agent: string;
+  length_m: number;
+  duration_s: number;
+  steps: RouteStep[];
+}
+
+/** A place, the way between two, or a ball, across which no route leads. */
+export interface Blockage {
+  id: number;
+  place: number | null;
+  from: number | null;
+  to: number | null;
+  at_m: Vec3 | null;
+  radius_m: number | null;
+}
+
+export interface Channel {
+  name: string;
+  kind: "level" | "descriptor";
+  views: number | null;
+  learned: { range_m: number; information_nats: number; independence: number } | null;
+}

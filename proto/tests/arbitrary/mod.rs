@@ -225,6 +225,19 @@ fn reasons() -> impl Strategy<Value = SkipReason> {
     ]
 }
 
+fn loops_closed(floats: &Floats) -> impl Strategy<Value = EventKind> + use<> {
+    let (lengths, position) = ((floats.clone(), floats.clone()), uniform3(floats.clone()));
+    (any::<u64>(), any::<u64>(), lengths, position).prop_map(
+        |(closures, view_matches, (moved_m, turned_rad), translation_m)| EventKind::LoopsClosed {
+            closures,
+            view_matches,
+            moved_m,
+            turned_rad,
+            translation_m,
+        },
+    )
+}
+
 pub(crate) fn events(floats: &Floats) -> impl Strategy<Value = Event> + use<> {
     let number = any::<u64>;
     let three = || uniform3(floats.clone());
@@ -260,6 +273,7 @@ pub(crate) fn events(floats: &Floats) -> impl Strategy<Value = Event> + use<> {
             }),
             (number(), number()).prop_map(|(trip, legs)| EventKind::TripForgotten { trip, legs }),
             three().prop_map(|translation_m| EventKind::AgentPlaced { translation_m }),
+            loops_closed(floats),
             (number(), any::<String>(), number(), floats.clone()).prop_map(
                 |(place, channel, percepts, surprise)| EventKind::PerceptSurprising {
                     place,

@@ -240,7 +240,7 @@ fn object_events() -> [(&'static str, EventKind); 7] {
 }
 
 #[expect(clippy::too_many_lines, reason = "a list: each kind once")]
-fn event_kinds() -> [(&'static str, EventKind); 15] {
+fn event_kinds() -> [(&'static str, EventKind); 16] {
     let session = 1_800_000_000_000_000_000;
     let landmark = "porte 3, étage α".to_owned();
     [
@@ -301,6 +301,16 @@ fn event_kinds() -> [(&'static str, EventKind); 15] {
         (
             "trip_forgotten",
             EventKind::TripForgotten { trip: 2, legs: 14 },
+        ),
+        (
+            "loops_closed",
+            EventKind::LoopsClosed {
+                closures: 12,
+                view_matches: 340,
+                moved_m: 0.75,
+                turned_rad: 0.0625,
+                translation_m: [4.5, -1.25, 0.0],
+            },
         ),
         (
             "agent_placed",

@@ -2,7 +2,7 @@
 
 use cogmap_proto as wire;
 use cognitive_map::{
-    ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, Label, SkipReason,
+    ChannelKind, CognitiveMap, Event, EventKind, InvalidSample, Label, LoopsClosed, SkipReason,
 };
 
 use super::guidance::route_event;
@@ -87,6 +87,7 @@ fn event_kind(map: &CognitiveMap, kind: &EventKind) -> Option<wire::EventKind> {
         EventKind::AgentPlaced { position } => wire::EventKind::AgentPlaced {
             translation_m: position.coords.into(),
         },
+        EventKind::LoopsClosed(closed) => loops_closed(closed),
         EventKind::ObjectsNarrowed { .. }
         | EventKind::ObjectRecognised { .. }
         | EventKind::ObjectUnknown
@@ -103,6 +104,17 @@ fn event_kind(map: &CognitiveMap, kind: &EventKind) -> Option<wire::EventKind> {
         },
         EventKind::PerceptCompared { .. } => surprise(map, kind)?,
     })
+}
+
+/// What closed loops have brought an agent.
+fn loops_closed(closed: &LoopsClosed) -> wire::EventKind {
+    wire::EventKind::LoopsClosed {
+        closures: closed.closures as u64,
+        view_matches: closed.view_matches as u64,
+        moved_m: closed.moved_m,
+        turned_rad: closed.turned_rad,
+        translation_m: closed.position.coords.into(),
+    }
 }
 
 /// A percept that surprises; none of one that does not, and of anything else.

@@ -47,7 +47,7 @@ pub use sequence::sequence;
 pub use space::space_info;
 pub use trajectory::{agent_at, stamped, trajectory};
 pub use trip::{leg, trip, trip_detail};
-pub use way_graph::{graphml, nav2};
+pub use way_graph::{RouteGraph, graphml, nav2};
 
 /// Frame of all positions in answers.
 pub const FRAME: &str = "map";

@@ -5,7 +5,8 @@ use std::fmt::Write;
 
 use cognitive_map::{CognitiveMap, PlaceId, Reverse, ThinnedTraversal, ThinnedWay};
 use nalgebra::Vector3;
-use serde_json::{Value, json};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::FRAME;
 
@@ -113,45 +114,108 @@ pub fn graphml(map: &CognitiveMap, tolerance_m: f64, reverse: Reverse) -> String
     text
 }
 
+/// A graph for the Route Server of Nav2, as `GeoJSON`.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(tag = "type")]
+pub enum RouteGraph {
+    /// The graph.
+    FeatureCollection {
+        /// Name of the space.
+        name: String,
+        /// Nodes, then edges.
+        features: Vec<RouteFeature>,
+    },
+}
+
+/// A node or an edge of a graph for the Route Server.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(tag = "type")]
+pub enum RouteFeature {
+    /// One of both.
+    Feature {
+        /// What it is.
+        properties: RouteProperties,
+        /// Where it is.
+        geometry: RouteGeometry,
+    },
+}
+
+/// What a node or an edge for the Route Server is.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum RouteProperties {
+    /// An edge, in one direction.
+    Edge {
+        /// Its number, beyond those of places.
+        id: u64,
+        /// Number of the place where it begins.
+        startid: u32,
+        /// Number of the place where it ends.
+        endid: u32,
+        /// More of it.
+        metadata: RouteEdge,
+    },
+    /// A node.
+    Node {
+        /// Number of the place.
+        id: u32,
+        /// Its frame: `map`.
+        frame: &'static str,
+    },
+}
+
+/// What is known of an edge for the Route Server.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct RouteEdge {
+    /// How long it takes \[s\].
+    abs_time_taken: f64,
+    /// Length along the way that it stands for \[m\].
+    length_m: f64,
+    /// Whether somebody travelled all of it in this direction.
+    travelled: bool,
+}
+
+/// Where a node or an edge for the Route Server is, in the plane \[m\].
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(tag = "type", content = "coordinates")]
+pub enum RouteGeometry {
+    /// A node.
+    Point([f64; 2]),
+    /// An edge: one line from its beginning to its end.
+    MultiLineString([[[f64; 2]; 2]; 1]),
+}
+
 /// The ways as a graph for the Route Server of Nav2, which takes straight edges in the plane: nodes
 /// with the numbers of places, edges in each direction with the numbers after those.
-pub fn nav2(space: &str, map: &CognitiveMap, tolerance_m: f64, reverse: Reverse) -> String {
+pub fn nav2(space: &str, map: &CognitiveMap, tolerance_m: f64, reverse: Reverse) -> RouteGraph {
     let graph = Graph::of(map, tolerance_m, reverse);
-    let nodes = graph.nodes.iter().map(|(place, at)| {
-        json!({
-            "type": "Feature",
-            "properties": { "id": place.0, "frame": FRAME },
-            "geometry": { "type": "Point", "coordinates": [at.x, at.y] },
-        })
+    let nodes = graph.nodes.iter().map(|(place, at)| RouteFeature::Feature {
+        properties: RouteProperties::Node {
+            id: place.0,
+            frame: FRAME,
+        },
+        geometry: RouteGeometry::Point([at.x, at.y]),
     });
-    let first = graph
-        .nodes
-        .keys()
-        .next_back()
-        .map_or(0, |last| u64::from(last.0) + 1);
+    let last = graph.nodes.keys().next_back();
+    let first = last.map_or(0, |last| u64::from(last.0) + 1);
     let edges = (first..).zip(graph.arcs()).filter_map(|(id, arc)| {
         let ends = [graph.nodes.get(&arc.from)?, graph.nodes.get(&arc.to)?];
-        let line = ends.map(|end| [end.x, end.y]);
-        Some(json!({
-            "type": "Feature",
-            "properties": {
-                "id": id,
-                "startid": arc.from.0,
-                "endid": arc.to.0,
-                "metadata": {
-                    "abs_time_taken": arc.traversal.duration_s,
-                    "length_m": arc.way.length_m,
-                    "travelled": arc.traversal.is_travelled,
+        Some(RouteFeature::Feature {
+            properties: RouteProperties::Edge {
+                id,
+                startid: arc.from.0,
+                endid: arc.to.0,
+                metadata: RouteEdge {
+                    abs_time_taken: arc.traversal.duration_s,
+                    length_m: arc.way.length_m,
+                    travelled: arc.traversal.is_travelled,
                 },
             },
-            "geometry": { "type": "MultiLineString", "coordinates": [line] },
-        }))
+            geometry: RouteGeometry::MultiLineString([ends.map(|end| [end.x, end.y])]),
+        })
     });
-    let features: Vec<Value> = nodes.chain(edges).collect();
-    let collection = json!({
-        "type": "FeatureCollection",
-        "name": space,
-        "features": features,
-    });
-    collection.to_string()
+    RouteGraph::FeatureCollection {
+        name: space.to_owned(),
+        features: nodes.chain(edges).collect(),
+    }
 }

@@ -10,7 +10,7 @@ use axum::extract::State;
 use axum::http::Response;
 use axum::http::header::{CONTENT_DISPOSITION, HeaderValue};
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
-use cogmap_proto::{AgentSummary, Landmark, Place, SpaceInfo, TripDetail, Way};
+use cogmap_proto::{AgentSummary, Codec, Landmark, Place, SpaceInfo, TripDetail, Way};
 use cognitive_map::Reverse;
 use futures_util::stream;
 use pose_graph::g2o::write_g2o;
@@ -26,7 +26,7 @@ use super::reply;
 use super::state::Service;
 use super::trajectory::TUM;
 use crate::answer::agent_once_named;
-use crate::encode;
+use crate::encode::{self, RouteGraph};
 use crate::engine::Space;
 
 /// Legal tolerances of thinned ways \[m\].
@@ -128,7 +128,7 @@ pub(crate) struct MapExport {
         (status = 200, description = "The map", content(
             (MapExport = "application/json"), (String = "text/plain"),
             (Vec<u8> = "application/octet-stream"),
-            (String = "application/graphml+xml"), (String = "application/geo+json"))),
+            (String = "application/graphml+xml"), (RouteGraph = "application/geo+json"))),
         (status = 404, description = "There is no such space or agent"),
         (status = 410, description = "The agent has been removed: name one of its sessions"),
         (status = 422, description = "Parameters do not go together, such as `agent` with another format than `tum`")))]
@@ -159,9 +159,9 @@ pub(crate) async fn get(
             let room = long.enter()?;
             let text = long.make(move || {
                 if is_nav2 {
-                    encode::nav2(&name, &map, tolerance_m, reverse)
+                    Codec::Json.encode(&encode::nav2(&name, &map, tolerance_m, reverse))
                 } else {
-                    encode::graphml(&map, tolerance_m, reverse)
+                    encode::graphml(&map, tolerance_m, reverse).into_bytes()
                 }
             });
             let (body, (media_type, ending)) = (Body::from(text.await?), graph_type(is_nav2));

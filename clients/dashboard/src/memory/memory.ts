@@ -6,6 +6,7 @@ import { LiveStream } from "../stream";
 import { Problem } from "../problem";
 import type { Space } from "../service";
 import type {
+  Channel,
   Counts,
   EventRecord,
   Health,
@@ -18,6 +19,7 @@ import { Agent } from "./agent";
 import { Clock } from "./clock";
 import { Cloud } from "./cloud";
 import { TripLog } from "./trip_log";
+import { Wayfinding } from "./wayfinding";
 
 const BY_NAME = new Intl.Collator("en", { numeric: true }).compare;
 /** Ticks a second: estimates come in groups of some tens of milliseconds. */
@@ -34,6 +36,8 @@ const EVENTS_MAX = 1500;
 /** How often it asks for what ticks leave out [ms]. */
 const REFRESH_MS = 2000;
 const TOUCH_MS = 400;
+/** How often it asks what was learned of the channels [ms]. */
+const CHANNELS_MS = 10_000;
 /** Agents whose episodes are asked for at a time: judging one takes the service milliseconds. */
 const TOUCHING_MAX = 4;
 
@@ -64,6 +68,8 @@ export class Memory {
   readonly trips = new TripLog(this.clock);
   landmarks: Landmark[] = [];
   objects: ObjectSummary[] = [];
+  channels: Channel[] = [];
+  readonly wayfinding = new Wayfinding();
   readonly events: ShownEvent[] = [];
   counts: Counts = { agents: 0, places: 0, trips: 0, landmarks: 0, objects: 0 };
   health: Health | null = null;
@@ -80,6 +86,7 @@ export class Memory {
   private readonly timers: number[];
   private cloudRevision: bigint | null = null;
   private seenCounts = "";
+  private channelsMs = -Infinity;
   private nColours = 0;
   private isRefreshing = false;
   private hasTrips = false;
@@ -189,6 +196,7 @@ export class Memory {
     const fresh = earlier.filter(({ id }) => !known.has(id));
     this.events.unshift(...fresh);
     for (const { kind, event, s } of fresh) {
+      this.wayfinding.note(kind, event.agent);
       if (kind === "agent_placed") {
         this.agents.get(event.agent)?.track.part(s);
       }
@@ -199,6 +207,7 @@ export class Memory {
   /** What an event says of the map is shown at once; the next reading of the map makes it exact. */
   private remember({ kind, fields, s, event }: ShownEvent): void {
     const place = fields["place"] as number;
+    this.wayfinding.note(kind, event.agent);
     if (kind === "place_recruited") {
       this.cloud.recruit(place, fields["translation_m"] as never, s);
     } else if (kind === "place_forgotten") {
@@ -237,6 +246,8 @@ export class Memory {
         this.cloudRevision = file.revision;
         this.isLoaded = true;
         this.landmarks = await this.space.landmarks();
+        await this.wayfinding.read(this.space);
+        await this.readChannels();
       }
       if (!this.hasTrips) {
         this.hasTrips = true;
@@ -257,6 +268,13 @@ export class Memory {
       console.debug("cogmap: the map was not read:", Problem.from(error).message);
     } finally {
       this.isRefreshing = false;
+    }
+  }
+
+  private async readChannels(): Promise<void> {
+    if (performance.now() - this.channelsMs > CHANNELS_MS) {
+      this.channelsMs = performance.now();
+      this.channels = await this.space.channels();
     }
   }
 

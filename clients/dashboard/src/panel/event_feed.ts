@@ -21,6 +21,8 @@ export function inWords({ kind, fields }: ShownEvent): string | null {
       const [x, y, z] = fields["translation_m"] as Vec3;
       return `was found at ${[x, y, z].map((c) => metres(c).replace(" m", "")).join(", ")} m`;
     }
+    case "loops_closed":
+      return `closed loops and moved by ${metres(Number(fields["moved_m"]))}`;
     case "trip_ended":
       if (fields["reason"] === "full") {
         return null; // The next one continues it.
@@ -50,6 +52,12 @@ export function inWords({ kind, fields }: ShownEvent): string | null {
       return `lost samples ${text("from")} to ${text("to")}`;
     case "trip_forgotten":
       return `made room: trip ${text("trip")} was forgotten`;
+    case "route_left":
+      return "goes another way";
+    case "route_done":
+      return "has arrived";
+    case "route_failed":
+      return `gave up its route (${text("reason").replaceAll("_", " ")})`;
     case "agent_removed":
       return "was removed";
     default:

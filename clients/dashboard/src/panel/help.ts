@@ -33,13 +33,15 @@ export class Help {
         ),
         sign(h("span", { class: "sign dot" }), "point: a place that the team remembers"),
         sign(h("span", { class: "sign line" }), "thin line: a trip from place to place"),
+        sign(h("span", { class: "sign line thick" }), "thick line: a route that an agent follows"),
+        sign(h("span", { class: "sign flash blocked" }), "red ring: no route leads across here"),
         sign(
           h("span", { class: "sign ray" }),
           "short ray: a sighting; the thick ones are of other agents",
         ),
         sign(
           h("span", { class: "sign flash" }),
-          "flash: found, recognised, learned, merged, come back to",
+          "flash: found, corrected by a loop, recognised, learned, merged, come back to",
         ),
       ),
       h(

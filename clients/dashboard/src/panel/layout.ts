@@ -14,6 +14,7 @@ export interface Parts {
   agents: HTMLElement;
   legend: HTMLElement;
   objects: HTMLElement;
+  channels: HTMLElement;
   feed: HTMLElement;
   timeline: HTMLElement;
   notice: HTMLElement;
@@ -93,7 +94,14 @@ export class Layout {
       "aside",
       { class: "left" },
       h("section", { class: "card" }, h("h3", {}, "Team"), parts.agents),
-      h("section", { class: "card" }, h("h3", {}, "Memory"), parts.legend, parts.objects),
+      h(
+        "section",
+        { class: "card" },
+        h("h3", {}, "Memory"),
+        parts.legend,
+        parts.objects,
+        parts.channels,
+      ),
     );
     this.right = h("aside", { class: "right" }, ...parts.inspected);
     const bottom = h(

@@ -4,10 +4,16 @@ import { conjugate, multiply, rotate } from "../grid/lattice";
 import type { Agent } from "../memory/agent";
 import type { Memory } from "../memory/memory";
 import { Problem } from "../problem";
-import type { Place, Prediction, Vec3 } from "../wire";
+import type { Place, Prediction, Route, Vec3 } from "../wire";
 import { button, CLOSE, h, say } from "./dom";
 import { Facts } from "./facts";
 import { deviation, exact, metres, percent, position, time } from "./format";
+
+export interface PlaceActions {
+  recall(at: Vec3): void;
+  route(place: number): void;
+  close(): void;
+}
 
 export class PlacePanel {
   readonly element = h("section", { class: "inspect place-panel" });
@@ -18,14 +24,20 @@ export class PlacePanel {
   private readonly expectedTitle = h("h3");
   private readonly note = h("p", { class: "soft" });
 
-  /** @param recall - Called with the position of the place. @param close - Called to let go. */
-  constructor(recall: (at: Vec3) => void, close: () => void) {
-    let here: Vec3 | null = null;
-    this.position = (at) => (here = at);
+  private readonly way = h("p", { class: "soft way" });
+  private here: Vec3 | null = null;
+  private id = 0;
+
+  constructor(actions: PlaceActions) {
     const ask = button(
       "Recall from here",
       "Ask which places answer at this position (R)",
-      () => here !== null && recall(here),
+      () => this.here !== null && actions.recall(this.here),
+    );
+    const route = button(
+      "Route here",
+      "The shortest route over the team's ways, from the agent that was chosen last",
+      () => actions.route(this.id),
     );
     this.element.append(
       h(
@@ -33,9 +45,10 @@ export class PlacePanel {
         {},
         h("span", { class: "mark place" }),
         this.name,
-        button("", "Close", close, CLOSE),
+        button("", "Close", () => actions.close(), CLOSE),
       ),
-      h("div", { class: "actions" }, ask),
+      h("div", { class: "actions" }, ask, route),
+      this.way,
       this.facts.element,
       h("h3", {}, "Who was there"),
       this.visitors,
@@ -45,17 +58,21 @@ export class PlacePanel {
     );
   }
 
-  private readonly position: (at: Vec3) => void;
+  /** Says what a route to the place is like, or why there is none. */
+  set route(text: string) {
+    say(this.way, text);
+  }
 
   /** Asks for a place, and what the agent that is nearest would feel there. */
   async show(id: number, memory: Memory, isWanted: () => boolean): Promise<void> {
     say(this.name, `Place ${id}`);
+    [this.id, this.route] = [id, ""];
     try {
       const place = await memory.space.place(id);
       if (!isWanted()) {
         return;
       }
-      this.position(place.translation_m);
+      this.here = place.translation_m;
       this.showFacts(place);
       this.showVisitors(place, memory);
       const agent = nearest(memory, place.translation_m);
@@ -149,7 +166,7 @@ export class PlacePanel {
 }
 
 /** The agent that has the shortest way to a position, of those that know where they are. */
-function nearest(memory: Memory, at: Vec3): Agent | null {
+export function nearest(memory: Memory, at: Vec3): Agent | null {
   let found: Agent | null = null;
   let least = Infinity;
   for (const agent of memory.agents.values()) {
@@ -167,4 +184,10 @@ async function predictAt(place: Place, memory: Memory, agent: Agent): Promise<Pr
   const away = place.translation_m.map((x, i) => x - from[i]!) as Vec3;
   const back = conjugate(turned);
   return memory.space.predict(agent.name, rotate(back, away), multiply(back, turned));
+}
+
+/** A route in a few words. */
+export function routeInWords(agent: string, { length_m, duration_s, sd_m }: Route): string {
+  const length = `${metres(length_m)} from ${agent}`;
+  return `${length}, some ${Math.round(duration_s)} s, sure to ±${deviation(sd_m)} at its end.`;
 }

@@ -131,6 +131,7 @@ export class Timeline {
     const { clientWidth: width, clientHeight: height } = this.marks;
     const heights: Record<string, number> = {
       agent_placed: 1,
+      loops_closed: 0.6,
       object_recognised: 1,
       objects_merged: 1,
       object_learned: 0.8,

@@ -7,6 +7,7 @@ import type { Flash } from "./rings";
 /** Radius [px], alpha and duration [ms] of a flash. */
 const FLASHES: Record<string, [number, number, number]> = {
   agent_placed: [90, 1, 2600],
+  loops_closed: [64, 0.9, 1800],
   object_recognised: [70, 1, 2200],
   objects_merged: [70, 1, 2200],
   object_split: [70, 1, 2200],

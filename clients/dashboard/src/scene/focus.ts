@@ -15,17 +15,24 @@ export interface Fields {
   colour: string;
 }
 
+/** A route that was asked for: an agent, and the positions after it. */
+export interface AskedRoute {
+  agent: string;
+  steps: Vec3[];
+}
+
 export interface Focus {
   /** The agent, landmark or place that was chosen. */
   selected: Picked | null;
   /** The agent that stays in the middle. */
   followed: string | null;
   recalled: Recalled | null;
+  route: AskedRoute | null;
   fields: Fields | null;
   /** Time that is shown [s]; null for now. */
   time: number | null;
 }
 
 export function noFocus(): Focus {
-  return { selected: null, followed: null, recalled: null, fields: null, time: null };
+  return { selected: null, followed: null, recalled: null, route: null, fields: null, time: null };
 }

@@ -56,6 +56,7 @@ export const PALETTES: Record<Shade, Palette> = {
     labelHalo: "#070b12",
     flash: {
       agent_placed: "#8dffc4",
+      loops_closed: "#b9a2ff",
       object_recognised: "#ffe38a",
       objects_merged: "#ffe38a",
       object_split: "#ffb38a",
@@ -96,6 +97,7 @@ export const PALETTES: Record<Shade, Palette> = {
     labelHalo: "#f5f8fc",
     flash: {
       agent_placed: "#0f9d62",
+      loops_closed: "#6a3fd0",
       object_recognised: "#b07f00",
       objects_merged: "#b07f00",
       object_split: "#b3541a",

@@ -14,6 +14,7 @@ import { agentLabel, landmarkLabels, markLabels, recallLabels } from "./naming";
 import { agentColour, PALETTES, rgb, type Palette } from "./palette";
 import { Projection, type Picked } from "./picker";
 import { Places, type PlaceColour } from "./places";
+import { Routes } from "./routes";
 import { Things } from "./things";
 import { Trails } from "./trails";
 import { Trips } from "./trips";
@@ -34,6 +35,7 @@ export class Stage {
   private readonly floor = new Floor();
   private readonly trips = new Trips();
   private readonly trails = new Trails();
+  private readonly routes = new Routes();
   private readonly things = new Things();
   private readonly movement = new Movement();
   private readonly labels: Labels;
@@ -61,7 +63,9 @@ export class Stage {
     this.eye = new Eye(element, () => this.invalidate());
     this.eye.controls.addEventListener("start", () => (this.isTouched = true));
     const { ellipsoids, rays, solids, rings } = this.things;
-    const lines = [this.floor, this.trips, this.trails].map((layer) => layer.lines.mesh);
+    const lines = [this.floor, this.trips, this.trails, this.routes].map(
+      (layer) => layer.lines.mesh,
+    );
     [...lines, ellipsoids.mesh, rays.lines.mesh, solids.mesh, rings.mesh].forEach((mesh, order) => {
       mesh.renderOrder = 2 * order;
       this.scene.add(mesh);
@@ -214,7 +218,7 @@ export class Stage {
     this.renderer.setSize(this.width, this.height, false);
     this.labels.resize(this.width, this.height, ratio);
     this.eye.resize(this.width, this.height, this.insets);
-    for (const { lines } of [this.floor, this.trips, this.trails, this.things.rays]) {
+    for (const { lines } of [this.floor, this.trips, this.trails, this.routes, this.things.rays]) {
       lines.resize(this.width, this.height);
     }
     if (!this.isTouched && this.fitted > 0) {
@@ -262,6 +266,7 @@ export class Stage {
     this.trails.lines.uniform("uNow", now);
     this.trips.lines.uniform("uNow", until);
     const { poses } = this.movement;
+    this.routes.update(memory, focus, poses, palette);
     const floorZ = this.floor.z;
     const radiusM = bounds.radius;
     this.things.draw({ memory, poses, focus, palette, nowMs, pixel, radiusM, floorZ });

@@ -1,6 +1,7 @@
 /** Agents and landmarks with their uncertainty, marks, sightings and flashes. */
 
 import type { Memory, ShownEvent } from "../memory/memory";
+import { blockedAt } from "../memory/wayfinding";
 import type { TrackPose } from "../memory/track";
 import type { LiveSighting, Status, Vec3 } from "../wire";
 import { Ellipsoids } from "./ellipsoids";
@@ -17,6 +18,8 @@ const AGENT_PX = 10;
 const PAST_SIZE = 0.75;
 const LANDMARK_M = 0.04;
 const LANDMARK_PX = 5;
+/** Blockages that are shown. */
+const BLOCKAGES_MAX = 64;
 /** The shape says how an agent is localised. */
 const SHAPES: Record<Status, Shape> = { localized: "dart", uncertain: "octahedron", lost: "cube" };
 
@@ -61,7 +64,7 @@ export class Things {
     this.isRestless = false;
     this.solids.begin(n);
     this.ellipsoids.begin(n);
-    this.rings.begin(nowMs, 3 * n + nPoints + 4);
+    this.rings.begin(nowMs, 3 * n + nPoints + BLOCKAGES_MAX + 4);
     this.rays.begin(nowMs);
     this.drawLandmarks(drawing);
     for (const [name, pose] of poses) {
@@ -117,6 +120,14 @@ export class Things {
     const at = selected?.kind === "place" ? memory.cloud.positionOf(selected.id) : null;
     if (at !== null) {
       this.rings.add(mark(at, rgb(palette.label), 11));
+    }
+    const red = rgb(palette.status.lost);
+    for (const blockage of memory.wayfinding.blockages.slice(0, BLOCKAGES_MAX)) {
+      const centre = focus.time === null ? blockedAt(blockage, memory.cloud) : null;
+      if (centre !== null) {
+        const radiusM = blockage.radius_m ?? 0;
+        this.rings.add({ ...mark(centre, red, 9), radiusM, thickness: 0.05 });
+      }
     }
     for (const centre of fields?.at ?? []) {
       const { radiusM, colour } = fields!;

@@ -282,6 +282,26 @@ class RouteFailed:
 
 
 @dataclass(frozen=True)
+class LoopsClosed:
+    """Loops have closed: the agent's pose is corrected by the past relaxed.
+
+    It comes for each agent of the map, whoever closed them, with each relaxation.
+    """
+
+    TAG: ClassVar[str] = "loops_closed"
+    #: Number of loop closures by which the past is relaxed.
+    closures: int
+    #: Number of matches of views by which it is.
+    view_matches: int
+    #: How far the agent's position has moved [m]. Its pose in `odom` goes on smoothly.
+    moved_m: float
+    #: How far the agent has turned [rad], 0 to pi.
+    turned_rad: float
+    #: Its position in `map` since [m].
+    translation_m: Vec3
+
+
+@dataclass(frozen=True)
 class UnknownKind:
     """Something that this version of the package has no word for."""
 
@@ -317,6 +337,7 @@ EventKind = Union[
     RouteLeft,
     RouteDone,
     RouteFailed,
+    LoopsClosed,
     UnknownKind,
 ]
 

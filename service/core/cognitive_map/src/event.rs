@@ -74,6 +74,8 @@ pub enum EventKind {
         /// Its position in `map` \[m\].
         position: Point3<f64>,
     },
+    /// Loops have closed: the agent's pose is corrected by the past relaxed.
+    LoopsClosed(LoopsClosed),
     /// A landmark was seen for the first time.
     LandmarkLearned {
         /// The landmark.
@@ -205,6 +207,21 @@ pub enum EventKind {
         /// Its name.
         name: Label,
     },
+}
+
+/// What closed loops have brought an agent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoopsClosed {
+    /// Number of loop closures by which the past is relaxed.
+    pub closures: usize,
+    /// Number of matches of views by which it is.
+    pub view_matches: usize,
+    /// How far the agent's position has moved \[m\].
+    pub moved_m: f64,
+    /// How far it has turned \[rad\], 0 to π.
+    pub turned_rad: f64,
+    /// Its position in `map` since \[m\].
+    pub position: Point3<f64>,
 }
 
 /// Why an agent follows another route than before, and which.

@@ -14,7 +14,7 @@ mod route;
 mod settings;
 
 pub use agent::{Agent, Status};
-pub use event::{Event, EventKind, RouteFailure, RouteLeft};
+pub use event::{Event, EventKind, LoopsClosed, RouteFailure, RouteLeft};
 pub use fold::{
     CheckpointPage, CognitiveMap, CorruptCheckpoint, Localization, Predicted, Prediction,
 };

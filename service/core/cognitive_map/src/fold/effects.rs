@@ -1,10 +1,13 @@
 //! What the estimator brings about: kept in the keyframe graph, and applied to landmarks and
 //! places.
 
+use nalgebra::Isometry3;
+
 use super::CognitiveMap;
 use super::apply::Fold;
 use crate::estimator::{AgentSighted, Effect, FramesMerged};
-use crate::input::Relation;
+use crate::event::{Event, EventKind, LoopsClosed};
+use crate::input::{AgentId, Relation};
 use crate::keyframes::{Moment, Refined, RelaxationJob, ViewChannel};
 use crate::memory::place::PlaceId;
 use pose_graph::PoseGraph;
@@ -109,15 +112,40 @@ impl Fold<'_> {
     pub(super) fn relax_matches(&mut self) {
         let (agent, stamp_ns) = (self.agent_id.0, self.stamp_ns);
         for correction in self.keyframes.go_on_relaxing(agent, stamp_ns) {
+            let before = self.estimator.in_frame(correction.agent).copied();
             self.estimator
                 .fuse(correction.agent, &correction.estimate, &mut self.effects);
             self.apply_effects();
+            self.tell_closed_loops(correction.agent, before);
         }
         self.keyframes.begin_relaxation(agent, stamp_ns);
     }
 }
 
 impl Fold<'_> {
+    /// Tells that an agent was corrected by loops; `before` is its pose until then. A past that is
+    /// relaxed by what many saw at the same time alone closes none.
+    fn tell_closed_loops(&mut self, agent: u32, before: Option<Isometry3<f64>>) {
+        let (Some(before), Some(now)) = (before, self.estimator.in_frame(agent)) else {
+            return;
+        };
+        let graph = &self.keyframes.graph;
+        let closed = LoopsClosed {
+            closures: graph.n_closures_accepted(),
+            view_matches: graph.n_view_matches(),
+            moved_m: (now.translation.vector - before.translation.vector).norm(),
+            turned_rad: now.rotation.angle_to(&before.rotation),
+            position: now.translation.vector.into(),
+        };
+        if closed.closures + closed.view_matches > 0 {
+            self.events.push(Event {
+                agent: AgentId(agent),
+                stamp_ns: self.stamp_ns,
+                kind: EventKind::LoopsClosed(closed),
+            });
+        }
+    }
+
     /// Moves some of the places that turned out to be elsewhere.
     pub(super) fn move_places(&mut self) {
         for (place, at) in self.keyframes.graph.moved_places() {

@@ -115,6 +115,11 @@ impl KeyframeGraph {
         self.add_constraint(constraint) != NONE
     }
 
+    /// Number of matches of views by which the past is relaxed.
+    pub fn n_view_matches(&self) -> usize {
+        self.matches.len()
+    }
+
     /// Number of accepted closures.
     pub fn n_closures_accepted(&self) -> usize {
         self.constraints.n_accepted()

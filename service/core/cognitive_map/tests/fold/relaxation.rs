@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::thread;
 
 use cognitive_map::{
-    AgentId, CheckpointPage, CognitiveMap, Motion, PoseNoise, Record, Relation, RelativePose,
-    Sample, SampleBody, Settings, Sighting, Target,
+    AgentId, CheckpointPage, CognitiveMap, EventKind, Motion, PoseNoise, Record, Relation,
+    RelativePose, Sample, SampleBody, Settings, Sighting, Target,
 };
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
@@ -177,6 +177,45 @@ fn a_closure_counts_half_a_second_later() {
         { waits_ns.iter() }.all(|wait_ns| *wait_ns == 5 * STEP_NS),
         "{waits_ns:?}"
     );
+}
+
+/// Whoever is moved by a closure is told how far, and where it is from its next sample on.
+#[test]
+fn who_is_corrected_is_told() {
+    let (mut map, mut told) = (new_map(), 0);
+    let mut last: Vector3<f64> = Vector3::zeros();
+    let mut correction = None;
+    for record in &drive() {
+        let mut events = Vec::new();
+        map.apply(record, &mut events);
+        for event in events {
+            if let EventKind::LoopsClosed(closed) = event.kind {
+                assert_eq!(
+                    (event.agent, closed.closures),
+                    (AgentId(0), map.closure_count())
+                );
+                correction = Some(closed);
+            }
+        }
+        let Record::Sample {
+            agent: AgentId(0),
+            sample,
+            ..
+        } = record
+        else {
+            continue;
+        };
+        let now = map.agent(AgentId(0)).unwrap().pose().translation.vector;
+        if let Some(closed) = correction.take() {
+            let is_moving = matches!(sample.body, SampleBody::Motion(_));
+            let step_m = f64::from(u8::from(is_moving)) * 0.31;
+            assert!((now - closed.position.coords).norm() <= step_m + 1e-9);
+            assert!(((now - last).norm() - closed.moved_m).abs() <= step_m + 1e-9);
+            told += 1;
+        }
+        last = now;
+    }
+    assert!(told > 1, "{told}");
 }
 
 #[test]

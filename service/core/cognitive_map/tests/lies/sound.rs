@@ -81,6 +81,10 @@ pub(crate) fn check_event(event: &Event) -> Result<(), String> {
         EventKind::PlaceRecruited { position, .. }
         | EventKind::LandmarkLearned { position, .. }
         | EventKind::AgentPlaced { position } => check_position(position.coords.as_slice()),
+        EventKind::LoopsClosed(closed) => {
+            finite("moved", &[closed.moved_m, closed.turned_rad])?;
+            check_position(closed.position.coords.as_slice())
+        }
         EventKind::PlaceEntered { confidence, .. } => finite("confidence", &[*confidence]),
         _ => Ok(()),
     }
