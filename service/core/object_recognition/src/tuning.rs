@@ -101,6 +101,8 @@ pub(crate) const FLAT_SHARE: f64 = 0.02;
 pub(crate) const ERROR_REACH: f64 = 1.0;
 /// Least share of an object that counts as not explored. Chosen.
 pub(crate) const UNEXPLORED_MIN: f64 = 0.05;
+/// Objects against each of which an unknown one has to be earned, the likeliest. Budget.
+pub(crate) const EARNED_MAX: usize = 6;
 /// Share of contacts between places that are not as predicted: a corner, an edge or the end of a
 /// pattern may lie there. Chosen.
 pub(crate) const UNEXPECTED_SHARE: f64 = 0.5;
@@ -126,8 +128,9 @@ pub(crate) const FIELD_SAMPLES: usize = 96;
 pub(crate) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
 /// Noise of a field that is tried, per its variance. Chosen.
 pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
-/// Fewer places tell nothing of what lies between and beyond them. Chosen.
-pub(crate) const BETWEEN_MIN: usize = 20;
+/// Fewer places tell nothing of what lies between and beyond them: of twenty contacts some fall on
+/// one place. Chosen.
+pub(crate) const BETWEEN_MIN: usize = 16;
 /// Share of the variance of a level that neighbours may leave open, at most: beyond, what is felt
 /// at a place says little of what lies beside it. Chosen.
 pub(crate) const UNPREDICTED_MAX: f64 = 0.5;

@@ -14,4 +14,4 @@ mod open;
 
 pub(crate) use graph::LinkGraph;
 pub(crate) use nodes::{Fields, interpolated};
-pub(crate) use open::OpenRegion;
+pub(crate) use open::{OpenRegion, Part};

@@ -8,7 +8,7 @@ use super::graph::LinkGraph;
 use crate::numeric::centroid;
 use crate::tuning::{
     BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FIELD_PER_SPACING, FLAT_SHARE,
-    MISSING_PER_KNOWN, NODE_STEP, PARTIAL_PRIOR, UNEXPECTED_SHARE, UNEXPLORED_MIN,
+    MISSING_PER_KNOWN, NODE_STEP, PARTIAL_PRIOR, UNEXPLORED_MIN,
 };
 
 /// The part of space of which a model knows little: beyond the edge of what was felt, and in the
@@ -24,6 +24,17 @@ pub(crate) struct OpenRegion {
     pub(crate) unexplored: f64,
     /// Length of what was felt, or the side of a square as large \[m\].
     known_m: f64,
+}
+
+/// Part of space, as far as a model tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// Beside a place that was felt.
+    Known,
+    /// In a gap between places: what lies there is predicted, and may be otherwise.
+    Gap,
+    /// Beyond an edge of what was felt.
+    Beyond,
 }
 
 /// A place that was felt.
@@ -132,9 +143,8 @@ impl OpenRegion {
         (-step_m / (MISSING_PER_KNOWN * self.known_m).max(f64::MIN_POSITIVE)).exp()
     }
 
-    /// Probability that what lies at a point is none of what the model says, as far as it is known
-    /// there at all.
-    pub(crate) fn share(&self, point: &Point3<f64>) -> f64 {
+    /// What the model says of a point.
+    pub(crate) fn part(&self, point: &Point3<f64>) -> Part {
         let mut best = (f64::INFINITY, None);
         for place in &self.felt {
             let square = (place.position - point).norm_squared();
@@ -143,15 +153,15 @@ impl OpenRegion {
             }
         }
         let (square, Some(place)) = best else {
-            return 0.0;
+            return Part::Known;
         };
         let is_far = square > (EXPLORED_REACH * self.typical_m).powi(2);
         if place.is_open || is_far && self.unexplored > 0.0 {
-            1.0
+            Part::Beyond
         } else if square > place.gap_m2 {
-            UNEXPECTED_SHARE
+            Part::Gap
         } else {
-            0.0
+            Part::Known
         }
     }
 }

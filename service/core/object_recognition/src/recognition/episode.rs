@@ -12,7 +12,9 @@ use crate::recognition::dependence::evidence_share;
 use crate::recognition::likelihoods::{unknown_fit_log, walk_log};
 use crate::surfels::map::SurfelMap;
 use crate::translations::GaussianSum;
-use crate::tuning::{CONTACTS_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, UNKNOWN_PRIOR};
+use crate::tuning::{
+    CONTACTS_MAX, EARNED_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, UNKNOWN_PRIOR,
+};
 
 /// The state of one episode of recognition.
 ///
@@ -33,7 +35,7 @@ pub struct Recognition {
 
 #[derive(Clone, Debug)]
 pub(super) enum Hypotheses {
-    Translations(GaussianSum),
+    Translations(Box<GaussianSum>),
     Poses(PoseHypotheses),
 }
 
@@ -41,7 +43,7 @@ impl Recognition {
     /// An episode without contacts.
     pub fn new(orientation: &Orientation) -> Self {
         let hypotheses = match orientation.rotations() {
-            Some(rotations) => Hypotheses::Translations(GaussianSum::new(rotations)),
+            Some(rotations) => Hypotheses::Translations(Box::new(GaussianSum::new(rotations))),
             None => Hypotheses::Poses(PoseHypotheses::default()),
         };
         Self {
@@ -84,6 +86,10 @@ impl Recognition {
                 poses.touch(library, &contact, CONTACTS_MAX, &size_log);
             }
         }
+        let sizes = self.translation_shares(library);
+        if let Hypotheses::Translations(translations) = &mut self.hypotheses {
+            translations.settle(&sizes);
+        }
         if self.contacts.len() >= CONTACTS_MAX {
             self.contacts.remove(0);
         }
@@ -124,9 +130,8 @@ impl Recognition {
                 .fold(f64::NEG_INFINITY, f64::max);
             none += self.earned(
                 library,
-                best,
-                most,
-                evidence_share * self.unknown_log(library, best),
+                &objects,
+                evidence_share * self.unknown_log(library),
             );
             if matches!(self.hypotheses, Hypotheses::Poses(_)) {
                 let strange = unknown_fit_log(fit, self.contacts.len());
@@ -162,28 +167,32 @@ impl Recognition {
         }
     }
 
-    /// Log-likelihood of an unknown object, as far as independent contacts speak for it: `unknown`
-    /// by all contacts, and that of the best object.
-    fn earned(
-        &self,
-        library: &ObjectLibrary,
-        best: Option<ObjectId>,
-        best_log: f64,
-        unknown: f64,
-    ) -> f64 {
-        let (Hypotheses::Translations(translations), Some(best)) = (&self.hypotheses, best) else {
+    /// Log-likelihood of an unknown object, as far as independent contacts speak for it against each
+    /// of the likeliest objects: `unknown` by all contacts.
+    ///
+    /// What speaks for it against an object is tempered by how far the contacts tell the same of
+    /// that object's model. Against the best object it has no more than the least of these. The odds
+    /// between objects do not depend on it.
+    fn earned(&self, library: &ObjectLibrary, objects: &[(ObjectId, f64)], unknown: f64) -> f64 {
+        let best_log = { objects.iter() }.fold(f64::NEG_INFINITY, |best, own| best.max(own.1));
+        let Hypotheses::Translations(translations) = &self.hypotheses else {
             return unknown;
         };
         if unknown <= best_log || !best_log.is_finite() {
             return unknown;
         }
-        let likeliest = translations.heaviest(best, 1);
-        let likeliest = likeliest.first().zip(library.indexed(best));
-        let share = likeliest.map_or(1.0, |(hypothesis, indexed)| {
-            let pose = hypothesis.pose(&translations.rotations);
-            evidence_share(indexed, &pose, &self.contacts)
-        });
-        best_log + share * (unknown - best_log)
+        let mut likeliest: Vec<_> = objects.iter().filter(|own| own.1.is_finite()).collect();
+        likeliest.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let leads = likeliest
+            .iter()
+            .take(EARNED_MAX)
+            .filter_map(|(object, log)| {
+                let heaviest = translations.heaviest(*object, 1);
+                let (hypothesis, indexed) = heaviest.first().zip(library.indexed(*object))?;
+                let pose = hypothesis.pose(&translations.rotations);
+                Some(evidence_share(indexed, &pose, &self.contacts) * (unknown - log))
+            });
+        best_log + leads.fold(unknown - best_log, f64::min)
     }
 
     /// Whether there is no hypothesis yet.

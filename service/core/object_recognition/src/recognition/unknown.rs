@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_6, PI};
 
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::recognition::episode::Hypotheses;
 use crate::recognition::episode::Recognition;
 use crate::tuning::MISS_PER_CONTACT;
@@ -21,8 +21,7 @@ impl Recognition {
     }
 
     /// Log-likelihood of the contacts under an unknown object, in the measure of the hypotheses.
-    /// `best` is the object for which it would be taken.
-    pub(super) fn unknown_log(&self, library: &ObjectLibrary, best: Option<ObjectId>) -> f64 {
+    pub(super) fn unknown_log(&self, library: &ObjectLibrary) -> f64 {
         let extent_m = library.extent_m().max(1e-6);
         let aimed = -(self.aimed as f64) * extent_m.ln();
         let steps = self.steps_m.len() as f64;
@@ -34,8 +33,7 @@ impl Recognition {
                         .map(|(_, s)| s.share(reach_m).max(1e-9).ln());
                     logs.sum::<f64>() / library.len().max(1) as f64
                 });
-                let unlike = best.and_then(|best| translations.background.log(best));
-                unlike.unwrap_or(0.0) - steps * shares + aimed
+                translations.background.log - steps * shares + aimed
             }
             // Only its size is known: a contact lies anywhere within a step, with any normal.
             Hypotheses::Poses(_) => {

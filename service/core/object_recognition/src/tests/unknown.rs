@@ -38,3 +38,81 @@ fn what_lies_on_a_part_of_something_learned_is_another_thing() {
     let posterior = recognise(&library, &ball);
     assert_eq!(posterior.verdict(), Verdict::Object(ObjectId(1)));
 }
+
+/// What is felt of a box that has waves of level over its faces.
+fn waved(box_number: u64, key: u64) -> (Point3<f64>, f64) {
+    let side = |axis: u64| 0.05 + 0.06 * uniform(900_000 + 8 * box_number + axis);
+    let (point, _) = on_box([side(0), side(1), side(2)], key);
+    let wave = |axis: u64| 100.0 * (uniform(910_000 + 8 * box_number + axis) - 0.5);
+    let phase = wave(0) * point.x + wave(1) * point.y + wave(2) * point.z;
+    (point, (phase + 6.0 * uniform(920_000 + box_number)).sin())
+}
+
+/// A noisy contact with it.
+fn felt((point, level): (Point3<f64>, f64), key: u64) -> Contact {
+    let noise = Vector3::from_fn(|axis, _| normal(2_000_000 + 16 * key + axis as u64));
+    let level = level + 0.03 * normal(2_000_000 + 16 * key + 8);
+    Contact::at(point + noise * NOISE_M, NOISE_M).with_level(0, level, 0.03)
+}
+
+/// A run of touches over such a box, a centimetre apart or so.
+fn run_over(box_number: u64, count: u64) -> Vec<Contact> {
+    let drawn: Vec<_> = (0..600).map(|key| waved(box_number, 5_000 + key)).collect();
+    let mut at = drawn[0].0;
+    let mut ahead = Vector3::x();
+    let run = (0..count).map(|number| {
+        let turn = Vector3::from_fn(|axis, _| normal(3_000_000 + 4 * number + axis as u64));
+        let target = at + 0.01 * (ahead + 0.4 * turn).normalize();
+        let apart = |own: &&(Point3<f64>, f64)| (own.0 - target).norm();
+        let next = { drawn.iter() }.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        let next = *next.expect("there are some");
+        ahead = (next.0 - at).try_normalize(1e-9).unwrap_or(-ahead);
+        at = next.0;
+        felt(next, 10_000 * box_number + number)
+    });
+    run.collect()
+}
+
+/// Boxes that were taught by so many contacts each.
+fn taught(boxes: std::ops::Range<u64>, contacts: u64) -> ObjectLibrary {
+    let mut library = ObjectLibrary::default();
+    for (id, box_number) in (0u32..).zip(boxes) {
+        let mut model = ObjectModel::new(ModelSettings::default());
+        for key in 0..contacts {
+            let key = 1_000_000 + 1_000 * box_number + key;
+            model.learn(&felt(waved(box_number, key), key));
+        }
+        library.put(ObjectId(id), model);
+    }
+    library
+}
+
+#[test]
+fn what_was_taught_by_few_contacts_is_never_called_unknown() {
+    let library = taught(0..3, 20);
+    for own in 0..3 {
+        let mut recognition = Recognition::new(&Orientation::Known);
+        for (count, contact) in (1..).zip(run_over(own, 200)) {
+            recognition.touch(&library, contact);
+            let posterior = recognition.posterior(&library);
+            let verdict = posterior.verdict();
+            assert_ne!(verdict, Verdict::Unknown, "{own} after {count} touches");
+        }
+    }
+    // Of strangers most are rather unknown than any of these, and none is named.
+    let mut unknown = 0;
+    for stranger in 1000..1003 {
+        let mut recognition = Recognition::new(&Orientation::Known);
+        for contact in run_over(stranger, 100) {
+            recognition.touch(&library, contact);
+        }
+        let posterior = recognition.posterior(&library);
+        let verdict = posterior.verdict();
+        assert!(
+            !matches!(verdict, Verdict::Object(_)),
+            "{stranger}: {posterior:?}"
+        );
+        unknown += u32::from(posterior.unknown > posterior.objects[0].1);
+    }
+    assert!(unknown >= 2, "{unknown} of three");
+}

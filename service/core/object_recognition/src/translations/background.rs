@@ -12,36 +12,65 @@ use crate::percept_likelihood::ContactPercepts;
 use crate::translations::candidates::CandidateSearch;
 use crate::tuning::{BACKGROUND_WEIGHT_MIN, OUTLIER_SHARE};
 
-/// Log-likelihood of the contacts under an unknown object, by the object for which it would be
-/// taken.
+/// Log-likelihood of the contacts under an unknown object.
 ///
 /// Its percepts are either like those of the library or carry no information, each with probability
-/// ½.
+/// ½. It depends on the object for which the unknown one would be taken: that one's places do not
+/// count. When another object comes to be the best, its log-likelihood would rise by all that the
+/// best one had earned so far. So it rises by one contact after the other only, each by the object
+/// that was the best before; it falls at once.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct BackgroundModel(BTreeMap<ObjectId, [f64; 2]>);
+pub(crate) struct BackgroundModel {
+    /// Sums over all contacts so far, by the object for which it would be taken.
+    sums: BTreeMap<ObjectId, [f64; 2]>,
+    /// The object for which it would be taken after the contacts so far.
+    best: Option<ObjectId>,
+    /// Of all contacts so far.
+    pub(crate) log: f64,
+}
+
+/// Log densities of a contact with an unknown object.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct UnknownContact {
+    /// By the object for which it would be taken, with percepts and without.
+    pub(crate) of_objects: BTreeMap<ObjectId, [f64; 2]>,
+    /// After the contacts before: what the contact adds to the unknown object's log-likelihood.
+    pub(crate) log: f64,
+}
 
 impl BackgroundModel {
-    /// Adds a contact: see [`background_logs`]. Answers its own log density by object, with
-    /// percepts and without.
+    /// Adds a contact: see [`background_logs`].
     pub(crate) fn touch(
         &mut self,
         library: &ObjectLibrary,
         rotations: &[UnitQuaternion<f64>],
         pair: (&Contact, &Contact),
         drift_m2: f64,
-    ) -> BTreeMap<ObjectId, [f64; 2]> {
-        let all = background_logs(library, rotations, pair, drift_m2);
-        for (object, logs) in &all {
-            for (sum, log) in self.0.entry(*object).or_default().iter_mut().zip(logs) {
+    ) -> UnknownContact {
+        let of_objects = background_logs(library, rotations, pair, drift_m2);
+        let before = self.log_of_best();
+        for (object, logs) in &of_objects {
+            for (sum, log) in self.sums.entry(*object).or_default().iter_mut().zip(logs) {
                 *sum += log;
             }
         }
-        all
+        let log = { self.log_of_best().zip(before) }.map_or(0.0, |(now, before)| now - before);
+        self.log += log;
+        UnknownContact { of_objects, log }
     }
 
-    /// Of all contacts so far.
-    pub(crate) fn log(&self, object: ObjectId) -> Option<f64> {
-        let logs = self.0.get(&object)?;
+    /// After a contact: the object for which the unknown one would be taken now.
+    pub(crate) fn settle(&mut self, best: Option<ObjectId>) {
+        self.best = best;
+        if let Some(log) = self.log_of_best() {
+            self.log = self.log.min(log);
+        }
+    }
+
+    /// Of all contacts so far, taken for the best object.
+    fn log_of_best(&self) -> Option<f64> {
+        let best = self.best?;
+        let logs = self.sums.get(&best).copied().unwrap_or_default();
         Some(log_sum(logs.iter().copied()) - LN_2)
     }
 }
@@ -71,7 +100,10 @@ fn background_logs(
         [other, &bare[0]].map(|contact| ContactPercepts::new(contact, library.level_prior()));
     let now =
         [contact, &bare[1]].map(|contact| ContactPercepts::new(contact, library.level_prior()));
-    let mut sums: BTreeMap<ObjectId, [Sums; 2]> = BTreeMap::new();
+    // An object without a sample is one of which no place is to be left out.
+    let objects = library.indexed_models().map(|(object, _)| object);
+    let mut sums: BTreeMap<ObjectId, [Sums; 2]> =
+        objects.map(|object| (object, Default::default())).collect();
     let mut nearby = CandidateSearch::default();
     let mut turns = rotations.iter().cycle();
     for sample in library.samples() {
@@ -144,8 +176,9 @@ impl Sums {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Point3;
+    use nalgebra::{Point3, UnitQuaternion};
 
+    use super::BackgroundModel;
     use crate::{
         Contact, ModelSettings, ObjectId, ObjectLibrary, ObjectModel, Orientation, Recognition,
         Verdict,
@@ -174,6 +207,30 @@ mod tests {
             library.put(ObjectId(id), model);
         }
         library
+    }
+
+    #[test]
+    fn an_unknown_object_rises_by_no_more_than_one_contact_says() {
+        let library = rods();
+        let mut background = BackgroundModel::default();
+        let none = [UnitQuaternion::identity()];
+        let mut falls = 0;
+        for k in 0..11 {
+            // What it would be taken for changes at each contact.
+            background.settle(Some(ObjectId(u32::from(k % 4))));
+            let levels = [k, k + 1].map(|k| f64::from(k * 5 % 13));
+            let [before, now] = [contact(k, levels[0]), contact(k + 1, levels[1])];
+            let log = background.log;
+            let said = background.touch(&library, &none, (&before, &now), 0.0);
+            let most = said.of_objects.values().flatten().copied();
+            let most = most.fold(f64::NEG_INFINITY, f64::max);
+            assert!(background.log - log <= most + 1e-9, "{k}: {said:?}");
+            let log = background.log;
+            background.settle(Some(ObjectId(u32::from((k + 1) % 4))));
+            assert!(background.log <= log, "{k}");
+            falls += u32::from(background.log < log);
+        }
+        assert!(falls > 0, "no other object explains it better");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::contact::{Contact, Reached};
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::numeric::{log_sum, to_f32};
 use crate::percept_likelihood::ContactPercepts;
-use crate::translations::background::BackgroundModel;
+use crate::translations::background::{BackgroundModel, UnknownContact};
 use crate::translations::hypothesis::TranslationHypothesis;
 use crate::translations::mass_histogram::MassHistogram;
 use crate::translations::prefilter::{Prefilter, Seed};
@@ -66,9 +66,9 @@ impl GaussianSum {
             return;
         };
         let unknown = self.unknown(library, before, contact);
-        let densities = self
-            .unexplored
-            .densities(library, (last, contact), &unknown, share);
+        let densities =
+            self.unexplored
+                .densities(library, (last, contact), unknown.as_ref(), share);
         let touch = TouchUpdate::new(library, (last, contact), &densities);
         let mut buffers = SplitBuffers::default();
         let mut parts = Vec::with_capacity(2 * self.all.len());
@@ -88,7 +88,7 @@ impl GaussianSum {
         if !self.prefilter.is_empty() {
             self.promote(library, before, &touch, &mut buffers, &mut parts);
         }
-        let bare = |object| Some(unknown.get(&object)?[1] + share(object));
+        let bare = |object| Some(unknown.as_ref()?.of_objects.get(&object)?[1] + share(object));
         let best = parts.iter().map(|part| part.evidence);
         let best = best.fold(self.prefilter.best_log(), f64::max);
         let (rotations, least) = (&self.rotations, best - PRUNE_NATS);
@@ -99,25 +99,33 @@ impl GaussianSum {
         self.prune();
     }
 
-    /// Log densities of a contact with an unknown object, by the object for which it would be
-    /// taken; none of one that was asked for.
+    /// After a touch: what an unknown object would be taken for, where the masses of objects are
+    /// multiplied by e^`sizes`.
+    pub(crate) fn settle(&mut self, sizes: &BTreeMap<ObjectId, f64>) {
+        let size = |object: ObjectId| sizes.get(&object).copied().unwrap_or_default();
+        let logs = self.object_logs().into_iter();
+        let best = { logs.map(|(object, log)| (object, log + size(object))) }
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        self.background.settle(best.map(|(object, _)| object));
+    }
+
+    /// Log densities of a contact with an unknown object; none of one that was asked for.
     fn unknown(
         &mut self,
         library: &ObjectLibrary,
         before: &[Contact],
         contact: &Contact,
-    ) -> BTreeMap<ObjectId, [f64; 2]> {
+    ) -> Option<UnknownContact> {
         let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
         let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
-        let (Some(nearest), Some(last)) = (nearest, before.last()) else {
-            return BTreeMap::new();
-        };
+        let (nearest, last) = nearest.zip(before.last())?;
         if contact.reached == Reached::Aimed {
-            return BTreeMap::new();
+            return None;
         }
         let drift_m2 = (contact.drift_sd_m.powi(2) - last.drift_sd_m.powi(2)).max(0.0);
         let pair = (nearest, contact);
-        (self.background).touch(library, &self.rotations, pair, drift_m2)
+        let background = &mut self.background;
+        Some(background.touch(library, &self.rotations, pair, drift_m2))
     }
 
     /// Updates the prefilter, and promotes the heaviest of the seeds that the touch supports: from

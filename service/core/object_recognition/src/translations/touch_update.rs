@@ -6,9 +6,10 @@ use nalgebra::Point3;
 
 use crate::contact::Contact;
 use crate::indexed_model::IndexedModel;
+use crate::interpolation::Part;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::percept_likelihood::ContactPercepts;
-use crate::tuning::OUTLIER_SHARE;
+use crate::tuning::{OUTLIER_SHARE, UNEXPECTED_SHARE};
 
 /// A touch, with what its update of every hypothesis shares.
 #[derive(Debug)]
@@ -18,8 +19,17 @@ pub(crate) struct TouchUpdate<'a> {
     pub(crate) drift_m2: f64,
     /// Density of outliers times their share \[1/m³\].
     pub(crate) outlier: f64,
-    /// Density of a contact with what was not explored of an object \[1/m³\].
-    pub(crate) unexplored: &'a BTreeMap<ObjectId, f64>,
+    /// Densities of a contact with what the models do not predict.
+    pub(crate) unexplored: &'a BTreeMap<ObjectId, UnpredictedDensity>,
+}
+
+/// Densities of a contact with what a model does not predict \[1/m³\].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct UnpredictedDensity {
+    /// In a gap between places, where the surface may not be as predicted.
+    pub(crate) gap: f64,
+    /// Beyond an edge of what was felt.
+    pub(crate) open: f64,
 }
 
 impl<'a> TouchUpdate<'a> {
@@ -27,7 +37,7 @@ impl<'a> TouchUpdate<'a> {
     pub(crate) fn new(
         library: &'a ObjectLibrary,
         (last, contact): (&Contact, &'a Contact),
-        unexplored: &'a BTreeMap<ObjectId, f64>,
+        unexplored: &'a BTreeMap<ObjectId, UnpredictedDensity>,
     ) -> Self {
         Self {
             percepts: ContactPercepts::new(contact, library.level_prior()),
@@ -37,8 +47,8 @@ impl<'a> TouchUpdate<'a> {
         }
     }
 
-    /// Density of the touch at a point, if it is one of what was not explored of an object;
-    /// `explored` is that of what was.
+    /// Density of the touch at a point, if it is one of what the model of an object does not
+    /// predict; `explored` is that of what it does.
     pub(crate) fn beyond(
         &self,
         object: ObjectId,
@@ -47,10 +57,20 @@ impl<'a> TouchUpdate<'a> {
         explored: f64,
     ) -> f64 {
         let density = self.unexplored.get(&object);
-        let density = density.filter(|density| explored < **density);
-        let share = { density.zip(indexed.open.as_ref()) }
-            .map(|(density, open)| density * open.share(point));
-        share.unwrap_or_default()
+        let density = density.filter(|density| explored < density.gap.max(density.open));
+        let Some((density, open)) = density.zip(indexed.open.as_ref()) else {
+            return 0.0;
+        };
+        let (share, density) = match open.part(point) {
+            Part::Known => (0.0, 0.0),
+            Part::Gap => (UNEXPECTED_SHARE, density.gap),
+            Part::Beyond => (1.0, density.open),
+        };
+        if explored < density {
+            share * density
+        } else {
+            0.0
+        }
     }
 }
 

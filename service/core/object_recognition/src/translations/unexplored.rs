@@ -8,22 +8,23 @@ use crate::contact::Contact;
 use crate::level_prior::likelihood_below_one;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::numeric::log_sum;
+use crate::translations::background::UnknownContact;
 use crate::translations::hypothesis::TranslationHypothesis;
+use crate::translations::touch_update::UnpredictedDensity;
 use crate::tuning::{ENTER_MIN, PREFILTER_CONTACTS_MAX};
 
 /// Where an episode may have been that knows no place of an object: on what was not explored of it.
 ///
 /// There a contact is as likely as with an unknown object whose percepts are like those of the
-/// library, so that it says nothing against the
-/// object but that so much of it should be missing: each further contact stays there with
-/// a probability that falls with the step. Otherwise it is the first one on what was explored, at
-/// its edge.
+/// library, so that it says nothing against the object but that so much of it should be missing:
+/// each further contact stays there with a probability that falls with the step. Otherwise it is
+/// the first one on what was explored, at its edge.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Unexplored {
     /// Log of the mass of the episodes that were nowhere else so far.
     pub(crate) logs: BTreeMap<ObjectId, f64>,
     /// Densities of the contacts after the first, as far as seeds may be promoted by them.
-    pub(crate) history: Vec<BTreeMap<ObjectId, f64>>,
+    pub(crate) history: Vec<BTreeMap<ObjectId, UnpredictedDensity>>,
 }
 
 impl Unexplored {
@@ -38,31 +39,37 @@ impl Unexplored {
         }
     }
 
-    /// Densities of a contact, from log densities of one with an unknown object; those of an object
-    /// are multiplied by e^`share` for its size. What was not explored has levels like those of the
+    /// Densities of a contact, from those of one with an unknown object; those of an object are
+    /// multiplied by e^`share` for its size. What was not explored has levels like those of the
     /// rest.
+    ///
+    /// In a gap, where the surface is not as predicted, a contact is as likely as it is of the
+    /// unknown object with which the object competes: it tells nothing between the two.
     pub(crate) fn densities(
         &self,
         library: &ObjectLibrary,
         (last, contact): (&Contact, &Contact),
-        unknown: &BTreeMap<ObjectId, [f64; 2]>,
+        unknown: Option<&UnknownContact>,
         share: impl Fn(ObjectId) -> f64,
-    ) -> BTreeMap<ObjectId, f64> {
+    ) -> BTreeMap<ObjectId, UnpredictedDensity> {
+        let Some(unknown) = unknown else {
+            return BTreeMap::new();
+        };
         // Without the object that explains it best: else its places would speak for all others.
-        let least = unknown.values().map(|logs| logs[0]);
+        let least = unknown.of_objects.values().map(|logs| logs[0]);
         let least = least.fold(f64::INFINITY, f64::min);
-        let objects = self
-            .logs
-            .keys()
-            .filter(|object| unknown.contains_key(object));
-        let densities = objects.filter_map(|object| {
-            let log = least + share(*object);
+        let densities = self.logs.keys().filter_map(|object| {
             let indexed = library.indexed(*object)?;
             let own = &indexed.own_levels;
             let alike = likelihood_below_one(contact, own, library.level_prior());
             let step_m = (contact.position_m - last.position_m).norm();
             let stay = indexed.open.as_ref()?.stay(step_m);
-            Some((*object, stay * alike * log.exp()))
+            let density = |log: f64| stay * alike * (log + share(*object)).exp();
+            let density = UnpredictedDensity {
+                gap: density(unknown.log),
+                open: density(least),
+            };
+            Some((*object, density))
         });
         densities.collect()
     }
@@ -109,10 +116,10 @@ impl Unexplored {
     }
 
     /// A contact lay there.
-    pub(crate) fn stayed(&mut self, densities: BTreeMap<ObjectId, f64>) {
+    pub(crate) fn stayed(&mut self, densities: BTreeMap<ObjectId, UnpredictedDensity>) {
         for (object, log) in &mut self.logs {
             let density = densities.get(object).copied().unwrap_or_default();
-            *log += density.ln();
+            *log += density.open.ln();
         }
         if self.history.len() <= PREFILTER_CONTACTS_MAX {
             self.history.push(densities);
