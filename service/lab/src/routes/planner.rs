@@ -25,8 +25,8 @@ pub struct LocalPlanner {
 }
 
 impl LocalPlanner {
-    /// Goes one step towards a point in the robot's frame; answers how it turned \[rad\] and how far
-    /// it was to go \[m\]. Where every heading is blocked the robot turns around.
+    /// Goes one step towards a point in the robot's frame; answers how it turned \[rad\] and how
+    /// far it was to go \[m\]. Where every heading is blocked the robot turns around.
     pub fn step(
         &mut self,
         robot: &mut PlanarRobot,

@@ -16,8 +16,8 @@ struct Distances([u32; PIVOTS]);
 
 const NOWHERE: Distances = Distances([u32::MAX; PIVOTS]);
 
-/// The ways as a search reads them, and distances along them from a few places, the *pivots*, to all
-/// others, for [`routes`](CognitiveMap::routes).
+/// The ways as a search reads them, and distances along them from a few places, the *pivots*, to
+/// all others, for [`routes`](CognitiveMap::routes).
 ///
 /// ```text
 /// |d(p, a) − d(p, b)| ≤ length of any route from a to b

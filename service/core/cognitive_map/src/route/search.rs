@@ -224,8 +224,8 @@ impl<'a> Search<'a> {
         std::iter::once((start, Hop::Start)).chain(hops).collect()
     }
 
-    /// The waypoint before another one on a shortest route. Lengths are the same in both directions,
-    /// and links are in the order of their places.
+    /// The waypoint before another one on a shortest route. Lengths are the same in both
+    /// directions, and links are in the order of their places.
     fn junction_before(&self, at: u32, links: &[Link]) -> Option<u32> {
         let cost = self.cost_to(at)?;
         let mut links = links.iter();
