@@ -47,16 +47,18 @@ impl RouteBoundsOfSpace {
         tokio::task::spawn_blocking(move || {
             // Also when the making ends with a panic.
             let making = Making(&this.is_making);
+            this.keep(RouteBounds::straight(&map)); // soon made, for questions in the meantime
             this.keep(RouteBounds::of(&map));
             drop(making);
         });
     }
 
-    /// Keeps bounds, unless there are later ones.
+    /// Keeps bounds, unless there are later ones; those with pivots are kept before those without.
     fn keep(&self, bounds: RouteBounds) {
         let mut latest = self.latest();
-        let is_later = |known: &RouteBounds| known.revision() > bounds.revision();
-        if !latest.as_ref().is_some_and(is_later) {
+        let rank = |bounds: &RouteBounds| (bounds.has_pivots(), bounds.revision());
+        let is_better = |known: &RouteBounds| rank(known) <= rank(&bounds);
+        if latest.as_ref().is_none_or(is_better) {
             *latest = Some(bounds);
         }
     }

@@ -21,6 +21,9 @@ const LOOK_EVERY: u64 = 5;
 /// Duration of a step \[ns\].
 const TICK_NS: i64 = 100_000_000;
 
+/// Stamp of its start \[ns\].
+const START_NS: i64 = 1_800_000_000_000_000_000;
+
 /// The robot.
 #[derive(Debug)]
 pub struct PlanarRobot {
@@ -29,6 +32,8 @@ pub struct PlanarRobot {
     random: ChaCha8Rng,
     ticks: u64,
     stamp_ns: i64,
+    /// Where it truly was after each step.
+    trail: Vec<Point2<f64>>,
     /// What it has sensed and nobody has taken.
     samples: Vec<Sample>,
 }
@@ -40,7 +45,8 @@ impl PlanarRobot {
             pose: Isometry2::translation(at.x, at.y),
             random: ChaCha8Rng::seed_from_u64(seed),
             ticks: 0,
-            stamp_ns: 1_800_000_000_000_000_000,
+            stamp_ns: START_NS,
+            trail: vec![at],
             samples: Vec::new(),
         }
     }
@@ -48,6 +54,17 @@ impl PlanarRobot {
     /// Where it is.
     pub fn position(&self) -> Point2<f64> {
         self.pose.translation.vector.into()
+    }
+
+    /// Where it truly started.
+    pub fn started_at(&self) -> Point2<f64> {
+        self.trail[0]
+    }
+
+    /// Where it truly was at a stamp.
+    pub fn was_at(&self, stamp_ns: i64) -> Option<Point2<f64>> {
+        let step = usize::try_from((stamp_ns - START_NS) / TICK_NS).ok()?;
+        self.trail.get(step).copied()
     }
 
     /// Which way it faces \[rad\].
@@ -65,6 +82,17 @@ impl PlanarRobot {
         std::mem::take(&mut self.samples)
     }
 
+    /// Whether its feelers touch nothing in a direction of its frame, up to a distance.
+    pub fn feels_free(&self, floor: &Floor, heading_rad: f64, reach_m: f64) -> bool {
+        let feeler = Point2::new(heading_rad.cos(), heading_rad.sin()) * reach_m;
+        floor.is_free(&self.pose.transform_point(&feeler))
+    }
+
+    /// Stamp of its latest step \[ns\].
+    pub fn stamp_ns(&self) -> i64 {
+        self.stamp_ns
+    }
+
     /// Turns and goes a step, as far as the floor is free; answers whether it got there.
     pub fn step(&mut self, floor: &Floor, turn_rad: f64, length_m: f64) -> bool {
         let length_m = length_m.min(STEP_M);
@@ -77,6 +105,7 @@ impl PlanarRobot {
             Isometry2::new(Vector2::zeros(), turn_rad)
         };
         self.pose *= go;
+        self.trail.push(self.position());
         self.ticks += 1;
         self.stamp_ns += TICK_NS;
         let [x, y, yaw] = [NOISE[0], NOISE[0], NOISE[1]].map(|sd| sd * self.normal());

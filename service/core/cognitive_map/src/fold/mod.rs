@@ -4,6 +4,7 @@ mod apply;
 mod checkpoint;
 mod effects;
 mod enrolment;
+mod following;
 mod forgetting;
 mod guidance;
 mod header;

@@ -177,7 +177,7 @@ impl Question<'_> {
         let goal = Some(self.goal);
         let found = search.run(self.start, goal, self.bounds, gives_up)?;
         Ok(found.map(|cost| Found {
-            path: search.path(self.start, self.goal),
+            path: search.path(self.start, self.goal, self.bounds),
             cost,
         }))
     }

@@ -35,6 +35,17 @@ impl Costs<'_> {
         Some(cost + cost * tuning::PENALTY_PERCENT * taken / 100)
     }
 
+    /// Whether every edge may be taken and costs its length.
+    pub(super) fn are_lengths(&self) -> bool {
+        let options = self.options;
+        options.cost == RouteCost::Length
+            && options.reverse == Reverse::Allowed
+            && options.avoid_places.is_empty()
+            && options.avoid_regions.is_empty()
+            && self.penalties.is_empty()
+            && self.blockages.is_empty()
+    }
+
     /// What an edge costs without penalties.
     fn plain(&self, from: &Waypoint, edge: &Edge) -> Option<u64> {
         let options = self.options;

@@ -7,7 +7,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::bounds::{RouteBounds, Target};
 use super::cost::Costs;
+use super::graph::{Graph, Junction, Link};
 use super::path::{Hop, Path};
+use super::reached::Reached;
 use super::{NoRoute, RouteCost, tuning};
 use crate::memory::ids::PlaceId;
 use crate::memory::way::Edge;
@@ -15,9 +17,9 @@ use crate::memory::way::Edge;
 /// What a search has found out so far.
 pub(super) struct Search<'a> {
     costs: &'a Costs<'a>,
-    /// Of each waypoint twice the cost from the start, plus two, and plus one once it was gone on
-    /// from; 0 where no way has been found yet. Zeroed memory costs nothing until it is touched.
-    reached: Vec<u64>,
+    /// Whether every edge may be taken and costs its length.
+    are_lengths: bool,
+    reached: Reached,
     open: BinaryHeap<Reverse<Open>>,
 }
 
@@ -26,32 +28,48 @@ type Open = (u64, u32);
 
 /// A lower bound of the cost from a waypoint to the goal.
 struct Bound<'a> {
+    goal: Option<u32>,
     /// Least cost for each metre of the straight line, in millionths.
     micro_per_m: f64,
-    goal: Vector3<f64>,
-    target: Option<Target<'a>>,
+    goal_m: Vector3<f64>,
+    target: Option<Target>,
+    /// The ways, as bounds know them.
+    graph: Option<&'a Graph>,
 }
 
 impl Bound<'_> {
     /// That without a goal.
     fn none() -> Self {
         Self {
+            goal: None,
             micro_per_m: 0.0,
-            goal: Vector3::zeros(),
+            goal_m: Vector3::zeros(),
             target: None,
+            graph: None,
         }
     }
 
-    /// That from a waypoint that lies near a position. Where distances from pivots are known the
-    /// straight line adds next to nothing.
-    fn from(&self, number: u32, near: &[f32; 3]) -> u64 {
-        if let Some(target) = &self.target {
-            return target.bound_um(number);
+    /// That from a waypoint. Where distances from pivots are known the straight line adds next to
+    /// nothing.
+    fn from(&self, at: &Junction) -> u64 {
+        match &self.target {
+            Some(target) => target.bound_um(at),
+            None => self.straight(&at.near),
         }
+    }
+
+    /// That from where an edge leads.
+    fn along(&self, edge: &Edge) -> u64 {
+        let junction = self.graph.and_then(|graph| graph.junction(edge.to));
+        junction.map_or_else(|| self.straight(&edge.near), |at| self.from(at))
+    }
+
+    /// That by the straight line.
+    fn straight(&self, near: &[f32; 3]) -> u64 {
         let near = Vector3::from(near.map(f64::from));
         // Each coordinate is rounded by at most half a bit of its 24.
         let rounding_m = near.abs().sum() * f64::from(f32::EPSILON);
-        let straight_m = ((near - self.goal).norm() - rounding_m).max(0.0);
+        let straight_m = ((near - self.goal_m).norm() - rounding_m).max(0.0);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -67,7 +85,8 @@ impl<'a> Search<'a> {
         let numbers = costs.ways.waypoint_numbers() as usize;
         Self {
             costs,
-            reached: vec![0; numbers],
+            are_lengths: costs.are_lengths(),
+            reached: Reached::new(numbers),
             open: BinaryHeap::new(),
         }
     }
@@ -83,18 +102,16 @@ impl<'a> Search<'a> {
     ) -> Result<Option<u64>, NoRoute> {
         let bound = goal.map_or_else(Bound::none, |goal| self.bound(goal, bounds));
         let found = |search: &Self| goal.and_then(|goal| search.cost_to(goal));
-        self.reach(start, 0, 0);
+        self.reached.reach(start, 0);
+        self.open.push(Reverse((0, start)));
         let mut visited = 0_usize;
         while let Some(Reverse((least, at))) = self.open.pop() {
             if found(self).is_some_and(|found| least > found) {
                 break;
             }
-            let reached = &mut self.reached[at as usize];
-            if *reached & 1 == 1 {
+            let Some(cost) = self.reached.visit(at) else {
                 continue; // it was found by a cheaper way before
-            }
-            *reached |= 1;
-            let cost = (*reached >> 1) - 1;
+            };
             visited += 1;
             if visited.is_multiple_of(tuning::ASK_EVERY) && gives_up() {
                 return Err(NoRoute::GivenUp);
@@ -106,6 +123,12 @@ impl<'a> Search<'a> {
 
     /// Goes on from a waypoint.
     fn expand(&mut self, at: u32, cost: u64, bound: &Bound<'_>) {
+        if self.are_lengths
+            && let Some(graph) = bound.graph
+            && let Some(links) = graph.junction(at).and_then(Junction::links)
+        {
+            return self.expand_along(graph, links, cost, bound);
+        }
         let costs = self.costs;
         let Some(waypoint) = costs.ways.waypoint(at) else {
             return;
@@ -115,21 +138,37 @@ impl<'a> Search<'a> {
                 continue;
             };
             let there = cost + more;
-            if self.cost_to(edge.to).is_none_or(|known| there < known) {
-                let least = there + bound.from(edge.to, &edge.near);
-                self.reach(edge.to, there, least);
+            if self.reached.reach(edge.to, there) {
+                let least = there + bound.along(edge);
+                self.open.push(Reverse((least, edge.to)));
             }
         }
     }
 
-    fn reach(&mut self, at: u32, cost: u64, least: u64) {
-        self.reached[at as usize] = (cost + 1) << 1;
-        self.open.push(Reverse((least, at)));
+    /// Goes on along links. Bounds are asked for together, so that the processor fetches what they
+    /// need at the same time.
+    fn expand_along(&mut self, graph: &Graph, links: &[Link], cost: u64, bound: &Bound<'_>) {
+        let mut nearer = [(0, 0); tuning::LINKS];
+        let mut count = 0;
+        for link in links {
+            let there = cost + u64::from(link.length_um);
+            if self.reached.reach(link.to, there) {
+                nearer[count] = (there, link.to);
+                count += 1;
+            }
+        }
+        for (least, to) in &mut nearer[..count] {
+            let at = graph.junction(*to);
+            let at = at.filter(|at| !at.is_dead_end() || bound.goal == Some(*to));
+            *least = at.map_or(u64::MAX, |at| *least + bound.from(at));
+        }
+        let leads_on = nearer[..count].iter().filter(|open| open.0 < u64::MAX);
+        self.open.extend(leads_on.copied().map(Reverse));
     }
 
     /// Cost to a waypoint, as far as it is known.
     fn cost_to(&self, at: u32) -> Option<u64> {
-        (self.reached[at as usize] >> 1).checked_sub(1)
+        self.reached.cost(at)
     }
 
     fn bound<'b>(&self, goal: u32, bounds: Option<&'b RouteBounds>) -> Bound<'b> {
@@ -146,51 +185,72 @@ impl<'a> Search<'a> {
             RouteCost::Uncertainty => micro_per_m * ways.least_m2_per_m(),
         };
         let along = matches!(cost, RouteCost::Length | RouteCost::Recency);
+        let bounds = bounds.filter(|_| along);
         Bound {
+            goal: Some(goal),
             micro_per_m,
-            goal: waypoint.pose().translation.vector,
-            target: { bounds.filter(|_| along) }.and_then(|bounds| bounds.target(goal)),
+            goal_m: waypoint.pose().translation.vector,
+            target: bounds.and_then(|bounds| bounds.target(goal)),
+            graph: bounds.map(RouteBounds::graph),
         }
     }
 
     /// Of the cheapest routes to the goal, that whose places have the lowest numbers, counted from
     /// the goal: each waypoint of a cheapest route has been visited.
-    pub(super) fn path(&self, start: u32, goal: u32) -> Path {
-        let (costs, mut at) = (self.costs, goal);
-        let mut path = Vec::new();
+    pub(super) fn path(&self, start: u32, goal: u32, bounds: Option<&RouteBounds>) -> Path {
+        let graph = bounds.filter(|_| self.are_lengths).map(RouteBounds::graph);
+        let mut numbers = vec![goal];
+        let mut at = goal;
         while at != start {
-            let Some((before, edge)) = self.step_before(at) else {
+            let links = graph.and_then(|graph| graph.junction(at)?.links());
+            let before = match links {
+                Some(links) => self.junction_before(at, links),
+                None => self.waypoint_before(at),
+            };
+            let Some(before) = before else {
                 break; // never: the goal was reached
             };
-            path.push((at, Hop::Way(edge)));
+            numbers.push(before);
             at = before;
         }
         debug_assert!(at == start, "the route leads back to its start");
-        debug_assert!(
-            costs.ways.waypoint(start).is_some(),
-            "ways lead to the start"
-        );
-        path.push((start, Hop::Start));
-        path.reverse();
-        path
+        numbers.reverse();
+        let ways = self.costs.ways;
+        let hops = numbers.windows(2).filter_map(|pair| {
+            let mut edges = ways.waypoint(pair[0])?.edges().iter();
+            let edge = edges.find(|edge| edge.to == pair[1])?;
+            Some((pair[1], Hop::Way(*edge)))
+        });
+        std::iter::once((start, Hop::Start)).chain(hops).collect()
     }
 
-    /// The waypoint before another one on a cheapest route, and the edge between them.
-    fn step_before(&self, at: u32) -> Option<(u32, Edge)> {
+    /// The waypoint before another one on a shortest route. Lengths are the same in both
+    /// directions, and links are in the order of their places.
+    fn junction_before(&self, at: u32, links: &[Link]) -> Option<u32> {
+        let cost = self.cost_to(at)?;
+        let mut links = links.iter();
+        let before = links.find(|link| {
+            let known = self.cost_to(link.to);
+            known.is_some_and(|known| known + u64::from(link.length_um) == cost)
+        });
+        before.map(|link| link.to)
+    }
+
+    /// The waypoint before another one on a cheapest route.
+    fn waypoint_before(&self, at: u32) -> Option<u32> {
         let costs = self.costs;
         let (cost, here) = (self.cost_to(at)?, costs.ways.waypoint(at)?);
         here.edges().iter().find_map(|back| {
+            let known = self.cost_to(back.to).filter(|known| *known < cost)?;
             let before = costs.ways.waypoint(back.to)?;
             let edge = before.edge_to(here.place())?;
-            let through = self.cost_to(back.to)? + costs.of(before, edge)?;
-            (through == cost).then_some((back.to, *edge))
+            (known + costs.of(before, edge)? == cost).then_some(back.to)
         })
     }
 
     /// Of all that was reached, the place nearest to a position, with its distance \[m\].
     pub(super) fn nearest_reached(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
-        let reached = (0..).zip(&self.reached).filter(|(_, cost)| **cost > 0);
-        let distances = reached.filter_map(|(number, _): (u32, _)| {
+        let distances = self.reached.numbers().filter_map(|number| {
             let waypoint = self.costs.ways.waypoint(number)?;
             let offset = waypoint.pose().translation.vector - position.coords;
             Some((offset.norm(), waypoint.place()))

@@ -6,7 +6,7 @@ use super::cost::duration_s;
 use super::path::{Hop, Path};
 use super::{Route, RouteEnd, RouteStep, StepKind, tuning};
 use crate::fold::CognitiveMap;
-use crate::memory::way::{Edge, Waypoint};
+use crate::memory::way::{Edge, Way, Waypoint};
 
 /// A route under construction.
 struct Steps {
@@ -15,6 +15,13 @@ struct Steps {
     facing: UnitQuaternion<f64>,
     variance_m2: f64,
     tolerance_min_m: f64,
+}
+
+/// What is known of an edge: its way, where it leads, and the variance of that by motion \[m²\].
+struct Known<'a> {
+    way: &'a Way,
+    to: &'a Waypoint,
+    variance_m2: f64,
 }
 
 impl CognitiveMap {
@@ -42,7 +49,11 @@ impl CognitiveMap {
             variance_m2: from.variance_m2,
             tolerance_min_m: tuning::TOLERANCE_PER_FIELD_RADIUS * self.settings().field_radius_m,
         };
-        for pair in path.windows(2) {
+        // Looked up together, so that the processor fetches what is far apart at the same time.
+        let known: Vec<_> = { path.iter() }
+            .map(|(_, hop)| hop.edge().and_then(|edge| self.known(edge)))
+            .collect();
+        for (pair, known) in path.windows(2).zip(known.iter().skip(1)) {
             let Some(before) = self.ways.waypoint(pair[0].0) else {
                 continue;
             };
@@ -50,9 +61,9 @@ impl CognitiveMap {
                 let place = Point3::from(before.pose().translation.vector);
                 steps.approach(Some(before.place()), place);
             }
-            match pair[1].1 {
-                Hop::Way(edge) => self.follow(&mut steps, before, &edge),
-                hop => self.cut(&mut steps, pair[1].0, hop),
+            match (pair[1].1, known) {
+                (Hop::Way(edge), Some(known)) => steps.follow(before, &edge, known),
+                (hop, _) => self.cut(&mut steps, pair[1].0, hop),
             }
         }
         if let Some(goal) = to.position {
@@ -90,15 +101,26 @@ impl CognitiveMap {
         steps.push(step);
     }
 
+    /// What is known of an edge.
+    fn known(&self, edge: &Edge) -> Option<Known<'_>> {
+        let (way, to) = (self.ways.way(edge.way)?, self.ways.waypoint(edge.to)?);
+        let variance_m2 = way.position_variance_m2();
+        Some(Known {
+            way,
+            to,
+            variance_m2,
+        })
+    }
+}
+
+impl Steps {
     /// Adds the step along an edge.
-    fn follow(&self, steps: &mut Steps, before: &Waypoint, edge: &Edge) {
-        let (Some(way), Some(to)) = (self.ways.way(edge.way), self.ways.waypoint(edge.to)) else {
-            return;
-        };
+    fn follow(&mut self, before: &Waypoint, edge: &Edge, known: &Known<'_>) {
+        let Known { way, to, .. } = known;
         let there = way.travelled_from(before.place());
         let back = way.travelled_from(to.place());
         let length_m = edge.length_um as f64 / tuning::MICRO;
-        steps.variance_m2 += way.position_variance_m2();
+        self.variance_m2 += known.variance_m2;
         let position = Point3::from(to.pose().translation.vector);
         let kind = if edge.travelled {
             StepKind::Travelled
@@ -111,13 +133,11 @@ impl CognitiveMap {
             traversals: there.times(),
             last_stamp_ns: Some(way.last_stamp_ns()),
             leg: there.leg().or(back.leg()),
-            ..steps.step_to(position, length_m, kind)
+            ..self.step_to(position, length_m, kind)
         };
-        steps.push(step);
+        self.push(step);
     }
-}
 
-impl Steps {
     /// A step in a straight line beside the ways. One of less than a micrometre is none.
     fn approach(&mut self, place: Option<crate::PlaceId>, position: Point3<f64>) {
         let length_m = (position - self.at).norm();

@@ -40,13 +40,15 @@ struct Chain {
 impl CognitiveMap {
     /// The ways as a graph of fewer edges: each chain of ways between places where other than two
     /// ways meet is as few edges as leave each of its places within `tolerance_m` of them. The ways
-    /// of an edge were all travelled in the same directions. Equal maps give equal graphs.
+    /// of an edge were all travelled in the same directions. Ways that are blocked in one direction
+    /// or the other are left out. Equal maps give equal graphs.
     ///
     /// No edge leads from a place to itself, but there may be two between the same places.
     pub fn thinned_ways(&self, tolerance_m: f64) -> Vec<ThinnedWay> {
         let mut places: Vec<PlaceId> = self.waypoints().map(Waypoint::place).collect();
         places.sort_unstable();
-        let mut done: BTreeSet<[PlaceId; 2]> = BTreeSet::new();
+        let blocked = self.ways().filter(|way| self.is_blocked(way));
+        let mut done: BTreeSet<[PlaceId; 2]> = blocked.map(Way::ends).collect();
         let mut thinned = Vec::new();
         // Chains begin where ways meet; what is left are circles, which begin anywhere.
         let junctions = { places.iter() }.filter(|place| !self.is_passed(**place));
@@ -68,6 +70,20 @@ impl CognitiveMap {
             }
         }
         thinned
+    }
+
+    /// Whether nobody gets through a way, in one direction or the other.
+    fn is_blocked(&self, way: &Way) -> bool {
+        if self.blockages().is_empty() {
+            return false;
+        }
+        let [Some(a), Some(b)] = way.ends().map(|end| self.waypoint(end)) else {
+            return false;
+        };
+        let at = |end: &Waypoint| Point3::from(end.pose().translation.vector);
+        let (a, b) = ((a.place(), &at(a)), (b.place(), &at(b)));
+        let mut blocked = self.blockages().iter().map(|blockage| &blockage.blocked);
+        blocked.any(|what| what.blocks(a, b) || what.blocks(b, a))
     }
 
     /// Whether two ways meet at a place, and both were travelled in the same directions through it.

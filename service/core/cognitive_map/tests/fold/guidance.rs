@@ -342,3 +342,21 @@ fn pinned_trips_stay_and_have_at_most_half_the_budget() {
     assert!(free.is_forgotten_trip(TripId(1)));
     assert!(pinned.trip(TripId(1)).is_some());
 }
+
+#[test]
+fn thinned_ways_leave_out_what_is_blocked() {
+    let mut map = CognitiveMap::new(settings(|_| ()));
+    let mut robot = Robot::enrol(&mut map);
+    robot.ahead(&mut map, 1.0, 10);
+    let mut operator = Operator::default();
+    let counts = |map: &CognitiveMap| -> Vec<usize> {
+        let thinned = map.thinned_ways(0.1);
+        thinned.iter().map(|edge| edge.places.len()).collect()
+    };
+    let places = counts(&map)[0];
+    assert_eq!(counts(&map), [places]);
+    operator.blocks(&mut map, Blocked::Way([PlaceId(3), PlaceId(4)]));
+    assert_eq!(counts(&map), [4, places - 4]);
+    operator.says(&mut map, Instruction::Unblock(BlockageId(0)));
+    assert_eq!(counts(&map), [places]);
+}

@@ -125,14 +125,14 @@ proptest! {
         options in options(),
     ) {
         let (mut map, mut robot) = wandered(&yaws, half_life);
-        let mut bounds = RouteBounds::of(&map);
+        let (mut bounds, mut straight) = (RouteBounds::of(&map), RouteBounds::straight(&map));
         wander(&mut map, &mut robot, &later);
-        prop_assert!(bounds.follow(&map, usize::MAX));
+        prop_assert!(bounds.follow(&map, usize::MAX) && straight.follow(&map, usize::MAX));
         let places: Vec<_> = map.places().map(|(id, _)| id).collect();
         let (from, to) = (places[ends.0.index(places.len())], places[ends.1.index(places.len())]);
         let (start, goal) = (map.route_end_at(from).unwrap(), map.route_end_at(to).unwrap());
         let found = routes(&map, &start, &goal, &options);
-        for bounds in [bounds, RouteBounds::of(&map)] {
+        for bounds in [bounds, straight, RouteBounds::of(&map), RouteBounds::straight(&map)] {
             let again = map.routes(&start, &goal, &options, Some(&bounds), &mut || false);
             prop_assert_eq!(&again, &found, "with bounds");
         }

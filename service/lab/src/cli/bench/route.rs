@@ -48,7 +48,7 @@ struct Row {
     /// With distances from pivots.
     us_p50: f64,
     us_p99: f64,
-    /// With the straight line alone.
+    /// With the ways as a search reads them, and the straight line alone.
     straight_us_p50: f64,
     straight_us_p99: f64,
     /// Petgraph's `astar` with the straight line.
@@ -56,7 +56,7 @@ struct Row {
     petgraph_us_p99: f64,
     /// Routes whose cost is not that of petgraph's.
     other_costs: usize,
-    /// Routes that are others with and without distances from pivots.
+    /// Routes that are others with distances from pivots, without, or without any bounds.
     other_routes: usize,
     /// Until the distances from pivots are made.
     bounds_s: f64,
@@ -161,6 +161,7 @@ fn row(map: &CognitiveMap, args: &RouteArgs) -> Row {
     let start = Instant::now();
     let bounds = RouteBounds::of(map);
     let bounds_s = start.elapsed().as_secs_f64();
+    let line = RouteBounds::straight(map);
     let yardstick = Yardstick::of(map);
     let mut random = ChaCha8Rng::seed_from_u64(args.seed);
     let places: Vec<_> = map.places().map(|(id, _)| id).collect();
@@ -171,10 +172,10 @@ fn row(map: &CognitiveMap, args: &RouteArgs) -> Row {
         let ends = [from, to].map(|place| map.route_end_at(place).expect("a place of the map"));
         // One after the other, so that the machine's moods hit them alike.
         let led = timed(&mut with, || route(map, &ends, Some(&bounds)));
-        let plain = timed(&mut straight, || route(map, &ends, None));
+        let plain = timed(&mut straight, || route(map, &ends, Some(&line)));
         let cost = timed(&mut petgraph, || yardstick.cost(from, to));
         other_costs += usize::from(plain.as_ref().map(|route| route.cost_micro) != cost);
-        other_routes += usize::from(plain != led);
+        other_routes += usize::from(plain != led || plain != route(map, &ends, None));
     }
     Row {
         places: map.place_count(),
