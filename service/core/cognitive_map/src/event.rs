@@ -15,7 +15,7 @@ use object_recognition::{ObjectId, Posterior};
 /// One event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// The agent that caused it.
+    /// The agent that caused it, or whose pose closed loops have corrected.
     pub agent: AgentId,
     /// Stamp of the sample that caused it \[ns\]; for a skip, of the latest sample before it;
     /// 0 where there is none.

@@ -34,7 +34,7 @@ impl KeyframeMap {
         if self.graph.is_due() {
             // What comes from now on is for the next one.
             self.graph.constraints.schedule = Schedule {
-                keyframes_then: self.graph.keyframes_with_ranges(),
+                keyframes_then: self.graph.keyframes_if_seen(),
                 ..Schedule::default()
             };
         }

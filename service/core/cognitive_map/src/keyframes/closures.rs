@@ -125,30 +125,31 @@ impl KeyframeGraph {
         self.constraints.n_accepted()
     }
 
-    /// Whether closures are new or landmarks were found by distances, and enough records have come
-    /// in since the last relaxation to pay for another one.
+    /// Whether closures are new or what was seen says more of the past, and enough records have
+    /// come in since the last relaxation to pay for another one.
     pub fn is_due(&self) -> bool {
         let schedule = &self.constraints.schedule;
-        (schedule.new_closures > 0 || self.has_news_by_ranges())
+        (schedule.new_closures > 0 || self.has_seen_news())
             && schedule.records as usize >= self.n_keyframes() / tuning::KEYFRAMES_PER_RECORD
     }
 
-    /// Whether distances say more of the past than they did at the last relaxation: a landmark was
-    /// found, or the past has grown by a third.
+    /// Whether what was seen says more of the past than it did at the last relaxation: a landmark
+    /// was found by distances, or the past has grown by a third.
     ///
-    /// The live estimate takes a distance in where it then thinks that everything is, and the first
-    /// ones not at all.
-    fn has_news_by_ranges(&self) -> bool {
+    /// The live estimate corrects where an agent is, and not where it was: places that were founded
+    /// while it was off move with the past. It takes a distance in where it then thinks that
+    /// everything is, and the first ones not at all.
+    fn has_seen_news(&self) -> bool {
         let schedule = &self.constraints.schedule;
         let then = schedule.keyframes_then as usize;
-        let has_grown = self.n_keyframes() as f64 >= tuning::RANGES_GROWTH * then as f64;
-        schedule.found > 0 || (schedule.ranges > 0 && has_grown)
+        let has_grown = self.n_keyframes() as f64 >= tuning::SEEN_GROWTH * then as f64;
+        schedule.found > 0 || (schedule.ranges.max(schedule.points) > 0 && has_grown)
     }
 
-    /// Number of keyframes, where distances say anything of the past; 0 without any.
-    pub(super) fn keyframes_with_ranges(&self) -> u32 {
+    /// Number of keyframes, where what was seen says anything of the past; 0 otherwise.
+    pub(super) fn keyframes_if_seen(&self) -> u32 {
         let schedule = &self.constraints.schedule;
-        if schedule.ranges == 0 && schedule.keyframes_then == 0 {
+        if schedule.ranges.max(schedule.points) == 0 && schedule.keyframes_then == 0 {
             return 0;
         }
         u32::try_from(self.n_keyframes()).unwrap_or(u32::MAX)
@@ -156,7 +157,7 @@ impl KeyframeGraph {
 
     /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses
     /// of the agents in the map; nothing if no closure was accepted or rejected, and no distances
-    /// came.
+    /// came: what else was seen has corrected the live estimates already.
     ///
     /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then
     /// the same records give the same map.
@@ -184,7 +185,7 @@ impl KeyframeGraph {
         }
         let is_nothing_new = is_undecided && coarse.accepted().next().is_none();
         let is_settled = schedule.accepted == 0 && schedule.ranges == 0 && !is_matched;
-        if is_nothing_new && judged.is_empty() && is_settled {
+        if is_nothing_new && judged.is_empty() && is_settled && schedule.points == 0 {
             return Vec::new();
         }
         let best = RelaxationCopy::most_probable(coarse, judged);
@@ -194,10 +195,14 @@ impl KeyframeGraph {
             accepted.map(|(number, _)| number).collect()
         };
         let (before, now) = (accepted(self), accepted(best.copy.graph()));
-        if is_settled && before == now {
+        let is_seen_alone = is_settled && before == now;
+        if is_seen_alone && schedule.points == 0 {
             return Vec::new();
         }
         self.adopt(best.copy.graph());
+        if is_seen_alone {
+            return Vec::new();
+        }
         best.corrections(is_matched || !now.is_subset(&before))
     }
 

@@ -26,44 +26,47 @@ pub(super) struct Schedule {
     pub(super) found: u32,
     /// Distances of targets whose place is known.
     pub(super) ranges: u32,
+    /// Sightings of where targets are.
+    pub(super) points: u32,
     /// Keyframes at that relaxation.
     pub(super) keyframes_then: u32,
 }
 
-/// Bit of the number of accepted closures that says that what is known of distances follows:
-/// without any, a schedule has the bytes that it had before there were distances.
-const HAS_RANGES: u32 = 1 << 31;
+/// Bit of the number of accepted closures that says that what was seen follows: without any, a
+/// schedule has the bytes that it had before what is seen relaxed the past.
+const HAS_SEEN: u32 = 1 << 31;
 
 impl State for Schedule {
     fn write(&self, out: &mut StateWriter) {
-        let ranges = [self.found, self.ranges, self.keyframes_then];
-        let follows = ranges != [0; 3];
-        let flag = if follows { HAS_RANGES } else { 0 };
+        let seen = [self.found, self.ranges, self.points, self.keyframes_then];
+        let follows = seen != [0; 4];
+        let flag = if follows { HAS_SEEN } else { 0 };
         self.records.write(out);
         self.new_closures.write(out);
-        (self.accepted.min(HAS_RANGES - 1) | flag).write(out);
+        (self.accepted.min(HAS_SEEN - 1) | flag).write(out);
         if follows {
-            ranges.write(out);
+            seen.write(out);
         }
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         let (records, new_closures) = (u32::read(input)?, u32::read(input)?);
         let accepted = u32::read(input)?;
-        let mut ranges = [0; 3];
-        if accepted & HAS_RANGES != 0 {
-            ranges = State::read(input)?;
-            if ranges == [0; 3] {
+        let mut seen = [0; 4];
+        if accepted & HAS_SEEN != 0 {
+            seen = State::read(input)?;
+            if seen == [0; 4] {
                 return Err(CorruptState::Invalid);
             }
         }
-        let [found, ranges, keyframes_then] = ranges;
+        let [found, ranges, points, keyframes_then] = seen;
         Ok(Self {
             records,
             new_closures,
-            accepted: accepted & !HAS_RANGES,
+            accepted: accepted & !HAS_SEEN,
             found,
             ranges,
+            points,
             keyframes_then,
         })
     }

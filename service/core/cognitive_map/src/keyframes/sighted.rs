@@ -24,6 +24,7 @@ impl KeyframeGraph {
         variance: &Vector3<f64>,
     ) {
         let seen = Observation::Point(SeenPoint::new(relation, variance));
+        self.count_point();
         self.observe_landmark(moment, label, &seen);
     }
 
@@ -45,6 +46,11 @@ impl KeyframeGraph {
     fn count_range(&mut self, is_place_known: bool) {
         let schedule = &mut self.constraints.schedule;
         schedule.ranges = schedule.ranges.saturating_add(u32::from(is_place_known));
+    }
+
+    fn count_point(&mut self) {
+        let schedule = &mut self.constraints.schedule;
+        schedule.points = schedule.points.saturating_add(1);
     }
 
     /// A landmark was found by distances that had corrected nothing: the past is to be relaxed by
@@ -110,7 +116,11 @@ impl KeyframeGraph {
         seen.add_noise(&(turn * spread * turn.transpose()));
         let lever = there.motion.translation.vector;
         self.remember_sighting(here.keyframe, Seen::Agent(there.keyframe, lever), seen);
-        self.count_range(is_range);
+        if is_range {
+            self.count_range(true);
+        } else {
+            self.count_point();
+        }
     }
 
     /// The present instant of an agent: at its latest keyframe if that is near, or at a new one.

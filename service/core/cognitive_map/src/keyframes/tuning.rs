@@ -29,9 +29,9 @@ pub(super) const RANGES_AGREE_SD: f64 = 3.0;
 /// such a point is ever off, and for heights those of rooms.
 pub(super) const RANGED_POINT_SD_M: (f64, f64) = (100.0, 3.0);
 
-/// Growth of the number of keyframes after which distances relax the past again. Source: so the
-/// work of all relaxations is some four times that of the last one.
-pub(super) const RANGES_GROWTH: f64 = 1.3;
+/// Growth of the number of keyframes after which what was seen relaxes the past again. Source: so
+/// the work of all relaxations is some four times that of the last one.
+pub(super) const SEEN_GROWTH: f64 = 1.3;
 
 // Attachments.
 

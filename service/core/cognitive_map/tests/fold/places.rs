@@ -1,10 +1,10 @@
 //! Recruitment and revisits.
 
 use cognitive_map::{CognitiveMap, EventKind, PlaceId, Recruitment, Settings};
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3, Vector3};
 use proptest::prelude::*;
 
-use crate::journal::{Robot, motion, settings, start_pose};
+use crate::journal::{Robot, motion, settings, sighting, start_pose};
 
 fn recruited(events: &[EventKind]) -> usize {
     events
@@ -79,6 +79,50 @@ fn a_second_lap_enters_the_places_of_the_first() {
     );
 }
 
+/// Odometry turns too much, so that places are founded beside where the robot is. When it sees the
+/// landmarks of the start again, they move with its past.
+#[test]
+fn places_move_when_landmarks_correct_the_past() {
+    const LAP: usize = 100;
+    let mut map = CognitiveMap::new(Settings::default());
+    let mut robot = Robot::enrol(&mut map);
+    robot.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
+    let turn = std::f64::consts::TAU / LAP as f64;
+    let step = Isometry3::new(Vector3::new(0.2, 0.0, 0.0), Vector3::new(0.0, 0.0, turn));
+    let (mut truth, mut founded) = (Isometry3::identity(), Vec::new());
+    for at in 0..LAP + LAP / 2 {
+        let events = robot.go(&mut map, [0.2, 0.0, 0.0], [0.0, 0.0, turn * 1.03]);
+        truth *= step;
+        founded.extend(events.iter().filter_map(|event| match event {
+            EventKind::PlaceRecruited { place, position } if (10..LAP - 10).contains(&at) => {
+                Some((
+                    *place,
+                    (position.coords - truth.translation.vector).norm(),
+                    truth,
+                ))
+            }
+            _ => None,
+        }));
+        if !(10..LAP - 10).contains(&(at % LAP)) {
+            for (name, stands) in [("door", [1.0, 2.0, 0.0]), ("lamp", [3.0, -1.0, 1.0])] {
+                let seen = truth.inverse() * Point3::from(stands);
+                robot.sample(&mut map, sighting(name, seen.coords.into(), 0.02));
+            }
+        }
+    }
+    let n = founded.len() as f64;
+    let before_m = founded.iter().map(|(_, off_m, _)| off_m).sum::<f64>() / n;
+    let off_m = |(place, _, truth): &(PlaceId, f64, Isometry3<f64>)| {
+        let place = map.place(*place).expect("remembered");
+        (place.position().coords - truth.translation.vector).norm()
+    };
+    let after_m = founded.iter().map(off_m).sum::<f64>() / n;
+    assert!(
+        n > 30.0 && before_m > 0.05 && after_m < 0.5 * before_m,
+        "{n} {before_m} {after_m}"
+    );
+}
+
 #[test]
 fn another_agent_enters_the_places_of_the_first() {
     let mut map = CognitiveMap::new(Settings::default());
@@ -139,7 +183,7 @@ fn uncertainty_of_a_place_lies_along_the_axes_of_the_map() {
     robot.sample(&mut map, cognitive_map::SampleBody::StartPose(start));
     robot.go(&mut map, [0.0; 3], [0.0; 3]);
     let sd_m = map.place(PlaceId(0)).unwrap().position_sd_m();
-    assert!((sd_m - nalgebra::Vector3::new(0.2, 0.1, 0.3)).norm() < 1e-12);
+    assert!((sd_m - Vector3::new(0.2, 0.1, 0.3)).norm() < 1e-12);
 }
 
 #[test]
