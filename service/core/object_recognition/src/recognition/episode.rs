@@ -167,12 +167,12 @@ impl Recognition {
         }
     }
 
-    /// Log-likelihood of an unknown object, as far as independent contacts speak for it against each
-    /// of the likeliest objects: `unknown` by all contacts.
+    /// Log-likelihood of an unknown object, as far as independent contacts speak for it against
+    /// each of the likeliest objects: `unknown` by all contacts.
     ///
     /// What speaks for it against an object is tempered by how far the contacts tell the same of
-    /// that object's model. Against the best object it has no more than the least of these. The odds
-    /// between objects do not depend on it.
+    /// that object's model. Against the best object it has no more than the least of these. The
+    /// odds between objects do not depend on it.
     fn earned(&self, library: &ObjectLibrary, objects: &[(ObjectId, f64)], unknown: f64) -> f64 {
         let best_log = { objects.iter() }.fold(f64::NEG_INFINITY, |best, own| best.max(own.1));
         let Hypotheses::Translations(translations) = &self.hypotheses else {
