@@ -117,16 +117,16 @@ def test_routes_and_blockages_are_drawn(service: Server, open_page: Open) -> Non
     asked = client.route("default", cogmap.AtAgent("ada"), cogmap.AtPlace(3))
     page.page.mouse.click(*page.place_on_screen(3))
     page.until("the place", selected={"kind": "place", "id": 3})
-    page.page.get_by_role("button", name="Route here").click()
+    page.page.get_by_text("Route here").click()
     page.until("the route", routeSteps=len(asked.steps))
     eventually("its length", lambda: "m from ada" in page.text(".place-panel .way"))
     page.page.keyboard.press("Escape")
     page.until("nothing chosen", routeSteps=None)
 
-    # A robot follows a route, and something stands in its way elsewhere.
+    # A robot follows a route, leaves it and gets another one; elsewhere no route leads across.
     client.follow_route("default", "ada", cogmap.AtPlace(8))
     client.block("default", cogmap.BlockageRequest(at_m=(50.0, 0.0, 0.5), radius_m=1.0))
-    ada.drive(STEPS)
+    ada.drive(12)
     page.until("the blockage", blockages=1)
     page.until("the route that is followed", following=["ada"])
     assert page.complaints == []
