@@ -110,7 +110,7 @@ pub struct EventPage {
 pub struct Event {
     /// Space.
     pub space: String,
-    /// Agent that caused it.
+    /// Agent that caused it, or whose pose closed loops have corrected.
     pub agent: String,
     /// Number of records that the map includes with the one that brought it about.
     pub map_revision: u64,

@@ -347,7 +347,7 @@ class Event:
     """One event."""
 
     space: str
-    #: Agent that caused it.
+    #: Agent that caused it, or whose pose closed loops have corrected.
     agent: str
     #: Number of records that the map includes.
     map_revision: int

@@ -33,10 +33,7 @@ impl KeyframeMap {
         self.pending = Some(PendingRelaxation::Awaited(job));
         if self.graph.is_due() {
             // What comes from now on is for the next one.
-            self.graph.constraints.schedule = Schedule {
-                keyframes_then: self.graph.keyframes_if_seen(),
-                ..Schedule::default()
-            };
+            self.graph.constraints.schedule = Schedule::default();
         }
         let mut meanwhile = Meanwhile::default();
         meanwhile.note(agent, stamp_ns);

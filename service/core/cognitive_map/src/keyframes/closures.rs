@@ -134,25 +134,17 @@ impl KeyframeGraph {
     }
 
     /// Whether what was seen says more of the past than it did at the last relaxation: a landmark
-    /// was found by distances, or the past has grown by a third.
+    /// was found by distances, or enough of the past is new. A full graph, too, has new keyframes:
+    /// others went for them.
     ///
     /// The live estimate corrects where an agent is, and not where it was: places that were founded
     /// while it was off move with the past. It takes a distance in where it then thinks that
     /// everything is, and the first ones not at all.
     fn has_seen_news(&self) -> bool {
         let schedule = &self.constraints.schedule;
-        let then = schedule.keyframes_then as usize;
-        let has_grown = self.n_keyframes() as f64 >= tuning::SEEN_GROWTH * then as f64;
-        schedule.found > 0 || (schedule.ranges.max(schedule.points) > 0 && has_grown)
-    }
-
-    /// Number of keyframes, where what was seen says anything of the past; 0 otherwise.
-    pub(super) fn keyframes_if_seen(&self) -> u32 {
-        let schedule = &self.constraints.schedule;
-        if schedule.ranges.max(schedule.points) == 0 && schedule.keyframes_then == 0 {
-            return 0;
-        }
-        u32::try_from(self.n_keyframes()).unwrap_or(u32::MAX)
+        let new = f64::from(schedule.keyframes);
+        let is_much_new = new >= tuning::NEWLY_SEEN * self.n_keyframes() as f64;
+        schedule.found > 0 || (schedule.ranges.max(schedule.points) > 0 && is_much_new)
     }
 
     /// Relaxes the graph with the closures that agree, moves the keyframes, and answers the poses

@@ -28,46 +28,27 @@ pub(super) struct Schedule {
     pub(super) ranges: u32,
     /// Sightings of where targets are.
     pub(super) points: u32,
-    /// Keyframes at that relaxation.
-    pub(super) keyframes_then: u32,
+    /// Keyframes that were made, whether or not they are still kept.
+    pub(super) keyframes: u32,
 }
-
-/// Bit of the number of accepted closures that says that what was seen follows: without any, a
-/// schedule has the bytes that it had before what is seen relaxed the past.
-const HAS_SEEN: u32 = 1 << 31;
 
 impl State for Schedule {
     fn write(&self, out: &mut StateWriter) {
-        let seen = [self.found, self.ranges, self.points, self.keyframes_then];
-        let follows = seen != [0; 4];
-        let flag = if follows { HAS_SEEN } else { 0 };
-        self.records.write(out);
-        self.new_closures.write(out);
-        (self.accepted.min(HAS_SEEN - 1) | flag).write(out);
-        if follows {
-            seen.write(out);
-        }
+        [self.records, self.new_closures, self.accepted].write(out);
+        [self.found, self.ranges, self.points, self.keyframes].write(out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let (records, new_closures) = (u32::read(input)?, u32::read(input)?);
-        let accepted = u32::read(input)?;
-        let mut seen = [0; 4];
-        if accepted & HAS_SEEN != 0 {
-            seen = State::read(input)?;
-            if seen == [0; 4] {
-                return Err(CorruptState::Invalid);
-            }
-        }
-        let [found, ranges, points, keyframes_then] = seen;
+        let [records, new_closures, accepted] = State::read(input)?;
+        let [found, ranges, points, keyframes] = State::read(input)?;
         Ok(Self {
             records,
             new_closures,
-            accepted: accepted & !HAS_SEEN,
+            accepted,
             found,
             ranges,
             points,
-            keyframes_then,
+            keyframes,
         })
     }
 }

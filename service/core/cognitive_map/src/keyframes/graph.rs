@@ -281,6 +281,8 @@ impl KeyframeGraph {
         }
         let (pose, is_origin) = (track.pose, track.is_origin);
         let number = self.chains.append(agent, self.revision);
+        let schedule = &mut self.constraints.schedule;
+        schedule.keyframes = schedule.keyframes.saturating_add(1);
         if let Some(meanwhile) = &mut self.meanwhile {
             meanwhile.keyframes.insert(number);
         }

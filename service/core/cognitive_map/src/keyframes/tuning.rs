@@ -29,9 +29,10 @@ pub(super) const RANGES_AGREE_SD: f64 = 3.0;
 /// such a point is ever off, and for heights those of rooms.
 pub(super) const RANGED_POINT_SD_M: (f64, f64) = (100.0, 3.0);
 
-/// Growth of the number of keyframes after which what was seen relaxes the past again. Source: so
-/// the work of all relaxations is some four times that of the last one.
-pub(super) const SEEN_GROWTH: f64 = 1.3;
+/// Part of the keyframes that is new since the last relaxation when what was seen relaxes the past
+/// again: a past that was kept whole has then grown by 0.3. Source: so the work of all relaxations is
+/// some four times that of the last one, or, of a graph that is full, of one for every quarter of it.
+pub(super) const NEWLY_SEEN: f64 = 0.3 / 1.3;
 
 // Attachments.
 

@@ -9,7 +9,7 @@ use cognitive_map::{
 };
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use crate::journal::{label, motion, start_pose};
+use crate::journal::{Robot, label, motion, settings, sighting, start_pose};
 
 /// Steps of a round, ten a second.
 const ROUND: usize = 40;
@@ -216,6 +216,28 @@ fn who_is_corrected_is_told() {
         last = now;
     }
     assert!(told > 1, "{told}");
+}
+
+/// A graph that is full still learns: what comes in place of what goes is relaxed, too.
+#[test]
+fn sightings_relax_a_past_that_is_full() {
+    let mut map = CognitiveMap::new(settings(|values| values.keyframes_max = 64));
+    let mut robot = Robot::enrol(&mut map);
+    robot.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
+    let turn = std::f64::consts::TAU / ROUND as f64;
+    let (mut begun, mut last) = (Vec::new(), None);
+    for step in 0..20 * ROUND {
+        robot.go(&mut map, [0.3, 0.0, 0.0], [0.0, 0.0, turn]);
+        robot.sample(&mut map, sighting("centre", [0.0, 1.9, 0.0], 0.05));
+        let job = map.relaxation().map(cognitive_map::RelaxationJob::revision);
+        if job.is_some() && job != last {
+            begun.push(step);
+        }
+        last = job;
+    }
+    // The graph is full after two rounds, and has been renewed several times since.
+    let late = begun.iter().filter(|step| **step > 10 * ROUND).count();
+    assert!(late >= 4, "{begun:?}");
 }
 
 #[test]
