@@ -69,7 +69,7 @@ pub use object::{
     AgentObject, Contact, ContactLevel, EndedEpisode, EpisodeKind, Identification, IdentifyQuery,
     NextTouch, ObjectDetail, ObjectLesson, ObjectLevel, ObjectMark, ObjectPage, ObjectPlace,
     ObjectPose, ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached,
-    TouchNoise,
+    RivalObject, TouchNoise,
 };
 pub use percept::{Descriptor, Level};
 pub use predict::{ExpectedPercept, MotionBody, PredictAnswer, PredictQuery, PredictedPercept};

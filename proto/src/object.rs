@@ -39,6 +39,16 @@ pub enum ObjectMark {
     },
     /// The episode ends.
     End {},
+    /// What is felt from here on is to be recognised, and nothing is learned from it, also in a
+    /// space that learns unknown objects.
+    Recognise {
+        /// How the frame may be turned against an object's.
+        #[serde(default)]
+        orientation: Orientation,
+        /// How exactly is felt.
+        #[serde(default)]
+        noise: TouchNoise,
+    },
 }
 
 /// What is known of how the frame of an episode is turned against an object's.
@@ -58,6 +68,9 @@ pub enum Orientation {
     },
     /// By any rotation. Contacts need normals then.
     Free {},
+    /// By any rotation about the vertical: the z axes of both frames are parallel, as of things that
+    /// stand on a table. Contacts need no normals.
+    Yaw {},
 }
 
 impl Default for Orientation {
@@ -73,12 +86,17 @@ impl ObjectMark {
             Self::Learn {
                 name, orientation, ..
             } => (name.as_ref().map_or(0, String::len), orientation),
-            Self::Identify { orientation, .. } => (0, orientation),
+            Self::Identify { orientation, .. } | Self::Recognise { orientation, .. } => {
+                (0, orientation)
+            }
             Self::End {} => return (0, 0),
         };
         let rotations = match orientation {
             Orientation::Finite { rotations_xyzw } => rotations_xyzw.len(),
-            Orientation::Known {} | Orientation::Cube {} | Orientation::Free {} => 0,
+            Orientation::Known {}
+            | Orientation::Cube {}
+            | Orientation::Free {}
+            | Orientation::Yaw {} => 0,
         };
         (name, rotations)
     }
@@ -210,6 +228,18 @@ pub struct ObjectSummary {
     pub contacts: u64,
     /// In how many episodes and lessons.
     pub visits: u64,
+    /// Typical distance between neighbouring places \[m\]; absent of a single place.
+    #[serde(default)]
+    pub gap_m: Option<f64>,
+    /// Distance between places at which the surface between them would be known as exactly as it is
+    /// felt \[m\]: what is above it should be felt more densely. Absent where places are dense, or
+    /// too few to tell.
+    #[serde(default)]
+    pub advised_gap_m: Option<f64>,
+    /// In the answer to a lesson, another object for which this one would be taken, turned about
+    /// the vertical or not.
+    #[serde(default)]
+    pub alike: Option<ObjectProbability>,
 }
 
 /// Objects of a space.
@@ -287,6 +317,24 @@ pub struct Identification {
     pub pose: Option<ObjectPose>,
     /// Where the next touch would tell most.
     pub next_touch: Option<NextTouch>,
+    /// Share of the most probable object's places that a contact has come near, where its pose is
+    /// known: what is left of it may differ.
+    #[serde(default)]
+    pub explored: Option<f64>,
+    /// What speaks for the most probable object against the second.
+    #[serde(default)]
+    pub rival: Option<RivalObject>,
+}
+
+/// The second most probable object, and what the contacts say against it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct RivalObject {
+    /// Its name.
+    pub name: String,
+    /// How much each contact, in the order in which they were felt, speaks for the most probable
+    /// object against this one \[nats\]; below zero for this one.
+    pub contacts_nats: Vec<f64>,
 }
 
 /// The answer to which object it is.

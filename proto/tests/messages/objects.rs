@@ -4,7 +4,7 @@ use cogmap_proto::{
     AgentObject, Contact, ContactLevel, Descriptor, EndedEpisode, EpisodeKind, Identification,
     IdentifyQuery, NextTouch, ObjectDetail, ObjectLesson, ObjectLevel, ObjectPage, ObjectPlace,
     ObjectPose, ObjectProbability, ObjectSummary, ObjectVerdict, Orientation, OtherPose, Reached,
-    TouchNoise,
+    RivalObject, TouchNoise,
 };
 
 use super::Visit;
@@ -76,6 +76,12 @@ fn summary() -> ObjectSummary {
         max_m: [0.05, 0.08, 0.11],
         contacts: 1000,
         visits: 3,
+        gap_m: Some(0.0075),
+        advised_gap_m: Some(0.005),
+        alike: Some(ObjectProbability {
+            name: "bowl".to_owned(),
+            probability: 0.996_093_75,
+        }),
     }
 }
 
@@ -150,6 +156,11 @@ fn recognised() -> Identification {
             approach: Some([0.0, 0.0, -1.0]),
             gain_nats: 0.5,
         }),
+        explored: Some(0.375),
+        rival: Some(RivalObject {
+            name: "bowl".to_owned(),
+            contacts_nats: vec![0.0, 2.5, -0.25],
+        }),
     }
 }
 
@@ -160,6 +171,8 @@ fn undecided() -> Identification {
         unknown: 1.0,
         pose: None,
         next_touch: None,
+        explored: None,
+        rival: None,
         ..recognised()
     }
 }

@@ -72,6 +72,10 @@ fn object_marks() -> Vec<SampleBody> {
             noise,
         },
         ObjectMark::End {},
+        ObjectMark::Recognise {
+            orientation: Orientation::Yaw {},
+            noise,
+        },
     ];
     marks.map(SampleBody::Object).to_vec()
 }

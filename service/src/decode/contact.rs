@@ -29,6 +29,15 @@ pub(super) fn object_mark(mark: &wire::ObjectMark) -> Result<ObjectMark, Invalid
         } => ObjectMark::Identify {
             orientation: orientation(turned)?,
             noise: touch_noise(noise)?,
+            learns: true,
+        },
+        wire::ObjectMark::Recognise {
+            orientation: turned,
+            noise,
+        } => ObjectMark::Identify {
+            orientation: orientation(turned)?,
+            noise: touch_noise(noise)?,
+            learns: false,
         },
         wire::ObjectMark::End {} => ObjectMark::End,
     })
@@ -74,6 +83,7 @@ pub(super) fn orientation(orientation: &wire::Orientation) -> Result<Orientation
         wire::Orientation::Known {} => Orientation::Known,
         wire::Orientation::Cube {} => Orientation::cube(),
         wire::Orientation::Free {} => Orientation::Free,
+        wire::Orientation::Yaw {} => Orientation::Yaw,
         wire::Orientation::Finite { rotations_xyzw } => {
             if !(1..=ROTATIONS_MAX).contains(&rotations_xyzw.len()) {
                 return Err(InvalidSample::NumberOutOfRange);

@@ -19,6 +19,9 @@ pub enum InvalidContacts {
     /// The noise, the spacing or the orientation makes no sense.
     #[error("{0}: {1}")]
     Field(String, InvalidSample),
+    /// A contact lacks a normal, where the orientation is free.
+    #[error("{0}: a free orientation needs the normal of every contact")]
+    Normal(String),
     /// The name is none.
     #[error("name: {0}")]
     Name(InvalidSample),
@@ -67,7 +70,13 @@ pub fn touches_to_identify(
     let noise = noise.map_err(|error| of_noise(&query.noise, error))?;
     let touches = contact::touches(&query.contacts, noise);
     let touches = touches.map_err(|refused| of_contact(&query.contacts, refused))?;
-    Ok((orientation, touches))
+    let bare = query.contacts.iter().position(|one| one.normal.is_none());
+    match bare {
+        Some(at) if orientation == Orientation::Free => {
+            Err(InvalidContacts::Normal(format!("contacts[{at}].normal")))
+        }
+        _ => Ok((orientation, touches)),
+    }
 }
 
 fn check_channels(contacts: &[wire::Contact]) -> Result<(), InvalidContacts> {

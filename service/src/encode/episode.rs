@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use cogmap_proto::{EndedEpisode, EpisodeKind};
 use cognitive_map::{CognitiveMap, Event, EventKind, Identified};
+use object_recognition::Explanation;
 
 use super::identification;
 
@@ -25,6 +26,7 @@ pub(crate) fn ended_episode(
             let identified = posterior.as_deref().map(|posterior| Identified {
                 posterior: posterior.clone(),
                 next_touch: None,
+                explanation: Explanation::default(),
             });
             let ended = EndedEpisode {
                 episode: EpisodeKind::of(*teaches),

@@ -35,6 +35,7 @@ pub fn identification(
     let Identified {
         posterior,
         next_touch,
+        explanation,
     } = identified;
     let Posterior {
         objects,
@@ -82,6 +83,13 @@ pub fn identification(
             position_m: touch.point_m.coords.into(),
             approach: touch.approach.map(|way| way.into_inner().into()),
             gain_nats: touch.gain_nats,
+        }),
+        explored: explanation.explored,
+        rival: { explanation.rival.as_ref() }.and_then(|(id, said)| {
+            Some(wire::RivalObject {
+                name: name(*id)?,
+                contacts_nats: said.clone(),
+            })
         }),
     }
 }

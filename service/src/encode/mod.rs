@@ -38,7 +38,7 @@ pub use landmark::landmark;
 pub(crate) use live::{live_counts, live_sighting};
 pub use localization::localization;
 pub use map_export::{agent_summaries, map_export};
-pub use object::{object_detail, object_summary};
+pub use object::{object_alike, object_detail, object_summary};
 pub use place::place;
 pub use prediction::prediction;
 pub use recall::recall;

@@ -83,7 +83,7 @@ fn summaries(map: &CognitiveMap, after: Option<&str>, limit: usize) -> Response<
     objects.sort_by(|a, b| a.1.name().cmp(b.1.name()));
     let summaries = objects
         .iter()
-        .map(|(_, known, model)| encode::object_summary(known, model));
+        .map(|object| encode::object_summary(map, *object));
     let (objects, next) = page::cut(summaries, limit, |summary| summary.name.clone());
     reply::json(&ObjectPage { objects, next })
 }
@@ -123,9 +123,14 @@ pub(crate) async fn put(
     let valid = decode::lesson(&lesson)?;
     space.teach(&name, lesson, valid).await?;
     let map = space.snapshot().await?;
-    detail(&map, &name)
-        .map(|object| reply::json(&object.summary))
-        .ok_or_else(|| unknown("object"))
+    let mut taught = detail(&map, &name)
+        .ok_or_else(|| unknown("object"))?
+        .summary;
+    // The lesson is on disk, whether or not there is room for the question.
+    if let Ok((map, alike)) = space.alike(name).await {
+        taught.alike = encode::object_alike(&map, alike);
+    }
+    Ok(reply::json(&taught))
 }
 
 /// Forget an object.
@@ -193,8 +198,8 @@ pub(crate) async fn of_agent(
 
 fn detail(map: &CognitiveMap, name: &Label) -> Option<ObjectDetail> {
     let id = map.object_by_name(name)?;
-    let (_, known, model) = map.objects().find(|(object, ..)| *object == id)?;
-    Some(encode::object_detail(map, known, model))
+    let object = map.objects().find(|(object, ..)| *object == id)?;
+    Some(encode::object_detail(map, object))
 }
 
 /// The space that the path names, and the name of an object that may be there or not, or none that

@@ -235,6 +235,7 @@ fn object_mark(mark: &ReadingMark) -> Result<ObjectMark, InvalidSample> {
         ReadingMark::Identify { noise } => ObjectMark::Identify {
             orientation: Orientation::Free,
             noise: core(noise)?,
+            learns: true,
         },
         ReadingMark::End => ObjectMark::End,
     })

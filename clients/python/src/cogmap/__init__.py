@@ -120,6 +120,7 @@ from .object import (
     ObjectVerdict,
     OtherPose,
     Reached,
+    RivalObject,
     Undecided,
     UnknownObject,
 )
@@ -170,6 +171,7 @@ from .sample import (
     Position,
     Range,
     RangeBearing,
+    RecogniseObject,
     Relation,
     RelativePose,
     Sample,
@@ -181,6 +183,7 @@ from .sample import (
     Target,
     TouchNoise,
     Velocity,
+    YawTurn,
 )
 from .sequence import NextPlace, SequenceAnswer, SequenceElement, SequenceQuery, SequenceTrip
 from .settings import Bernoulli, NoiseSettings, Novelty, Recruitment, SpaceSettings
@@ -319,6 +322,9 @@ __all__ = [
     "Recruitment",
     "Rejection",
     "Relation",
+    "YawTurn",
+    "RecogniseObject",
+    "RivalObject",
     "RelativePose",
     "Retrace",
     "RetraceDirection",

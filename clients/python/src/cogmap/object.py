@@ -140,6 +140,13 @@ class ObjectSummary:
     contacts: int
     #: In how many episodes and lessons.
     visits: int
+    #: Typical distance between neighbouring places [m]; None of a single place.
+    gap_m: Optional[float] = None
+    #: Distance between places at which the surface between them would be known as exactly as it is
+    #: felt [m]: what is above it should be felt more densely.
+    advised_gap_m: Optional[float] = None
+    #: In the answer to a lesson, another object for which this one would be taken.
+    alike: Optional[ObjectProbability] = None
 
 
 @dataclass(frozen=True)
@@ -257,6 +264,16 @@ class NextTouch:
 
 
 @dataclass(frozen=True)
+class RivalObject:
+    """The second most probable object, and what the contacts say against it."""
+
+    name: str
+    #: How much each contact, in the order in which they were felt, speaks for the most probable
+    #: object against this one [nats]; below zero for this one.
+    contacts_nats: Tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Identification:
     """What a sequence of contacts says."""
 
@@ -282,6 +299,11 @@ class Identification:
     pose: Optional[ObjectPose]
     #: Where the next touch would tell most.
     next_touch: Optional[NextTouch]
+    #: Share of the most probable object's places that a contact has come near, where its pose is
+    #: known: what is left of it may differ.
+    explored: Optional[float] = None
+    #: What speaks for the most probable object against the second.
+    rival: Optional[RivalObject] = None
 
 
 class EpisodeKind(Enum):

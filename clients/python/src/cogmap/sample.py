@@ -341,8 +341,16 @@ class AnyTurn:
     TAG: ClassVar[str] = "free"
 
 
+@dataclass(frozen=True)
+class YawTurn:
+    """They are turned by any rotation about the vertical, the z axis of both, as things on a table
+    are. Contacts need no normals."""
+
+    TAG: ClassVar[str] = "yaw"
+
+
 #: How the frame of an episode may be turned against an object's.
-Orientation = Union[NoTurn, CubeTurns, FiniteTurns, AnyTurn]
+Orientation = Union[NoTurn, CubeTurns, FiniteTurns, AnyTurn, YawTurn]
 
 
 @dataclass(frozen=True)
@@ -401,6 +409,21 @@ class IdentifyObject:
 
 
 @dataclass(frozen=True)
+class RecogniseObject:
+    """What is felt from here on is to be recognised, and nothing is learned from it."""
+
+    TAG: ClassVar[str] = "recognise"
+    #: How the frame may be turned against an object's.
+    orientation: Orientation = NoTurn()
+    #: How exactly is felt.
+    noise: TouchNoise = TouchNoise()
+
+    def __post_init__(self) -> None:
+        one_of("orientation", self.orientation, get_args(Orientation))
+        one_of("noise", self.noise, (TouchNoise,))
+
+
+@dataclass(frozen=True)
 class EndObject:
     """The episode with an object ends."""
 
@@ -413,10 +436,10 @@ class ObjectMark:
 
     TAG: ClassVar[str] = "object"
     NEWTYPE: ClassVar[bool] = True
-    mark: Union[LearnObject, IdentifyObject, EndObject]
+    mark: Union[LearnObject, IdentifyObject, EndObject, RecogniseObject]
 
     def __post_init__(self) -> None:
-        one_of("mark", self.mark, (LearnObject, IdentifyObject, EndObject))
+        one_of("mark", self.mark, (LearnObject, IdentifyObject, EndObject, RecogniseObject))
 
 
 @dataclass(frozen=True)

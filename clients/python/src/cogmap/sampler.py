@@ -18,6 +18,7 @@ from .sample import (
     NoTurn,
     ObjectMark,
     Orientation,
+    RecogniseObject,
     Relation,
     SampleBody,
     Sighting,
@@ -201,6 +202,7 @@ class Sampler(ABC):
         *,
         orientation: Orientation = NoTurn(),
         noise: TouchNoise = TouchNoise(),
+        learns: bool = True,
         stamp_ns: Optional[int] = None,
     ) -> int:
         """What is felt from here on is to be recognised, until `end_object`.
@@ -208,9 +210,11 @@ class Sampler(ABC):
         Args:
             orientation: How the body's frame may be turned against an object's.
             noise: How exactly is felt.
+            learns: Whether an object that turns out to be unknown is learned, where the space does.
             stamp_ns: When it begins, on the sensor's clock [ns].
         """
-        return self._send(ObjectMark(IdentifyObject(orientation, noise)), stamp_ns)
+        mark = IdentifyObject if learns else RecogniseObject
+        return self._send(ObjectMark(mark(orientation, noise)), stamp_ns)
 
     def end_object(self, *, stamp_ns: Optional[int] = None) -> int:
         """The episode with an object ends."""

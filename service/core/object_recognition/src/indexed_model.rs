@@ -85,6 +85,15 @@ impl IndexedModel {
         self.places.iter().flat_map(|place| &place.levels)
     }
 
+    /// Standard deviation of what was predicted between the places \[m\]; none where nothing was.
+    pub(crate) fn between_sd_m(&self) -> Option<f64> {
+        let predicted = self.places.iter().filter(|place| place.is_predicted);
+        let (count, sum) = predicted.fold((0.0, 0.0), |(count, sum), place| {
+            (count + 1.0, sum + place.variance_m2)
+        });
+        (count > 0.0).then(|| f64::sqrt(sum / count))
+    }
+
     /// Mean share of the model within `reach_m` of one of its places.
     pub(crate) fn share(&self, reach_m: f64) -> f64 {
         let at = (reach_m / self.extent_m).clamp(0.0, 1.0) * SHARE_BINS as f64;

@@ -24,10 +24,10 @@ mod tuning;
 mod z_score;
 
 pub use contact::{Contact, DescriptorReading, LevelReading, Reached};
-pub use library::{ObjectId, ObjectLibrary};
+pub use library::{Density, ObjectId, ObjectLibrary};
 pub use model::{LevelMemory, ModelPlace, ModelSettings, ObjectModel};
 pub use next_touch::NextTouch;
 pub use orientation::Orientation;
 pub use posterior::{PoseEstimate, Posterior, Verdict};
-pub use recognition::Recognition;
+pub use recognition::{Explanation, Recognition, explain};
 pub use tuning::ANSWER_PROBABILITY;

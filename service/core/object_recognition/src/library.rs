@@ -23,6 +23,27 @@ pub(crate) struct LibraryEntry {
     pub(crate) indexed: IndexedModel,
 }
 
+/// How densely an object was felt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Density {
+    /// Typical distance between neighbouring places \[m\].
+    pub gap_m: f64,
+    /// Standard deviation of a contact, per axis \[m\].
+    pub contact_sd_m: f64,
+    /// Standard deviation of the surface between the places, as it is predicted \[m\]; none where
+    /// they are dense, or too few to tell.
+    pub between_sd_m: Option<f64>,
+}
+
+impl Density {
+    /// Distance between places at which the surface between them would be known as exactly as it is
+    /// felt \[m\]: a smooth surface leaves the chord as the square of its length.
+    pub fn advised_gap_m(&self) -> Option<f64> {
+        let ratio = self.contact_sd_m / self.between_sd_m?;
+        Some(self.gap_m * ratio.min(1.0).sqrt())
+    }
+}
+
 /// A place of the library.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
@@ -101,6 +122,17 @@ impl ObjectLibrary {
     /// The model of an object.
     pub fn get(&self, id: ObjectId) -> Option<&ObjectModel> {
         self.objects.get(&id).map(|object| &object.model)
+    }
+
+    /// How densely an object was felt.
+    pub fn density(&self, id: ObjectId) -> Option<Density> {
+        let object = self.objects.get(&id)?;
+        let gap_m = object.indexed.gap_m;
+        (gap_m > 0.0).then(|| Density {
+            gap_m,
+            contact_sd_m: object.model.noise_m2().sqrt(),
+            between_sd_m: object.indexed.between_sd_m(),
+        })
     }
 
     /// All objects, by number.

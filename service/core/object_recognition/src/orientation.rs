@@ -1,8 +1,10 @@
 //! Prior over the rotation between the episode's frame and a model's.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::tuning::YAW_TURNS;
 
 /// Prior over the rotation from the episode's frame into a model's.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +15,8 @@ pub enum Orientation {
     Finite(Vec<UnitQuaternion<f64>>),
     /// Any rotation.
     Free,
+    /// Any rotation about the z axis that both frames share, as of what stands on a table.
+    Yaw,
 }
 
 impl Orientation {
@@ -41,7 +45,20 @@ impl Orientation {
         match self {
             Self::Known => Some(vec![UnitQuaternion::identity()]),
             Self::Finite(rotations) => Some(rotations.clone()),
+            Self::Yaw => {
+                let turn = |at: u16| Vector3::z() * (TAU * f64::from(at) / f64::from(YAW_TURNS));
+                Some((0..YAW_TURNS).map(turn).map(UnitQuaternion::new).collect())
+            }
             Self::Free => None,
+        }
+    }
+
+    /// Standard deviation of a rotation about the z axis that one of [`rotations`](Self::rotations)
+    /// stands for \[rad\].
+    pub(crate) fn yaw_sd_rad(&self) -> f64 {
+        match self {
+            Self::Yaw => TAU / f64::from(YAW_TURNS) / 12.0_f64.sqrt(),
+            Self::Known | Self::Finite(_) | Self::Free => 0.0,
         }
     }
 }

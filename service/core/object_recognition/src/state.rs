@@ -52,6 +52,7 @@ state_of_enum!(Orientation {
     Known = 0,
     Free = 1,
     Finite(rotations) = 2,
+    Yaw = 3,
 });
 
 impl State for ObjectModel {

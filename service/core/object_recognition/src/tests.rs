@@ -397,6 +397,38 @@ fn one_of_24_turns_is_found() {
 }
 
 #[test]
+fn a_turn_about_the_vertical_is_found() {
+    let mut library = ObjectLibrary::default();
+    for key in 1..6 {
+        library.put(ObjectId(u32::try_from(key).unwrap()), dotted(key));
+    }
+    // Both signs, none, a half turn, and halfway between two hypotheses.
+    for degrees in [0.0, 31.0, -77.0, 179.9, 180.0, 3601.0_f64] {
+        let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, degrees.to_radians());
+        let map_from_episode = Isometry3::from_parts(Translation3::new(-0.4, 3.0, 0.7), turn);
+        let mut recognition = Recognition::new(&Orientation::Yaw);
+        for (point, level) in dots(4, 9) {
+            let at = map_from_episode.inverse() * point;
+            recognition.touch(&library, Contact::at(at, 0.001).with_level(0, level, 0.3));
+        }
+        let posterior = recognition.posterior(&library);
+        assert_eq!(
+            posterior.verdict(),
+            Verdict::Object(ObjectId(4)),
+            "{degrees}: {posterior:?}"
+        );
+        let found = posterior.pose.unwrap();
+        let error = found.map_from_episode.inverse() * map_from_episode;
+        let sd_rad = found.covariance.matrix()[(5, 5)].sqrt();
+        assert!((0.009..0.011).contains(&sd_rad), "{sd_rad}");
+        assert!(error.rotation.angle() < 2.0 * sd_rad, "{degrees}: {error}");
+        // Where the contacts are, and not only where their frame begins.
+        let at = map_from_episode.inverse() * dots(4, 1)[0].0;
+        assert!((error * at - at).norm() < 0.01, "{degrees}: {error}");
+    }
+}
+
+#[test]
 fn a_model_stays_within_its_budget_and_keeps_its_extent() {
     let settings = ModelSettings {
         spacing_m: 0.002,

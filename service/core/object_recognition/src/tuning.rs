@@ -173,6 +173,10 @@ pub(crate) const GATE_SQUARED: f64 = 32.0;
 /// Seeds of the prefilter. Of larger libraries every second place stands for two, or every third
 /// for three. Budget.
 pub(crate) const SEEDS_MAX: usize = 1 << 22;
+/// Rotations that stand for all about the vertical: 2 degrees apart, so that at 0.1 m from the first
+/// contact a rotation between two moves a contact by 1 mm (deviation), as exactly as hands feel.
+/// Chosen.
+pub(crate) const YAW_TURNS: u16 = 180;
 /// Contacts that promoted seeds explain at a touch. Budget.
 pub(crate) const PROMOTION_MAX: usize = 1280;
 /// The same at least. Budget.
@@ -342,6 +346,12 @@ pub(crate) const HALVINGS_MAX: usize = 4;
 pub(crate) const PART_PLACES_MIN: usize = 8;
 /// Contacts that a coverage test needs. Chosen.
 pub(crate) const COVERAGE_CONTACTS_MIN: usize = 4;
+
+// Explanation.
+
+/// Standard deviations of a contact's position, beside the spacing of the model, within which a
+/// place counts as explored. Chosen.
+pub(crate) const EXPLORED_SDS: f64 = 2.0;
 
 // Next touch.
 

@@ -15,6 +15,8 @@ pub enum Turn {
     None,
     /// Anyhow; contacts tell the surface's normal.
     Any,
+    /// By any angle about the vertical.
+    Yaw,
 }
 
 /// Where an object is touched to teach it.

@@ -1,5 +1,7 @@
 //! Objects taught and touched again, through the fold.
 
+use std::f64::consts::PI;
+
 use cognitive_map::{
     AgentId, CognitiveMap, EventKind, InvalidSample, Label, Lesson, Level, Motion, ObjectMark,
     PoseNoise, Record, Sample, SampleBody, Settings, Spacing, Touch, TouchLevel, TouchNoise,
@@ -161,6 +163,11 @@ fn touch_again(
             let turn = UnitQuaternion::new_normalize(Quaternion::from(of));
             (turn, Orientation::Free)
         }
+        Turn::Yaw => {
+            let yaw_rad = random.random_range(-PI..PI);
+            let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw_rad);
+            (turn, Orientation::Yaw)
+        }
     };
     let way = walk(solid, last, protocol.step_m, random);
     let half_touches = half_covered(solid, &way, protocol.step_m, random);
@@ -169,7 +176,11 @@ fn touch_again(
     let noise = noise(protocol)?;
     hand.sample(
         &mut map,
-        SampleBody::Object(ObjectMark::Identify { orientation, noise }),
+        SampleBody::Object(ObjectMark::Identify {
+            orientation,
+            noise,
+            learns: true,
+        }),
     );
     let mut trial = Trial {
         half_touches,

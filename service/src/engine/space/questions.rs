@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use cognitive_map::{CognitiveMap, Identified, Localization, RouteBounds, Sample, Touch};
-use object_recognition::Orientation;
+use cognitive_map::{CognitiveMap, Identified, Label, Localization, RouteBounds, Sample, Touch};
+use object_recognition::{ObjectId, Orientation};
 use tokio::sync::oneshot;
 
 use super::Space;
@@ -85,6 +85,20 @@ impl Space {
     ) -> Result<(Arc<CognitiveMap>, Identified), QuestionError> {
         self.ask(TIME_MAX, move |map, _| map.identify(&orientation, &touches))
             .await
+    }
+
+    /// For which other object one would be taken, and how probably.
+    ///
+    /// # Errors
+    /// See [`QuestionError`].
+    pub async fn alike(
+        &self,
+        name: Label,
+    ) -> Result<(Arc<CognitiveMap>, Option<(ObjectId, f64)>), QuestionError> {
+        self.ask(TIME_MAX, move |map, _| {
+            map.object_alike(map.object_by_name(&name)?)
+        })
+        .await
     }
 
     /// Answers a question by the map as it is. Who no longer waits for the answer lets the work end

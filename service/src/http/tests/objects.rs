@@ -83,6 +83,11 @@ async fn objects_are_taught_listed_shown_and_forgotten() {
         (&summary["visits"], &summary["places"]),
         (&1.into(), &8.into())
     );
+    // Nobody could tell it from the other one now.
+    assert_eq!(summary["alike"]["name"], "fork");
+    assert_eq!(knife["summary"]["alike"], json!(null));
+    let gap_m = knife["summary"]["gap_m"].as_f64().expect("a number");
+    assert!((gap_m - PITCH_M).abs() < 1e-9, "{gap_m}");
     let gone = Request::delete(path)
         .body(Body::empty())
         .expect("a request");
@@ -112,6 +117,10 @@ async fn contacts_tell_the_object_and_its_pose() {
         .as_f64()
         .expect("a number");
     assert!((x - 7.0).abs() < 0.005, "{x}");
+    assert_eq!(answer["explored"], 1.0);
+    assert_eq!(answer["rival"]["name"], "fork");
+    let said = answer["rival"]["contacts_nats"].as_array().expect("a list");
+    assert_eq!(said.len(), 8);
     // Nothing is known after one contact whose level both have.
     let told = contacts(&KNIFE, &[0], 0.0);
     let answer = rig.send(Method::POST, path, JSON, query(told)).await.good();
@@ -127,6 +136,17 @@ async fn contacts_tell_the_object_and_its_pose() {
         problem["detail"]
             .as_str()
             .is_some_and(|text| text.starts_with("contacts[1].normal Some([2.0"))
+    );
+    // What may be turned anyhow is told by the normals.
+    let free = Codec::Json.encode(&IdentifyQuery {
+        orientation: Orientation::Free {},
+        noise: noise(),
+        contacts: contacts(&KNIFE, &[0, 1], 0.0),
+    });
+    let refused = rig.send(Method::POST, path, JSON, free).await;
+    assert_eq!(
+        refused.problem(422, "invalid-query")["detail"],
+        "contacts[0].normal: a free orientation needs the normal of every contact"
     );
 }
 

@@ -7,7 +7,7 @@ use crate::input::AgentId;
 use crate::input::Label;
 use crate::input::{ObjectMark, Spacing, Touch};
 use crate::memory::object::{Episode, Identified, Insight, KnownObject, News, ObjectMemory};
-use object_recognition::{ModelPlace, ObjectId, ObjectModel, Orientation};
+use object_recognition::{Density, ModelPlace, ObjectId, ObjectModel, Orientation};
 
 impl Fold<'_> {
     /// An episode with an object begins or ends. One that is under way ends in any case.
@@ -24,9 +24,13 @@ impl Fold<'_> {
                 let (name, orientation) = (name.clone(), orientation.clone());
                 Some(Episode::learn(name, spacing.model(), orientation, *noise))
             }
-            ObjectMark::Identify { orientation, noise } => {
+            ObjectMark::Identify {
+                orientation,
+                noise,
+                learns,
+            } => {
                 let model = Spacing::default().model();
-                let learns = self.settings.learns_unknown_objects;
+                let learns = *learns && self.settings.learns_unknown_objects;
                 let episode = Episode::identify(model, orientation.clone(), *noise);
                 Some(episode.learning(learns))
             }
@@ -146,6 +150,17 @@ impl CognitiveMap {
     /// most. Levels and descriptors of channels on which no object was sensed do not count.
     pub fn identify(&self, orientation: &Orientation, touches: &[Touch]) -> Identified {
         self.objects.identify(orientation, touches)
+    }
+
+    /// How densely an object was felt.
+    pub fn object_density(&self, object: ObjectId) -> Option<Density> {
+        self.objects.library().density(object)
+    }
+
+    /// The object that one looks like, turned about the vertical or not, and how probable it is
+    /// that a hand which feels the one takes it for the other.
+    pub fn object_alike(&self, object: ObjectId) -> Option<(ObjectId, f64)> {
+        self.objects.alike(object)
     }
 
     /// What an agent's episode says so far, if one is under way: whether it teaches, and what is

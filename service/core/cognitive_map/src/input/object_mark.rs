@@ -110,13 +110,15 @@ pub enum ObjectMark {
         /// How exactly is sensed.
         noise: TouchNoise,
     },
-    /// What is sensed from here on is to be recognised. If it turns out to be unknown, it is
-    /// learned at the end.
+    /// What is sensed from here on is to be recognised.
     Identify {
         /// How the frame may be turned against an object's.
         orientation: Orientation,
         /// How exactly is sensed.
         noise: TouchNoise,
+        /// Whether it is learned at the end if it turns out to be unknown, and the space learns
+        /// such objects.
+        learns: bool,
     },
     /// The episode ends.
     End,

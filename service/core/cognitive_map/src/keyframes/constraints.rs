@@ -28,23 +28,42 @@ pub(super) struct Schedule {
     pub(super) ranges: u32,
     /// Sightings of where targets are.
     pub(super) points: u32,
-    /// Keyframes that were made, whether or not they are still kept.
+    /// Keyframes that were made, without those of agents that were forgotten.
     pub(super) keyframes: u32,
 }
 
+/// Bit of the number of accepted closures that says that more follows: an empty graph has the bytes
+/// that it had before what is seen relaxed the past.
+const FOLLOWS: u32 = 1 << 31;
+
 impl State for Schedule {
     fn write(&self, out: &mut StateWriter) {
-        [self.records, self.new_closures, self.accepted].write(out);
-        [self.found, self.ranges, self.points, self.keyframes].write(out);
+        let seen = [self.found, self.ranges, self.points, self.keyframes];
+        let follows = seen != [0; 4];
+        let flag = if follows { FOLLOWS } else { 0 };
+        self.records.write(out);
+        self.new_closures.write(out);
+        (self.accepted.min(FOLLOWS - 1) | flag).write(out);
+        if follows {
+            seen.write(out);
+        }
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let [records, new_closures, accepted] = State::read(input)?;
-        let [found, ranges, points, keyframes] = State::read(input)?;
+        let (records, new_closures) = (u32::read(input)?, u32::read(input)?);
+        let accepted = u32::read(input)?;
+        let mut seen = [0; 4];
+        if accepted & FOLLOWS != 0 {
+            seen = State::read(input)?;
+            if seen == [0; 4] {
+                return Err(CorruptState::Invalid);
+            }
+        }
+        let [found, ranges, points, keyframes] = seen;
         Ok(Self {
             records,
             new_closures,
-            accepted,
+            accepted: accepted & !FOLLOWS,
             found,
             ranges,
             points,

@@ -17,6 +17,8 @@ impl KeyframeGraph {
             let previous = keyframe.previous;
             self.strip(number);
             self.chains.keyframes.remove(number, self.revision);
+            let schedule = &mut self.constraints.schedule;
+            schedule.keyframes = schedule.keyframes.saturating_sub(1);
             number = previous;
         }
         if let Some(track) = self.track_mut(agent) {

@@ -9,9 +9,8 @@ use cognitive_map::{
 use object_recognition::Orientation;
 use proptest::prelude::*;
 
-use crate::journal::{
-    Robot, any_settings, descriptor, journals, label, level, run, settings, sighting,
-};
+use crate::any_journal::{any_settings, journals};
+use crate::journal::{Robot, descriptor, label, level, run, settings, sighting};
 
 type Store = BTreeMap<(u8, u32), Vec<u8>>;
 
@@ -79,6 +78,7 @@ fn rich_map() -> CognitiveMap {
         SampleBody::Object(ObjectMark::Identify {
             orientation: Orientation::Known,
             noise,
+            learns: true,
         }),
     );
     robots[0].sample(&mut map, level("touch", 1.0, [0.0; 3]));

@@ -3,7 +3,8 @@
 use cognitive_map::{CognitiveMap, Motion, Record, SampleBody, Settings};
 use proptest::prelude::*;
 
-use crate::journal::{any_settings, journals, run};
+use crate::any_journal::{any_settings, journals};
+use crate::journal::run;
 
 /// The records that had an effect, in order.
 fn effective(settings: &Settings, records: &[Record]) -> Vec<Record> {

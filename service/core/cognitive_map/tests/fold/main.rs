@@ -5,13 +5,14 @@
     reason = "clippy knows test functions, but not what they call"
 )]
 
+mod any_journal; // arbitrary journals
 mod astray; // robots that are carried off
 mod budgets; // what is forgotten, and when
 mod checkpoint; // pages out and in, damaged ones too
 mod correction; // what others see of an agent
 mod determinism; // the same records, the same map
 mod guidance; // blockages, routes that are followed, pinned trips
-mod journal; // arbitrary journals, and a robot to write readable ones
+mod journal; // a robot that writes readable journals
 mod landmarks; // what sightings teach
 mod lessons; // objects that are taught at once
 mod levels; // where robots are by what they feel

@@ -47,9 +47,15 @@ fn learn(name: Option<&str>) -> SampleBody {
 }
 
 pub(crate) fn identify() -> SampleBody {
+    identify_or_learn(true)
+}
+
+/// What is unknown is learned, or not.
+fn identify_or_learn(learns: bool) -> SampleBody {
     SampleBody::Object(ObjectMark::Identify {
         orientation: Orientation::Known,
         noise: noise(),
+        learns,
     })
 }
 
@@ -106,6 +112,26 @@ pub(crate) fn taught(settings: Settings) -> (CognitiveMap, Robot) {
     (map, hand)
 }
 
+#[test]
+fn what_looks_like_another_object_is_found() {
+    let (mut map, mut hand) = taught(Settings::default());
+    let known = |map: &CognitiveMap, name| map.object_by_name(&label(name)).unwrap();
+    for (name, _) in &RODS {
+        assert_eq!(map.object_alike(known(&map, name)), None, "{name}");
+    }
+    // The fork once more, the other way round.
+    let mut turned = RODS[0].1;
+    turned.reverse();
+    hand.sample(&mut map, learn(Some("twin")));
+    feel(&mut map, &mut hand, &turned, &UP);
+    hand.sample(&mut map, end());
+    let (alike, probability) = map.object_alike(known(&map, "twin")).unwrap();
+    assert_eq!(alike, known(&map, "fork"));
+    assert!(probability >= 0.995, "{probability}");
+    let density = map.object_density(alike).unwrap();
+    assert!((density.gap_m - PITCH_M).abs() < 0.002, "{density:?}");
+}
+
 fn recognised(events: &[EventKind]) -> Vec<&str> {
     let names = events.iter().filter_map(|event| match event {
         EventKind::ObjectRecognised { name, .. } => Some(name.as_str()),
@@ -127,6 +153,14 @@ fn what_was_learned_by_touch_is_known_again_from_an_unknown_start() {
         let pose = identified.posterior.pose.unwrap();
         let off = pose.map_from_episode.translation.vector.x - 10.0 * PITCH_M;
         assert!(off.abs() < 0.003, "{off}");
+        // Ten of twelve places were felt, and the levels tell it from another rod.
+        let explanation = identified.explanation;
+        let explored = explanation.explored.unwrap();
+        assert!((0.8..0.95).contains(&explored), "{explored}");
+        let (rival, said) = explanation.rival.unwrap();
+        assert_ne!(map.object(rival).unwrap().name().as_str(), *name);
+        assert_eq!(said.len(), 10);
+        assert!(said.iter().sum::<f64>() > 5.0, "{said:?}");
         hand.sample(&mut map, end());
         assert!(map.episode(hand.id).is_none());
     }
@@ -367,8 +401,8 @@ fn a_visit_to_what_was_known_before_does_not_undo_what_was_added() {
 }
 
 #[test]
-fn nothing_unknown_is_learned_where_the_settings_say_so() {
-    let learned = |learns| {
+fn nothing_unknown_is_learned_where_the_settings_or_the_episode_say_so() {
+    let learned = |(learns, episode_learns)| {
         let values = SettingsValues {
             learns_unknown_objects: learns,
             ..SettingsValues::default()
@@ -376,13 +410,14 @@ fn nothing_unknown_is_learned_where_the_settings_say_so() {
         let (mut map, mut hand) = taught(Settings::new(values).unwrap());
         let before = map.object_count();
         let strange = RODS[2].1.map(|level| level + 20.0);
-        hand.sample(&mut map, identify());
+        hand.sample(&mut map, identify_or_learn(episode_learns));
         let events = feel(&mut map, &mut hand, &strange, &UP);
         assert!(events.contains(&EventKind::ObjectUnknown), "{events:?}");
         hand.sample(&mut map, end());
         map.object_count() - before
     };
-    assert_eq!([true, false].map(learned), [1, 0]);
+    let cases = [(true, true), (true, false), (false, true), (false, false)];
+    assert_eq!(cases.map(learned), [1, 0, 0, 0]);
 }
 
 #[test]

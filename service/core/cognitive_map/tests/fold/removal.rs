@@ -7,7 +7,8 @@ use cognitive_map::{
 };
 use proptest::prelude::*;
 
-use crate::journal::{Robot, any_settings, journals, label, run, sighting};
+use crate::any_journal::{any_settings, journals};
+use crate::journal::{Robot, label, run, sighting};
 
 fn remove(map: &mut CognitiveMap, agent: AgentId) -> Vec<EventKind> {
     let events = run(map, &[Record::Remove { agent }]);

@@ -146,7 +146,11 @@ impl Liar {
                 orientation,
                 noise,
             },
-            1 => ObjectMark::Identify { orientation, noise },
+            1 => ObjectMark::Identify {
+                orientation,
+                noise,
+                learns: true,
+            },
             _ => ObjectMark::End,
         }
     }

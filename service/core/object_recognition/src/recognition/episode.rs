@@ -1,5 +1,7 @@
 //! An episode of recognition: contacts come in, a posterior comes out.
 
+use nalgebra::Point3;
+
 use crate::contact::{Contact, Reached};
 use crate::indexed_model::IndexedModel;
 use crate::library::{ObjectId, ObjectLibrary};
@@ -31,6 +33,10 @@ pub struct Recognition {
     /// Contacts that were asked for.
     pub(super) aimed: usize,
     pub(super) hypotheses: Hypotheses,
+    /// Standard deviation of each hypothesis' rotation about the z axis \[rad\].
+    pub(super) yaw_sd_rad: f64,
+    /// Position of the first contact \[m\].
+    pub(super) first_m: Option<Point3<f64>>,
 }
 
 #[derive(Clone, Debug)]
@@ -53,11 +59,14 @@ impl Recognition {
             drawn: 0,
             aimed: 0,
             hypotheses,
+            yaw_sd_rad: orientation.yaw_sd_rad(),
+            first_m: None,
         }
     }
 
     /// Updates the hypotheses with one contact.
     pub fn touch(&mut self, library: &ObjectLibrary, contact: Contact) {
+        let contact = self.as_turned(contact);
         match (self.contacts.last(), contact.reached) {
             (_, Reached::Aimed) => self.aimed += 1,
             (None, _) => {}
@@ -94,6 +103,18 @@ impl Recognition {
             self.contacts.remove(0);
         }
         self.contacts.push(contact);
+    }
+
+    /// A contact as exactly as it is known in the frame of a hypothesis, whose rotation is off by
+    /// what lies between two of them.
+    fn as_turned(&mut self, contact: Contact) -> Contact {
+        let first_m = *self.first_m.get_or_insert(contact.position_m);
+        let lever_m = (contact.position_m - first_m).xy().norm();
+        let turned_m = lever_m * self.yaw_sd_rad;
+        Contact {
+            position_sd_m: contact.position_sd_m.hypot(turned_m),
+            ..contact
+        }
     }
 
     /// Contacts so far.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use geometry::{PoseCovariance, se3, symmetric};
-use nalgebra::{Isometry3, Matrix6, Translation3};
+use nalgebra::{Isometry3, Matrix6, Translation3, Vector3, Vector6};
 
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::numeric::log_sum;
@@ -174,7 +174,7 @@ impl Recognition {
             .filter(|(_, share)| *share > LISTED_SHARE_MIN);
         // The adjoint takes an error on the left of the pose to one on its right.
         let back = se3::adjoint(&best.map_from_episode.inverse());
-        let covariance = back * best.covariance * back.transpose();
+        let covariance = back * best.covariance * back.transpose() + self.yaw_covariance();
         Some(PoseEstimate {
             object,
             map_from_episode: best.map_from_episode,
@@ -182,6 +182,18 @@ impl Recognition {
             share: share(best.log),
             others: others.collect(),
         })
+    }
+}
+
+impl Recognition {
+    /// Covariance of a pose's error on its right by what lies between the rotations of two
+    /// hypotheses: it turns about the first contact.
+    fn yaw_covariance(&self) -> Matrix6<f64> {
+        let pivot = self.first_m.unwrap_or_default().coords;
+        let moved = pivot.cross(&Vector3::z()) * self.yaw_sd_rad;
+        let turned = Vector3::z() * self.yaw_sd_rad;
+        let motion = Vector6::from_iterator(moved.iter().chain(turned.iter()).copied());
+        motion * motion.transpose()
     }
 }
 

@@ -2,8 +2,10 @@
 
 mod dependence;
 mod episode;
+mod explanation;
 mod likelihoods;
 mod masses;
 mod unknown;
 
 pub use episode::Recognition;
+pub use explanation::{Explanation, explain};

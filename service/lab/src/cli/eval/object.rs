@@ -68,6 +68,8 @@ pub(in crate::cli) enum Turns {
     /// The 24 that take a cube into itself.
     #[value(name = "24")]
     Cube,
+    /// All about the vertical.
+    Yaw,
     /// All rotations.
     So3,
 }
@@ -77,6 +79,7 @@ impl From<Turns> for Rotate {
         match turns {
             Turns::None => Self::None,
             Turns::Cube => Self::Cube,
+            Turns::Yaw => Self::Yaw,
             Turns::So3 => Self::Free,
         }
     }

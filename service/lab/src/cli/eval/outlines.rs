@@ -22,6 +22,9 @@ pub(in crate::cli) struct OutlinesArgs {
     /// Objects may have turned anyhow, and contacts tell the surface's normal.
     #[arg(long)]
     turned: bool,
+    /// Objects may have turned about the vertical.
+    #[arg(long, conflicts_with = "turned")]
+    yaw: bool,
     /// Seed of objects, explorations and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -39,7 +42,11 @@ pub(super) fn run(args: &OutlinesArgs) -> anyhow::Result<()> {
         }
         for levels in [Levels::Spread, Levels::Same] {
             for &taught in &args.taught {
-                let turn = if args.turned { Turn::Any } else { Turn::None };
+                let turn = match (args.turned, args.yaw) {
+                    (true, _) => Turn::Any,
+                    (false, true) => Turn::Yaw,
+                    (false, false) => Turn::None,
+                };
                 let mut protocol = OutlineProtocol::new(family, levels, turn, taught);
                 protocol.sets = args.sets;
                 protocol.seed = args.seed;

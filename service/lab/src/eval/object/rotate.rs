@@ -1,5 +1,7 @@
 //! How an object lies when it is to be recognised.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Quaternion, UnitQuaternion};
 use object_recognition::Orientation;
 use rand::RngExt;
@@ -14,16 +16,19 @@ pub enum Rotate {
     None,
     /// One of the 24 that take a cube into itself.
     Cube,
+    /// Any rotation about the vertical.
+    Yaw,
     /// Any rotation.
     Free,
 }
 
 impl Rotate {
-    /// Its short name: `none`, `24` or `so3`.
+    /// Its short name: `none`, `24`, `yaw` or `so3`.
     pub fn name(self) -> &'static str {
         match self {
             Self::None => "none",
             Self::Cube => "24",
+            Self::Yaw => "yaw",
             Self::Free => "so3",
         }
     }
@@ -33,6 +38,7 @@ impl Rotate {
         match self {
             Self::None => Orientation::Known,
             Self::Cube => Orientation::cube(),
+            Self::Yaw => Orientation::Yaw,
             Self::Free => Orientation::Free,
         }
     }
@@ -42,6 +48,9 @@ impl Rotate {
         match self.orientation() {
             Orientation::Known => UnitQuaternion::identity(),
             Orientation::Finite(turns) => turns[random.random_range(0..turns.len())],
+            Orientation::Yaw => {
+                UnitQuaternion::from_euler_angles(0.0, 0.0, random.random_range(-PI..PI))
+            }
             // Four independent normal numbers have no preferred direction.
             Orientation::Free => {
                 let [i, j, k, w]: [f64; 4] = std::array::from_fn(|_| random.sample(StandardNormal));

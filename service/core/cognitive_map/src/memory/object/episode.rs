@@ -271,10 +271,7 @@ impl Episode {
     /// What its contacts say now, with what would tell more.
     pub(crate) fn identified(&self, memory: &ObjectMemory) -> Identified {
         let fresh = self.clone().recognise(memory);
-        Identified {
-            posterior: fresh.posterior(memory.library()),
-            next_touch: fresh.next_touch(memory.library()),
-        }
+        memory.identified(&fresh, &self.orientation, &self.contacts)
     }
 
     /// Learns an object of a new name: one that was learned on the spot, if it is that, or a new

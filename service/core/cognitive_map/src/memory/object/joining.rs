@@ -63,6 +63,26 @@ impl ObjectMemory {
         self.joinings.is_empty() && self.are_all_named()
     }
 
+    /// The object that one looks like, turned about the vertical or not, with its probability: what
+    /// was learned of the one, touched again, would be taken for the other.
+    pub(crate) fn alike(&self, id: ObjectId) -> Option<(ObjectId, f64)> {
+        let others = self.known.keys().filter(|&&other| other != id);
+        let others = self.library.select(others.map(|&other| (other, other)));
+        let contacts = self.sampled(id);
+        let posterior = recognised(&others, &Orientation::Yaw, contacts);
+        match (posterior.verdict(), posterior.objects.first()) {
+            (Verdict::Object(other), Some(&(_, probability))) => Some((other, probability)),
+            _ => None,
+        }
+    }
+
+    /// Places of an object, taken for contacts.
+    fn sampled(&self, id: ObjectId) -> impl Iterator<Item = Contact> {
+        let places = self.places(id);
+        let step = places.len().div_ceil(CONTACTS_MAX).max(1);
+        { places.iter().step_by(step) }.map(|place| place.contact().aimed())
+    }
+
     /// What a visit's contacts say of the objects that they fit.
     pub(super) fn reflect(
         &mut self,
@@ -117,13 +137,7 @@ impl ObjectMemory {
     ) -> Option<FramePose> {
         let others = similar.iter().filter(|&&other| other != part);
         let others = self.library.select(others.map(|&other| (other, other)));
-        let places = self.places(part);
-        let step = places.len().div_ceil(CONTACTS_MAX).max(1);
-        let contacts = places
-            .iter()
-            .step_by(step)
-            .map(|place| place.contact().aimed());
-        let posterior = recognised(&others, orientation, contacts);
+        let posterior = recognised(&others, orientation, self.sampled(part));
         if posterior.verdict() != Verdict::Object(whole) || posterior.fit < FIT_LEAST {
             return None;
         }

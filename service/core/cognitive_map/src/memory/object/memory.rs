@@ -11,8 +11,8 @@ use crate::input::{Lesson, Touch};
 use crate::memory::strength::{Clock, Strength};
 use ::state::{State, StateWriter};
 use object_recognition::{
-    Contact, ModelPlace, NextTouch, ObjectId, ObjectLibrary, ObjectModel, Orientation, Posterior,
-    Recognition, Verdict,
+    Contact, Explanation, ModelPlace, NextTouch, ObjectId, ObjectLibrary, ObjectModel, Orientation,
+    Posterior, Recognition, Verdict, explain,
 };
 
 /// Most objects; of more, the weakest is forgotten.
@@ -261,14 +261,27 @@ impl ObjectMemory {
 
     /// What a sequence of contacts says that no agent sensed.
     pub(crate) fn identify(&self, orientation: &Orientation, touches: &[Touch]) -> Identified {
+        let contacts = { touches.iter() }.map(|touch| touch.contact(|label| self.channel(label)));
+        let contacts: Vec<_> = contacts.collect();
         let mut recognition = Recognition::new(orientation);
-        for touch in touches {
-            let contact = touch.contact(|label| self.channel(label));
-            recognition.touch(&self.library, contact);
+        for contact in &contacts {
+            recognition.touch(&self.library, contact.clone());
         }
+        self.identified(&recognition, orientation, &contacts)
+    }
+
+    /// What the contacts of an episode say.
+    pub(super) fn identified(
+        &self,
+        recognition: &Recognition,
+        orientation: &Orientation,
+        contacts: &[Contact],
+    ) -> Identified {
+        let posterior = recognition.posterior(&self.library);
         Identified {
-            posterior: recognition.posterior(&self.library),
             next_touch: recognition.next_touch(&self.library),
+            explanation: explain(&self.library, orientation, contacts, &posterior),
+            posterior,
         }
     }
 
@@ -405,4 +418,6 @@ pub struct Identified {
     pub posterior: Posterior,
     /// What would tell more.
     pub next_touch: Option<NextTouch>,
+    /// Why.
+    pub explanation: Explanation,
 }
