@@ -174,6 +174,7 @@ fn episode() -> AgentObject {
             ..undecided()
         }),
         last: None,
+        contacts: contacts(),
     }
 }
 
@@ -193,6 +194,7 @@ fn no_episode() -> AgentObject {
     AgentObject {
         episode: None,
         identification: None,
+        contacts: Vec::new(),
         ..episode()
     }
 }
