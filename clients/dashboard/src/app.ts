@@ -22,6 +22,7 @@ import { Space, spaces } from "./service";
 import type { Connection } from "./stream";
 import { Theme } from "./theme";
 import { token } from "./token";
+import type { Vec3 } from "./wire";
 
 /** How often panels are filled, and the spaces are asked for [ms]. */
 const PANELS_MS = 200;
@@ -89,6 +90,11 @@ export class App {
     window.setInterval(() => this.fill(), PANELS_MS);
     window.setInterval(() => void this.askSpaces(), SPACES_MS);
     void this.askSpaces();
+  }
+
+  /** What is drawn of the episode of the agent that was chosen. */
+  get felt(): { object: string | null; contacts: Vec3[] } | null {
+    return this.inspector.felt;
   }
 
   /** Shows a space. */

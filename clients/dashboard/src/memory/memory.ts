@@ -162,7 +162,6 @@ export class Memory {
         }
       }
       agent.live = live;
-      agent.feel(s);
       agent.track.push(s, live.translation_m, live.rotation_xyzw);
       this.note(s);
     }
@@ -196,7 +195,6 @@ export class Memory {
     const fresh = earlier.filter(({ id }) => !known.has(id));
     this.events.unshift(...fresh);
     for (const { kind, event, s } of fresh) {
-      this.wayfinding.note(kind, event.agent);
       if (kind === "agent_placed") {
         this.agents.get(event.agent)?.track.part(s);
       }
@@ -207,7 +205,6 @@ export class Memory {
   /** What an event says of the map is shown at once; the next reading of the map makes it exact. */
   private remember({ kind, fields, s, event }: ShownEvent): void {
     const place = fields["place"] as number;
-    this.wayfinding.note(kind, event.agent);
     if (kind === "place_recruited") {
       this.cloud.recruit(place, fields["translation_m"] as never, s);
     } else if (kind === "place_forgotten") {
@@ -324,6 +321,10 @@ export class Memory {
   /** Asks what an agent touches, or touched last. */
   async askTouch(agent: Agent): Promise<void> {
     agent.touch = await this.space.agentObject(agent.name).catch(() => null);
+    // Contacts of an episode that has ended stay in sight until the next one begins.
+    if (agent.touch?.episode) {
+      agent.contacts = agent.touch.contacts;
+    }
   }
 
   /** Asks what the episodes with objects say, and once more when they have ended. */

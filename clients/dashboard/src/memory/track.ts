@@ -13,10 +13,6 @@ const GAP_S = 3;
 /** Nor are those between which the agent would have moved faster than this [m/s]. */
 const SPEED_MAX_M_S = 40;
 
-/** An agent is at rest that says nothing for so long [s], or moves less than this [m]. */
-const REST_S = 0.25;
-const REST_M = 5e-4;
-
 export interface TrackPose {
   position: Vec3;
   rotation: Quat;
@@ -107,19 +103,6 @@ export class Track {
       }
     }
     return low;
-  }
-
-  /** The latest pose if the agent was at rest there until about a time [s]. */
-  restBefore(s: number): TrackPose | null {
-    if (this.n === 0) {
-      return null;
-    }
-    const last = this.n - 1;
-    const isQuiet = s - this.time(last) > REST_S;
-    const moved = [0, 1, 2].map(
-      (axis) => this.at(last, axis) - this.at(Math.max(0, last - 1), axis),
-    );
-    return isQuiet || (last > 0 && Math.hypot(...moved) < REST_M) ? this.pose(last) : null;
   }
 
   /** The latest pose up to a time; none before the first one. */
