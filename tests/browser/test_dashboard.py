@@ -126,7 +126,7 @@ def test_a_position_recalls_places(service: Server, open_page: Open) -> None:
 def test_routes_and_blockages_are_drawn(service: Server, open_page: Open) -> None:
     ada = Driver(service, "ada")
     ada.drive(STEPS)
-    Driver(service, "bob", x=0.5).drive(STEPS // 4)
+    Driver(service, "bob", x=0.5).drive(8)
     page = open_page(service)
     page.until_places(10)
     page.settle()

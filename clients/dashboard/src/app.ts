@@ -81,6 +81,7 @@ export class App {
     this.inspector.start(this.stage, this.layout);
     this.theme = new Theme((palette) => {
       this.stage.paint(palette);
+      this.recount();
       this.fill();
     });
     this.layout.resized = () => this.stage.cover(this.layout.insets());
@@ -110,10 +111,7 @@ export class App {
     this.memory = new Memory(new Space(name), {
       connectionChanged: (connection) => this.showConnection(connection),
       ticked: (_tick, events) => this.takeEvents(events),
-      recounted: () => {
-        this.feed.clear();
-        this.feed.add(this.memory!.events, this.memory!, this.stage.palette);
-      },
+      recounted: () => this.recount(),
       sighted: (sightings) => {
         if (this.stage.focus.time === null) {
           this.stage.sight(sightings);
@@ -125,6 +123,14 @@ export class App {
     this.stage.show(this.memory);
     this.inspector.open(this.memory);
     this.fill();
+  }
+
+  /** Tells all events anew. */
+  private recount(): void {
+    this.feed.clear();
+    if (this.memory !== null) {
+      this.feed.add(this.memory.events, this.memory, this.stage.palette);
+    }
   }
 
   private takeEvents(events: ShownEvent[]): void {

@@ -42,6 +42,17 @@ test("no line joins what a gap or a leap parts", () => {
   );
 });
 
+test("no line is drawn through what was of another frame", () => {
+  const made = track([1, 1.1, 1.2, 1.3, 1.4]);
+  made.hide(1, 1.3);
+  assert.deepEqual(
+    [1, 2, 3, 4].map((i) => made.isJoined(i)),
+    [false, false, true, true],
+  );
+  made.part(1.3);
+  assert.equal(made.isJoined(3), false);
+});
+
 test("no line joins the frame of a lost agent with the map", () => {
   const made = track([1, 1.1, 1.2, 1.3]);
   made.part(1.2);

@@ -12,6 +12,9 @@ export class Agent {
   /** Contacts of its latest episode that the page has seen, in the frame in which it began. */
   contacts: Contact[] = [];
 
+  /** When its session began, until it is known where it is in `map` [s]. */
+  private unplacedSinceS: number | null = null;
+
   constructor(
     /** Which of the colours is its own. */
     readonly colour: number,
@@ -20,6 +23,25 @@ export class Agent {
 
   get name(): string {
     return this.live.name;
+  }
+
+  /** A session began: until the agent is placed, its poses are counted from where it woke up. */
+  begin(s: number): void {
+    this.unplacedSinceS = s;
+  }
+
+  /** The agent has left a trace in the map, so it is known where it is. */
+  leaveTrace(): void {
+    this.unplacedSinceS = null;
+  }
+
+  /** It became known where the agent is. */
+  place(s: number): void {
+    if (this.unplacedSinceS !== null) {
+      this.track.hide(this.unplacedSinceS, s);
+      this.unplacedSinceS = null;
+    }
+    this.track.part(s);
   }
 
   /** Standard deviation of the position along its worst axis, at most √trace [m]. */

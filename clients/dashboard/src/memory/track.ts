@@ -26,6 +26,8 @@ export class Track {
   rewrites = 0;
   /** Times at which the frame of the poses became another one [s]. */
   private breaks: number[] = [];
+  /** Times between which the poses were of another frame [s]. */
+  private hidden: [number, number][] = [];
 
   push(s: number, position: Vec3, rotation: Quat): void {
     if (this.n > 0 && s <= this.time(this.n - 1)) {
@@ -76,12 +78,22 @@ export class Track {
     this.rewrites += 1;
   }
 
+  /** Says that poses between these times are of another frame than `map`: they are not drawn [s]. */
+  hide(from: number, to: number): void {
+    this.hidden.push([from, to]);
+    this.hidden.splice(0, Math.max(0, this.hidden.length - BREAKS_MAX));
+    this.rewrites += 1;
+  }
+
   /** Whether pose `i` follows the one before without a break: no gap, no leap. */
   isJoined(i: number): boolean {
     if (i === 0) {
       return false;
     }
     if (this.breaks.some((at) => at > this.time(i - 1) && at <= this.time(i))) {
+      return false;
+    }
+    if (this.hidden.some(([from, to]) => from <= this.time(i) && this.time(i) < to)) {
       return false;
     }
     const s = this.time(i) - this.time(i - 1);

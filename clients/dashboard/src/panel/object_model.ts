@@ -10,9 +10,14 @@ import { sharpContext } from "./dom";
 /** The view turns by one radian in this time [ms]. */
 const TURN_MS = 4000;
 /** Part of the drawing that the object takes. */
-const FILLED = 0.86;
+const FILLED = 0.88;
+/** How much of a height, and of a way from the eye, is seen as one upwards. */
+const UPRIGHT = 0.9;
+const LEANING = 0.42;
 /** The normal of a contact is so long, as a part of the object's size. */
-const NORMAL = 0.09;
+const NORMAL = 0.06;
+/** The latest contacts stand out. */
+const LATEST = 16;
 /** Distance of points where no model says one [m]: that of things that a hand can hold. */
 const SPACING_M = 0.004;
 
@@ -44,14 +49,18 @@ export function drawModel(canvas: HTMLCanvasElement, felt: Felt, palette: Palett
   const { clientWidth: width, clientHeight: height } = canvas;
   const { low, high, spacingM } = extent(felt);
   const middle = low.map((x, i) => (x + high[i]!) / 2) as Vec3;
-  const size = Math.max(Math.hypot(...low.map((x, i) => high[i]! - x)), 1e-3);
-  const scale = (FILLED * Math.min(width, height)) / size;
+  const [dx, dy, dz] = low.map((x, i) => high[i]! - x) as Vec3;
+  const size = Math.max(Math.hypot(dx, dy, dz), 1e-3);
+  // It turns, and is to fit in all of its positions.
+  const wide = Math.max(Math.hypot(dx, dy), 1e-3);
+  const tall = UPRIGHT * dz + LEANING * wide;
+  const scale = FILLED * Math.min(width / wide, height / tall);
   const turn = performance.now() / TURN_MS;
   const put: Put = (at) => {
     const [dx, dy, dz] = at.map((x, i) => x - middle[i]!) as Vec3;
     const x = dx * Math.cos(turn) - dy * Math.sin(turn);
     const away = dx * Math.sin(turn) + dy * Math.cos(turn);
-    const up = 0.9 * dz + 0.42 * away;
+    const up = UPRIGHT * dz + LEANING * away;
     const near = Math.min(1, Math.max(0, 0.5 - away / size));
     return { x: width / 2 + scale * x, y: height / 2 - scale * up, near };
   };
@@ -111,9 +120,10 @@ function drawContacts(
   contacts.forEach(({ position_m, normal }, i) => {
     const at = put(position_m);
     const isLast = i === contacts.length - 1;
-    context.globalAlpha = 0.55 + 0.45 * at.near;
+    const isLate = i >= contacts.length - LATEST;
+    context.globalAlpha = (isLate ? 0.75 : 0.4) + 0.25 * at.near;
     context.strokeStyle = colour;
-    context.lineWidth = 1.4;
+    context.lineWidth = isLate ? 1.5 : 1;
     if (normal !== null) {
       const out = put(position_m.map((x, axis) => x + normalM * normal[axis]!) as Vec3);
       context.beginPath();
@@ -121,10 +131,12 @@ function drawContacts(
       context.lineTo(out.x, out.y);
       context.stroke();
     }
-    context.fillStyle = palette.labelHalo;
-    disc(context, at.x, at.y, isLast ? 5.4 : 4);
+    if (isLate) {
+      context.fillStyle = palette.labelHalo;
+      disc(context, at.x, at.y, 4);
+    }
     context.fillStyle = colour;
-    disc(context, at.x, at.y, isLast ? 4.4 : 2.9);
+    disc(context, at.x, at.y, isLast ? 4.4 : isLate ? 3 : 1.8);
     if (isLast) {
       context.globalAlpha = 0.9;
       context.beginPath();

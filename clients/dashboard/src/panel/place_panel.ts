@@ -61,7 +61,12 @@ export class PlacePanel {
         this.name,
         button("", "Close", () => actions.close(), CLOSE),
       ),
-      h("div", { class: "actions" }, ask, route, h("span", { class: "soft" }, "from"), this.from),
+      h(
+        "div",
+        { class: "actions" },
+        ask,
+        h("span", { class: "start" }, route, h("span", { class: "soft" }, "from"), this.from),
+      ),
       this.way,
       this.facts.element,
       h("h3", {}, "What it remembers"),
@@ -102,8 +107,8 @@ export class PlacePanel {
     this.remembered.show([], palette);
     try {
       const { space } = memory;
-      const asked = [space.place(id), space.percepts(id), space.next(id, NEXT_MAX)] as const;
-      const [place, percepts, next] = await Promise.all(asked);
+      const asked = [space.place(id), space.percepts(id)] as const;
+      const [place, percepts] = await Promise.all(asked);
       if (!isWanted()) {
         return;
       }
@@ -111,8 +116,11 @@ export class PlacePanel {
       this.showFacts(place);
       this.remembered.show(percepts, palette);
       say(this.forgets, percepts.length === 0 ? "Nothing was felt or seen here." : "");
-      this.showNext(next);
       this.showVisitors(place, memory);
+      const next = await space.next(id, NEXT_MAX);
+      if (isWanted()) {
+        this.showNext(next);
+      }
       const agent = nearest(memory, place.translation_m);
       if (agent !== null) {
         const predicted = await predictAt(place, memory, agent);

@@ -98,13 +98,15 @@ export class TouchPanel {
     palette: Palette,
   ): Felt | null {
     const pose = said?.pose ?? null;
-    const name = pose?.object ?? said?.objects[0]?.name;
+    const best = said?.objects[0];
+    // What is none of these is not drawn on one of them.
+    const name = (best?.probability ?? 0) < (said?.unknown ?? 1) ? undefined : best!.name;
     const own = { nextTouch: null, colour: agentColour(palette, colour) };
     const model = name === undefined ? undefined : this.modelOf(name, memory);
     if (model === undefined) {
       return contacts.length === 0 ? null : { model: null, contacts, ...own };
     }
-    if (pose === null) {
+    if (pose?.object !== name || pose === null) {
       return { model, contacts: [], ...own };
     }
     const { next_touch } = said!;
