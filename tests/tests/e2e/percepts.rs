@@ -158,7 +158,7 @@ fn a_motion_predicts_what_was_felt_at_its_end() {
             let mut known = memory.percepts.iter();
             known.find(|percept| percept.channel == channel).cloned()
         };
-        let place = remembered("touch").expect("what is predicted is remembered");
+        let place = remembered(&touch.channel).expect("what is predicted is remembered");
         assert_eq!(
             (place.expected, place.percepts),
             (touch.expected.clone(), touch.percepts)
