@@ -101,6 +101,34 @@ pub struct FollowedRoute {
     pub steps: Vec<RouteStep>,
 }
 
+/// Agents that follow routes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FollowedRoutePage {
+    /// Number of records that the map includes.
+    pub map_revision: u64,
+    /// What is left of their routes, by the names of the agents.
+    pub routes: Vec<FollowedRouteSummary>,
+    /// Name to go on after; absent on the last page.
+    pub next: Option<String>,
+}
+
+/// What is left of the route that an agent follows, without the steps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FollowedRouteSummary {
+    /// The agent.
+    pub agent: String,
+    /// Length that is left \[m\].
+    pub length_m: f64,
+    /// Duration to be expected of all steps that are left \[s\].
+    pub duration_s: f64,
+    /// Steps of the route that it has gone.
+    pub steps_done: u64,
+    /// Steps that are left; none where it has arrived.
+    pub steps_left: u64,
+}
+
 /// Why an agent follows no route any more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]

@@ -33,6 +33,7 @@ mod object;
 mod percept;
 mod predict;
 mod query;
+mod remembered;
 mod route;
 mod sample;
 mod sequence;
@@ -56,7 +57,8 @@ pub use event::{
 };
 pub use field::at_field;
 pub use guidance::{
-    Blockage, BlockageList, BlockageRequest, FollowRequest, FollowedRoute, RouteFailure,
+    Blockage, BlockageList, BlockageRequest, FollowRequest, FollowedRoute, FollowedRoutePage,
+    FollowedRouteSummary, RouteFailure,
 };
 pub use key::{
     AgentKey, KeyError, SESSION_PARAMETER, durable_key, estimate_key, events_key, json_key,
@@ -74,6 +76,7 @@ pub use object::{
 pub use percept::{Descriptor, Level};
 pub use predict::{ExpectedPercept, MotionBody, PredictAnswer, PredictQuery, PredictedPercept};
 pub use query::{PerceptCue, RecallQuery, Verb, WatermarkQuery};
+pub use remembered::{PlacePercepts, RememberedPercept};
 pub use route::{
     RetraceDirection, Route, RouteAnswer, RouteAvoid, RouteBack, RouteBox, RouteCost, RouteEnd,
     RouteFormat, RoutePose, RouteQuery, RouteRetrace, RouteReverse, RouteStep, RouteWay, Way,

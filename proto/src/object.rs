@@ -422,6 +422,10 @@ pub struct AgentObject {
     /// Also kept when the robot has closed its session, and over a restart of the service.
     #[serde(default)]
     pub last: Option<EndedEpisode>,
+    /// The contacts of the episode under way, oldest first, in the frame of the body when it began:
+    /// at most the first 128, by which it recognises. Without descriptors, which may be long.
+    #[serde(default)]
+    pub contacts: Vec<Contact>,
 }
 
 /// An episode with an object that has ended.

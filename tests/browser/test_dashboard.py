@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import urllib.request
-from typing import Sequence
+from typing import List, Optional, Sequence
 
 import cogmap
 from arm import FELT, Arm
 from driver import Driver, Driving
 from conftest import MakeServer, Open
-from page import brightness, n_colours
+from page import Dashboard, brightness, n_colours
 from server import Server
 from wait import eventually
 
@@ -23,6 +23,15 @@ COLOURS = 40
 def apart(a: Sequence[float], b: Sequence[float]) -> float:
     """Largest difference of two positions along an axis [m]."""
     return max(abs(x - y) for x, y in zip(a, b))
+
+
+def all_felt(page: Dashboard, n: int) -> Optional[List[List[float]]]:
+    """The contacts that are drawn on the cup, once there are `n`."""
+    felt = page.page.evaluate("cogmap.felt()")
+    if felt is None or felt["object"] != "cup" or len(felt["contacts"]) != n:
+        return None
+    contacts: List[List[float]] = felt["contacts"]
+    return contacts
 
 
 def test_a_space_is_drawn_and_nothing_complains(service: Server, open_page: Open) -> None:
@@ -83,8 +92,15 @@ def test_a_click_tells_about_an_agent_and_a_place(service: Server, open_page: Op
     page.until("the place", selected={"kind": "place", "id": 3})
     eventually("the founder", lambda: "by ada" in page.text(".place-panel .facts"))
     eventually("the visitors", lambda: "ada" in page.text(".visitors"))
-    eventually("what is felt", lambda: "light" in page.text(".percepts") or
-               "Place" in page.text(".place-panel > p"))
+    remembered = [percept.channel for percept
+                  in service.client().place_percepts("default", 3).percepts]
+    assert remembered == ["light"]
+    eventually("what it remembers", lambda: "light" in page.panel(".percepts")
+               and "±" in page.panel(".percepts"))
+    eventually("what is predicted", lambda: "place would answer" in page.panel(".expected"))
+    eventually("what comes next", lambda: "Place 4" in page.panel(".next"))
+    page.page.get_by_role("button", name="Look at place 4").click()
+    page.until("the next place", selected={"kind": "place", "id": 4})
     assert page.complaints == []
 
 
@@ -110,6 +126,7 @@ def test_a_position_recalls_places(service: Server, open_page: Open) -> None:
 def test_routes_and_blockages_are_drawn(service: Server, open_page: Open) -> None:
     ada = Driver(service, "ada")
     ada.drive(STEPS)
+    Driver(service, "bob", x=0.5).drive(8)
     page = open_page(service)
     page.until_places(10)
     page.settle()
@@ -120,11 +137,17 @@ def test_routes_and_blockages_are_drawn(service: Server, open_page: Open) -> Non
     page.page.get_by_text("Route here").click()
     page.until("the route", routeSteps=len(asked.steps))
     eventually("its length", lambda: "m from ada" in page.text(".place-panel .way"))
+    page.page.select_option(".from", "bob")
+    eventually("from another one", lambda: "m from bob" in page.text(".place-panel .way"))
     page.page.keyboard.press("Escape")
     page.until("nothing chosen", routeSteps=None)
 
     # A robot follows a route, leaves it and gets another one; elsewhere no route leads across.
+    # Of an agent that says nothing, and before somebody opens the page: no event tells of it.
     client.follow_route("default", "ada", cogmap.AtPlace(8))
+    late = open_page(service)
+    late.until("the route that is followed", following=["ada"])
+    eventually("what is left", lambda: "left" in late.panel(".agent-panel .facts"))
     client.block("default", cogmap.BlockageRequest(at_m=(50.0, 0.0, 0.5), radius_m=1.0))
     ada.drive(12)
     page.until("the blockage", blockages=1)
@@ -145,6 +168,11 @@ def test_hypotheses_narrow_while_an_arm_touches(service: Server, open_page: Open
                and {"cup", "can"} <= set(page.page.locator(".bars .what").all_inner_texts()))
     arm.touch(FELT["cup"][::-1][1:], -0.02)
     eventually("the verdict", lambda: "It is cup." in page.panel(".touch"))
+    felt = eventually("the contacts on the cup", lambda: all_felt(page, len(FELT["cup"])))
+    known = service.client().object("default", "cup").places
+    # It was felt from its other end.
+    for contact, place in zip(felt, known[::-1]):
+        assert apart(contact, place.position_m) < 0.002, (felt, known)
     eventually("the event", lambda: "recognised cup" in page.text(".feed"))
     page.page.click("[data-object=can]")
     eventually("the model", lambda: "8 contacts" in page.panel(".object-panel"))

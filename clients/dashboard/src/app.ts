@@ -22,6 +22,7 @@ import { Space, spaces } from "./service";
 import type { Connection } from "./stream";
 import { Theme } from "./theme";
 import { token } from "./token";
+import type { Vec3 } from "./wire";
 
 /** How often panels are filled, and the spaces are asked for [ms]. */
 const PANELS_MS = 200;
@@ -80,6 +81,7 @@ export class App {
     this.inspector.start(this.stage, this.layout);
     this.theme = new Theme((palette) => {
       this.stage.paint(palette);
+      this.recount();
       this.fill();
     });
     this.layout.resized = () => this.stage.cover(this.layout.insets());
@@ -89,6 +91,11 @@ export class App {
     window.setInterval(() => this.fill(), PANELS_MS);
     window.setInterval(() => void this.askSpaces(), SPACES_MS);
     void this.askSpaces();
+  }
+
+  /** What is drawn of the episode of the agent that was chosen. */
+  get felt(): { object: string | null; contacts: Vec3[] } | null {
+    return this.inspector.felt;
   }
 
   /** Shows a space. */
@@ -104,10 +111,7 @@ export class App {
     this.memory = new Memory(new Space(name), {
       connectionChanged: (connection) => this.showConnection(connection),
       ticked: (_tick, events) => this.takeEvents(events),
-      recounted: () => {
-        this.feed.clear();
-        this.feed.add(this.memory!.events, this.memory!, this.stage.palette);
-      },
+      recounted: () => this.recount(),
       sighted: (sightings) => {
         if (this.stage.focus.time === null) {
           this.stage.sight(sightings);
@@ -119,6 +123,14 @@ export class App {
     this.stage.show(this.memory);
     this.inspector.open(this.memory);
     this.fill();
+  }
+
+  /** Tells all events anew. */
+  private recount(): void {
+    this.feed.clear();
+    if (this.memory !== null) {
+      this.feed.add(this.memory.events, this.memory, this.stage.palette);
+    }
   }
 
   private takeEvents(events: ShownEvent[]): void {

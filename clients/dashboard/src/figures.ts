@@ -27,6 +27,8 @@ export function figures(app: App) {
         view: stage.view,
       };
     },
+    /** The object that a model is drawn of, and the contacts on it, in its frame [m]. */
+    felt: () => app.felt,
     /** Where a position of `map` lies in the window [px]; null behind the eye. */
     onScreen: (at: Vec3) => app.stage.onScreen(at),
     agent: (name: string) => app.stage.positionOf(name),

@@ -33,7 +33,8 @@ export class Inspector {
   private readonly agentPanel: AgentPanel;
   private readonly placePanel = new PlacePanel({
     recall: (at) => void this.recall(at),
-    route: (place) => void this.route(place),
+    route: (place, agent) => void this.route(place, agent),
+    choose: (id) => this.choose({ kind: "place", id }),
     close: () => this.choose(null),
   });
   private readonly objectPanel = new ObjectPanel(() => this.choose(null));
@@ -89,6 +90,9 @@ export class Inspector {
         this.grid = this.detail = focus.fields = null;
       }
       this.lastAgent = picked.name;
+      if (this.memory !== null) {
+        this.memory.wayfinding.chosen = picked.name;
+      }
       this.inspect("agent");
       const agent = this.agent;
       if (agent !== null && agent.touch === null) {
@@ -99,7 +103,8 @@ export class Inspector {
     } else if (picked?.kind === "place" && this.memory !== null) {
       const isWanted = (): boolean => this.stage.focus.selected === picked;
       this.inspect("place");
-      void this.placePanel.show(picked.id, this.memory, isWanted);
+      this.placePanel.propose(this.memory.agentNames(), this.starter(picked.id)?.name ?? null);
+      void this.placePanel.show(picked.id, this.memory, this.stage.palette, isWanted);
     } else if (picked?.kind === "object" && this.memory !== null) {
       this.inspect("object");
       void this.objectPanel.show(picked.name, this.memory);
@@ -153,17 +158,23 @@ export class Inspector {
     this.stage.invalidate();
   }
 
-  /** Asks for a route to a place, from the agent that was chosen last or else is nearest. */
-  private async route(place: number): Promise<void> {
+  /** The agent that a route to a place begins at, if nobody says otherwise: the one that was chosen
+   * last if it knows where it is, or else the nearest one that does. */
+  private starter(place: number): Agent | null {
     const memory = this.memory;
     const at = memory?.cloud.positionOf(place) ?? null;
-    if (memory === null || at === null) {
-      return;
+    const last = memory?.agents.get(this.lastAgent ?? "");
+    if (last !== undefined && last.live.status !== "lost") {
+      return last;
     }
-    const last = memory.agents.get(this.lastAgent ?? "");
-    const agent = last?.live.status === "lost" ? undefined : last;
-    const name = (agent ?? nearest(memory, at))?.name;
-    if (name === undefined) {
+    return memory === null || at === null ? null : nearest(memory, at);
+  }
+
+  /** Asks for a route to a place, from an agent. */
+  private async route(place: number, agent: string | null): Promise<void> {
+    const memory = this.memory;
+    const name = agent ?? this.starter(place)?.name;
+    if (memory === null || name === undefined) {
       this.placePanel.route = "No agent knows where it is.";
       return;
     }
@@ -176,7 +187,10 @@ export class Inspector {
         this.placePanel.route = routeInWords(name, route);
       }
     } catch (error) {
-      this.placePanel.route = Problem.from(error).message;
+      if (this.stage.focus.selected === selected) {
+        this.stage.focus.route = null;
+        this.placePanel.route = Problem.from(error).message;
+      }
     }
     this.stage.invalidate();
   }
@@ -194,6 +208,13 @@ export class Inspector {
         this.recallPanel.show(null, [], how);
       }
     }
+  }
+
+  /** The object that a model is drawn of, and the contacts on it. */
+  get felt(): { object: string | null; contacts: Vec3[] } | null {
+    const felt = this.agent === null ? null : this.agentPanel.touch.felt;
+    const contacts = felt?.contacts.map(({ position_m }) => position_m);
+    return contacts === undefined ? null : { object: felt?.model?.summary.name ?? null, contacts };
   }
 
   toggleFollow(): void {
@@ -252,6 +273,8 @@ export class Inspector {
       this.objectPanel.draw(this.stage.palette);
     } else if (kind === "agent") {
       this.agentPanel.touch.turn();
+    } else if (kind === "place") {
+      this.placePanel.draw(this.stage.palette);
     }
   }
 

@@ -11,6 +11,7 @@ import type {
   Channel,
   EventRecord,
   FollowedRoute,
+  FollowedSummary,
   GridState,
   Landmark,
   Leg,
@@ -20,7 +21,9 @@ import type {
   Prediction,
   Quat,
   RecalledPlace,
+  RememberedPercept,
   Route,
+  Sequence,
   SpaceInfo,
   Trajectory,
   Trip,
@@ -115,6 +118,16 @@ export class Space {
     return get(`${this.base}/places/${id}`);
   }
 
+  async percepts(place: number): Promise<RememberedPercept[]> {
+    const path = `${this.base}/places/${place}/percepts`;
+    return (await get<{ percepts: RememberedPercept[] }>(path)).percepts;
+  }
+
+  /** Where the team went on to from a place. */
+  next(place: number, limit: number): Promise<Sequence> {
+    return post(`${this.base}/sequence`, { cue: [{ place }], limit });
+  }
+
   async recall(positionM: Vec3, limit: number): Promise<RecalledPlace[]> {
     const body = { position_m: positionM, limit };
     return (await post<{ places: RecalledPlace[] }>(`${this.base}/recall`, body)).places;
@@ -123,6 +136,11 @@ export class Space {
   /** The shortest route over the team's ways, from where an agent is to a place. */
   route(agent: string, place: number): Promise<Route> {
     return post(`${this.base}/route`, { from: { agent }, to: { place } });
+  }
+
+  /** The agents that follow routes, by name. */
+  async following(): Promise<FollowedSummary[]> {
+    return this.all<FollowedSummary>("routes", "routes");
   }
 
   followedRoute(agent: string): Promise<FollowedRoute> {

@@ -165,12 +165,24 @@ export interface AgentDetail {
   watermark: { durable: Int64; applied: Int64 };
 }
 
-export interface PredictedPercept {
+/** What a place remembers of a channel. */
+export interface RememberedPercept {
   channel: string;
   expected: { level?: { mean: number; sd: number }; descriptor?: { vector: number[] } };
+  percepts: number;
+  strength: number;
+}
+
+export interface PredictedPercept extends RememberedPercept {
   place: number;
   confidence: number;
-  percepts: number;
+}
+
+/** What comes next after a place, by the trips of the team. */
+export interface Sequence {
+  next: { place: number; probability: number }[];
+  others: number;
+  none: number;
 }
 
 export interface Prediction {
@@ -201,6 +213,21 @@ export interface ObjectDetail {
   places: ObjectPlace[];
 }
 
+/** A contact with an object. */
+export interface Contact {
+  position_m: Vec3;
+  /** The surface's outward normal, where it was felt. */
+  normal: Vec3 | null;
+  levels: { channel: string; value: number }[];
+}
+
+/** Where the frame of contacts lies in an object's. */
+export interface ObjectPose {
+  object: string;
+  translation_m: Vec3;
+  rotation_xyzw: Quat;
+}
+
 export interface Identification {
   verdict: { undecided?: object; object?: { name: string }; unknown?: object };
   objects: { name: string; probability: number }[];
@@ -208,7 +235,8 @@ export interface Identification {
   live_hypotheses: number;
   entropy_nats: number;
   contacts: number;
-  pose: { object: string; translation_m: Vec3; rotation_xyzw: Quat } | null;
+  pose: ObjectPose | null;
+  next_touch: { position_m: Vec3; gain_nats: number } | null;
 }
 
 export interface AgentObject {
@@ -219,6 +247,8 @@ export interface AgentObject {
     stamp_ns: Int64;
     identification: Identification | null;
   } | null;
+  /** Contacts of the episode under way, in the frame of the body when it began. */
+  contacts: Contact[];
 }
 
 /** A step of a route: where it leads. */
@@ -240,6 +270,14 @@ export interface FollowedRoute {
   length_m: number;
   duration_s: number;
   steps: RouteStep[];
+}
+
+/** What is left of it, without the steps. */
+export interface FollowedSummary {
+  agent: string;
+  length_m: number;
+  duration_s: number;
+  steps_left: number;
 }
 
 /** A place, the way between two, or a ball, across which no route leads. */

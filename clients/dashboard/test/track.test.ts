@@ -42,13 +42,15 @@ test("no line joins what a gap or a leap parts", () => {
   );
 });
 
-test("an agent was at rest if it said nothing for a while, or has not moved", () => {
-  const moving = track([1, 1.1, 1.2]);
-  assert.equal(moving.restBefore(1.3), null);
-  assert.deepEqual(moving.restBefore(2)?.position, [1.2, 0, 0]);
-  moving.push(1.3, [1.2, 0, 0], AHEAD);
-  assert.deepEqual(moving.restBefore(1.4)?.position, [1.2, 0, 0]);
-  assert.equal(new Track().restBefore(1), null);
+test("no line is drawn through what was of another frame", () => {
+  const made = track([1, 1.1, 1.2, 1.3, 1.4]);
+  made.hide(1, 1.3);
+  assert.deepEqual(
+    [1, 2, 3, 4].map((i) => made.isJoined(i)),
+    [false, false, true, true],
+  );
+  made.part(1.3);
+  assert.equal(made.isJoined(3), false);
 });
 
 test("no line joins the frame of a lost agent with the map", () => {

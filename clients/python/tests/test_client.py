@@ -181,6 +181,9 @@ def test_memories_are_iterated_and_shown_one_by_one(server: Server, client: cogm
     places = dict(golden("place_page"), next=None)
     server.answer("GET /v1/spaces/lab/places", places)
     server.answer("GET /v1/spaces/lab/places/3", places["places"][0])
+    server.answer("GET /v1/spaces/lab/places/3/percepts", golden("place_percepts"))
+    routes = dict(golden("followed_route_page"), next=None)
+    server.answer("GET /v1/spaces/lab/routes", routes)
     trips = dict(golden("trip_page"), next=None)
     server.answer("GET /v1/spaces/lab/trips", trips)
     server.answer("GET /v1/spaces/lab/trips/0", golden("trip_detail"))
@@ -191,6 +194,9 @@ def test_memories_are_iterated_and_shown_one_by_one(server: Server, client: cogm
     assert len(list(client.places("lab", limit=2))) == len(places["places"])
     assert server.seen[0].query == {"limit": "2"}
     assert client.place("lab", 3).id == places["places"][0]["id"]
+    remembered = client.place_percepts("lab", 3).percepts
+    assert [percept.channel for percept in remembered] == ["touch", "camera"]
+    assert [route.steps_left for route in client.followed_routes("lab")] == [9]
     assert [trip.ended for trip in client.trips("lab")][:2] == [
         cogmap.TripEnd.STILLNESS,
         cogmap.TripEnd.GAP,

@@ -13,9 +13,9 @@ use cogmap_proto::{
     AgentAt, AgentDetail, AgentObject, AgentPage, AgentSummary, Channel, ChannelList, Codec,
     GridState, Identification, IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization,
     LocalizeQuery, ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage,
-    PredictAnswer, PredictQuery, RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch,
-    SequenceAnswer, SequenceQuery, SpaceInfo, SpaceList, SpaceSettings, Trajectory, Trip,
-    TripDetail, TripPage,
+    PlacePercepts, PredictAnswer, PredictQuery, RecallAnswer, RecallQuery, RouteAnswer, RouteQuery,
+    SampleBatch, SequenceAnswer, SequenceQuery, SpaceInfo, SpaceList, SpaceSettings, Trajectory,
+    Trip, TripDetail, TripPage,
 };
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};
@@ -333,6 +333,14 @@ impl Api {
         self.pages(&path(space, "/landmarks")?, |page: LandmarkPage| {
             (page.landmarks, page.next)
         })
+    }
+
+    /// What a place remembers of what was felt and seen there.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn place_percepts(&self, space: &str, place: u64) -> Result<PlacePercepts, ApiError> {
+        self.get(&path(space, &format!("/places/{place}/percepts"))?)
     }
 
     /// The channels of percepts of a space, and what was learned of their views.

@@ -3,9 +3,10 @@
 use cogmap_proto::{
     AgentDetail, AgentPage, AgentSummary, Channel, ChannelKind, ChannelList, Evidence,
     ExpectedPercept, GridModuleState, GridState, IngestAnswer, Landmark, LandmarkPage,
-    LearnedChannel, Leg, NoiseSettings, Place, PlacePage, PredictAnswer, PredictedPercept, Problem,
-    RecallAnswer, RecalledPlace, Recruitment, Rivals, SpaceInfo, SpaceList, SpaceSettings,
-    StampedPose, Status, Trajectory, Trip, TripDetail, TripPage,
+    LearnedChannel, Leg, NoiseSettings, Place, PlacePage, PlacePercepts, PredictAnswer,
+    PredictedPercept, Problem, RecallAnswer, RecalledPlace, Recruitment, RememberedPercept, Rivals,
+    SpaceInfo, SpaceList, SpaceSettings, StampedPose, Status, Trajectory, Trip, TripDetail,
+    TripPage,
 };
 
 use super::Visit;
@@ -28,6 +29,7 @@ pub(super) fn each(visit: &mut impl Visit) {
         },
     );
     visit.message("place_page", &places());
+    visit.message("place_percepts", &remembered());
     visit.message("recall_answer", &recalled());
     visit.message("recall_answer_without_cue", &recalled_without_cue());
     visit.message("predict_answer", &predicted());
@@ -257,6 +259,22 @@ fn recalled_without_cue() -> RecallAnswer {
         places: vec![latest],
         rivals: None,
         ..recalled()
+    }
+}
+
+fn remembered() -> PlacePercepts {
+    let percepts = predicted().percepts.into_iter();
+    let remembered = percepts.map(|predicted| RememberedPercept {
+        channel: predicted.channel,
+        expected: predicted.expected,
+        percepts: predicted.percepts,
+        strength: predicted.strength,
+    });
+    PlacePercepts {
+        space: "lab".to_owned(),
+        place: 3,
+        map_revision: 4_711,
+        percepts: remembered.collect(),
     }
 }
 

@@ -187,6 +187,7 @@ fn episode() -> AgentObject {
             ..undecided()
         }),
         last: None,
+        contacts: contacts(),
     }
 }
 
@@ -206,6 +207,7 @@ fn no_episode() -> AgentObject {
     AgentObject {
         episode: None,
         identification: None,
+        contacts: Vec::new(),
         ..episode()
     }
 }

@@ -1,9 +1,10 @@
 //! Routes: what is asked and what is answered.
 
 use cogmap_proto::{
-    Blockage, BlockageList, BlockageRequest, FollowRequest, FollowedRoute, Level, PerceptCue,
-    RetraceDirection, Route, RouteAnswer, RouteAvoid, RouteBack, RouteBox, RouteCost, RouteEnd,
-    RouteFormat, RoutePose, RouteQuery, RouteRetrace, RouteReverse, RouteStep, RouteWay,
+    Blockage, BlockageList, BlockageRequest, FollowRequest, FollowedRoute, FollowedRoutePage,
+    FollowedRouteSummary, Level, PerceptCue, RetraceDirection, Route, RouteAnswer, RouteAvoid,
+    RouteBack, RouteBox, RouteCost, RouteEnd, RouteFormat, RoutePose, RouteQuery, RouteRetrace,
+    RouteReverse, RouteStep, RouteWay,
 };
 
 use super::Visit;
@@ -101,6 +102,19 @@ fn each_of_guidance(visit: &mut impl Visit) {
         steps: answer().steps,
     };
     visit.message("followed_route", &followed);
+    let summary = FollowedRouteSummary {
+        agent: "robot-1".to_owned(),
+        length_m: 12.5,
+        duration_s: 15.25,
+        steps_done: 4,
+        steps_left: 9,
+    };
+    let page = FollowedRoutePage {
+        map_revision: 4_711,
+        routes: vec![summary],
+        next: Some("robot-1".to_owned()),
+    };
+    visit.message("followed_route_page", &page);
 }
 
 fn query() -> RouteQuery {

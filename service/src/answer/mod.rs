@@ -63,7 +63,9 @@ pub fn agent_object(
     name: &str,
     last: Option<EndedEpisode>,
 ) -> AgentObject {
-    encode::agent_object(space, map, name, map.episode(agent).as_ref(), last)
+    let episode = map.episode(agent);
+    let said = (episode.as_ref(), map.episode_contacts(agent));
+    encode::agent_object(space, map, name, said, last)
 }
 
 #[cfg(test)]

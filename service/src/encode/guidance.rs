@@ -2,8 +2,8 @@
 
 use cogmap_proto as wire;
 use cognitive_map::{
-    AgentId, Blockage, Blocked, CognitiveMap, Errand, EventKind, Following, Goal, Instruction,
-    Region, Reverse, RouteCost, RouteFailure,
+    Agent, AgentId, Blockage, Blocked, CognitiveMap, Errand, EventKind, Following, Goal,
+    Instruction, Region, Reverse, RouteCost, RouteFailure,
 };
 
 use super::FRAME;
@@ -59,6 +59,18 @@ pub fn followed_route(space: &str, map: &CognitiveMap, agent: AgentId) -> wire::
         duration_s: rest.iter().map(|step| step.duration_s).sum(),
         steps_done: following.map_or(0, |following| following.steps_done() as u64),
         steps: rest.iter().map(|of| step(map, of)).collect(),
+    }
+}
+
+/// What is left of a route that an agent follows, without the steps.
+pub fn followed_summary(agent: &Agent, following: &Following) -> wire::FollowedRouteSummary {
+    let rest = following.rest();
+    wire::FollowedRouteSummary {
+        agent: agent.name().as_str().to_owned(),
+        length_m: following.rest_m(&agent.pose().translation.vector.into()),
+        duration_s: rest.iter().map(|step| step.duration_s).sum(),
+        steps_done: following.steps_done() as u64,
+        steps_left: rest.len() as u64,
     }
 }
 

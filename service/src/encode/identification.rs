@@ -3,18 +3,20 @@
 use cogmap_proto as wire;
 use cognitive_map::{CognitiveMap, Identified};
 use geometry::upper_triangle;
-use object_recognition::{ObjectId, PoseEstimate, Posterior, Verdict};
+use object_recognition::{
+    Contact, LevelReading, ObjectId, PoseEstimate, Posterior, Reached, Verdict,
+};
 
 /// Least probability of an object that is named in an answer.
 const PROBABILITY_MIN: f64 = 1e-6;
 
 /// The episode of an agent, and the latest one that has ended. An episode says whether it teaches,
-/// and what is recognised.
+/// and what is recognised by which contacts.
 pub fn agent_object(
     space: &str,
     map: &CognitiveMap,
     agent: &str,
-    episode: Option<&(bool, Identified)>,
+    (episode, contacts): (Option<&(bool, Identified)>, &[Contact]),
     last: Option<wire::EndedEpisode>,
 ) -> wire::AgentObject {
     wire::AgentObject {
@@ -23,6 +25,30 @@ pub fn agent_object(
         episode: episode.map(|(teaches, _)| wire::EpisodeKind::of(*teaches)),
         identification: episode.map(|(_, identified)| identification(space, map, identified)),
         last,
+        contacts: contacts.iter().map(|felt| contact(map, felt)).collect(),
+    }
+}
+
+/// A contact of an episode, without descriptors.
+fn contact(map: &CognitiveMap, felt: &Contact) -> wire::Contact {
+    let level = |level: &LevelReading| {
+        let channel = map.object_channel(level.channel)?;
+        Some(wire::ContactLevel {
+            channel: channel.as_str().to_owned(),
+            value: level.value,
+        })
+    };
+    wire::Contact {
+        position_m: felt.position_m.into(),
+        normal: felt.normal.map(|normal| normal.into_inner().into()),
+        levels: felt.levels.iter().filter_map(level).collect(),
+        descriptors: Vec::new(),
+        drift_sd_m: felt.drift_sd_m,
+        reached: match felt.reached {
+            Reached::Found => wire::Reached::Found,
+            Reached::Drawn => wire::Reached::Drawn,
+            Reached::Aimed => wire::Reached::Aimed,
+        },
     }
 }
 

@@ -1,7 +1,7 @@
-//! What an agent would feel.
+//! What an agent would feel, and what places remember.
 
 use cogmap_proto as wire;
-use cognitive_map::{CognitiveMap, Expected, Predicted, Prediction};
+use cognitive_map::{CognitiveMap, Expected, PlaceId, Predicted, Prediction, Remembered};
 
 use super::FRAME;
 
@@ -29,23 +29,42 @@ pub fn prediction(
 }
 
 fn percept(map: &CognitiveMap, predicted: Predicted) -> Option<wire::PredictedPercept> {
-    let Predicted {
-        remembered,
-        confidence,
-    } = predicted;
-    let channel = map.channel(remembered.channel)?;
-    let expected = match remembered.expected {
+    let place = predicted.remembered.place.0.into();
+    let remembered = remembered(map, predicted.remembered)?;
+    Some(wire::PredictedPercept {
+        channel: remembered.channel,
+        expected: remembered.expected,
+        place,
+        confidence: predicted.confidence,
+        percepts: remembered.percepts,
+        strength: remembered.strength,
+    })
+}
+
+/// What a place remembers.
+pub fn place_percepts(space: &str, map: &CognitiveMap, place: PlaceId) -> wire::PlacePercepts {
+    wire::PlacePercepts {
+        space: space.to_owned(),
+        place: place.0.into(),
+        map_revision: map.revision(),
+        percepts: { map.remembered(place) }
+            .filter_map(|one| remembered(map, one))
+            .collect(),
+    }
+}
+
+fn remembered(map: &CognitiveMap, of: Remembered) -> Option<wire::RememberedPercept> {
+    let channel = map.channel(of.channel)?;
+    let expected = match of.expected {
         Expected::Level { mean, sd } => wire::ExpectedPercept::Level { mean, sd },
         Expected::Descriptor(direction) => wire::ExpectedPercept::Descriptor {
             vector: direction.into_vec(),
         },
     };
-    Some(wire::PredictedPercept {
+    Some(wire::RememberedPercept {
         channel: channel.label().as_str().to_owned(),
         expected,
-        place: remembered.place.0.into(),
-        confidence,
-        percepts: remembered.percepts,
-        strength: remembered.strength,
+        percepts: of.percepts,
+        strength: of.strength,
     })
 }

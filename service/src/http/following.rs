@@ -2,14 +2,60 @@
 
 use axum::body::Body;
 use axum::http::{Response, StatusCode};
-use cogmap_proto::{FollowRequest, FollowedRoute};
+use cogmap_proto::{FollowRequest, FollowedRoute, FollowedRoutePage};
+use serde::Deserialize;
 
-use super::extract::{AgentOfPath, AgentParams, Json, NoQuery};
+use super::extract::{AgentOfPath, AgentParams, Json, NoQuery, Query, SpaceOfPath, SpaceParam};
+use super::page;
 use super::problem::Problem;
 use super::reply;
 use crate::answer;
 use crate::decode::InvalidRoute;
 use crate::encode;
+
+/// Which agents.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct FollowedQuery {
+    /// Only agents whose names come after this one.
+    after: Option<String>,
+    /// Most agents in the answer; 100 when absent.
+    #[param(minimum = 1, maximum = 1000)]
+    limit: Option<u32>,
+}
+
+/// The agents that follow routes, and what is left of these.
+#[utoipa::path(get, path = "/v1/spaces/{space}/routes", tag = "agents",
+    operation_id = "list_followed_routes", params(SpaceParam, FollowedQuery),
+    responses(
+        (status = 200, description = "What is left of the routes, without the steps, by agent",
+            body = FollowedRoutePage),
+        (status = 404, description = "There is no such space"),
+        (status = 422, description = "A parameter breaks a rule")))]
+pub(crate) async fn list(
+    SpaceOfPath(space): SpaceOfPath,
+    Query(query): Query<FollowedQuery>,
+) -> Result<Response<Body>, Problem> {
+    let limit = page::limit(query.limit)?;
+    let map = space.snapshot().await?;
+    let followed = map.all_followed();
+    let mut followed: Vec<_> = followed
+        .filter_map(|(agent, following)| Some((map.agent(agent)?, following)))
+        .collect();
+    followed.sort_by_key(|(agent, _)| agent.name().as_str());
+    let after = query.after.as_deref();
+    let wanted = { followed.into_iter() }
+        .filter(|(agent, _)| after.is_none_or(|after| agent.name().as_str() > after));
+    let (routes, next) = page::cut(wanted, limit, |(agent, _)| agent.name().as_str().to_owned());
+    Ok(reply::json(&FollowedRoutePage {
+        map_revision: map.revision(),
+        routes: { routes.into_iter() }
+            .map(|(agent, following)| encode::followed_summary(agent, following))
+            .collect(),
+        next,
+    }))
+}
 
 /// What is left of the route that an agent follows.
 #[utoipa::path(get, path = "/v1/spaces/{space}/agents/{agent}/route", tag = "agents",

@@ -4,8 +4,8 @@ use axum::body::Body;
 use axum::extract::{FromRequestParts, State};
 use axum::http::Response;
 use axum::http::request::Parts;
-use cogmap_proto::{Place, PlacePage};
-use cognitive_map::{CognitiveMap, PlaceId};
+use cogmap_proto::{self as wire, PlacePage, PlacePercepts};
+use cognitive_map::{CognitiveMap, Place, PlaceId};
 use serde::{Deserialize, Deserializer};
 
 use super::extract::{IdParams, NoQuery, Query, SpaceOfPath, SpaceParam, path, space};
@@ -90,7 +90,7 @@ fn places(map: &CognitiveMap, query: &PlacesQuery, limit: usize) -> Response<Bod
     tag = "memory", operation_id = "get_place",
     params(IdParams),
     responses(
-        (status = 200, description = "The place", body = Place),
+        (status = 200, description = "The place", body = wire::Place),
         (status = 404, description = "There is no such space or place"),
         (status = 410, description = "The place has been forgotten")))]
 pub(crate) async fn get(
@@ -98,11 +98,33 @@ pub(crate) async fn get(
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
+    let (id, place) = known(&map, id)?;
+    Ok(reply::json(&encode::place(&map, id, place)))
+}
+
+/// What a place remembers of what was felt and seen there.
+#[utoipa::path(get, path = "/v1/spaces/{space}/places/{id}/percepts",
+    tag = "memory", operation_id = "get_place_percepts",
+    params(IdParams),
+    responses(
+        (status = 200, description = "What it remembers, by channel", body = PlacePercepts),
+        (status = 404, description = "There is no such space or place"),
+        (status = 410, description = "The place has been forgotten")))]
+pub(crate) async fn percepts(
+    MemoryOfPath(space, id): MemoryOfPath,
+    _: NoQuery,
+) -> Result<Response<Body>, Problem> {
+    let map = space.snapshot().await?;
+    let (id, _) = known(&map, id)?;
+    Ok(reply::json(&encode::place_percepts(space.name(), &map, id)))
+}
+
+fn known(map: &CognitiveMap, id: u64) -> Result<(PlaceId, &Place), Problem> {
     let id = u32::try_from(id)
         .map(PlaceId)
         .map_err(|_| unknown("place"))?;
     match map.place(id) {
-        Some(place) => Ok(reply::json(&encode::place(&map, id, place))),
+        Some(place) => Ok((id, place)),
         None if map.is_forgotten_place(id) => Err(forgotten("place")),
         None => Err(unknown("place")),
     }

@@ -8,7 +8,7 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 35] = [
+const ROUTES: [(&str, &[&str]); 37] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
@@ -44,8 +44,10 @@ const ROUTES: [(&str, &[&str]); 35] = [
     ),
     ("/v1/spaces/{space}/places", &["get"]),
     ("/v1/spaces/{space}/places/{id}", &["get"]),
+    ("/v1/spaces/{space}/places/{id}/percepts", &["get"]),
     ("/v1/spaces/{space}/recall", &["post"]),
     ("/v1/spaces/{space}/route", &["post"]),
+    ("/v1/spaces/{space}/routes", &["get"]),
     ("/v1/spaces/{space}/sequence", &["post"]),
     ("/v1/spaces/{space}/trips", &["get"]),
     ("/v1/spaces/{space}/trips/{id}", &["get"]),

@@ -153,6 +153,16 @@ fn a_motion_predicts_what_was_felt_at_its_end() {
         let cosine: f32 = vector.iter().zip(&seen).map(|(a, b)| a * b).sum();
         assert!(cosine > 0.7, "{cosine}");
         assert!(touch.confidence > 0.05, "{touch:?}");
+        let memory = api.place_percepts("default", touch.place).unwrap();
+        let remembered = |channel: &str| {
+            let mut known = memory.percepts.iter();
+            known.find(|percept| percept.channel == channel).cloned()
+        };
+        let place = remembered(&touch.channel).expect("what is predicted is remembered");
+        assert_eq!(
+            (place.expected, place.percepts),
+            (touch.expected.clone(), touch.percepts)
+        );
 
         let asked = PredictQuery {
             agent: Some(AGENT.to_owned()),

@@ -155,6 +155,14 @@ fn a_followed_route_and_its_blockages_outlive_a_restart_and_are_told_on_every_do
     let blockage = api.block("default", &place).unwrap();
     let other = api.followed_route("default", AGENT).unwrap();
     assert!(other.steps.iter().all(|step| step.place != ahead));
+    let led = api.followed_routes("default").unwrap();
+    let [only] = &led[..] else {
+        panic!("one agent follows a route: {led:?}");
+    };
+    assert_eq!(
+        (only.agent.as_str(), only.length_m, only.steps_left),
+        (AGENT, other.length_m, other.steps.len() as u64)
+    );
     let is_new_route = |event: &Event| {
         matches!(&event.kind, EventKind::RouteLeft { blockage: Some(id), steps, .. }
             if *id == blockage.id && !steps.is_empty())
@@ -173,6 +181,7 @@ fn a_followed_route_and_its_blockages_outlive_a_restart_and_are_told_on_every_do
     server.run();
     let api = server.api();
     assert_eq!(api.followed_route("default", AGENT).unwrap(), other);
+    assert_eq!(api.followed_routes("default").unwrap(), led);
     assert_eq!(
         api.blockages("default").unwrap(),
         std::slice::from_ref(&blockage)
@@ -192,6 +201,7 @@ fn a_followed_route_and_its_blockages_outlive_a_restart_and_are_told_on_every_do
         .unwrap();
     let over = api.followed_route("default", AGENT).unwrap_err();
     assert!(over.to_string().contains("follows no route"), "{over}");
+    assert_eq!(api.followed_routes("default").unwrap(), []);
 }
 
 #[test]

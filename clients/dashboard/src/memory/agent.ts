@@ -1,10 +1,7 @@
 /** An agent as the page knows it. */
 
-import type { AgentObject, LiveAgent } from "../wire";
-import { Track, type TrackPose } from "./track";
-
-/** Poses of one episode that are kept: some minutes. */
-const TOUCH_POSES_MAX = 2000;
+import type { AgentObject, Contact, LiveAgent } from "../wire";
+import { Track } from "./track";
 
 export class Agent {
   readonly track = new Track();
@@ -12,10 +9,11 @@ export class Agent {
   refined: Track | null = null;
   /** What its episode with an object says, while there is one. */
   touch: AgentObject | null = null;
-  /** Poses of the body since the episode under way began; empty where that is not known. */
-  touchPath: TrackPose[] = [];
-  private isTouching = false;
-  private wasSeenFree = false;
+  /** Contacts of its latest episode that the page has seen, in the frame in which it began. */
+  contacts: Contact[] = [];
+
+  /** When its session began, until it is known where it is in `map` [s]. */
+  private unplacedSinceS: number | null = null;
 
   constructor(
     /** Which of the colours is its own. */
@@ -27,26 +25,23 @@ export class Agent {
     return this.live.name;
   }
 
-  /**
-   * Notes where the body is at a time [s] while it touches an object. An episode counts from where
-   * the body was when it began. That is known only of a body that had been at rest: ticks do not
-   * say when an episode began.
-   */
-  feel(s: number): void {
-    const { contacts, translation_m, rotation_xyzw } = this.live;
-    if (contacts === null) {
-      this.isTouching = false;
-      this.wasSeenFree = true;
-      return;
+  /** A session began: until the agent is placed, its poses are counted from where it woke up. */
+  begin(s: number): void {
+    this.unplacedSinceS = s;
+  }
+
+  /** The agent has left a trace in the map, so it is known where it is. */
+  leaveTrace(): void {
+    this.unplacedSinceS = null;
+  }
+
+  /** It became known where the agent is. */
+  place(s: number): void {
+    if (this.unplacedSinceS !== null) {
+      this.track.hide(this.unplacedSinceS, s);
+      this.unplacedSinceS = null;
     }
-    if (!this.isTouching) {
-      this.isTouching = true;
-      const rest = this.wasSeenFree ? this.track.restBefore(s) : null;
-      this.touchPath = rest === null ? [] : [rest];
-    }
-    if (this.touchPath.length > 0 && this.touchPath.length < TOUCH_POSES_MAX) {
-      this.touchPath.push({ position: translation_m, rotation: rotation_xyzw });
-    }
+    this.track.part(s);
   }
 
   /** Standard deviation of the position along its worst axis, at most √trace [m]. */

@@ -41,6 +41,9 @@ const CHANNELS_MS = 10_000;
 /** Agents whose episodes are asked for at a time: judging one takes the service milliseconds. */
 const TOUCHING_MAX = 4;
 
+/** What only agents do whose place in the map is known. */
+const LEAVES_TRACE = new Set(["place_recruited", "place_entered", "trip_started"]);
+
 export interface ShownEvent extends EventRecord {
   /** Time on the view's clock [s]; 0 for events without a stamp. */
   s: number;
@@ -87,7 +90,8 @@ export class Memory {
   private cloudRevision: bigint | null = null;
   private seenCounts = "";
   private channelsMs = -Infinity;
-  private nColours = 0;
+  /** Which colour is whose; a name that comes back has its own again. */
+  private readonly colours = new Map<string, number>();
   private isRefreshing = false;
   private hasTrips = false;
   private hasEvents = false;
@@ -154,15 +158,13 @@ export class Memory {
       const s = this.clock.seconds(live.stamp_ns);
       let agent = this.agents.get(live.name);
       if (agent === undefined) {
-        agent = new Agent(this.nColours, live);
-        this.nColours += 1;
+        agent = new Agent(this.colourOf(live.name), live);
         this.agents.set(live.name, agent);
         if (this.agents.size <= PAST_AGENTS_MAX) {
           void this.readPast(agent, s - PAST_S);
         }
       }
       agent.live = live;
-      agent.feel(s);
       agent.track.push(s, live.translation_m, live.rotation_xyzw);
       this.note(s);
     }
@@ -183,6 +185,12 @@ export class Memory {
     this.listener.worked(performance.now() - began);
   }
 
+  private colourOf(name: string): number {
+    const colour = this.colours.get(name) ?? this.colours.size;
+    this.colours.set(name, colour);
+    return colour;
+  }
+
   private shown(record: EventRecord): ShownEvent {
     const [kind, fields] = Object.entries(record.event.kind)[0] ?? ["unknown", {}];
     const s = Number(record.event.stamp_ns) === 0 ? 0 : this.clock.seconds(record.event.stamp_ns);
@@ -195,11 +203,9 @@ export class Memory {
     const earlier = (await this.space.events()).map((record) => this.shown(record));
     const fresh = earlier.filter(({ id }) => !known.has(id));
     this.events.unshift(...fresh);
-    for (const { kind, event, s } of fresh) {
-      this.wayfinding.note(kind, event.agent);
-      if (kind === "agent_placed") {
-        this.agents.get(event.agent)?.track.part(s);
-      }
+    // All of them, in their order: what began before is told by those that were known already.
+    for (const { kind, event, s } of earlier) {
+      this.follow(kind, event.agent, s);
     }
     this.listener.recounted();
   }
@@ -207,18 +213,28 @@ export class Memory {
   /** What an event says of the map is shown at once; the next reading of the map makes it exact. */
   private remember({ kind, fields, s, event }: ShownEvent): void {
     const place = fields["place"] as number;
-    this.wayfinding.note(kind, event.agent);
     if (kind === "place_recruited") {
       this.cloud.recruit(place, fields["translation_m"] as never, s);
     } else if (kind === "place_forgotten") {
       this.cloud.forget(place);
-    } else if (kind === "agent_placed") {
-      this.agents.get(event.agent)?.track.part(s);
     } else if (kind === "trip_started") {
       this.trips.start(fields["trip"] as number, event.agent, event.stamp_ns);
     }
+    this.follow(kind, event.agent, s);
     if (kind === "place_recruited" || kind === "place_entered") {
       this.trips.extend(event.agent, place, s);
+    }
+  }
+
+  /** Notes since when it is known where an agent is. */
+  private follow(kind: string, name: string, s: number): void {
+    const agent = this.agents.get(name);
+    if (kind === "session_started") {
+      agent?.begin(s);
+    } else if (kind === "agent_placed") {
+      agent?.place(s);
+    } else if (LEAVES_TRACE.has(kind)) {
+      agent?.leaveTrace();
     }
   }
 
@@ -324,6 +340,10 @@ export class Memory {
   /** Asks what an agent touches, or touched last. */
   async askTouch(agent: Agent): Promise<void> {
     agent.touch = await this.space.agentObject(agent.name).catch(() => null);
+    // Contacts of an episode that has ended stay in sight until the next one begins.
+    if (agent.touch?.episode) {
+      agent.contacts = agent.touch.contacts;
+    }
   }
 
   /** Asks what the episodes with objects say, and once more when they have ended. */

@@ -13,10 +13,6 @@ const GAP_S = 3;
 /** Nor are those between which the agent would have moved faster than this [m/s]. */
 const SPEED_MAX_M_S = 40;
 
-/** An agent is at rest that says nothing for so long [s], or moves less than this [m]. */
-const REST_S = 0.25;
-const REST_M = 5e-4;
-
 export interface TrackPose {
   position: Vec3;
   rotation: Quat;
@@ -30,6 +26,8 @@ export class Track {
   rewrites = 0;
   /** Times at which the frame of the poses became another one [s]. */
   private breaks: number[] = [];
+  /** Times between which the poses were of another frame [s]. */
+  private hidden: [number, number][] = [];
 
   push(s: number, position: Vec3, rotation: Quat): void {
     if (this.n > 0 && s <= this.time(this.n - 1)) {
@@ -80,12 +78,22 @@ export class Track {
     this.rewrites += 1;
   }
 
+  /** Says that poses between these times are of another frame than `map`: they are not drawn [s]. */
+  hide(from: number, to: number): void {
+    this.hidden.push([from, to]);
+    this.hidden.splice(0, Math.max(0, this.hidden.length - BREAKS_MAX));
+    this.rewrites += 1;
+  }
+
   /** Whether pose `i` follows the one before without a break: no gap, no leap. */
   isJoined(i: number): boolean {
     if (i === 0) {
       return false;
     }
     if (this.breaks.some((at) => at > this.time(i - 1) && at <= this.time(i))) {
+      return false;
+    }
+    if (this.hidden.some(([from, to]) => from <= this.time(i) && this.time(i) < to)) {
       return false;
     }
     const s = this.time(i) - this.time(i - 1);
@@ -107,19 +115,6 @@ export class Track {
       }
     }
     return low;
-  }
-
-  /** The latest pose if the agent was at rest there until about a time [s]. */
-  restBefore(s: number): TrackPose | null {
-    if (this.n === 0) {
-      return null;
-    }
-    const last = this.n - 1;
-    const isQuiet = s - this.time(last) > REST_S;
-    const moved = [0, 1, 2].map(
-      (axis) => this.at(last, axis) - this.at(Math.max(0, last - 1), axis),
-    );
-    return isQuiet || (last > 0 && Math.hypot(...moved) < REST_M) ? this.pose(last) : null;
   }
 
   /** The latest pose up to a time; none before the first one. */

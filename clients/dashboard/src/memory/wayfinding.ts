@@ -1,42 +1,48 @@
 /** What stands in the way, and the routes that agents follow. */
 
 import type { Space } from "../service";
-import type { Blockage, FollowedRoute, Vec3 } from "../wire";
+import type { Blockage, FollowedRoute, FollowedSummary, Vec3 } from "../wire";
 import type { Cloud } from "./cloud";
 
-/** Agents whose routes are asked for at a time. */
-const FOLLOWING_MAX = 16;
+/** Agents whose routes are drawn. */
+const DRAWN_MAX = 16;
 
 export class Wayfinding {
   blockages: Blockage[] = [];
-  /** What is left of the routes that agents follow, by their names. */
+  /** What is left of the routes that agents follow, by the names of the agents. */
+  following = new Map<string, FollowedSummary>();
+  /** Their steps, of the first ones and of those that are asked for. */
   readonly followed = new Map<string, FollowedRoute>();
-  /** The agents that follow a route, by what happened: others are not asked for one. */
-  private readonly following = new Set<string>();
-
-  note(kind: string, agent: string): void {
-    if (kind === "route_progress" || kind === "route_left") {
-      this.following.add(agent);
-    } else if (["route_done", "route_failed", "agent_removed", "session_started"].includes(kind)) {
-      this.following.delete(agent);
-      this.followed.delete(agent);
-    }
-  }
+  /** The agent that was chosen: its route is drawn however many others there are. */
+  chosen: string | null = null;
 
   async read(space: Space): Promise<void> {
     this.blockages = await space.blockages();
-    const names = [...this.following].slice(0, FOLLOWING_MAX);
-    const read = async (name: string): Promise<void> => {
-      const route = await space.followedRoute(name).catch(() => null);
-      if (route === null || !this.following.has(name)) {
-        // Somebody took it back.
-        this.following.delete(name);
+    const summaries = await space.following();
+    this.following = new Map(summaries.map((summary) => [summary.agent, summary]));
+    const names = [...this.following.keys()].sort((a, b) => this.rank(a) - this.rank(b));
+    const drawn = names.slice(0, DRAWN_MAX);
+    for (const name of this.followed.keys()) {
+      if (!drawn.includes(name)) {
         this.followed.delete(name);
-      } else {
-        this.followed.set(name, route);
       }
-    };
-    await Promise.all(names.map(read));
+    }
+    await Promise.all(drawn.map((name) => this.readSteps(space, name)));
+  }
+
+  private rank(name: string): number {
+    return name === this.chosen ? 0 : 1;
+  }
+
+  private async readSteps(space: Space, name: string): Promise<void> {
+    const route = await space.followedRoute(name).catch(() => null);
+    if (route === null) {
+      // It has arrived meanwhile, or somebody took the route back.
+      this.following.delete(name);
+      this.followed.delete(name);
+    } else {
+      this.followed.set(name, route);
+    }
   }
 }
 

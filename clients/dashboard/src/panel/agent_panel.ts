@@ -3,10 +3,10 @@
 import type { Agent } from "../memory/agent";
 import type { Memory } from "../memory/memory";
 import { agentColour, type Palette } from "../scene/palette";
-import type { AgentDetail } from "../wire";
+import type { AgentDetail, FollowedSummary } from "../wire";
 import { button, CLOSE, h, say } from "./dom";
 import { Facts } from "./facts";
-import { count, degrees, deviation, exact, metres, percent, position, time } from "./format";
+import { count, degrees, deviation, exact, metres, percent, position, span, time } from "./format";
 import { GridPanel } from "./grid_panel";
 import { badge, glyph } from "./status";
 import { TouchPanel } from "./touch_panel";
@@ -96,6 +96,12 @@ export class AgentPanel {
       live.place === null ? "none" : `${live.place} · ${percent(live.confidence)}`,
       "The place cell that answers strongest, and its confidence",
     );
+    const route = memory.wayfinding.following.get(agent.name);
+    facts.set(
+      "route",
+      route === undefined ? null : routeLeft(route),
+      "What is left of the route that it follows",
+    );
     facts.set("stamp", time(live.stamp_ns), exact(live.stamp_ns));
     facts.set("lag", `${count(live.lag_samples)} samples`, "Received and not yet on disk");
     facts.set("travelled", detail === null ? null : metres(detail.travelled_m), "In this session");
@@ -110,4 +116,8 @@ export class AgentPanel {
     this.touch.update(agent, memory, palette);
     this.grid.draw(colour, ink, module);
   }
+}
+
+function routeLeft({ length_m, steps_left, duration_s }: FollowedSummary): string {
+  return steps_left === 0 ? "arrived" : `${metres(length_m)} left, some ${span(duration_s)}`;
 }

@@ -87,7 +87,7 @@ export class EventFeed {
         name.style.color = agentColour(palette, agent.colour);
       }
       const stamp = event.event.stamp_ns;
-      const when = event.s === 0 ? "" : time(stamp).replace(/\.\d$/, "");
+      const when = event.s === 0 ? "–" : time(stamp).replace(/\.\d$/, "");
       const line = h(
         "li",
         { title: event.s === 0 ? "" : exact(stamp) },

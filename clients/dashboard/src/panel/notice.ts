@@ -64,7 +64,7 @@ export class Notice {
         this.tell(
           "warn",
           "Reconnecting",
-          `${connection.problem.message}. What is shown is what was heard last; ` +
+          `${capital(connection.problem.message)}. What is shown is what was heard last; ` +
             "the page comes back by itself.",
         );
         return true;
@@ -81,4 +81,8 @@ export class Notice {
       }
     }
   }
+}
+
+function capital(text: string): string {
+  return text.charAt(0).toUpperCase() + text.slice(1);
 }

@@ -49,7 +49,8 @@ export class ObjectPanel {
 
   draw(palette: Palette): void {
     if (this.detail !== null) {
-      drawModel(this.model, this.detail, [], palette.label, palette);
+      const felt = { model: this.detail, contacts: [], nextTouch: null, colour: palette.label };
+      drawModel(this.model, felt, palette);
     }
   }
 

@@ -1,17 +1,24 @@
-/** A place: what it is, who was there, and what an agent would feel there. */
+/** A place: what it is, what it remembers and predicts, and who was there. */
 
 import { conjugate, multiply, rotate } from "../grid/lattice";
 import type { Agent } from "../memory/agent";
 import type { Memory } from "../memory/memory";
 import { Problem } from "../problem";
-import type { Place, Prediction, Route, Vec3 } from "../wire";
+import type { Palette } from "../scene/palette";
+import type { Place, Prediction, Route, Sequence, Vec3 } from "../wire";
 import { button, CLOSE, h, say } from "./dom";
 import { Facts } from "./facts";
 import { deviation, exact, metres, percent, position, time } from "./format";
+import { PerceptList } from "./percept_list";
+
+/** Places that are told to come next. */
+const NEXT_MAX = 4;
 
 export interface PlaceActions {
   recall(at: Vec3): void;
-  route(place: number): void;
+  /** Asks for a route from an agent; from the one that fits best where none is named. */
+  route(place: number, agent: string | null): void;
+  choose(place: number): void;
   close(): void;
 }
 
@@ -20,15 +27,21 @@ export class PlacePanel {
   private readonly name = h("h2");
   private readonly facts = new Facts();
   private readonly visitors = h("ul", { class: "visitors" });
-  private readonly expected = h("ul", { class: "percepts" });
+  private readonly remembered = new PerceptList();
+  private readonly forgets = h("p", { class: "soft nothing" });
+  private readonly next = h("ul", { class: "next bars" });
   private readonly expectedTitle = h("h3");
-  private readonly note = h("p", { class: "soft" });
-
+  private readonly note = h("p", { class: "soft expected" });
+  private readonly from = h("select", {
+    class: "from",
+    title: "The agent that the route begins at",
+    attributes: { "aria-label": "route from" },
+  });
   private readonly way = h("p", { class: "soft way" });
   private here: Vec3 | null = null;
   private id = 0;
 
-  constructor(actions: PlaceActions) {
+  constructor(private readonly actions: PlaceActions) {
     const ask = button(
       "Recall from here",
       "Ask which places answer at this position (R)",
@@ -36,9 +49,10 @@ export class PlacePanel {
     );
     const route = button(
       "Route here",
-      "The shortest route over the team's ways, from the agent that was chosen last",
-      () => actions.route(this.id),
+      "The shortest route over the team's ways, from the agent beside",
+      () => actions.route(this.id, this.from.value || null),
     );
+    this.from.addEventListener("change", () => actions.route(this.id, this.from.value || null));
     this.element.append(
       h(
         "header",
@@ -47,14 +61,23 @@ export class PlacePanel {
         this.name,
         button("", "Close", () => actions.close(), CLOSE),
       ),
-      h("div", { class: "actions" }, ask, route),
+      h(
+        "div",
+        { class: "actions" },
+        ask,
+        h("span", { class: "start" }, route, h("span", { class: "soft" }, "from"), this.from),
+      ),
       this.way,
       this.facts.element,
+      h("h3", {}, "What it remembers"),
+      this.remembered.element,
+      this.forgets,
+      this.expectedTitle,
+      this.note,
+      h("h3", {}, "Where the team went on to"),
+      this.next,
       h("h3", {}, "Who was there"),
       this.visitors,
-      this.expectedTitle,
-      this.expected,
-      this.note,
     );
   }
 
@@ -63,27 +86,73 @@ export class PlacePanel {
     say(this.way, text);
   }
 
-  /** Asks for a place, and what the agent that is nearest would feel there. */
-  async show(id: number, memory: Memory, isWanted: () => boolean): Promise<void> {
+  /** The agents that a route may begin at, and the one that is proposed. */
+  propose(agents: string[], agent: string | null): void {
+    const options = agents.map((name) => h("option", { attributes: { value: name } }, name));
+    this.from.replaceChildren(...options);
+    this.from.disabled = agents.length === 0;
+    this.from.value = agent ?? agents[0] ?? "";
+  }
+
+  draw(palette: Palette): void {
+    this.remembered.draw(palette);
+  }
+
+  /** Asks for a place: what it remembers and predicts, and who was there. */
+  async show(id: number, memory: Memory, palette: Palette, isWanted: () => boolean): Promise<void> {
     say(this.name, `Place ${id}`);
     [this.id, this.route] = [id, ""];
+    [this.note, this.expectedTitle, this.forgets].forEach((element) => say(element, ""));
+    [this.next, this.visitors].forEach((element) => element.replaceChildren());
+    this.remembered.show([], palette);
     try {
-      const place = await memory.space.place(id);
+      const { space } = memory;
+      const asked = [space.place(id), space.percepts(id)] as const;
+      const [place, percepts] = await Promise.all(asked);
       if (!isWanted()) {
         return;
       }
       this.here = place.translation_m;
       this.showFacts(place);
+      this.remembered.show(percepts, palette);
+      say(this.forgets, percepts.length === 0 ? "Nothing was felt or seen here." : "");
       this.showVisitors(place, memory);
+      const next = await space.next(id, NEXT_MAX);
+      if (isWanted()) {
+        this.showNext(next);
+      }
       const agent = nearest(memory, place.translation_m);
       if (agent !== null) {
-        this.showPrediction(agent, place, await predictAt(place, memory, agent));
+        const predicted = await predictAt(place, memory, agent);
+        if (isWanted()) {
+          this.showPrediction(agent, place, predicted);
+        }
       }
     } catch (error) {
       if (isWanted()) {
         say(this.note, Problem.from(error).message);
       }
     }
+  }
+
+  /** The places that came next on the trips through here, as bars. */
+  private showNext({ next, others, none }: Sequence): void {
+    const rows = next.map(({ place, probability }) => ({
+      what: button(`Place ${place}`, `Look at place ${place}`, () => this.actions.choose(place)),
+      part: probability,
+    }));
+    const rest = [
+      { what: h("span", {}, "other places"), part: others },
+      { what: h("span", { title: "Nobody went on from here" }, "nowhere yet"), part: none },
+    ].filter(({ part }) => part >= 0.005);
+    const made = [...rows, ...rest].map(({ what, part }) => {
+      const bar = h("i");
+      bar.style.width = `${100 * part}%`;
+      what.classList.add("what");
+      const number = h("span", { class: "number" }, percent(part));
+      return h("li", {}, what, h("span", { class: "bar" }, bar), number);
+    });
+    this.next.replaceChildren(...made);
   }
 
   private showFacts(place: Place): void {
@@ -143,24 +212,20 @@ export class PlacePanel {
     const from = agent.live.translation_m;
     const way = Math.hypot(...there.translation_m.map((x, i) => x - from[i]!));
     say(this.expectedTitle, `What ${agent.name} would feel there`);
-    this.expected.replaceChildren(
-      ...percepts.map(({ channel, expected, percepts: n }) => {
-        const level = expected.level;
-        const what =
-          level === undefined
-            ? `a view of ${expected.descriptor?.vector.length ?? 0} numbers`
-            : `${level.mean.toPrecision(3)} ± ${level.sd.toPrecision(2)}`;
-        return h("li", { title: `Learned from ${n} percepts` }, h("b", {}, channel), ` ${what}`);
-      }),
+    if (place === null) {
+      say(this.note, `Nothing that is sure: no place would answer after the ${metres(way)} there.`);
+      return;
+    }
+    const expected = percepts.map(({ channel, expected: { level } }) =>
+      level === undefined
+        ? `the view that it has of ${channel}`
+        : `${channel} ${level.mean.toPrecision(3)}`,
     );
-    const answers =
-      place === null
-        ? "No place would answer after the way there."
-        : `Place ${place} would answer, with a confidence of ${percent(confidence)} after the ` +
-          `noise of the ${metres(way)} there.`;
+    const what = expected.length === 0 ? "Nothing that is remembered" : expected.join(", ");
+    const which = place === there.id ? "this place" : `place ${place}`;
     say(
       this.note,
-      percepts.length > 0 ? answers : `${answers} Nothing was felt here that is remembered.`,
+      `${what}. After the ${metres(way)} there, ${which} would answer with ${percent(confidence)}.`,
     );
   }
 }

@@ -1,13 +1,13 @@
-/** An episode with an object: hypotheses as bars that narrow, and what is felt on the model. */
+/** An episode with an object: hypotheses as bars that narrow, and the contacts on the model. */
 
-import { conjugate, rotate } from "../grid/lattice";
+import { rotate } from "../grid/lattice";
 import type { Agent } from "../memory/agent";
 import type { Memory } from "../memory/memory";
 import { agentColour, type Palette } from "../scene/palette";
-import type { Identification, ObjectDetail, Vec3 } from "../wire";
+import type { Contact, Identification, ObjectDetail, ObjectPose, Vec3 } from "../wire";
 import { h, say } from "./dom";
 import { percent } from "./format";
-import { drawModel } from "./object_model";
+import { drawModel, type Felt } from "./object_model";
 
 /** Hypotheses that are shown. */
 const BARS_MAX = 5;
@@ -18,8 +18,7 @@ export class TouchPanel {
   private readonly bars = h("ul", { class: "bars" });
   private readonly model = h("canvas", { class: "model" });
   private readonly note = h("p", { class: "soft" });
-  private drawing: { model: ObjectDetail; way: Vec3[]; colour: string; palette: Palette } | null =
-    null;
+  private drawing: { felt: Felt; palette: Palette } | null = null;
   private readonly models = new Map<string, ObjectDetail | "asked">();
 
   constructor() {
@@ -38,29 +37,24 @@ export class TouchPanel {
     const doing = touch?.episode === "learn" ? "Learning by touch" : "Recognising by touch";
     say(this.title, `${isUnderWay ? doing : "Touched last"} · ${contacts} contacts`);
     this.showBars(said, palette);
-    const name = said?.pose?.object ?? said?.objects[0]?.name;
-    const model = name === undefined ? undefined : this.modelOf(name, memory);
-    this.model.hidden = model === undefined;
+    const felt = this.feltOf(agent, said, memory, palette);
+    this.drawing = felt && { felt, palette };
+    this.model.hidden = felt === null;
     say(
       this.note,
       said === null ? "What is felt teaches an object; nothing is compared." : verdict(said),
     );
-    this.drawing =
-      model === undefined
-        ? null
-        : {
-            model,
-            way: pathOnModel(agent, said),
-            colour: agentColour(palette, agent.colour),
-            palette,
-          };
+  }
+
+  /** What is drawn of it. */
+  get felt(): Felt | null {
+    return this.element.hidden ? null : (this.drawing?.felt ?? null);
   }
 
   /** Turns the model on. */
   turn(): void {
     if (this.drawing !== null && !this.element.hidden) {
-      const { model, way, colour, palette } = this.drawing;
-      drawModel(this.model, model, way, colour, palette);
+      drawModel(this.model, this.drawing.felt, this.drawing.palette);
     }
   }
 
@@ -96,6 +90,35 @@ export class TouchPanel {
     });
   }
 
+  /** The contacts on the model of the most probable object; by themselves where there is none. */
+  private feltOf(
+    { contacts, colour }: Agent,
+    said: Identification | null,
+    memory: Memory,
+    palette: Palette,
+  ): Felt | null {
+    const pose = said?.pose ?? null;
+    const best = said?.objects[0];
+    // What is none of these is not drawn on one of them.
+    const name = (best?.probability ?? 0) < (said?.unknown ?? 1) ? undefined : best!.name;
+    const own = { nextTouch: null, colour: agentColour(palette, colour) };
+    const model = name === undefined ? undefined : this.modelOf(name, memory);
+    if (model === undefined) {
+      return contacts.length === 0 ? null : { model: null, contacts, ...own };
+    }
+    if (pose?.object !== name || pose === null) {
+      return { model, contacts: [], ...own };
+    }
+    const { next_touch } = said!;
+    const next = next_touch && onObject({ ...next_touch, normal: null, levels: [] }, pose);
+    return {
+      model,
+      contacts: contacts.map((contact) => onObject(contact, pose)),
+      nextTouch: next?.position_m ?? null,
+      colour: own.colour,
+    };
+  }
+
   private modelOf(name: string, memory: Memory): ObjectDetail | undefined {
     const known = this.models.get(name);
     if (known === undefined) {
@@ -109,19 +132,15 @@ export class TouchPanel {
   }
 }
 
-/** The way of the body since the episode began, in the frame of the most probable object. */
-function pathOnModel(agent: Agent, said: Identification | null): Vec3[] {
-  const start = agent.touchPath[0];
-  const pose = said?.pose;
-  if (start === undefined || pose === null || pose === undefined) {
-    return [];
-  }
-  const back = conjugate(start.rotation);
-  return agent.touchPath.map(({ position }) => {
-    const away = position.map((x, i) => x - start.position[i]!) as Vec3;
-    const inEpisode = rotate(back, away);
-    return rotate(pose.rotation_xyzw, inEpisode).map((x, i) => x + pose.translation_m[i]!) as Vec3;
-  });
+/** A contact, in the frame of the object in which its episode's frame lies so. */
+function onObject(contact: Contact, { translation_m, rotation_xyzw }: ObjectPose): Contact {
+  const { position_m, normal } = contact;
+  const turned = rotate(rotation_xyzw, position_m);
+  return {
+    ...contact,
+    position_m: turned.map((x, i) => x + translation_m[i]!) as Vec3,
+    normal: normal && rotate(rotation_xyzw, normal),
+  };
 }
 
 function verdict(said: Identification): string {

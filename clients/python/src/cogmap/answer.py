@@ -369,6 +369,31 @@ class ExpectedDescriptor:
 
 
 @dataclass(frozen=True)
+class RememberedPercept:
+    """What a place remembers of a channel."""
+
+    #: Name of the channel.
+    channel: str
+    #: What is expected there.
+    expected: Union[ExpectedLevel, ExpectedDescriptor]
+    #: Number of percepts that it has learned from.
+    percepts: int
+    #: Strength of the association: the sum of the place's confidences when they were felt.
+    strength: float
+
+
+@dataclass(frozen=True)
+class PlacePercepts:
+    """What a place remembers of what was felt and seen there."""
+
+    space: str
+    place: int
+    map_revision: int
+    #: What it remembers, in the order of the channels; empty where nothing was felt.
+    percepts: Tuple[RememberedPercept, ...]
+
+
+@dataclass(frozen=True)
 class PredictedPercept:
     """A percept that is expected."""
 

@@ -14,6 +14,7 @@ from .answer import (
     IngestAnswer,
     Place,
     PlacePage,
+    PlacePercepts,
     PredictAnswer,
     RecallAnswer,
     SpaceInfo,
@@ -234,6 +235,10 @@ class Client(Questions, GuidanceClient):
     def place(self, space: str, place: int) -> Place:
         """A place."""
         return self._get(Place, path_of(space, "places", str(place)))
+
+    def place_percepts(self, space: str, place: int) -> PlacePercepts:
+        """What a place remembers of what was felt and seen there."""
+        return self._get(PlacePercepts, path_of(space, "places", str(place), "percepts"))
 
     def trips(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Trip]:
         """All trips of a space, by id. `filters` are passed on as query parameters."""

@@ -105,6 +105,31 @@ class FollowedRoute:
     steps: Tuple[RouteStep, ...]
 
 
+@dataclass(frozen=True)
+class FollowedRouteSummary:
+    """What is left of the route that an agent follows, without the steps."""
+
+    agent: str
+    #: Length that is left [m].
+    length_m: float
+    #: Duration to be expected of the steps that are left [s].
+    duration_s: float
+    #: Steps of the route that it has gone.
+    steps_done: int
+    #: Steps that are left; none where it has arrived.
+    steps_left: int
+
+
+@dataclass(frozen=True)
+class FollowedRoutePage:
+    """Agents that follow routes, by name."""
+
+    map_revision: int
+    routes: Tuple[FollowedRouteSummary, ...]
+    #: Name to go on after; absent on the last page.
+    next: Optional[str] = None
+
+
 class RouteFailure(str, Enum):
     """Why an agent follows no route any more."""
 

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Iterable, Tuple
+from typing import Iterable, Iterator, Tuple
 
-from .guidance import Blockage, BlockageList, BlockageRequest, FollowedRoute, FollowRequest
-from .http_service import HttpService
+from .guidance import (
+    Blockage,
+    BlockageList,
+    BlockageRequest,
+    FollowedRoute,
+    FollowedRoutePage,
+    FollowedRouteSummary,
+    FollowRequest,
+)
+from .http_service import HttpService, Query
 from .request import json_of, path_of
 from .route import RouteAvoid, RouteBox, RouteCost, RouteEnd, RouteReverse
 from .wire import JSON
@@ -36,6 +44,16 @@ class GuidanceClient(HttpService):
     def followed_route(self, space: str, agent: str) -> FollowedRoute:
         """What is left of the route that an agent follows."""
         return self._get(FollowedRoute, path_of(space, "agents", agent, "route"))
+
+    def followed_routes(self, space: str) -> Iterator[FollowedRouteSummary]:
+        """What is left of the routes that agents follow, without the steps, by agent."""
+        query: Query = {}
+        while True:
+            page = self._get(FollowedRoutePage, path_of(space, "routes"), query)
+            yield from page.routes
+            if page.next is None:
+                return
+            query["after"] = page.next
 
     def stop_following(self, space: str, agent: str) -> None:
         """Lets an agent follow its route no more."""

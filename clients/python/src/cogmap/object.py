@@ -343,3 +343,6 @@ class AgentObject:
     #: The latest episode that has ended; absent when there was none in which something was felt.
     #: Also kept when the robot is closed.
     last: Optional[EndedEpisode] = None
+    #: The contacts of the episode under way, oldest first, in the frame of the body when it began:
+    #: at most the first 128, by which it recognises. Without descriptors, which may be long.
+    contacts: Tuple[Contact, ...] = ()

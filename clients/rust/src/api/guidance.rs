@@ -1,6 +1,9 @@
 //! What robots and routes are to heed: blockages, routes that agents follow, pinned trips.
 
-use cogmap_proto::{Blockage, BlockageList, BlockageRequest, FollowRequest, FollowedRoute};
+use cogmap_proto::{
+    Blockage, BlockageList, BlockageRequest, FollowRequest, FollowedRoute, FollowedRoutePage,
+    FollowedRouteSummary,
+};
 use ureq::http::Method;
 
 use super::Api;
@@ -29,6 +32,16 @@ impl Api {
     /// See [`ApiError`].
     pub fn followed_route(&self, space: &str, agent: &str) -> Result<FollowedRoute, ApiError> {
         self.get(&agent_path(space, agent, "/route")?)
+    }
+
+    /// What is left of the routes that agents follow, without the steps, by agent.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn followed_routes(&self, space: &str) -> Result<Vec<FollowedRouteSummary>, ApiError> {
+        self.pages(&path(space, "/routes")?, |page: FollowedRoutePage| {
+            (page.routes, page.next)
+        })
     }
 
     /// Lets an agent follow its route no more.

@@ -27,14 +27,15 @@ pub(super) fn run(args: &DemoArgs, runtime: &Runtime) -> anyhow::Result<Summary>
                 Ok(service) => break (service, endpoint),
                 Err(error) => error,
             };
-            // Another program may take a port after it was found free.
-            let again = match error {
-                StartError::HttpTaken { .. } | StartError::ZenohTaken { .. } => {
-                    settings(args, &temporary)?
-                }
+            // Another program may take a port after it was found free. Of a port that the user
+            // named there is no other choice, whatever the demo chooses for the rest.
+            let has_other_choice = match error {
+                StartError::HttpTaken { .. } => |a: &Config, b: &Config| a.http != b.http,
+                StartError::ZenohTaken { .. } => |a: &Config, b: &Config| a.zenoh != b.zenoh,
                 _ => return Err(error.into()),
             };
-            if again == config {
+            let again = settings(args, &temporary)?;
+            if !has_other_choice(&again, &config) {
                 return Err(error.into());
             }
             config = again;

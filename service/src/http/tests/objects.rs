@@ -218,6 +218,21 @@ async fn an_agent_learns_and_recognises_by_touch() {
         "{told}"
     );
     assert_eq!(told["contacts"], 8);
+    let felt = status["contacts"].as_array().expect("a list");
+    let felt: Vec<(f64, f64)> = felt
+        .iter()
+        .map(|contact| {
+            let number = |of: &Value| of.as_f64().expect("a number");
+            let at = number(&contact["position_m"][0]);
+            (at, number(&contact["levels"][0]["value"]))
+        })
+        .collect();
+    // Where the body was, counted from where the episode began.
+    for (i, (at, level)) in felt.iter().enumerate() {
+        assert!((at + i as f64 * PITCH_M).abs() < 1e-9, "{felt:?}");
+        assert!((level - KNIFE[7 - i]).abs() < 1e-9, "{felt:?}");
+    }
+    assert_eq!(felt.len(), 8);
     let end = SampleBody::Object(ObjectMark::End {});
     rig.samples("arm", &next(end)).await.good();
     let status = rig.get("/v1/spaces/lab/agents/arm/object").await.good();
@@ -225,6 +240,7 @@ async fn an_agent_learns_and_recognises_by_touch() {
         (&status["episode"], &status["identification"]),
         (&Value::Null, &Value::Null)
     );
+    assert_eq!(status["contacts"], json!([]));
     let last = &status["last"];
     assert_eq!(
         (&last["episode"], &last["session"]),

@@ -419,7 +419,7 @@ fn assert_references(root: &Value, value: &Value) {
 }
 
 /// All operations, by method and path.
-const OPERATIONS: [&str; 44] = [
+const OPERATIONS: [&str; 46] = [
     "DELETE /v1/spaces/{space}",
     "DELETE /v1/spaces/{space}/agents/{agent}",
     "DELETE /v1/spaces/{space}/agents/{agent}/route",
@@ -450,6 +450,8 @@ const OPERATIONS: [&str; 44] = [
     "GET /v1/spaces/{space}/objects/{name}",
     "GET /v1/spaces/{space}/places",
     "GET /v1/spaces/{space}/places/{id}",
+    "GET /v1/spaces/{space}/places/{id}/percepts",
+    "GET /v1/spaces/{space}/routes",
     "GET /v1/spaces/{space}/trips",
     "GET /v1/spaces/{space}/trips/{id}",
     "POST /v1/spaces/{space}/agents/{agent}/predict",

@@ -21,6 +21,11 @@ impl CognitiveMap {
         self.guidance.followed(agent).map(|following| &**following)
     }
 
+    /// The routes that agents follow, by the numbers of the agents.
+    pub fn all_followed(&self) -> impl Iterator<Item = (AgentId, &Following)> {
+        self.guidance.all_followed()
+    }
+
     /// The route of an errand from where an agent is now.
     fn route_of(&self, agent: AgentId, errand: &Errand) -> Result<Route, RouteFailure> {
         if self

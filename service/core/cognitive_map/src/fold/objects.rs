@@ -7,7 +7,7 @@ use crate::input::AgentId;
 use crate::input::Label;
 use crate::input::{ObjectMark, Spacing, Touch};
 use crate::memory::object::{Episode, Identified, Insight, KnownObject, News, ObjectMemory};
-use object_recognition::{Density, ModelPlace, ObjectId, ObjectModel, Orientation};
+use object_recognition::{Contact, Density, ModelPlace, ObjectId, ObjectModel, Orientation};
 
 impl Fold<'_> {
     /// An episode with an object begins or ends. One that is under way ends in any case.
@@ -161,6 +161,13 @@ impl CognitiveMap {
     /// that a hand which feels the one takes it for the other.
     pub fn object_alike(&self, object: ObjectId) -> Option<(ObjectId, f64)> {
         self.objects.alike(object)
+    }
+
+    /// The first contacts of an agent's episode, by which it recognises: in the frame of the body
+    /// when it began. None where no episode is under way.
+    pub fn episode_contacts(&self, agent: AgentId) -> &[Contact] {
+        let episode = self.agent(agent).and_then(|agent| agent.episode.as_ref());
+        episode.map(Episode::contacts).unwrap_or_default()
     }
 
     /// What an agent's episode says so far, if one is under way: whether it teaches, and what is

@@ -148,6 +148,11 @@ impl Episode {
         self.count
     }
 
+    /// The first contacts, by which it recognises, in its own frame.
+    pub(crate) fn contacts(&self) -> &[Contact] {
+        &self.contacts
+    }
+
     /// The body moved, with noise of these variances.
     pub(crate) fn go(&mut self, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
         self.travel.append(increment, variance);
