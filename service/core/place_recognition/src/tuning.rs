@@ -454,7 +454,7 @@ pub(crate) mod particles {
     /// Standard deviation of the factor of lengths, and of its step: that of steps on foot.
     pub(crate) const SCALE_SD: f64 = 0.05;
     pub(crate) const SCALE_STEP: f64 = 0.004;
-    /// Particles so near to the mode make up the estimate \[m\].
+    /// Particles so near to the mode make up the estimate, across and up \[m\].
     pub(crate) const NEAR_M: f64 = 10.0;
     pub(crate) const NEAR_Z_M: f64 = 2.0;
 }
@@ -463,16 +463,16 @@ pub(crate) mod particles {
 pub(crate) mod claims {
     /// Fewest views.
     pub(crate) const VIEWS_MIN: u32 = 3;
-    /// A claim is right up to this error \[m\].
+    /// A claim is right up to this error, across and up \[m\].
     pub(crate) const NEAR_M: f64 = 15.0;
     pub(crate) const NEAR_Z_M: f64 = 2.5;
     /// Weight of a view in what is learned: neighbours err alike.
     pub(crate) const WEIGHT: f64 = 0.3;
     /// Log odds from which on a claim is made \[nats\]. They are learned from agents whose own
     /// poses err and while the map grows, and understate how often later claims are right.
-    pub(crate) const SURE: f64 = 0.5;
+    pub(crate) const SURE: f64 = 1.2;
     /// Views one after the other that must be so sure: chance does not last.
-    pub(crate) const TIMES: u8 = 3;
+    pub(crate) const TIMES: u8 = 2;
     /// Log odds down to which the pose of an agent that was found is corrected \[nats\].
     pub(crate) const FOLLOWED: f64 = 0.0;
     /// Factor by which what was learned fades with a claim: the latest fifty count.

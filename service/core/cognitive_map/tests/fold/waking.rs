@@ -14,7 +14,7 @@ const REACH_M: f64 = 9.0;
 /// Way between two views \[m\], and views of a session.
 const STEP_M: f64 = 2.5;
 const VIEWS: usize = 24;
-const TAUGHT: usize = 70;
+const TAUGHT: usize = 60;
 
 /// What is heard.
 #[derive(Clone, Copy, PartialEq)]

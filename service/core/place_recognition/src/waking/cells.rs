@@ -94,7 +94,8 @@ impl Cells {
         if is_first {
             for (about, kernel) in self.about(channel, key) {
                 if let Some(near) = self.near.get_mut(about as usize, revision) {
-                    near.push((own, kernel));
+                    let at = near.partition_point(|(number, _)| *number < own);
+                    near.insert(at, (own, kernel));
                 }
             }
         }
@@ -193,10 +194,11 @@ impl Cells {
         found.collect()
     }
 
-    /// Those of them that have views.
+    /// Those of them that have views, by number: sums have one order, whoever derives them.
     fn near_of(&self, channel: u8, key: Key) -> Vec<(u32, f32)> {
         let mut about = self.about(channel, key);
         about.retain(|(number, _)| self.get(*number).is_some_and(|cell| !cell.sum.is_empty()));
+        about.sort_unstable_by_key(|(number, _)| *number);
         about
     }
 
