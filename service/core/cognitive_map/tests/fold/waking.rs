@@ -108,16 +108,23 @@ impl World {
             Heard::Halves => Vector2::new(at.x % (0.5 * HALL_M[0]), at.y),
             _ => *at,
         };
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a strength of at most a few"
+        )]
         let strength = |from: &Vector2<f64>| {
             let loss = (0.3 * self.random.normal()).exp();
-            match self.heard {
-                Heard::Noise => self.random.normal() as f32,
-                _ => ((-(from - at).norm() / REACH_M).exp() * loss) as f32,
-            }
+            let strength = match self.heard {
+                Heard::Noise => self.random.normal(),
+                _ => (-(from - at).norm() / REACH_M).exp() * loss,
+            };
+            strength as f32
         };
         let mut view: Vec<f32> = self.transmitters.iter().map(strength).collect();
         let length = view.iter().map(|x| x * x).sum::<f32>().sqrt();
-        view.iter_mut().for_each(|x| *x /= length);
+        for number in &mut view {
+            *number /= length;
+        }
         view
     }
 
