@@ -35,7 +35,10 @@ const CORE: [(&str, &[&str]); 10] = [
         &["geometry", "nalgebra", "pulp", "state", "thiserror"],
     ),
     ("place_filter", &["geometry", "nalgebra", "state"]),
-    ("place_recognition", &["geometry", "nalgebra", "state"]),
+    (
+        "place_recognition",
+        &["geometry", "nalgebra", "random", "state"],
+    ),
     (
         "object_recognition",
         &["geometry", "grid", "nalgebra", "pulp", "state"],

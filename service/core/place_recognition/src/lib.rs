@@ -11,9 +11,11 @@ mod similarity;
 mod tuning;
 mod view;
 mod views;
+mod waking;
 
 pub use descriptor::dot;
 pub use keyframes::{Keyframes, SampleKey};
 pub use recognition::{Guess, Part, PlaceRecognition, Relocalised, Revisit};
 pub use similarity::{LearnedChannel, Similarity, ViewLog, ViewMatch};
 pub use view::View;
+pub use waking::Found;

@@ -358,3 +358,132 @@ pub(crate) mod similarity {
     /// Bounds of the depth of a match: logarithm of its odds.
     pub(crate) const DEPTH: (f64, f64) = (0.05, 6.0);
 }
+
+/// Cells of mean views. Lengths are those of channels that reach farther than a room, such as
+/// Wi-Fi (docs/decisions/0072).
+pub(crate) mod cells {
+    /// Side of a cell, and height of its layer, less than that of a storey \[m\].
+    pub(crate) const SIDE_M: f64 = 3.0;
+    /// Length of the kernel by which cells about one count \[m\].
+    pub(crate) const KERNEL_M: f64 = 4.0;
+    /// Farthest cell that counts, in sides: beyond, the kernel is below 0.08.
+    pub(crate) const REACH: i32 = 3;
+    /// Most cells of all channels, those without views included: about 12 MiB, 0.15 km² in all. A
+    /// cell with views takes at most 0.9 KiB.
+    pub(crate) const CELLS_MAX: usize = 16_384;
+    /// Sharpness of the density of views: a cosine less by its inverse counts e times less.
+    pub(crate) const SHARPNESS: f32 = 30.0;
+    /// Weight of views that nobody took, so that few views say little.
+    pub(crate) const OPEN: f32 = 0.3;
+    /// Least density.
+    pub(crate) const LEAST: f32 = 1e-6;
+}
+
+/// Learning what views say of cells.
+pub(crate) mod waking {
+    /// Most channels.
+    pub(crate) const CHANNELS_MAX: usize = 16;
+    /// Information of the prior of a weight.
+    pub(crate) const PRIOR: f64 = 1.0;
+    /// Least variance of an outcome, so that a step stays bounded.
+    pub(crate) const VARIANCE_MIN: f64 = 0.01;
+    /// Factor by which what was learned fades with a view: the latest thousand count.
+    pub(crate) const KEPT: f64 = 0.999;
+    /// Weights of the features before anything is learned.
+    pub(crate) const WEIGHTS: [f64; 2] = [3.0, 0.3];
+    /// Fewest views that say what a channel tells.
+    pub(crate) const VIEWS_MIN: u32 = 64;
+    /// Views of a channel that tells nothing until one is tried again.
+    pub(crate) const TRIED: u32 = 16;
+    /// Least mean information of a view \[nats\].
+    pub(crate) const TOLD_MIN: f64 = 1.0;
+    /// Fewest cells among which a view is weighed.
+    pub(crate) const CELLS_MIN: usize = 64;
+    /// Fewest cells of a map in which agents are sought: some 70 m by 70 m. A smaller one is
+    /// known by single views.
+    pub(crate) const CELLS_LARGE: usize = 512;
+    /// Least share of views within or outside, against large weights.
+    pub(crate) const SHARE_MIN: f64 = 0.05;
+    /// Share of views that were taken in another cell than that of the estimate.
+    pub(crate) const MISPLACED: f64 = 0.05;
+    /// Standard deviation of a position along an axis up to which its view counts \[m\]: two
+    /// lengths of the kernel.
+    pub(crate) const SD_M_MAX: f64 = 8.0;
+    /// The same up to which it tells whether a claim is right.
+    pub(crate) const SHADOW_SD_M_MAX: f64 = 4.0;
+    /// The same at which a view counts half.
+    pub(crate) const SURE_M: f64 = 4.0;
+    /// Views that wait: a few sessions on foot.
+    pub(crate) const WAITING: usize = 256;
+    /// Rate at which the mean cosine of far views follows.
+    pub(crate) const ALIKE_RATE: f64 = 0.02;
+    /// Mean cosine of far views from which a channel shows the same everywhere.
+    pub(crate) const ALIKE_MAX: f64 = 0.98;
+    /// Views of a session by which claims are tried.
+    pub(crate) const SHADOW_VIEWS: u32 = 32;
+    /// Rate at which an agent's means of what is alike follow.
+    pub(crate) const ALIKE_LATELY: f64 = 0.2;
+    /// Views after which an agent is no longer followed.
+    pub(crate) const FOLLOWED: u32 = 96;
+}
+
+/// The particle filter.
+pub(crate) mod particles {
+    /// Particles.
+    pub(crate) const COUNT: usize = 3000;
+    /// One of so many is drawn anew with each view.
+    pub(crate) const FRESH: usize = 25;
+    /// Probability at first that the agent is where nothing is known.
+    pub(crate) const WITHOUT: f64 = 0.5;
+    /// Part of independent evidence that a view is: neighbours err alike.
+    pub(crate) const TEMPER: f64 = 0.3;
+    /// The same when particles are first drawn.
+    pub(crate) const FIRST: f64 = 0.5;
+    /// Bounds of the evidence of a view for the cells \[nats\].
+    pub(crate) const WITHIN: (f64, f64) = (-8.0, 3.0);
+    /// Evidence against a particle between the cells \[nats\].
+    pub(crate) const HOLE: f64 = 1.0;
+    /// Probability that an agent is somewhere else altogether with the next view.
+    pub(crate) const ANEW: f64 = 0.004;
+    /// Part of the probability of no cell that stays with a view, and what is added.
+    pub(crate) const OPEN: (f64, f64) = (0.999, 0.0005);
+    /// Standard deviation of the heading: of a view, and of the way \[rad, rad/√m\].
+    pub(crate) const TURN_SD: (f64, f64) = (0.005, 0.04);
+    /// The same of the position \[m, m/√m\].
+    pub(crate) const POSITION_SD: (f64, f64) = (0.15, 0.15);
+    /// Standard deviation of the factor of lengths, and of its step: that of steps on foot.
+    pub(crate) const SCALE_SD: f64 = 0.05;
+    pub(crate) const SCALE_STEP: f64 = 0.004;
+    /// Particles so near to the mode make up the estimate, across and up \[m\].
+    pub(crate) const NEAR_M: f64 = 10.0;
+    pub(crate) const NEAR_Z_M: f64 = 2.0;
+}
+
+/// Claims where an agent is.
+pub(crate) mod claims {
+    /// Fewest views.
+    pub(crate) const VIEWS_MIN: u32 = 3;
+    /// A claim is right up to this error, across and up \[m\].
+    pub(crate) const NEAR_M: f64 = 15.0;
+    pub(crate) const NEAR_Z_M: f64 = 2.5;
+    /// Weight of a view in what is learned: neighbours err alike.
+    pub(crate) const WEIGHT: f64 = 0.3;
+    /// Log odds from which on a claim is made \[nats\]. They are learned from agents whose own
+    /// poses err and while the map grows, and understate how often later claims are right.
+    pub(crate) const SURE: f64 = 1.2;
+    /// Views one after the other that must be so sure: chance does not last.
+    pub(crate) const TIMES: u8 = 2;
+    /// Log odds down to which the pose of an agent that was found is corrected \[nats\].
+    pub(crate) const FOLLOWED: f64 = 0.0;
+    /// Factor by which what was learned fades with a claim: the latest fifty count.
+    pub(crate) const KEPT: f64 = 0.98;
+    /// Fewest claims that say how often they are right.
+    pub(crate) const COUNT_MIN: f64 = 10.0;
+    /// Largest share of wrong ones at which claims are made at all.
+    pub(crate) const WRONG_MAX: f64 = 0.2;
+    /// Squared error of a claim in its variances: at first, and the largest that counts.
+    pub(crate) const RATIO: f64 = 2.0;
+    pub(crate) const RATIO_MAX: f64 = 10.0;
+    /// Least variance of a component \[m², rad²\].
+    pub(crate) const FLOOR: f64 = 1e-4;
+}

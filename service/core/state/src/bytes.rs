@@ -103,7 +103,7 @@ macro_rules! state_of_integer {
         })+
     };
 }
-state_of_integer!(u8, u16, u32, u64, u128, i64);
+state_of_integer!(u8, u16, u32, u64, u128, i32, i64);
 
 /// Most items of a list that no smaller bound is known of: against counts that no bytes can follow.
 pub const ITEMS_MAX: u32 = 1 << 20;

@@ -52,7 +52,8 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// aside, version 10 no relaxation under way, version 11 no noise of odometry and no searches by
 /// levels, version 12 no log of views, no ways and no distances alone, version 13 no veers, no
 /// stretches of logged views, no instructions and no episodes that learn nothing, version 14 no
-/// past that is relaxed by sightings.
+/// past that is relaxed by sightings, version 15 no cells of mean views and no count of keyframes
+/// that are new.
 const VERSION: u16 = 16;
 
 const HEADER: u8 = 0;

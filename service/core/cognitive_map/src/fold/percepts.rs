@@ -8,7 +8,7 @@ use crate::agent::Status;
 use crate::estimator::ExternalEstimate;
 use crate::event::EventKind;
 use crate::input::Descriptor;
-use crate::keyframes::Relocalised;
+use crate::keyframes::{Relocalised, View};
 use crate::memory::percept::Compared;
 use crate::memory::place::{PlaceId, confidence};
 use crate::memory::trip::TripEnd;
@@ -52,6 +52,9 @@ impl Fold<'_> {
                 return self.lose_agent();
             }
         }
+        if self.wake(&view) {
+            return;
+        }
         let is_sought = self.keyframes.is_seeking(number);
         if self.agent.placed() && !is_sought {
             // Where a kidnapped agent sees it is not known.
@@ -66,6 +69,44 @@ impl Fold<'_> {
         if let Some(found) = self.keyframes.seek(&view, sd_max_m) {
             self.relocalised(&found);
         }
+    }
+
+    /// Lets an agent that knows where it is teach what views say of cells, and finds one that does
+    /// not among them. Answers whether it was found now.
+    fn wake(&mut self, view: &View<'_>) -> bool {
+        let number = self.agent_id.0;
+        let is_placed = self.agent.placed() && !self.keyframes.is_kidnapped(number);
+        let is_followed = is_placed && self.keyframes.is_waking(number);
+        if is_placed && !is_followed {
+            self.keyframes.teach_cells(view);
+            return false;
+        }
+        let Some(found) = self.keyframes.wake(view) else {
+            return false;
+        };
+        let estimate = ExternalEstimate {
+            pose: found.pose,
+            covariance: found.covariance,
+            calibration: None,
+            prevails: false,
+        };
+        if is_followed && self.estimator.fuse(number, &estimate, &mut self.effects) {
+            self.apply_effects();
+            self.update_pose();
+            return false;
+        }
+        let was_placed = self.agent.placed();
+        self.estimator
+            .recognised(number, &found.pose, &found.covariance, &mut self.effects);
+        self.apply_effects();
+        let moment = self.moment();
+        self.keyframes
+            .found_among_cells(&moment, was_placed.then_some(&found.pose));
+        self.end_trip(TripEnd::StartPose);
+        self.place_agent();
+        let position = found.pose.translation.vector.into();
+        self.emit(EventKind::AgentPlaced { position });
+        true
     }
 
     /// Whether an agent in the map is known so little that it may be anywhere.

@@ -14,6 +14,9 @@
 //! 9     page   up to 32 attachments of places
 //! 10    page   what an agent has seen that contradicts its estimate
 //! 11    page   up to 16 views of the log
+//! 12    page   up to 16 cells of mean views
+//! 13    page   up to 16 views that wait for their cells
+//! 14    page   the particles of an agent
 //! ```
 
 use std::collections::BTreeMap;
@@ -37,7 +40,7 @@ macro_rules! of_graph {
 }
 
 /// The other parts, by number, from 1.
-const PARTS: [Stored; 11] = [
+const PARTS: [Stored; 14] = [
     of_graph!(chains.tracks),
     of_graph!(chains.keyframes.pages),
     of_graph!(sightings.slab.pages),
@@ -49,6 +52,9 @@ const PARTS: [Stored; 11] = [
     of_graph!(attachments.slab.pages),
     Stored::InRecognition(Part::KidnapTests),
     Stored::InRecognition(Part::Log),
+    Stored::InRecognition(Part::Cells),
+    Stored::InRecognition(Part::Waiting),
+    Stored::InRecognition(Part::Filters),
 ];
 
 /// Number of pending sightings at the end of the head: they are the estimator's.
@@ -167,6 +173,10 @@ impl KeyframeMap {
         if has_views {
             self.write_views(&mut out);
         }
+        let has_cells = self.recognition.has_cells();
+        if has_cells {
+            self.recognition.write_cells_head(&mut out);
+        }
         if let (Some(pending), Some(meanwhile)) = (&self.pending, &self.graph.meanwhile) {
             pending.write_digested(&mut out);
             meanwhile.write(&mut out);
@@ -175,6 +185,8 @@ impl KeyframeMap {
             match stored {
                 Stored::InGraph(vector, _) => vector(&self.graph).write_digests(&mut out),
                 Stored::InRecognition(Part::Log) if !has_views => {}
+                Stored::InRecognition(Part::Cells | Part::Waiting | Part::Filters)
+                    if !has_cells => {}
                 Stored::InRecognition(part) => self.recognition.write_digests(*part, &mut out),
             }
         }
@@ -194,6 +206,7 @@ impl KeyframeMap {
         let mut out = StateWriter::default();
         self.write_head(&mut out);
         self.write_views(&mut out);
+        self.recognition.write_cells_head(&mut out);
         let pending = self.pending.as_ref().zip(self.graph.meanwhile.as_deref());
         pending.is_some().write(&mut out);
         if let Some((pending, meanwhile)) = pending {
@@ -246,6 +259,7 @@ impl KeyframeMap {
         graph.matches = read_list::<ViewMatch>(&mut input, NONE)?.into();
         graph.learned = read_list::<LearnedChannel>(&mut input, NONE)?.into();
         self.recognition.read_log_head(&mut input)?;
+        self.recognition.read_cells_head(&mut input)?;
         if bool::read(&mut input)? {
             self.pending = Some(State::read(&mut input)?);
             self.graph.meanwhile = Some(Box::new(State::read(&mut input)?));

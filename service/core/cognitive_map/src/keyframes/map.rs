@@ -2,7 +2,7 @@
 
 use geometry::PoseCovariance;
 use nalgebra::Isometry3;
-use place_recognition::{Guess, PlaceRecognition, Relocalised, SampleKey, View, ViewLog};
+use place_recognition::{Found, Guess, PlaceRecognition, Relocalised, SampleKey, View, ViewLog};
 
 use super::graph::KeyframeGraph;
 use super::moment::Moment;
@@ -68,6 +68,7 @@ impl KeyframeMap {
 
     fn forget_searches(&mut self, agent: u32) {
         self.recognition.end_search(agent);
+        self.recognition.end_waking(agent);
         let latest = self.graph.chains.track(agent).map_or(0, |track| track.seq);
         self.recognition.confirm_pose(agent, latest);
     }
@@ -114,6 +115,7 @@ impl KeyframeMap {
     /// estimated to be, and a search begins with it.
     pub fn declare_kidnapped(&mut self, moment: &Moment) {
         self.recognition.declare_kidnapped(self.sample(moment));
+        self.recognition.end_waking(moment.agent);
         self.graph.begin_stretch(moment.agent, None);
     }
 
@@ -131,6 +133,23 @@ impl KeyframeMap {
     /// known to better than `sd_max_m`.
     pub fn seek(&mut self, view: &View<'_>, sd_max_m: f64) -> Option<Relocalised> {
         self.recognition.seek(view, sd_max_m, &self.graph.chains)
+    }
+
+    /// Learns from the view of an agent that knows where it is what views say of cells.
+    pub fn teach_cells(&mut self, view: &View<'_>) {
+        self.recognition.teach_cells(view);
+    }
+
+    /// An agent that does not know where it is sees something. Answers where among the cells of
+    /// the map it is, once that is sure.
+    pub fn wake(&mut self, view: &View<'_>) -> Option<Found> {
+        self.recognition.wake(view)
+    }
+
+    /// Whether an agent that was found among the cells is still followed there.
+    pub fn is_waking(&self, agent: u32) -> bool {
+        let session = self.graph.chains.session(agent);
+        self.recognition.is_waking(agent, session)
     }
 
     /// All that agents of the map saw.
@@ -158,12 +177,19 @@ impl KeyframeMap {
         if found.is_last {
             self.recognition.end_search(agent);
         }
+        self.recognition.end_waking(agent);
         self.graph.close_to_recognised(agent, similar, found);
     }
 
     /// An agent was found by what it feels; `elsewhere` is its pose if it was estimated to be in
     /// the map already. No motion leads there from what it did before.
     pub fn found(&mut self, moment: &Moment, elsewhere: Option<&Isometry3<f64>>) {
+        self.found_among_cells(moment, elsewhere);
+        self.recognition.end_waking(moment.agent);
+    }
+
+    /// The same of an agent that was found among the cells, where it is still followed.
+    pub fn found_among_cells(&mut self, moment: &Moment, elsewhere: Option<&Isometry3<f64>>) {
         if elsewhere.is_some() {
             self.recognition.cut(moment.agent);
             self.graph.begin_stretch(moment.agent, elsewhere);
@@ -175,6 +201,7 @@ impl KeyframeMap {
     /// An agent knows where it is, or begins anew: its search is over.
     pub fn end_search(&mut self, agent: u32) {
         self.recognition.end_search(agent);
+        self.recognition.end_waking(agent);
     }
 
     /// Where an agent may be that searches, the most probable first.

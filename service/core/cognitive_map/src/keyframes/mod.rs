@@ -74,7 +74,7 @@ pub use checkpoint::{CorruptKeyframes, KeyframePage};
 pub use graph::KeyframeGraph;
 pub use map::KeyframeMap;
 pub use moment::Moment;
-pub use place_recognition::{Guess, LearnedChannel, Relocalised};
+pub use place_recognition::{Found, Guess, LearnedChannel, Relocalised, View};
 pub use refined::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
 pub use relaxation::Correction;
 pub use relaxation_job::RelaxationJob;

@@ -31,4 +31,5 @@ mod settings; // what each setting changes
 mod thinned; // chains of ways as single edges
 mod trips; // legs, and every way a trip ends
 mod views; // what is seen along ways that are driven again
+mod waking; // robots that wake up in a large hall
 mod ways; // what the legs add up to, and which ways go

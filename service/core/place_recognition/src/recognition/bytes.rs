@@ -17,6 +17,12 @@ pub enum Part {
     Searches,
     /// The views that contradict where an agent is believed to be.
     KidnapTests,
+    /// Mean views of cells, 16 a page.
+    Cells,
+    /// Views that wait until they are added to cells, 16 a page.
+    Waiting,
+    /// The particles of an agent.
+    Filters,
 }
 
 /// Number of a page, and its bytes.
@@ -31,6 +37,9 @@ impl PlaceRecognition {
             Part::Tracks => Box::new(pages_of(&self.views.tracks, since_revision)),
             Part::Searches => Box::new(pages_of(&self.searches, since_revision)),
             Part::KidnapTests => Box::new(pages_of(&self.kidnap_tests, since_revision)),
+            Part::Cells => Box::new(pages_of(&self.waking.cells.all, since_revision)),
+            Part::Waiting => Box::new(pages_of(&self.waking.waiting, since_revision)),
+            Part::Filters => Box::new(pages_of(&self.waking.filters, since_revision)),
         }
     }
 
@@ -46,6 +55,9 @@ impl PlaceRecognition {
             Part::Tracks => self.views.tracks.push_page(bytes, revision),
             Part::Searches => self.searches.push_page(bytes, revision),
             Part::KidnapTests => self.kidnap_tests.push_page(bytes, revision),
+            Part::Cells => self.waking.cells.all.push_page(bytes, revision),
+            Part::Waiting => self.waking.waiting.push_page(bytes, revision),
+            Part::Filters => self.waking.filters.push_page(bytes, revision),
         }
     }
 
@@ -57,6 +69,9 @@ impl PlaceRecognition {
             Part::Tracks => self.views.tracks.write_digests(out),
             Part::Searches => self.searches.write_digests(out),
             Part::KidnapTests => self.kidnap_tests.write_digests(out),
+            Part::Cells => self.waking.cells.all.write_digests(out),
+            Part::Waiting => self.waking.waiting.write_digests(out),
+            Part::Filters => self.waking.filters.write_digests(out),
         }
     }
 
@@ -81,12 +96,31 @@ impl PlaceRecognition {
         self.views.log.read_head(input)
     }
 
+    /// Whether views have taught cells.
+    pub fn has_cells(&self) -> bool {
+        !self.waking.is_empty()
+    }
+
+    /// Writes what was learned of cells and is in no page.
+    pub fn write_cells_head(&self, out: &mut StateWriter) {
+        self.waking.write_head(out);
+    }
+
+    /// Reads what [`write_cells_head`](Self::write_cells_head) wrote, after all pages.
+    ///
+    /// # Errors
+    /// The bytes are no such head.
+    pub fn read_cells_head(&mut self, input: &mut StateReader<'_>) -> Result<(), CorruptState> {
+        self.waking.read_head(input, self.revision)
+    }
+
     /// Whether everything that the state names is there, among so many agents.
     pub fn is_sound(&self, agents: usize) -> bool {
         let is_channel = |channel, length| self.views.is_channel(channel, length);
         let mut searches = self.searches.iter();
         let mut tests = self.kidnap_tests.iter();
         self.views.is_sound(agents)
+            && self.waking.is_sound(agents)
             && searches.all(|search| search.is_sound(agents, is_channel))
             && tests.all(|test| test.is_sound(agents, is_channel))
     }

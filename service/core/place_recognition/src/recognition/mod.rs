@@ -12,6 +12,8 @@ pub use revisit::Revisit;
 use crate::relocalisation::{KidnapTests, Searches};
 use crate::sequences::ViewMemory;
 use crate::similarity::ViewLog;
+use crate::view::View;
+use crate::waking::{Found, Waking};
 
 /// What agents have seen, and the searches of those that do not know where they are.
 ///
@@ -25,6 +27,8 @@ pub struct PlaceRecognition {
     searches: Searches,
     /// Whether what agents of the map see contradicts where they are believed to be.
     kidnap_tests: KidnapTests,
+    /// Mean views of cells, and the filters of agents that search among them.
+    waking: Waking,
 }
 
 impl Default for PlaceRecognition {
@@ -35,6 +39,7 @@ impl Default for PlaceRecognition {
             views: ViewMemory::default(),
             searches: Searches::default(),
             kidnap_tests: KidnapTests::default(),
+            waking: Waking::default(),
         }
     }
 }
@@ -79,6 +84,27 @@ impl PlaceRecognition {
 
     /// Bytes of memory that the views take.
     pub fn bytes(&self) -> usize {
-        self.views.bytes()
+        self.views.bytes() + self.waking.bytes()
+    }
+
+    /// Learns from the view of an agent that knows where it is what views say of cells.
+    pub fn teach_cells(&mut self, view: &View<'_>) {
+        self.waking.teach(view, self.revision);
+    }
+
+    /// A view of an agent that does not know where it is; answers the pose among the cells of the
+    /// map, once that is sure.
+    pub fn wake(&mut self, view: &View<'_>) -> Option<Found> {
+        self.waking.seek(view, self.revision)
+    }
+
+    /// Whether an agent that was found among the cells is still followed there.
+    pub fn is_waking(&self, agent: u32, session: u32) -> bool {
+        self.waking.is_following(agent, session)
+    }
+
+    /// Ends the search of an agent among the cells.
+    pub fn end_waking(&mut self, agent: u32) {
+        self.waking.end(agent, self.revision);
     }
 }

@@ -187,7 +187,7 @@ fn class_of(angle_rad: f64) -> usize {
 }
 
 /// A name of at most 255 bytes.
-struct ShortText;
+pub(crate) struct ShortText;
 
 impl Codec<Box<str>> for ShortText {
     fn write(name: &Box<str>, out: &mut StateWriter) {

@@ -1,0 +1,407 @@
+//! The particle filter of an agent that does not know where it is.
+
+use std::f64::consts::TAU;
+
+use geometry::PoseCovariance;
+use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3};
+use random::Seeded;
+use state::{Counted, state_of_struct};
+
+use super::cells::{Cells, beside, key_of};
+use super::model::Scores;
+use crate::keyframes::SampleKey;
+use crate::tuning::particles as tuning;
+
+/// Where the agent may be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Particle {
+    /// Position in the map \[m\].
+    at: [f32; 3],
+    /// Turn of the frame of odometry in the map \[rad\].
+    turn_rad: f32,
+    /// Factor of odometry's lengths.
+    scale: f32,
+    weight: f32,
+}
+
+state_of_struct!(Particle {
+    at,
+    turn_rad,
+    scale,
+    weight
+});
+
+/// The filter of an agent in a session.
+#[derive(Clone, Debug)]
+pub(crate) struct Filter {
+    pub(super) agent: u32,
+    pub(super) session: u32,
+    /// Whether the agent knows where it is, and shows how often a claim would be right.
+    pub(super) is_shadow: bool,
+    pub(super) channel: u8,
+    /// Views so far.
+    pub(super) n_views: u32,
+    /// Probability that the agent is where nothing is known.
+    pub(super) without: f64,
+    /// Pose by motion alone at the latest view.
+    pub(super) in_odom: Isometry3<f64>,
+    /// Mean lately of how alike the views are where the agent is estimated to be, and anywhere.
+    pub(super) alike: [f64; 2],
+    /// Views one after the other at which it was sure where the agent is.
+    n_sure: u8,
+    /// Whether it was claimed that the agent is where the filter has it.
+    pub(super) has_claimed: bool,
+    particles: Vec<Particle>,
+}
+
+state_of_struct!(Filter {
+    agent,
+    session,
+    is_shadow,
+    channel,
+    n_views,
+    without,
+    in_odom,
+    alike,
+    n_sure,
+    has_claimed,
+    particles as Counted<u16>
+});
+
+/// Where most particles are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mode {
+    pub(super) pose: Isometry3<f64>,
+    pub(super) covariance: PoseCovariance,
+    /// Probability that the agent is near.
+    pub(super) probability: f64,
+}
+
+impl Filter {
+    pub(super) fn new(sample: SampleKey, channel: u8, is_shadow: bool) -> Self {
+        Self {
+            agent: sample.agent,
+            session: sample.session,
+            is_shadow,
+            channel,
+            n_views: 0,
+            without: tuning::WITHOUT,
+            in_odom: Isometry3::identity(),
+            alike: [0.0; 2],
+            n_sure: 0,
+            has_claimed: false,
+            particles: Vec::new(),
+        }
+    }
+
+    /// Takes in a view.
+    pub(super) fn step(&mut self, in_odom: &Isometry3<f64>, scores: &Scores, cells: &Cells) {
+        let seed = u64::from(self.agent) << 32 | u64::from(self.n_views);
+        let mut draws = Seeded(random::bits(
+            seed,
+            [self.session.into(), self.channel.into(), 1],
+        ));
+        let temper = tuning::TEMPER;
+        let weigh = |score: f32| (temper * f64::from(score)).exp();
+        let mean_within = { scores.cells.iter() }
+            .map(|(_, score)| weigh(*score))
+            .sum::<f64>()
+            / scores.cells.len().max(1) as f64;
+        let within = scores.within.clamp(tuning::WITHIN.0, tuning::WITHIN.1);
+        let numerator = if self.particles.is_empty() {
+            let temper_of_draw = temper.max(tuning::FIRST);
+            self.particles = draw(tuning::COUNT, temper_of_draw, scores, cells, &mut draws);
+            normalise(&mut self.particles);
+            mean_within * (1.0 - self.without)
+        } else {
+            self.go(in_odom, &mut draws);
+            let outside = (-temper * within).min(0.0) - tuning::HOLE;
+            let mut of_cell = vec![f32::NAN; cells.all.len()];
+            for (cell, score) in &scores.cells {
+                of_cell[*cell as usize] = *score;
+            }
+            let mut old = 0.0;
+            for particle in &mut self.particles {
+                let number = cells.find(self.channel, key_of(&particle.position()));
+                let score = number.map_or(f32::NAN, |number| of_cell[number as usize]);
+                let gain = if score.is_nan() {
+                    outside.exp()
+                } else {
+                    weigh(score)
+                };
+                #[expect(clippy::cast_possible_truncation, reason = "a weight")]
+                let weight = (f64::from(particle.weight) * gain) as f32;
+                particle.weight = weight;
+                old += f64::from(weight);
+            }
+            old *= 1.0 - tuning::ANEW;
+            let fresh = tuning::ANEW * mean_within;
+            let all = old + fresh;
+            let n_fresh = tuning::COUNT / tuning::FRESH;
+            self.resample(tuning::COUNT - n_fresh, old / all, &mut draws);
+            let mut new = draw(n_fresh, temper, scores, cells, &mut draws);
+            normalise(&mut new);
+            #[expect(clippy::cast_possible_truncation, reason = "a share")]
+            let share = (fresh / all) as f32;
+            for particle in &mut new {
+                particle.weight *= share;
+            }
+            self.particles.extend(new);
+            (1.0 - self.without) * all
+        };
+        let open = self.without * (-temper * within).exp();
+        self.without = open / (open + numerator);
+        self.without = tuning::OPEN.0 * self.without + tuning::OPEN.1;
+        self.in_odom = *in_odom;
+        self.n_views = self.n_views.saturating_add(1);
+    }
+
+    /// Moves the particles as odometry says, with its errors.
+    fn go(&mut self, in_odom: &Isometry3<f64>, draws: &mut Seeded) {
+        let way = in_odom.translation.vector - self.in_odom.translation.vector;
+        let length_m = way.norm();
+        let turn_sd = tuning::TURN_SD.0 + tuning::TURN_SD.1 * length_m.sqrt();
+        let position_sd = tuning::POSITION_SD.0 + tuning::POSITION_SD.1 * length_m.sqrt();
+        for particle in &mut self.particles {
+            let [a, b] = pair(draws);
+            let [c, d] = pair(draws);
+            let (sin, cos) = f64::from(particle.turn_rad).sin_cos();
+            let scale = f64::from(particle.scale);
+            let [x, y, z] = particle.at.map(f64::from);
+            particle.at = floats([
+                x + scale * (cos * way.x - sin * way.y) + position_sd * a,
+                y + scale * (sin * way.x + cos * way.y) + position_sd * b,
+                z + scale * way.z,
+            ]);
+            let [turn, scale] = floats([
+                f64::from(particle.turn_rad) + turn_sd * c,
+                scale + tuning::SCALE_STEP * d,
+            ]);
+            (particle.turn_rad, particle.scale) = (turn, scale);
+        }
+    }
+
+    /// Systematic resampling (Kitagawa 1996).
+    fn resample(&mut self, count: usize, share: f64, draws: &mut Seeded) {
+        let whole: f64 = self
+            .particles
+            .iter()
+            .map(|each| f64::from(each.weight))
+            .sum();
+        #[expect(clippy::cast_possible_truncation, reason = "a share")]
+        let weight = (share / count as f64) as f32;
+        let step = whole / count as f64;
+        let mut next = step * draws.uniform();
+        let mut sum = 0.0;
+        let mut kept = Vec::with_capacity(tuning::COUNT);
+        for particle in &self.particles {
+            sum += f64::from(particle.weight);
+            while next < sum && kept.len() < count {
+                kept.push(Particle {
+                    weight,
+                    ..*particle
+                });
+                next += step;
+            }
+        }
+        while let (true, Some(last)) = (kept.len() < count, kept.last().copied()) {
+            kept.push(last);
+        }
+        self.particles = kept;
+    }
+
+    /// Where most particles are; `None` without any.
+    pub(super) fn mode(&self, cells: &Cells) -> Option<Mode> {
+        let mut by_key: Vec<([i32; 3], f64)> = { self.particles.iter() }
+            .map(|particle| (key_of(&particle.position()), f64::from(particle.weight)))
+            .collect();
+        by_key.sort_by_key(|(key, _)| *key);
+        by_key.dedup_by(|next, kept| {
+            let is_same = next.0 == kept.0;
+            if is_same {
+                kept.1 += next.1;
+            }
+            is_same
+        });
+        let weight_of = |key: [i32; 3]| {
+            let at = by_key.binary_search_by_key(&key, |(key, _)| *key);
+            at.map_or(0.0, |at| by_key[at].1)
+        };
+        let sums = by_key.iter().map(|(key, weight)| {
+            let around: f64 = beside(*key).map(weight_of).sum();
+            (*key, weight + around)
+        });
+        let (key, _) = sums.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let height_m = { cells.find(self.channel, key) }
+            .and_then(|number| cells.get(number))
+            .map_or(f64::from(key[2]) * crate::tuning::cells::SIDE_M, |cell| {
+                cell.middle().z
+            });
+        let side_m = crate::tuning::cells::SIDE_M;
+        let mut middle = Vector3::new(
+            f64::from(key[0]) * side_m,
+            f64::from(key[1]) * side_m,
+            height_m,
+        );
+        for _ in 0..3 {
+            let (sum, weight) = self.near(&middle).fold(
+                (Vector3::zeros(), 0.0),
+                |(sum, whole), (particle, weight)| {
+                    (sum + particle.position().coords * weight, whole + weight)
+                },
+            );
+            if weight <= 0.0 {
+                return None;
+            }
+            middle = sum / weight;
+        }
+        Some(self.gaussian(&middle))
+    }
+
+    fn near(&self, middle: &Vector3<f64>) -> impl Iterator<Item = (&Particle, f64)> {
+        let middle = *middle;
+        self.particles.iter().filter_map(move |particle| {
+            let off = particle.position().coords - middle;
+            let is_near = off.xy().norm() < tuning::NEAR_M && off.z.abs() < tuning::NEAR_Z_M;
+            is_near.then_some((particle, f64::from(particle.weight)))
+        })
+    }
+
+    /// The particles about a point as a Gaussian about a pose.
+    fn gaussian(&self, middle: &Vector3<f64>) -> Mode {
+        let (mut sin, mut cos, mut whole) = (0.0, 0.0, 0.0);
+        for (particle, weight) in self.near(middle) {
+            let (s, c) = f64::from(particle.turn_rad).sin_cos();
+            (sin, cos, whole) = (sin + s * weight, cos + c * weight, whole + weight);
+        }
+        let turn_rad = sin.atan2(cos);
+        let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, turn_rad);
+        let rotation = turn * self.in_odom.rotation;
+        let inverse = rotation.inverse();
+        let mut covariance = Matrix6::zeros();
+        for (particle, weight) in self.near(middle) {
+            let off = inverse * (particle.position().coords - middle);
+            let turned = (f64::from(particle.turn_rad) - turn_rad + TAU / 2.0).rem_euclid(TAU);
+            let up = inverse * Vector3::z() * (turned - TAU / 2.0);
+            let mut error = nalgebra::Vector6::zeros();
+            error.fixed_rows_mut::<3>(0).copy_from(&off);
+            error.fixed_rows_mut::<3>(3).copy_from(&up);
+            covariance += error * error.transpose() * (weight / whole);
+        }
+        let all: f64 = self
+            .particles
+            .iter()
+            .map(|each| f64::from(each.weight))
+            .sum();
+        Mode {
+            pose: Isometry3::from_parts((*middle).into(), rotation),
+            covariance: PoseCovariance::from_matrix(&covariance),
+            probability: whole / all * (1.0 - self.without),
+        }
+    }
+
+    /// Whether these log odds, and those of the views before, are enough for a claim.
+    pub(super) fn is_sure(&mut self, odds: f64) -> bool {
+        let is_more = odds >= crate::tuning::claims::SURE;
+        self.n_sure = if is_more {
+            self.n_sure.saturating_add(1)
+        } else {
+            0
+        };
+        self.n_sure >= crate::tuning::claims::TIMES
+    }
+
+    /// Whether the state is one that this program may have written to a checkpoint.
+    pub(super) fn is_sound(&self, agents: usize, channels: usize) -> bool {
+        let is_finite = |particle: &Particle| {
+            let [x, y, z] = particle.at;
+            let all = [x, y, z, particle.turn_rad, particle.scale, particle.weight];
+            all.iter().all(|number| number.is_finite())
+        };
+        (self.agent as usize) < agents
+            && usize::from(self.channel) < channels
+            && self.particles.len() <= tuning::COUNT
+            && self.particles.iter().all(is_finite)
+    }
+
+    /// Bytes of memory that its particles take.
+    pub(super) fn bytes(&self) -> usize {
+        self.particles.len() * size_of::<Particle>()
+    }
+}
+
+impl Particle {
+    fn position(&self) -> Point3<f64> {
+        Point3::from(self.at.map(f64::from))
+    }
+}
+
+/// Draws particles by the scores of a view. Their weights make up for a tempering that is not the
+/// filter's.
+fn draw(
+    count: usize,
+    temper: f64,
+    scores: &Scores,
+    cells: &Cells,
+    draws: &mut Seeded,
+) -> Vec<Particle> {
+    let mut sum = 0.0;
+    let sums: Vec<f64> = { scores.cells.iter() }
+        .map(|(_, score)| {
+            sum += (temper * f64::from(*score)).exp();
+            sum
+        })
+        .collect();
+    let side_m = crate::tuning::cells::SIDE_M;
+    let drawn = (0..count).filter_map(|_| {
+        let at = draws.uniform() * sum;
+        let index = sums
+            .partition_point(|sum| *sum < at)
+            .min(sums.len().checked_sub(1)?);
+        let (number, score) = scores.cells[index];
+        let middle = cells.get(number)?.middle();
+        let [x, y] = [middle.x, middle.y].map(|x| x + (draws.uniform() - 0.5) * side_m);
+        let [scale, _] = pair(draws);
+        let [x, y, z, turn_rad, scale, weight] = floats([
+            x,
+            y,
+            middle.z,
+            draws.uniform() * TAU,
+            1.0 + tuning::SCALE_SD * scale,
+            ((tuning::TEMPER - temper) * f64::from(score)).exp(),
+        ]);
+        Some(Particle {
+            at: [x, y, z],
+            turn_rad,
+            scale,
+            weight,
+        })
+    });
+    drawn.collect()
+}
+
+fn normalise(particles: &mut [Particle]) {
+    let whole: f64 = particles.iter().map(|each| f64::from(each.weight)).sum();
+    for particle in particles {
+        #[expect(clippy::cast_possible_truncation, reason = "a share")]
+        let share = (f64::from(particle.weight) / whole) as f32;
+        particle.weight = share;
+    }
+}
+
+/// Two numbers of mean 0 and variance 1, nearly normal: sums of four uniform ones of 16 bits each
+/// (Irwin & Hall 1927), for a fifth of the cost.
+fn pair(draws: &mut Seeded) -> [f64; 2] {
+    [(); 2].map(|()| {
+        let sum = draws.uniform() + draws.uniform() + draws.uniform();
+        2.0 * (sum - 1.5)
+    })
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "metres and radians, to seven digits"
+)]
+fn floats<const N: usize>(numbers: [f64; N]) -> [f32; N] {
+    numbers.map(|number| number as f32)
+}
