@@ -31,3 +31,4 @@ mod thinned; // chains of ways as single edges
 mod trips; // legs, and every way a trip ends
 mod views; // what is seen along ways that are driven again
 mod ways; // what the legs add up to, and which ways go
+mod wrong_way; // robots that drive against their route
