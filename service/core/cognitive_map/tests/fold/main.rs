@@ -21,6 +21,7 @@ mod objects; // what is taught and known again
 mod percepts; // what places learn of percepts, and what they predict
 mod places; // recruitment, revisits
 mod ranges; // distances alone
+mod readers; // routes after a replay, and on many threads
 mod recall; // recall against an exhaustive scan
 mod relaxation; // loops that close while samples come in
 mod removal; // agents that go, and who comes after them
