@@ -86,6 +86,7 @@ from .event import (
     TripStarted,
     UnknownKind,
 )
+from .felt import FeltAnswer, FeltPercept, FeltPlace, FeltQuery, Looked
 from .guidance import (
     Blockage,
     BlockageList,
@@ -242,6 +243,10 @@ __all__ = [
     "ExpectedLevel",
     "FiniteTurns",
     "FollowedRoute",
+    "FeltAnswer",
+    "FeltPercept",
+    "FeltPlace",
+    "FeltQuery",
     "FollowRequest",
     "GridModuleState",
     "GridState",
@@ -271,6 +276,7 @@ __all__ = [
     "LocalizeQuery",
     "LocalizedPose",
     "LoopsClosed",
+    "Looked",
     "Marker",
     "MarkerPassed",
     "MissedEvents",

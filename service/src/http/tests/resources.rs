@@ -419,7 +419,7 @@ fn assert_references(root: &Value, value: &Value) {
 }
 
 /// All operations, by method and path.
-const OPERATIONS: [&str; 44] = [
+const OPERATIONS: [&str; 45] = [
     "DELETE /v1/spaces/{space}",
     "DELETE /v1/spaces/{space}/agents/{agent}",
     "DELETE /v1/spaces/{space}/agents/{agent}/route",
@@ -455,6 +455,7 @@ const OPERATIONS: [&str; 44] = [
     "POST /v1/spaces/{space}/agents/{agent}/predict",
     "POST /v1/spaces/{space}/agents/{agent}/samples",
     "POST /v1/spaces/{space}/blockages",
+    "POST /v1/spaces/{space}/felt",
     "POST /v1/spaces/{space}/localize",
     "POST /v1/spaces/{space}/objects/identify",
     "POST /v1/spaces/{space}/recall",

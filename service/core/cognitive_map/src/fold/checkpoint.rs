@@ -53,7 +53,7 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// levels, version 12 no log of views, no ways and no distances alone, version 13 no veers, no
 /// stretches of logged views, no instructions and no episodes that learn nothing, version 14 no
 /// past that is relaxed by sightings.
-const VERSION: u16 = 15;
+const VERSION: u16 = 16;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

@@ -4,6 +4,7 @@ mod apply;
 mod checkpoint;
 mod effects;
 mod enrolment;
+mod felt;
 mod following;
 mod forgetting;
 mod guidance;
@@ -24,6 +25,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub use checkpoint::{CheckpointPage, CorruptCheckpoint};
+pub use felt::{Felt, FeltCue, FeltPlace, Looked};
 pub use localization::Localization;
 pub use prediction::{Predicted, Prediction};
 

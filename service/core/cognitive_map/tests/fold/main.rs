@@ -10,6 +10,7 @@ mod budgets; // what is forgotten, and when
 mod checkpoint; // pages out and in, damaged ones too
 mod correction; // what others see of an agent
 mod determinism; // the same records, the same map
+mod felt; // what was felt near a point, and who was there
 mod guidance; // blockages, routes that are followed, pinned trips
 mod journal; // arbitrary journals, and a robot to write readable ones
 mod landmarks; // what sightings teach
