@@ -22,8 +22,9 @@ pub use fold::{
 pub use input::{
     AgentId, Descriptor, Errand, Goal, Instruction, InvalidSample, Label, Lesson, Level, Marker,
     Motion, NoisyPose, ObjectMark, PoseNoise, Range, RangeBearing, Record, Relation, RelativePose,
-    RelativePosition, Retrace, Sample, SampleBody, Sighting, SkipReason, Spacing, StartPose,
-    Target, Touch, TouchLevel, TouchNoise,
+    RelativePosition, RememberedPlace, RememberedTraversals, RememberedWay, Remembrance, Retrace,
+    Sample, SampleBody, Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel,
+    TouchNoise,
 };
 pub use keyframes::{Guess, LearnedChannel, RelaxationJob, ViewChannel};
 pub use memory::blockage::{BLOCKAGES_MAX, Ball, Blockage, BlockageId, Blocked};

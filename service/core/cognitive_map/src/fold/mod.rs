@@ -16,6 +16,7 @@ mod objects;
 mod percepts;
 mod prediction;
 mod queries;
+mod remembrance;
 mod sequence;
 mod sightings;
 mod tuning;
@@ -110,11 +111,12 @@ impl CognitiveMap {
     ///
     /// Every record is legal. One that says nothing new has no effect at all: the enrolment of an
     /// agent that is there (or is neither next in line nor vacant, or has another one's name), the
-    /// removal of one that is not, a lesson or an instruction that is not next in line, a sample of
-    /// an unknown or removed agent, of an earlier session, or with a sequence number that has been
-    /// applied or skipped. A sample whose number is ahead first skips the missing ones as
-    /// [`SkipReason::Lost`]. Work and memory per sample are bounded, whatever the size of the map;
-    /// one by which an agent leaves the route that it follows takes a search among the ways.
+    /// removal of one that is not, a place or a way that is there already, a lesson or an
+    /// instruction that is not next in line, a sample of an unknown or removed agent, of an earlier
+    /// session, or with a sequence number that has been applied or skipped. A sample whose number
+    /// is ahead first skips the missing ones as [`SkipReason::Lost`]. Work and memory per sample
+    /// are bounded, whatever the size of the map; one by which an agent leaves the route that it
+    /// follows takes a search among the ways.
     pub fn apply(&mut self, record: &Record, events: &mut Vec<Event>) {
         match record {
             Record::Enrol { agent, name } => self.enrol(*agent, name, events),
@@ -166,6 +168,7 @@ impl CognitiveMap {
                 fold.skip(*to, *reason);
                 fold.finish();
             }
+            Record::Remember(remembrance) => self.remember(remembrance),
             Record::TeachObject {
                 number,
                 name,

@@ -25,6 +25,7 @@ mod ranges; // distances alone
 mod readers; // routes after a replay, and on many threads
 mod recall; // recall against an exhaustive scan
 mod relaxation; // loops that close while samples come in
+mod remembrance; // places and ways of another map
 mod removal; // agents that go, and who comes after them
 mod routes; // cheapest routes against another program's
 mod sequences; // which trips the last places look like, and what comes next
