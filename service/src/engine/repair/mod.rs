@@ -342,6 +342,7 @@ impl Repair<'_> {
                 fits = number == self.instructions;
                 self.next_instruction(instruction)
             }
+            Entry::Remember { remembrance } => Entry::Remember { remembrance },
             Entry::Remove { agent } => {
                 self.enrol_to(agent.saturating_add(1), before);
                 if let Some(known) = self.agents.get_mut(agent as usize) {
