@@ -142,8 +142,8 @@ proptest! {
         prop_assert_eq!(other.blockages(), map.blockages());
         let rest = |map: &CognitiveMap| map.followed(AGENT).map(|of| of.rest().to_vec());
         prop_assert_eq!(rest(&other), rest(&map));
-        let is_pinned = |map: &CognitiveMap| (0..3).map(|k| map.is_pinned(TripId(k))).collect::<Vec<_>>();
-        prop_assert_eq!(is_pinned(&other), is_pinned(&map));
+        let pins = |map: &CognitiveMap| [0, 1, 2].map(|trip| map.is_pinned(TripId(trip)));
+        prop_assert_eq!(pins(&other), pins(&map));
         prop_assert_eq!(all_routes(&other, None), all_routes(&map, None));
     }
 
