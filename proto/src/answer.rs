@@ -341,6 +341,8 @@ pub struct Trip {
     /// each half as much after every half-life. The weakest trip goes when there would be more legs
     /// than `legs_max`.
     pub strength: f64,
+    /// Whether it is pinned: never forgotten.
+    pub pinned: bool,
 }
 
 /// A trip with its legs.

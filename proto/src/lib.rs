@@ -21,6 +21,7 @@ mod encoding;
 mod error;
 mod estimate;
 mod event;
+mod felt;
 mod field;
 mod guidance;
 mod key;
@@ -55,6 +56,7 @@ pub use event::{
     Event, EventId, EventIdError, EventKind, EventPage, EventRecord, MissedEvents, PerceptKind,
     TripEnd,
 };
+pub use felt::{FeltAnswer, FeltPercept, FeltPlace, FeltQuery, Looked};
 pub use field::at_field;
 pub use guidance::{
     Blockage, BlockageList, BlockageRequest, FollowRequest, FollowedRoute, FollowedRoutePage,

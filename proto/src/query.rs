@@ -21,6 +21,8 @@ pub enum Verb {
     Route,
     /// [`crate::SequenceQuery`] → [`crate::SequenceAnswer`].
     Sequence,
+    /// [`crate::FeltQuery`] → [`crate::FeltAnswer`].
+    Felt,
 }
 
 impl Verb {
@@ -34,6 +36,7 @@ impl Verb {
             Self::Localize => "localize",
             Self::Route => "route",
             Self::Sequence => "sequence",
+            Self::Felt => "felt",
         }
     }
 }

@@ -273,6 +273,10 @@ pub struct Way {
     pub from_m: [f64; 3],
     /// Where the other one is \[m\].
     pub to_m: [f64; 3],
+    /// Orientation of the first in `map`, a unit quaternion `[x, y, z, w]`.
+    pub from_rotation_xyzw: [f64; 4],
+    /// Orientation of the other one.
+    pub to_rotation_xyzw: [f64; 4],
     /// Length \[m\]: the shortest path that was travelled, but no less than the distance of the
     /// places.
     pub length_m: f64,
@@ -288,6 +292,8 @@ pub struct Way {
     pub translation_sd_m: [f64; 3],
     /// Those about its axes \[rad\].
     pub rotation_sd_rad: [f64; 3],
+    /// Number of measurements in the mean.
+    pub measurements: u32,
     /// Whether the measurements lie more than five standard deviations from where the places are:
     /// the past was relaxed, and the places count.
     pub disagrees: bool,

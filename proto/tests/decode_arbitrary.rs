@@ -8,11 +8,11 @@ use std::fmt::Debug;
 
 use cogmap_proto::{
     AgentAt, AgentDetail, AgentObject, AgentPage, BlockageList, BlockageRequest, Codec,
-    DecodeError, Estimate, Event, FollowRequest, FollowedRoute, GridState, Identification,
-    IdentifyQuery, IngestAnswer, LandmarkPage, Localization, LocalizeQuery, Name, ObjectDetail,
-    ObjectLesson, ObjectPage, PlacePage, PredictAnswer, PredictQuery, Problem, RecallAnswer,
-    RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SequenceAnswer, SequenceQuery, SpaceList,
-    SpaceSettings, Trajectory, TripDetail, TripPage, Watermark, WatermarkQuery,
+    DecodeError, Estimate, Event, FeltAnswer, FeltQuery, FollowRequest, FollowedRoute, GridState,
+    Identification, IdentifyQuery, IngestAnswer, LandmarkPage, Localization, LocalizeQuery, Name,
+    ObjectDetail, ObjectLesson, ObjectPage, PlacePage, PredictAnswer, PredictQuery, Problem,
+    RecallAnswer, RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SequenceAnswer, SequenceQuery,
+    SpaceList, SpaceSettings, Trajectory, TripDetail, TripPage, Watermark, WatermarkQuery,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -55,6 +55,8 @@ fn decode_as_everything(bytes: &[u8]) {
     decode_as::<RecallQuery>(bytes);
     decode_as::<RouteAnswer>(bytes);
     decode_as::<RouteQuery>(bytes);
+    decode_as::<FeltAnswer>(bytes);
+    decode_as::<FeltQuery>(bytes);
     decode_as::<SequenceAnswer>(bytes);
     decode_as::<AgentAt>(bytes);
     decode_as::<SequenceQuery>(bytes);

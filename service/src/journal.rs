@@ -9,17 +9,22 @@
 //!        | 4 number:varint name:string                     an object to forget
 //!        | 5 agent:varint                                  an agent that is removed
 //!        | 6 number:varint instruction                     a blockage, a route, a pin
+//!        | 7 remembrance                                   a place or a way of another map
 //! ```
 //!
 //! All of it is postcard of [`Entry`], so a batch that came as postcard and is accepted whole goes
 //! to disk as the bytes that came. The format is kept readable for ever: a change is a new version.
 
 mod instruction;
+mod remembrance;
 
 use std::borrow::Cow;
 
 use cogmap_proto::{Codec, ObjectLesson, SampleBatch, SkipReason};
 pub use instruction::{JournaledBlocked, JournaledErrand, JournaledGoal, JournaledInstruction};
+pub use remembrance::{
+    JournaledPlace, JournaledPose, JournaledRemembrance, JournaledTraversals, JournaledWay,
+};
 use serde::{Deserialize, Serialize};
 
 /// Version of blocks that this build writes.
@@ -82,6 +87,11 @@ pub enum Entry<'a> {
         number: u64,
         /// What was said.
         instruction: JournaledInstruction,
+    },
+    /// A place or a way that another map has had.
+    Remember {
+        /// It.
+        remembrance: JournaledRemembrance,
     },
 }
 

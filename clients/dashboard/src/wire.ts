@@ -116,6 +116,7 @@ export interface Trip {
   leg_count: number;
   length_m: number;
   strength: number;
+  pinned: boolean;
 }
 
 export interface Leg {

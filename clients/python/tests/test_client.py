@@ -137,6 +137,21 @@ def test_a_route_is_asked_for_as_it_is_meant(server: Server, client: cogmap.Clie
     assert json.loads(server.seen[1].body) == golden("route_query_full")
 
 
+def test_what_was_felt_is_asked_for_as_it_is_meant(server: Server, client: cogmap.Client) -> None:
+    server.answer("POST /v1/spaces/lab/felt", golden("felt_answer"))
+    answer = client.felt("lab", (1.5, -2, 0))
+    assert json.loads(server.seen[0].body) == golden("felt_query")
+    assert answer.looked is cogmap.Looked.FELT
+    assert [place.looked for place in answer.places] == [
+        cogmap.Looked.FELT,
+        cogmap.Looked.NOTHING_FELT,
+    ]
+    since_ns = 1_800_000_000_610_000_000
+    names = ["touch", "camera"]
+    client.felt("lab", (1.5, -2, 0), radius_m=0.5, since_ns=since_ns, channels=names, limit=3)
+    assert json.loads(server.seen[1].body) == golden("felt_query_full")
+
+
 def test_a_sequence_is_asked_about_as_it_is_meant(server: Server, client: cogmap.Client) -> None:
     server.answer("POST /v1/spaces/lab/sequence", golden("sequence_answer"))
     found = client.sequence("lab", [3, 4])

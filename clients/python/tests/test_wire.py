@@ -31,6 +31,8 @@ TYPES: Dict[str, type] = {
     "blockage": cogmap.Blockage,
     "blockage_list": cogmap.BlockageList,
     "blockage_request": cogmap.BlockageRequest,
+    "felt_answer": cogmap.FeltAnswer,
+    "felt_query": cogmap.FeltQuery,
     "follow_request": cogmap.FollowRequest,
     "followed_route": cogmap.FollowedRoute,
     "followed_route_page": cogmap.FollowedRoutePage,

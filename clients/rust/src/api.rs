@@ -11,11 +11,11 @@ use std::time::Duration;
 use cogmap_proto::limits::PAGE_ITEMS_MAX;
 use cogmap_proto::{
     AgentAt, AgentDetail, AgentObject, AgentPage, AgentSummary, Channel, ChannelList, Codec,
-    GridState, Identification, IdentifyQuery, IngestAnswer, Landmark, LandmarkPage, Localization,
-    LocalizeQuery, ObjectDetail, ObjectLesson, ObjectPage, ObjectSummary, Place, PlacePage,
-    PlacePercepts, PredictAnswer, PredictQuery, RecallAnswer, RecallQuery, RouteAnswer, RouteQuery,
-    SampleBatch, SequenceAnswer, SequenceQuery, SpaceInfo, SpaceList, SpaceSettings, Trajectory,
-    Trip, TripDetail, TripPage,
+    FeltAnswer, FeltQuery, GridState, Identification, IdentifyQuery, IngestAnswer, Landmark,
+    LandmarkPage, Localization, LocalizeQuery, ObjectDetail, ObjectLesson, ObjectPage,
+    ObjectSummary, Place, PlacePage, PlacePercepts, PredictAnswer, PredictQuery, RecallAnswer,
+    RecallQuery, RouteAnswer, RouteQuery, SampleBatch, SequenceAnswer, SequenceQuery, SpaceInfo,
+    SpaceList, SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
 };
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request, Response, StatusCode};
@@ -295,6 +295,14 @@ impl Api {
     /// See [`ApiError`]. A service that is at several of these already asks to come back (503).
     pub fn sequence(&self, space: &str, query: &SequenceQuery) -> Result<SequenceAnswer, ApiError> {
         self.send(Method::POST, &path(space, "/sequence")?, &json(query))
+    }
+
+    /// What was felt near a point, and who was there.
+    ///
+    /// # Errors
+    /// See [`ApiError`].
+    pub fn felt(&self, space: &str, query: &FeltQuery) -> Result<FeltAnswer, ApiError> {
+        self.send(Method::POST, &path(space, "/felt")?, &json(query))
     }
 
     /// All places of a space, by id.

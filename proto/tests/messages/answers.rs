@@ -334,6 +334,7 @@ fn trip() -> Trip {
         leg_count: 1,
         length_m: 0.75,
         strength: 0.625,
+        pinned: false,
     }
 }
 
@@ -345,6 +346,7 @@ fn trips() -> TripPage {
         .map(|(id, ended)| Trip {
             id,
             ended,
+            pinned: id == 1,
             ..trip()
         })
         .collect();

@@ -4,6 +4,7 @@
 //! JSON, and halves, quarters and so on in the `f32` vectors.
 
 mod answers;
+mod felt;
 mod localize;
 mod objects;
 mod published;
@@ -41,4 +42,5 @@ pub(crate) fn each(visit: &mut impl Visit) {
     localize::each(visit);
     routes::each(visit);
     sequences::each(visit);
+    felt::each(visit);
 }

@@ -10,7 +10,8 @@ pub use route::{errand_in, route, route_in};
 pub use sequence::{sequence, sequence_in};
 
 use cogmap_proto::{
-    AgentObject, EndedEpisode, PredictAnswer, PredictQuery, RecallAnswer, RecallQuery,
+    AgentObject, EndedEpisode, FeltAnswer, FeltQuery, PredictAnswer, PredictQuery, RecallAnswer,
+    RecallQuery,
 };
 use cognitive_map::{AgentId, CognitiveMap};
 
@@ -30,6 +31,19 @@ pub fn recall(
     let recalled = map.recall(&cue);
     let rivals = { recalled.first() }.and_then(|best| map.rivals(&cue, best));
     Ok(encode::recall(space, map, recalled, rivals.as_ref()))
+}
+
+/// What was felt near a point of a space, and who was there.
+///
+/// # Errors
+/// Says which rule the query breaks, or that a channel in it is unknown.
+pub fn felt(
+    space: &str,
+    map: &CognitiveMap,
+    query: &FeltQuery,
+) -> Result<FeltAnswer, InvalidQuery> {
+    let cue = decode::felt(map, query)?;
+    Ok(encode::felt(space, map, &map.felt(&cue)))
 }
 
 /// What an agent would feel if it moved so.

@@ -6,6 +6,7 @@ pub mod duration;
 mod export;
 mod free_port;
 pub mod help;
+mod import;
 pub mod output;
 mod quantile;
 mod serve;
@@ -40,6 +41,8 @@ enum Command {
     /// Write what a store holds: the journal as JSON lines, a trajectory as TUM.
     #[command(subcommand)]
     Export(export::ExportCommand),
+    /// Make a space of the JSON export of a map: its places and ways, and the names of its agents.
+    Import(import::ImportArgs),
     /// Verify or repair a store.
     #[command(subcommand)]
     Store(store::StoreCommand),
@@ -104,6 +107,7 @@ pub fn main() -> ExitCode {
         Command::Demo(args) => demo::run(&args),
         Command::CheckConfig(args) => check_config::run(&args),
         Command::Export(command) => export::run(&command),
+        Command::Import(args) => import::run(&args),
         Command::Store(command) => store::run(&command),
         Command::Backup(args) => store::backup(&args),
         Command::Restore(args) => store::restore(&args),

@@ -42,6 +42,9 @@ pub enum InvalidQuery {
     /// The percept's channel cannot be asked for.
     #[error("percept: {0}")]
     Channel(#[from] InvalidChannel),
+    /// No channels are named, or too many.
+    #[error("channels must be a list of 1 to {0} names")]
+    Channels(usize),
     /// The limit is out of range.
     #[error("limit must be 1 to {PAGE_ITEMS_MAX}, not {0}")]
     Limit(usize),
@@ -98,7 +101,7 @@ pub(super) fn checked_percept(
     Ok(percept)
 }
 
-fn position(metres: [f64; 3]) -> Result<Point3<f64>, InvalidQuery> {
+pub(super) fn position(metres: [f64; 3]) -> Result<Point3<f64>, InvalidQuery> {
     let legal = metres.iter().all(|metre| metre.abs() <= METRES_MAX);
     legal
         .then(|| Point3::from(metres))

@@ -8,6 +8,7 @@ use cognitive_map::{AgentId, InvalidSample, Label, Record, SkipReason};
 
 use super::instruction::journaled_instruction;
 use super::lesson::journaled_lesson;
+use super::remembrance::journaled_remembrance;
 use super::sample::journaled_sample;
 use crate::journal::Entry;
 
@@ -60,6 +61,12 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
                     number: *number,
                     instruction,
                 });
+            }
+        }
+        Entry::Remember { remembrance } => {
+            // Only what passed is journaled.
+            if let Some(remembrance) = journaled_remembrance(remembrance) {
+                take(Record::Remember(remembrance));
             }
         }
         Entry::Remove { agent } => take(Record::Remove {

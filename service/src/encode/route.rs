@@ -78,6 +78,7 @@ pub fn way(map: &CognitiveMap, way: &Way) -> Option<wire::Way> {
     let places = map.places_of_way(way)?;
     let [from_m, to_m] = [from, to].map(|end| map.waypoint(end));
     let position = |end: &Waypoint| end.pose().translation.vector.into();
+    let rotation = |end: &Waypoint| end.pose().rotation.coords.into();
     let variance = way.measurement_variance().map(|x| x.max(0.0).sqrt());
     let relative = way.relative();
     Some(wire::Way {
@@ -85,6 +86,9 @@ pub fn way(map: &CognitiveMap, way: &Way) -> Option<wire::Way> {
         to: to.0.into(),
         from_m: position(from_m?),
         to_m: position(to_m?),
+        from_rotation_xyzw: rotation(from_m?),
+        to_rotation_xyzw: rotation(to_m?),
+        measurements: way.measurements(),
         length_m: way.length_m(&places),
         there: traversals(way.travelled_from(from)),
         back: traversals(way.travelled_from(to)),

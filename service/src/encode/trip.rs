@@ -18,6 +18,7 @@ pub fn trip(map: &CognitiveMap, id: TripId, trip: &Trip) -> wire::Trip {
         leg_count: trip.leg_count() as u64,
         length_m: trip.length_m(),
         strength: map.trip_strength(id),
+        pinned: map.is_pinned(id),
     }
 }
 

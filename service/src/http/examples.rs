@@ -25,6 +25,7 @@ pub(crate) fn of(operation: &str) -> Option<Value> {
             } } },
         ] }),
         "sequence" => json!({ "cue": [{ "place": 0 }, { "place": 1 }] }),
+        "felt" => json!({ "position_m": [1, 0, 0], "radius_m": 0.5, "since_ns": 0 }),
         "route" => json!({ "from": { "agent": "ada" }, "to": { "place": 0 } }),
         "block" => json!({ "at_m": [2, 5, 0], "radius_m": 0.5 }),
         "follow_route" => json!({ "to": { "place": 0 }, "cost": "time" }),

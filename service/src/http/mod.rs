@@ -18,6 +18,7 @@ mod events;
 mod examples;
 mod export;
 mod extract;
+mod felt;
 mod following;
 mod guard;
 mod health;
@@ -100,6 +101,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(localize::post))
         .routes(routes!(route::post))
         .routes(routes!(sequence::post))
+        .routes(routes!(felt::post))
         .routes(routes!(blockages::list, blockages::post))
         .routes(routes!(blockages::delete))
         .routes(routes!(following::get, following::put, following::delete))

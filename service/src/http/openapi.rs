@@ -208,6 +208,7 @@ fn merge_into_array(schema: &mut Value, length: usize) {
 /// Writes the bounds of request bodies into their schemas: the types cannot carry them.
 fn constrain(schemas: &mut Value) {
     constrain_recall(&mut schemas["RecallQuery"]["properties"]);
+    constrain_felt(&mut schemas["FeltQuery"]["properties"]);
     constrain_route(schemas);
     constrain_batch(&mut schemas["SampleBatch"]["properties"]);
     constrain_rotations(&mut schemas["Orientation"]);
@@ -235,6 +236,17 @@ fn constrain_recall(query: &mut Value) {
     merge(&mut phase["items"], &turns);
     let modules = json!({ "minItems": 1, "maxItems": GRID_MODULES_MAX });
     merge(&mut query["code"], &modules);
+}
+
+fn constrain_felt(query: &mut Value) {
+    let metres = json!({ "minimum": -METRES_MAX, "maximum": METRES_MAX });
+    merge(&mut query["position_m"]["items"], &metres);
+    let radius = json!({ "minimum": 0.0, "maximum": METRES_MAX });
+    merge(&mut query["radius_m"], &radius);
+    let limit = json!({ "minimum": 1, "maximum": 1000 });
+    merge(&mut query["limit"], &limit);
+    let channels = json!({ "minItems": 1, "maxItems": 64 });
+    merge(&mut query["channels"], &channels);
 }
 
 fn constrain_route(schemas: &mut Value) {

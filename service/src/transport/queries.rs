@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use cogmap_proto::{
-    Codec, IdentifyQuery, LocalizeQuery, PredictQuery, RecallQuery, RouteQuery, SESSION_PARAMETER,
-    SequenceQuery, Verb, WatermarkQuery, query_key,
+    Codec, FeltQuery, IdentifyQuery, LocalizeQuery, PredictQuery, RecallQuery, RouteQuery,
+    SESSION_PARAMETER, SequenceQuery, Verb, WatermarkQuery, query_key,
 };
 use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
@@ -16,7 +16,7 @@ use super::latest;
 use super::reply::{busy, codec_of, refuse, send};
 use super::session::TransportError;
 use crate::answer;
-use crate::decode::{self, InvalidPrediction};
+use crate::decode::{self, InvalidPrediction, InvalidQuery};
 use crate::encode;
 use crate::engine::Engine;
 use crate::problem::{Kind, Problem};
@@ -39,6 +39,7 @@ pub(crate) async fn declare(
         Verb::Localize,
         Verb::Route,
         Verb::Sequence,
+        Verb::Felt,
     ] {
         let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(&room));
         let queryable = session
@@ -89,11 +90,8 @@ async fn answer(
         Verb::Recall => {
             let body: RecallQuery = body(query, codec)?;
             let map = space.snapshot().await?;
-            // It may look at every place: not on a thread that others wait for.
             let recall = move || answer::recall(space.name(), &map, &body);
-            let recalled = tokio::task::spawn_blocking(recall).await;
-            let recalled = recalled.map_err(|_| Problem::interrupted())??;
-            Ok(codec.encode(&recalled))
+            Ok(codec.encode(&beside(recall).await?))
         }
         Verb::Watermark => {
             let body: WatermarkQuery = body(query, codec)?;
@@ -132,7 +130,21 @@ async fn answer(
             let body: SequenceQuery = body(query, codec)?;
             Ok(codec.encode(&answer::sequence_in(&space, body).await?))
         }
+        Verb::Felt => {
+            let body: FeltQuery = body(query, codec)?;
+            let map = space.snapshot().await?;
+            let felt = move || answer::felt(space.name(), &map, &body);
+            Ok(codec.encode(&beside(felt).await?))
+        }
     }
+}
+
+/// What may look at every place, not on a thread that others wait for.
+async fn beside<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, InvalidQuery> + Send + 'static,
+) -> Result<T, Problem> {
+    let answered = tokio::task::spawn_blocking(work).await;
+    Ok(answered.map_err(|_| Problem::interrupted())??)
 }
 
 /// The session that a robot asks as, if it says so: the service tells whether it may begin.

@@ -2,7 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use cogmap_proto::{Increment, Sample, SampleBody};
+use cogmap_client::Api;
+use cogmap_proto::{
+    Increment, RecallQuery, RecalledPlace, RouteAvoid, RouteCost, RouteEnd, RouteFormat,
+    RouteQuery, RouteReverse, Sample, SampleBody,
+};
 use cogmap_tests::{Server, batch, run};
 use serde_json::Value;
 
@@ -160,4 +164,85 @@ fn a_map_is_exported_as_it_was() {
     assert_eq!(refused.code(), 1);
     let range = format!("0 to {}", revision(&latest));
     assert!(refused.stderr.contains(&range), "{}", refused.stderr);
+}
+
+/// What a space recalls at some positions, and its routes between all pairs of some places.
+fn answers(api: &Api, space: &str) -> (Vec<Vec<RecalledPlace>>, Vec<(f64, Vec<Option<u64>>)>) {
+    let recalled = [[0.3, 0.1, 0.0], [5.0, 0.0, 0.0], [8.0, 3.0, 0.0]].map(|position_m| {
+        let query = RecallQuery {
+            position_m: Some(position_m),
+            ..RecallQuery::default()
+        };
+        api.recall(space, &query).unwrap().places
+    });
+    let ends = [0, 5, 11, 17, 22];
+    let pairs = ends.iter().flat_map(|from| ends.map(|to| (*from, to)));
+    let routes = pairs.map(|(from, to)| {
+        let query = RouteQuery {
+            from: RouteEnd::Place(from),
+            to: RouteEnd::Place(to),
+            cost: RouteCost::Time,
+            reverse: RouteReverse::Allowed,
+            avoid: RouteAvoid::default(),
+            shortcuts: false,
+            body_radius_m: None,
+            alternatives: 0,
+            format: RouteFormat::Steps,
+            spacing_m: None,
+        };
+        let route = api.route(space, &query).unwrap();
+        let steps = route.steps.iter().map(|step| step.place);
+        (route.length_m, steps.collect())
+    });
+    (recalled.to_vec(), routes.collect())
+}
+
+#[test]
+fn an_export_makes_a_space_with_the_same_answers() {
+    let mut server = Server::start(&[]);
+    let api = server.api();
+    let samples = batch(1, 0, corner());
+    api.post_samples("default", AGENT, &samples).unwrap();
+    let expected = answers(&api, "default");
+    let data = server.data().to_str().unwrap().to_owned();
+    server.terminate();
+    let exported = run(&["export", "map", "--data-dir", &data]);
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("map.json");
+    std::fs::write(&file, exported.text()).unwrap();
+    let file = file.to_str().unwrap();
+
+    let import = ["import", file, "--data-dir", &data, "--space", "copy"];
+    let imported = run(&import);
+    assert_eq!(imported.code(), 0, "{}", imported.stderr);
+    let again = run(&import);
+    assert_eq!(again.code(), 1, "the space is there already");
+    let mut digests = Vec::new();
+    for _ in 0..2 {
+        server.run();
+        let (mut recalled, routes) = answers(&api, "copy");
+        // Strengths fade with the number of records, of which there are fewer now.
+        for (now, then) in recalled
+            .iter_mut()
+            .flatten()
+            .zip(expected.0.iter().flatten())
+        {
+            assert!((now.place.strength / then.place.strength - 1.0).abs() < 1e-3);
+            now.place.strength = then.place.strength;
+        }
+        assert_eq!((recalled, routes), expected);
+        digests.push(api.space("copy").unwrap().digest);
+        server.kill();
+    }
+    assert!(imported.text().contains(&digests[0]), "{}", imported.text());
+    assert_eq!(digests[0], digests[1]);
+
+    std::fs::write(file, "{}").unwrap();
+    let refused = run(&["import", file, "--data-dir", &data, "--space", "none"]);
+    assert_eq!(refused.code(), 1);
+    assert!(
+        refused.stderr.contains("no JSON export"),
+        "{}",
+        refused.stderr
+    );
 }

@@ -8,7 +8,7 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 37] = [
+const ROUTES: [(&str, &[&str]); 38] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
@@ -32,6 +32,7 @@ const ROUTES: [(&str, &[&str]); 37] = [
     ("/v1/spaces/{space}/channels", &["get"]),
     ("/v1/spaces/{space}/events", &["get"]),
     ("/v1/spaces/{space}/export", &["get"]),
+    ("/v1/spaces/{space}/felt", &["post"]),
     ("/v1/spaces/{space}/landmarks", &["get"]),
     ("/v1/spaces/{space}/landmarks/{id}", &["get"]),
     ("/v1/spaces/{space}/live", &["get"]),

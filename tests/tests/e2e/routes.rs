@@ -271,6 +271,18 @@ fn instructions_that_make_no_sense_are_refused() {
         refused(api.pin_trip("default", 9_999)),
         (404, unknown.to_owned())
     );
-    api.pin_trip("default", 0).unwrap();
-    api.unpin_trip("default", 0).unwrap();
+    for is_pinned in [true, false] {
+        if is_pinned {
+            api.pin_trip("default", 0).unwrap();
+        } else {
+            api.unpin_trip("default", 0).unwrap();
+        }
+        assert_eq!(api.trip("default", 0).unwrap().trip.pinned, is_pinned);
+        let listed = api.trips("default").unwrap();
+        assert!(
+            listed
+                .iter()
+                .all(|trip| trip.pinned == (is_pinned && trip.id == 0))
+        );
+    }
 }

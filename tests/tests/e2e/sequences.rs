@@ -2,8 +2,8 @@
 //! Zenoh alike, and the same after a restart.
 
 use cogmap_proto::{
-    Codec, Increment, Level, Marker, PerceptCue, Problem, Sample, SampleBody, SequenceAnswer,
-    SequenceElement, SequenceQuery, StartPose, query_key,
+    Codec, FeltAnswer, FeltQuery, Increment, Level, Looked, Marker, PerceptCue, Problem, Sample,
+    SampleBody, SequenceAnswer, SequenceElement, SequenceQuery, StartPose, query_key,
 };
 use cogmap_tests::{RawPublisher, Server, batch};
 
@@ -238,4 +238,74 @@ fn where_an_agent_was_is_told_between_its_samples() {
     server.kill();
     server.run();
     check(&server);
+}
+
+#[test]
+fn that_nobody_looked_is_told_from_that_nothing_was_felt() {
+    let mut server = Server::start(&[]);
+    let api = server.api();
+    let samples = forks();
+    let last_ns = samples.last().unwrap().stamp_ns;
+    api.post_samples("default", AGENT, &batch(1, 0, samples))
+        .unwrap();
+    let near = |position_m: [f64; 3], since_ns: i64| FeltQuery {
+        position_m,
+        radius_m: None,
+        since_ns: Some(since_ns),
+        channels: Some(vec!["touch".to_owned()]),
+        limit: None,
+    };
+    // At 3 m it felt 2 each of four times; to the left, and to the right, nothing.
+    let questions = [
+        (near([3.0, 0.0, 0.0], START_NS), Looked::Felt),
+        (near([8.0, 4.0, 0.0], START_NS), Looked::NothingFelt),
+        (near([3.0, 0.0, 0.0], last_ns), Looked::Never),
+        (near([50.0, 0.0, 0.0], START_NS), Looked::Never),
+    ];
+    let answers = questions.each_ref().map(|(query, looked)| {
+        let answer = api.felt("default", query).unwrap();
+        assert_eq!(answer.looked, *looked, "{query:?}");
+        answer
+    });
+    let percept = &answers[0].places[0].percepts[0];
+    assert_eq!((percept.percepts, percept.mean), (4, Some(2.0)));
+    assert_eq!(answers[0].last_felt_ns, Some(percept.last_stamp_ns));
+    assert!(answers[2].last_seen_ns.unwrap() < last_ns && answers[3].near == 0);
+
+    let raw = RawPublisher::connect(&server.endpoint());
+    let key = query_key("default", "felt");
+    for codec in [Codec::Json, Codec::Cbor, Codec::Postcard] {
+        let bytes = raw.ask(&key, codec.encoding(), codec.encode(&questions[0].0));
+        let heard: FeltAnswer = codec.decode(&bytes.unwrap()).unwrap();
+        assert_eq!(heard, answers[0]);
+    }
+    let path = "/v1/spaces/default/felt";
+    for (body, status, kind) in [
+        (r#"{"position_m":[0,0]}"#, 400, "malformed-body"),
+        (r#"{"position_m":[0,0,1e300]}"#, 422, "invalid-query"),
+        (
+            r#"{"position_m":[0,0,0],"radius_m":-1}"#,
+            422,
+            "invalid-query",
+        ),
+        (
+            r#"{"position_m":[0,0,0],"channels":[]}"#,
+            422,
+            "invalid-query",
+        ),
+        (
+            r#"{"position_m":[0,0,0],"channels":["smell"]}"#,
+            404,
+            "unknown-channel",
+        ),
+    ] {
+        let answer = server
+            .http()
+            .post(path, "application/json", body.as_bytes());
+        answer.problem(status, kind);
+    }
+    server.kill();
+    server.run();
+    let again = server.api().felt("default", &questions[0].0).unwrap();
+    assert_eq!(again, answers[0]);
 }

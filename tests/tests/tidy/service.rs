@@ -7,7 +7,7 @@ const TRANSLATED: [&str; 4] = ["cognitive_map", "geometry", "grid", "object_reco
 
 /// Files of `service/src` beside decode/ and encode/ that name messages of the wire and types of
 /// the core, each with what it needs both for. None of them makes one from the other.
-const NAMES_BOTH: [(&str, &str); 18] = [
+const NAMES_BOTH: [(&str, &str); 19] = [
     (
         "answer/mod.rs",
         "asks the map what decode has read, and hands encode what it says",
@@ -20,6 +20,10 @@ const NAMES_BOTH: [(&str, &str); 18] = [
     (
         "cli/export.rs",
         "reads the settings that a space was stored with, and folds its journal",
+    ),
+    (
+        "cli/import.rs",
+        "checks a space's name, and folds what it journals",
     ),
     (
         "engine/agent_view.rs",

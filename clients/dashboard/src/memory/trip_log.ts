@@ -53,6 +53,7 @@ export class TripLog {
       leg_count: 0,
       length_m: 0,
       strength: 1,
+      pinned: false,
     };
     this.trips.set(id, { trip, legs: [] });
     this.underWay.set(agent, { trip: id, place: null, s: this.clock.seconds(stampNs) });

@@ -88,6 +88,7 @@ from .event import (
     TripStarted,
     UnknownKind,
 )
+from .felt import FeltAnswer, FeltPercept, FeltPlace, FeltQuery, Looked
 from .guidance import (
     Blockage,
     BlockageList,
@@ -249,6 +250,10 @@ __all__ = [
     "ExpectedLevel",
     "FiniteTurns",
     "FollowedRoute",
+    "FeltAnswer",
+    "FeltPercept",
+    "FeltPlace",
+    "FeltQuery",
     "FollowedRoutePage",
     "FollowedRouteSummary",
     "FollowRequest",
@@ -280,6 +285,7 @@ __all__ = [
     "LocalizeQuery",
     "LocalizedPose",
     "LoopsClosed",
+    "Looked",
     "Marker",
     "MarkerPassed",
     "MissedEvents",

@@ -447,6 +447,8 @@ class Trip:
     #: The recording and travelling it again count one when they happen, and half as much after
     #: every half-life.
     strength: float
+    #: Whether it is pinned: never forgotten.
+    pinned: bool
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Iterable, Optional, Tuple, cast
 
+from .felt import FeltAnswer, FeltQuery
 from .http_service import HttpService, Query
 from .localize import Localization, LocalizeQuery
 from .request import json_of, path_of
@@ -20,6 +21,7 @@ from .route import (
 from .sample import Sample
 from .sequence import AnyElement, SequenceAnswer, SequenceQuery, element
 from .trajectory import AgentAt
+from .vector import Vec3
 from .wire import JSON
 
 
@@ -85,6 +87,24 @@ class Questions(HttpService):
         query = SequenceQuery(tuple(map(element, cue)), error_rate, none_prior, limit)
         path = path_of(space, "sequence")
         return self._send(SequenceAnswer, "POST", path, JSON, json_of("query", query))
+
+    def felt(
+        self,
+        space: str,
+        position_m: Vec3,
+        *,
+        radius_m: Optional[float] = None,
+        since_ns: Optional[int] = None,
+        channels: Optional[Iterable[str]] = None,
+        limit: Optional[int] = None,
+    ) -> FeltAnswer:
+        """What was felt near a point [m] since a stamp, by what the places within `radius_m` of it
+        remember, also of some `channels` only. That nobody looked (`Looked.NEVER`) is told from
+        that somebody did and felt nothing."""
+        names = None if channels is None else tuple(channels)
+        query = FeltQuery(position_m, radius_m, since_ns, names, limit)
+        path = path_of(space, "felt")
+        return self._send(FeltAnswer, "POST", path, JSON, json_of("query", query))
 
     def agent_at(
         self,

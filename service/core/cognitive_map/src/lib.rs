@@ -16,19 +16,23 @@ mod settings;
 pub use agent::{Agent, Status};
 pub use event::{Event, EventKind, LoopsClosed, RouteFailure, RouteLeft};
 pub use fold::{
-    CheckpointPage, CognitiveMap, CorruptCheckpoint, Localization, Predicted, Prediction,
+    CheckpointPage, CognitiveMap, CorruptCheckpoint, Felt, FeltCue, FeltPlace, Localization,
+    Looked, Predicted, Prediction,
 };
 pub use input::{
     AgentId, Descriptor, Errand, Goal, Instruction, InvalidSample, Label, Lesson, Level, Marker,
     Motion, NoisyPose, ObjectMark, PoseNoise, Range, RangeBearing, Record, Relation, RelativePose,
-    RelativePosition, Retrace, Sample, SampleBody, Sighting, SkipReason, Spacing, StartPose,
-    Target, Touch, TouchLevel, TouchNoise,
+    RelativePosition, RememberedPlace, RememberedTraversals, RememberedWay, Remembrance, Retrace,
+    Sample, SampleBody, Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel,
+    TouchNoise,
 };
 pub use keyframes::{Guess, LearnedChannel, RelaxationJob, ViewChannel};
 pub use memory::blockage::{BLOCKAGES_MAX, Ball, Blockage, BlockageId, Blocked};
 pub use memory::landmark::{Landmark, LandmarkId};
 pub use memory::object::{Identified, KnownObject};
-pub use memory::percept::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
+pub use memory::percept::{
+    Channel, ChannelId, ChannelKind, Expected, FeltPercept, PerceptCue, Remembered,
+};
 pub use memory::place::{Place, PlaceId};
 pub use memory::recall::{RecallCue, Recalled, Rivals};
 pub use memory::sequence::{

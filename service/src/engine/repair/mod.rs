@@ -9,8 +9,9 @@
 //! - Agents keep their numbers. One whose enrolment is lost is enrolled again where the hole was,
 //!   under its name if the checkpoint knows it, else under a placeholder.
 //! - A number that was enrolled again although its removal is lost is removed first.
-//! - Lessons about objects and instructions are numbered anew, for the numbers count those before;
-//!   blockages keep theirs.
+//! - Lessons about objects are numbered anew, for the numbers count those before.
+//! - Instructions keep their numbers, which are also those of blockages: each one that is lost is
+//!   replaced by one that does nothing.
 
 #[cfg(test)]
 mod tests;
@@ -337,9 +338,11 @@ impl Repair<'_> {
                 number,
                 instruction,
             } => {
+                self.instruct_to(number, before);
                 fits = number == self.instructions;
                 self.next_instruction(instruction)
             }
+            Entry::Remember { remembrance } => Entry::Remember { remembrance },
             Entry::Remove { agent } => {
                 self.enrol_to(agent.saturating_add(1), before);
                 if let Some(known) = self.agents.get_mut(agent as usize) {
@@ -378,6 +381,23 @@ impl Repair<'_> {
             name,
             lesson,
         }
+    }
+
+    /// Replaces the instructions up to and without `number` that are lost. Otherwise a blockage to
+    /// come would get the number of one that is kept.
+    fn instruct_to(&mut self, number: u64, before: &mut BlockWriter) {
+        if !self.holes {
+            return;
+        }
+        for number in self.instructions..number {
+            // Nothing goes by the number of a lost instruction.
+            let instruction = JournaledInstruction::Unblock { id: number };
+            before.push(&Entry::Instruct {
+                number,
+                instruction,
+            });
+        }
+        self.instructions = self.instructions.max(number);
     }
 
     fn next_instruction(&mut self, instruction: JournaledInstruction) -> Entry<'static> {

@@ -1,8 +1,12 @@
 //! Journals with holes, and what becomes of what follows them.
 
-use cogmap_proto::{Marker, Sample, SampleBatch, SampleBody};
+use cogmap_proto::{
+    Increment, Marker, RouteAvoid, RouteCost, RouteReverse, Sample, SampleBatch, SampleBody,
+};
+use cognitive_map::BlockageId;
 
 use super::*;
+use crate::journal::{JournaledBlocked, JournaledErrand, JournaledGoal};
 use crate::store::Journal;
 
 fn enrol(agent: u32, name: &'static str) -> Entry<'static> {
@@ -39,6 +43,32 @@ fn lost(agent: u32, session: u64, from: u64, to: u64) -> Entry<'static> {
         to,
         reason: SkipReason::Lost,
     }
+}
+
+fn instruct(number: u64, instruction: JournaledInstruction) -> Entry<'static> {
+    Entry::Instruct {
+        number,
+        instruction,
+    }
+}
+
+fn block(number: u64) -> Entry<'static> {
+    let instruction = JournaledInstruction::Block {
+        id: number,
+        blocked: JournaledBlocked::Ball([1.0, 0.0, 0.0], 0.2),
+        until_ns: None,
+    };
+    instruct(number, instruction)
+}
+
+fn follow(number: u64, agent: u32) -> Entry<'static> {
+    let errand = JournaledErrand {
+        goal: JournaledGoal::Position([0.0; 3]),
+        cost: RouteCost::Length,
+        reverse: RouteReverse::Allowed,
+        avoid: RouteAvoid::default(),
+    };
+    instruct(number, JournaledInstruction::Follow { agent, errand })
 }
 
 /// The entries of a journal of these blocks after a repair in which one of them is lost, with the
@@ -143,6 +173,90 @@ fn agents_keep_their_numbers_and_lessons_get_new_ones() {
     ];
     assert_eq!(read, expected);
     assert!(report.agents[0].name_lost);
+}
+
+/// A robot that goes 2 m ahead, and stands still with every further sample.
+fn walk(first_seq: u64, count: u64) -> Entry<'static> {
+    let samples = (first_seq..first_seq + count).map(|seq| {
+        let ahead = if seq < 20 { 0.1 } else { 0.0 };
+        Sample {
+            stamp_ns: i64::try_from(seq).unwrap() * 100_000_000,
+            body: SampleBody::Increment(Increment {
+                translation_m: [ahead, 0.0, 0.0],
+                rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+                noise: None,
+            }),
+        }
+    });
+    let batch = SampleBatch {
+        session: 1,
+        first_seq,
+        samples: samples.collect(),
+    };
+    Entry::Samples { agent: 0, batch }
+}
+
+fn folded(read: &[Entry<'static>]) -> CognitiveMap {
+    let settings = core_settings(&SpaceSettings::default()).unwrap();
+    let mut map = CognitiveMap::new(settings);
+    for entry in read {
+        crate::decode::records_of(entry, |record| map.apply(&record, &mut Vec::new()));
+    }
+    map
+}
+
+#[test]
+fn blockages_and_followed_routes_outlive_a_hole() {
+    let blocks: [&[_]; 3] = [
+        &[enrol(0, "ada"), walk(0, 20)],
+        &[
+            block(0),
+            instruct(1, JournaledInstruction::Unblock { id: 0 }),
+        ],
+        &[block(2), follow(3, 0), walk(20, 2)],
+    ];
+    let (read, _) = repaired(&blocks, 1);
+    let map = folded(&read);
+    let ids: Vec<_> = map.blockages().iter().map(|blockage| blockage.id).collect();
+    assert_eq!(ids, [BlockageId(2)]);
+    assert_eq!(map.instructions(), 4);
+    // The blockage is between the robot and its goal, and no way leads round it.
+    let agent = cognitive_map::AgentId(0);
+    assert!(map.followed(agent).is_none());
+
+    // The next blockage has a number of its own, and the robot can be sent off again.
+    let next = [
+        block(map.instructions()),
+        instruct(5, JournaledInstruction::Unblock { id: 2 }),
+        instruct(6, JournaledInstruction::Unblock { id: 4 }),
+        follow(7, 0),
+    ];
+    let went_on: Vec<_> = read.iter().chain(&next[..1]).cloned().collect();
+    assert_eq!(folded(&went_on).blockages().len(), 2);
+    let went_on: Vec<_> = read.iter().chain(&next).cloned().collect();
+    let map = folded(&went_on);
+    assert_eq!(map.blockages(), []);
+    assert!(!map.followed(agent).unwrap().rest().is_empty());
+}
+
+#[test]
+fn a_route_is_followed_on_over_a_hole_behind_it() {
+    let blocks: [&[_]; 3] = [
+        &[enrol(0, "ada"), walk(0, 20), block(0), follow(1, 0)],
+        &[forget(0)],
+        &[
+            instruct(2, JournaledInstruction::Unblock { id: 0 }),
+            follow(3, 0),
+            walk(20, 2),
+        ],
+    ];
+    let (read, report) = repaired(&blocks, 1);
+    assert!(report.agents.is_empty(), "nothing of the robot is missing");
+    assert_eq!(read[..4], blocks[0][..]);
+    assert_eq!(read[4..], blocks[2][..], "instructions are as they were");
+    let map = folded(&read);
+    assert_eq!(map.blockages(), []);
+    assert!(map.followed(cognitive_map::AgentId(0)).is_some());
 }
 
 #[test]

@@ -419,7 +419,7 @@ fn assert_references(root: &Value, value: &Value) {
 }
 
 /// All operations, by method and path.
-const OPERATIONS: [&str; 46] = [
+const OPERATIONS: [&str; 47] = [
     "DELETE /v1/spaces/{space}",
     "DELETE /v1/spaces/{space}/agents/{agent}",
     "DELETE /v1/spaces/{space}/agents/{agent}/route",
@@ -457,6 +457,7 @@ const OPERATIONS: [&str; 46] = [
     "POST /v1/spaces/{space}/agents/{agent}/predict",
     "POST /v1/spaces/{space}/agents/{agent}/samples",
     "POST /v1/spaces/{space}/blockages",
+    "POST /v1/spaces/{space}/felt",
     "POST /v1/spaces/{space}/localize",
     "POST /v1/spaces/{space}/objects/identify",
     "POST /v1/spaces/{space}/recall",

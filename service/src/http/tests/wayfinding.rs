@@ -167,5 +167,5 @@ async fn every_example_of_a_body_is_taken() {
             asked += 1;
         }
     }
-    assert_eq!(asked, 11, "operations with a body");
+    assert_eq!(asked, 12, "operations with a body");
 }

@@ -43,6 +43,7 @@ impl Fold<'_> {
             offset_m: sensor - at,
             spread_m2: covariance.map_or(f64::MAX, |covariance| axis_variance_m2(&covariance)),
             agent: self.agent_id.0,
+            stamp_ns: self.stamp_ns,
         };
         let compared = self
             .percepts

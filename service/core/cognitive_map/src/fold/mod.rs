@@ -4,6 +4,7 @@ mod apply;
 mod checkpoint;
 mod effects;
 mod enrolment;
+mod felt;
 mod following;
 mod forgetting;
 mod guidance;
@@ -15,6 +16,7 @@ mod objects;
 mod percepts;
 mod prediction;
 mod queries;
+mod remembrance;
 mod sequence;
 mod sightings;
 mod tuning;
@@ -24,6 +26,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub use checkpoint::{CheckpointPage, CorruptCheckpoint};
+pub use felt::{Felt, FeltCue, FeltPlace, Looked};
 pub use localization::Localization;
 pub use prediction::{Predicted, Prediction};
 
@@ -108,11 +111,12 @@ impl CognitiveMap {
     ///
     /// Every record is legal. One that says nothing new has no effect at all: the enrolment of an
     /// agent that is there (or is neither next in line nor vacant, or has another one's name), the
-    /// removal of one that is not, a lesson or an instruction that is not next in line, a sample of
-    /// an unknown or removed agent, of an earlier session, or with a sequence number that has been
-    /// applied or skipped. A sample whose number is ahead first skips the missing ones as
-    /// [`SkipReason::Lost`]. Work and memory per sample are bounded, whatever the size of the map;
-    /// one by which an agent leaves the route that it follows takes a search among the ways.
+    /// removal of one that is not, a place or a way that is there already, a lesson or an
+    /// instruction that is not next in line, a sample of an unknown or removed agent, of an earlier
+    /// session, or with a sequence number that has been applied or skipped. A sample whose number
+    /// is ahead first skips the missing ones as [`SkipReason::Lost`]. Work and memory per sample
+    /// are bounded, whatever the size of the map; one by which an agent leaves the route that it
+    /// follows takes a search among the ways.
     pub fn apply(&mut self, record: &Record, events: &mut Vec<Event>) {
         match record {
             Record::Enrol { agent, name } => self.enrol(*agent, name, events),
@@ -164,6 +168,7 @@ impl CognitiveMap {
                 fold.skip(*to, *reason);
                 fold.finish();
             }
+            Record::Remember(remembrance) => self.remember(remembrance),
             Record::TeachObject {
                 number,
                 name,

@@ -21,14 +21,14 @@ impl Fold<'_> {
         self.touch(|episode, objects| episode.descriptor(descriptor, objects));
         self.recognise_place(descriptor);
         let body = self.agent.announced.in_map().translation.vector.into();
-        let Some((place, weight)) = self.answering(&body) else {
+        let Some(answering) = self.answering(&body) else {
             return;
         };
-        let revision = self.revision;
+        let (stamp_ns, revision) = (self.stamp_ns, self.revision);
         let compared = self
             .percepts
-            .learn_descriptor(descriptor, place, weight, revision);
-        self.compared(place, compared);
+            .learn_descriptor(descriptor, answering, stamp_ns, revision);
+        self.compared(answering.0, compared);
     }
 
     /// Remembers what an agent of the map saw, and finds out whether it has come where something

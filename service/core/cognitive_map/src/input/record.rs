@@ -1,6 +1,6 @@
 //! Records: the journal's entries, in the order in which the fold meets them.
 
-use super::{AgentId, Instruction, InvalidSample, Label, Lesson, Sample};
+use super::{AgentId, Instruction, InvalidSample, Label, Lesson, Remembrance, Sample};
 
 /// One entry of the journal.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,6 +59,9 @@ pub enum Record {
         /// What was said.
         instruction: Instruction,
     },
+    /// A place or a way that another map has had. It counts once: a place whose number has been
+    /// given out is there already, and so is a way between two places that one joins.
+    Remember(Remembrance),
     /// An agent is removed: its name is free, and what it did in the map stays.
     Remove {
         /// The agent.

@@ -38,6 +38,14 @@ impl Strength {
         Self { key: now.0 }
     }
 
+    /// That of a memory of which so much is left.
+    pub(crate) fn left(now: Clock, strength: f64) -> Self {
+        let strength = strength.max(f64::MIN_POSITIVE);
+        Self {
+            key: strength.log2() + now.0,
+        }
+    }
+
     /// One more use, which counts `weight`.
     pub(crate) fn used(&mut self, now: Clock, weight: f64) {
         self.key = (self.now(now) + weight).log2() + now.0;

@@ -163,7 +163,10 @@ impl CognitiveMap {
     /// Where an end is in `map`.
     pub(super) fn position_of(&self, end: &RouteEnd) -> Point3<f64> {
         let place = self.place(end.place).map(|place| *place.position());
-        end.position.or(place).unwrap_or_default()
+        let waypoint = || Some(self.waypoint(end.place)?.pose().translation.vector.into());
+        { end.position.or(place) }
+            .or_else(waypoint)
+            .unwrap_or_default()
     }
 }
 

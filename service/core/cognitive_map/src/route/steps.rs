@@ -68,6 +68,9 @@ impl CognitiveMap {
         }
         if let Some(goal) = to.position {
             steps.approach(None, goal);
+        } else if path.len() < 2 && from.position.is_some() {
+            // From beside the place to the place itself.
+            steps.approach(Some(to.place), self.position_of(to));
         }
         steps.finish()
     }

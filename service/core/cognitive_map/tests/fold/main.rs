@@ -11,6 +11,7 @@ mod budgets; // what is forgotten, and when
 mod checkpoint; // pages out and in, damaged ones too
 mod correction; // what others see of an agent
 mod determinism; // the same records, the same map
+mod felt; // what was felt near a point, and who was there
 mod guidance; // blockages, routes that are followed, pinned trips
 mod journal; // a robot that writes readable journals
 mod landmarks; // what sightings teach
@@ -22,8 +23,10 @@ mod objects; // what is taught and known again
 mod percepts; // what places learn of percepts, and what they predict
 mod places; // recruitment, revisits
 mod ranges; // distances alone
+mod readers; // routes after a replay, and on many threads
 mod recall; // recall against an exhaustive scan
 mod relaxation; // loops that close while samples come in
+mod remembrance; // places and ways of another map
 mod removal; // agents that go, and who comes after them
 mod routes; // cheapest routes against another program's
 mod sequences; // which trips the last places look like, and what comes next
@@ -33,3 +36,4 @@ mod trips; // legs, and every way a trip ends
 mod views; // what is seen along ways that are driven again
 mod waking; // robots that wake up in a large hall
 mod ways; // what the legs add up to, and which ways go
+mod wrong_way; // robots that drive against their route

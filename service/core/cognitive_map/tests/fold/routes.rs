@@ -6,7 +6,7 @@ use cognitive_map::{
     CognitiveMap, NoRoute, NoRouteEnd, PlaceId, Region, Reverse, Route, RouteBounds, RouteCost,
     RouteEnd, RouteOptions, Settings, StepKind, TripId,
 };
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use petgraph::graphmap::DiGraphMap;
 use proptest::prelude::*;
 
@@ -246,6 +246,23 @@ fn a_route_leads_from_beside_the_places_to_beside_them() {
         "{}",
         route.duration_s
     );
+}
+
+#[test]
+fn a_route_from_beside_a_place_to_the_place_is_an_approach() {
+    let (map, _) = square();
+    let place = map.nearest_place(&Point3::new(1.5, 0.0, 0.0)).unwrap().0;
+    let position = *map.place(place).unwrap().position();
+    let there = map.route_end_at(place).unwrap();
+    let beside = near(&map, (position.coords + Vector3::new(0.0, 0.3, 0.0)).into());
+    let route = only(&map, &beside, &there, &RouteOptions::default());
+    let [step] = &route.steps[..] else {
+        panic!("{route:?}");
+    };
+    assert_eq!((step.kind, step.place), (StepKind::Approach, Some(place)));
+    assert!((step.position - position).norm() < 1e-9 && (route.length_m - 0.3).abs() < 1e-9);
+    let nowhere = only(&map, &there, &there, &RouteOptions::default());
+    assert_eq!((nowhere.steps.len(), nowhere.length_m), (0, 0.0));
 }
 
 #[test]

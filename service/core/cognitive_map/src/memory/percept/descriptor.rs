@@ -23,13 +23,29 @@ pub(super) struct DescriptorTrace {
     pub(super) place: PlaceId,
     pub(super) count: u64,
     pub(super) weight: f64,
+    /// Latest stamp of a descriptor \[ns\].
+    pub(super) last_stamp_ns: i64,
 }
 
 state_of_struct!(DescriptorTrace {
     place,
     count,
-    weight
+    weight,
+    last_stamp_ns
 });
+
+/// A descriptor that a place sees.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen<'a> {
+    /// The place.
+    pub(crate) place: PlaceId,
+    /// Its confidence.
+    pub(crate) weight: f64,
+    /// The descriptor's numbers.
+    pub(crate) vector: &'a [f32],
+    /// When \[ns\].
+    pub(crate) stamp_ns: i64,
+}
 
 /// Some traces and their directions.
 #[derive(Clone, Debug)]
@@ -95,6 +111,12 @@ impl DescriptorMemory {
         Some((&block.traces[row], direction))
     }
 
+    /// What a place remembers, without the direction.
+    pub(super) fn trace(&self, place: PlaceId) -> Option<&DescriptorTrace> {
+        let (block, row) = self.row_of(place)?;
+        block.traces.get(row)
+    }
+
     /// What a place remembers, against a descriptor: number of percepts, and the cosine.
     pub(super) fn compare(&self, place: PlaceId, vector: &[f32]) -> Option<(u64, f64)> {
         let (block, row) = self.row_of(place)?;
@@ -103,14 +125,8 @@ impl DescriptorMemory {
 
     /// Strengthens the association of a place and a descriptor. Beyond `blocks_max` blocks no
     /// further place remembers anything.
-    pub(super) fn strengthen(
-        &mut self,
-        place: PlaceId,
-        vector: &[f32],
-        weight: f64,
-        blocks_max: usize,
-        revision: u64,
-    ) -> bool {
+    pub(super) fn strengthen(&mut self, seen: &Seen<'_>, blocks_max: usize, revision: u64) -> bool {
+        let place = seen.place;
         let rows = rows_per_block(self.dimension);
         let slot = if let Some(slot) = self.slot_of(place) {
             slot
@@ -132,7 +148,7 @@ impl DescriptorMemory {
         if slot % rows == block.traces.len() {
             block.push(place);
         }
-        block.strengthen(slot % rows, vector, weight);
+        block.strengthen(slot % rows, seen);
         let sketch = self.sketcher.sketch(block.sum(slot % rows));
         self.sketches.set(slot, sketch);
         true
@@ -268,6 +284,7 @@ impl Block {
             place,
             count: 0,
             weight: 0.0,
+            last_stamp_ns: i64::MIN,
         });
         if self.sums.is_empty() {
             // What doubling would reserve beyond a full block is never used.
@@ -294,17 +311,19 @@ impl Block {
     }
 
     /// Adds a descriptor to a sum.
-    fn strengthen(&mut self, row: usize, vector: &[f32], weight: f64) {
+    fn strengthen(&mut self, row: usize, seen: &Seen<'_>) {
         let trace = &mut self.traces[row];
         trace.count += 1;
-        trace.weight += weight;
+        trace.weight += seen.weight;
+        // The clocks of two agents may differ, so a later one may carry an earlier stamp.
+        trace.last_stamp_ns = trace.last_stamp_ns.max(seen.stamp_ns);
         #[expect(
             clippy::cast_possible_truncation,
             reason = "a confidence needs no more digits"
         )]
-        let weight = weight as f32;
+        let weight = seen.weight as f32;
         let sum = &mut self.sums[row * self.dimension..][..self.dimension];
-        for (sum, x) in sum.iter_mut().zip(vector) {
+        for (sum, x) in sum.iter_mut().zip(seen.vector) {
             *sum += weight * x;
         }
         self.scales[row] = scale(sum);

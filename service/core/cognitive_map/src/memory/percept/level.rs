@@ -15,9 +15,15 @@ pub(crate) struct LevelTrace {
     pub(crate) levels: Moments,
     /// The same for who finds out where it is by them.
     pub(crate) felt: Trace,
+    /// Latest stamp of one of them \[ns\].
+    pub(crate) last_stamp_ns: i64,
 }
 
-state_of_struct!(LevelTrace { levels, felt });
+state_of_struct!(LevelTrace {
+    levels,
+    felt,
+    last_stamp_ns
+});
 
 /// A level that was sensed while a place answered.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +40,8 @@ pub(crate) struct Sensed {
     pub(crate) spread_m2: f64,
     /// The agent.
     pub(crate) agent: u32,
+    /// When \[ns\].
+    pub(crate) stamp_ns: i64,
 }
 
 /// What all places remember of the channel.
@@ -66,13 +74,19 @@ impl LevelMemory {
         if let Some(trace) = self.traces.get_mut(place, revision) {
             trace.levels.add(value, weight);
             trace.felt.learn(value, offset_m, spread_m2, sensed.agent);
+            // The clocks of two agents may differ, so a later one may carry an earlier stamp.
+            trace.last_stamp_ns = trace.last_stamp_ns.max(sensed.stamp_ns);
             return;
         }
         let mut levels = Moments::default();
         levels.add(value, weight);
         let felt = Trace::new(value, offset_m, spread_m2, sensed.agent);
-        self.traces
-            .insert(place, LevelTrace { levels, felt }, revision);
+        let trace = LevelTrace {
+            levels,
+            felt,
+            last_stamp_ns: sensed.stamp_ns,
+        };
+        self.traces.insert(place, trace, revision);
     }
 
     /// Forgets what a place remembers.

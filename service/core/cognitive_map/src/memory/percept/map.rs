@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::descriptor::{Block, DescriptorMemory};
+use super::descriptor::{Block, DescriptorMemory, Seen};
 use super::level::{LEVEL_MAX, LevelMemory, LevelTrace, Sensed, surprise};
-use super::{Channel, ChannelId, ChannelKind, Expected, PerceptCue, Remembered};
+use super::{Channel, ChannelId, ChannelKind, Expected, FeltPercept, PerceptCue, Remembered};
 use crate::input::{Descriptor, Label};
 use crate::memory::ids::PlaceId;
 use place_filter::{Kernel, Trace};
@@ -128,8 +128,8 @@ impl PerceptMap {
     pub(crate) fn learn_descriptor(
         &mut self,
         descriptor: &Descriptor,
-        place: PlaceId,
-        weight: f64,
+        (place, weight): (PlaceId, f64),
+        stamp_ns: i64,
         revision: u64,
     ) -> Option<Compared> {
         let vector = descriptor.vector();
@@ -145,7 +145,13 @@ impl PerceptMap {
                 percepts,
                 surprise: 1.0 - cosine,
             });
-        memory.strengthen(place, vector, weight, CHANNEL_PAGES_MAX as usize, revision);
+        let seen = Seen {
+            place,
+            weight,
+            vector,
+            stamp_ns,
+        };
+        memory.strengthen(&seen, CHANNEL_PAGES_MAX as usize, revision);
         compared
     }
 
@@ -153,6 +159,12 @@ impl PerceptMap {
     pub(crate) fn of_place(&self, place: PlaceId) -> impl Iterator<Item = Remembered> {
         let memories = (0u8..).map(ChannelId).zip(self.memories.iter());
         memories.filter_map(move |(channel, memory)| memory.recall(channel, place))
+    }
+
+    /// What a place has felt, channel by channel.
+    pub(crate) fn felt_at(&self, place: PlaceId) -> impl Iterator<Item = FeltPercept> {
+        let memories = (0u8..).map(ChannelId).zip(self.memories.iter());
+        memories.filter_map(move |(channel, memory)| memory.felt(channel, place))
     }
 
     /// The places that remember something of the cue's channel, and how well each fits the cue: for
@@ -362,6 +374,29 @@ impl Memory {
             percepts,
             strength,
             expected,
+        })
+    }
+
+    /// What a place has felt.
+    fn felt(&self, channel: ChannelId, place: PlaceId) -> Option<FeltPercept> {
+        let (percepts, strength, last_stamp_ns, level) = match self {
+            Self::Levels(memory) => {
+                let trace = memory.get(place)?;
+                let levels = &trace.levels;
+                let level = Some((levels.mean(), levels.sd()));
+                (levels.count(), levels.weight(), trace.last_stamp_ns, level)
+            }
+            Self::Descriptors(memory) => {
+                let trace = memory.trace(place)?;
+                (trace.count, trace.weight, trace.last_stamp_ns, None)
+            }
+        };
+        Some(FeltPercept {
+            channel,
+            percepts,
+            strength,
+            last_stamp_ns,
+            level,
         })
     }
 }

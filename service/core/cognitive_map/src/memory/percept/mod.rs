@@ -47,6 +47,21 @@ pub struct Remembered {
     pub expected: Expected,
 }
 
+/// When a place learned of a channel last, and what levels were like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeltPercept {
+    /// The channel.
+    pub channel: ChannelId,
+    /// Number of percepts that taught the place.
+    pub percepts: u64,
+    /// Strength of the association: the sum of the place's confidences when they were sensed.
+    pub strength: f64,
+    /// Latest stamp of one of them \[ns\].
+    pub last_stamp_ns: i64,
+    /// Mean of levels, in the channel's unit, and their standard deviation; `None` of descriptors.
+    pub level: Option<(f64, f64)>,
+}
+
 /// What a percept is expected to be like.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expected {

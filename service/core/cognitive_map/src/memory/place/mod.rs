@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 pub use crate::memory::ids::PlaceId;
 pub(crate) use map::PlaceMap;
 
-use crate::input::AgentId;
+use crate::input::{AgentId, RememberedPlace};
 use crate::memory::ids::TripId;
 use crate::memory::strength::{Clock, Strength};
 
@@ -74,6 +74,22 @@ impl Place {
             trip: None,
             attachment: None,
             strength: Strength::new(now),
+        }
+    }
+
+    /// One that another map has had.
+    pub(crate) fn remembered(was: &RememberedPlace, now: Clock) -> Self {
+        Self {
+            position: was.pose.translation.vector.into(),
+            rotation: was.pose.rotation,
+            position_sd_m: was.position_sd_m,
+            visits: was.visits,
+            first_stamp_ns: was.first_stamp_ns,
+            last_stamp_ns: was.last_stamp_ns,
+            founder: was.founder,
+            trip: None,
+            attachment: None,
+            strength: Strength::left(now, was.strength),
         }
     }
 

@@ -3,6 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::{Edge, Traversal, Traversals, Way, Waypoint};
+use crate::input::RememberedWay;
 use crate::memory::ids::PlaceId;
 use crate::memory::strength::{Clock, Strength};
 use state::{CorruptState, NONE, Slab, Slot, SparseVec, State, StateReader, StateWriter};
@@ -210,10 +211,13 @@ impl WayMap {
         let ends = traversal.ends();
         let number = match self.number_between(ends[0], ends[1]) {
             Some(number) => number,
-            None => match self.join(traversal, poses, now, revision) {
-                Some(number) => number,
-                None => return,
-            },
+            None => {
+                let made = |waypoints| Way::new(traversal, waypoints, now, revision);
+                match self.join(ends, poses, revision, made) {
+                    Some(number) => number,
+                    None => return,
+                }
+            }
         };
         let places = poses[0].inv_mul(poses[1]);
         if let Some(way) = self.ways.get_mut(number, revision) {
@@ -223,22 +227,32 @@ impl WayMap {
         self.summarise(number);
     }
 
-    /// Makes a way between two places; `None` when there are no more numbers.
+    /// Takes in a way that another map has had. There must be room for one more, and none between
+    /// these places.
+    pub(crate) fn remember(&mut self, was: &RememberedWay, now: Clock, revision: u64) {
+        let made = |waypoints| Way::remembered(was, waypoints, now, revision);
+        let poses = was.poses.each_ref();
+        if let Some(number) = self.join(was.ends, poses, revision, made) {
+            self.refresh(number, revision);
+            self.summarise(number);
+        }
+    }
+
+    /// Makes a way between two waypoints; `None` when there are no more numbers.
     fn join(
         &mut self,
-        traversal: &Traversal,
+        ends: [PlaceId; 2],
         poses: [&Isometry3<f64>; 2],
-        now: Clock,
         revision: u64,
+        made: impl FnOnce([u32; 2]) -> Way,
     ) -> Option<u32> {
-        let ends = traversal.ends();
         // A way to a new place closes no circle.
         if ends.iter().all(|end| self.at(*end).is_some()) {
             self.is_forest = false;
         }
         let first = self.waypoint_at(ends[0], poses[0], revision)?;
         let second = self.waypoint_at(ends[1], poses[1], revision)?;
-        let mut way = Way::new(traversal, [first, second], now, revision);
+        let mut way = made([first, second]);
         way.spared = self.spared_max;
         let number = self.ways.insert(way, revision);
         if number == NONE {

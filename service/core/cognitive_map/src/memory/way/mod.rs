@@ -15,6 +15,7 @@ pub use traversals::Traversals;
 pub(crate) use waypoint::Edge;
 pub use waypoint::Waypoint;
 
+use crate::input::RememberedWay;
 use crate::memory::ids::PlaceId;
 use crate::memory::strength::{Clock, Strength};
 use geometry::se3;
@@ -77,6 +78,28 @@ impl Way {
             shortest_m: f64::INFINITY,
             last_revision: revision,
             strength: Strength::new(now),
+            spared: 0,
+        }
+    }
+
+    /// One that another map has had.
+    pub(super) fn remembered(
+        was: &RememberedWay,
+        waypoints: [u32; 2],
+        now: Clock,
+        revision: u64,
+    ) -> Self {
+        Self {
+            ends: was.ends,
+            waypoints,
+            travelled: was.travelled.each_ref().map(Traversals::remembered),
+            relative: was.relative,
+            variance: was.variance,
+            scatter: Vector6::zeros(),
+            measurements: was.measurements,
+            shortest_m: was.shortest_m,
+            last_revision: revision,
+            strength: Strength::left(now, was.strength),
             spared: 0,
         }
     }
@@ -172,6 +195,11 @@ impl Way {
     /// orientations of their founders.
     pub fn relative(&self) -> &Isometry3<f64> {
         &self.relative
+    }
+
+    /// Number of measurements in the mean.
+    pub fn measurements(&self) -> u32 {
+        self.measurements
     }
 
     /// Variance of the mean position along it, summed over the axes \[m²\].

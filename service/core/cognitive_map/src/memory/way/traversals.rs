@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Vector6};
 
+use crate::input::RememberedTraversals;
 use crate::memory::ids::{PlaceId, TripId};
 use crate::memory::trip::Leg;
 use geometry::se3;
@@ -99,6 +100,17 @@ state_of_struct!(Traversals {
 });
 
 impl Traversals {
+    /// Those of a way that another map has had.
+    pub(super) fn remembered(were: &RememberedTraversals) -> Self {
+        Self {
+            times: were.times,
+            fastest_s: were.fastest_s,
+            mean_s: were.mean_s,
+            last_stamp_ns: were.last_stamp_ns,
+            leg: None,
+        }
+    }
+
     /// Counts one more.
     pub(super) fn count(&mut self, traversal: &Traversal) {
         let duration_s = traversal.duration_s;
