@@ -209,15 +209,11 @@ impl WayMap {
         revision: u64,
     ) {
         let ends = traversal.ends();
-        let number = match self.number_between(ends[0], ends[1]) {
-            Some(number) => number,
-            None => {
-                let made = |waypoints| Way::new(traversal, waypoints, now, revision);
-                match self.join(ends, poses, revision, made) {
-                    Some(number) => number,
-                    None => return,
-                }
-            }
+        let made = |waypoints| Way::new(traversal, waypoints, now, revision);
+        let known = self.number_between(ends[0], ends[1]);
+        let number = known.or_else(|| self.join(ends, poses, revision, made));
+        let Some(number) = number else {
+            return;
         };
         let places = poses[0].inv_mul(poses[1]);
         if let Some(way) = self.ways.get_mut(number, revision) {
