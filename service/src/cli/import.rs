@@ -50,7 +50,9 @@ pub(super) fn run(args: &ImportArgs) -> anyhow::Result<()> {
     let mut block = BlockWriter::new();
     for (at, entries) in (0..).zip(import.entries.chunks(BLOCK_ENTRIES)) {
         block.clear();
-        entries.iter().for_each(|entry| block.push(entry));
+        for entry in entries {
+            block.push(entry);
+        }
         store.append(number, at, 0, block.bytes())?;
     }
     store.sync()?;

@@ -37,48 +37,46 @@ pub fn records_of(entry: &Entry<'_>, mut take: impl FnMut(Record)) {
             to: *to,
             reason: skip_reason(*reason),
         }),
+        Entry::Remove { agent } => take(Record::Remove {
+            agent: AgentId(*agent),
+        }),
+        Entry::Teach { .. }
+        | Entry::Forget { .. }
+        | Entry::Instruct { .. }
+        | Entry::Remember { .. } => {
+            if let Some(record) = record_of_change(entry) {
+                take(record);
+            }
+        }
+    }
+}
+
+/// The record of a change that is no agent's, if it makes sense: only what passed is journaled.
+fn record_of_change(entry: &Entry<'_>) -> Option<Record> {
+    match entry {
         Entry::Teach {
             number,
             name,
             lesson,
-        } => {
-            // Only lessons that passed are journaled.
-            if let (Ok(name), Ok(lesson)) = (Label::new(name), journaled_lesson(lesson)) {
-                take(Record::TeachObject {
-                    number: *number,
-                    name,
-                    lesson,
-                });
-            }
-        }
+        } => Some(Record::TeachObject {
+            number: *number,
+            name: Label::new(name).ok()?,
+            lesson: journaled_lesson(lesson).ok()?,
+        }),
+        Entry::Forget { number, name } => Some(Record::ForgetObject {
+            number: *number,
+            name: Label::new(name).ok()?,
+        }),
         Entry::Instruct {
             number,
             instruction,
-        } => {
-            // Only instructions that passed are journaled.
-            if let Some(instruction) = journaled_instruction(instruction) {
-                take(Record::Instruct {
-                    number: *number,
-                    instruction,
-                });
-            }
-        }
-        Entry::Remember { remembrance } => {
-            // Only what passed is journaled.
-            if let Some(remembrance) = journaled_remembrance(remembrance) {
-                take(Record::Remember(remembrance));
-            }
-        }
-        Entry::Remove { agent } => take(Record::Remove {
-            agent: AgentId(*agent),
+        } => Some(Record::Instruct {
+            number: *number,
+            instruction: journaled_instruction(instruction)?,
         }),
-        Entry::Forget { number, name } => {
-            if let Ok(name) = Label::new(name) {
-                take(Record::ForgetObject {
-                    number: *number,
-                    name,
-                });
-            }
+        Entry::Remember { remembrance } => journaled_remembrance(remembrance).map(Record::Remember),
+        Entry::Enrol { .. } | Entry::Samples { .. } | Entry::Skip { .. } | Entry::Remove { .. } => {
+            None
         }
     }
 }

@@ -80,12 +80,12 @@ pub fn map_import(export: &str) -> Result<MapImport, InvalidImport> {
         entries.push(checked(
             place.map(JournaledRemembrance::Place),
             "the place",
-            &was.id,
+            was.id,
         )?);
     }
     for was in &export.ways {
         let way = way(was).map(|way| JournaledRemembrance::Way(Box::new(way)));
-        entries.push(checked(way, "the way from", &was.from)?);
+        entries.push(checked(way, "the way from", was.from)?);
     }
     Ok(MapImport {
         settings: export.space.settings,
@@ -96,7 +96,7 @@ pub fn map_import(export: &str) -> Result<MapImport, InvalidImport> {
 fn checked(
     remembrance: Option<JournaledRemembrance>,
     what: &'static str,
-    number: &u64,
+    number: u64,
 ) -> Result<Entry<'static>, InvalidImport> {
     let makes_sense = |journaled: &JournaledRemembrance| journaled_remembrance(journaled).is_some();
     let remembrance = remembrance.filter(makes_sense);

@@ -166,8 +166,11 @@ fn a_map_is_exported_as_it_was() {
     assert!(refused.stderr.contains(&range), "{}", refused.stderr);
 }
 
+/// Length of a route \[m\], and its places.
+type Route = (f64, Vec<Option<u64>>);
+
 /// What a space recalls at some positions, and its routes between all pairs of some places.
-fn answers(api: &Api, space: &str) -> (Vec<Vec<RecalledPlace>>, Vec<(f64, Vec<Option<u64>>)>) {
+fn answers(api: &Api, space: &str) -> (Vec<Vec<RecalledPlace>>, Vec<Route>) {
     let recalled = [[0.3, 0.1, 0.0], [5.0, 0.0, 0.0], [8.0, 3.0, 0.0]].map(|position_m| {
         let query = RecallQuery {
             position_m: Some(position_m),

@@ -147,16 +147,9 @@ fn teach(
     Ok(map)
 }
 
-/// An agent's episode with one object, in a frame of its own.
-fn touch_again(
-    protocol: &OutlineProtocol,
-    map: &CognitiveMap,
-    solid: &Solid,
-    truth: Option<ObjectId>,
-    random: &mut ChaCha8Rng,
-) -> Result<Trial, InvalidSample> {
-    let last = protocol.looks.last().copied().unwrap_or_default();
-    let (turn, orientation) = match protocol.turn {
+/// How an object has turned, and what the recogniser is told of it.
+fn turned(turn: Turn, random: &mut ChaCha8Rng) -> (UnitQuaternion<f64>, Orientation) {
+    match turn {
         Turn::None => (UnitQuaternion::identity(), Orientation::Known),
         Turn::Any => {
             let of: [f64; 4] = std::array::from_fn(|_| random.sample(StandardNormal));
@@ -168,7 +161,19 @@ fn touch_again(
             let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw_rad);
             (turn, Orientation::Yaw)
         }
-    };
+    }
+}
+
+/// An agent's episode with one object, in a frame of its own.
+fn touch_again(
+    protocol: &OutlineProtocol,
+    map: &CognitiveMap,
+    solid: &Solid,
+    truth: Option<ObjectId>,
+    random: &mut ChaCha8Rng,
+) -> Result<Trial, InvalidSample> {
+    let last = protocol.looks.last().copied().unwrap_or_default();
+    let (turn, orientation) = turned(protocol.turn, random);
     let way = walk(solid, last, protocol.step_m, random);
     let half_touches = half_covered(solid, &way, protocol.step_m, random);
     let mut map = map.clone();

@@ -179,6 +179,17 @@ fn learn(name: &str) -> SampleBody {
     })
 }
 
+/// Where an episode's contacts are along the rod, and their levels.
+fn contacts_told(status: &Value) -> Vec<(f64, f64)> {
+    let number = |of: &Value| of.as_f64().expect("a number");
+    let contact = |contact: &Value| {
+        let at = number(&contact["position_m"][0]);
+        (at, number(&contact["levels"][0]["value"]))
+    };
+    let told = status["contacts"].as_array().expect("a list");
+    told.iter().map(contact).collect()
+}
+
 #[tokio::test]
 async fn an_agent_learns_and_recognises_by_touch() {
     let rig = rig();
@@ -212,22 +223,11 @@ async fn an_agent_learns_and_recognises_by_touch() {
     let status = rig.get("/v1/spaces/lab/agents/arm/object").await.good();
     assert_eq!(status["episode"], "identify");
     let told = &status["identification"];
-    assert_eq!(
-        told["verdict"],
-        json!({"object": {"name": "knife"}}),
-        "{told}"
-    );
+    let knife = json!({"object": {"name": "knife"}});
+    assert_eq!(told["verdict"], knife, "{told}");
     assert_eq!(told["contacts"], 8);
-    let felt = status["contacts"].as_array().expect("a list");
-    let felt: Vec<(f64, f64)> = felt
-        .iter()
-        .map(|contact| {
-            let number = |of: &Value| of.as_f64().expect("a number");
-            let at = number(&contact["position_m"][0]);
-            (at, number(&contact["levels"][0]["value"]))
-        })
-        .collect();
     // Where the body was, counted from where the episode began.
+    let felt = contacts_told(&status);
     for (i, (at, level)) in felt.iter().enumerate() {
         assert!((at + i as f64 * PITCH_M).abs() < 1e-9, "{felt:?}");
         assert!((level - KNIFE[7 - i]).abs() < 1e-9, "{felt:?}");

@@ -1,6 +1,6 @@
 //! `cogmap-lab eval outlines`.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use cogmap_lab::outlines::{
     Family, Levels, OutlineProtocol, Report, Teaching, Turn, run as explore,
 };
@@ -19,12 +19,10 @@ pub(in crate::cli) struct OutlinesArgs {
     /// Objects are taught by one run of neighbouring touches, instead of all over.
     #[arg(long)]
     run: bool,
-    /// Objects may have turned anyhow, and contacts tell the surface's normal.
-    #[arg(long)]
-    turned: bool,
-    /// Objects may have turned about the vertical.
-    #[arg(long, conflicts_with = "turned")]
-    yaw: bool,
+    /// Objects may have turned: anyhow, and contacts tell the surface's normal; or about the
+    /// vertical.
+    #[arg(long, value_name = "HOW", num_args = 0..=1, default_missing_value = "any")]
+    turned: Option<Turned>,
     /// Seed of objects, explorations and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -33,19 +31,28 @@ pub(in crate::cli) struct OutlinesArgs {
     json: bool,
 }
 
+/// How objects may have turned.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Turned {
+    /// Anyhow.
+    Any,
+    /// About the vertical.
+    Yaw,
+}
+
 pub(super) fn run(args: &OutlinesArgs) -> anyhow::Result<()> {
     let mut protocols = Vec::new();
     for family in Family::ALL {
         // A line has no normals by which it could be turned back.
-        if args.turned && family == Family::Outline {
+        if matches!(args.turned, Some(Turned::Any)) && family == Family::Outline {
             continue;
         }
         for levels in [Levels::Spread, Levels::Same] {
             for &taught in &args.taught {
-                let turn = match (args.turned, args.yaw) {
-                    (true, _) => Turn::Any,
-                    (false, true) => Turn::Yaw,
-                    (false, false) => Turn::None,
+                let turn = match args.turned {
+                    Some(Turned::Any) => Turn::Any,
+                    Some(Turned::Yaw) => Turn::Yaw,
+                    None => Turn::None,
                 };
                 let mut protocol = OutlineProtocol::new(family, levels, turn, taught);
                 protocol.sets = args.sets;
