@@ -68,8 +68,8 @@ pub enum Orientation {
     },
     /// By any rotation. Contacts need normals then.
     Free {},
-    /// By any rotation about the vertical: the z axes of both frames are parallel, as of things that
-    /// stand on a table. Contacts need no normals.
+    /// By any rotation about the vertical: the z axes of both frames are parallel, as of things
+    /// that stand on a table. Contacts need no normals.
     Yaw {},
 }
 

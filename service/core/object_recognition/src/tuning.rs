@@ -173,9 +173,9 @@ pub(crate) const GATE_SQUARED: f64 = 32.0;
 /// Seeds of the prefilter. Of larger libraries every second place stands for two, or every third
 /// for three. Budget.
 pub(crate) const SEEDS_MAX: usize = 1 << 22;
-/// Rotations that stand for all about the vertical: 2 degrees apart, so that at 0.1 m from the first
-/// contact a rotation between two moves a contact by 1 mm (deviation), as exactly as hands feel.
-/// Chosen.
+/// Rotations that stand for all about the vertical: 2 degrees apart, so that at 0.1 m from the
+/// first contact a rotation between two moves a contact by 1 mm (deviation), as exactly as hands
+/// feel. Chosen.
 pub(crate) const YAW_TURNS: u16 = 180;
 /// Contacts that promoted seeds explain at a touch. Budget.
 pub(crate) const PROMOTION_MAX: usize = 1280;

@@ -30,8 +30,8 @@ pub(super) const RANGES_AGREE_SD: f64 = 3.0;
 pub(super) const RANGED_POINT_SD_M: (f64, f64) = (100.0, 3.0);
 
 /// Part of the keyframes that is new since the last relaxation when what was seen relaxes the past
-/// again: a past that was kept whole has then grown by 0.3. Source: so the work of all relaxations is
-/// some four times that of the last one, or, of a graph that is full, of one for every quarter of it.
+/// again: a past that was kept whole has then grown by 0.3. Source: so the work of all relaxations
+/// is some four times that of the last one, or, of a graph that is full, of one for every quarter.
 pub(super) const NEWLY_SEEN: f64 = 0.3 / 1.3;
 
 // Attachments.
