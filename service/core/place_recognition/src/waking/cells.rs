@@ -3,12 +3,9 @@
 use nalgebra::{Point3, Vector3};
 use state::{Counted, PagedVec, state_of_struct};
 
-use super::index::CellIndex;
+use super::index::{CellIndex, Key};
 use crate::descriptor::dot;
 use crate::tuning::cells as tuning;
-
-/// Place of a cell in the lattice.
-pub(super) type Key = [i32; 3];
 
 /// What was seen in a cell of space on a channel.
 #[derive(Clone, Debug)]
@@ -48,6 +45,14 @@ pub(crate) struct Cells {
     near: PagedVec<Vec<(u32, f32)>, 64>,
     /// The cells by channel and key; derived.
     index: CellIndex,
+}
+
+/// Tells the channel and key of a numbered cell.
+fn place_in(cells: &PagedVec<Cell, 16>) -> impl Fn(u32) -> Option<(u8, Key)> + '_ {
+    move |number| {
+        let cell = cells.get(number as usize)?;
+        Some((cell.channel, cell.key))
+    }
 }
 
 /// How alike a view is to what was seen about a cell.
@@ -169,13 +174,13 @@ impl Cells {
             revision,
         );
         self.near.push(near, revision);
-        self.index.insert(number, channel, key, &self.all);
+        self.index.insert(number, channel, key, place_in(&self.all));
         Some(number)
     }
 
     /// The number of the cell of a channel at a key.
     pub(super) fn find(&self, channel: u8, key: Key) -> Option<u32> {
-        self.index.find(channel, key, &self.all)
+        self.index.find(channel, key, place_in(&self.all))
     }
 
     pub(super) fn get(&self, number: u32) -> Option<&Cell> {
@@ -267,7 +272,7 @@ impl Cells {
         for number in 0..self.all.len() {
             if let (Some(cell), Ok(at)) = (self.all.get(number), u32::try_from(number)) {
                 let (channel, key) = (cell.channel, cell.key);
-                self.index.insert(at, channel, key, &self.all);
+                self.index.insert(at, channel, key, place_in(&self.all));
             }
         }
         for number in 0..self.all.len() {

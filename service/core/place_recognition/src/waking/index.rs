@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use state::PagedVec;
-
-use super::cells::{Cell, Key};
+/// Place of a cell in the lattice.
+pub(super) type Key = [i32; 3];
 
 /// An empty slot.
 const NONE: u32 = u32::MAX;
@@ -19,33 +18,38 @@ pub(super) struct CellIndex {
 }
 
 impl CellIndex {
-    pub(super) fn find(&self, channel: u8, key: Key, cells: &PagedVec<Cell, 16>) -> Option<u32> {
+    /// The number of the cell of a channel at a key; `place` tells both of a numbered cell.
+    pub(super) fn find(
+        &self,
+        channel: u8,
+        key: Key,
+        place: impl Fn(u32) -> Option<(u8, Key)>,
+    ) -> Option<u32> {
         let mask = self.slots.len().checked_sub(1)?;
         let mut slot = hash(channel, key) & mask;
         loop {
             let number = self.slots[slot];
-            let cell = cells.get(number as usize)?;
-            if (cell.channel, cell.key) == (channel, key) {
+            if place(number)? == (channel, key) {
                 return Some(number);
             }
             slot = (slot + 1) & mask;
         }
     }
 
-    /// Inserts a cell that is in `cells` but not here.
+    /// Inserts a cell of which `place` tells, but which is not here.
     pub(super) fn insert(
         &mut self,
         number: u32,
         channel: u8,
         key: Key,
-        cells: &PagedVec<Cell, 16>,
+        place: impl Fn(u32) -> Option<(u8, Key)>,
     ) {
         if 2 * (self.len + 1) > self.slots.len() {
             let slots = (2 * self.slots.len()).max(SLOTS_MIN);
             let old = std::mem::replace(&mut self.slots, Arc::new(vec![NONE; slots]));
             for number in old.iter().filter(|number| **number != NONE) {
-                if let Some(cell) = cells.get(*number as usize) {
-                    self.put(*number, hash(cell.channel, cell.key));
+                if let Some((channel, key)) = place(*number) {
+                    self.put(*number, hash(channel, key));
                 }
             }
         }
