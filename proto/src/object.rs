@@ -236,8 +236,8 @@ pub struct ObjectSummary {
     /// too few to tell.
     #[serde(default)]
     pub advised_gap_m: Option<f64>,
-    /// In the answer to a lesson, another object for which this one would be taken, turned about
-    /// the vertical or not.
+    /// In the answer to a lesson that asks for it, another object for which this one would be
+    /// taken, turned about the vertical or not.
     #[serde(default)]
     pub alike: Option<ObjectProbability>,
 }

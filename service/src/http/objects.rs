@@ -105,10 +105,21 @@ pub(crate) async fn get(
         .ok_or_else(|| unknown("object"))
 }
 
+/// What the answer to a lesson tells beside the object.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct TeachQuery {
+    /// Whether to compare it with all other objects, and to tell for which it would be taken. Takes
+    /// as long as to identify something among them; false when absent.
+    #[serde(default)]
+    alike: bool,
+}
+
 /// Teach an object at once, by contacts in its own frame, in place of what was known of it. Answers
 /// when the lesson is on disk.
 #[utoipa::path(put, path = "/v1/spaces/{space}/objects/{name}", tag = "memory",
-    operation_id = "teach_object", params(ObjectParams), request_body = ObjectLesson,
+    operation_id = "teach_object", params(ObjectParams, TeachQuery), request_body = ObjectLesson,
     responses(
         (status = 200, description = "The object is known", body = ObjectSummary),
         (status = 404, description = "There is no such space"),
@@ -116,7 +127,7 @@ pub(crate) async fn get(
         (status = 507, description = "The store is full")))]
 pub(crate) async fn put(
     ObjectOfPath(space, name): ObjectOfPath,
-    _: NoQuery,
+    Query(query): Query<TeachQuery>,
     Json(lesson): Json<ObjectLesson>,
 ) -> Result<Response<Body>, Problem> {
     let name = name.map_err(InvalidContacts::Name)?;
@@ -127,7 +138,9 @@ pub(crate) async fn put(
         .ok_or_else(|| unknown("object"))?
         .summary;
     // The lesson is on disk, whether or not there is room for the question.
-    if let Ok((map, alike)) = space.alike(name).await {
+    if query.alike
+        && let Ok((map, alike)) = space.alike(name).await
+    {
         taught.alike = encode::object_alike(&map, alike);
     }
     Ok(reply::json(&taught))

@@ -298,11 +298,13 @@ class Client(Questions, GuidanceClient):
         *,
         spacing_m: float = 0.004,
         noise: TouchNoise = TouchNoise(),
+        alike: bool = False,
     ) -> ObjectSummary:
         """Teaches an object at once, by contacts in its own frame, in place of what was known of
-        it; returns when that is on the service's disk."""
+        it; returns when that is on the service's disk. With `alike` it is compared with all other
+        objects, which takes as long as `identify`."""
         lesson = ObjectLesson(spacing_m, noise, cast(Tuple[Contact, ...], contacts))
-        path = path_of(space, "objects", name)
+        path = path_of(space, "objects", name) + ("?alike=true" if alike else "")
         return self._send(ObjectSummary, "PUT", path, JSON, json_of("lesson", lesson))
 
     def forget_object(self, space: str, name: str) -> None:

@@ -145,7 +145,7 @@ class ObjectSummary:
     #: Distance between places at which the surface between them would be known as exactly as it is
     #: felt [m]: what is above it should be felt more densely.
     advised_gap_m: Optional[float] = None
-    #: In the answer to a lesson, another object for which this one would be taken.
+    #: In the answer to a lesson that asks for it, another object for which this one would be taken.
     alike: Optional[ObjectProbability] = None
 
 

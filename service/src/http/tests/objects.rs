@@ -75,8 +75,9 @@ async fn objects_are_taught_listed_shown_and_forgotten() {
     );
     // Taught anew in place of what was known.
     let path = "/v1/spaces/lab/objects/knife";
+    let compared = format!("{path}?alike=true");
     let summary = rig
-        .send(Method::PUT, path, JSON, lesson(&FORK))
+        .send(Method::PUT, &compared, JSON, lesson(&FORK))
         .await
         .good();
     assert_eq!(

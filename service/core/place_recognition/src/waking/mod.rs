@@ -96,8 +96,8 @@ impl Waking {
         let at = view.position();
         let known = &mut self.channels[usize::from(channel)];
         known.n_seen = known.n_seen.wrapping_add(1);
-        let is_dumb = known.model.n_views >= tuning::VIEWS_MIN && !known.model.is_telling();
-        if is_dumb && !known.n_seen.is_multiple_of(tuning::TRIED) {
+        let tells_little = known.model.n_views >= tuning::VIEWS_MIN && !known.model.is_telling();
+        if tells_little && !known.n_seen.is_multiple_of(tuning::TRIED) {
             return;
         }
         let alike = self.cells.alike(channel, &vector);

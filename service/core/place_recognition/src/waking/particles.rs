@@ -389,8 +389,8 @@ fn normalise(particles: &mut [Particle]) {
     }
 }
 
-/// Two numbers of mean 0 and variance 1, nearly normal: sums of four uniform ones of 16 bits each
-/// (Irwin & Hall 1927), for a fifth of the cost.
+/// Two numbers of mean 0 and variance 1, nearly normal: sums of three uniform ones (Irwin & Hall
+/// 1927), since logarithms and cosines would be most of the cost of a step.
 fn pair(draws: &mut Seeded) -> [f64; 2] {
     [(); 2].map(|()| {
         let sum = draws.uniform() + draws.uniform() + draws.uniform();
