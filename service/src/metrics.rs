@@ -2,7 +2,7 @@
 
 mod process;
 
-pub(crate) use process::resident_bytes;
+pub use process::resident_bytes;
 
 use std::path::PathBuf;
 use std::time::Duration;

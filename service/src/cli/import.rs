@@ -10,7 +10,6 @@ use super::output;
 use crate::decode::{core_settings, map_import, records_of};
 use crate::journal::BlockWriter;
 use crate::service::open_store;
-use crate::store::Journal;
 use cogmap_proto::Name;
 use cognitive_map::CognitiveMap;
 
@@ -45,17 +44,17 @@ pub(super) fn run(args: &ImportArgs) -> anyhow::Result<()> {
     let store =
         open_store(directory).with_context(|| format!("open the store {}", directory.display()))?;
     let settings = serde_json::to_vec(&import.settings)?;
-    let number = store.create_space(&args.space, &settings)?;
-    store.open_journal(number)?;
+    // An import that is cut short leaves no space behind.
+    let mut draft = store.journals().draft(&args.space, &settings)?;
     let mut block = BlockWriter::new();
-    for (at, entries) in (0..).zip(import.entries.chunks(BLOCK_ENTRIES)) {
+    for entries in import.entries.chunks(BLOCK_ENTRIES) {
         block.clear();
         for entry in entries {
             block.push(entry);
         }
-        store.append(number, at, 0, block.bytes())?;
+        draft.append(0, block.bytes())?;
     }
-    store.sync()?;
+    draft.finish()?;
     Ok(output::line(&format!(
         "{}: {} places and {} ways, digest {}",
         args.space,

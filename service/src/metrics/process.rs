@@ -33,7 +33,7 @@ pub(super) fn record() {
 }
 
 /// Memory of the process that is in use \[bytes\], where the system keeps books of it.
-pub(crate) fn resident_bytes() -> Option<u64> {
+pub fn resident_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let kibibytes: u64 = field(&status, "VmRSS:")?;
     Some(kibibytes * 1024)

@@ -24,7 +24,9 @@ pub(crate) use local::disk_model;
 pub use backup::{BackupReport, SpaceBackup, backup, restore};
 pub use error::{DamagedJournal, DerivedError, StoreError};
 pub use format1::migrate;
-pub use local::{FORMAT_VERSION, LocalJournal, LocalStore, Replacement, SpaceSurvey, verify};
+pub use local::{
+    Draft, FORMAT_VERSION, LocalJournal, LocalStore, Replacement, SpaceSurvey, verify,
+};
 pub use log::{Damage, Extent, Flaw, Survey};
 
 /// A space as the store knows it. The number is never used again, the name may be.

@@ -32,8 +32,9 @@ pub struct PlanarRobot {
     random: ChaCha8Rng,
     ticks: u64,
     stamp_ns: i64,
-    /// Where it truly was after each step.
-    trail: Vec<Point2<f64>>,
+    started_at: Point2<f64>,
+    /// Where it truly was after each step; none where nobody will ask.
+    trail: Option<Vec<Point2<f64>>>,
     /// What it has sensed and nobody has taken.
     samples: Vec<Sample>,
 }
@@ -46,7 +47,8 @@ impl PlanarRobot {
             random: ChaCha8Rng::seed_from_u64(seed),
             ticks: 0,
             stamp_ns: START_NS,
-            trail: vec![at],
+            started_at: at,
+            trail: Some(vec![at]),
             samples: Vec::new(),
         }
     }
@@ -58,13 +60,18 @@ impl PlanarRobot {
 
     /// Where it truly started.
     pub fn started_at(&self) -> Point2<f64> {
-        self.trail[0]
+        self.started_at
     }
 
-    /// Where it truly was at a stamp.
+    /// Keeps no trail from now on, so that its memory does not grow with its steps.
+    pub fn forget_trail(&mut self) {
+        self.trail = None;
+    }
+
+    /// Where it truly was at a stamp, as long as it keeps a trail.
     pub fn was_at(&self, stamp_ns: i64) -> Option<Point2<f64>> {
         let step = usize::try_from((stamp_ns - START_NS) / TICK_NS).ok()?;
-        self.trail.get(step).copied()
+        self.trail.as_ref()?.get(step).copied()
     }
 
     /// Which way it faces \[rad\].
@@ -105,7 +112,10 @@ impl PlanarRobot {
             Isometry2::new(Vector2::zeros(), turn_rad)
         };
         self.pose *= go;
-        self.trail.push(self.position());
+        let position = self.position();
+        if let Some(trail) = &mut self.trail {
+            trail.push(position);
+        }
         self.ticks += 1;
         self.stamp_ns += TICK_NS;
         let [x, y, yaw] = [NOISE[0], NOISE[0], NOISE[1]].map(|sd| sd * self.normal());

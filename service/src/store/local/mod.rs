@@ -18,10 +18,10 @@
 //! Blocks and settings are the engine's, which versions its own bytes. A name that ends in `.new`
 //! is not finished, and opening the store removes it.
 
+mod draft;
 pub(super) mod files;
 mod opening;
 pub(super) mod record;
-mod replacement;
 mod store;
 mod survey;
 mod syncing;
@@ -51,8 +51,8 @@ use super::{
 use record::{Found, SpaceRecord};
 use syncing::{Logs, MarkSync, sync_all};
 
+pub use draft::{Draft, Replacement};
 pub(super) use opening::{is_store as is_local_store, lock, refuse_foreign};
-pub use replacement::Replacement;
 pub use store::LocalStore;
 pub use survey::{SpaceSurvey, verify};
 
@@ -226,6 +226,13 @@ impl LocalJournal {
         Ok((unfinished, log))
     }
 
+    fn refuse_taken(&self, name: &str) -> Result<(), StoreError> {
+        if self.spaces()?.iter().any(|space| space.name == name) {
+            return Err(StoreError::SpaceExists(name.to_owned()));
+        }
+        Ok(())
+    }
+
     fn lock_spaces(&self) -> MutexGuard<'_, ()> {
         // The lock guards no data of its own, so a panic under it leaves nothing half done.
         self.changing.lock().unwrap_or_else(PoisonError::into_inner)
@@ -252,21 +259,8 @@ impl Journal for LocalJournal {
 
     fn create_space(&self, name: &str, settings: &[u8]) -> Result<SpaceNumber, StoreError> {
         let _changing = self.lock_spaces();
-        if self.spaces()?.iter().any(|space| space.name == name) {
-            return Err(StoreError::SpaceExists(name.to_owned()));
-        }
-        self.refuse_if_broken()?;
-        let number = self.take_number()?;
-        let space = StoredSpace {
-            number,
-            name: name.to_owned(),
-            settings: Some(settings.to_vec()),
-        };
-        let replaces = None;
-        let (unfinished, _) = self.begin_space(&SpaceRecord { space, replaces })?;
-        let directory = self.space_directory(number);
-        self.change(&directory, || files::rename(&unfinished, &directory))?;
-        Ok(number)
+        self.refuse_taken(name)?;
+        self.begin(name, Some(settings), None)?.publish()
     }
 
     fn delete_space(&self, space: SpaceNumber) -> Result<(), StoreError> {

@@ -209,6 +209,38 @@ fn a_repair_that_is_cut_leaves_the_old_journal_or_the_new_one() {
 }
 
 #[test]
+fn a_draft_that_is_cut_is_whole_or_not_there() {
+    let home = directory();
+    let path = home.path().join("store");
+    drop(open(&path));
+    let model = DiskModel::of(home.path());
+    model.cut_before_each_sync(&CUTS);
+    let journal = open(&path);
+    let mut draft = journal.draft("hall", b"{}").unwrap();
+    for number in 0..3 {
+        draft.append(0, &block("hall", number)).unwrap();
+    }
+    draft.finish().unwrap();
+    model.promise(1);
+    drop(journal);
+    drop(open(&path));
+    let images = model.take_images();
+    assert!(images.len() > 5 * CUTS.len(), "{}", images.len());
+    for image in images {
+        let journal = open(&image.directory.path().join("store"));
+        match &*journal.spaces().unwrap() {
+            [] => assert_eq!(image.promised, 0, "{:?}", image.cut),
+            [found] => {
+                assert_eq!(found.name, "hall");
+                let opened = journal.open_journal(found.number).unwrap();
+                assert_eq!(opened.extent.blocks, 3, "{:?}", image.cut);
+            }
+            more => panic!("{:?}: {more:?}", image.cut),
+        }
+    }
+}
+
+#[test]
 fn a_backup_that_is_cut_is_whole_or_is_refused() {
     let home = directory();
     let path = home.path().join("store");

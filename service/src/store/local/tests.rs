@@ -241,6 +241,40 @@ fn a_directory_with_other_things_in_it_is_left_alone() {
 }
 
 #[test]
+fn a_draft_is_in_the_store_when_it_is_finished() {
+    let directory = directory();
+    let store = LocalStore::open(directory.path()).unwrap();
+    let mut given_up = store.journals().draft("hall", b"{}").unwrap();
+    given_up.append(0, b"block").unwrap();
+    drop(given_up);
+    let mut late = store.journals().draft("hall", b"{}").unwrap();
+    late.append(0, b"late").unwrap();
+    let mut draft = store.journals().draft("hall", b"{}").unwrap();
+    draft.append(0, b"first").unwrap();
+    assert!(store.spaces().unwrap().is_empty());
+    let number = draft.finish().unwrap();
+    let taken = late.finish();
+    assert!(
+        matches!(taken, Err(StoreError::SpaceExists(_))),
+        "{taken:?}"
+    );
+    let taken = store.journals().draft("hall", b"{}");
+    assert!(
+        matches!(taken, Err(StoreError::SpaceExists(_))),
+        "{taken:?}"
+    );
+    assert_eq!(store.open_journal(number).unwrap().extent.blocks, 1);
+    drop(store);
+    let store = LocalStore::open(directory.path()).unwrap();
+    assert_eq!(store.spaces().unwrap().len(), 1);
+    let blocks: Vec<_> = store
+        .journal(number, 0)
+        .map(|block| block.unwrap().1)
+        .collect();
+    assert_eq!(blocks, [b"first"]);
+}
+
+#[test]
 fn a_creation_cut_short_is_begun_again() {
     let directory = directory();
     let path = directory.path();

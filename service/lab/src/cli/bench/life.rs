@@ -4,12 +4,11 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use cogmap::cli::output;
+use cogmap::metrics::resident_bytes;
 use cogmap_worlds::{ObstacleWorld, Sensor, Team, TeamSettings, robot_name};
 use cognitive_map::{AgentId, CognitiveMap, Label, Record, Sample, Settings};
 use serde::Serialize;
 
-/// Bytes of a page of memory, on the machines that tell how many a process has.
-const PAGE_BYTES: f64 = 4096.0;
 /// Parts of the run, a row each.
 const PARTS: u32 = 10;
 
@@ -66,7 +65,7 @@ pub(super) fn run(args: &LifeArgs) -> anyhow::Result<()> {
             let [us_mean, us_p99, us_max] = times_us(&mut times);
             rows.push(Row {
                 samples: life.samples,
-                memory_mb: memory_mb(),
+                memory_mb: resident_bytes().unwrap_or(0) as f64 / 1e6,
                 us_mean,
                 us_p99,
                 us_max,
@@ -160,12 +159,4 @@ fn times_us(times: &mut [Duration]) -> [f64; 3] {
         times.get(rank).copied().map_or(0.0, us),
         times.last().copied().map_or(0.0, us),
     ]
-}
-
-/// Memory of this process \[MB\]; 0 where the machine does not tell.
-fn memory_mb() -> f64 {
-    let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
-    let pages = text.split_whitespace().nth(1);
-    let pages: f64 = pages.and_then(|text| text.parse().ok()).unwrap_or(0.0);
-    pages * PAGE_BYTES / 1e6
 }

@@ -4,9 +4,11 @@
 mod code;
 mod object;
 mod outlines;
+mod patrol;
 mod progress;
 mod room;
 mod routes;
+mod scout;
 mod sequences;
 mod service;
 mod waking;
@@ -36,6 +38,9 @@ pub(in crate::cli) enum EvalCommand {
     /// Routes in a hall, an office and a maze, through the HTTP of a service: are they found, are
     /// they the shortest, and does a robot that follows them arrive?
     Routes(routes::RoutesArgs),
+    /// A robot that goes its rounds on and on, through the HTTP of a service: do its ways, its
+    /// memory and the times of answers stay as they are?
+    Patrol(patrol::PatrolArgs),
     /// Robots that wake up somewhere in a room that a team-mate has explored: are they found, how
     /// soon, and how far off?
     Waking(waking::WakingArgs),
@@ -50,6 +55,7 @@ pub(super) fn run(command: &EvalCommand) -> anyhow::Result<()> {
         EvalCommand::Code(args) => code::run(args),
         EvalCommand::Sequences(args) => sequences::run(args),
         EvalCommand::Routes(args) => routes::run(args),
+        EvalCommand::Patrol(args) => patrol::run(args),
         EvalCommand::Waking(args) => waking::run(args),
     }
 }

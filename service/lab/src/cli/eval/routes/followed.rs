@@ -14,7 +14,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-use super::scout::{AGENT, Scout};
+use crate::cli::eval::scout::{AGENT, Scout};
 
 /// Steps of a message while a route is followed.
 const BATCH_STEPS: u64 = 3;

@@ -1,7 +1,6 @@
 //! `cogmap-lab eval routes`.
 
 mod followed;
-mod scout;
 
 use std::collections::BTreeMap;
 
@@ -17,10 +16,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
+use super::scout::Scout;
 use crate::cli::bench::Bench;
 use cogmap::cli::output;
 use followed::Followed;
-use scout::Scout;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RoutesArgs {

@@ -76,21 +76,32 @@ impl<'a> Scout<'a> {
     pub(super) fn explore(&mut self, steps: u64, random: &mut ChaCha8Rng) -> anyhow::Result<()> {
         while self.robot.steps() < steps {
             let goal = self.floor.any_free(random);
-            for point in self.floor.path(&self.robot.position(), &goal) {
-                while (point - self.robot.position()).norm() > 1e-6 {
-                    let to = point - self.robot.position();
-                    let turn_rad = turn_to(self.robot.heading_rad(), &to);
-                    // Beside the points the way to them may be cut off by a corner.
-                    if !self.robot.step(&self.floor, turn_rad, to.norm()) {
-                        break;
-                    }
-                    if self.robot.steps().is_multiple_of(BATCH_STEPS) {
-                        self.send()?;
-                    }
+            self.go_to(&goal)?;
+        }
+        self.send()
+    }
+
+    /// Goes to a position by the plan of the floor, and sends now and then.
+    pub(super) fn go_to(&mut self, goal: &Point2<f64>) -> anyhow::Result<()> {
+        for point in self.floor.path(&self.robot.position(), goal) {
+            while (point - self.robot.position()).norm() > 1e-6 {
+                let to = point - self.robot.position();
+                let turn_rad = turn_to(self.robot.heading_rad(), &to);
+                // Beside the points the way to them may be cut off by a corner.
+                if !self.robot.step(&self.floor, turn_rad, to.norm()) {
+                    break;
+                }
+                if self.robot.steps().is_multiple_of(BATCH_STEPS) {
+                    self.send()?;
                 }
             }
         }
-        self.send()
+        Ok(())
+    }
+
+    /// Samples that were sent.
+    pub(super) fn sent(&self) -> u64 {
+        self.seq
     }
 
     pub(super) fn send(&mut self) -> anyhow::Result<()> {
