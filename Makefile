@@ -25,14 +25,16 @@ export COGMAP_BIN := $(TARGET)/debug/cogmap
 
 # Every step over the workspace names all of its targets, and so gets the same features of every
 # dependency: Zenoh is then built once, not once for each step. `--locked` builds the versions of
-# Cargo.lock, and fails where the manifests ask for others.
-ALL := --locked --workspace --all-targets
+# Cargo.lock, and fails where the manifests ask for others. The store on object storage, a feature,
+# is tested with all else; that the rest does without it is left to the lints.
+FEATURES := --features cogmap/object-storage
+ALL := --locked --workspace --all-targets $(FEATURES)
 
 # nextest runs the tests of all crates at once; without it, cargo's own runner does.
 ifneq ($(shell command -v cargo-nextest),)
-RUN_RUST_TESTS := cargo nextest run --locked --workspace
+RUN_RUST_TESTS := cargo nextest run --locked --workspace $(FEATURES)
 else
-RUN_RUST_TESTS := cargo test --locked --workspace --lib --bins --tests
+RUN_RUST_TESTS := cargo test --locked --workspace $(FEATURES) --lib --bins --tests
 endif
 
 .PHONY: help
@@ -44,14 +46,15 @@ help: ## list the targets
 .PHONY: test
 test: needs-node needs-chromium ## the whole gate: format, lints, documentation, tests of Rust, of Python and in a browser
 	cargo fmt --all --check
+	cargo clippy --locked --workspace --all-targets -- -D warnings
 	cargo clippy $(ALL) -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps --lib --examples
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace $(FEATURES) --no-deps --lib --examples
 	$(MAKE) --no-print-directory test-page test-rust test-python test-browser
 
 .PHONY: test-rust
 test-rust: ## tests of Rust, the end-to-end tests among them
 	cargo build $(ALL)
-	cargo test --locked --workspace --doc
+	cargo test --locked --workspace $(FEATURES) --doc
 	$(RUN_RUST_TESTS)
 
 .PHONY: test-python

@@ -140,14 +140,17 @@ fn at_zero() {
 }
 
 /// Moves what histograms have recorded into their buckets from time to time. A scrape does that
-/// too; where nobody scrapes, the records would pile up. Measures the store's `directory`, too.
-pub async fn upkeep(handle: PrometheusHandle, directory: PathBuf) {
+/// too; where nobody scrapes, the records would pile up. Measures the store's `directory`, too, if
+/// it has one.
+pub async fn upkeep(handle: PrometheusHandle, directory: Option<PathBuf>) {
     let mut ticks = tokio::time::interval(UPKEEP_INTERVAL);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         ticks.tick().await;
         handle.run_upkeep();
-        let directory = directory.clone();
+        let Some(directory) = directory.clone() else {
+            continue;
+        };
         // A panic there is in the log, and the next look may do better.
         let _ = tokio::task::spawn_blocking(move || process::record_store(&directory)).await;
     }

@@ -19,7 +19,7 @@ use crate::http::{self, HttpSettings};
 use crate::journal;
 use crate::metrics;
 use crate::ports;
-use crate::store::{self, Journal, LocalStore, StoreError};
+use crate::store::{self, LocalStore, Store, StoreError};
 use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohPublisher};
 
 /// Longest wait for the Zenoh session to close.
@@ -49,10 +49,10 @@ pub enum StartError {
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// The store.
-    #[error("store {directory}")]
+    #[error("store {place}")]
     Store {
-        /// Its directory.
-        directory: String,
+        /// Its directory or URL.
+        place: String,
         /// Why.
         source: StoreError,
     },
@@ -121,7 +121,8 @@ impl Service {
             Some(session) => Some(Intake::start(session, &engine).await?),
             None => None,
         };
-        let directory = config.store.directory.clone();
+        let is_local = config.store.url.is_empty();
+        let directory = is_local.then(|| config.store.directory.clone());
         let upkeep = [
             tokio::spawn(metrics::upkeep(prometheus.clone(), directory)),
             tokio::spawn(transport::forbid_lingering()),
@@ -238,12 +239,16 @@ fn open_engine(
         Some(publisher) => Arc::clone(publisher) as Arc<dyn Publisher>,
         None => Arc::new(Silent),
     };
-    let directory = &config.store.directory;
+    let place = config.store.place();
     let of_store = |source| StartError::Store {
-        directory: directory.display().to_string(),
+        place: place.clone(),
         source,
     };
-    let store = Arc::new(open_store(directory).map_err(of_store)?);
+    let store: Arc<dyn Store> = if config.store.url.is_empty() {
+        Arc::new(open_store(&config.store.directory).map_err(of_store)?)
+    } else {
+        store_at(&place).map_err(of_store)?
+    };
     let stored = store.spaces().map_err(of_store)?;
     let name_lost = stored.iter().any(|space| space.settings.is_none());
     let engine = Engine::open(store, config.engine.settings(), publisher).map_err(of_store)?;
@@ -284,6 +289,23 @@ fn create_spaces(config: &Config, engine: &Engine, name_lost: bool) -> Result<()
 pub fn open_store(directory: &Path) -> Result<LocalStore, StoreError> {
     store::migrate(directory, journal::samples_in)?;
     LocalStore::open(directory)
+}
+
+/// Opens the store at a URL or in a directory.
+///
+/// # Errors
+/// See [`open_store`] and `ObjectStore::open`; this build may have no object storage.
+pub fn store_at(place: &str) -> Result<Arc<dyn Store>, StoreError> {
+    if !place.contains("://") {
+        return Ok(Arc::new(open_store(Path::new(place))?));
+    }
+    #[cfg(feature = "object-storage")]
+    return Ok(Arc::new(store::ObjectStore::open(place)?));
+    #[cfg(not(feature = "object-storage"))]
+    Err(StoreError::Io(format!(
+        "{place}: this program is built without object storage; build it with \
+         --features object-storage"
+    )))
 }
 
 /// Listens on an address. Connections that come faster than they are accepted wait in a long queue:

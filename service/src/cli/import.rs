@@ -10,6 +10,7 @@ use super::output;
 use crate::decode::{core_settings, map_import, records_of};
 use crate::journal::BlockWriter;
 use crate::service::open_store;
+use crate::store::Journal;
 use cogmap_proto::Name;
 use cognitive_map::CognitiveMap;
 
@@ -45,7 +46,7 @@ pub(super) fn run(args: &ImportArgs) -> anyhow::Result<()> {
         open_store(directory).with_context(|| format!("open the store {}", directory.display()))?;
     let settings = serde_json::to_vec(&import.settings)?;
     // An import that is cut short leaves no space behind.
-    let mut draft = store.journals().draft(&args.space, &settings)?;
+    let mut draft = store.draft(&args.space, &settings)?;
     let mut block = BlockWriter::new();
     for entries in import.entries.chunks(BLOCK_ENTRIES) {
         block.clear();

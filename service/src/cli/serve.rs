@@ -18,7 +18,7 @@ pub(super) fn run(args: &ConfigArgs) -> anyhow::Result<()> {
             tracing::info!(
                 http = %format_args!("http://{}", service.address()),
                 zenoh = ?config.zenoh.endpoints(),
-                store = %config.store.directory.display(),
+                store = %config.store.place(),
                 "serving"
             );
             interrupted().await?;

@@ -1,6 +1,6 @@
 //! `cogmap store`, `cogmap backup`, `cogmap restore`: the care of a store.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 
 use super::output;
 use crate::engine::{self, RepairReport};
-use crate::service::open_store;
+use crate::journal::samples_in;
+use crate::service::{open_store, store_at};
 use crate::store::{self, BackupReport, Damage, SpaceSurvey};
 
 #[derive(Debug, Subcommand)]
@@ -18,6 +19,9 @@ pub(super) enum StoreCommand {
     Verify(VerifyArgs),
     /// Make a new journal of the blocks of a damaged space that can be read. The old one is kept.
     Repair(RepairArgs),
+    /// Copy all spaces of a store into another one, and check what has come. No service may run on
+    /// either.
+    Copy(CopyArgs),
 }
 
 #[derive(Debug, Args)]
@@ -47,6 +51,16 @@ pub(super) struct RepairArgs {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct CopyArgs {
+    /// Directory or URL of the store.
+    #[arg(value_name = "FROM")]
+    from: String,
+    /// Directory or URL of the other one, which is made if it is not there.
+    #[arg(value_name = "TO")]
+    to: String,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct BackupArgs {
     /// Directory of the backup.
     #[arg(value_name = "BACKUP")]
@@ -60,7 +74,27 @@ pub(super) fn run(command: &StoreCommand) -> anyhow::Result<()> {
     match command {
         StoreCommand::Verify(args) => verify(args),
         StoreCommand::Repair(args) => repair(args),
+        StoreCommand::Copy(args) => copy(args),
     }
+}
+
+fn copy(args: &CopyArgs) -> anyhow::Result<()> {
+    // An empty directory would be made a store.
+    anyhow::ensure!(
+        args.from.contains("://") || !is_empty(Path::new(&args.from)),
+        "there is no store at {}",
+        args.from
+    );
+    let open = |place: &str| store_at(place).with_context(|| format!("open the store {place}"));
+    let (from, to) = (open(&args.from)?, open(&args.to)?);
+    let copied = store::copy(&*from, &*to, samples_in)?;
+    for space in copied {
+        output::line(&format!(
+            "{}: {} blocks with {} samples, check {:016x} on both ends",
+            space.name, space.extent.blocks, space.extent.samples, space.check
+        ))?;
+    }
+    Ok(())
 }
 
 fn verify(args: &VerifyArgs) -> anyhow::Result<()> {
@@ -167,8 +201,11 @@ fn in_words(damage: &Damage) -> String {
 fn repair(args: &RepairArgs) -> anyhow::Result<()> {
     let directory = &args.data_dir;
     // An empty directory would be made a store.
-    let is_empty = std::fs::read_dir(directory).map_or(true, |mut names| names.next().is_none());
-    anyhow::ensure!(!is_empty, "there is no store at {}", directory.display());
+    anyhow::ensure!(
+        !is_empty(directory),
+        "there is no store at {}",
+        directory.display()
+    );
     let store =
         open_store(directory).with_context(|| format!("open the store {}", directory.display()))?;
     let space = store.journals().space(&args.space)?;
@@ -181,6 +218,11 @@ fn repair(args: &RepairArgs) -> anyhow::Result<()> {
         Some(report) if args.json => output::json(&report),
         Some(report) => print_repair(&report),
     }
+}
+
+/// Whether a directory is empty or not there.
+fn is_empty(directory: &Path) -> bool {
+    std::fs::read_dir(directory).map_or(true, |mut names| names.next().is_none())
 }
 
 fn print_repair(report: &RepairReport) -> anyhow::Result<()> {

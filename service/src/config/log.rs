@@ -16,7 +16,7 @@ section! {
     /// What is logged, and how.
     pub struct LogConfig of "log" {
         /// Level, or directives by module, like `info,cogmap=debug`.
-        filter: String = "info,fjall=warn,lsm_tree=warn,zenoh=warn".to_owned(), FILTER;
+        filter: String = "info,fjall=warn,lsm_tree=warn,slatedb=warn,zenoh=warn".to_owned(), FILTER;
         /// Form of a line: for people, or one JSON object a line for machines.
         format: LogFormat = LogFormat::Text, any("text or json");
     }

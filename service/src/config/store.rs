@@ -11,15 +11,39 @@ const DIRECTORY: Rule<PathBuf> = Rule {
     shown: |_| "empty".to_owned(),
 };
 
+const URL: Rule<String> = Rule {
+    words: "a URL such as s3://bucket/prefix, or empty",
+    holds: |url| {
+        url.is_empty()
+            || url
+                .split_once("://")
+                .is_some_and(|(scheme, _)| !scheme.is_empty())
+    },
+    shown: String::clone,
+};
+
 section! {
     /// Settings of the store.
     pub struct StoreConfig of "store" {
         /// Directory of the store, relative to the working directory; created when it is not there.
         directory: PathBuf = PathBuf::from("cogmap-data"), DIRECTORY;
+        /// Object storage in place of the directory: `s3://bucket/prefix`, `gs://…`, `az://…` or
+        /// `file:///directory`. Region, endpoint and credentials come from the provider's own
+        /// environment variables. Only in builds with the feature `object-storage`.
+        url: String = String::new(), URL;
     }
 }
 
 impl StoreConfig {
+    /// Where the store is: its URL or its directory.
+    pub fn place(&self) -> String {
+        if self.url.is_empty() {
+            self.directory.display().to_string()
+        } else {
+            self.url.clone()
+        }
+    }
+
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         self.check_values()
     }

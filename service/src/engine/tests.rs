@@ -14,10 +14,12 @@ use proptest::prelude::*;
 use super::{Engine, EngineSettings, QuestionError, Readiness, Silent};
 use crate::decode::{core_settings, records_of, trajectory_interval_ns};
 use crate::journal::Entry;
-use crate::store::{Derived, Journal, LocalStore};
+use crate::store::{Derived, Journal, LocalStore, Store};
 
 mod faults;
 mod mangled;
+#[cfg(feature = "object-storage")]
+mod object_storage;
 mod relaxation;
 mod removal;
 mod settings;
@@ -80,7 +82,11 @@ fn drive() -> Vec<Sample> {
 }
 
 fn open(directory: &Path, settings: EngineSettings) -> Engine {
-    let store = Arc::new(LocalStore::open(directory).expect("the store opens"));
+    let store = LocalStore::open(directory).expect("the store opens");
+    open_over(Arc::new(store), settings)
+}
+
+fn open_over(store: Arc<dyn Store>, settings: EngineSettings) -> Engine {
     let engine = Engine::open(store, settings, Arc::new(Silent)).expect("the engine opens");
     let name = SPACE.parse().expect("a name");
     engine

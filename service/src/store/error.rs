@@ -34,6 +34,12 @@ pub enum StoreError {
     /// An earlier write failed; writes are refused until the service is restarted.
     #[error("the store refuses writes since an earlier failure ({0}); restart the service")]
     Broken(String),
+    /// Another process has opened the store; what it keeps is that one's now.
+    #[error("another service has taken over the store {0}: this one may write no more")]
+    Fenced(String),
+    /// The storage does not answer.
+    #[error("storage: {0}")]
+    Unreachable(String),
     /// The journal of a space is damaged, or a part of it is missing.
     #[error(transparent)]
     Damaged(Box<DamagedJournal>),

@@ -1,16 +1,21 @@
 //! The store: the journal, which is the ground state, and what is derived from it.
 //!
-//! Two ports, [`Journal`] and [`Derived`], and their embedded end ([`LocalStore`]). They share
-//! nothing on disk: whatever happens to derived state, it is dropped and made again from the
-//! journal. Everything else of the service speaks to the ports, and only the ends know a disk
-//! format.
+//! Two ports, [`Journal`] and [`Derived`], and their ends: the embedded one ([`LocalStore`]), and
+//! one on object storage (`ObjectStore`, with the feature `object-storage`). Whatever happens to
+//! derived state, it is dropped and made again from the journal. Everything else of the service
+//! speaks to the ports, and only the ends know a format.
 
 mod backup;
+mod copy;
 mod derived;
 mod error;
 mod format1;
 mod local;
 mod log;
+#[cfg(feature = "object-storage")]
+mod object;
+#[cfg(test)]
+mod suite;
 
 use cognitive_map::CheckpointPage;
 
@@ -22,12 +27,13 @@ pub const OPEN_FILES_MAX: usize = 2 * 256 + 2 * derived::CACHED_FILES_MAX;
 pub(crate) use local::disk_model;
 
 pub use backup::{BackupReport, SpaceBackup, backup, restore};
+pub use copy::{CopiedSpace, copy};
 pub use error::{DamagedJournal, DerivedError, StoreError};
 pub use format1::migrate;
-pub use local::{
-    Draft, FORMAT_VERSION, LocalJournal, LocalStore, Replacement, SpaceSurvey, verify,
-};
+pub use local::{FORMAT_VERSION, LocalJournal, LocalStore, Replacement, SpaceSurvey, verify};
 pub use log::{Damage, Extent, Flaw, Survey};
+#[cfg(feature = "object-storage")]
+pub use object::ObjectStore;
 
 /// A space as the store knows it. The number is never used again, the name may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -87,9 +93,10 @@ pub type Blocks<'a> = Box<dyn Iterator<Item = Result<(u64, Vec<u8>), StoreError>
 /// The port of a journal for each space. All methods may be called from any thread; each space has
 /// one writer.
 ///
-/// What [`Journal::append`] has written survives the process at once and a power cut after the next
-/// [`Journal::sync`] has returned. After an error of either the journal refuses all further
-/// changes ([`StoreError::DiskFull`] once more, or [`StoreError::Broken`]); reading goes on.
+/// What [`Journal::append`] has written survives the process and a power cut after the next
+/// [`Journal::sync`] has returned; on the embedded end it survives the process at once. After an
+/// error of either the journal refuses all further changes ([`StoreError::DiskFull`] or
+/// [`StoreError::Fenced`] once more, or [`StoreError::Broken`]); reading goes on.
 pub trait Journal: std::fmt::Debug + Send + Sync + 'static {
     /// The spaces, by number.
     ///
@@ -102,6 +109,12 @@ pub trait Journal: std::fmt::Debug + Send + Sync + 'static {
     /// # Errors
     /// The name is taken, or the journal cannot be written.
     fn create_space(&self, name: &str, settings: &[u8]) -> Result<SpaceNumber, StoreError>;
+
+    /// Begins a space that is in the store when it is finished, with all its blocks.
+    ///
+    /// # Errors
+    /// The name is taken, or the journal cannot be written.
+    fn draft<'a>(&'a self, name: &str, settings: &[u8]) -> Result<Box<dyn Draft + 'a>, StoreError>;
 
     /// Deletes a space durably, with all that belongs to it.
     ///
@@ -138,6 +151,22 @@ pub trait Journal: std::fmt::Debug + Send + Sync + 'static {
     /// The journal of a space from block `from` on: up to its end when asked, or to the first
     /// damage.
     fn journal(&self, space: SpaceNumber, from: u64) -> Blocks<'_>;
+}
+
+/// A space that is being written and that nobody sees. Dropped before it is finished, it leaves the
+/// store as it was; so does a crash.
+pub trait Draft: std::fmt::Debug {
+    /// Appends the next block, which holds `samples` samples.
+    ///
+    /// # Errors
+    /// The journal cannot be written.
+    fn append(&mut self, samples: u64, bytes: &[u8]) -> Result<(), StoreError>;
+
+    /// Puts the space into the store, durably and in one step. Returns its number.
+    ///
+    /// # Errors
+    /// The name has been taken meanwhile, or the journal cannot be written.
+    fn finish(self: Box<Self>) -> Result<SpaceNumber, StoreError>;
 }
 
 /// The port of what is derived from the journals: checkpoints and trajectories. A failure loses

@@ -7,8 +7,8 @@ use super::*;
 use crate::engine::{IngestError, Space};
 use crate::store::disk_model::{Cut, DiskModel, Failing};
 use crate::store::{
-    Blocks, Checkpoint, ChunkKey, DerivedError, OpenJournal, SpaceNumber, StoreError, StoredChunk,
-    StoredSpace,
+    Blocks, Checkpoint, ChunkKey, DerivedError, Draft, OpenJournal, SpaceNumber, StoreError,
+    StoredChunk, StoredSpace,
 };
 
 fn watermark(engine: &Engine) -> Watermark {
@@ -58,6 +58,10 @@ impl Journal for Treacherous {
 
     fn create_space(&self, name: &str, settings: &[u8]) -> Result<SpaceNumber, StoreError> {
         self.0.create_space(name, settings)
+    }
+
+    fn draft<'a>(&'a self, name: &str, settings: &[u8]) -> Result<Box<dyn Draft + 'a>, StoreError> {
+        self.0.draft(name, settings)
     }
 
     fn delete_space(&self, space: SpaceNumber) -> Result<(), StoreError> {

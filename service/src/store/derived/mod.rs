@@ -18,7 +18,7 @@
 //! written before is whole, and a checkpoint that is some blocks older costs a longer replay only.
 
 mod fault;
-mod keys;
+pub(super) mod keys;
 
 #[cfg(test)]
 mod tests;

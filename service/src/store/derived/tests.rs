@@ -40,39 +40,6 @@ fn open(directory: &Path) -> FjallDerived {
 }
 
 #[test]
-fn a_checkpoint_is_the_merge_of_its_writes() {
-    let directory = tempfile::tempdir().unwrap();
-    let store = open(directory.path());
-    let (space, other) = (SpaceNumber(3), SpaceNumber(4));
-    assert!(store.checkpoint(space).unwrap().is_none());
-    let first = vec![page(0, 0, b"a0"), page(0, 256, b"a256"), page(1, 0, b"b0")];
-    let write = |store: &FjallDerived, space, state| store.write_checkpoint(space, &state).unwrap();
-    write(&store, space, checkpoint(10, b"r1", first));
-    // A page of no bytes is none: it removes what was stored.
-    let second = vec![page(0, 256, b"A256"), page(1, 0, b""), page(2, 7, b"")];
-    write(&store, space, checkpoint(20, b"r2", second));
-    write(&store, other, checkpoint(5, b"", vec![page(0, 0, b"z")]));
-    write(&store, space, checkpoint(u64::MAX, b"", Vec::new()));
-    drop(store);
-
-    let store = open(directory.path());
-    let merged = store.checkpoint(space).unwrap().unwrap();
-    assert_eq!(
-        (merged.next_block, &*merged.recorders),
-        (u64::MAX, &b""[..])
-    );
-    let expected: [(u8, u32, &[u8]); 2] = [(0, 0, b"a0"), (0, 256, b"A256")];
-    assert_eq!(contents(&merged), expected);
-
-    store.forget(space).unwrap();
-    assert!(store.checkpoint(space).unwrap().is_none());
-    assert!(store.checkpoint(other).unwrap().is_some());
-    write(&store, space, checkpoint(1, b"", vec![page(0, 1, b"new")]));
-    let read = store.checkpoint(space).unwrap().unwrap();
-    assert_eq!(contents(&read), [(0, 1, &b"new"[..])]);
-}
-
-#[test]
 fn a_space_that_is_gone_is_dropped_when_the_store_is_opened() {
     let directory = tempfile::tempdir().unwrap();
     let store = open(directory.path());
@@ -84,44 +51,6 @@ fn a_space_that_is_gone_is_dropped_when_the_store_is_opened() {
     drop(FjallDerived::open(&path, [SpaceNumber(4)].into_iter()).unwrap());
     let store = open(directory.path());
     assert_eq!(store.chunks(SpaceNumber(3), 0, 0, 0, 1).unwrap(), []);
-}
-
-#[test]
-fn chunks_start_at_the_last_one_that_begins_at_or_before() {
-    let directory = tempfile::tempdir().unwrap();
-    let store = open(directory.path());
-    let space = SpaceNumber(0);
-    let stamps = [i64::MIN, -256, -1, 0, 1, 300, i64::MAX];
-    // Backwards, so that the order is the store's own.
-    for stamp in stamps.into_iter().rev() {
-        let bytes = stamp.to_string();
-        let put = store.put_chunk(space, chunk_key(7, 2, stamp), bytes.as_bytes());
-        put.unwrap();
-    }
-    for neighbour in [chunk_key(7, 1, 0), chunk_key(7, 3, 0), chunk_key(6, 2, 0)] {
-        store.put_chunk(space, neighbour, b"other").unwrap();
-    }
-    let read = |from_ns, limit| -> Vec<i64> {
-        let chunks = store.chunks(space, 7, 2, from_ns, limit).unwrap();
-        for (key, bytes) in &chunks {
-            assert_eq!((key.agent, key.session), (7, 2));
-            assert_eq!(*bytes, key.first_stamp_ns.to_string().into_bytes());
-        }
-        let stamps = chunks.iter().map(|(key, _)| key.first_stamp_ns);
-        stamps.collect()
-    };
-    assert_eq!(read(i64::MIN, 100), stamps);
-    assert_eq!(read(0, 100), stamps[3..]);
-    assert_eq!(read(-2, 100), stamps[1..]);
-    assert_eq!(read(299, 2), stamps[4..6]);
-    assert_eq!(read(i64::MAX, 100), [i64::MAX]);
-    assert_eq!(read(0, 0), [0; 0]);
-    // One that begins after the instant is found when none begins before.
-    store.put_chunk(space, chunk_key(1, 1, 50), b"old").unwrap();
-    store.put_chunk(space, chunk_key(1, 1, 50), b"new").unwrap();
-    let chunks = store.chunks(space, 1, 1, -50, 10).unwrap();
-    assert_eq!(chunks, [(chunk_key(1, 1, 50), b"new".to_vec())]);
-    assert_eq!(store.chunks(space, 1, 9, 0, 10).unwrap(), []);
 }
 
 #[test]

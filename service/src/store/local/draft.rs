@@ -3,15 +3,14 @@
 use std::path::PathBuf;
 
 use super::super::log::SpaceLog;
-use super::super::{SpaceNumber, StoreError, StoredSpace};
+use super::super::{Draft, SpaceNumber, StoreError, StoredSpace};
 use super::opening::set_aside;
 use super::record::{self, SpaceRecord};
 use super::{LocalJournal, files};
 
-/// A new space and its journal, in the store as soon as it is finished. Dropped before, it leaves
-/// the store as it was; so does a crash.
+/// A new space and its journal, under an unfinished name.
 #[derive(Debug)]
-pub struct Draft<'a> {
+pub(super) struct LocalDraft<'a> {
     journal: &'a LocalJournal,
     record: SpaceRecord,
     unfinished: PathBuf,
@@ -21,21 +20,11 @@ pub struct Draft<'a> {
 /// A draft of a space with another journal, which takes the place of the present one.
 #[derive(Debug)]
 pub struct Replacement<'a> {
-    draft: Draft<'a>,
+    draft: LocalDraft<'a>,
     replaced: SpaceNumber,
 }
 
 impl LocalJournal {
-    /// Begins a space.
-    ///
-    /// # Errors
-    /// The name is taken, or the store cannot be written.
-    pub fn draft(&self, name: &str, settings: &[u8]) -> Result<Draft<'_>, StoreError> {
-        let _changing = self.lock_spaces();
-        self.refuse_taken(name)?;
-        self.begin(name, Some(settings), None)
-    }
-
     /// Begins a journal in the place of that of a space, with its name and settings.
     ///
     /// # Errors
@@ -53,7 +42,7 @@ impl LocalJournal {
         name: &str,
         settings: Option<&[u8]>,
         replaces: Option<SpaceNumber>,
-    ) -> Result<Draft<'_>, StoreError> {
+    ) -> Result<LocalDraft<'_>, StoreError> {
         self.refuse_if_broken()?;
         let space = StoredSpace {
             number: self.take_number()?,
@@ -62,7 +51,7 @@ impl LocalJournal {
         };
         let record = SpaceRecord { space, replaces };
         let (unfinished, log) = self.begin_space(&record)?;
-        Ok(Draft {
+        Ok(LocalDraft {
             journal: self,
             record,
             unfinished,
@@ -71,28 +60,7 @@ impl LocalJournal {
     }
 }
 
-impl Draft<'_> {
-    /// Appends the next block, which holds `samples` samples.
-    ///
-    /// # Errors
-    /// The store cannot be written.
-    pub fn append(&mut self, samples: u64, bytes: &[u8]) -> Result<(), StoreError> {
-        let block = self.log.appended().blocks;
-        let write = || self.log.append(block, samples, bytes);
-        self.journal.change(&self.unfinished, write)
-    }
-
-    /// Puts the space into the store, durably and in one step. Returns its number.
-    ///
-    /// # Errors
-    /// The name has been taken meanwhile, or the store cannot be written.
-    pub fn finish(self) -> Result<SpaceNumber, StoreError> {
-        let journal = self.journal;
-        let _changing = journal.lock_spaces();
-        journal.refuse_taken(&self.record.space.name)?;
-        self.publish()
-    }
-
+impl LocalDraft<'_> {
     /// Finishes it; whoever calls holds the list of spaces.
     pub(super) fn publish(&self) -> Result<SpaceNumber, StoreError> {
         let number = self.record.space.number;
@@ -105,6 +73,20 @@ impl Draft<'_> {
             files::rename(&self.unfinished, &directory)
         })?;
         Ok(number)
+    }
+}
+
+impl Draft for LocalDraft<'_> {
+    fn append(&mut self, samples: u64, bytes: &[u8]) -> Result<(), StoreError> {
+        let block = self.log.appended().blocks;
+        let write = || self.log.append(block, samples, bytes);
+        self.journal.change(&self.unfinished, write)
+    }
+
+    fn finish(self: Box<Self>) -> Result<SpaceNumber, StoreError> {
+        let _changing = self.journal.lock_spaces();
+        self.journal.refuse_taken(&self.record.space.name)?;
+        self.publish()
     }
 }
 

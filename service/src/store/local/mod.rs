@@ -46,12 +46,13 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::log::{Item, LogReader, Pending, SpaceLog, Survey, create_mark, read_mark};
 use super::{
-    Blocks, DamagedJournal, Extent, Journal, OpenJournal, SpaceNumber, StoreError, StoredSpace,
+    Blocks, DamagedJournal, Draft, Extent, Journal, OpenJournal, SpaceNumber, StoreError,
+    StoredSpace,
 };
 use record::{Found, SpaceRecord};
 use syncing::{Logs, MarkSync, sync_all};
 
-pub use draft::{Draft, Replacement};
+pub use draft::Replacement;
 pub(super) use opening::{is_store as is_local_store, lock, refuse_foreign};
 pub use store::LocalStore;
 pub use survey::{SpaceSurvey, verify};
@@ -261,6 +262,12 @@ impl Journal for LocalJournal {
         let _changing = self.lock_spaces();
         self.refuse_taken(name)?;
         self.begin(name, Some(settings), None)?.publish()
+    }
+
+    fn draft<'a>(&'a self, name: &str, settings: &[u8]) -> Result<Box<dyn Draft + 'a>, StoreError> {
+        let _changing = self.lock_spaces();
+        self.refuse_taken(name)?;
+        Ok(Box::new(self.begin(name, Some(settings), None)?))
     }
 
     fn delete_space(&self, space: SpaceNumber) -> Result<(), StoreError> {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::derived::FjallDerived;
 use super::super::{
-    Blocks, Checkpoint, ChunkKey, Derived, DerivedError, Journal, OpenJournal, SpaceNumber,
+    Blocks, Checkpoint, ChunkKey, Derived, DerivedError, Draft, Journal, OpenJournal, SpaceNumber,
     StoreError, StoredChunk, StoredSpace,
 };
 use super::{LocalJournal, opening};
@@ -55,6 +55,10 @@ impl Journal for LocalStore {
 
     fn create_space(&self, name: &str, settings: &[u8]) -> Result<SpaceNumber, StoreError> {
         self.journal.create_space(name, settings)
+    }
+
+    fn draft<'a>(&'a self, name: &str, settings: &[u8]) -> Result<Box<dyn Draft + 'a>, StoreError> {
+        self.journal.draft(name, settings)
     }
 
     fn delete_space(&self, space: SpaceNumber) -> Result<(), StoreError> {

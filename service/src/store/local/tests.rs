@@ -8,6 +8,8 @@ use tempfile::TempDir;
 use super::*;
 use crate::store::{Checkpoint, ChunkKey, Derived};
 
+crate::store::suite::suite!(|directory| Box::new(LocalStore::open(directory).unwrap()));
+
 pub(super) fn directory() -> TempDir {
     tempfile::tempdir().unwrap()
 }
@@ -50,76 +52,6 @@ fn bytes_below(directory: &Path) -> u64 {
         }
     });
     sizes.sum()
-}
-
-#[test]
-fn spaces_are_listed_by_number_with_name_and_settings() {
-    let directory = directory();
-    let store = LocalStore::open(directory.path()).unwrap();
-    assert_eq!(store.spaces().unwrap(), []);
-    // Past ten, where the order of the decimal names is not that of the numbers.
-    for i in 0..12_u8 {
-        let number = store.create_space(&format!("hall-{i}"), &[i; 3]).unwrap();
-        assert_eq!(number, SpaceNumber(u32::from(i)));
-    }
-    let spaces = store.spaces().unwrap();
-    assert!(spaces.is_sorted_by_key(|space| space.number));
-    assert_eq!(
-        spaces[11],
-        StoredSpace {
-            number: SpaceNumber(11),
-            name: "hall-11".to_owned(),
-            settings: Some(vec![11; 3]),
-        }
-    );
-}
-
-#[test]
-fn a_name_is_taken_once_and_may_be_anything() {
-    let directory = directory();
-    let store = LocalStore::open(directory.path()).unwrap();
-    for name in ["", "a/b", "L\u{fc}beck", "../0"] {
-        store.create_space(name, &[]).unwrap();
-        let again = store.create_space(name, &[]);
-        assert!(matches!(again, Err(StoreError::SpaceExists(taken)) if taken == name));
-    }
-    assert_eq!(store.spaces().unwrap().len(), 4);
-    // Refusing a name is not a failed write.
-    store.create_space("new", &[]).unwrap();
-}
-
-#[test]
-fn the_journal_comes_back_in_order_and_by_space() {
-    let directory = directory();
-    let store = LocalStore::open(directory.path()).unwrap();
-    let spaces = ["a", "b", "c"].map(|name| store.create_space(name, b"").unwrap());
-    let block = |space: SpaceNumber, number: u64| {
-        let length = if number.is_multiple_of(7) { 5000 } else { 20 };
-        vec![u8::try_from((number + u64::from(space.0)) % 251).unwrap(); length]
-    };
-    for space in spaces {
-        assert_eq!(store.open_journal(space).unwrap().extent, Extent::default());
-    }
-    for number in 0..600 {
-        for space in spaces {
-            store
-                .append(space, number, 2, &block(space, number))
-                .unwrap();
-        }
-    }
-    store.sync().unwrap();
-    for space in spaces {
-        let expected: Vec<_> = (0..600).map(|n| (n, block(space, n))).collect();
-        assert_eq!(blocks(&store, space, 0), expected);
-        assert_eq!(blocks(&store, space, 255), expected[255..]);
-        assert_eq!(blocks(&store, space, 600), []);
-        let extent = store.open_journal(space).unwrap().extent;
-        assert_eq!((extent.blocks, extent.samples), (600, 1200));
-    }
-    let mut reading = store.journal(spaces[0], 599);
-    store.append(spaces[0], 600, 0, b"later").unwrap();
-    assert_eq!(reading.next().unwrap().unwrap().0, 599);
-    assert!(reading.next().is_none(), "the journal as it was when asked");
 }
 
 #[test]
@@ -238,40 +170,6 @@ fn a_directory_with_other_things_in_it_is_left_alone() {
     let opened = LocalStore::open(&file);
     assert!(matches!(opened, Err(StoreError::Io(_))), "{opened:?}");
     assert_eq!(fs::read(file).unwrap(), b"important");
-}
-
-#[test]
-fn a_draft_is_in_the_store_when_it_is_finished() {
-    let directory = directory();
-    let store = LocalStore::open(directory.path()).unwrap();
-    let mut given_up = store.journals().draft("hall", b"{}").unwrap();
-    given_up.append(0, b"block").unwrap();
-    drop(given_up);
-    let mut late = store.journals().draft("hall", b"{}").unwrap();
-    late.append(0, b"late").unwrap();
-    let mut draft = store.journals().draft("hall", b"{}").unwrap();
-    draft.append(0, b"first").unwrap();
-    assert!(store.spaces().unwrap().is_empty());
-    let number = draft.finish().unwrap();
-    let taken = late.finish();
-    assert!(
-        matches!(taken, Err(StoreError::SpaceExists(_))),
-        "{taken:?}"
-    );
-    let taken = store.journals().draft("hall", b"{}");
-    assert!(
-        matches!(taken, Err(StoreError::SpaceExists(_))),
-        "{taken:?}"
-    );
-    assert_eq!(store.open_journal(number).unwrap().extent.blocks, 1);
-    drop(store);
-    let store = LocalStore::open(directory.path()).unwrap();
-    assert_eq!(store.spaces().unwrap().len(), 1);
-    let blocks: Vec<_> = store
-        .journal(number, 0)
-        .map(|block| block.unwrap().1)
-        .collect();
-    assert_eq!(blocks, [b"first"]);
 }
 
 #[test]
