@@ -65,6 +65,7 @@ test-python: $(VENV)/installed ## types and tests of the Python client, then the
 	cd tests/scorecard && $(VENV)/bin/mypy --strict .
 	cd tests/wheels && $(VENV)/bin/mypy --strict .
 	cd tests/image && $(VENV)/bin/mypy --strict .
+	cd tests/object_storage && $(VENV)/bin/mypy --strict .
 	cd $(CLIENT) && $(VENV)/bin/pytest
 	$(VENV)/bin/pytest tests/scorecard
 	$(VENV)/bin/pytest tests/python
@@ -228,6 +229,14 @@ ifeq ($(BASES),local)
 endif
 	BUILDAH_FORMAT=docker $(ENGINE) build --file docker/Dockerfile --tag cogmap $(BUILD_ARGS) .
 	ENGINE='$(ENGINE)' IMAGE=cogmap $(VENV)/bin/pytest tests/image
+
+# Beside the gate, which tries the same store in a directory: the S3 server is a large package.
+.PHONY: object-storage-check
+object-storage-check: $(VENV)/installed ## services over a real S3 server: kills, take-overs, a storage that stands still
+	cargo build $(ALL)
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check \
+	    --requirement tests/object_storage/requirements.txt
+	$(VENV)/bin/pytest tests/object_storage
 
 .PHONY: docs
 docs: ## documentation of the crates, in target/doc
