@@ -247,7 +247,7 @@ fn open_engine(
     let store: Arc<dyn Store> = if config.store.url.is_empty() {
         Arc::new(open_store(&config.store.directory).map_err(of_store)?)
     } else {
-        store_at(&place).map_err(of_store)?
+        store_at(&place, true).map_err(of_store)?
     };
     let stored = store.spaces().map_err(of_store)?;
     let name_lost = stored.iter().any(|space| space.settings.is_none());
@@ -291,16 +291,26 @@ pub fn open_store(directory: &Path) -> Result<LocalStore, StoreError> {
     LocalStore::open(directory)
 }
 
-/// Opens the store at a URL or in a directory.
+/// Opens the store at a URL or in a directory, and creates it where there is none, if so wanted.
 ///
 /// # Errors
-/// See [`open_store`] and `ObjectStore::open`; this build may have no object storage.
-pub fn store_at(place: &str) -> Result<Arc<dyn Store>, StoreError> {
+/// See [`open_store`] and `ObjectStore::open`; there is none, or this build has no object storage.
+pub fn store_at(place: &str, creates: bool) -> Result<Arc<dyn Store>, StoreError> {
     if !place.contains("://") {
-        return Ok(Arc::new(open_store(Path::new(place))?));
+        let directory = Path::new(place);
+        // An empty directory would be made a store.
+        let mut names = std::fs::read_dir(directory).into_iter().flatten();
+        if !creates && names.next().is_none() {
+            return Err(StoreError::Io(format!("there is no store at {place}")));
+        }
+        return Ok(Arc::new(open_store(directory)?));
     }
     #[cfg(feature = "object-storage")]
-    return Ok(Arc::new(store::ObjectStore::open(place)?));
+    return Ok(if creates {
+        Arc::new(store::ObjectStore::open(place)?)
+    } else {
+        Arc::new(store::ObjectStore::open_existing(place)?)
+    });
     #[cfg(not(feature = "object-storage"))]
     Err(StoreError::Io(format!(
         "{place}: this program is built without object storage; build it with \

@@ -1,6 +1,6 @@
 //! `cogmap store`, `cogmap backup`, `cogmap restore`: the care of a store.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
@@ -79,14 +79,10 @@ pub(super) fn run(command: &StoreCommand) -> anyhow::Result<()> {
 }
 
 fn copy(args: &CopyArgs) -> anyhow::Result<()> {
-    // An empty directory would be made a store.
-    anyhow::ensure!(
-        args.from.contains("://") || !is_empty(Path::new(&args.from)),
-        "there is no store at {}",
-        args.from
-    );
-    let open = |place: &str| store_at(place).with_context(|| format!("open the store {place}"));
-    let (from, to) = (open(&args.from)?, open(&args.to)?);
+    let open = |place: &str, creates: bool| {
+        store_at(place, creates).with_context(|| format!("open the store {place}"))
+    };
+    let (from, to) = (open(&args.from, false)?, open(&args.to, true)?);
     let copied = store::copy(&*from, &*to, samples_in)?;
     for space in copied {
         output::line(&format!(
@@ -201,11 +197,8 @@ fn in_words(damage: &Damage) -> String {
 fn repair(args: &RepairArgs) -> anyhow::Result<()> {
     let directory = &args.data_dir;
     // An empty directory would be made a store.
-    anyhow::ensure!(
-        !is_empty(directory),
-        "there is no store at {}",
-        directory.display()
-    );
+    let is_empty = std::fs::read_dir(directory).map_or(true, |mut names| names.next().is_none());
+    anyhow::ensure!(!is_empty, "there is no store at {}", directory.display());
     let store =
         open_store(directory).with_context(|| format!("open the store {}", directory.display()))?;
     let space = store.journals().space(&args.space)?;
@@ -218,11 +211,6 @@ fn repair(args: &RepairArgs) -> anyhow::Result<()> {
         Some(report) if args.json => output::json(&report),
         Some(report) => print_repair(&report),
     }
-}
-
-/// Whether a directory is empty or not there.
-fn is_empty(directory: &Path) -> bool {
-    std::fs::read_dir(directory).map_or(true, |mut names| names.next().is_none())
 }
 
 fn print_repair(report: &RepairReport) -> anyhow::Result<()> {

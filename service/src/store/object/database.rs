@@ -38,11 +38,15 @@ impl std::fmt::Debug for Database {
 }
 
 impl Database {
-    /// Tries the storage, and opens the database there.
-    pub(super) fn open(url: &str) -> Result<Self, StoreError> {
+    /// Tries the storage, and opens the database there. Where there is none it is created, if so
+    /// wanted.
+    pub(super) fn open(url: &str, creates: bool) -> Result<Self, StoreError> {
         let runtime = Runtime::start()?;
         let location = Location::parse(url)?;
         let opening = async {
+            if !creates && location.is_empty().await? {
+                return Err(StoreError::Io(format!("there is no store at {location}")));
+            }
             location.probe().await?;
             let db = Db::builder(location.prefix().clone(), location.storage())
                 .with_settings(settings())

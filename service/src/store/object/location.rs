@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use futures_util::StreamExt;
 use futures_util::future::join_all;
 use slatedb::object_store::local::LocalFileSystem;
 use slatedb::object_store::path::Path;
@@ -62,6 +63,16 @@ impl Location {
     /// What all objects of the store begin with.
     pub(super) fn prefix(&self) -> &Path {
         &self.prefix
+    }
+
+    /// Whether nothing is there.
+    pub(super) async fn is_empty(&self) -> Result<bool, StoreError> {
+        let first = self.storage.list(Some(&self.prefix)).next().await;
+        match first {
+            None => Ok(true),
+            Some(Ok(_)) => Ok(false),
+            Some(Err(error)) => Err(StoreError::Unreachable(format!("{self}: {error}"))),
+        }
     }
 
     /// Lets some create the same object at once. Where more than one may, two owners would

@@ -65,8 +65,20 @@ impl ObjectStore {
     /// [`StoreError::Io`] when the URL names no store or the storage does not keep what it
     /// promises, [`StoreError::Unreachable`], [`StoreError::NewerFormat`].
     pub fn open(url: &str) -> Result<Self, StoreError> {
+        Self::over(Database::open(url, true)?)
+    }
+
+    /// Opens the store at a URL, where there is one.
+    ///
+    /// # Errors
+    /// Those of [`ObjectStore::open`], and [`StoreError::Io`] where there is none.
+    pub fn open_existing(url: &str) -> Result<Self, StoreError> {
+        Self::over(Database::open(url, false)?)
+    }
+
+    fn over(database: Database) -> Result<Self, StoreError> {
         let store = Self {
-            database: Database::open(url)?,
+            database,
             changing: Mutex::default(),
             open: Mutex::default(),
         };

@@ -72,6 +72,16 @@ fn a_deletion_that_a_crash_cut_short_is_finished() {
 }
 
 #[test]
+fn where_nothing_is_no_store_is_made_unless_so_wanted() {
+    let directory = tempfile::tempdir().unwrap();
+    let opened = ObjectStore::open_existing(&url(directory.path()));
+    assert!(matches!(&opened, Err(StoreError::Io(text)) if text.contains("no store")));
+    assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
+    drop(open(directory.path()));
+    ObjectStore::open_existing(&url(directory.path())).unwrap();
+}
+
+#[test]
 fn a_newer_format_and_nonsense_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let store = open(directory.path());
