@@ -312,10 +312,10 @@ pub fn store_at(place: &str, creates: bool) -> Result<Arc<dyn Store>, StoreError
         Arc::new(store::ObjectStore::open_existing(place)?)
     });
     #[cfg(not(feature = "object-storage"))]
-    Err(StoreError::Io(format!(
-        "{place}: this program is built without object storage; build it with \
-         --features object-storage"
-    )))
+    Err(StoreError::Io(
+        "this program is built without object storage; build it with --features object-storage"
+            .to_owned(),
+    ))
 }
 
 /// Listens on an address. Connections that come faster than they are accepted wait in a long queue:

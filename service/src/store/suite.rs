@@ -52,7 +52,7 @@ fn fill(store: &dyn Store, space: SpaceNumber, count: u64) {
     store.sync().unwrap();
 }
 
-fn key(agent: u32, session: u64, first_stamp_ns: i64) -> ChunkKey {
+pub(super) fn key(agent: u32, session: u64, first_stamp_ns: i64) -> ChunkKey {
     ChunkKey {
         agent,
         session,
@@ -60,12 +60,16 @@ fn key(agent: u32, session: u64, first_stamp_ns: i64) -> ChunkKey {
     }
 }
 
-fn page(kind: u8, index: u32, bytes: &[u8]) -> CheckpointPage {
+pub(super) fn page(kind: u8, index: u32, bytes: &[u8]) -> CheckpointPage {
     let bytes = bytes.to_vec();
     CheckpointPage { kind, index, bytes }
 }
 
-fn checkpoint(next_block: u64, recorders: &[u8], pages: Vec<CheckpointPage>) -> Checkpoint {
+pub(super) fn checkpoint(
+    next_block: u64,
+    recorders: &[u8],
+    pages: Vec<CheckpointPage>,
+) -> Checkpoint {
     Checkpoint {
         next_block,
         pages,

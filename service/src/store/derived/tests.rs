@@ -3,28 +3,8 @@
 use std::fs;
 
 use super::super::Derived;
+use super::super::suite::{checkpoint, key as chunk_key, page};
 use super::*;
-
-fn chunk_key(agent: u32, session: u64, first_stamp_ns: i64) -> ChunkKey {
-    ChunkKey {
-        agent,
-        session,
-        first_stamp_ns,
-    }
-}
-
-fn page(kind: u8, index: u32, bytes: &[u8]) -> CheckpointPage {
-    let bytes = bytes.to_vec();
-    CheckpointPage { kind, index, bytes }
-}
-
-fn checkpoint(next_block: u64, recorders: &[u8], pages: Vec<CheckpointPage>) -> Checkpoint {
-    Checkpoint {
-        next_block,
-        pages,
-        recorders: recorders.to_vec(),
-    }
-}
 
 /// Kind, index and bytes of each page.
 fn contents(checkpoint: &Checkpoint) -> Vec<(u8, u32, &[u8])> {

@@ -68,8 +68,8 @@ impl LocalDraft<'_> {
         self.journal.change(&self.unfinished, || {
             if let Some(pending) = self.log.pending() {
                 self.log.sync(&pending)?;
-                self.log.sync_mark()?;
             }
+            self.log.sync_mark()?;
             files::rename(&self.unfinished, &directory)
         })?;
         Ok(number)
