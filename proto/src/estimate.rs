@@ -50,4 +50,9 @@ pub struct Estimate {
     pub place: Option<u64>,
     /// Its confidence, in \[0, 1\]; 0 without a place.
     pub confidence: f64,
+    /// Number of the owner of the space's journal that made it: each later owner has a larger one;
+    /// 0 on one machine. An estimate with a smaller term than the largest that was heard of the
+    /// agent is outdated.
+    #[serde(default)]
+    pub term: u64,
 }

@@ -21,6 +21,12 @@ pub struct Watermark {
     pub gap: Option<SeqRange>,
     /// Samples refused for good, the latest few.
     pub rejected: Vec<Rejection>,
+    /// Number of the owner of the space's journal that wrote it: each later owner has a larger one;
+    /// 0 on one machine. A watermark with a smaller term than the largest that was heard of the
+    /// agent is outdated. From one term to the next `applied` may go back, and `durable` never
+    /// does.
+    #[serde(default)]
+    pub term: u64,
 }
 
 /// The sequence numbers from `from` up to but without `to`.

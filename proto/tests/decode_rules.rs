@@ -2,8 +2,9 @@
 
 use cogmap_proto::limits::{BATCH_SAMPLES_MAX, LOCALIZE_SAMPLES_MAX, MESSAGE_BYTES_MAX};
 use cogmap_proto::{
-    Codec, DecodeError, Descriptor, Increment, Level, LocalizeQuery, Marker, RecallQuery, Relation,
-    Sample, SampleBatch, SampleBody, SpaceSettings, StartPose, Velocity, WatermarkQuery,
+    Codec, DecodeError, Descriptor, Estimate, Increment, Level, LocalizeQuery, Marker, RecallQuery,
+    Relation, Sample, SampleBatch, SampleBody, SpaceSettings, StartPose, Velocity, Watermark,
+    WatermarkQuery,
 };
 
 const CODECS: [Codec; 3] = [Codec::Postcard, Codec::Cbor, Codec::Json];
@@ -470,4 +471,25 @@ fn nesting_is_bounded() {
         assert_malformed(&cbor(200), "CBOR");
         assert_malformed(&cbor(MESSAGE_BYTES_MAX / 3), "CBOR");
     }
+}
+
+#[test]
+fn an_estimate_and_a_watermark_without_a_term_are_of_term_0() {
+    fn read<T: serde::de::DeserializeOwned>(json: &str) -> [T; 2] {
+        let value: serde_json::Value = serde_json::from_str(json).expect("the tests write JSON");
+        let cbor = Codec::Cbor.encode(&value);
+        [
+            Codec::Json.decode(json.as_bytes()).expect("a message"),
+            Codec::Cbor.decode(&cbor).expect("a message"),
+        ]
+    }
+    let watermark = r#"{"session":5,"durable":3,"applied":3,"gap":null,"rejected":[]}"#;
+    let estimate = format!(
+        r#"{{"space":"lab","agent":"ada","session":5,"seq":2,"stamp_ns":9,"frame":"map",
+            "map_revision":4,"status":"localized","translation_m":[0,0,0],
+            "rotation_xyzw":[0,0,0,1],"covariance":{:?},"place":null,"confidence":0}}"#,
+        [0; 21]
+    );
+    assert_eq!(read::<Watermark>(watermark).map(|mark| mark.term), [0, 0]);
+    assert_eq!(read::<Estimate>(&estimate).map(|one| one.term), [0, 0]);
 }

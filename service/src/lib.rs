@@ -6,6 +6,7 @@
 
 pub mod answer;
 pub mod cli;
+pub mod cluster;
 pub mod config;
 pub mod decode;
 mod descriptors;

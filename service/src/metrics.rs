@@ -86,6 +86,17 @@ pub const HTTP_REQUEST_SECONDS: &str = "cogmap_http_request_seconds";
 pub const HTTP_CLOSED_CONNECTIONS: &str = "cogmap_http_closed_connections_total";
 /// Event streams open now.
 pub const HTTP_STREAMS: &str = "cogmap_http_streams";
+/// Nodes of the cluster that take part, this one among them.
+pub const CLUSTER_NODES: &str = "cogmap_cluster_nodes";
+/// Shards that are open here.
+pub const SHARDS_OPEN: &str = "cogmap_shards_open";
+/// Shards that this node has opened.
+pub const SHARDS_OPENED: &str = "cogmap_shards_opened_total";
+/// Shards that this node has closed; label `reason` (`moved`, `lost` to another node or by a
+/// failure).
+pub const SHARDS_CLOSED: &str = "cogmap_shards_closed_total";
+/// Requests that were passed on to other nodes; label `result` (`answered`, `failed`).
+pub const FORWARDED_REQUESTS: &str = "cogmap_forwarded_requests_total";
 /// Agents of a space by how they are localised; labels `space`, `status` (`localized`, `uncertain`,
 /// `lost`, or `new` before the first sample).
 pub const AGENTS_BY_STATUS: &str = "cogmap_agents_by_status";
@@ -186,6 +197,7 @@ fn describe() {
     describe_samples();
     describe_memory();
     describe_http();
+    describe_cluster();
     describe_states();
 }
 
@@ -293,6 +305,19 @@ fn describe_http() {
         "HTTP connections that the service closed, by reason"
     );
     describe_gauge!(HTTP_STREAMS, Unit::Count, "Event streams open now");
+}
+
+/// Tells the recorder what the metrics of the cluster mean.
+fn describe_cluster() {
+    describe_gauge!(CLUSTER_NODES, Unit::Count, "Nodes that take part");
+    describe_gauge!(SHARDS_OPEN, Unit::Count, "Shards that are open here");
+    describe_counter!(SHARDS_OPENED, Unit::Count, "Shards opened");
+    describe_counter!(SHARDS_CLOSED, Unit::Count, "Shards closed, by reason");
+    describe_counter!(
+        FORWARDED_REQUESTS,
+        Unit::Count,
+        "Requests passed on to other nodes"
+    );
 }
 
 /// Tells the recorder what the metrics of the agents' and the process's state mean.

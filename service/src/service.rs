@@ -1,7 +1,8 @@
 //! The composition root: the whole service from its settings.
 
+mod opening;
+
 use std::net::SocketAddr;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -15,12 +16,16 @@ use crate::config::{Config, ConfigError};
 use crate::decode::core_settings;
 use crate::descriptors::{self, Shares};
 use crate::engine::{Engine, Publisher, Silent, SpaceError};
-use crate::http::{self, HttpSettings};
-use crate::journal;
+use crate::http::{self, HttpSettings, Served};
 use crate::metrics;
 use crate::ports;
-use crate::store::{self, LocalStore, Store, StoreError};
-use crate::transport::{self, Intake, TransportError, TransportSettings, ZenohPublisher};
+use crate::store::StoreError;
+use crate::transport::{
+    self, Intake, IntakeOfSpaces, TransportError, TransportSettings, ZenohPublisher,
+};
+
+use opening::Opened;
+pub use opening::{open_store, store_at};
 
 /// Longest wait for the Zenoh session to close.
 const SESSION_CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -32,14 +37,37 @@ const ZENOH_HANDSHAKES_MAX: usize = 128;
 /// A running service.
 #[derive(Debug)]
 pub struct Service {
-    engine: Engine,
+    opened: Opened,
     address: SocketAddr,
     session: Option<Session>,
     publisher: Option<Arc<ZenohPublisher>>,
-    intake: Option<Intake>,
+    intake: Option<Doors>,
     stop_http: oneshot::Sender<()>,
     http: JoinHandle<std::io::Result<()>>,
     upkeep: [JoinHandle<()>; 2],
+}
+
+/// Where samples and queries come in over Zenoh. Dropping it closes them.
+#[derive(Debug)]
+enum Doors {
+    /// Those of all spaces.
+    All { _intake: Intake },
+    /// Those of the spaces that are here, in a cluster.
+    OfSpaces { _intake: IntakeOfSpaces },
+}
+
+impl Doors {
+    async fn open(session: &Session, served: &Served) -> Result<Self, TransportError> {
+        Ok(if served.cluster.is_some() {
+            Self::OfSpaces {
+                _intake: IntakeOfSpaces::start(session, &served.engine),
+            }
+        } else {
+            Self::All {
+                _intake: Intake::start(session, &served.engine).await?,
+            }
+        })
+    }
 }
 
 /// Why the service does not start.
@@ -116,9 +144,14 @@ impl Service {
         }
         let address = listener.local_addr().map_err(of_http)?;
         let (session, publisher) = open_zenoh(config, shares).await?;
-        let engine = open_engine(config, publisher.as_ref())?;
+        let publishes: Arc<dyn Publisher> = match &publisher {
+            Some(publisher) => Arc::clone(publisher) as Arc<dyn Publisher>,
+            None => Arc::new(Silent),
+        };
+        let opened = Opened::open(config, address, publishes, session.as_ref()).await?;
+        let served = opened.served();
         let intake = match &session {
-            Some(session) => Some(Intake::start(session, &engine).await?),
+            Some(session) => Some(Doors::open(session, &served).await?),
             None => None,
         };
         let is_local = config.store.url.is_empty();
@@ -130,7 +163,7 @@ impl Service {
         let (stop_http, stopped) = oneshot::channel();
         let http = tokio::spawn(http::run(
             listener,
-            engine.clone(),
+            served,
             http_settings,
             prometheus,
             async {
@@ -139,7 +172,7 @@ impl Service {
             },
         ));
         Ok(Self {
-            engine,
+            opened,
             address,
             session,
             publisher,
@@ -152,7 +185,7 @@ impl Service {
 
     /// The engine.
     pub fn engine(&self) -> &Engine {
-        &self.engine
+        self.opened.engine()
     }
 
     /// The Zenoh session, if there is one.
@@ -175,9 +208,9 @@ impl Service {
             Err(error) => tracing::error!(%error, "the http task ended with a panic"),
         }
         self.upkeep.iter().for_each(JoinHandle::abort);
-        let (engine, publisher) = (self.engine, self.publisher);
+        let (opened, publisher) = (self.opened, self.publisher);
         let end = move || {
-            engine.shutdown();
+            opened.close();
             if let Some(publisher) = publisher {
                 publisher.close();
             }
@@ -228,94 +261,6 @@ async fn open_zenoh(
     let codec = config.zenoh.encoding.codec();
     let publisher = ZenohPublisher::declare(session.clone(), codec).await?;
     Ok((Some(session), Some(Arc::new(publisher))))
-}
-
-/// The engine over the store, with the spaces of the settings.
-fn open_engine(
-    config: &Config,
-    publisher: Option<&Arc<ZenohPublisher>>,
-) -> Result<Engine, StartError> {
-    let publisher: Arc<dyn Publisher> = match publisher {
-        Some(publisher) => Arc::clone(publisher) as Arc<dyn Publisher>,
-        None => Arc::new(Silent),
-    };
-    let place = config.store.place();
-    let of_store = |source| StartError::Store {
-        place: place.clone(),
-        source,
-    };
-    let store: Arc<dyn Store> = if config.store.url.is_empty() {
-        Arc::new(open_store(&config.store.directory).map_err(of_store)?)
-    } else {
-        store_at(&place, true).map_err(of_store)?
-    };
-    let stored = store.spaces().map_err(of_store)?;
-    let name_lost = stored.iter().any(|space| space.settings.is_none());
-    let engine = Engine::open(store, config.engine.settings(), publisher).map_err(of_store)?;
-    create_spaces(config, &engine, name_lost)?;
-    Ok(engine)
-}
-
-/// Creates the spaces of the settings that the store does not hold.
-fn create_spaces(config: &Config, engine: &Engine, name_lost: bool) -> Result<(), StartError> {
-    for (name, settings) in &config.spaces {
-        if let Some(space) = engine.space(name.as_str()) {
-            if space.settings() != settings {
-                tracing::warn!(space = %name,
-                    "the settings given for the space are without effect: they were fixed when it was created");
-            }
-            continue;
-        }
-        if name_lost {
-            // A robot must not find an empty map where its own may be.
-            tracing::error!(space = %name,
-                "the space is not created: it may be one whose name is lost, see /v1/spaces");
-            continue;
-        }
-        engine
-            .create_space(name, settings)
-            .map_err(|source| StartError::Space {
-                name: name.to_string(),
-                source,
-            })?;
-    }
-    Ok(())
-}
-
-/// Opens the store in `directory`, made anew in the present format where it has an older one.
-///
-/// # Errors
-/// See [`LocalStore::open`] and [`store::migrate`].
-pub fn open_store(directory: &Path) -> Result<LocalStore, StoreError> {
-    store::migrate(directory, journal::samples_in)?;
-    LocalStore::open(directory)
-}
-
-/// Opens the store at a URL or in a directory, and creates it where there is none, if so wanted.
-///
-/// # Errors
-/// See [`open_store`] and `ObjectStore::open`; there is none, or this build has no object storage.
-pub fn store_at(place: &str, creates: bool) -> Result<Arc<dyn Store>, StoreError> {
-    if !place.contains("://") {
-        let directory = Path::new(place);
-        // An empty directory would be made a store.
-        let mut names = std::fs::read_dir(directory).into_iter().flatten();
-        if !creates && names.next().is_none() {
-            return Err(StoreError::Io(format!("there is no store at {place}")));
-        }
-        return Ok(Arc::new(open_store(directory)?));
-    }
-    #[cfg(feature = "object-storage")]
-    return Ok(if creates {
-        Arc::new(store::ObjectStore::open(place)?)
-    } else {
-        Arc::new(store::ObjectStore::open_existing(place)?)
-    });
-    #[cfg(not(feature = "object-storage"))]
-    Err(StoreError::Io(
-        "this program is built without object storage; build it with --features object-storage"
-            .to_owned(),
-    ))
 }
 
 /// Listens on an address. Connections that come faster than they are accepted wait in a long queue:

@@ -1,9 +1,12 @@
 //! The service's HTTP interface.
 
+mod addresses;
 mod authorities;
 mod error;
 mod exchange;
 mod guidance;
+mod request;
+mod retry;
 
 use std::path::Path;
 use std::time::Duration;
@@ -18,13 +21,15 @@ use cogmap_proto::{
     SpaceList, SpaceSettings, Trajectory, Trip, TripDetail, TripPage,
 };
 use serde::de::DeserializeOwned;
-use ureq::http::{Method, Request, Response, StatusCode};
+use ureq::Agent;
+use ureq::http::{Method, StatusCode};
 use ureq::tls::TlsConfig;
-use ureq::{Agent, Body};
 
+use addresses::Addresses;
 use authorities::authorities;
 pub use error::ApiError;
 use exchange::{Content, agent_path, answer, done, escaped, json, path, refusal};
+use retry::{RETRY_TIMEOUT, Repeat};
 
 /// Longest wait for a whole answer; the service itself gives up earlier.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -32,7 +37,8 @@ const TIMEOUT: Duration = Duration::from_secs(30);
 /// Asks a service over HTTP. Cheap to clone; connections are pooled.
 #[derive(Clone, Debug)]
 pub struct Api {
-    base: String,
+    addresses: Addresses,
+    retry_timeout: Duration,
     token: Option<String>,
     agent: Agent,
 }
@@ -73,7 +79,8 @@ impl Api {
             .tls_config(tls)
             .build();
         Self {
-            base: base.trim_end_matches('/').to_owned(),
+            addresses: Addresses::of(base),
+            retry_timeout: RETRY_TIMEOUT,
             token: token.map(str::to_owned),
             agent: config.new_agent(),
         }
@@ -84,7 +91,7 @@ impl Api {
     /// # Errors
     /// The service cannot be reached or answers neither yes (200) nor no (503).
     pub fn ready(&self) -> Result<bool, ApiError> {
-        let response = self.run(Method::GET, "/readyz", None)?;
+        let response = self.run(&Method::GET, "/readyz", None)?;
         match response.status() {
             StatusCode::SERVICE_UNAVAILABLE => Ok(false),
             status if status.is_success() => Ok(true),
@@ -109,7 +116,7 @@ impl Api {
         space: &str,
         settings: &SpaceSettings,
     ) -> Result<SpaceInfo, ApiError> {
-        self.send(Method::PUT, &path(space, "")?, &json(settings))
+        self.send(&Method::PUT, &path(space, "")?, &json(settings))
     }
 
     /// A space.
@@ -125,7 +132,7 @@ impl Api {
     /// # Errors
     /// See [`ApiError`].
     pub fn delete_space(&self, space: &str) -> Result<(), ApiError> {
-        done(self.run(Method::DELETE, &path(space, "")?, None)?)
+        done(self.run(&Method::DELETE, &path(space, "")?, None)?)
     }
 
     /// All agents of a space, by name.
@@ -153,7 +160,7 @@ impl Api {
     /// # Errors
     /// See [`ApiError`].
     pub fn delete_agent(&self, space: &str, agent: &str) -> Result<(), ApiError> {
-        done(self.run(Method::DELETE, &agent_path(space, agent, "")?, None)?)
+        done(self.run(&Method::DELETE, &agent_path(space, agent, "")?, None)?)
     }
 
     /// The grid-cell state of an agent.
@@ -239,9 +246,10 @@ impl Api {
         let content = Content {
             kind: Codec::Postcard.encoding(),
             bytes: Codec::Postcard.encode(batch),
+            repeat: Repeat::Harmless,
         };
         self.send(
-            Method::POST,
+            &Method::POST,
             &agent_path(space, agent, "/samples")?,
             &content,
         )
@@ -252,7 +260,7 @@ impl Api {
     /// # Errors
     /// See [`ApiError`].
     pub fn recall(&self, space: &str, query: &RecallQuery) -> Result<RecallAnswer, ApiError> {
-        self.send(Method::POST, &path(space, "/recall")?, &json(query))
+        self.send(&Method::POST, &path(space, "/recall")?, &json(query))
     }
 
     /// Where a sequence of samples was taken, which needs no agent and changes nothing.
@@ -260,7 +268,7 @@ impl Api {
     /// # Errors
     /// See [`ApiError`]. A service that is at several of these already asks to come back (503).
     pub fn localize(&self, space: &str, query: &LocalizeQuery) -> Result<Localization, ApiError> {
-        self.send(Method::POST, &path(space, "/localize")?, &json(query))
+        self.send(&Method::POST, &path(space, "/localize")?, &json(query))
     }
 
     /// What an agent would feel after a motion from where it is now.
@@ -274,7 +282,7 @@ impl Api {
         query: &PredictQuery,
     ) -> Result<PredictAnswer, ApiError> {
         self.send(
-            Method::POST,
+            &Method::POST,
             &agent_path(space, agent, "/predict")?,
             &json(query),
         )
@@ -286,7 +294,7 @@ impl Api {
     /// See [`ApiError`]. A lost agent and a goal to which no way leads are conflicts (409); a
     /// service that is at several of these already asks to come back (503).
     pub fn route(&self, space: &str, query: &RouteQuery) -> Result<RouteAnswer, ApiError> {
-        self.send(Method::POST, &path(space, "/route")?, &json(query))
+        self.send(&Method::POST, &path(space, "/route")?, &json(query))
     }
 
     /// Which trips the last places of somebody look like, and what comes next.
@@ -294,7 +302,7 @@ impl Api {
     /// # Errors
     /// See [`ApiError`]. A service that is at several of these already asks to come back (503).
     pub fn sequence(&self, space: &str, query: &SequenceQuery) -> Result<SequenceAnswer, ApiError> {
-        self.send(Method::POST, &path(space, "/sequence")?, &json(query))
+        self.send(&Method::POST, &path(space, "/sequence")?, &json(query))
     }
 
     /// What was felt near a point, and who was there.
@@ -302,7 +310,7 @@ impl Api {
     /// # Errors
     /// See [`ApiError`].
     pub fn felt(&self, space: &str, query: &FeltQuery) -> Result<FeltAnswer, ApiError> {
-        self.send(Method::POST, &path(space, "/felt")?, &json(query))
+        self.send(&Method::POST, &path(space, "/felt")?, &json(query))
     }
 
     /// All places of a space, by id.
@@ -389,7 +397,7 @@ impl Api {
         lesson: &ObjectLesson,
     ) -> Result<ObjectSummary, ApiError> {
         let path = path(space, &format!("/objects/{}", escaped(name)))?;
-        self.send(Method::PUT, &path, &json(lesson))
+        self.send(&Method::PUT, &path, &json(lesson))
     }
 
     /// Forgets an object.
@@ -398,7 +406,7 @@ impl Api {
     /// See [`ApiError`].
     pub fn forget_object(&self, space: &str, name: &str) -> Result<(), ApiError> {
         let path = path(space, &format!("/objects/{}", escaped(name)))?;
-        done(self.run(Method::DELETE, &path, None)?)
+        done(self.run(&Method::DELETE, &path, None)?)
     }
 
     /// Which object a sequence of contacts is of, and in which pose.
@@ -407,7 +415,7 @@ impl Api {
     /// See [`ApiError`].
     pub fn identify(&self, space: &str, query: &IdentifyQuery) -> Result<Identification, ApiError> {
         let path = path(space, "/objects/identify")?;
-        self.send(Method::POST, &path, &json(query))
+        self.send(&Method::POST, &path, &json(query))
     }
 
     /// What an agent's episode with an object says so far, and what the latest one said that has
@@ -436,44 +444,16 @@ impl Api {
     }
 
     fn get<T: DeserializeOwned>(&self, path: &str) -> Result<T, ApiError> {
-        answer(path, self.run(Method::GET, path, None)?)
+        answer(path, self.run(&Method::GET, path, None)?)
     }
 
     fn send<T: DeserializeOwned>(
         &self,
-        method: Method,
+        method: &Method,
         path: &str,
         content: &Content,
     ) -> Result<T, ApiError> {
         answer(path, self.run(method, path, Some(content))?)
-    }
-
-    fn run(
-        &self,
-        method: Method,
-        path: &str,
-        content: Option<&Content>,
-    ) -> Result<Response<Body>, ApiError> {
-        let mut request = Request::builder()
-            .method(method)
-            .uri(format!("{}{path}", self.base))
-            .header("accept", "application/json");
-        if let Some(token) = &self.token {
-            request = request.header("authorization", format!("Bearer {token}"));
-        }
-        let response = match content {
-            Some(content) => {
-                let request = request
-                    .header("content-type", content.kind)
-                    .body(content.bytes.as_slice())
-                    .map_err(ureq::Error::from)?;
-                self.agent.run(request)?
-            }
-            None => self
-                .agent
-                .run(request.body(()).map_err(ureq::Error::from)?)?,
-        };
-        Ok(response)
     }
 }
 

@@ -297,9 +297,9 @@ impl Robot {
             self.check_session(&state)?;
             let now = Instant::now();
             if let Some(estimate) = &state.estimate {
-                if state.window.applied() >= target {
-                    applied_at.get_or_insert(now);
-                }
+                // What was applied may be gone with the owner of the space.
+                let is_applied = state.window.applied() >= target;
+                applied_at = is_applied.then(|| applied_at.unwrap_or(now));
                 let settled = applied_at.is_some_and(|at| now >= at + ESTIMATE_GRACE);
                 if estimate.seq + 1 >= target || settled {
                     return Ok(estimate.clone());

@@ -191,11 +191,12 @@ impl Shared {
         };
         let mut state = self.lock();
         state.counters.estimates += 1;
-        let late = state
-            .estimate
-            .as_ref()
-            .is_some_and(|known| estimate.seq < known.seq);
-        if estimate.session != state.session || late {
+        let is_outdated = state.window.is_outdated(estimate.term);
+        // Another owner of the space begins where the journal ends, which may be before.
+        let age = |estimate: &Estimate| (estimate.term, estimate.seq);
+        let known = state.estimate.as_ref();
+        let is_late = known.is_some_and(|known| age(&estimate) < age(known));
+        if estimate.session != state.session || is_outdated || is_late {
             return;
         }
         let callback = state.on_estimate.clone();

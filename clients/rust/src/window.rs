@@ -7,8 +7,11 @@
 //! - A watermark of this session that covers more than was sent is about another run's samples:
 //!   two runs use one session number, and this one is over.
 //! - A *gap* in a watermark is sent again at once, the same gap at most every [`GAP_INTERVAL`].
-//! - A watermark whose `applied` has fallen back tells of a restarted service: everything from
-//!   `durable` on is sent again.
+//! - A watermark whose `applied` has fallen back tells of a restarted service, and one of a larger
+//!   *term* of another owner of the space: what the one before had only in memory is gone, and
+//!   everything from `durable` on is sent again.
+//! - What comes of a smaller term than the largest that was heard is outdated, and counts for
+//!   nothing.
 //! - When samples are out and the watermark has not moved for [`SILENCE`], the service is asked
 //!   for it. If that moves nothing within [`GRACE`], everything from `durable` on is sent again.
 //!   The wait doubles each time, up to [`SILENCE_MAX`], until the watermark moves.
@@ -85,6 +88,10 @@ pub(crate) struct Window {
     durable: u64,
     sent: u64,
     applied: u64,
+    /// The largest term that was heard of the agent.
+    term: u64,
+    /// Term of the latest watermark of this session.
+    marked_term: Option<u64>,
     unsent_bytes: usize,
     unsent_since: Duration,
     /// Samples below this number do not wait for a full batch.
@@ -116,6 +123,8 @@ impl Window {
             durable: 0,
             sent: 0,
             applied: 0,
+            term: 0,
+            marked_term: None,
             unsent_bytes: 0,
             unsent_since: Duration::ZERO,
             hurry_below: 0,
@@ -261,8 +270,19 @@ impl Window {
             .max(1)
     }
 
+    /// Notes the term of an estimate or a watermark of the agent. Says whether it is outdated:
+    /// written by an owner of the space that has lost it.
+    pub(crate) fn is_outdated(&mut self, term: u64) -> bool {
+        let is_outdated = term < self.term;
+        self.term = self.term.max(term);
+        is_outdated
+    }
+
     /// Takes in a watermark, which may come late, twice or out of order.
     pub(crate) fn hear(&mut self, watermark: &Watermark, now: Duration) -> Heard {
+        if self.is_outdated(watermark.term) {
+            return Heard::Stale;
+        }
         match watermark.session.cmp(&self.session) {
             Ordering::Greater => return Heard::TakenOver,
             Ordering::Less => return Heard::Stale,
@@ -279,9 +299,12 @@ impl Window {
             return Heard::Stale;
         }
         self.advance(watermark.durable, now);
-        let restarted = watermark.applied < self.applied;
+        let fell_back = watermark.applied < self.applied;
         self.applied = watermark.applied;
-        if restarted && self.restart_at.is_none_or(|at| now >= at + GAP_INTERVAL) {
+        let before = self.marked_term.replace(watermark.term);
+        let is_other_owner = before.is_some_and(|before| before < watermark.term);
+        let is_restart = fell_back && self.restart_at.is_none_or(|at| now >= at + GAP_INTERVAL);
+        if is_other_owner || is_restart {
             self.restart_at = Some(now);
             self.repeat_all();
         }

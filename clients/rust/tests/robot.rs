@@ -10,10 +10,12 @@ use std::thread;
 use std::time::Duration;
 
 use cogmap_client::proto::{
-    Codec, Level, Rejection, Relation, Sample, SampleBody, SeqRange, SkipReason, Target,
+    Codec, Estimate, Level, POSTCARD_V1, Rejection, Relation, Sample, SampleBody, SeqRange,
+    SkipReason, Target, estimate_key,
 };
 use cogmap_client::{ClientError, Robot, RobotSettings, TripMark, open_session};
 use service::{Faults, Service};
+use zenoh::Wait;
 
 /// Longest wait of any test; none should come near.
 const LONG: Duration = Duration::from_secs(30);
@@ -443,4 +445,37 @@ fn waits_without_an_end_are_no_fault() {
     robot.flush(Duration::MAX).unwrap();
     assert_eq!(robot.estimate(Duration::MAX).unwrap().seq, 4);
     robot.close(Duration::MAX).unwrap();
+}
+
+#[test]
+fn an_estimate_of_an_owner_before_is_not_taken_and_one_of_the_next_may_go_back() {
+    let endpoint = free_endpoint();
+    let router = service::router(&endpoint);
+    let _service = Service::on(router.clone(), "demo", "ada", Faults::default());
+    let robot = Robot::connect(&endpoint, "demo", "ada").unwrap();
+    robot.send_batch(levels(5)).unwrap();
+    robot.flush(LONG).unwrap();
+    let known = robot.estimate(LONG).unwrap();
+    let (told, heard) = channel();
+    robot.on_estimate(move |estimate| told.send((estimate.term, estimate.seq)).unwrap());
+    for (term, seq) in [(4, 2), (3, 4), (4, 1), (4, 2), (5, 0), (0, 4), (5, 1)] {
+        let estimate = Estimate {
+            term,
+            seq,
+            ..known.clone()
+        };
+        router
+            .put(
+                estimate_key("demo", "ada"),
+                Codec::Postcard.encode(&estimate),
+            )
+            .encoding(POSTCARD_V1)
+            .wait()
+            .unwrap();
+    }
+    let heard: Vec<_> = { 0..4 }
+        .map(|_| heard.recv_timeout(LONG).unwrap())
+        .collect();
+    assert_eq!(heard, [(4, 2), (4, 2), (5, 0), (5, 1)]);
+    assert_eq!(robot.latest_estimate().unwrap().seq, 1);
 }

@@ -179,7 +179,7 @@ pub(crate) fn estimates(floats: &Floats) -> impl Strategy<Value = Estimate> + us
             uniform3(floats.clone()),
         ),
         (uniform4(floats.clone()), uniform21(floats.clone())),
-        (option::of(any::<u64>()), floats.clone()),
+        (option::of(any::<u64>()), floats.clone(), any::<u64>()),
     )
         .prop_map(|(who, what, pose, place)| Estimate {
             space: who.0,
@@ -195,6 +195,7 @@ pub(crate) fn estimates(floats: &Floats) -> impl Strategy<Value = Estimate> + us
             covariance: pose.1,
             place: place.0,
             confidence: place.1,
+            term: place.2,
         })
 }
 
@@ -207,14 +208,18 @@ pub(crate) fn watermarks() -> impl Strategy<Value = Watermark> {
         any::<u64>(),
         option::of(range()),
         vec(rejection, 0..17),
+        any::<u64>(),
     )
-        .prop_map(|(session, durable, applied, gap, rejected)| Watermark {
-            session,
-            durable,
-            applied,
-            gap,
-            rejected,
-        })
+        .prop_map(
+            |(session, durable, applied, gap, rejected, term)| Watermark {
+                session,
+                durable,
+                applied,
+                gap,
+                rejected,
+                term,
+            },
+        )
 }
 
 fn reasons() -> impl Strategy<Value = SkipReason> {

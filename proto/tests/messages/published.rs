@@ -114,6 +114,7 @@ pub(super) fn estimate(status: Status) -> Estimate {
         covariance: upper_triangle(),
         place: Some(3),
         confidence: 0.875,
+        term: 3,
     }
 }
 
@@ -129,6 +130,7 @@ pub(super) fn watermark() -> Watermark {
         applied: 62,
         gap: None,
         rejected: Vec::new(),
+        term: 3,
     }
 }
 
@@ -143,6 +145,7 @@ fn watermark_with_gap() -> Watermark {
         applied: 50,
         gap: Some(SeqRange { from: 50, to: 60 }),
         rejected: rejected.collect(),
+        term: 0,
     }
 }
 

@@ -27,6 +27,7 @@ pub fn space_named(engine: &Engine, name: &str) -> Result<Arc<Space>, Problem> {
 pub fn any_space_named(engine: &Engine, name: &str) -> Result<Arc<Space>, Problem> {
     // Only what was not found needs the name's rules: what exists has a valid one.
     engine.space(name).ok_or_else(|| match Name::check(name) {
+        Ok(()) if !engine.owns(name) => Problem::moving(name),
         Ok(()) => Problem::unknown_space(name),
         Err(error) => Problem::new(Kind::InvalidPath, format!("{name:?}: {error}")),
     })

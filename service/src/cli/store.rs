@@ -1,5 +1,6 @@
 //! `cogmap store`, `cogmap backup`, `cogmap restore`: the care of a store.
 
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -10,7 +11,7 @@ use super::output;
 use crate::engine::{self, RepairReport};
 use crate::journal::samples_in;
 use crate::service::{open_store, store_at};
-use crate::store::{self, BackupReport, Damage, SpaceSurvey};
+use crate::store::{self, BackupReport, Damage, Shards, SpaceSurvey};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum StoreCommand {
@@ -58,6 +59,9 @@ pub(super) struct CopyArgs {
     /// Directory or URL of the other one, which is made if it is not there.
     #[arg(value_name = "TO")]
     to: String,
+    /// Shards that the other one is made with on object storage; one that is there keeps its own.
+    #[arg(long, value_name = "COUNT", default_value = "1")]
+    shards: NonZeroU32,
 }
 
 #[derive(Debug, Args)]
@@ -79,11 +83,12 @@ pub(super) fn run(command: &StoreCommand) -> anyhow::Result<()> {
 }
 
 fn copy(args: &CopyArgs) -> anyhow::Result<()> {
-    let open = |place: &str, creates: bool| {
+    let open = |place: &str, creates: Option<Shards>| {
         store_at(place, creates).with_context(|| format!("open the store {place}"))
     };
-    let (from, to) = (open(&args.from, false)?, open(&args.to, true)?);
-    let copied = store::copy(&*from, &*to, samples_in)?;
+    let shards = Shards::from(args.shards);
+    let (from, to) = (open(&args.from, None)?, open(&args.to, Some(shards))?);
+    let copied = store::copy(&from, &to, samples_in)?;
     for space in copied {
         output::line(&format!(
             "{}: {} blocks with {} samples, check {:016x} on both ends",

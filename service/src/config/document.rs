@@ -38,6 +38,7 @@ fn page() -> String {
         ("HTTP", HttpConfig::SETTINGS),
         ("Zenoh", ZenohConfig::SETTINGS),
         ("Store", StoreConfig::SETTINGS),
+        ("Cluster", ClusterConfig::SETTINGS),
         ("Engine", EngineConfig::SETTINGS),
         ("Log", LogConfig::SETTINGS),
     ];

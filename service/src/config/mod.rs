@@ -5,6 +5,7 @@
 //! rules. Nothing unknown is ignored: a misspelt key is an error.
 
 mod assignment;
+mod cluster;
 mod engine;
 mod error;
 mod http;
@@ -23,6 +24,7 @@ use crate::decode::core_settings;
 pub use crate::http::Token;
 
 pub use assignment::Assignment;
+pub use cluster::ClusterConfig;
 pub use engine::EngineConfig;
 pub use error::ConfigError;
 pub use http::HttpConfig;
@@ -40,6 +42,8 @@ pub struct Config {
     pub zenoh: ZenohConfig,
     /// Where the journal and what is derived from it are kept.
     pub store: StoreConfig,
+    /// The part of the service in a cluster.
+    pub cluster: ClusterConfig,
     /// Bounds and intervals of the engine.
     pub engine: EngineConfig,
     /// Spaces that exist from the start; those that the store does not hold yet are created.
@@ -55,6 +59,7 @@ impl Default for Config {
             http: HttpConfig::default(),
             zenoh: ZenohConfig::default(),
             store: StoreConfig::default(),
+            cluster: ClusterConfig::default(),
             engine: EngineConfig::default(),
             spaces: BTreeMap::from([(name, SpaceSettings::default())]),
             log: LogConfig::default(),
@@ -142,6 +147,7 @@ impl Config {
         self.http.check()?;
         self.zenoh.check()?;
         self.store.check()?;
+        self.cluster.check(self)?;
         self.engine.check()?;
         self.log.check()?;
         for (name, settings) in &self.spaces {

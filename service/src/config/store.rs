@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::ConfigError;
 use super::setting::{Rule, section};
+use crate::store::Shards;
 
 const DIRECTORY: Rule<PathBuf> = Rule {
     words: "the path of a directory",
@@ -22,6 +23,12 @@ const URL: Rule<String> = Rule {
     shown: String::clone,
 };
 
+const SHARDS: Rule<u32> = Rule {
+    words: "1 to 1024",
+    holds: |count| (1..=1024).contains(count),
+    shown: u32::to_string,
+};
+
 section! {
     /// Settings of the store.
     pub struct StoreConfig of "store" {
@@ -31,6 +38,9 @@ section! {
         /// `file:///directory`. Region, endpoint and credentials come from the provider's own
         /// environment variables. Only in builds with the feature `object-storage`.
         url: String = String::new(), URL;
+        /// Databases that a new store on object storage is divided into: each space is in one of
+        /// them, and each has one owner among the nodes of a cluster. Fixed when it is created.
+        shards: u32 = 1, SHARDS;
     }
 }
 
@@ -42,6 +52,11 @@ impl StoreConfig {
         } else {
             self.url.clone()
         }
+    }
+
+    /// The shards of a new store. They must have been checked.
+    pub fn shards(&self) -> Shards {
+        Shards::new(self.shards).unwrap_or(Shards::ONE)
     }
 
     pub(super) fn check(&self) -> Result<(), ConfigError> {

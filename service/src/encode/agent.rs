@@ -7,8 +7,13 @@ use geometry::upper_triangle;
 use super::FRAME;
 use super::trajectory::stamped;
 
-/// The estimate of an agent; nothing before its first sample.
-pub(crate) fn estimate(space: &str, map: &CognitiveMap, id: AgentId) -> Option<wire::Estimate> {
+/// The estimate of an agent by the owner of a term; nothing before the agent's first sample.
+pub(crate) fn estimate(
+    space: &str,
+    term: u64,
+    map: &CognitiveMap,
+    id: AgentId,
+) -> Option<wire::Estimate> {
     let agent = map.agent(id)?;
     let stamp_ns = agent.stamp_ns()?;
     let pose = stamped(stamp_ns, agent.pose());
@@ -31,6 +36,7 @@ pub(crate) fn estimate(space: &str, map: &CognitiveMap, id: AgentId) -> Option<w
         covariance: upper_triangle(&covariance),
         place,
         confidence,
+        term,
     })
 }
 

@@ -94,11 +94,11 @@ pub fn map_export(
     head.chain(lists).chain(std::iter::once("}".to_owned()))
 }
 
-/// The agents of a map, by name, as it has them.
+/// The agents of a map, by name, as it has them. Their term is 0: no owner has published them.
 pub fn agent_summaries(space: &str, map: &CognitiveMap) -> Vec<AgentSummary> {
     let agents = map.agents().map(|(id, agent)| AgentSummary {
         name: agent.name().as_str().to_owned(),
-        estimate: estimate(space, map, id),
+        estimate: estimate(space, 0, map, id),
     });
     let mut agents: Vec<_> = agents.collect();
     agents.sort_by(|a, b| a.name.cmp(&b.name));

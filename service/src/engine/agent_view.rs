@@ -22,6 +22,7 @@ use crate::encode;
 pub struct AgentView {
     id: AgentId,
     name: String,
+    term: u64,
     readout: ArcSwapOption<Readout>,
     marks: Mutex<Marks>,
     recorder: Mutex<Recorder>,
@@ -82,12 +83,12 @@ pub(crate) struct Marks {
 }
 
 impl AgentView {
-    /// A view for an agent whose samples below `next` are durable.
+    /// A view for an agent whose samples below `next` are durable, by the owner of a term.
     pub(crate) fn new(
         id: AgentId,
         name: &str,
-        session: u64,
-        next: u64,
+        term: u64,
+        (session, next): (u64, u64),
         recorder: Recorder,
     ) -> Self {
         let marks = Marks {
@@ -99,6 +100,7 @@ impl AgentView {
         Self {
             id,
             name: name.to_owned(),
+            term,
             readout: ArcSwapOption::empty(),
             marks: Mutex::new(marks),
             recorder: Mutex::new(recorder),
@@ -175,7 +177,7 @@ impl AgentView {
 
     /// How far its samples have come.
     pub fn watermark(&self) -> Watermark {
-        self.marks().watermark()
+        self.marks().watermark(self.term)
     }
 
     /// All that is known of it here.
@@ -230,7 +232,7 @@ impl AgentView {
     fn tail(&self, readout: Option<&Readout>) -> DetailTail {
         let marks = self.marks();
         DetailTail {
-            watermark: marks.watermark(),
+            watermark: marks.watermark(self.term),
             lag_samples: marks.applied.saturating_sub(marks.durable) + marks.waiting,
             travelled_m: readout.map_or(0.0, |readout| readout.travelled_m),
             forgotten_matches: readout.map_or(0, |readout| readout.forgotten_matches),
@@ -255,7 +257,7 @@ impl AgentView {
 /// A view of an agent that has done nothing.
 #[cfg(test)]
 pub(crate) fn view_of(name: &str) -> AgentView {
-    AgentView::new(AgentId(0), name, 0, 0, Recorder::default())
+    AgentView::new(AgentId(0), name, 0, (0, 0), Recorder::default())
 }
 
 /// What became of an agent's sightings; of none before its first sample.
@@ -264,11 +266,11 @@ fn evidence(readout: Option<&Readout>) -> Evidence {
 }
 
 impl Readout {
-    /// What is published of an agent; nothing before its first sample.
-    pub(crate) fn of(space: &str, map: &CognitiveMap, id: AgentId) -> Option<Self> {
+    /// What the owner of a term publishes of an agent; nothing before its first sample.
+    pub(crate) fn of(space: &str, term: u64, map: &CognitiveMap, id: AgentId) -> Option<Self> {
         let agent = map.agent(id)?;
         Some(Self {
-            estimate: encode::estimate(space, map, id)?,
+            estimate: encode::estimate(space, term, map, id)?,
             odometry: encode::odometry(agent)?,
             evidence: encode::evidence(agent),
             travelled_m: agent.travelled_m(),
@@ -325,13 +327,14 @@ impl Marks {
         }
     }
 
-    fn watermark(&self) -> Watermark {
+    fn watermark(&self, term: u64) -> Watermark {
         Watermark {
             session: self.session,
             durable: self.durable,
             applied: self.applied,
             gap: self.gap,
             rejected: self.rejected.iter().cloned().collect(),
+            term,
         }
     }
 }

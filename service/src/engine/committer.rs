@@ -4,7 +4,7 @@
 //! watermarks, and only after the sync has returned.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -16,6 +16,9 @@ use super::health::Health;
 use super::message::{Change, IngestError, Reply};
 use super::publisher::Publisher;
 use crate::store::Store;
+
+/// How often is looked, while nothing is written, whether the store may still be written.
+const LOOK_INTERVAL: Duration = Duration::from_millis(250);
 
 /// What a writer has appended to the store and applied.
 #[derive(Debug)]
@@ -69,7 +72,7 @@ fn run(
     let counters = CommitCounters::new();
     let mut group = Vec::new();
     let mut last_sync: Option<Instant> = None;
-    while let Ok(first) = commits.recv() {
+    while let Some(first) = next(store, health, commits) {
         group.push(first);
         // A group that comes alone is synced at once; under load the interval lets groups gather.
         if let Some(rest) = last_sync.and_then(|last| interval.checked_sub(last.elapsed())) {
@@ -98,6 +101,21 @@ fn run(
                 group.drain(..).for_each(|commit| refuse(commit, health));
             }
             None => group.drain(..).for_each(|commit| refuse(commit, health)),
+        }
+    }
+}
+
+/// The next commit; none when all senders are gone.
+fn next(store: &dyn Store, health: &Health, commits: &Receiver<Commit>) -> Option<Commit> {
+    loop {
+        match commits.recv_timeout(LOOK_INTERVAL) {
+            Ok(commit) => return Some(commit),
+            Err(RecvTimeoutError::Disconnected) => return None,
+            Err(RecvTimeoutError::Timeout) => {
+                if let Err(error) = store.check_ownership() {
+                    health.fail(&error);
+                }
+            }
         }
     }
 }

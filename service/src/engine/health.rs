@@ -20,16 +20,28 @@ pub(crate) struct Health {
 #[derive(Debug)]
 struct Failure {
     detail: String,
-    disk_full: bool,
+    kind: FailureKind,
+}
+
+#[derive(Clone, Debug)]
+enum FailureKind {
+    DiskFull,
+    /// Another process owns this store.
+    Fenced(String),
+    Other,
 }
 
 impl Health {
     /// Notes a failure; the first one counts.
     pub(crate) fn fail(&self, error: &StoreError) {
-        let disk_full = matches!(error, StoreError::DiskFull);
+        let kind = match error {
+            StoreError::DiskFull => FailureKind::DiskFull,
+            StoreError::Fenced(place) => FailureKind::Fenced(place.clone()),
+            _ => FailureKind::Other,
+        };
         let failure = Failure {
             detail: error.to_string(),
-            disk_full,
+            kind,
         };
         if self.failure.set(failure).is_ok() {
             tracing::error!(%error, "write to the store; no more samples are taken");
@@ -57,12 +69,10 @@ impl Health {
 
     /// The failure once more, if there was one.
     pub(crate) fn error(&self) -> Option<StoreError> {
-        self.failure.get().map(|failure| {
-            if failure.disk_full {
-                StoreError::DiskFull
-            } else {
-                StoreError::Io(failure.detail.clone())
-            }
+        self.failure.get().map(|failure| match &failure.kind {
+            FailureKind::DiskFull => StoreError::DiskFull,
+            FailureKind::Fenced(place) => StoreError::Fenced(place.clone()),
+            FailureKind::Other => StoreError::Io(failure.detail.clone()),
         })
     }
 
@@ -70,10 +80,10 @@ impl Health {
     pub(crate) fn refusal(&self) -> Option<IngestError> {
         self.failure.get().map(|failure| {
             let detail = failure.detail.clone();
-            if failure.disk_full {
-                IngestError::DiskFull(detail)
-            } else {
-                IngestError::Store(detail)
+            match failure.kind {
+                FailureKind::DiskFull => IngestError::DiskFull(detail),
+                FailureKind::Fenced(_) => IngestError::Fenced(detail),
+                FailureKind::Other => IngestError::Store(detail),
             }
         })
     }

@@ -127,6 +127,9 @@ pub enum IngestError {
     /// The store's disk is full.
     #[error("{0}")]
     DiskFull(String),
+    /// Another process owns the store now; whether it has these samples is not known.
+    #[error("{0}")]
+    Fenced(String),
     /// The store failed otherwise.
     #[error("{0}")]
     Store(String),

@@ -22,6 +22,7 @@ mod message;
 mod publisher;
 mod question;
 mod queue;
+mod readiness;
 mod recovery;
 mod refinement;
 mod relaxers;
@@ -31,6 +32,7 @@ mod route_bounds;
 mod sequencer;
 mod session_bound;
 mod settings;
+mod shard;
 mod shared;
 mod space;
 mod trajectory;
@@ -47,7 +49,7 @@ use std::thread::JoinHandle;
 use arc_swap::ArcSwap;
 use cogmap_proto::{Codec, DecodeError, Name, SpaceSettings};
 use cognitive_map::InvalidSettings;
-use metrics::gauge;
+use tokio::sync::watch;
 
 pub use agent_view::AgentView;
 #[cfg(test)]
@@ -57,6 +59,7 @@ pub use events::{EVENTS_KEPT, EventFollower, Followed};
 pub use message::IngestError;
 pub use publisher::{Publisher, Silent};
 pub use question::QuestionError;
+pub use readiness::Readiness;
 pub use refinement::{SharedText, refined_trajectories};
 pub use repair::{AgentLoss, LostBlocks, MissingSamples, RepairReport, repair};
 pub use settings::EngineSettings;
@@ -65,24 +68,27 @@ pub use trajectory::{Around, Chunk, Recorder, TrajectoryPage};
 pub use unavailable::{TrajectoryError, Unavailable};
 
 use crate::decode::{core_settings, trajectory_interval_ns};
-use crate::metrics::SPACE_STOPPED;
-use crate::store::{Store, StoreError, StoredSpace};
+use crate::store::{ShardNumber, Shards, Store, StoreError, StoredSpace};
 use counters::{Drop, IntakeCounters};
-use health::Health;
 use question::QuestionRoom;
 use queue::NotQueued;
-use shared::Surroundings;
+use shard::{Common, Shard};
 
-/// The engine. Clones share it.
+/// The engine: the shards of a store that this process owns, and their spaces. Clones share it.
 #[derive(Clone, Debug)]
 pub struct Engine(Arc<Inner>);
 
 #[derive(Debug)]
 struct Inner {
+    /// The spaces of all open shards.
     spaces: ArcSwap<BTreeMap<String, Arc<Space>>>,
-    /// Taken to create or delete a space, and to shut down.
+    shards: ArcSwap<BTreeMap<ShardNumber, Arc<Shard>>>,
+    /// How many shards the store has, open or not.
+    count: Shards,
+    /// Taken to open or close a shard, and to shut down.
     control: Mutex<Control>,
-    health: Arc<Health>,
+    /// Told whenever spaces come or go.
+    changes: watch::Sender<()>,
     intake: IntakeCounters,
     spaces_max: usize,
 }
@@ -90,30 +96,21 @@ struct Inner {
 #[derive(Debug)]
 struct Control {
     /// Gone after the shutdown.
-    around: Option<Surroundings>,
+    common: Option<Common>,
     threads: Vec<JoinHandle<()>>,
 }
 
-/// Whether the service can do its work.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Readiness {
-    /// It can.
-    Ready,
-    /// It can, but for these spaces, which are stopped because they are damaged.
-    ReadyBut {
-        /// Their names, each with the reason.
-        stopped: Vec<(String, String)>,
-    },
-    /// These spaces are still loading.
-    Recovering {
-        /// Their names.
-        spaces: Vec<String>,
-    },
-    /// It takes no samples.
-    Failed {
-        /// Why.
-        detail: String,
-    },
+/// An open shard.
+#[derive(Clone, Debug)]
+pub struct OpenShard {
+    /// Its number.
+    pub number: ShardNumber,
+    /// Which owner of the shard in a row this process is.
+    pub term: u64,
+    /// Why it takes no samples, if so.
+    pub failure: Option<String>,
+    /// Its spaces, by name.
+    pub spaces: Vec<Arc<Space>>,
 }
 
 /// Why a space cannot be created or deleted.
@@ -131,6 +128,9 @@ pub enum SpaceError {
     /// There is no such space.
     #[error("unknown space")]
     Unknown,
+    /// The shard of the space is not open in this process.
+    #[error("the shard of the space is not here")]
+    NotHere,
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -158,7 +158,8 @@ fn stored_settings(
 }
 
 impl Engine {
-    /// Starts the spaces that the store holds. Returns at once; they load in their own threads.
+    /// An engine over one store that is not divided. Returns at once; the spaces load in their own
+    /// threads.
     ///
     /// # Errors
     /// The list of spaces cannot be read.
@@ -167,79 +168,154 @@ impl Engine {
         settings: EngineSettings,
         publisher: Arc<dyn Publisher>,
     ) -> Result<Self, StoreError> {
-        let health = Arc::new(Health::default());
-        let stored = store.spaces()?;
-        let (commits, committer) = committer::start(
-            Arc::clone(&store),
-            Arc::clone(&publisher),
-            Arc::clone(&health),
-            settings.commit_interval,
-        );
-        let (jobs, checkpointer) = checkpointer::start(Arc::clone(&store), Arc::clone(&health));
-        let (relaxers, mut threads) = relaxers::start(settings.relaxation_threads);
-        threads.extend([committer, checkpointer]);
+        let engine = Self::new(Shards::ONE, settings, publisher);
+        engine.open_shard(ShardNumber(0), store)?;
+        Ok(engine)
+    }
+
+    /// An engine for a store of so many shards, none of which is open yet.
+    pub fn new(count: Shards, settings: EngineSettings, publisher: Arc<dyn Publisher>) -> Self {
+        Self::with(count, settings, publisher, false)
+    }
+
+    /// An engine that follows shards of other processes: it takes no samples, and folds what they
+    /// write.
+    pub fn following(count: Shards, settings: EngineSettings) -> Self {
+        Self::with(count, settings, Arc::new(Silent), true)
+    }
+
+    fn with(
+        count: Shards,
+        settings: EngineSettings,
+        publisher: Arc<dyn Publisher>,
+        follows: bool,
+    ) -> Self {
+        let (relaxers, threads) = relaxers::start(settings.relaxation_threads);
         let spaces_max = settings.spaces_max;
-        let around = Surroundings {
-            store,
+        let common = Common {
             publisher,
-            health: Arc::clone(&health),
-            commits,
-            jobs,
             relaxers,
             questions: QuestionRoom::default(),
             settings,
+            follows,
         };
-        let mut spaces = BTreeMap::new();
-        for stored in stored {
-            let (number, name) = (stored.number, &stored.name);
-            let space = match stored_settings(&stored) {
-                Ok((settings, core)) => Space::start(number, name, settings, core, &around),
-                Err(reason) => Space::stopped(number, name, reason, &around),
-            };
-            spaces.insert(stored.name, Arc::new(space));
-        }
-        let control = Control {
-            around: Some(around),
-            threads,
-        };
-        Ok(Self(Arc::new(Inner {
-            spaces: ArcSwap::from_pointee(spaces),
-            control: Mutex::new(control),
-            health,
+        Self(Arc::new(Inner {
+            spaces: ArcSwap::default(),
+            shards: ArcSwap::default(),
+            count,
+            control: Mutex::new(Control {
+                common: Some(common),
+                threads,
+            }),
+            changes: watch::Sender::default(),
             intake: IntakeCounters::new(),
             spaces_max,
-        })))
+        }))
     }
 
-    /// Whether the service can do its work.
-    pub fn readiness(&self) -> Readiness {
-        let spaces = self.0.spaces.load();
-        if let Some(detail) = self.0.health.failed() {
-            return Readiness::Failed { detail };
+    /// Opens a shard and starts its spaces. Returns at once; they load in their own threads.
+    ///
+    /// # Errors
+    /// The list of its spaces cannot be read, the shard is open, or the service is shutting down.
+    pub fn open_shard(&self, number: ShardNumber, store: Arc<dyn Store>) -> Result<(), StoreError> {
+        let closed = || StoreError::Io("the service is shutting down".to_owned());
+        let common = self.control().common.clone().ok_or_else(closed)?;
+        // The store may be slow, and other shards open and close meanwhile.
+        let (shard, started) = Shard::open(store, &common)?;
+        let control = self.control();
+        if control.common.is_none() || self.0.shards.load().contains_key(&number) {
+            drop(control);
+            shard.close(|| started.into_values().collect());
+            return Err(closed());
         }
-        if let Some(detail) = spaces.values().find_map(|space| space.failure()) {
-            return Readiness::Failed { detail };
-        }
-        let recovering: Vec<_> = spaces
-            .values()
-            .filter(|space| space.recovering())
-            .map(|space| space.name().to_owned())
-            .collect();
-        if !recovering.is_empty() {
-            return Readiness::Recovering { spaces: recovering };
-        }
-        let reason = |space: &Arc<Space>| {
-            let reason = space.stop_reason()?;
-            Some((space.name().to_owned(), reason.to_owned()))
+        // Before the shard, so that none of them is unknown for a moment.
+        self.change_spaces(|spaces| spaces.extend(started.clone()));
+        let shard = Arc::new(shard);
+        self.0.shards.rcu(|shards| {
+            let mut shards = BTreeMap::clone(shards);
+            shards.insert(number, Arc::clone(&shard));
+            shards
+        });
+        Ok(())
+    }
+
+    /// Closes a shard: takes what is queued in its spaces, makes it durable, checkpoints each, and
+    /// gives up the store. Of one that has failed, for another process owns it, nothing is written.
+    pub fn close_shard(&self, number: ShardNumber) {
+        let Some(shard) = self.0.shards.load().get(&number).cloned() else {
+            return;
         };
-        let stopped: Vec<_> = spaces.values().filter_map(reason).collect();
-        match &*stopped {
-            [] => Readiness::Ready,
-            [(_, reason), ..] if stopped.len() == spaces.len() => Readiness::Failed {
-                detail: format!("all spaces are stopped; {reason}"),
-            },
-            _ => Readiness::ReadyBut { stopped },
+        // From here on nobody finds the shard.
+        self.0.shards.rcu(|shards| {
+            let mut shards = BTreeMap::clone(shards);
+            shards.remove(&number);
+            shards
+        });
+        shard.close(|| {
+            let closing = self.spaces_of(number);
+            self.change_spaces(|spaces| {
+                spaces.retain(|name, _| self.0.count.of(name) != number);
+            });
+            closing
+        });
+    }
+
+    /// Starts the spaces that have come to a shard that is followed, and closes those that are
+    /// gone.
+    ///
+    /// # Errors
+    /// The list of its spaces cannot be read, or the shard is not open.
+    pub fn follow_spaces(&self, number: ShardNumber) -> Result<(), SpaceError> {
+        let shard = self.0.shards.load().get(&number).cloned();
+        let shard = shard.ok_or(SpaceError::NotHere)?;
+        let change = shard.change()?;
+        let stored = shard.stored()?;
+        let known = self.spaces_of(number);
+        let is_gone =
+            |space: &&Arc<Space>| !stored.iter().any(|stored| stored.number == space.number());
+        let gone: Vec<_> = known.iter().filter(is_gone).collect();
+        let has_come =
+            |stored: &&StoredSpace| !known.iter().any(|space| space.number() == stored.number);
+        let come: BTreeMap<_, _> = { stored.iter().filter(has_come) }
+            .map(|stored| (stored.name.clone(), Arc::new(change.start(stored))))
+            .collect();
+        if !gone.is_empty() || !come.is_empty() {
+            self.change_spaces(|spaces| {
+                spaces.retain(|_, space| !gone.iter().any(|gone| Arc::ptr_eq(gone, space)));
+                spaces.extend(come.clone());
+            });
         }
+        for space in gone {
+            space.close();
+        }
+        Ok(())
+    }
+
+    /// The shards that are open.
+    pub fn open_shards(&self) -> Vec<OpenShard> {
+        let shards = self.0.shards.load();
+        let open = shards.iter().map(|(number, shard)| OpenShard {
+            number: *number,
+            term: shard.term(),
+            failure: shard.health().failed(),
+            spaces: self.spaces_of(*number),
+        });
+        open.collect()
+    }
+
+    /// How many shards the store has, open or not.
+    pub fn shards(&self) -> Shards {
+        self.0.count
+    }
+
+    /// Whether the shard is open that a space of the name belongs to.
+    pub fn owns(&self, space: &str) -> bool {
+        self.shard_of(space).is_some()
+    }
+
+    /// Is told whenever spaces come or go.
+    pub fn changes(&self) -> watch::Receiver<()> {
+        self.0.changes.subscribe()
     }
 
     /// The spaces, by name.
@@ -265,8 +341,8 @@ impl Engine {
         settings: &SpaceSettings,
     ) -> Result<(Arc<Space>, bool), SpaceError> {
         let core = (core_settings(settings)?, trajectory_interval_ns(settings));
-        let control = self.control();
-        let around = control.around.as_ref().ok_or(SpaceError::Closed)?;
+        let shard = self.shard_of(name.as_str()).ok_or(SpaceError::NotHere)?;
+        let change = shard.change()?;
         if let Some(space) = self.space(name.as_str()) {
             return if space.settings() == settings {
                 Ok((space, false))
@@ -278,14 +354,9 @@ impl Engine {
         if count >= self.0.spaces_max {
             return Err(SpaceError::TooManySpaces(count));
         }
-        let bytes = serde_json::to_vec(settings).expect("plain data encodes");
-        let number = around.store.create_space(name.as_str(), &bytes)?;
-        let space = Space::start(number, name.as_str(), settings.clone(), core, around);
-        let space = Arc::new(space);
-        self.0.spaces.rcu(|spaces| {
-            let mut spaces = BTreeMap::clone(spaces);
+        let space = Arc::new(change.create(name, settings, core)?);
+        self.change_spaces(|spaces| {
             spaces.insert(name.as_str().to_owned(), Arc::clone(&space));
-            spaces
         });
         Ok((space, true))
     }
@@ -295,23 +366,17 @@ impl Engine {
     /// # Errors
     /// See [`SpaceError`].
     pub fn delete_space(&self, name: &str) -> Result<(), SpaceError> {
-        let control = self.control();
-        let around = control.around.as_ref().ok_or(SpaceError::Closed)?;
+        let shard = self.shard_of(name).ok_or(SpaceError::NotHere)?;
+        let change = shard.change()?;
         let space = self.space(name).ok_or(SpaceError::Unknown)?;
         // What cannot be deleted must not vanish until the next start.
-        if let Some(error) = self.0.health.error() {
+        if let Some(error) = shard.health().error() {
             return Err(error.into());
         }
-        self.0.spaces.rcu(|spaces| {
-            let mut spaces = BTreeMap::clone(spaces);
+        self.change_spaces(|spaces| {
             spaces.remove(name);
-            spaces
         });
-        space.close();
-        if space.stop_reason().is_some() {
-            gauge!(SPACE_STOPPED, "space" => name.to_owned()).set(0.0);
-        }
-        Ok(around.store.delete_space(space.number())?)
+        change.delete(&space)
     }
 
     /// Takes a message as it came over Zenoh. Never blocks; what cannot be taken is counted.
@@ -345,17 +410,42 @@ impl Engine {
 
     /// Takes what is queued, makes it durable, checkpoints every space and ends all threads.
     pub fn shutdown(&self) {
-        let mut control = self.control();
-        control.around = None;
-        for space in self.spaces() {
-            space.close();
+        let threads = {
+            let mut control = self.control();
+            control.common = None;
+            std::mem::take(&mut control.threads)
+        };
+        let open: Vec<_> = self.0.shards.load().keys().copied().collect();
+        for number in open {
+            self.close_shard(number);
         }
-        // With the writers gone, the last senders are too, and these threads end by themselves.
-        for thread in control.threads.drain(..) {
+        for thread in threads {
             if thread.join().is_err() {
                 tracing::error!("a thread of the engine ended with a panic");
             }
         }
+    }
+
+    /// The open shard that a space of a name belongs to.
+    fn shard_of(&self, space: &str) -> Option<Arc<Shard>> {
+        self.0.shards.load().get(&self.0.count.of(space)).cloned()
+    }
+
+    fn spaces_of(&self, number: ShardNumber) -> Vec<Arc<Space>> {
+        let spaces = self.0.spaces.load();
+        let of_shard = spaces
+            .values()
+            .filter(|space| self.0.count.of(space.name()) == number);
+        of_shard.cloned().collect()
+    }
+
+    fn change_spaces(&self, change: impl Fn(&mut BTreeMap<String, Arc<Space>>)) {
+        self.0.spaces.rcu(|spaces| {
+            let mut spaces = BTreeMap::clone(spaces);
+            change(&mut spaces);
+            spaces
+        });
+        self.0.changes.send_replace(());
     }
 
     fn control(&self) -> MutexGuard<'_, Control> {

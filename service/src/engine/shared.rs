@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
+use std::time::{Duration, Instant};
 
 use arc_swap::ArcSwapOption;
 use cognitive_map::{AgentId, CognitiveMap};
@@ -32,6 +32,12 @@ use crate::store::{SpaceNumber, Store};
 pub(crate) struct Shared {
     pub(crate) name: Arc<str>,
     pub(crate) number: SpaceNumber,
+    /// Number of this process as the owner of the store.
+    pub(crate) term: u64,
+    /// Whether another process writes the space, and this one folds what it has written.
+    pub(crate) follows: bool,
+    /// Of a space that is followed: all that could be read at this time is folded.
+    caught_up: Mutex<Option<Instant>>,
     pub(crate) interval_ns: i64,
     pub(crate) agents_max: usize,
     pub(crate) sessions: SessionBound,
@@ -82,6 +88,8 @@ pub(crate) struct Surroundings {
     pub(crate) relaxers: Relaxers,
     pub(crate) questions: QuestionRoom,
     pub(crate) settings: EngineSettings,
+    /// Whether another process writes the spaces.
+    pub(crate) follows: bool,
 }
 
 impl Shared {
@@ -94,6 +102,9 @@ impl Shared {
         Arc::new(Self {
             name: name.into(),
             number,
+            term: around.store.term(),
+            follows: around.follows,
+            caught_up: Mutex::default(),
             interval_ns,
             agents_max: around.settings.agents_max,
             sessions: SessionBound::new(around.settings.session_ahead_max),
@@ -124,6 +135,17 @@ impl Shared {
         tracing::error!(space = %self.name, reason, "the space is stopped");
         gauge!(SPACE_STOPPED, "space" => self.name.to_string()).set(1.0);
         let _ = self.loaded.set(Err(Unavailable::Stopped(reason)));
+    }
+
+    /// Notes that all that could be read at a time is folded.
+    pub(crate) fn note_caught_up(&self, at: Instant) {
+        *self.lock_caught_up() = Some(at);
+    }
+
+    pub(super) fn lock_caught_up(&self) -> MutexGuard<'_, Option<Instant>> {
+        self.caught_up
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Lists a new agent.
@@ -171,9 +193,7 @@ impl Shared {
         self.agents.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn snapshot_requests(
-        &self,
-    ) -> std::sync::MutexGuard<'_, Option<Vec<SnapshotRequest>>> {
+    pub(super) fn snapshot_requests(&self) -> MutexGuard<'_, Option<Vec<SnapshotRequest>>> {
         self.snapshot_requests
             .lock()
             .unwrap_or_else(PoisonError::into_inner)

@@ -10,6 +10,7 @@ mod trajectories;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{Builder, JoinHandle};
+use std::time::Instant;
 
 use cogmap_proto::{Codec, EventId, IngestAnswer, Name, ObjectLesson, SampleBatch, SpaceSettings};
 use cognitive_map::{CognitiveMap, Label, Lesson, Settings};
@@ -138,6 +139,17 @@ impl Space {
         })
     }
 
+    /// Revision of the map at the end of the latest round.
+    pub fn revision(&self) -> u64 {
+        self.shared.revision.load(Ordering::Acquire)
+    }
+
+    /// Of a space that is followed: when all was folded that could be read by then. None before the
+    /// first time, and of a space that this process writes.
+    pub fn caught_up(&self) -> Option<Instant> {
+        *self.shared.lock_caught_up()
+    }
+
     /// Whether a map of this space knows all that changed after a revision: it came to the revision
     /// after it was loaded.
     pub fn knows_changes_since(&self, revision: u64, map: &CognitiveMap) -> bool {
@@ -160,6 +172,12 @@ impl Space {
             .take(limit)
             .map(|(_, view)| view.clone())
             .collect()
+    }
+
+    /// Samples of all agents that are applied and not durable yet.
+    pub fn lag_samples(&self) -> u64 {
+        let agents = self.shared.agents();
+        agents.values().map(|view| view.lag().not_durable).sum()
     }
 
     /// Follows the events after `after`, or those from now on.
@@ -262,10 +280,15 @@ impl Space {
         &self.shared.questions
     }
 
-    /// Takes what is queued, checkpoints, and ends the thread.
-    pub(crate) fn close(&self) {
+    /// Has the thread take what is queued, checkpoint, and end; waits for nothing.
+    pub(crate) fn begin_to_close(&self) {
         self.shared.closing.store(true, Ordering::Release);
         self.queue.call();
+    }
+
+    /// Takes what is queued, checkpoints, and ends the thread.
+    pub(crate) fn close(&self) {
+        self.begin_to_close();
         let thread = self
             .thread
             .lock()

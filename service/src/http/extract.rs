@@ -129,8 +129,12 @@ pub(crate) fn name(text: &str) -> Result<Name, Problem> {
         .map_err(|error| Problem::new(Kind::InvalidPath, format!("{text:?}: {error}")))
 }
 
-/// The space of a name in a path.
-pub(crate) fn space(service: &Service, text: &str) -> Result<Arc<Space>, Problem> {
+/// The space of a name in a path; in place of one of another node what this node follows of it, if
+/// the request allows that.
+pub(crate) fn space(parts: &Parts, service: &Service, text: &str) -> Result<Arc<Space>, Problem> {
+    if let Some(replica) = parts.extensions.get::<super::forward::Replica>() {
+        return Ok(Arc::clone(&replica.space));
+    }
     answer::space_named(&service.engine, text)
 }
 
@@ -149,7 +153,7 @@ impl FromRequestParts<Service> for SpaceOfPath {
 
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: SpaceParam = path(parts, service).await?;
-        space(service, &params.space).map(Self)
+        space(parts, service, &params.space).map(Self)
     }
 }
 
@@ -168,7 +172,7 @@ impl FromRequestParts<Service> for AgentName {
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: AgentParams = path(parts, service).await?;
         let agent = name(&params.agent)?;
-        Ok(Self(space(service, &params.space)?, agent))
+        Ok(Self(space(parts, service, &params.space)?, agent))
     }
 }
 
@@ -177,7 +181,7 @@ impl FromRequestParts<Service> for AgentOfPath {
 
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: AgentParams = path(parts, service).await?;
-        let space = space(service, &params.space)?;
+        let space = space(parts, service, &params.space)?;
         let agent = name(&params.agent)?;
         let view = answer::agent_named(&space, agent.as_str())?;
         Ok(Self(space, view))

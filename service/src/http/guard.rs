@@ -37,9 +37,9 @@ const EVENT_STREAM: &str = "text/event-stream";
 /// Label of requests that no route matches.
 const UNMATCHED: &str = "unmatched";
 /// Statuses that have counters of their own.
-const STATUSES: [u16; 22] = [
-    200, 201, 204, 303, 304, 308, 400, 401, 403, 404, 405, 409, 410, 413, 415, 421, 422, 500, 503,
-    504, 507, 0,
+const STATUSES: [u16; 23] = [
+    200, 201, 204, 303, 304, 308, 400, 401, 403, 404, 405, 409, 410, 413, 415, 421, 422, 500, 502,
+    503, 504, 507, 0,
 ];
 
 /// What stands before every handler.

@@ -11,6 +11,7 @@ use super::problem::{Kind, Problem};
 use super::reply;
 use super::spaces::StoppedSpace;
 use super::state::Service;
+use crate::cluster::Cluster;
 use crate::engine::Readiness;
 
 /// Whether the service does its work.
@@ -49,6 +50,11 @@ pub(crate) async fn readyz(
     State(service): State<Service>,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
+    let standing = service.cluster.as_ref().map(Cluster::standing);
+    if standing.is_some_and(|standing| standing.resigned) {
+        let detail = "this node of the cluster has no contact to the storage";
+        return Err(Problem::new(Kind::NotReady, detail));
+    }
     match service.engine.readiness() {
         Readiness::Ready => Ok(ready(Vec::new())),
         Readiness::ReadyBut { stopped } => Ok(ready(stopped)),

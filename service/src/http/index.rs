@@ -2,13 +2,13 @@
 
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::Response;
+use axum::http::{HeaderMap, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::extract::NoQuery;
-use super::reply;
 use super::state::Service;
+use super::{reply, spaces};
 
 /// What is here, and where.
 #[derive(Debug, Serialize, ToSchema)]
@@ -38,6 +38,8 @@ struct Links {
     readiness: &'static str,
     /// What it counts.
     metrics: &'static str,
+    /// The nodes of the cluster, and who owns which shard.
+    cluster: &'static str,
 }
 
 /// A space and its address.
@@ -56,21 +58,30 @@ const LINKS: Links = Links {
     health: "/healthz",
     readiness: "/readyz",
     metrics: "/metrics",
+    cluster: "/v1/cluster",
 };
 
 /// What is here, and where: the spaces, the description of the interface, health and metrics.
 #[utoipa::path(get, path = "/v1", tag = "service", operation_id = "get_index",
     responses((status = 200, description = "The index", body = ApiIndex)))]
-pub(crate) async fn get(State(service): State<Service>, _: NoQuery) -> Response<Body> {
-    let spaces = service.engine.spaces();
+pub(crate) async fn get(
+    State(service): State<Service>,
+    headers: HeaderMap,
+    _: NoQuery,
+) -> Response<Body> {
+    let elsewhere = spaces::elsewhere(&service, &headers).await;
+    let here = service.engine.spaces();
+    let here = here.iter().map(|space| space.name().to_owned());
+    let mut names: Vec<_> = elsewhere.names().map(str::to_owned).chain(here).collect();
+    names.sort();
     reply::json(&ApiIndex {
         service: env!("CARGO_PKG_NAME"),
         version: env!("CARGO_PKG_VERSION"),
         links: LINKS,
-        spaces: { spaces.iter() }
-            .map(|space| SpaceLink {
-                name: space.name().to_owned(),
-                href: format!("/v1/spaces/{}", space.name()),
+        spaces: { names.into_iter() }
+            .map(|name| SpaceLink {
+                href: format!("/v1/spaces/{name}"),
+                name,
             })
             .collect(),
     })

@@ -83,6 +83,6 @@ impl FromRequestParts<Service> for LandmarkOfPath {
 
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: LabelParams = path(parts, service).await?;
-        Ok(Self(space(service, &params.space)?, params.id))
+        Ok(Self(space(parts, service, &params.space)?, params.id))
     }
 }

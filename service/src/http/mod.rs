@@ -9,6 +9,7 @@ mod agents;
 mod blockages;
 mod channels;
 mod cloud;
+mod cluster;
 mod compression;
 mod cors;
 mod dashboard;
@@ -20,6 +21,8 @@ mod export;
 mod extract;
 mod felt;
 mod following;
+mod forward;
+mod forwarder;
 mod guard;
 mod health;
 mod held;
@@ -66,9 +69,9 @@ use utoipa_axum::routes;
 pub use hosts::HostRule;
 pub use problem::{Kind, Problem};
 pub use settings::HttpSettings;
+pub use state::Served;
 pub use token::Token;
 
-use crate::engine::Engine;
 use guard::Guard;
 use listener::BoundedListener;
 use state::{Service, Shared};
@@ -123,6 +126,7 @@ fn described() -> OpenApiRouter<Service> {
         .routes(routes!(events::get))
         .routes(routes!(export::get))
         .routes(routes!(health::metrics))
+        .routes(routes!(cluster::get))
         .layer(compression::layer())
         // Short answers, of which the first is asked for most of all: nothing looks at them.
         .routes(routes!(agents::get, agents::delete))
@@ -145,7 +149,7 @@ pub fn openapi(token: bool) -> serde_json::Value {
 
 /// The whole interface as a service. Event streams end when `stopping` turns true.
 pub fn router(
-    engine: Engine,
+    served: impl Into<Served>,
     settings: &HttpSettings,
     prometheus: PrometheusHandle,
     stopping: watch::Receiver<bool>,
@@ -155,14 +159,15 @@ pub fn router(
     let guard = Guard::new(settings, paths.iter().cloned());
     let pages = docs::routes(&openapi(settings.token.is_some()))
         .merge(dashboard::routes::<_, dashboard::Built>());
+    let shared = Shared::new(served.into(), prometheus, settings, stopping, paths);
+    let service = Service::new(shared);
+    let described = described.layer(forward::layer(&service));
     let router = described
         .merge(pages.layer(compression::layer()))
         .fallback(elsewhere::unknown_path)
         .method_not_allowed_fallback(elsewhere::other_method)
         .layer(guard)
-        .with_state(Service::new(Shared::new(
-            engine, prometheus, settings, stopping, paths,
-        )));
+        .with_state(service);
     if settings.cors_origins.is_empty() {
         return router;
     }
@@ -175,13 +180,13 @@ pub fn router(
 /// The listener fails.
 pub async fn run(
     listener: TcpListener,
-    engine: Engine,
+    served: Served,
     settings: HttpSettings,
     prometheus: PrometheusHandle,
     shutdown: impl Future<Output = ()> + Send + 'static,
 ) -> io::Result<()> {
     let (stop, stopping) = watch::channel(false);
-    let router = router(engine, &settings, prometheus, stopping.clone());
+    let router = router(served, &settings, prometheus, stopping.clone());
     let signal = async move {
         shutdown.await;
         stop.send_replace(true);

@@ -225,6 +225,6 @@ impl FromRequestParts<Service> for ObjectOfPath {
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: ObjectParams = path(parts, service).await?;
         let name = Label::new(&params.name);
-        Ok(Self(space(service, &params.space)?, name))
+        Ok(Self(space(parts, service, &params.space)?, name))
     }
 }

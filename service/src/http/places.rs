@@ -141,7 +141,7 @@ impl FromRequestParts<Service> for MemoryOfPath {
 
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: IdParams = path(parts, service).await?;
-        Ok(Self(space(service, &params.space)?, params.id))
+        Ok(Self(space(parts, service, &params.space)?, params.id))
     }
 }
 

@@ -6,9 +6,9 @@ use std::time::Duration;
 use axum::body::Body;
 use axum::extract::{FromRequest, Request, State};
 use axum::http::header::LOCATION;
-use axum::http::{HeaderValue, Response, StatusCode};
+use axum::http::{HeaderMap, HeaderValue, Response, StatusCode};
 use cogmap_proto::{Name, SpaceInfo, SpaceSettings};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::extract::{
@@ -25,17 +25,25 @@ use crate::engine::{Space, Unavailable};
 const SET_UP_POLL: Duration = Duration::from_millis(1);
 
 /// The spaces of the service.
-#[derive(Debug, Serialize, ToSchema)]
+#[derive(Debug, Serialize, Deserialize, ToSchema)]
 pub(crate) struct ListedSpaces {
     /// The spaces, by name.
     spaces: Vec<SpaceInfo>,
     /// Spaces that are stopped because their journal is damaged, by name.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     stopped: Vec<StoppedSpace>,
 }
 
+impl ListedSpaces {
+    /// The names of all of them.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        let spaces = self.spaces.iter().map(|space| space.name.as_str());
+        spaces.chain(self.stopped.iter().map(|space| space.name.as_str()))
+    }
+}
+
 /// A space that is stopped because its journal is damaged.
-#[derive(Debug, Serialize, ToSchema)]
+#[derive(Debug, Serialize, Deserialize, ToSchema)]
 pub(crate) struct StoppedSpace {
     /// Name.
     pub(crate) name: String,
@@ -51,9 +59,13 @@ pub(crate) struct StoppedSpace {
     responses((status = 200, description = "All spaces, by name", body = ListedSpaces)))]
 pub(crate) async fn list(
     State(service): State<Service>,
+    headers: HeaderMap,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
-    let (mut spaces, mut stopped) = (Vec::new(), Vec::new());
+    let ListedSpaces {
+        mut spaces,
+        mut stopped,
+    } = elsewhere(&service, &headers).await;
     for space in service.engine.spaces() {
         if let Some(reason) = space.stop_reason() {
             let (name, reason) = (space.name().to_owned(), reason.to_owned());
@@ -62,7 +74,26 @@ pub(crate) async fn list(
             spaces.push(info);
         }
     }
+    spaces.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(reply::json(&ListedSpaces { spaces, stopped }))
+}
+
+/// The spaces of the other nodes of the cluster.
+pub(crate) async fn elsewhere(service: &Service, headers: &HeaderMap) -> ListedSpaces {
+    let mut all = ListedSpaces {
+        spaces: Vec::new(),
+        stopped: Vec::new(),
+    };
+    for answer in super::forward::ask_others(service, "/v1/spaces", headers).await {
+        match serde_json::from_slice::<ListedSpaces>(&answer) {
+            Ok(listed) => {
+                all.spaces.extend(listed.spaces);
+                all.stopped.extend(listed.stopped);
+            }
+            Err(error) => tracing::debug!(%error, "the spaces of another node"),
+        }
+    }
+    all
 }
 
 /// A space.

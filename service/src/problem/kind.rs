@@ -74,6 +74,10 @@ pub enum Kind {
     Busy,
     /// The space is still loading; come back.
     Recovering,
+    /// No node of the cluster owns the space at the moment; come back.
+    Moving,
+    /// The node that owns the space did not answer: whether it did what was asked is not known.
+    OwnerLost,
     /// The space's journal is damaged; an operator must look after it.
     SpaceStopped,
     /// The service or the space is closing.
@@ -88,7 +92,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, by status.
-    pub const ALL: [Self; 40] = [
+    pub const ALL: [Self; 42] = [
         Self::InvalidPath,
         Self::InvalidParameter,
         Self::MalformedBody,
@@ -122,8 +126,10 @@ impl Kind {
         Self::InvalidQuery,
         Self::Internal,
         Self::StoreFailed,
+        Self::OwnerLost,
         Self::Busy,
         Self::Recovering,
+        Self::Moving,
         Self::SpaceStopped,
         Self::Closing,
         Self::NotReady,
@@ -169,6 +175,8 @@ impl Kind {
             Self::StoreFailed => ("store-failed", 500, "The store has failed"),
             Self::Busy => ("busy", 503, "Too much is under way"),
             Self::Recovering => ("recovering", 503, "The space is loading"),
+            Self::Moving => ("moving", 503, "The space is changing hands"),
+            Self::OwnerLost => ("owner-lost", 502, "The owner of the space did not answer"),
             Self::SpaceStopped => ("space-stopped", 503, "The space is stopped"),
             Self::Closing => ("closing", 503, "The service is closing"),
             Self::NotReady => ("not-ready", 503, "The service is not ready"),

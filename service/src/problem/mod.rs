@@ -45,6 +45,12 @@ impl Problem {
         Self::new(Kind::UnknownSpace, format!("there is no space {name:?}"))
     }
 
+    /// Nobody in reach owns the space now.
+    pub fn moving(name: &str) -> Self {
+        let detail = format!("the shard of the space {name:?} is changing hands");
+        Self::new(Kind::Moving, detail)
+    }
+
     /// There is no such agent.
     pub fn unknown_agent(name: &str) -> Self {
         Self::new(
@@ -207,6 +213,7 @@ impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         let kind = match &error {
             StoreError::DiskFull => Kind::StoreFull,
+            StoreError::Fenced(_) => Kind::OwnerLost,
             _ => Kind::StoreFailed,
         };
         tracing::error!(%error, "answer from the store");
@@ -238,6 +245,7 @@ impl From<SpaceError> for Problem {
             SpaceError::TooManySpaces(_) => Kind::TooManySpaces,
             SpaceError::Unknown => Kind::UnknownSpace,
             SpaceError::Closed => Kind::Closing,
+            SpaceError::NotHere => Kind::Moving,
             SpaceError::Store(error) => return error.into(),
         };
         Self::new(kind, error.to_string())
@@ -260,6 +268,7 @@ impl From<IngestError> for Problem {
             IngestError::UnknownAgent(_) => Self::new(Kind::UnknownAgent, detail),
             IngestError::TooManyAgents => Self::new(Kind::TooManyAgents, detail),
             IngestError::DiskFull(_) => Self::new(Kind::StoreFull, detail),
+            IngestError::Fenced(_) => Self::new(Kind::OwnerLost, detail),
             IngestError::Store(_) => Self::new(Kind::StoreFailed, detail),
             IngestError::Stopped(_) => Self::new(Kind::SpaceStopped, detail),
             IngestError::Closed => Self::new(Kind::Closing, detail),

@@ -2,7 +2,7 @@
 
 use xxhash_rust::xxh3::Xxh3;
 
-use super::{Extent, Journal, SpaceNumber, StoreError};
+use super::{Extent, Journal, SpaceNumber, StoreError, StoredSpace, WholeStore};
 
 /// A space that was copied.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,55 +22,69 @@ pub struct CopiedSpace {
 /// The name of a space is taken there or lost here, a block cannot be read, or it is another one
 /// when it is read there.
 pub fn copy(
-    from: &dyn Journal,
-    to: &dyn Journal,
+    from: &WholeStore,
+    to: &WholeStore,
     samples_in: fn(&[u8]) -> u64,
 ) -> Result<Vec<CopiedSpace>, StoreError> {
-    let spaces = from.spaces()?;
-    let taken = to.spaces()?;
     // Before anything is written.
-    if let Some(space) = spaces
-        .iter()
-        .find(|space| taken.iter().any(|other| other.name == space.name))
-    {
-        return Err(StoreError::SpaceExists(space.name.clone()));
+    for (_, shard) in from.iter() {
+        for space in shard.spaces()? {
+            let taken = to.of(&space.name).spaces()?;
+            if taken.iter().any(|other| other.name == space.name) {
+                return Err(StoreError::SpaceExists(space.name));
+            }
+        }
     }
     let mut copied = Vec::new();
-    for space in spaces {
-        let name = space.name;
-        let Some(settings) = space.settings else {
-            let what = format!("the settings of space {name:?} are lost");
-            return Err(StoreError::Corrupt(what));
-        };
-        // What a crash has cut off the end of the journal is not copied.
-        from.open_journal(space.number)?;
-        let mut draft = to.draft(&name, &settings)?;
-        let (mut extent, mut check) = (Extent::default(), Xxh3::new());
-        for block in from.journal(space.number, 0) {
-            let (_, bytes) = block?;
-            let samples = samples_in(&bytes);
-            draft.append(samples, &bytes)?;
-            extent.blocks += 1;
-            extent.samples += samples;
-            take(&mut check, &bytes);
+    for (_, shard) in from.iter() {
+        for space in shard.spaces()? {
+            let to = to.of(&space.name);
+            copied.push(copy_space(&**shard, to, space, samples_in)?);
         }
-        let number = draft.finish()?;
-        let check = check.digest();
-        if check_of(to, number)? != check {
-            let what = format!("the copy of space {name:?} is not what was written");
-            return Err(StoreError::Corrupt(what));
-        }
-        copied.push(CopiedSpace {
-            name,
-            extent,
-            check,
-        });
     }
+    copied.sort_by(|a: &CopiedSpace, b| a.name.cmp(&b.name));
     Ok(copied)
 }
 
+/// Copies a space from the shard where it is to the one where it belongs.
+fn copy_space<T: Journal + ?Sized>(
+    from: &T,
+    to: &T,
+    space: StoredSpace,
+    samples_in: fn(&[u8]) -> u64,
+) -> Result<CopiedSpace, StoreError> {
+    let name = space.name;
+    let Some(settings) = space.settings else {
+        let what = format!("the settings of space {name:?} are lost");
+        return Err(StoreError::Corrupt(what));
+    };
+    // What a crash has cut off the end of the journal is not copied.
+    from.open_journal(space.number)?;
+    let mut draft = to.draft(&name, &settings)?;
+    let (mut extent, mut check) = (Extent::default(), Xxh3::new());
+    for block in from.journal(space.number, 0) {
+        let (_, bytes) = block?;
+        let samples = samples_in(&bytes);
+        draft.append(samples, &bytes)?;
+        extent.blocks += 1;
+        extent.samples += samples;
+        take(&mut check, &bytes);
+    }
+    let number = draft.finish()?;
+    let check = check.digest();
+    if check_of(to, number)? != check {
+        let what = format!("the copy of space {name:?} is not what was written");
+        return Err(StoreError::Corrupt(what));
+    }
+    Ok(CopiedSpace {
+        name,
+        extent,
+        check,
+    })
+}
+
 /// The check of all blocks of a space.
-fn check_of(journal: &dyn Journal, space: SpaceNumber) -> Result<u64, StoreError> {
+fn check_of<T: Journal + ?Sized>(journal: &T, space: SpaceNumber) -> Result<u64, StoreError> {
     journal.open_journal(space)?;
     let mut check = Xxh3::new();
     for block in journal.journal(space, 0) {

@@ -14,8 +14,10 @@ mod local;
 mod log;
 #[cfg(feature = "object-storage")]
 mod object;
+mod shard;
 #[cfg(test)]
 mod suite;
+mod whole;
 
 use cognitive_map::CheckpointPage;
 
@@ -33,7 +35,9 @@ pub use format1::migrate;
 pub use local::{FORMAT_VERSION, LocalJournal, LocalStore, Replacement, SpaceSurvey, verify};
 pub use log::{Damage, Extent, Flaw, Survey};
 #[cfg(feature = "object-storage")]
-pub use object::ObjectStore;
+pub use object::{NodeId, ObjectStorage, ObjectStore, OwnerRecord, Registry, Seen};
+pub use shard::{ShardNumber, Shards};
+pub use whole::WholeStore;
 
 /// A space as the store knows it. The number is never used again, the name may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -98,6 +102,12 @@ pub type Blocks<'a> = Box<dyn Iterator<Item = Result<(u64, Vec<u8>), StoreError>
 /// error of either the journal refuses all further changes ([`StoreError::DiskFull`] or
 /// [`StoreError::Fenced`] once more, or [`StoreError::Broken`]); reading goes on.
 pub trait Journal: std::fmt::Debug + Send + Sync + 'static {
+    /// Number of this process as the owner of the journals, larger than that of any owner before; 0
+    /// where one machine alone can own them, as on the embedded end.
+    fn term(&self) -> u64 {
+        0
+    }
+
     /// The spaces, by number.
     ///
     /// # Errors
@@ -151,6 +161,24 @@ pub trait Journal: std::fmt::Debug + Send + Sync + 'static {
     /// The journal of a space from block `from` on: up to its end when asked, or to the first
     /// damage.
     fn journal(&self, space: SpaceNumber, from: u64) -> Blocks<'_>;
+
+    /// Whether the journal still takes changes, as far as is known without asking the disk.
+    ///
+    /// # Errors
+    /// [`StoreError::Fenced`]: another process owns it.
+    fn check_ownership(&self) -> Result<(), StoreError> {
+        Ok(())
+    }
+
+    /// Grows when there may be something new to read in a journal that another process writes; 0
+    /// where this process does.
+    fn progress(&self) -> u64 {
+        0
+    }
+
+    /// Gives the journal up, so that another process may own it at once. Nothing is written
+    /// afterwards.
+    fn give_up(&self) {}
 }
 
 /// A space that is being written and that nobody sees. Dropped before it is finished, it leaves the

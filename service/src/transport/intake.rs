@@ -1,10 +1,13 @@
 //! Samples in.
 
 use std::borrow::Cow;
-use std::sync::LazyLock;
+use std::collections::BTreeMap;
+use std::sync::{Arc, LazyLock};
 
 use cogmap_proto::limits::MESSAGE_BYTES_MAX;
 use cogmap_proto::{Codec, DecodeError, Name, samples_key};
+use tokio::sync::Semaphore;
+use tokio::task::JoinHandle;
 use zenoh::Session;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Subscriber;
@@ -28,18 +31,71 @@ impl Intake {
     /// # Errors
     /// The declarations fail.
     pub async fn start(session: &Session, engine: &Engine) -> Result<Self, TransportError> {
-        let queries = queries::declare(session, engine).await?;
+        Self::of("*", session, engine, &queries::room()).await
+    }
+
+    /// Begins to take samples and queries of a space, or of all.
+    async fn of(
+        space: &str,
+        session: &Session,
+        engine: &Engine,
+        room: &Arc<Semaphore>,
+    ) -> Result<Self, TransportError> {
+        let queries = queries::declare(space, session, engine, room).await?;
         let engine = engine.clone();
         // The callback runs on a thread that receives for the whole session: it copies the bytes to
         // the space's queue or counts a drop, and never waits.
         let samples = session
-            .declare_subscriber(samples_key("*", "*"))
+            .declare_subscriber(samples_key(space, "*"))
             .callback(move |sample| take(&engine, &sample))
             .await?;
         Ok(Self {
             _samples: samples,
             _queries: queries,
         })
+    }
+}
+
+/// Samples and queries of the spaces that are here, while they are: those of others are for other
+/// nodes. Dropping it ends all.
+#[derive(Debug)]
+pub struct IntakeOfSpaces(JoinHandle<()>);
+
+impl IntakeOfSpaces {
+    /// Begins to take samples and queries of each space of the engine.
+    pub fn start(session: &Session, engine: &Engine) -> Self {
+        let (session, engine) = (session.clone(), engine.clone());
+        Self(tokio::spawn(async move {
+            let (mut changes, room) = (engine.changes(), queries::room());
+            let mut taken: BTreeMap<String, Intake> = BTreeMap::new();
+            loop {
+                changes.mark_unchanged();
+                let spaces = engine.spaces();
+                taken.retain(|name, _| spaces.iter().any(|space| space.name() == name));
+                for space in spaces {
+                    if taken.contains_key(space.name()) {
+                        continue;
+                    }
+                    match Intake::of(space.name(), &session, &engine, &room).await {
+                        Ok(intake) => {
+                            taken.insert(space.name().to_owned(), intake);
+                        }
+                        Err(error) => {
+                            tracing::error!(space = space.name(), %error, "take samples");
+                        }
+                    }
+                }
+                if changes.changed().await.is_err() {
+                    return;
+                }
+            }
+        }))
+    }
+}
+
+impl Drop for IntakeOfSpaces {
+    fn drop(&mut self) {
+        self.0.abort();
     }
 }
 

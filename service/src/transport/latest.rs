@@ -39,8 +39,9 @@ impl Latest {
     }
 }
 
-/// Answers for every agent of every space.
+/// Answers for every agent of a space, or of every one.
 pub(super) async fn declare(
+    space: &str,
     session: &Session,
     engine: &Engine,
     room: &Arc<Semaphore>,
@@ -49,7 +50,7 @@ pub(super) async fn declare(
     for latest in [Latest::Estimate, Latest::Watermark] {
         let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(room));
         let queryable = session
-            .declare_queryable(latest.key("*", "*"))
+            .declare_queryable(latest.key(space, "*"))
             .complete(true)
             // The callback runs on a receiving thread: the answer is made elsewhere, on a thread
             // that may wait for a congested link.

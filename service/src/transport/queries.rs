@@ -24,13 +24,19 @@ use crate::problem::{Kind, Problem};
 /// Most queries under way; further ones are told to come back.
 const QUERIES_MAX: usize = 64;
 
-/// Answers every verb for every space.
+/// Room for the queries under way, of all spaces.
+pub(crate) fn room() -> Arc<Semaphore> {
+    Arc::new(Semaphore::new(QUERIES_MAX))
+}
+
+/// Answers every verb for a space, or for every one.
 pub(crate) async fn declare(
+    space: &str,
     session: &Session,
     engine: &Engine,
+    room: &Arc<Semaphore>,
 ) -> Result<Vec<Queryable<()>>, TransportError> {
     let mut queryables = Vec::new();
-    let room = Arc::new(Semaphore::new(QUERIES_MAX));
     for verb in [
         Verb::Recall,
         Verb::Watermark,
@@ -41,9 +47,9 @@ pub(crate) async fn declare(
         Verb::Sequence,
         Verb::Felt,
     ] {
-        let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(&room));
+        let (engine, runtime, room) = (engine.clone(), Handle::current(), Arc::clone(room));
         let queryable = session
-            .declare_queryable(query_key("*", verb.as_str()))
+            .declare_queryable(query_key(space, verb.as_str()))
             .complete(true)
             // The callback runs on a receiving thread: the answer is made elsewhere.
             .callback(move |query| {
@@ -54,7 +60,7 @@ pub(crate) async fn declare(
             .await?;
         queryables.push(queryable);
     }
-    queryables.extend(latest::declare(session, engine, &room).await?);
+    queryables.extend(latest::declare(space, session, engine, room).await?);
     Ok(queryables)
 }
 

@@ -8,11 +8,12 @@ use cogmap_tests::{Drive, Server, batch, seed};
 use serde_json::json;
 
 /// Every path of the interface and its methods: what clients are written against.
-const ROUTES: [(&str, &[&str]); 38] = [
+const ROUTES: [(&str, &[&str]); 39] = [
     ("/healthz", &["get"]),
     ("/metrics", &["get"]),
     ("/readyz", &["get"]),
     ("/v1", &["get"]),
+    ("/v1/cluster", &["get"]),
     ("/v1/spaces", &["get"]),
     ("/v1/spaces/{space}", &["delete", "get", "put"]),
     ("/v1/spaces/{space}/agents", &["get"]),

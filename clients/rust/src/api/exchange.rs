@@ -7,6 +7,7 @@ use ureq::Body;
 use ureq::http::Response;
 
 use super::ApiError;
+use super::retry::Repeat;
 
 /// Longest answer \[bytes\]: a full page of the longest items, many times over.
 const ANSWER_BYTES_MAX: u64 = 64 << 20;
@@ -17,6 +18,7 @@ const EXCERPT_BYTES_MAX: usize = 400;
 pub(super) struct Content {
     pub(super) kind: &'static str,
     pub(super) bytes: Vec<u8>,
+    pub(super) repeat: Repeat,
 }
 
 /// A body in JSON.
@@ -24,6 +26,7 @@ pub(super) fn json<T: Serialize>(body: &T) -> Content {
     Content {
         kind: Codec::Json.encoding(),
         bytes: Codec::Json.encode(body),
+        repeat: Repeat::Once,
     }
 }
 
@@ -40,7 +43,7 @@ pub(super) fn agent_path(space: &str, agent: &str, rest: &str) -> Result<String,
 }
 
 /// Whether something was done that has no answer.
-pub(super) fn done(response: Response<Body>) -> Result<(), ApiError> {
+pub(super) fn done(response: Response<Vec<u8>>) -> Result<(), ApiError> {
     if response.status().is_success() {
         Ok(())
     } else {
@@ -62,36 +65,34 @@ pub(super) fn escaped(text: &str) -> String {
     })
 }
 
-/// The bytes of an answer.
-pub(super) fn bytes(response: Response<Body>) -> Result<Vec<u8>, ApiError> {
-    Ok(response
-        .into_body()
+/// An answer, read to its end.
+pub(super) fn whole(response: Response<Body>) -> Result<Response<Vec<u8>>, ApiError> {
+    let (head, body) = response.into_parts();
+    let bytes = body
         .into_with_config()
         .limit(ANSWER_BYTES_MAX)
-        .read_to_vec()?)
+        .read_to_vec()?;
+    Ok(Response::from_parts(head, bytes))
 }
 
 /// The message that an answer holds.
 pub(super) fn answer<T: DeserializeOwned>(
     path: &str,
-    response: Response<Body>,
+    response: Response<Vec<u8>>,
 ) -> Result<T, ApiError> {
     if !response.status().is_success() {
         return Err(refusal(response));
     }
-    serde_json::from_slice(&bytes(response)?).map_err(|source| ApiError::Answer {
+    serde_json::from_slice(response.body()).map_err(|source| ApiError::Answer {
         path: path.to_owned(),
         source,
     })
 }
 
 /// Why nothing was answered; the body may be anything when a proxy wrote it.
-pub(super) fn refusal(response: Response<Body>) -> ApiError {
+pub(super) fn refusal(response: Response<Vec<u8>>) -> ApiError {
     let status = response.status().as_u16();
-    let body = match bytes(response) {
-        Ok(body) => body,
-        Err(error) => return error,
-    };
+    let body = response.into_body();
     serde_json::from_slice(&body).map_or_else(
         |_| ApiError::Status {
             status,

@@ -23,7 +23,7 @@ impl Api {
         request: &FollowRequest,
     ) -> Result<FollowedRoute, ApiError> {
         let path = agent_path(space, agent, "/route")?;
-        self.send(Method::PUT, &path, &json(request))
+        self.send(&Method::PUT, &path, &json(request))
     }
 
     /// What is left of the route that an agent follows.
@@ -50,7 +50,7 @@ impl Api {
     /// See [`ApiError`].
     pub fn stop_following(&self, space: &str, agent: &str) -> Result<(), ApiError> {
         let path = agent_path(space, agent, "/route")?;
-        done(self.run(Method::DELETE, &path, None)?)
+        done(self.run(&Method::DELETE, &path, None)?)
     }
 
     /// The blockages of a space, by number.
@@ -68,7 +68,7 @@ impl Api {
     /// See [`ApiError`].
     pub fn block(&self, space: &str, request: &BlockageRequest) -> Result<Blockage, ApiError> {
         let path = path(space, "/blockages")?;
-        self.send(Method::POST, &path, &json(request))
+        self.send(&Method::POST, &path, &json(request))
     }
 
     /// Ends a blockage.
@@ -77,7 +77,7 @@ impl Api {
     /// See [`ApiError`].
     pub fn unblock(&self, space: &str, blockage: u64) -> Result<(), ApiError> {
         let path = path(space, &format!("/blockages/{blockage}"))?;
-        done(self.run(Method::DELETE, &path, None)?)
+        done(self.run(&Method::DELETE, &path, None)?)
     }
 
     /// Pins a trip, which then is never forgotten.
@@ -86,7 +86,7 @@ impl Api {
     /// See [`ApiError`].
     pub fn pin_trip(&self, space: &str, trip: u64) -> Result<(), ApiError> {
         let path = path(space, &format!("/trips/{trip}/pin"))?;
-        done(self.run(Method::PUT, &path, None)?)
+        done(self.run(&Method::PUT, &path, None)?)
     }
 
     /// Lets a trip be forgotten like others.
@@ -95,6 +95,6 @@ impl Api {
     /// See [`ApiError`].
     pub fn unpin_trip(&self, space: &str, trip: u64) -> Result<(), ApiError> {
         let path = path(space, &format!("/trips/{trip}/pin"))?;
-        done(self.run(Method::DELETE, &path, None)?)
+        done(self.run(&Method::DELETE, &path, None)?)
     }
 }

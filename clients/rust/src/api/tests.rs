@@ -12,6 +12,8 @@ use cogmap_proto::{
 
 use super::{Api, ApiError};
 
+mod retry;
+
 /// One request as the server saw it.
 struct Seen {
     /// Request line and headers, header names in lower case.
@@ -21,11 +23,17 @@ struct Seen {
 
 /// Serves the answers in turn on a free port; hands back the base address and the requests.
 fn serve(answers: Vec<(u16, String)>) -> (String, Receiver<Seen>) {
+    let answers = answers.into_iter();
+    serve_with(answers.map(|(status, body)| (status, "", body)).collect())
+}
+
+/// The same with header lines, each with its end.
+fn serve_with(answers: Vec<(u16, &'static str, String)>) -> (String, Receiver<Seen>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let base = format!("http://{}/", listener.local_addr().unwrap());
     let (sender, seen) = channel();
     thread::spawn(move || {
-        for (status, answer) in answers {
+        for (status, headers, answer) in answers {
             let (mut stream, _) = listener.accept().unwrap();
             let mut reader = BufReader::new(stream.try_clone().unwrap());
             let mut head = Vec::new();
@@ -43,12 +51,14 @@ fn serve(answers: Vec<(u16, String)>) -> (String, Receiver<Seen>) {
             let mut body = vec![0; length.map_or(0, |length| length.parse().unwrap())];
             reader.read_exact(&mut body).unwrap();
             let length = answer.len();
+            // A client may have what it asked for before the test looks at what it sent.
+            sender.send(Seen { head, body }).unwrap();
             write!(
                 stream,
-                "HTTP/1.1 {status} x\r\nconnection: close\r\ncontent-length: {length}\r\n\r\n{answer}"
+                "HTTP/1.1 {status} x\r\n{headers}connection: close\r\n\
+                 content-length: {length}\r\n\r\n{answer}"
             )
             .unwrap();
-            sender.send(Seen { head, body }).unwrap();
         }
     });
     (base, seen)

@@ -38,6 +38,7 @@ fn watermark(durable: u64, gap: Option<(u64, u64)>) -> Watermark {
         applied: durable,
         gap: gap.map(|(from, to)| SeqRange { from, to }),
         rejected: Vec::new(),
+        term: 0,
     }
 }
 
@@ -149,6 +150,67 @@ fn a_restarted_service_gets_everything_again_at_once() {
     assert_eq!(window.applied(), 40);
     window.hear(&watermark(12, None), ms(500));
     assert_eq!(take_all(&mut window, ms(500)), [(12, 40, true)]);
+}
+
+/// A watermark of another owner: what it applied, and nothing else, is durable.
+fn watermark_of(term: u64, durable: u64) -> Watermark {
+    Watermark {
+        term,
+        ..watermark(durable, None)
+    }
+}
+
+#[test]
+fn another_owner_gets_what_it_may_not_have_at_once() {
+    let mut window = window_sent(40);
+    let mut before = watermark_of(3, 10);
+    before.applied = 30;
+    assert_eq!(window.hear(&before, ms(10)), Heard::Current);
+    assert_eq!(take_all(&mut window, ms(10)), []);
+    assert_eq!(window.hear(&watermark_of(4, 10), ms(11)), Heard::Current);
+    assert_eq!((window.durable(), window.applied()), (10, 10));
+    assert_eq!(take_all(&mut window, ms(11)), [(10, 40, true)]);
+    // The next one within the interval of restarts, with all that was applied before.
+    let mut next = watermark_of(5, 12);
+    next.applied = 20;
+    assert_eq!(window.hear(&next, ms(12)), Heard::Current);
+    assert_eq!(take_all(&mut window, ms(12)), [(12, 40, true)]);
+    // The same owner again is no other one.
+    next.applied = 40;
+    assert_eq!(window.hear(&next, ms(13)), Heard::Current);
+    assert_eq!(take_all(&mut window, ms(13)), []);
+}
+
+#[test]
+fn a_watermark_of_an_owner_before_counts_for_nothing() {
+    let mut window = window_sent(40);
+    assert_eq!(window.hear(&watermark_of(4, 10), ms(1)), Heard::Current);
+    let mut late = watermark_of(3, 30);
+    late.gap = Some(SeqRange { from: 30, to: 35 });
+    assert_eq!(window.hear(&late, ms(2)), Heard::Stale);
+    late.session = SESSION + 1;
+    assert_eq!(window.hear(&late, ms(3)), Heard::Stale);
+    assert_eq!((window.durable(), window.applied()), (10, 10));
+    assert_eq!(take_all(&mut window, ms(3)), []);
+    assert_eq!(window.hear(&watermark_of(4, 30), ms(4)), Heard::Current);
+}
+
+#[test]
+fn an_estimate_tells_of_another_owner_and_its_watermark_brings_the_rest_again() {
+    let mut window = window_sent(40);
+    assert_eq!(window.hear(&watermark_of(3, 10), ms(1)), Heard::Current);
+    assert!(!window.is_outdated(3) && !window.is_outdated(4) && window.is_outdated(3));
+    assert_eq!(window.hear(&watermark_of(3, 20), ms(2)), Heard::Stale);
+    assert_eq!(window.hear(&watermark_of(4, 10), ms(3)), Heard::Current);
+    assert_eq!(take_all(&mut window, ms(3)), [(10, 40, true)]);
+}
+
+#[test]
+fn what_is_durable_stays_so_in_a_later_term() {
+    let mut window = window_sent(40);
+    assert_eq!(window.hear(&watermark_of(3, 20), ms(1)), Heard::Current);
+    assert_eq!(window.hear(&watermark_of(4, 10), ms(2)), Heard::Stale);
+    assert_eq!(window.durable(), 20);
 }
 
 #[test]
@@ -298,6 +360,7 @@ struct Service {
     journal: Vec<u64>,
     durable: u64,
     early: BTreeMap<u64, u64>,
+    term: u64,
 }
 
 impl Service {
@@ -335,6 +398,7 @@ impl Service {
                 to,
             }),
             rejected: Vec::new(),
+            term: self.term,
         }
     }
 }
@@ -386,6 +450,8 @@ fn run(seed: u64, total: u64) -> Vec<u64> {
         if crashes > 0 && generator.chance(1) && generator.chance(10) {
             crashes -= 1;
             service.crash();
+            // An embedded store has one owner; one on object storage has another one from now on.
+            service.term += seed % 2;
             back.put(&service.watermark(), now_ms, &mut generator);
         }
         for watermark in back.arrived(now_ms) {

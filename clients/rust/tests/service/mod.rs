@@ -186,6 +186,7 @@ impl Book {
                 })
                 .into_iter()
                 .collect(),
+            term: 0,
         }
     }
 
@@ -209,6 +210,7 @@ impl Book {
             covariance: [0.0; 21],
             place: None,
             confidence: 0.0,
+            term: 0,
         })
     }
 }

@@ -238,6 +238,7 @@ mod tests {
             covariance: [0.0; 21],
             place: None,
             confidence: 0.0,
+            term: 0,
         }
     }
 

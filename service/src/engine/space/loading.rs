@@ -80,7 +80,12 @@ pub(super) fn load_and_run(
             );
             let _present = Presence(shared);
             let _ = shared.loaded.set(Ok(()));
-            writer.run(inbox);
+            if !shared.follows {
+                return writer.run(inbox);
+            }
+            if let Err(error) = writer.follow(inbox) {
+                tracing::error!(space, %error, "follow the journal");
+            }
         }
         Err(RecoveryError::Closing) => {
             let _ = shared.loaded.set(Err(Unavailable::Closing));

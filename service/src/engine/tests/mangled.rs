@@ -9,7 +9,7 @@ use proptest::sample::Index;
 use proptest::test_runner::Config;
 
 use super::*;
-use crate::engine::Health;
+use crate::engine::health::Health;
 use crate::engine::recovery::{Loading, recover};
 use crate::engine::trajectory::{Recorder, note_all};
 use crate::journal::{BlockWriter, entries};

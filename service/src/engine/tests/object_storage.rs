@@ -3,7 +3,7 @@
 use super::removal::ingest;
 use super::*;
 use crate::engine::IngestError;
-use crate::store::ObjectStore;
+use crate::store::{ObjectStorage, ShardNumber, Shards};
 
 fn open_at(directory: &Path) -> Engine {
     let url = format!("file://{}", directory.display());
@@ -11,7 +11,8 @@ fn open_at(directory: &Path) -> Engine {
         checkpoint_interval: Duration::from_millis(1),
         ..EngineSettings::default()
     };
-    let store = ObjectStore::open(&url).expect("the store opens");
+    let storage = ObjectStorage::open(&url, Shards::ONE).expect("the storage answers");
+    let store = storage.open_shard(ShardNumber(0)).expect("the store opens");
     open_over(Arc::new(store), settings)
 }
 
@@ -43,7 +44,7 @@ fn an_engine_that_was_taken_over_from_acknowledges_nothing() {
     assert_eq!(ingest(&second, AGENT, SESSION, &drive()[..60]), Ok(60));
 
     let refused = ingest(&first, AGENT, SESSION, &drive()[..90]).expect_err("it is not its owner");
-    let IngestError::Store(detail) = &refused else {
+    let IngestError::Fenced(detail) = &refused else {
         panic!("{refused}");
     };
     assert!(detail.contains("taken over"), "{detail}");
@@ -57,4 +58,38 @@ fn an_engine_that_was_taken_over_from_acknowledges_nothing() {
     let third = open_at(directory.path());
     assert_eq!((applied(&third), digest(&third)), (SAMPLES, whole));
     third.shutdown();
+}
+
+#[test]
+fn each_opening_of_the_store_has_a_larger_term() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let terms = [40, 60, 60].map(|samples| {
+        let engine = open_at(directory.path());
+        let taken = ingest(&engine, AGENT, SESSION, &drive()[..samples]);
+        assert_eq!(taken, Ok(samples as u64));
+        let space = engine.space(SPACE).expect("the space is there");
+        let view = space.agent(AGENT).expect("the agent is there");
+        let estimate = view.estimate().expect("it has moved");
+        assert_eq!(estimate.term, view.watermark().term);
+        engine.shutdown();
+        estimate.term
+    });
+    let grow = terms.windows(2).all(|pair| pair[0] < pair[1]);
+    assert!(terms[0] > 0 && grow, "{terms:?}");
+}
+
+#[test]
+fn a_session_that_begins_is_of_the_same_term() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let engine = open_at(directory.path());
+    let term = |session| {
+        assert_eq!(ingest(&engine, AGENT, session, &drive()[..40]), Ok(40));
+        let space = engine.space(SPACE).expect("the space is there");
+        let view = space.agent(AGENT).expect("the agent is there");
+        let mark = view.watermark();
+        assert_eq!((mark.session, mark.durable), (session, 40));
+        mark.term
+    };
+    assert_eq!(term(SESSION), term(SESSION + 1));
+    engine.shutdown();
 }

@@ -31,7 +31,8 @@ impl Writer {
             .map(|(id, agent)| {
                 let recorder = recorders.next().unwrap_or_default();
                 let name = agent.name().as_str();
-                let view = AgentView::new(id, name, agent.session(), agent.next_seq(), recorder);
+                let durable = (agent.session(), agent.next_seq());
+                let view = AgentView::new(id, name, self.shared.term, durable, recorder);
                 view.put_ended_episode(episodes.next().flatten());
                 let sequencer = Sequencer::new(agent.session(), agent.next_seq());
                 let latest_ns = agent.stamp_ns().unwrap_or(i64::MIN);
@@ -64,7 +65,7 @@ impl Writer {
             agent: id,
             name: label,
         });
-        let view = AgentView::new(id, name, 0, 0, Recorder::default());
+        let view = AgentView::new(id, name, self.shared.term, (0, 0), Recorder::default());
         self.put_slot(
             number,
             AgentSlot::new(view, Sequencer::new(0, 0), i64::MIN, now),
@@ -73,7 +74,7 @@ impl Writer {
     }
 
     /// Puts an agent under a number that is the next one or vacant.
-    fn put_slot(&mut self, number: usize, slot: AgentSlot) {
+    pub(super) fn put_slot(&mut self, number: usize, slot: AgentSlot) {
         if !slot.removed {
             self.by_name.insert(slot.view.name().into(), number);
             self.shared.add_view(Arc::clone(&slot.view));
@@ -176,7 +177,12 @@ pub(super) fn note_removal(
 }
 
 impl AgentSlot {
-    fn new(view: AgentView, sequencer: Sequencer<Sample>, latest_ns: i64, heard: Instant) -> Self {
+    pub(super) fn new(
+        view: AgentView,
+        sequencer: Sequencer<Sample>,
+        latest_ns: i64,
+        heard: Instant,
+    ) -> Self {
         Self {
             view: Arc::new(view),
             sequencer,

@@ -5,6 +5,7 @@
 //! round; the committer makes the block durable beside the next one.
 
 mod agents;
+mod follow;
 mod instructions;
 mod journal;
 mod objects;

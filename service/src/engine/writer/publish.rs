@@ -25,7 +25,7 @@ impl Writer {
         self.measure(0);
         for slot in self.agents.iter().filter(|slot| !slot.removed) {
             let id = slot.view.id();
-            if let Some(readout) = Readout::of(&self.shared.name, &self.map, id) {
+            if let Some(readout) = Readout::of(&self.shared.name, self.shared.term, &self.map, id) {
                 slot.view.publish(readout);
             }
             self.remind(slot);
@@ -34,7 +34,7 @@ impl Writer {
 
     /// Publishes what the round brought about, and hands it to the committer.
     pub(super) fn publish(&mut self) {
-        let space = &self.shared.name;
+        let (space, term) = (&self.shared.name, self.shared.term);
         let mut commit = Commit {
             space: Arc::clone(space),
             samples: std::mem::take(&mut self.applied),
@@ -58,7 +58,7 @@ impl Writer {
             };
             let (session, next) = (agent.session(), agent.next_seq());
             if applied {
-                if let Some(readout) = Readout::of(space, &self.map, slot.view.id()) {
+                if let Some(readout) = Readout::of(space, term, &self.map, slot.view.id()) {
                     slot.view.publish(readout);
                     self.shared.publisher.estimate(space, &slot.view);
                 }

@@ -36,7 +36,7 @@ use tokio::sync::watch;
 use tower::ServiceExt;
 
 use super::*;
-use crate::engine::{EngineSettings, Silent};
+use crate::engine::{Engine, EngineSettings, Silent};
 use crate::store::LocalStore;
 
 /// A service with the space `lab`, and the store that it lives on.

@@ -419,7 +419,7 @@ fn assert_references(root: &Value, value: &Value) {
 }
 
 /// All operations, by method and path.
-const OPERATIONS: [&str; 47] = [
+const OPERATIONS: [&str; 48] = [
     "DELETE /v1/spaces/{space}",
     "DELETE /v1/spaces/{space}/agents/{agent}",
     "DELETE /v1/spaces/{space}/agents/{agent}/route",
@@ -430,6 +430,7 @@ const OPERATIONS: [&str; 47] = [
     "GET /metrics",
     "GET /readyz",
     "GET /v1",
+    "GET /v1/cluster",
     "GET /v1/spaces",
     "GET /v1/spaces/{space}",
     "GET /v1/spaces/{space}/agents",

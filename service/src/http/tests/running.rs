@@ -20,7 +20,7 @@ async fn run_on(rig: &Rig, settings: HttpSettings) -> Running {
     let (stop, stopped) = oneshot::channel::<()>();
     let task = tokio::spawn(run(
         listener,
-        rig.engine.clone(),
+        rig.engine.clone().into(),
         settings,
         prometheus,
         async {

@@ -1,10 +1,15 @@
 //! The database: keys, batches, syncs, and what its errors mean.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use slatedb::config::{CompressionCodec, FlushOptions, FlushType, ScanOptions, Settings};
-use slatedb::{CloseReason, Db, DbIterator, ErrorKind, IterationOrder, KeyValue, WriteBatch};
+use slatedb::config::{
+    CompressionCodec, DbReaderOptions, FlushOptions, FlushType, ScanOptions, Settings,
+};
+use slatedb::object_store::path::Path;
+use slatedb::{
+    CloseReason, Db, DbIterator, DbReader, ErrorKind, IterationOrder, KeyValue, WriteBatch,
+};
 
 use super::super::StoreError;
 use super::location::Location;
@@ -20,13 +25,23 @@ const BATCH_KEYS: usize = 10_000;
 /// Longest wait for the storage when the store is closed. All that was acknowledged is there.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// A database that this process owns until another one opens it.
+/// How often a reader looks for what has been written.
+pub(super) const FOLLOW_INTERVAL: Duration = Duration::from_millis(100);
+
+/// A database that this process owns until another one opens it, or that it only reads.
 pub(super) struct Database {
     location: Location,
-    runtime: Runtime,
-    db: Db,
+    runtime: Arc<Runtime>,
+    handle: Handle,
+    /// Epoch of its writer, which no other writer has.
+    term: u64,
     /// The first failed write.
     failure: OnceLock<StoreError>,
+}
+
+enum Handle {
+    Owner(Db),
+    Reader(Box<DbReader>),
 }
 
 impl std::fmt::Debug for Database {
@@ -38,34 +53,124 @@ impl std::fmt::Debug for Database {
 }
 
 impl Database {
-    /// Tries the storage, and opens the database there. Where there is none it is created, if so
-    /// wanted.
-    pub(super) fn open(url: &str, creates: bool) -> Result<Self, StoreError> {
-        let runtime = Runtime::start()?;
-        let location = Location::parse(url)?;
-        let opening = async {
-            if !creates && location.is_empty().await? {
-                return Err(StoreError::Io(format!("there is no store at {location}")));
-            }
-            location.probe().await?;
-            let db = Db::builder(location.prefix().clone(), location.storage())
-                .with_settings(settings())
-                .build()
-                .await;
-            db.map_err(|error| fault(&location, &error))
-        };
-        let db = runtime.wait(opening)?;
+    /// Opens the database below `path`, and creates it where there is none. With the term of the
+    /// last owner that is known, it fails where there has been another one since.
+    pub(super) fn open(
+        location: &Location,
+        runtime: &Arc<Runtime>,
+        path: Path,
+        last_term: Option<u64>,
+    ) -> Result<Self, StoreError> {
+        let mut builder = Db::builder(path, location.storage()).with_settings(settings());
+        if let Some(last) = last_term {
+            builder = builder.with_expected_epoch(last);
+        }
+        let db = runtime.wait(builder.build());
+        let db = db.map_err(|error| fault(location, &error))?;
+        // Once: after a take-over the manifest has the epoch of the next writer.
+        let term = db.manifest().writer_epoch();
         Ok(Self {
-            location,
-            runtime,
-            db,
+            location: location.clone(),
+            runtime: Arc::clone(runtime),
+            handle: Handle::Owner(db),
+            term,
             failure: OnceLock::new(),
         })
     }
 
+    /// Reads the database below `path` as its owner writes it, and a moment later.
+    pub(super) fn follow(
+        location: &Location,
+        runtime: &Arc<Runtime>,
+        path: Path,
+    ) -> Result<Self, StoreError> {
+        let options = DbReaderOptions {
+            manifest_poll_interval: FOLLOW_INTERVAL,
+            ..DbReaderOptions::default()
+        };
+        let reader = DbReader::builder(path, location.storage()).with_options(options);
+        let reader = runtime.wait(reader.build());
+        let reader = reader.map_err(|error| fault(location, &error))?;
+        let term = reader.manifest().writer_epoch();
+        Ok(Self {
+            location: location.clone(),
+            runtime: Arc::clone(runtime),
+            handle: Handle::Reader(Box::new(reader)),
+            term,
+            failure: OnceLock::new(),
+        })
+    }
+
+    /// The database, to be written.
+    fn owned(&self) -> Result<&Db, StoreError> {
+        match &self.handle {
+            Handle::Owner(db) => Ok(db),
+            Handle::Reader(_) => {
+                let what = format!("{} is only read here", self.location);
+                Err(StoreError::Io(what))
+            }
+        }
+    }
+
+    /// Which owner of the database in a row this process is; of one that it reads, the owner that
+    /// has written last.
+    pub(super) fn term(&self) -> u64 {
+        match &self.handle {
+            Handle::Owner(_) => self.term,
+            Handle::Reader(reader) => reader.manifest().writer_epoch(),
+        }
+    }
+
+    /// Whether it may still be written, as far as it has noticed.
+    pub(super) fn check_ownership(&self) -> Result<(), StoreError> {
+        let Handle::Owner(db) = &self.handle else {
+            return Ok(());
+        };
+        if db.status().close_reason == Some(CloseReason::Fenced) {
+            return Err(self.noted(StoreError::Fenced(self.location.to_string())));
+        }
+        Ok(())
+    }
+
+    /// Number of the last durable write that a reader has seen; none of an owner.
+    pub(super) fn followed_to(&self) -> Option<u64> {
+        match &self.handle {
+            Handle::Owner(_) => None,
+            Handle::Reader(reader) => Some(reader.status().durable_seq),
+        }
+    }
+
+    /// Closes the database: what is durable is there for the next owner. Once is enough.
+    pub(super) fn close(&self) {
+        let status = match &self.handle {
+            Handle::Owner(db) => db.status(),
+            Handle::Reader(reader) => reader.status(),
+        };
+        if status.close_reason.is_some() {
+            return;
+        }
+        let closing = async {
+            match &self.handle {
+                Handle::Owner(db) => db.close().await,
+                Handle::Reader(reader) => reader.close().await,
+            }
+        };
+        let closing = async { tokio::time::timeout(CLOSE_TIMEOUT, closing).await };
+        match self.runtime.wait(closing) {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => tracing::warn!(store = %self.location, %error, "close the store"),
+            Err(_) => tracing::warn!(store = %self.location, "the storage does not answer"),
+        }
+    }
+
     /// The value of a key.
     pub(super) fn get(&self, key: impl AsRef<[u8]> + Send) -> Result<Option<Vec<u8>>, StoreError> {
-        let found = self.runtime.wait(self.db.get(key));
+        let found = self.runtime.wait(async {
+            match &self.handle {
+                Handle::Owner(db) => db.get(key).await,
+                Handle::Reader(reader) => reader.get(key).await,
+            }
+        });
         let found = found.map_err(|error| fault(&self.location, &error))?;
         Ok(found.map(|value| value.to_vec()))
     }
@@ -91,8 +196,16 @@ impl Database {
             from.to_be_bytes().to_vec()
         };
         let options = scan_options();
-        let items = self.db.scan_prefix_with_options(prefix, from.., &options);
-        let items = self.runtime.wait(items);
+        let items = self.runtime.wait(async {
+            match &self.handle {
+                Handle::Owner(db) => db.scan_prefix_with_options(prefix, from.., &options).await,
+                Handle::Reader(reader) => {
+                    reader
+                        .scan_prefix_with_options(prefix, from.., &options)
+                        .await
+                }
+            }
+        });
         items.map_err(|error| fault(&self.location, &error))
     }
 
@@ -105,7 +218,7 @@ impl Database {
     /// Puts a batch, durable with the next sync.
     pub(super) fn put(&self, batch: WriteBatch) -> Result<(), StoreError> {
         self.refuse_if_failed()?;
-        let put = self.runtime.wait(self.db.write(batch));
+        let put = self.runtime.wait(self.owned()?.write(batch));
         put.map(|_| ()).map_err(|error| self.failed(&error))
     }
 
@@ -118,14 +231,19 @@ impl Database {
     /// Makes durable all that was put before, and with `MemTable` writes tables, too.
     pub(super) fn flush(&self, flush_type: FlushType) -> Result<(), StoreError> {
         self.refuse_if_failed()?;
-        let flush = self.db.flush_with_options(FlushOptions { flush_type });
+        let flush = self
+            .owned()?
+            .flush_with_options(FlushOptions { flush_type });
         let flushed = self.runtime.wait(flush);
         flushed.map_err(|error| self.failed(&error))
     }
 
     /// Notes a failed write: what of it is there is unknown, so it is the last one.
     fn failed(&self, error: &slatedb::Error) -> StoreError {
-        let error = fault(&self.location, error);
+        self.noted(fault(&self.location, error))
+    }
+
+    fn noted(&self, error: StoreError) -> StoreError {
         let first = match &error {
             StoreError::Fenced(location) => StoreError::Fenced(location.clone()),
             other => StoreError::Broken(other.to_string()),
@@ -189,21 +307,20 @@ impl Database {
         last: Vec<u8>,
         options: &ScanOptions,
     ) -> Result<DbIterator, StoreError> {
-        let items = self
-            .runtime
-            .wait(self.db.scan_with_options(first..=last, options));
+        let range = first..=last;
+        let items = self.runtime.wait(async {
+            match &self.handle {
+                Handle::Owner(db) => db.scan_with_options(range, options).await,
+                Handle::Reader(reader) => reader.scan_with_options(range, options).await,
+            }
+        });
         items.map_err(|error| fault(&self.location, &error))
     }
 }
 
 impl Drop for Database {
     fn drop(&mut self) {
-        let closing = async { tokio::time::timeout(CLOSE_TIMEOUT, self.db.close()).await };
-        match self.runtime.wait(closing) {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => tracing::warn!(store = %self.location, %error, "close the store"),
-            Err(_) => tracing::warn!(store = %self.location, "the storage does not answer"),
-        }
+        self.close();
     }
 }
 

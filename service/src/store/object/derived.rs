@@ -16,12 +16,22 @@ impl From<StoreError> for DerivedError {
     }
 }
 
+impl ObjectStore {
+    /// Whether another process writes what is derived here.
+    fn is_others(&self) -> bool {
+        self.database.followed_to().is_some()
+    }
+}
+
 impl Derived for ObjectStore {
     fn write_checkpoint(
         &self,
         space: SpaceNumber,
         changed: &Checkpoint,
     ) -> Result<(), DerivedError> {
+        if self.is_others() {
+            return Ok(());
+        }
         let mut batch = WriteBatch::new();
         for page in &changed.pages {
             let key = keys::derived_key(space, &of_derived::page(page.kind, page.index));
@@ -63,6 +73,9 @@ impl Derived for ObjectStore {
     }
 
     fn forget(&self, space: SpaceNumber) -> Result<(), DerivedError> {
+        if self.is_others() {
+            return Ok(());
+        }
         self.database.remove_below(&keys::derived(space))?;
         Ok(self.database.flush(FlushType::Wal)?)
     }
@@ -73,6 +86,9 @@ impl Derived for ObjectStore {
         key: ChunkKey,
         bytes: &[u8],
     ) -> Result<(), DerivedError> {
+        if self.is_others() {
+            return Ok(());
+        }
         let mut batch = WriteBatch::new();
         batch.put(keys::derived_key(space, &of_derived::chunk(key)), bytes);
         Ok(self.database.put(batch)?)

@@ -60,9 +60,14 @@ impl Location {
         Arc::clone(&self.storage)
     }
 
-    /// What all objects of the store begin with.
-    pub(super) fn prefix(&self) -> &Path {
-        &self.prefix
+    /// The path of an object or of all below it, from parts that are names.
+    pub(super) fn path<const N: usize>(&self, parts: [&str; N]) -> Path {
+        { parts.into_iter() }.fold(self.prefix.clone(), Path::join)
+    }
+
+    /// The error of the storage.
+    pub(super) fn away(&self, error: &dyn std::fmt::Display) -> StoreError {
+        StoreError::Unreachable(format!("{self}: {error}"))
     }
 
     /// Whether nothing is there.
@@ -71,7 +76,7 @@ impl Location {
         match first {
             None => Ok(true),
             Some(Ok(_)) => Ok(false),
-            Some(Err(error)) => Err(StoreError::Unreachable(format!("{self}: {error}"))),
+            Some(Err(error)) => Err(self.away(&error)),
         }
     }
 
@@ -107,7 +112,7 @@ impl Location {
         let failed = failed.find(|error| !is_too_late(error));
         match (won, failed) {
             (1, _) => Ok(()),
-            (0, Some(error)) => Err(StoreError::Unreachable(format!("{self}: {error}"))),
+            (0, Some(error)) => Err(self.away(&error)),
             (won, _) => Err(StoreError::Io(format!(
                 "{self}: {won} of {CLAIMANTS} could create the same object at once: this storage \
                  would let two services write one journal"

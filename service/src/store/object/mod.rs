@@ -1,8 +1,15 @@
 //! The store on object storage: S3, GCS, Azure, anything that speaks S3, or a directory; by
 //! [SlateDB](https://docs.rs/slatedb).
 //!
-//! One database below the prefix of the URL. Numbers in keys are big-endian, so that the order of
-//! the bytes is the order of the numbers; numbers in values are little-endian.
+//! ```text
+//! object below the prefix of the URL      holds
+//! store.json                              format of the layout, and how many shards there are
+//! shards/{shard}/                         the database of a shard
+//! cluster/                                what nodes say of themselves (`registry.rs`)
+//! ```
+//!
+//! Numbers in keys of a database are big-endian, so that the order of the bytes is the order of the
+//! numbers; numbers in values are little-endian.
 //!
 //! ```text
 //! key                                     value
@@ -18,7 +25,7 @@
 //! What is put survives the process with the next [`Journal::sync`], not before. While the storage
 //! cannot be reached, a sync waits: the watermark stands still, and nothing is lost or refused.
 //!
-//! Whoever opens the database last owns it: whatever owned it before is *fenced*, its writes fail
+//! Whoever opens a database last owns it: whatever owned it before is *fenced*, its writes fail
 //! with [`StoreError::Fenced`], and nothing of them is there.
 
 mod database;
@@ -27,7 +34,9 @@ mod draft;
 mod keys;
 mod location;
 mod reading;
+mod registry;
 mod runtime;
+mod storage;
 
 #[cfg(test)]
 mod tests;
@@ -43,10 +52,13 @@ use database::Database;
 use draft::ObjectDraft;
 use reading::Reading;
 
+pub use registry::{NodeId, OwnerRecord, Registry, Seen};
+pub use storage::ObjectStorage;
+
 /// Format that this build reads and writes.
 const FORMAT: u32 = 1;
 
-/// A store on object storage, owned by this process until another one opens it.
+/// A shard of a store on object storage, owned by this process until another one opens it.
 #[derive(Debug)]
 pub struct ObjectStore {
     database: Database,
@@ -57,34 +69,20 @@ pub struct ObjectStore {
 }
 
 impl ObjectStore {
-    /// Opens the store at a URL such as `s3://bucket/prefix` or `file:///directory`, and creates it
-    /// where there is none. Region, endpoint and credentials of a provider come from its usual
-    /// environment variables. Another process that has it open is fenced.
-    ///
-    /// # Errors
-    /// [`StoreError::Io`] when the URL names no store or the storage does not keep what it
-    /// promises, [`StoreError::Unreachable`], [`StoreError::NewerFormat`].
-    pub fn open(url: &str) -> Result<Self, StoreError> {
-        Self::over(Database::open(url, true)?)
-    }
-
-    /// Opens the store at a URL, where there is one.
-    ///
-    /// # Errors
-    /// Those of [`ObjectStore::open`], and [`StoreError::Io`] where there is none.
-    pub fn open_existing(url: &str) -> Result<Self, StoreError> {
-        Self::over(Database::open(url, false)?)
-    }
-
     fn over(database: Database) -> Result<Self, StoreError> {
-        let store = Self {
-            database,
-            changing: Mutex::default(),
-            open: Mutex::default(),
-        };
+        let store = Self::reading(database);
         store.check_format()?;
         store.finish_deletions()?;
         Ok(store)
+    }
+
+    /// The store as another process writes it.
+    fn reading(database: Database) -> Self {
+        Self {
+            database,
+            changing: Mutex::default(),
+            open: Mutex::default(),
+        }
     }
 
     /// Writes the format, or refuses one of a newer build.
@@ -183,6 +181,10 @@ impl ObjectStore {
 }
 
 impl Journal for ObjectStore {
+    fn term(&self) -> u64 {
+        self.database.term()
+    }
+
     fn spaces(&self) -> Result<Vec<StoredSpace>, StoreError> {
         let mut spaces = Vec::new();
         self.database.scan(&keys::SPACES, |key, value| {
@@ -224,6 +226,9 @@ impl Journal for ObjectStore {
         let known = self.lock_open().get(&space).copied();
         let extent = if let Some(extent) = known {
             extent
+        } else if self.database.followed_to().is_some() {
+            // Its owner goes on writing it.
+            self.extent(space)?
         } else {
             let extent = self.extent(space)?;
             *self.lock_open().entry(space).or_insert(extent)
@@ -259,6 +264,10 @@ impl Journal for ObjectStore {
     }
 
     fn sync(&self) -> Result<(), StoreError> {
+        if self.database.followed_to().is_some() {
+            // What can be read is durable.
+            return Ok(());
+        }
         self.database.flush(FlushType::Wal)
     }
 
@@ -271,5 +280,17 @@ impl Journal for ObjectStore {
             Ok(reading) => Box::new(reading),
             Err(error) => Box::new(std::iter::once(Err(error))),
         }
+    }
+
+    fn check_ownership(&self) -> Result<(), StoreError> {
+        self.database.check_ownership()
+    }
+
+    fn progress(&self) -> u64 {
+        self.database.followed_to().unwrap_or(0)
+    }
+
+    fn give_up(&self) {
+        self.database.close();
     }
 }

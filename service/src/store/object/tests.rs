@@ -2,14 +2,20 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
-use super::super::{LocalStore, Store, copy};
+use super::super::{LocalStore, ShardNumber, Shards, Store, WholeStore, copy};
 use super::*;
 
 crate::store::suite::suite!(|directory| Box::new(open(directory)));
 
 fn open(directory: &Path) -> ObjectStore {
-    ObjectStore::open(&url(directory)).unwrap()
+    open_url(&url(directory)).unwrap()
+}
+
+fn open_url(url: &str) -> Result<ObjectStore, StoreError> {
+    ObjectStorage::open(url, Shards::ONE)?.open_shard(ShardNumber(0))
 }
 
 fn url(directory: &Path) -> String {
@@ -74,11 +80,11 @@ fn a_deletion_that_a_crash_cut_short_is_finished() {
 #[test]
 fn where_nothing_is_no_store_is_made_unless_so_wanted() {
     let directory = tempfile::tempdir().unwrap();
-    let opened = ObjectStore::open_existing(&url(directory.path()));
+    let opened = ObjectStorage::open_existing(&url(directory.path()));
     assert!(matches!(&opened, Err(StoreError::Io(text)) if text.contains("no store")));
     assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
     drop(open(directory.path()));
-    ObjectStore::open_existing(&url(directory.path())).unwrap();
+    ObjectStorage::open_existing(&url(directory.path())).unwrap();
 }
 
 #[test]
@@ -89,14 +95,14 @@ fn a_newer_format_and_nonsense_are_refused() {
     batch.put(keys::FORMAT, 2_u32.to_le_bytes());
     store.database.commit(batch).unwrap();
     drop(store);
-    let opened = ObjectStore::open(&url(directory.path()));
+    let opened = open_url(&url(directory.path()));
     let newer = StoreError::NewerFormat {
         found: 2,
         supported: 1,
     };
     assert_eq!(opened.unwrap_err().to_string(), newer.to_string());
     for nonsense in ["file://relative", "s3:/bucket", "nothing://bucket", "s3://"] {
-        let opened = ObjectStore::open(nonsense);
+        let opened = open_url(nonsense);
         assert!(
             matches!(&opened, Err(StoreError::Io(text)) if text.contains(nonsense)),
             "{opened:?}"
@@ -132,10 +138,117 @@ async fn it_may_be_used_from_an_async_thread() {
 }
 
 #[test]
+fn a_store_keeps_the_shards_that_it_was_created_with() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = url(directory.path());
+    let shards = |count| Shards::new(count).unwrap();
+    assert_eq!(
+        ObjectStorage::open(&at, shards(4)).unwrap().shards(),
+        shards(4)
+    );
+    assert_eq!(
+        ObjectStorage::open(&at, shards(9)).unwrap().shards(),
+        shards(4)
+    );
+    assert_eq!(
+        ObjectStorage::open_existing(&at).unwrap().shards(),
+        shards(4)
+    );
+}
+
+#[test]
+fn of_two_who_claim_a_shard_one_has_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let storage = ObjectStorage::open(&url(directory.path()), Shards::ONE).unwrap();
+    let shard = ShardNumber(0);
+    assert_eq!(storage.term_of(shard).unwrap(), 0);
+    let first = storage.claim_shard(shard, 0).unwrap();
+    assert_eq!((first.term(), storage.term_of(shard).unwrap()), (1, 1));
+    let late = storage.claim_shard(shard, 0);
+    assert!(matches!(late, Err(StoreError::Fenced(_))), "{late:?}");
+    assert!(first.check_ownership().is_ok());
+    let next = storage.claim_shard(shard, 1).unwrap();
+    assert_eq!(next.term(), 2);
+    // Given up, it may be claimed at once, and takes no more.
+    next.give_up();
+    assert!(next.create_space("hall", b"").is_err());
+    assert_eq!(storage.open_shard(shard).unwrap().term(), 3);
+}
+
+#[test]
+fn an_owner_that_writes_nothing_notices_too_that_it_is_none() {
+    let directory = tempfile::tempdir().unwrap();
+    let first = open(directory.path());
+    let _second = open(directory.path());
+    let deadline = Instant::now() + Duration::from_secs(30);
+    while first.check_ownership().is_ok() {
+        assert!(Instant::now() < deadline, "it has not noticed");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let refused = first.create_space("hall", b"");
+    assert!(matches!(refused, Err(StoreError::Fenced(_))), "{refused:?}");
+}
+
+#[test]
+fn a_store_that_nodes_are_at_work_on_is_opened_by_none_else() {
+    let directory = tempfile::tempdir().unwrap();
+    let storage = ObjectStorage::open(&url(directory.path()), Shards::ONE).unwrap();
+    let (registry, timeout) = (storage.registry(), Duration::from_secs(5));
+    let node = NodeId::parse("ada.1").unwrap();
+    registry.beat(&node, 0, timeout).unwrap();
+    assert!(storage.refuse_a_cluster().is_ok(), "it is gone");
+    let stop = Arc::new(AtomicBool::new(false));
+    let beating = {
+        let (registry, node, stop) = (registry.clone(), node.clone(), Arc::clone(&stop));
+        std::thread::spawn(move || {
+            for count in 1.. {
+                registry.beat(&node, count, timeout).unwrap();
+                if stop.load(Ordering::Relaxed) {
+                    return;
+                }
+                std::thread::sleep(Duration::from_millis(100));
+            }
+        })
+    };
+    let refused = storage.refuse_a_cluster();
+    stop.store(true, Ordering::Relaxed);
+    beating.join().unwrap();
+    assert!(matches!(&refused, Err(StoreError::Io(text)) if text.contains("node ada")));
+    registry.leave(&node, timeout).unwrap();
+    assert_eq!(registry.look(timeout).unwrap(), Seen::default());
+}
+
+#[test]
+fn the_registry_tells_owners() {
+    let directory = tempfile::tempdir().unwrap();
+    let storage = ObjectStorage::open(&url(directory.path()), Shards::ONE).unwrap();
+    let (registry, timeout) = (storage.registry(), Duration::from_secs(5));
+    let record = |shard, term, node| OwnerRecord {
+        shard: ShardNumber(shard),
+        term,
+        node: NodeId::parse(node).unwrap(),
+    };
+    let records = [
+        record(0, 3, "ada.1"),
+        record(0, 12, "b.c.2"),
+        record(7, 1, "ada.1"),
+    ];
+    for record in &records {
+        registry.own(record, timeout).unwrap();
+    }
+    let mut owners = registry.look(timeout).unwrap().owners;
+    owners.sort();
+    assert_eq!(owners, records);
+    registry.disown(&records[1], timeout).unwrap();
+    registry.disown(&records[1], timeout).unwrap();
+    assert_eq!(registry.look(timeout).unwrap().owners.len(), 2);
+}
+
+#[test]
 fn a_copy_goes_from_any_end_to_any_other() {
     let home = tempfile::tempdir().unwrap();
     let at = |name: &str| home.path().join(name);
-    let local = LocalStore::open(&at("local")).unwrap();
+    let local = Arc::new(LocalStore::open(&at("local")).unwrap());
     for (name, count) in [("hall", 3), ("empty", 0), ("yard", 700)] {
         let space = local.create_space(name, name.as_bytes()).unwrap();
         local.open_journal(space).unwrap();
@@ -146,17 +259,29 @@ fn a_copy_goes_from_any_end_to_any_other() {
     }
     local.sync().unwrap();
     let samples_in = |block: &[u8]| block.len() as u64;
-    let object = open(&at("object"));
+    let local = WholeStore::undivided(local);
+    let object = ObjectStorage::open(&url(&at("object")), Shards::new(3).unwrap()).unwrap();
+    let object = WholeStore::open(object.shards(), |shard| {
+        object
+            .open_shard(shard)
+            .map(|shard| Arc::new(shard) as Arc<dyn Store>)
+    })
+    .unwrap();
     let there = copy(&local, &object, samples_in).unwrap();
-    let back = LocalStore::open(&at("back")).unwrap();
+    let back = WholeStore::undivided(Arc::new(LocalStore::open(&at("back")).unwrap()));
     assert_eq!(copy(&object, &back, samples_in).unwrap(), there);
-    let contents = |store: &dyn Store| -> Vec<_> {
-        let spaces = store.spaces().unwrap().into_iter().map(|space| {
-            let extent = store.open_journal(space.number).unwrap().extent;
-            let blocks: Vec<_> = store.journal(space.number, 0).map(Result::unwrap).collect();
-            (space.name, space.settings, extent, blocks)
-        });
-        spaces.collect()
+    let contents = |store: &WholeStore| {
+        let mut spaces = Vec::new();
+        for (number, shard) in store.iter() {
+            for space in shard.spaces().unwrap() {
+                assert_eq!(store.shards().of(&space.name), number);
+                let extent = shard.open_journal(space.number).unwrap().extent;
+                let blocks: Vec<_> = shard.journal(space.number, 0).map(Result::unwrap).collect();
+                spaces.push((space.name, space.settings, extent, blocks));
+            }
+        }
+        spaces.sort();
+        spaces
     };
     assert_eq!(contents(&object), contents(&local));
     assert_eq!(contents(&back), contents(&local));

@@ -1,0 +1,178 @@
+//! What takes a node long: beats, and opening and closing shards, each on a thread of its own.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::thread::Builder;
+use std::time::{Duration, Instant};
+
+use cogmap_proto::{Name, SpaceSettings};
+
+use super::{NodeSettings, Signal};
+use crate::engine::{Engine, SpaceError};
+use crate::store::{
+    NodeId, ObjectStorage, OwnerRecord, Registry, Seen, ShardNumber, Store, StoreError,
+};
+
+/// What a beat has brought.
+#[derive(Debug)]
+pub(super) struct Beat {
+    /// When it began.
+    pub(super) asked: Instant,
+    /// What is in the storage.
+    pub(super) seen: Result<Seen, StoreError>,
+}
+
+/// What has been done.
+#[derive(Debug)]
+pub(super) enum Done {
+    /// A shard is open, with its term, or is not.
+    Opened(ShardNumber, Result<u64, StoreError>),
+    /// A shard is closed, and may be opened by others.
+    Closed(OwnerRecord),
+}
+
+/// Does what takes long.
+pub(super) struct Worker {
+    storage: Arc<ObjectStorage>,
+    registry: Registry,
+    engine: Engine,
+    signals: Sender<Signal>,
+    /// Longest wait for the storage.
+    timeout: Duration,
+    /// Spaces that are created where they are not there yet.
+    spaces: Arc<BTreeMap<Name, SpaceSettings>>,
+    beating: bool,
+}
+
+impl Worker {
+    pub(super) fn new(
+        storage: Arc<ObjectStorage>,
+        engine: Engine,
+        signals: Sender<Signal>,
+        settings: &NodeSettings,
+    ) -> Self {
+        Self {
+            registry: storage.registry(),
+            storage,
+            engine,
+            signals,
+            timeout: settings.lease,
+            spaces: Arc::new(settings.spaces.clone()),
+            beating: false,
+        }
+    }
+
+    /// Whether a beat is under way.
+    pub(super) fn is_beating(&self) -> bool {
+        self.beating
+    }
+
+    /// The beat that was under way has come back.
+    pub(super) fn beaten(&mut self) {
+        self.beating = false;
+    }
+
+    /// Says in the storage that the node is there, and looks who else is.
+    pub(super) fn beat(&mut self, node: &NodeId, count: u64) {
+        self.beating = true;
+        let (registry, node, timeout) = (self.registry.clone(), node.clone(), self.timeout);
+        self.spawn("beat", move || {
+            let asked = Instant::now();
+            let seen = registry.beat(&node, count, timeout);
+            Signal::Beat(Beat { asked, seen })
+        });
+    }
+
+    /// Claims a shard that `last` owned last, and starts its spaces.
+    pub(super) fn open(&self, shard: ShardNumber, node: &NodeId, last: Option<OwnerRecord>) {
+        let (storage, registry) = (Arc::clone(&self.storage), self.registry.clone());
+        let (engine, node, timeout) = (self.engine.clone(), node.clone(), self.timeout);
+        let spaces = Arc::clone(&self.spaces);
+        self.spawn("open shard", move || {
+            let open = || {
+                let known = last.as_ref().map_or(0, |last| last.term);
+                let before = storage.term_of(shard)?;
+                let owners = registry.look(timeout)?.owners;
+                let later =
+                    { owners.into_iter() }.find(|owner| owner.shard == shard && owner.term > known);
+                if let Some(owner) = later {
+                    return Err(StoreError::Fenced(format!(
+                        "shard {shard}, by {}",
+                        owner.node
+                    )));
+                }
+                // Whoever has claimed it since the term was read, keeps it.
+                let store = storage.claim_shard(shard, before)?;
+                let store: Arc<dyn Store> = Arc::new(store);
+                let term = store.term();
+                let record = OwnerRecord { shard, term, node };
+                registry.own(&record, timeout)?;
+                // What is left of it says nothing any more, and may stay.
+                if let Some(last) = last {
+                    let _ = registry.disown(&last, timeout);
+                }
+                engine.open_shard(shard, store)?;
+                create_spaces(&engine, shard, &spaces);
+                Ok(term)
+            };
+            Signal::Done(Done::Opened(shard, open()))
+        });
+    }
+
+    /// Closes a shard: what is queued becomes durable, if this node still owns it.
+    pub(super) fn close(&self, record: OwnerRecord) {
+        let (registry, engine, timeout) =
+            (self.registry.clone(), self.engine.clone(), self.timeout);
+        self.spawn("close shard", move || {
+            engine.close_shard(record.shard);
+            if let Err(error) = registry.disown(&record, timeout) {
+                tracing::debug!(%error, "forget the owner of a shard");
+            }
+            Signal::Done(Done::Closed(record))
+        });
+    }
+
+    /// Forgets this node in the storage, and waits for that.
+    pub(super) fn leave(&self, node: &NodeId) {
+        leave(&self.registry, node, self.timeout);
+    }
+
+    /// Forgets a node that is gone.
+    pub(super) fn forget(&self, node: NodeId) {
+        let (registry, timeout) = (self.registry.clone(), self.timeout);
+        spawn("forget node", move || leave(&registry, &node, timeout));
+    }
+
+    /// Does what takes long, and tells the node what came of it. It may have ended meanwhile.
+    fn spawn(&self, name: &str, work: impl FnOnce() -> Signal + Send + 'static) {
+        let signals = self.signals.clone();
+        spawn(name, move || drop(signals.send(work())));
+    }
+}
+
+fn spawn(name: &str, work: impl FnOnce() + Send + 'static) {
+    let spawned = Builder::new().name(name.to_owned()).spawn(work);
+    spawned.expect("the system can start a thread");
+}
+
+fn leave(registry: &Registry, node: &NodeId, timeout: Duration) {
+    if let Err(error) = registry.leave(node, timeout) {
+        tracing::debug!(%node, %error, "forget a node");
+    }
+}
+
+/// Creates the spaces of the settings that belong to a shard and are not there.
+fn create_spaces(engine: &Engine, shard: ShardNumber, spaces: &BTreeMap<Name, SpaceSettings>) {
+    let of_shard = spaces
+        .iter()
+        .filter(|(name, _)| engine.shards().of(name.as_str()) == shard);
+    for (name, settings) in of_shard {
+        match engine.create_space(name, settings) {
+            Ok(_) => {}
+            Err(SpaceError::ExistsWithOtherSettings) => tracing::warn!(space = %name,
+                "the settings given for the space are without effect: they were fixed when it was created"),
+            Err(error) => tracing::error!(space = %name, %error, "create a space"),
+        }
+    }
+}

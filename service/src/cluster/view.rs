@@ -1,0 +1,258 @@
+//! What a node sees of the others, and what follows for each shard. It does nothing, waits for
+//! nothing and reads no clock.
+//!
+//! Nodes are seen in two ways: by a token on Zenoh, which goes when the link does, and by beats in
+//! the storage. Only both together make a *live* node. One with beats and no token is *apart*: its
+//! shards are its own, and whichever side of such a cut has fewer nodes gives its shards up. One
+//! without beats has *lapsed*, and its shards are free.
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use super::placement;
+use super::standing::NodeState;
+use crate::store::{NodeId, OwnerRecord, Seen, ShardNumber};
+
+/// Beats after which a node without a token has lapsed.
+const BEATS_MISSED: u32 = 3;
+
+/// Times after which things are believed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Patience {
+    /// Time between the beats of a node.
+    pub(super) beat: Duration,
+    /// How long a node does without contact to the storage.
+    pub(super) lease: Duration,
+    /// How long the live nodes must have been the same before shards move.
+    pub(super) settled: Duration,
+}
+
+/// What a node sees.
+#[derive(Debug)]
+pub(super) struct View {
+    me: NodeId,
+    patience: Patience,
+    /// Nodes that have a token, and where they are reached.
+    linked: BTreeMap<NodeId, String>,
+    /// The beats of other nodes.
+    beats: BTreeMap<NodeId, Beat>,
+    /// Owners by the storage, and by tokens.
+    recorded: BTreeMap<ShardNumber, OwnerRecord>,
+    announced: BTreeSet<OwnerRecord>,
+    /// When this node last had contact to the storage.
+    contact: Option<Instant>,
+    /// The live nodes, and since when they are the same.
+    live: Lasting,
+    /// The nodes that are apart.
+    apart: Lasting,
+}
+
+/// Nodes, and since when they are the same.
+#[derive(Debug, Default)]
+struct Lasting {
+    nodes: BTreeSet<NodeId>,
+    since: Option<Instant>,
+}
+
+#[derive(Debug)]
+struct Beat {
+    mark: String,
+    changed: Instant,
+}
+
+impl View {
+    pub(super) fn new(me: NodeId, patience: Patience) -> Self {
+        Self {
+            me,
+            patience,
+            linked: BTreeMap::new(),
+            beats: BTreeMap::new(),
+            recorded: BTreeMap::new(),
+            announced: BTreeSet::new(),
+            contact: None,
+            live: Lasting::default(),
+            apart: Lasting::default(),
+        }
+    }
+
+    /// A node's token came, with its address, or went.
+    pub(super) fn link(&mut self, node: NodeId, address: Option<String>) {
+        if node == self.me {
+            return;
+        }
+        match address {
+            Some(address) => self.linked.insert(node, address),
+            None => self.linked.remove(&node),
+        };
+    }
+
+    /// The token of a shard's owner came or went.
+    pub(super) fn announce(&mut self, owner: OwnerRecord, there: bool) {
+        if there {
+            self.announced.insert(owner);
+        } else {
+            self.announced.remove(&owner);
+        }
+    }
+
+    /// The storage was reached at `asked`, and holds this.
+    pub(super) fn observe(&mut self, seen: Seen, asked: Instant, now: Instant) {
+        // A node that has seen nothing for a while cannot tell who has said nothing.
+        let looked = self.patience.beat * BEATS_MISSED;
+        let was_blind = (self.contact).is_none_or(|at| now.saturating_duration_since(at) > looked);
+        self.contact = Some(asked);
+        let mut beats = BTreeMap::new();
+        for (node, mark) in seen.nodes {
+            if node == self.me {
+                continue;
+            }
+            let changed = match self.beats.get(&node) {
+                Some(beat) if beat.mark == mark && !was_blind => beat.changed,
+                _ => now,
+            };
+            beats.insert(node, Beat { mark, changed });
+        }
+        self.beats = beats;
+        self.recorded.clear();
+        for owner in seen.owners {
+            let known = self.recorded.get(&owner.shard);
+            if known.is_none_or(|known| known.term < owner.term) {
+                self.recorded.insert(owner.shard, owner);
+            }
+        }
+    }
+
+    /// Brings what follows from the time up to date. To be called before the questions below.
+    pub(super) fn settle(&mut self, now: Instant) {
+        let (mut live, mut apart) = (BTreeSet::new(), BTreeSet::new());
+        for node in self.beats.keys() {
+            match self.state(node, now) {
+                NodeState::Live => _ = live.insert(node.clone()),
+                NodeState::Apart => _ = apart.insert(node.clone()),
+                NodeState::Lapsed => {}
+            }
+        }
+        live.insert(self.me.clone());
+        self.live.update(live, now);
+        self.apart.update(apart, now);
+    }
+
+    /// When this node had contact to the storage last.
+    pub(super) fn contact(&self) -> Option<Instant> {
+        self.contact
+    }
+
+    /// Whether this node has had contact to the storage of late.
+    pub(super) fn in_contact(&self, now: Instant) -> bool {
+        self.contact
+            .is_some_and(|at| now.saturating_duration_since(at) < self.patience.lease)
+    }
+
+    /// Whether another node takes part.
+    pub(super) fn state(&self, node: &NodeId, now: Instant) -> NodeState {
+        let linked = self.linked.contains_key(node);
+        let patience = if linked {
+            self.patience.lease
+        } else {
+            self.patience.beat * BEATS_MISSED
+        };
+        let beat = self.beats.get(node);
+        let fresh = beat.is_some_and(|beat| now.saturating_duration_since(beat.changed) < patience);
+        match (fresh, linked) {
+            (true, true) => NodeState::Live,
+            (true, false) => NodeState::Apart,
+            (false, _) => NodeState::Lapsed,
+        }
+    }
+
+    /// The other nodes, with their addresses where they have a token.
+    pub(super) fn others(&self, now: Instant) -> Vec<(&NodeId, Option<&str>, NodeState)> {
+        let nodes: BTreeSet<_> = self.beats.keys().chain(self.linked.keys()).collect();
+        let status = |node| {
+            let address = self.linked.get(node).map(String::as_str);
+            (node, address, self.state(node, now))
+        };
+        nodes.into_iter().map(status).collect()
+    }
+
+    /// The shards of `all` that this node is to own; none while nodes come or go, which leaves
+    /// everything as it is.
+    pub(super) fn wanted(
+        &self,
+        all: impl Iterator<Item = ShardNumber>,
+        now: Instant,
+    ) -> Option<BTreeSet<ShardNumber>> {
+        if !self.live.lasts(self.patience.settled, now) {
+            return None;
+        }
+        if self.yields(now) {
+            return Some(BTreeSet::new());
+        }
+        let live = &self.live.nodes;
+        let mine = all.filter(|shard| placement::owner(*shard, live) == Some(&self.me));
+        Some(mine.collect())
+    }
+
+    /// Whether this side of a cut leaves the shards to the other one: the side with fewer nodes,
+    /// or of two equal ones that without the first node. A node that has just come is apart until
+    /// its token is there.
+    fn yields(&self, now: Instant) -> bool {
+        let (live, apart) = (&self.live.nodes, &self.apart.nodes);
+        let of_equals = apart.len() == live.len() && apart.first() < live.first();
+        (apart.len() > live.len() || of_equals) && self.apart.lasts(self.patience.lease, now)
+    }
+
+    /// Whether a shard may be claimed: nobody owns it that may still be at work on it. What tokens
+    /// say does not count here, since anybody on Zenoh can declare one.
+    pub(super) fn is_free(&self, shard: ShardNumber, now: Instant) -> bool {
+        let free = |OwnerRecord { node, .. }: &OwnerRecord| {
+            *node == self.me || self.state(node, now) == NodeState::Lapsed
+        };
+        self.recorded.get(&shard).is_none_or(free)
+    }
+
+    /// The latest owner of a shard by the storage.
+    pub(super) fn recorded(&self, shard: ShardNumber) -> Option<&OwnerRecord> {
+        self.recorded.get(&shard)
+    }
+
+    /// The latest owner of a shard that is known, by the storage or by a token, which comes first.
+    pub(super) fn owner(&self, shard: ShardNumber) -> Option<&OwnerRecord> {
+        let announced = self.announced.iter().filter(|owner| owner.shard == shard);
+        announced
+            .chain(self.recorded.get(&shard))
+            .max_by_key(|owner| owner.term)
+    }
+
+    /// Records and beats that nobody needs any more: those of nodes that have lapsed long ago.
+    pub(super) fn left_behind(&self, now: Instant) -> Vec<NodeId> {
+        let long = self.patience.lease * 12;
+        let gone = self.beats.iter().filter(|(node, beat)| {
+            now.saturating_duration_since(beat.changed) > long && !self.linked.contains_key(node)
+        });
+        gone.map(|(node, _)| node.clone()).collect()
+    }
+
+    /// Where a node is reached.
+    pub(super) fn address(&self, node: &NodeId) -> Option<&str> {
+        self.linked.get(node).map(String::as_str)
+    }
+}
+
+impl Lasting {
+    fn update(&mut self, nodes: BTreeSet<NodeId>, now: Instant) {
+        if nodes != self.nodes || self.since.is_none() {
+            self.nodes = nodes;
+            self.since = Some(now);
+        }
+    }
+
+    /// Whether the nodes have been the same for so long.
+    fn lasts(&self, time: Duration, now: Instant) -> bool {
+        self.since
+            .is_some_and(|since| now.saturating_duration_since(since) >= time)
+    }
+}

@@ -1,0 +1,130 @@
+//! Any node answers: what another node owns is passed on to it, one hop far.
+
+mod replica;
+
+use axum::body::{Body, Bytes};
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, Response, StatusCode};
+use axum::middleware::{FromFnLayer, Next, from_fn_with_state};
+use axum::response::IntoResponse;
+use futures_util::future::{BoxFuture, join_all};
+
+use super::forwarder::FORWARDED;
+use super::problem::{Kind, Problem};
+use super::state::{Service, Shared};
+use crate::cluster::{NodeState, Whereabouts};
+
+pub(crate) use replica::Replica;
+
+/// What stands before the name of a space in a path.
+const SPACES: &str = "/v1/spaces/";
+type Middleware = fn(State<Service>, Request, Next) -> BoxFuture<'static, Response<Body>>;
+
+/// The layer that passes requests on.
+pub(crate) fn layer(
+    service: &Service,
+) -> FromFnLayer<Middleware, Service, (State<Service>, Request)> {
+    let pass: Middleware = |State(service), request, next| Box::pin(pass(service, request, next));
+    from_fn_with_state(Service::clone(service), pass)
+}
+
+async fn pass(service: Service, mut request: Request, next: Next) -> Response<Body> {
+    let (Some(cluster), Some(space)) = (&service.cluster, space_of(request.uri().path())) else {
+        return next.run(request).await;
+    };
+    let space = space.to_owned();
+    let max_age = match replica::take_max_age(&mut request) {
+        Ok(max_age) => max_age,
+        Err(problem) => return problem.into_response(),
+    };
+    let whereabouts = cluster.whereabouts(service.engine.shards().of(&space));
+    if whereabouts == Whereabouts::Here {
+        return answer_here(&service, &space, request, next).await;
+    }
+    let replica = max_age.and_then(|max_age| replica::of(&service, &space, &request, max_age));
+    if let Some(replica) = replica {
+        return replica.answer(request, next).await;
+    }
+    match whereabouts {
+        Whereabouts::At(address) if !request.headers().contains_key(FORWARDED) => {
+            let node = cluster.standing().node.clone();
+            match service.forwarder.forward(request, &address, &node).await {
+                Ok(response) => response,
+                Err(error) if error.is_connect() => Problem::moving(&space).into_response(),
+                Err(_) => owner_lost(&space).into_response(),
+            }
+        }
+        _ => Problem::moving(&space).into_response(),
+    }
+}
+
+/// The answer about a space of this node. It may have begun to leave, or is only just coming.
+async fn answer_here(
+    service: &Shared,
+    space: &str,
+    request: Request,
+    next: Next,
+) -> Response<Body> {
+    let response = next.run(request).await;
+    let found = service.engine.space(space);
+    let comes_or_goes = found.is_none_or(|space| space.recovering());
+    if response.status() == StatusCode::SERVICE_UNAVAILABLE && comes_or_goes {
+        return Problem::moving(space).into_response();
+    }
+    response
+}
+
+/// The space that a path is about.
+fn space_of(path: &str) -> Option<&str> {
+    let rest = path.strip_prefix(SPACES)?;
+    rest.split('/').next().filter(|name| !name.is_empty())
+}
+
+fn owner_lost(space: &str) -> Problem {
+    let detail = format!("the node that owns the space {space:?} did not answer");
+    Problem::new(Kind::OwnerLost, detail)
+}
+
+/// What the other nodes answer under a path, to a request that no node has passed on. Of a node
+/// that does not answer there is nothing.
+pub(crate) async fn ask_others(service: &Shared, path: &str, headers: &HeaderMap) -> Vec<Bytes> {
+    let Some(cluster) = service
+        .cluster
+        .as_ref()
+        .filter(|_| !headers.contains_key(FORWARDED))
+    else {
+        return Vec::new();
+    };
+    let standing = cluster.standing();
+    let others = standing
+        .nodes
+        .iter()
+        .filter(|other| other.name != standing.node && other.state == NodeState::Live);
+    let addresses = others.filter_map(|other| other.address.as_deref());
+    let asked = addresses.map(|address| {
+        service
+            .forwarder
+            .list(address, path, headers, &standing.node)
+    });
+    join_all(asked).await.into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_concerns_a_space_is_told_by_its_path() {
+        assert_eq!(space_of("/v1/spaces/hall"), Some("hall"));
+        assert_eq!(space_of("/v1/spaces/hall/agents/ada"), Some("hall"));
+        for path in [
+            "/v1/spaces",
+            "/v1/spaces/",
+            "/v1/cluster",
+            "/healthz",
+            "/v1",
+        ] {
+            assert_eq!(space_of(path), None, "{path}");
+        }
+    }
+}
