@@ -6,7 +6,7 @@ import json
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Tuple, Union
+from typing import Any, Callable, Dict, List, Optional, Tuple, Union
 from urllib.parse import parse_qs, urlsplit
 
 from cogmap.wire import JSON
@@ -37,6 +37,8 @@ class Server:
     def __init__(self) -> None:
         self.routes: Dict[str, Callable[[Request], Answer]] = {}
         self.seen: List[Request] = []
+        #: When to come back, with every answer from 500 on.
+        self.retry_after: Optional[str] = None
         outer = self
 
         class Handler(BaseHTTPRequestHandler):
@@ -50,6 +52,8 @@ class Server:
                 status, content_type, answer = not_found if route is None else route(request)
                 self.send_response(status)
                 self.send_header("Content-Type", content_type)
+                if status >= 500 and outer.retry_after is not None:
+                    self.send_header("Retry-After", outer.retry_after)
                 chunks = answer if isinstance(answer, list) else [answer or b""]
                 if not isinstance(answer, list):
                     self.send_header("Content-Length", str(len(chunks[0])))

@@ -41,6 +41,8 @@ class StandIn:
         #: Encodings of the messages that arrived.
         self.encodings: List[str] = []
         self.session = 0
+        #: Its number as the owner of the space.
+        self.term = 0
         self.rejected: Tuple[Rejection, ...] = ()
         #: Says whether the batch of this number is lost on arrival.
         self.loses: Callable[[int], bool] = lambda number: False
@@ -79,10 +81,13 @@ class StandIn:
     def watermark(self) -> Watermark:
         durable = len(self.journal)
         gap = SeqRange(durable, min(self._waiting)) if self._waiting else None
-        return Watermark(self.session, durable, durable, gap, self.rejected)
+        return Watermark(self.session, durable, durable, gap, self.rejected, self.term)
 
     def publish(self, watermark: Watermark) -> None:
         self._zenoh.put(f"cogmap/lab/{self.agent}/durable", encode(watermark), encoding=CBOR)
+
+    def publish_estimate(self, estimate: Estimate) -> None:
+        self._zenoh.put(f"cogmap/lab/{self.agent}/estimate", encode(estimate), encoding=CBOR)
 
     def publish_bytes(self, data: bytes, encoding: str) -> None:
         """Something that is not a watermark where watermarks are expected."""
@@ -128,8 +133,7 @@ class StandIn:
         while len(self.journal) in self._waiting:
             self.journal.append(self._waiting.pop(len(self.journal)))
         if self.journal:
-            key = f"cogmap/lab/{self.agent}/estimate"
-            self._zenoh.put(key, encode(self.estimate()), encoding=CBOR)
+            self.publish_estimate(self.estimate())
         if self.publishes_watermarks:
             self.publish(self.watermark())
 
@@ -147,6 +151,7 @@ class StandIn:
             translation_m=(1.0, 2.0, 0.0),
             rotation_xyzw=(0.0, 0.0, 0.0, 1.0),
             covariance=(0.0,) * 21,
+            term=self.term,
         )
 
     def _answer(self, query: zenoh.Query) -> None:

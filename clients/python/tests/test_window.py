@@ -9,8 +9,8 @@ import pytest
 
 from cogmap.window import Outgoing, Window, WindowLimits
 
-#: What a watermark says: durable, applied, gap.
-Heard = Tuple[int, int, Optional[Tuple[int, int]]]
+#: What a watermark says: durable, applied, gap, term.
+Heard = Tuple[int, int, Optional[Tuple[int, int]], int]
 
 LIMITS = WindowLimits(capacity_samples=100, capacity_bytes=10_000, batch_samples=4)
 
@@ -119,6 +119,48 @@ def test_a_service_that_forgot_what_it_had_applied_gets_it_again_at_once() -> No
     assert [batch.first_seq for batch in take_all(window, 0.2)] == [4]
 
 
+def test_another_owner_gets_at_once_what_it_may_not_have() -> None:
+    window = filled(12)
+    take_all(window, 0.0)
+    assert window.acknowledge(2, 10, None, 0.1, 3)
+    assert take_all(window, 0.1) == []
+    assert window.acknowledge(4, 4, None, 0.11, 4)
+    assert [batch.first_seq for batch in take_all(window, 0.11)] == [4]
+    # The next one within the interval of restarts, with all that was applied before.
+    window.acknowledge(4, 12, None, 0.12, 5)
+    assert [batch.first_seq for batch in take_all(window, 0.12)] == [4]
+    # The same owner again is no other one.
+    window.acknowledge(4, 12, None, 0.13, 5)
+    assert take_all(window, 0.13) == []
+
+
+def test_a_watermark_of_an_owner_before_counts_for_nothing() -> None:
+    window = filled(12)
+    take_all(window, 0.0)
+    assert window.acknowledge(2, 2, None, 0.1, 4)
+    assert not window.acknowledge(8, 8, (8, 9), 0.2, 3)
+    assert window.durable == 2 and take_all(window, 0.2) == []
+    assert window.acknowledge(8, 8, None, 0.3, 4)
+
+
+def test_an_estimate_tells_of_another_owner_and_its_watermark_brings_the_rest_again() -> None:
+    window = filled(12)
+    take_all(window, 0.0)
+    window.acknowledge(2, 2, None, 0.1, 3)
+    assert [window.is_outdated(term) for term in (3, 4, 3, 4)] == [False, False, True, False]
+    assert not window.acknowledge(8, 8, None, 0.2, 3)
+    window.acknowledge(2, 2, None, 0.3, 4)
+    assert [batch.first_seq for batch in take_all(window, 0.3)] == [2]
+
+
+def test_what_is_durable_stays_so_in_a_later_term() -> None:
+    window = filled(12)
+    take_all(window, 0.0)
+    window.acknowledge(8, 8, None, 0.1, 3)
+    assert not window.acknowledge(4, 4, None, 0.2, 4)
+    assert window.durable == 8
+
+
 @pytest.mark.parametrize("gap", [(0, 2), (20, 30), (5, 5), (7, 6)])
 def test_a_gap_outside_the_window_is_nothing(gap: Tuple[int, int]) -> None:
     window = filled(8)
@@ -213,6 +255,7 @@ class LossyService:
         self.waiting: Dict[int, bytes] = {}
         self.journal: List[bytes] = []
         self.durable = 0
+        self.term = 0
 
     def receive(self, batch: Outgoing) -> None:
         for seq, sample in enumerate(batch.samples, batch.first_seq):
@@ -230,7 +273,7 @@ class LossyService:
 
     def watermark(self) -> Heard:
         gap = (len(self.journal), min(self.waiting)) if self.waiting else None
-        return self.durable, len(self.journal), gap
+        return self.durable, len(self.journal), gap, self.term
 
 
 @pytest.mark.parametrize("seed", range(60))
@@ -274,12 +317,15 @@ def test_every_sample_arrives_once_and_in_order_through_a_bad_channel(seed: int)
             answer(now)
         if chance.random() < 0.01:
             service.restart()
+            # An embedded store has one owner; one on object storage has another one from now on.
+            service.term += seed % 2
             answer(now)
         elif chance.random() < 0.1:
             service.commit()
         for arrival in [item for item in back if item[0] <= now]:
             back.remove(arrival)
-            window.acknowledge(*arrival[1], now)
+            durable, applied, gap, term = arrival[1]
+            window.acknowledge(durable, applied, gap, now, term)
         assert window.durable <= service.durable, "only the service's word empties the window"
 
     assert service.journal == [b"%d" % seq for seq in range(total)]

@@ -113,6 +113,9 @@ class Estimate(UncertainPoseReadings):
     place: Optional[int] = None
     #: Its confidence, in [0, 1]; 0 without a place.
     confidence: float = 0.0
+    #: Number of the owner of the space's journal that made it: each later owner has a larger one; 0
+    #: on one machine.
+    term: int = 0
 
     def __str__(self) -> str:
         place = "" if self.place is None else f", place {self.place} ({self.confidence:.2f})"
@@ -155,6 +158,9 @@ class Watermark:
     gap: Optional[SeqRange] = None
     #: Samples refused for good, the latest few.
     rejected: Tuple[Rejection, ...] = ()
+    #: Number of the owner of the space's journal that wrote it: each later owner has a larger one;
+    #: 0 on one machine. From one term to the next `applied` may go back, and `durable` never does.
+    term: int = 0
 
 
 @dataclass(frozen=True)

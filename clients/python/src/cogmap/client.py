@@ -44,6 +44,7 @@ from .point_cloud import PointCloud
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
 from .questions import Questions
 from .request import json_of, path_of
+from .retry import RETRY_TIMEOUT_S
 from .route import RouteReverse
 from .sample import NoTurn, Orientation, SampleBatch, TouchNoise
 from .settings import SpaceSettings
@@ -62,11 +63,18 @@ class Client(Questions, GuidanceClient):
     answers in pages are iterated to the end, page by page as they are consumed.
 
     Args:
-        url: Address of the service, for example `http://127.0.0.1:8080`.
+        url: Address of the service, for example `http://127.0.0.1:8080`, or several, as those of
+            the nodes of a cluster: when nothing listens at one the next is asked, and stays in use;
+            for questions by GET and for samples also when the connection breaks.
         token: Bearer token, if the service asks for one.
         timeout_s: Longest silence of a connection [s].
         ca_file: File (PEM) with the authority that has signed the certificate of an `https://`
             service; the system's authorities when absent.
+        retry_timeout_s: How long a request is sent again while its space moves to another owner
+            (`/problems/moving`), with the pauses that the service asks for [s]; not at all with 0.
+            Questions by GET and samples, which are applied once however often they come, are sent
+            again also when the owner did not answer (`/problems/owner-lost`). What the service says
+            after that time is raised.
 
     Raises (all methods, each with the address in its message):
         InvalidValue: An argument makes no sense; nothing was asked.
@@ -78,12 +86,13 @@ class Client(Questions, GuidanceClient):
 
     def __init__(
         self,
-        url: str,
+        url: Union[str, Iterable[str]],
         token: Optional[str] = None,
         timeout_s: float = 10.0,
         ca_file: Optional[str] = None,
+        retry_timeout_s: float = RETRY_TIMEOUT_S,
     ) -> None:
-        super().__init__(url, token, timeout_s, ca_file)
+        super().__init__(url, token, timeout_s, ca_file, retry_timeout_s)
 
     def __repr__(self) -> str:
         return f"Client({self._url!r}{'' if self._token is None else ', token=...'})"
@@ -169,7 +178,7 @@ class Client(Questions, GuidanceClient):
     def post_samples(self, space: str, agent: str, batch: SampleBatch) -> IngestAnswer:
         """Sends samples without Zenoh; returns when they are on the service's disk."""
         path = path_of(space, "agents", agent, "samples")
-        return self._send(IngestAnswer, "POST", path, CBOR, encode(batch))
+        return self._send(IngestAnswer, "POST", path, CBOR, encode(batch), repeatable=True)
 
     # Memories
 

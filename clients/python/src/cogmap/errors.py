@@ -94,6 +94,7 @@ class ApiError(CogmapError):
         detail: str,
         extra: Optional[Mapping[str, Any]] = None,
         where: str = "",
+        retry_after_s: Optional[float] = None,
     ) -> None:
         told = f"{status} {title}: {detail}" if detail else f"{status} {title}"
         super().__init__(f"{told} ({where})" if where else told)
@@ -109,6 +110,8 @@ class ApiError(CogmapError):
         self.where = where
         #: Further members of the problem, for example `expected_seq` after a gap in posted samples.
         self.extra: Mapping[str, Any] = dict(extra or {})
+        #: When to ask again [s]; `None` if the service does not say.
+        self.retry_after_s = retry_after_s
 
 
 def _unpickled(

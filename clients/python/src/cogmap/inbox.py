@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from typing import Deque, Generic, Optional, Tuple, Type, TypeVar, Union
+from typing import Callable, Deque, Generic, Optional, Tuple, Type, TypeVar, Union
 
 import zenoh
 
@@ -36,13 +36,21 @@ class Inbox(Generic[T]):
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def drop(self) -> None:
-        """Drops the oldest message unread."""
-        self._waiting.popleft()
-
     def take(self) -> Optional[T]:
         """The oldest message; `None` if it cannot be read."""
-        encoding, data = self._waiting.popleft()
+        return self._read(*self._waiting.popleft())
+
+    def take_latest(self, is_wanted: Callable[[T], bool]) -> Optional[T]:
+        """The latest message that is wanted; those before it are dropped unread. What comes
+        meanwhile waits."""
+        waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        for encoding, data in reversed(waiting):
+            message = self._read(encoding, data)
+            if message is not None and is_wanted(message):
+                return message
+        return None
+
+    def _read(self, encoding: str, data: bytes) -> Optional[T]:
         try:
             return decode(self._kind, data, encoding)
         except WireError as error:

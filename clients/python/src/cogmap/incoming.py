@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Iterator, Union
+from typing import Callable, Iterator, Union
 
 from . import bounds
 from .answer import Estimate, Watermark
@@ -19,8 +19,11 @@ class Incoming:
         self.watermarks = Inbox(Watermark, bounds.ANSWERS_WAITING_MAX, wake)
         self.problems = Inbox(Problem, bounds.ANSWERS_WAITING_MAX, wake)
 
-    def drain(self, every_estimate: bool) -> Iterator[Union[Estimate, Watermark, Problem]]:
-        """What waits, one after the other; without `every_estimate` only the latest estimate.
+    def drain(
+        self, every_estimate: bool, is_wanted: Callable[[Estimate], bool]
+    ) -> Iterator[Union[Estimate, Watermark, Problem]]:
+        """What waits, one after the other; of estimates those that are wanted, and without
+        `every_estimate` only the latest of them.
 
         Estimates come first, and of the watermarks only those that are here when it begins: when a
         flush returns, the estimate that was published before is in place. What comes meanwhile
@@ -28,12 +31,12 @@ class Incoming:
         """
         watermarks = len(self.watermarks)
         while self.estimates:
-            if len(self.estimates) > 1 and not every_estimate:
+            if every_estimate:
+                estimate = self.estimates.take()
+            else:
                 # Nobody asked for each one, and only the latest is kept: spare the decoding.
-                self.estimates.drop()
-                continue
-            estimate = self.estimates.take()
-            if estimate is not None:
+                estimate = self.estimates.take_latest(is_wanted)
+            if estimate is not None and is_wanted(estimate):
                 yield estimate
         for _ in range(watermarks):
             watermark = self.watermarks.take()

@@ -425,7 +425,7 @@ class Run:
                 return
 
     def _receive(self) -> None:
-        for told in self._incoming.drain(self._listeners.want_estimates()):
+        for told in self._incoming.drain(self._listeners.want_estimates(), self._is_wanted):
             if isinstance(told, Estimate):
                 self._take_estimate(told)
             elif isinstance(told, Watermark):
@@ -433,9 +433,13 @@ class Run:
             else:
                 self._take_problem(told)
 
+    def _is_wanted(self, estimate: Estimate) -> bool:
+        """Whether it is of this run, and of no owner of the space that has lost it."""
+        with self.changed:
+            is_outdated = self.window.is_outdated(estimate.term)
+        return not is_outdated and estimate.session == self.session_id
+
     def _take_estimate(self, estimate: Estimate) -> None:
-        if estimate.session != self.session_id:
-            return
         with self.changed:
             self.estimate = estimate
             self.changed.notify_all()
@@ -443,6 +447,8 @@ class Run:
 
     def _take_watermark(self, watermark: Watermark) -> None:
         with self.changed:
+            if self.window.is_outdated(watermark.term):
+                return
             self._is_known = True
             self._problem = None
             if watermark.session < self.session_id:
@@ -459,7 +465,8 @@ class Run:
                 return
             now = time.monotonic()
             gap = None if watermark.gap is None else (watermark.gap.start, watermark.gap.stop)
-            self.window.acknowledge(watermark.durable, watermark.applied, gap, now)
+            durable, applied, term = watermark.durable, watermark.applied, watermark.term
+            self.window.acknowledge(durable, applied, gap, now, term)
             if self.watermark is None or watermark.durable >= self.watermark.durable:
                 self.watermark = watermark
             self.rejections.take(watermark.rejected, now)

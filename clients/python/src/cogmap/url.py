@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import urllib.parse
+from typing import Iterable, Tuple, Union
 
 from .errors import InvalidValue
 
@@ -18,3 +19,13 @@ def checked_url(url: str) -> str:
     if not usable:
         raise InvalidValue("url", url, expected)
     return url.rstrip("/")
+
+
+def checked_urls(url: Union[str, Iterable[str]]) -> Tuple[str, ...]:
+    """One address or several, each once and checked."""
+    if isinstance(url, str) or not isinstance(url, Iterable):
+        return (checked_url(url),)
+    urls = tuple(dict.fromkeys(map(checked_url, url)))
+    if not urls:
+        raise InvalidValue("url", url, "expected an address at least")
+    return urls

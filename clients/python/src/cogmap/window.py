@@ -5,8 +5,10 @@ so that every loss and delay can be tested without a network. The rules:
 
 * A sample is held until a watermark covers it.
 * A *gap* in a watermark is sent again at once, the same gap at most every `gap_interval_s`.
-* A watermark whose `applied` has fallen back tells of a restarted service: everything from the
-  watermark on is sent again, as after a silence.
+* A watermark whose `applied` has fallen back tells of a restarted service, and one of a larger
+  *term* of another owner of the space: what the one before had only in memory is gone, and
+  everything from the watermark on is sent again, as after a silence.
+* What comes of a smaller term than the largest that was heard is outdated, and counts for nothing.
 * When samples are outstanding and the watermark has not moved for `silence_s`, the watermark is
   asked for; if it does not move within `grace_s` either, everything from the watermark on is sent
   again. The wait doubles from time to time, up to `silence_max_s`, until the watermark moves.
@@ -87,6 +89,9 @@ class Window:
         # Disjoint ranges [start, stop) to send again, in order.
         self._repeat: List[Tuple[int, int]] = []
         self._applied = 0
+        # The largest term that was heard of the agent, and that of the latest watermark.
+        self._term = 0
+        self._marked_term: Optional[int] = None
         self._restart_at = float("-inf")
         # The gap that was sent again last, and when; `_gap_again` when it was named too soon after.
         self._gap: Tuple[int, int] = (-1, -1)
@@ -195,15 +200,27 @@ class Window:
         self._samples.rotate(start - self._durable)
         return tuple(chosen)
 
+    def is_outdated(self, term: int) -> bool:
+        """Notes the term of an estimate or a watermark of the agent; says whether it is outdated:
+        written by an owner of the space that has lost it."""
+        is_outdated = term < self._term
+        self._term = max(self._term, term)
+        return is_outdated
+
     def acknowledge(
-        self, durable: int, applied: int, gap: Optional[Tuple[int, int]], now: float
+        self,
+        durable: int,
+        applied: int,
+        gap: Optional[Tuple[int, int]],
+        now: float,
+        term: int = 0,
     ) -> bool:
         """Takes in a watermark of this session; says whether it moved.
 
         Watermarks may come late, twice or out of order. What is on disk stays there, so one with a
         lower `durable` is an old message. The caller has made sure that `durable <= sent`.
         """
-        if not self._durable <= durable <= self._sent:
+        if self.is_outdated(term) or not self._durable <= durable <= self._sent:
             return False
         moved = durable > self._durable
         if moved:
@@ -216,14 +233,17 @@ class Window:
             self._quiet_since = now
             self._silence_s = self._limits.silence_s
             self._asked_at = None
-        restarted = applied < self._applied
+        fell_back = applied < self._applied
         self._applied = applied
+        is_other_owner = self._marked_term is not None and self._marked_term < term
+        self._marked_term = term
+        is_restart = fell_back and now >= self._restart_at + self._limits.gap_interval_s
         if self._rejoining:
             self._rejoining = False
             self._asked_at = None
             self._quiet_since = now
             self.resend()
-        elif restarted and now >= self._restart_at + self._limits.gap_interval_s:
+        elif is_other_owner or is_restart:
             self._restart_at = now
             self.resend()
         if gap is None:
