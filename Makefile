@@ -66,6 +66,7 @@ test-python: $(VENV)/installed ## types and tests of the Python client, then the
 	cd tests/wheels && $(VENV)/bin/mypy --strict .
 	cd tests/image && $(VENV)/bin/mypy --strict .
 	cd tests/object_storage && $(VENV)/bin/mypy --strict .
+	cd tests/cluster && $(VENV)/bin/mypy --strict .
 	cd $(CLIENT) && $(VENV)/bin/pytest
 	$(VENV)/bin/pytest tests/scorecard
 	$(VENV)/bin/pytest tests/python
@@ -237,6 +238,24 @@ object-storage-check: $(VENV)/installed ## services over a real S3 server: kills
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check \
 	    --requirement tests/object_storage/requirements.txt
 	$(VENV)/bin/pytest tests/object_storage
+
+# Beside the gate, for it takes most of an hour. The optimised service, for times are asserted.
+ROUNDS ?= 20
+CLUSTER := tests/cluster
+.PHONY: drills-cluster
+drills-cluster: release-cluster ## several nodes over one S3 server: kills, cuts, a storage that fails; ROUNDS=3 ARGS="-k frozen" FIGURES=FILE
+	COGMAP_BIN=$(TARGET)/release/cogmap COGMAP_DRILL_ROUNDS=$(ROUNDS) \
+	    COGMAP_DRILL_FIGURES='$(FIGURES)' $(VENV)/bin/pytest -s $(CLUSTER) $(ARGS)
+
+.PHONY: measure-cluster
+measure-cluster: release-cluster ## several nodes beside an embedded store, as JSON; ARGS="--nodes 1 3 --spaces 64 --seconds 20"
+	COGMAP_BIN=$(TARGET)/release/cogmap $(VENV)/bin/python $(CLUSTER)/measure.py $(ARGS)
+
+.PHONY: release-cluster
+release-cluster: $(VENV)/installed
+	cargo build --release --locked --package cogmap --bin cogmap --features object-storage
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check \
+	    --requirement $(CLUSTER)/requirements.txt
 
 .PHONY: docs
 docs: ## documentation of the crates, in target/doc

@@ -16,12 +16,12 @@ import pytest
 
 import cogmap
 from binary import run
+from circle import BATCH, batch, undisturbed
 from server import Server
 from storage import BUCKET, Storage
 
 ROUNDS = 20
-#: Samples of a message, and messages of a round.
-BATCH = 10
+#: Messages of a round.
 MESSAGES = 20
 #: How long the storage or a service stands still [s].
 FROZEN_S = 8.0
@@ -48,28 +48,6 @@ def service(home: Path, name: str, settings: List[str]) -> Server:
     return Server(directory, settings)
 
 
-def batch(first: int, count: int = BATCH) -> cogmap.SampleBatch:
-    """Samples of a robot on a wide circle."""
-    forward, about = (0.5, 0.0, 0.0), (0.0, 0.0, 0.1)
-    samples = tuple(
-        cogmap.Sample(seq * 10_000_000, cogmap.Velocity(forward, about, 0.01))
-        for seq in range(first, first + count)
-    )
-    return cogmap.SampleBatch(1, first, samples)
-
-
-def undisturbed(home: Path, samples: int) -> str:
-    """The digest of the same samples on an embedded store."""
-    server = service(home, "undisturbed", [])
-    server.start()
-    server.client().create_space("hall")
-    for first in range(0, samples, 1000):
-        server.client().post_samples("hall", "ada", batch(first, min(1000, samples - first)))
-    digest = server.client().space("hall").digest
-    server.close()
-    return digest
-
-
 def durable(server: Server) -> int:
     """How far the samples are acknowledged."""
     mark = server.client().agent("hall", "ada").watermark
@@ -86,7 +64,8 @@ class Feeder:
         self._thread.start()
 
     def _feed(self) -> None:
-        client = self._server.client()
+        # It is to learn at once that the service owns nothing any more.
+        client = self._server.client(retry_timeout_s=0.0)
         while True:
             try:
                 answer = client.post_samples("hall", "ada", batch(self.acknowledged))
@@ -118,7 +97,7 @@ def test_what_was_acknowledged_is_there_after_each_kill(url: str, tmp_path: Path
     digest = server.client().space("hall").digest
     server.close()
     assert acknowledged > ROUNDS * BATCH
-    assert digest == undisturbed(tmp_path, acknowledged)
+    assert digest == undisturbed(tmp_path, {"hall": acknowledged})["hall"]
 
 
 def test_a_service_that_was_taken_over_from_writes_nothing(url: str, tmp_path: Path) -> None:
@@ -140,13 +119,13 @@ def test_a_service_that_was_taken_over_from_writes_nothing(url: str, tmp_path: P
         assert told <= reached, "the old owner has acknowledged something"
         assert durable(other) == reached
         with pytest.raises(cogmap.ApiError, match="taken over"):
-            owner.client().post_samples("hall", "ada", batch(reached))
+            owner.client(retry_timeout_s=0.0).post_samples("hall", "ada", batch(reached))
         owner.terminate()
         acknowledged = reached
     last = servers[ROUNDS % 2]
     digest = last.client().space("hall").digest
     last.close()
-    assert digest == undisturbed(tmp_path, acknowledged)
+    assert digest == undisturbed(tmp_path, {"hall": acknowledged})["hall"]
 
 
 def test_while_the_storage_stands_still_watermarks_do(

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import urllib.request
 from pathlib import Path
-from typing import Any, List, Optional, Sequence
+from typing import Any, List, Mapping, Optional, Sequence
 
 import cogmap
 
@@ -26,29 +26,46 @@ class Server:
         home: Directory for its store and its log.
         settings: Settings (`key=value`) beside the ports and the directory.
         token: Bearer token that its clients use, if the settings ask for one.
+        variables: Environment variables beside the caller's.
     """
 
     def __init__(
-        self, home: Path, settings: Sequence[str] = (), token: Optional[str] = None
+        self,
+        home: Path,
+        settings: Sequence[str] = (),
+        token: Optional[str] = None,
+        variables: Optional[Mapping[str, str]] = None,
     ) -> None:
         self._http = Port()
         self._zenoh = Port()
         self._settings = settings
         self._token = token
+        self._variables = variables or {}
         self.data = home / "data"
         self._log = home / "log"
         self._process: Optional[subprocess.Popen[bytes]] = None
 
     def start(self) -> None:
         """Starts the process and waits until it is ready."""
+        self.launch()
+        self.await_ready()
+
+    def launch(self) -> None:
+        """Starts the process without waiting for it."""
         assert self._process is None, "the service runs already"
         command = [binary(), "serve", "--data-dir", str(self.data)]
         command += ["--http", f"127.0.0.1:{self._http.number}", "--zenoh", self.endpoint]
         for setting in self._settings:
             command += ["--set", setting]
         with self._log.open("ab") as log:
-            process = subprocess.Popen(command, env=environment(), stdout=log, stderr=log)
-        self._process = process
+            self._process = subprocess.Popen(
+                command, env={**environment(), **self._variables}, stdout=log, stderr=log
+            )
+
+    def await_ready(self) -> None:
+        """Waits until the process is ready."""
+        process = self._process
+        assert process is not None, "the service does not run"
 
         def ready() -> bool:
             assert process.poll() is None, f"the service ended with {process.returncode}"
@@ -105,6 +122,11 @@ class Server:
             raise
 
     @property
+    def runs(self) -> bool:
+        """Whether the process was started and neither ended nor killed since."""
+        return self._process is not None and self._process.poll() is None
+
+    @property
     def url(self) -> str:
         """Base of its HTTP interface."""
         return f"http://127.0.0.1:{self._http.number}"
@@ -114,9 +136,9 @@ class Server:
         """Its Zenoh endpoint."""
         return f"tcp/127.0.0.1:{self._zenoh.number}"
 
-    def client(self) -> cogmap.Client:
+    def client(self, **options: Any) -> cogmap.Client:
         """The client's HTTP side."""
-        return cogmap.Client(self.url, token=self._token, timeout_s=LONG_S)
+        return cogmap.Client(self.url, token=self._token, timeout_s=LONG_S, **options)
 
     def robot(self, agent: str, session: Optional[int] = None, **options: Any) -> cogmap.Robot:
         """A robot of the space `default`, whose close adds nothing to what a test counts."""
