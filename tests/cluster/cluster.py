@@ -112,6 +112,8 @@ class Cluster:
         settings: Sequence[str] = (),
     ) -> None:
         self.home = home
+        #: Prefix of the store in the bucket.
+        self.store = store
         self._wiring = wiring or Wiring()
         #: Who has said that a shard is open there, by shard and term.
         self._holders: Dict[Tuple[int, int], str] = {}

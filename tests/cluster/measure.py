@@ -24,12 +24,16 @@ from typing import List, Optional, Sequence
 sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 
 from asking import insist
-from cluster import NAMES, Cluster
+from cluster import SHARDS, Cluster
 from figures import quantile
 from server import Server
 from storage import Storage
 from writer import Ack, Writer
 
+#: Beats of a node, each with a PUT, by its default settings [1/s].
+_BEATS_PER_S = 2.0
+#: Most nodes that one machine is asked to run.
+_NODES_MAX = 8
 #: Shortest time until what is measured begins [s]: connections are made, caches are filled.
 _WARM_UP_S = 3.0
 
@@ -49,6 +53,8 @@ class Result:
     #: Requests to the storage [1/s]; of the embedded store none.
     put_per_s: Optional[float]
     get_per_s: Optional[float]
+    #: PUT that docs/scaling.md reckons with, if the interval of commits is told [1/s].
+    expected_put_per_s: Optional[float]
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
@@ -73,18 +79,29 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 
 def _options(argv: Optional[Sequence[str]]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
-    parser.add_argument("--nodes", type=int, nargs="+", default=[1, 2, 3], help="numbers of nodes")
+    parser.add_argument(
+        "--nodes", type=int, nargs="+", default=[1, 2, 3, 4], help="numbers of nodes"
+    )
     parser.add_argument("--spaces", type=int, default=64, help="spaces, each with one robot")
     parser.add_argument("--batch", type=int, default=100, help="samples of a message")
     parser.add_argument("--seconds", type=float, default=20.0, help="how long is measured [s]")
+    parser.add_argument(
+        "--commit-interval", type=float, help="engine.commit_interval_s of all services [s]"
+    )
     options = parser.parse_args(argv)
-    if not set(options.nodes) <= set(range(1, len(NAMES) + 1)):
-        parser.error(f"--nodes: 1 to {len(NAMES)}")
+    if not set(options.nodes) <= set(range(1, _NODES_MAX + 1)):
+        parser.error(f"--nodes: 1 to {_NODES_MAX}")
     return options
 
 
+def _settings(options: argparse.Namespace) -> List[str]:
+    if options.commit_interval is None:
+        return []
+    return [f"engine.commit_interval_s={options.commit_interval}"]
+
+
 def _embedded(home: Path, options: argparse.Namespace) -> Result:
-    server = Server(Path(tempfile.mkdtemp(prefix="embedded-", dir=home)))
+    server = Server(Path(tempfile.mkdtemp(prefix="embedded-", dir=home)), _settings(options))
     server.start()
     try:
         return _measured("embedded", [server.url], None, options)
@@ -94,7 +111,8 @@ def _embedded(home: Path, options: argparse.Namespace) -> Result:
 
 def _nodes(home: Path, storage: Storage, n_nodes: int, options: argparse.Namespace) -> Result:
     name = f"nodes-{n_nodes}"
-    cluster = Cluster(storage, home / name, name, NAMES[:n_nodes])
+    names = [f"node-{number}" for number in range(n_nodes)]
+    cluster = Cluster(storage, home / name, name, names, settings=_settings(options))
     try:
         cluster.start()
         cluster.whole()
@@ -137,6 +155,9 @@ def _measured(
             return None
         return round((later.get(method, 0) - requests.get(method, 0)) / took_s, 1)
 
+    expected: Optional[float] = None
+    if storage is not None and options.commit_interval is not None:
+        expected = len(urls) * _BEATS_PER_S + SHARDS / options.commit_interval
     return Result(
         store=store,
         nodes=len(urls),
@@ -146,19 +167,22 @@ def _measured(
         p99_ms=round(quantile(waits_ms, 0.99), 2),
         put_per_s=rate("PUT"),
         get_per_s=rate("GET"),
+        expected_put_per_s=expected,
     )
 
 
 def _table(results: List[Result]) -> str:
     lines = [
-        "| store | nodes | spaces | durable samples/s | p50 [ms] | p99 [ms] | PUT/s | GET/s |",
-        "|---|---|---|---|---|---|---|---|",
+        "| store | nodes | spaces | durable samples/s | p50 [ms] | p99 [ms] | PUT/s | expected "
+        "| GET/s |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for each in results:
-        put, get = ("" if rate is None else rate for rate in (each.put_per_s, each.get_per_s))
+        rates = (each.put_per_s, each.expected_put_per_s, each.get_per_s)
+        put, expected, get = ("" if rate is None else rate for rate in rates)
         lines.append(
             f"| {each.store} | {each.nodes} | {each.spaces} | {each.samples_per_s} "
-            f"| {each.p50_ms} | {each.p99_ms} | {put} | {get} |"
+            f"| {each.p50_ms} | {each.p99_ms} | {put} | {expected} | {get} |"
         )
     return "\n".join(lines)
 

@@ -14,11 +14,16 @@ from cluster import Cluster
 from cogmap.wire import CBOR
 from conftest import MakeCluster
 from figures import ROUNDS, quantile, report
+from storage import Storage
 from wait import LONG_S
 from writer import Writer, message
 
 #: Messages that are acknowledged before and after something happens: a fifth of a second of them.
 MESSAGES = 10
+#: Rounds of the negative control at most, of which one has to show the loss.
+CONTROLS_MAX = 10
+#: Time in which a request that was sent reaches the storage [s].
+ARRIVES_S = 0.5
 #: Longest time without acknowledgements after an owner was killed, in half of all rounds [s]: its
 #: end is noticed at once, because its connections close; the next owner waits for half a second
 #: whether it stays away, opens the shard in a quarter of a second, and replays its spaces.
@@ -56,6 +61,34 @@ def test_a_frozen_owner_writes_nothing(cluster: Cluster) -> None:
             writer.through(cluster.others(owner)[0].url)
             stubborn.through(owner.url)
         cluster.assert_all_there_once(writer, stubborn)
+
+
+def test_without_its_fence_the_drill_sees_a_loss(cluster: Cluster, storage: Storage) -> None:
+    """The negative control of the drill above: an owner that nothing fences acknowledges samples
+    that nobody has."""
+    shard = cluster.create("hall")
+    log = f"{cluster.store}/shards/{shard}/wal"
+    for number in range(CONTROLS_MAX):
+        beside = cluster.create_in(shard, f"beside-{number}")
+        owner = cluster.owner(shard)
+        # Without a pace there is nearly always a message under way.
+        with Writer(owner.url, beside, pace_s=0.0, patience_s=LONG_S) as stubborn:
+            stubborn.await_acks(MESSAGES)
+            owner.pause()
+            # What was sent before that arrives.
+            time.sleep(ARRIVES_S)
+            before = set(storage.objects(log))
+            follower = cluster.await_other_owner(shard, owner)
+            # The first entry of the next owner is in the place where the one before would go on.
+            fence = next(name for name in storage.objects(log) if name not in before)
+            storage.remove(f"{log}/{fence}")
+            owner.resume()
+            cluster.whole()
+        told, there = stubborn.acknowledged, cluster.durable(follower, beside)
+        print(f"round {number}: {told} samples were acknowledged, {there} are there")
+        if there < told:
+            return
+    raise AssertionError(f"nothing was lost in {CONTROLS_MAX} rounds without a fence")
 
 
 def test_a_killed_owner_is_followed_soon(cluster: Cluster) -> None:

@@ -99,6 +99,19 @@ class Storage:
                 counts[method[1]] = counts.get(method[1], 0) + int(float(value))
         return counts
 
+    def objects(self, folder: str) -> List[str]:
+        """Names of the objects in a folder of the bucket, in order."""
+        request = urllib.request.Request(f"{self._files(folder)}/?limit=100000")
+        request.add_header("Accept", "application/json")
+        with urllib.request.urlopen(request, timeout=LONG_S) as answer:
+            entries = json.load(answer)["Entries"] or []
+        return sorted(entry["FullPath"].rpartition("/")[2] for entry in entries)
+
+    def remove(self, path: str) -> None:
+        """Removes an object of the bucket, which no program that keeps to its rules would."""
+        request = urllib.request.Request(self._files(path), method="DELETE")
+        urllib.request.urlopen(request, timeout=LONG_S).close()
+
     def freeze(self) -> None:
         """Lets it answer nothing, with all connections open."""
         self._running().send_signal(signal.SIGSTOP)
@@ -117,6 +130,10 @@ class Storage:
         """Ends it if it runs."""
         if self._process is not None:
             self.kill()
+
+    def _files(self, path: str) -> str:
+        """Where the server's own interface to files has an object."""
+        return f"http://127.0.0.1:{self._ports['filer.port'].number}/buckets/{BUCKET}/{path}"
 
     def _running(self) -> subprocess.Popen[bytes]:
         assert self._process is not None, "the S3 server does not run"
