@@ -159,7 +159,7 @@ scorecard: release-lab ## figures of README and docs beside the committed card, 
 
 # Peers are large packages, so they have a venv of their own and no part in the gate.
 .PHONY: peers
-peers: release-lab $(PEERS)/.venv/installed ## cogmap beside its peers in the same run, for minutes; ARGS="--json" DATA=DIR with pose graphs, TOUCH=DIR with touched objects
+peers: release-lab $(PEERS)/.venv/installed ## cogmap beside its peers in the same run, for minutes; ARGS="--json" DATA=DIR with pose graphs, TOUCH=DIR with touched objects, TUC=DIR with place matches
 	cd $(PEERS) && .venv/bin/mypy .
 	$(PEERS)/.venv/bin/python $(PEERS)/recall.py --binary $(TARGET)/release/cogmap $(ARGS)
 	$(PEERS)/.venv/bin/python $(PEERS)/gridness.py --binary $(TARGET)/release/cogmap $(ARGS)
@@ -169,6 +169,9 @@ ifdef DATA
 endif
 ifdef TOUCH
 	$(PEERS)/.venv/bin/python $(PEERS)/touch.py --binary $(TARGET)/release/cogmap-lab $(ARGS) $(TOUCH)
+endif
+ifdef TUC
+	$(PEERS)/.venv/bin/python $(PEERS)/closures.py $(ARGS) $(TUC)
 endif
 
 $(PEERS)/.venv/installed: $(PEERS)/requirements.txt $(PEERS)/judge.txt $(CLIENT)/pyproject.toml
