@@ -205,17 +205,17 @@ impl State {
     fn take(&mut self, signal: Signal) {
         let now = Instant::now();
         match signal {
-            Signal::Presence(PresenceSign::Node { node, address }) => self.view.link(node, address),
+            Signal::Presence(PresenceSign::Node { node, there }) => self.view.link(node, there),
             Signal::Presence(PresenceSign::Owner { owner, there }) => {
-                self.view.announce(owner, there);
+                self.view.announce(owner, there, now);
             }
             Signal::Beat(beat) => {
                 self.worker.beaten();
                 match beat.seen {
                     Ok(seen) => {
                         self.view.observe(seen, beat.asked, now);
-                        for node in self.view.left_behind(now) {
-                            self.worker.forget(node);
+                        for (node, address) in self.view.left_behind(now) {
+                            self.worker.forget(node, address);
                         }
                     }
                     Err(error) => tracing::debug!(%error, "beat"),
@@ -236,7 +236,7 @@ impl State {
                 self.presence.leave();
             } else {
                 tracing::info!(node = %self.me, "this node takes part in the cluster");
-                self.presence.join(&self.me, &self.settings.address);
+                self.presence.join(&self.me);
                 for (shard, term) in &self.open {
                     self.presence.own(&self.record(*shard, *term));
                 }
@@ -300,7 +300,7 @@ impl State {
                 self.busy.remove(&number);
                 self.open.insert(number, term);
                 let record = self.record(number, term);
-                self.view.announce(record.clone(), true);
+                self.view.announce(record.clone(), true, now);
                 if !self.resigned {
                     self.presence.own(&record);
                 }
@@ -313,7 +313,7 @@ impl State {
             Done::Closed(record) => {
                 self.busy.remove(&record.shard);
                 self.open.remove(&record.shard);
-                self.view.announce(record, false);
+                self.view.announce(record, false, now);
             }
         }
     }
@@ -330,16 +330,16 @@ impl State {
     fn show(&self, now: Instant) {
         let me = NodeStatus {
             name: self.me.name.clone(),
-            address: Some(self.settings.address.clone()),
+            address: self.settings.address.clone(),
             state: if self.resigned {
                 NodeState::Lapsed
             } else {
                 NodeState::Live
             },
         };
-        let status = |(node, address, state): (&NodeId, Option<&str>, NodeState)| NodeStatus {
+        let status = |(node, address, state): (&NodeId, &str, NodeState)| NodeStatus {
             name: node.name.clone(),
-            address: address.map(str::to_owned),
+            address: address.to_owned(),
             state,
         };
         let mut nodes: Vec<_> = self.view.others(now).into_iter().map(status).collect();
@@ -382,10 +382,8 @@ impl State {
         if let Some(term) = term {
             return own(OwnerState::Open, term);
         }
-        let there = |owner: &&OwnerRecord| {
-            owner.node != self.me && self.view.state(&owner.node, now) != NodeState::Lapsed
-        };
-        match self.view.owner(shard).filter(there) {
+        let owner = self.view.owner(shard, now);
+        match owner.filter(|owner| owner.node != self.me) {
             Some(OwnerRecord { term, node, .. }) => OwnerStatus {
                 shard,
                 owner: Some(node.name.clone()),
@@ -397,7 +395,7 @@ impl State {
                 shard,
                 owner: None,
                 address: None,
-                term: self.view.owner(shard).map_or(0, |owner| owner.term),
+                term: self.view.recorded(shard).map_or(0, |owner| owner.term),
                 state: OwnerState::None,
             },
         }

@@ -4,8 +4,8 @@ use crate::store::{NodeId, OwnerRecord, ShardNumber};
 
 /// Says what this node is and has, to all others, until it is said no more or the node is gone.
 pub trait Presence: std::fmt::Debug + Send + 'static {
-    /// This node is there, and reached over HTTP at an address.
-    fn join(&mut self, node: &NodeId, address: &str);
+    /// This node is there.
+    fn join(&mut self, node: &NodeId);
     /// This node owns a shard.
     fn own(&mut self, owner: &OwnerRecord);
     /// This node owns a shard no more.
@@ -19,12 +19,12 @@ pub trait Presence: std::fmt::Debug + Send + 'static {
 /// What is heard of nodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PresenceSign {
-    /// A node is there, at an address, or there no more.
+    /// A node is there, or there no more.
     Node {
         /// The node.
         node: NodeId,
-        /// Where it is reached over HTTP.
-        address: Option<String>,
+        /// Whether it is there.
+        there: bool,
     },
     /// A node owns a shard, or owns it no more.
     Owner {

@@ -33,8 +33,8 @@ pub struct Standing {
 pub struct NodeStatus {
     /// Its name.
     pub name: String,
-    /// Where it is reached over HTTP; none where it has no link to this node.
-    pub address: Option<String>,
+    /// Where it is reached over HTTP.
+    pub address: String,
     /// Whether it takes part.
     pub state: NodeState,
 }

@@ -5,6 +5,10 @@
 //! the storage. Only both together make a *live* node. One with beats and no token is *apart*: its
 //! shards are its own, and whichever side of such a cut has fewer nodes gives its shards up. One
 //! without beats has *lapsed*, and its shards are free.
+//!
+//! Anybody on Zenoh can declare a token, and only nodes write to the storage. So a token of a node
+//! says nothing without beats, where a node is reached is in its beats, and the token of an owner
+//! is believed until the storage must have told of it.
 
 #[cfg(test)]
 mod tests;
@@ -14,10 +18,12 @@ use std::time::{Duration, Instant};
 
 use super::placement;
 use super::standing::NodeState;
-use crate::store::{NodeId, OwnerRecord, Seen, ShardNumber};
+use crate::store::{NodeId, NodeRecord, OwnerRecord, Seen, ShardNumber};
 
-/// Beats after which a node without a token has lapsed.
+/// Beats after which a node without a token has lapsed, and what only a token says is forgotten.
 const BEATS_MISSED: u32 = 3;
+/// Most tokens of each kind that are remembered. Source: more than there are shards at most.
+const TOKENS_MAX: usize = 4096;
 
 /// Times after which things are believed.
 #[derive(Clone, Copy, Debug)]
@@ -35,13 +41,13 @@ pub(super) struct Patience {
 pub(super) struct View {
     me: NodeId,
     patience: Patience,
-    /// Nodes that have a token, and where they are reached.
-    linked: BTreeMap<NodeId, String>,
+    /// Nodes that have a token.
+    linked: BTreeSet<NodeId>,
     /// The beats of other nodes.
     beats: BTreeMap<NodeId, Beat>,
-    /// Owners by the storage, and by tokens.
+    /// Owners by the storage, and by tokens, each with when it was first heard of.
     recorded: BTreeMap<ShardNumber, OwnerRecord>,
-    announced: BTreeSet<OwnerRecord>,
+    announced: BTreeMap<OwnerRecord, Instant>,
     /// When this node last had contact to the storage.
     contact: Option<Instant>,
     /// The live nodes, and since when they are the same.
@@ -59,6 +65,8 @@ struct Lasting {
 
 #[derive(Debug)]
 struct Beat {
+    /// Where the node is reached over HTTP.
+    address: String,
     mark: String,
     changed: Instant,
 }
@@ -68,33 +76,31 @@ impl View {
         Self {
             me,
             patience,
-            linked: BTreeMap::new(),
+            linked: BTreeSet::new(),
             beats: BTreeMap::new(),
             recorded: BTreeMap::new(),
-            announced: BTreeSet::new(),
+            announced: BTreeMap::new(),
             contact: None,
             live: Lasting::default(),
             apart: Lasting::default(),
         }
     }
 
-    /// A node's token came, with its address, or went.
-    pub(super) fn link(&mut self, node: NodeId, address: Option<String>) {
-        if node == self.me {
-            return;
+    /// A node's token came or went.
+    pub(super) fn link(&mut self, node: NodeId, there: bool) {
+        if !there {
+            self.linked.remove(&node);
+        } else if node != self.me && self.linked.len() < TOKENS_MAX {
+            self.linked.insert(node);
         }
-        match address {
-            Some(address) => self.linked.insert(node, address),
-            None => self.linked.remove(&node),
-        };
     }
 
     /// The token of a shard's owner came or went.
-    pub(super) fn announce(&mut self, owner: OwnerRecord, there: bool) {
-        if there {
-            self.announced.insert(owner);
-        } else {
+    pub(super) fn announce(&mut self, owner: OwnerRecord, there: bool, now: Instant) {
+        if !there {
             self.announced.remove(&owner);
+        } else if self.announced.len() < TOKENS_MAX {
+            self.announced.entry(owner).or_insert(now);
         }
     }
 
@@ -105,7 +111,12 @@ impl View {
         let was_blind = (self.contact).is_none_or(|at| now.saturating_duration_since(at) > looked);
         self.contact = Some(asked);
         let mut beats = BTreeMap::new();
-        for (node, mark) in seen.nodes {
+        for record in seen.nodes {
+            let NodeRecord {
+                node,
+                address,
+                mark,
+            } = record;
             if node == self.me {
                 continue;
             }
@@ -113,7 +124,12 @@ impl View {
                 Some(beat) if beat.mark == mark && !was_blind => beat.changed,
                 _ => now,
             };
-            beats.insert(node, Beat { mark, changed });
+            let beat = Beat {
+                address,
+                mark,
+                changed,
+            };
+            beats.insert(node, beat);
         }
         self.beats = beats;
         self.recorded.clear();
@@ -153,7 +169,7 @@ impl View {
 
     /// Whether another node takes part.
     pub(super) fn state(&self, node: &NodeId, now: Instant) -> NodeState {
-        let linked = self.linked.contains_key(node);
+        let linked = self.linked.contains(node);
         let patience = if linked {
             self.patience.lease
         } else {
@@ -168,14 +184,12 @@ impl View {
         }
     }
 
-    /// The other nodes, with their addresses where they have a token.
-    pub(super) fn others(&self, now: Instant) -> Vec<(&NodeId, Option<&str>, NodeState)> {
-        let nodes: BTreeSet<_> = self.beats.keys().chain(self.linked.keys()).collect();
-        let status = |node| {
-            let address = self.linked.get(node).map(String::as_str);
-            (node, address, self.state(node, now))
-        };
-        nodes.into_iter().map(status).collect()
+    /// The other nodes, with their addresses.
+    pub(super) fn others(&self, now: Instant) -> Vec<(&NodeId, &str, NodeState)> {
+        let nodes = self.beats.iter();
+        nodes
+            .map(|(node, beat)| (node, &*beat.address, self.state(node, now)))
+            .collect()
     }
 
     /// The shards of `all` that this node is to own; none while nodes come or go, which leaves
@@ -219,26 +233,35 @@ impl View {
         self.recorded.get(&shard)
     }
 
-    /// The latest owner of a shard that is known, by the storage or by a token, which comes first.
-    pub(super) fn owner(&self, shard: ShardNumber) -> Option<&OwnerRecord> {
-        let announced = self.announced.iter().filter(|owner| owner.shard == shard);
-        announced
+    /// The latest owner of a shard that is there, by the storage or by a token, which comes first.
+    pub(super) fn owner(&self, shard: ShardNumber, now: Instant) -> Option<&OwnerRecord> {
+        let told_by = self.patience.beat * BEATS_MISSED;
+        let is_news = |heard: Instant| self.contact.is_none_or(|at| at < heard + told_by);
+        let announced = { self.announced.iter() }
+            .filter(|(owner, heard)| owner.shard == shard && is_news(**heard));
+        { announced.map(|(owner, _)| owner) }
             .chain(self.recorded.get(&shard))
+            .filter(|owner| self.is_there(&owner.node, now))
             .max_by_key(|owner| owner.term)
     }
 
+    fn is_there(&self, node: &NodeId, now: Instant) -> bool {
+        *node == self.me || self.state(node, now) != NodeState::Lapsed
+    }
+
     /// Records and beats that nobody needs any more: those of nodes that have lapsed long ago.
-    pub(super) fn left_behind(&self, now: Instant) -> Vec<NodeId> {
+    pub(super) fn left_behind(&self, now: Instant) -> Vec<(NodeId, String)> {
         let long = self.patience.lease * 12;
         let gone = self.beats.iter().filter(|(node, beat)| {
-            now.saturating_duration_since(beat.changed) > long && !self.linked.contains_key(node)
+            now.saturating_duration_since(beat.changed) > long && !self.linked.contains(node)
         });
-        gone.map(|(node, _)| node.clone()).collect()
+        gone.map(|(node, beat)| (node.clone(), beat.address.clone()))
+            .collect()
     }
 
     /// Where a node is reached.
     pub(super) fn address(&self, node: &NodeId) -> Option<&str> {
-        self.linked.get(node).map(String::as_str)
+        self.beats.get(node).map(|beat| &*beat.address)
     }
 }
 

@@ -45,8 +45,9 @@ section! {
 
 fn is_address(address: &str) -> bool {
     let parts = address.rsplit_once(':');
+    let is_of_host = |c: char| c.is_ascii_alphanumeric() || "-._:[]".contains(c);
     parts.is_some_and(|(host, port)| {
-        !host.is_empty() && !host.contains(['/', '*', '?', '#', '$']) && port.parse::<u16>().is_ok()
+        !host.is_empty() && host.chars().all(is_of_host) && port.parse::<u16>().is_ok()
     })
 }
 

@@ -100,11 +100,10 @@ pub(crate) async fn ask_others(service: &Shared, path: &str, headers: &HeaderMap
         .nodes
         .iter()
         .filter(|other| other.name != standing.node && other.state == NodeState::Live);
-    let addresses = others.filter_map(|other| other.address.as_deref());
-    let asked = addresses.map(|address| {
+    let asked = others.map(|other| {
         service
             .forwarder
-            .list(address, path, headers, &standing.node)
+            .list(&other.address, path, headers, &standing.node)
     });
     join_all(asked).await.into_iter().flatten().collect()
 }

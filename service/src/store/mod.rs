@@ -35,7 +35,7 @@ pub use format1::migrate;
 pub use local::{FORMAT_VERSION, LocalJournal, LocalStore, Replacement, SpaceSurvey, verify};
 pub use log::{Damage, Extent, Flaw, Survey};
 #[cfg(feature = "object-storage")]
-pub use object::{NodeId, ObjectStorage, ObjectStore, OwnerRecord, Registry, Seen};
+pub use object::{NodeId, NodeRecord, ObjectStorage, ObjectStore, OwnerRecord, Registry, Seen};
 pub use shard::{ShardNumber, Shards};
 pub use whole::WholeStore;
 

@@ -1,7 +1,7 @@
 //! Presence of the nodes of a cluster, by liveliness tokens of Zenoh.
 //!
 //! ```text
-//! cogmap/@nodes/{node}/{session}/{address}          the node is there, and reached there
+//! cogmap/@nodes/{node}/{session}                    the node is there
 //! cogmap/@shards/{shard}/{term}/{node}/{session}    the node owns the shard
 //! ```
 
@@ -90,9 +90,9 @@ impl ZenohPresence {
 }
 
 impl Presence for ZenohPresence {
-    fn join(&mut self, node: &NodeId, address: &str) {
+    fn join(&mut self, node: &NodeId) {
         let NodeId { name, session } = node;
-        self.node = self.token(format!("{NODES}/{name}/{session}/{address}"));
+        self.node = self.token(format!("{NODES}/{name}/{session}"));
     }
 
     fn own(&mut self, owner: &OwnerRecord) {
@@ -138,8 +138,7 @@ fn sign(key: &str, there: bool) -> Option<PresenceSign> {
     if let Some(parts) = key.strip_prefix(NODES) {
         let mut parts = parts.split('/').skip(1);
         let node = node(&mut parts)?;
-        let address = parts.next().filter(|_| there).map(str::to_owned);
-        return Some(PresenceSign::Node { node, address });
+        return Some(PresenceSign::Node { node, there });
     }
     let mut parts = key.strip_prefix(SHARDS)?.split('/').skip(1);
     let owner = OwnerRecord {
@@ -167,18 +166,11 @@ mod tests {
             name: "ada.lab".to_owned(),
             session: "7f".to_owned(),
         };
-        let key = "cogmap/@nodes/ada.lab/7f/10.0.0.5:8080";
-        let address = Some("10.0.0.5:8080".to_owned());
-        let came = PresenceSign::Node {
-            node: node.clone(),
-            address,
-        };
-        assert_eq!(sign(key, true), Some(came));
-        let gone = PresenceSign::Node {
-            node: node.clone(),
-            address: None,
-        };
-        assert_eq!(sign(key, false), Some(gone));
+        for there in [true, false] {
+            let node = node.clone();
+            let told = sign("cogmap/@nodes/ada.lab/7f", there);
+            assert_eq!(told, Some(PresenceSign::Node { node, there }));
+        }
         let owner = OwnerRecord {
             shard: ShardNumber(3),
             term: 12,

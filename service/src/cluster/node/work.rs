@@ -38,6 +38,8 @@ pub(super) struct Worker {
     registry: Registry,
     engine: Engine,
     signals: Sender<Signal>,
+    /// Where this node is reached over HTTP.
+    address: String,
     /// Longest wait for the storage.
     timeout: Duration,
     /// Spaces that are created where they are not there yet.
@@ -57,6 +59,7 @@ impl Worker {
             storage,
             engine,
             signals,
+            address: settings.address.clone(),
             timeout: settings.lease,
             spaces: Arc::new(settings.spaces.clone()),
             beating: false,
@@ -77,9 +80,10 @@ impl Worker {
     pub(super) fn beat(&mut self, node: &NodeId, count: u64) {
         self.beating = true;
         let (registry, node, timeout) = (self.registry.clone(), node.clone(), self.timeout);
+        let address = self.address.clone();
         self.spawn("beat", move || {
             let asked = Instant::now();
-            let seen = registry.beat(&node, count, timeout);
+            let seen = registry.beat(&node, &address, count, timeout);
             Signal::Beat(Beat { asked, seen })
         });
     }
@@ -135,13 +139,15 @@ impl Worker {
 
     /// Forgets this node in the storage, and waits for that.
     pub(super) fn leave(&self, node: &NodeId) {
-        leave(&self.registry, node, self.timeout);
+        leave(&self.registry, node, &self.address, self.timeout);
     }
 
     /// Forgets a node that is gone.
-    pub(super) fn forget(&self, node: NodeId) {
+    pub(super) fn forget(&self, node: NodeId, address: String) {
         let (registry, timeout) = (self.registry.clone(), self.timeout);
-        spawn("forget node", move || leave(&registry, &node, timeout));
+        spawn("forget node", move || {
+            leave(&registry, &node, &address, timeout);
+        });
     }
 
     /// Does what takes long, and tells the node what came of it. It may have ended meanwhile.
@@ -156,8 +162,8 @@ fn spawn(name: &str, work: impl FnOnce() + Send + 'static) {
     spawned.expect("the system can start a thread");
 }
 
-fn leave(registry: &Registry, node: &NodeId, timeout: Duration) {
-    if let Err(error) = registry.leave(node, timeout) {
+fn leave(registry: &Registry, node: &NodeId, address: &str, timeout: Duration) {
+    if let Err(error) = registry.leave(node, address, timeout) {
         tracing::debug!(%node, %error, "forget a node");
     }
 }

@@ -39,11 +39,11 @@ impl Scene {
     }
 
     fn link(&mut self, name: &str) {
-        self.view.link(node(name), Some(format!("{name}:80")));
+        self.view.link(node(name), true);
     }
 
     fn cut(&mut self, name: &str) {
-        self.view.link(node(name), None);
+        self.view.link(node(name), false);
     }
 
     fn stop(&mut self, name: &'static str) {
@@ -66,7 +66,11 @@ impl Scene {
             let nodes = beating.chain(stopped);
             let seen = Seen {
                 nodes: nodes
-                    .map(|(name, mark)| (node(name), mark.to_string()))
+                    .map(|(name, mark)| NodeRecord {
+                        node: node(name),
+                        address: format!("{name}:80"),
+                        mark: mark.to_string(),
+                    })
                     .collect(),
                 owners: self.owners.clone(),
             };
@@ -181,33 +185,65 @@ fn of_two_equal_sides_that_with_the_first_node_stays() {
 #[test]
 fn a_token_says_where_a_shard_is_and_takes_it_from_nobody() {
     let mut scene = Scene::new();
-    scene.link("b");
-    scene.beating.insert("b");
+    for name in ["b", "c"] {
+        scene.link(name);
+        scene.beating.insert(name);
+    }
     scene.owns(3, "b", 7);
     scene.pass(seconds(2.0));
-    let owner = |term, name: &str| OwnerRecord {
-        shard: ShardNumber(3),
+    let owner = |shard, term, name| OwnerRecord {
+        shard: ShardNumber(shard),
         term,
         node: node(name),
     };
-    let known = |scene: &Scene| scene.view.owner(ShardNumber(3)).map(|owner| owner.term);
+    let known = |scene: &Scene| {
+        let owner = scene.view.owner(ShardNumber(3), scene.now);
+        owner.map(|owner| owner.term)
+    };
     assert_eq!(known(&scene), Some(7));
-    scene.view.announce(owner(8, "c"), true);
+    scene.view.announce(owner(3, 8, "c"), true, scene.now);
     assert_eq!(known(&scene), Some(8));
-    assert_eq!(scene.view.recorded(ShardNumber(3)), Some(&owner(7, "b")));
+    assert_eq!(scene.view.recorded(ShardNumber(3)), Some(&owner(3, 7, "b")));
     assert!(!scene.is_free(3));
-    scene.view.announce(owner(8, "c"), false);
+    scene.view.announce(owner(3, 8, "c"), false, scene.now);
     assert_eq!(known(&scene), Some(7));
-    scene.view.announce(owner(1, "b"), true);
+    scene.view.announce(owner(4, 9, "b"), true, scene.now);
     assert!(scene.is_free(4));
-    scene.view.announce(
-        OwnerRecord {
-            shard: ShardNumber(4),
-            ..owner(9, "nobody")
-        },
-        true,
-    );
-    assert!(scene.is_free(4));
+}
+
+#[test]
+fn a_false_token_leads_nobody_astray_for_long() {
+    let mut scene = Scene::new();
+    scene.link("b");
+    scene.beating.insert("b");
+    scene.owns(3, "b", 7);
+    // A node that has never been in the storage is none, whatever is said of it.
+    scene.link("nobody");
+    scene.pass(seconds(2.0));
+    let shard = ShardNumber(3);
+    let forged = |node, term| OwnerRecord { shard, term, node };
+    scene
+        .view
+        .announce(forged(node("nobody"), u64::MAX), true, scene.now);
+    let known = |scene: &Scene| scene.view.owner(shard, scene.now).map(|owner| owner.term);
+    assert_eq!(known(&scene), Some(7));
+    assert_eq!(scene.view.address(&node("nobody")), None);
+    assert_eq!(scene.view.others(scene.now).len(), 1);
+    // One in the name of a node that is there is believed until the storage must have told of it,
+    // however often it is heard.
+    let of_b = forged(node("b"), u64::MAX);
+    for _ in 0..4 {
+        scene.view.announce(of_b.clone(), true, scene.now);
+        scene.pass(seconds(0.5));
+    }
+    assert_eq!(known(&scene), Some(7));
+    // Tokens without number fill no memory.
+    for term in 0..2 * TOKENS_MAX as u64 {
+        scene
+            .view
+            .announce(forged(node("b"), term), true, scene.now);
+    }
+    assert_eq!(scene.view.announced.len(), TOKENS_MAX);
 }
 
 #[test]
@@ -240,5 +276,8 @@ fn what_the_dead_have_left_is_found_late() {
     scene.pass(seconds(50.0));
     assert_eq!(scene.view.left_behind(scene.now), []);
     scene.pass(seconds(12.0));
-    assert_eq!(scene.view.left_behind(scene.now), [node("b")]);
+    assert_eq!(
+        scene.view.left_behind(scene.now),
+        [(node("b"), "b:80".to_owned())]
+    );
 }

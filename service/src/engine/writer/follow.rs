@@ -17,6 +17,11 @@ use crate::store::StoreError;
 
 /// How often is looked whether the journal has grown.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
+/// How long it is read at each look after it has grown: the store tells that a moment before what
+/// has come can be read.
+const SETTLES: Duration = Duration::from_millis(100);
+/// How often it is read in any case, should that moment have been a long one.
+const READ_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Writer {
     /// Folds what comes into the journal until the space closes.
@@ -25,25 +30,19 @@ impl Writer {
     /// The journal cannot be read on.
     pub(crate) fn follow(mut self, mut inbox: Inbox) -> Result<(), RecoveryError> {
         self.publish_initial();
-        let mut read = None;
+        let (mut progress, mut changed, mut read) = (None, Instant::now(), None);
         while !self.shared.closing.load(Ordering::Acquire) {
             let looked = Instant::now();
-            let progress = self.shared.store.progress();
-            let caught_up = if read == Some(progress) {
-                Ok(())
-            } else {
-                self.read_on()
-            };
-            match caught_up {
-                Ok(()) => {
-                    read = Some(progress);
-                    self.shared.note_caught_up(looked);
-                }
-                // What is known grows old, and goes on when the storage is back.
-                Err(RecoveryError::Store(StoreError::Unreachable(error))) => {
-                    tracing::debug!(space = %self.shared.name, error, "follow the journal");
-                }
-                Err(error) => return Err(error),
+            let now = Some(self.shared.store.progress());
+            if now != progress {
+                (progress, changed) = (now, looked);
+            }
+            let is_due = |read: Instant| looked.saturating_duration_since(read) >= READ_INTERVAL;
+            if looked < changed + SETTLES || read.is_none_or(is_due) {
+                read = self.read_on_if_reachable()?.then_some(looked);
+            }
+            if read.is_some() {
+                self.shared.note_caught_up(looked);
             }
             self.shared.serve_snapshots(&self.map);
             inbox.wait(LOOK_INTERVAL);
@@ -52,6 +51,18 @@ impl Writer {
         }
         self.counters.gone();
         Ok(())
+    }
+
+    /// Folds the blocks that have come, unless the storage is away: what is known grows old then.
+    fn read_on_if_reachable(&mut self) -> Result<bool, RecoveryError> {
+        match self.read_on() {
+            Ok(()) => Ok(true),
+            Err(RecoveryError::Store(StoreError::Unreachable(error))) => {
+                tracing::debug!(space = %self.shared.name, error, "follow the journal");
+                Ok(false)
+            }
+            Err(error) => Err(error),
+        }
     }
 
     /// Folds the blocks that have come.

@@ -52,7 +52,7 @@ use database::Database;
 use draft::ObjectDraft;
 use reading::Reading;
 
-pub use registry::{NodeId, OwnerRecord, Registry, Seen};
+pub use registry::{NodeId, NodeRecord, OwnerRecord, Registry, Seen};
 pub use storage::ObjectStorage;
 
 /// Format that this build reads and writes.

@@ -1,7 +1,7 @@
 //! What the nodes of a cluster say of themselves, as objects beside the shards.
 //!
 //! ```text
-//! cluster/nodes/{node}.{session}                      rewritten with every beat of the node
+//! cluster/nodes/{node}.{session}/{host}/{port}        rewritten with every beat of the node
 //! cluster/owners/{shard}/{term}/{node}.{session}      nothing: the node owns the shard
 //! ```
 //!
@@ -60,11 +60,22 @@ pub struct OwnerRecord {
     pub node: NodeId,
 }
 
+/// That a node is there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NodeRecord {
+    /// The node.
+    pub node: NodeId,
+    /// Where it is reached over HTTP.
+    pub address: String,
+    /// What changes when the node says so again.
+    pub mark: String,
+}
+
 /// What is in the registry.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Seen {
-    /// The nodes that have said something, each with what changes when it says it again.
-    pub nodes: Vec<(NodeId, String)>,
+    /// The nodes that have said something.
+    pub nodes: Vec<NodeRecord>,
     /// Who owns or owned what.
     pub owners: Vec<OwnerRecord>,
 }
@@ -81,12 +92,19 @@ impl Registry {
         Self { location, runtime }
     }
 
-    /// Says that a node is there, and looks who else is. `count` differs from beat to beat.
+    /// Says that a node is there, reached over HTTP at an address, and looks who else is. `count`
+    /// differs from beat to beat.
     ///
     /// # Errors
     /// [`StoreError::Unreachable`], also when it takes longer than `timeout`.
-    pub fn beat(&self, node: &NodeId, count: u64, timeout: Duration) -> Result<Seen, StoreError> {
-        let object = self.node(node);
+    pub fn beat(
+        &self,
+        node: &NodeId,
+        address: &str,
+        count: u64,
+        timeout: Duration,
+    ) -> Result<Seen, StoreError> {
+        let object = self.node(node, address);
         let beat = async {
             let payload = PutPayload::from(count.to_string().into_bytes());
             self.location.storage().put(&object, payload).await?;
@@ -124,12 +142,12 @@ impl Registry {
         self.remove(&self.owner(record), timeout)
     }
 
-    /// Forgets a node.
+    /// Forgets a node that was reached at an address.
     ///
     /// # Errors
     /// As [`Registry::beat`].
-    pub fn leave(&self, node: &NodeId, timeout: Duration) -> Result<(), StoreError> {
-        self.remove(&self.node(node), timeout)
+    pub fn leave(&self, node: &NodeId, address: &str, timeout: Duration) -> Result<(), StoreError> {
+        self.remove(&self.node(node, address), timeout)
     }
 
     fn remove(&self, object: &Path, timeout: Duration) -> Result<(), StoreError> {
@@ -166,11 +184,14 @@ impl Registry {
             let parts: Vec<_> = parts.collect();
             let parts: Vec<&str> = parts.iter().map(AsRef::as_ref).collect();
             match *parts {
-                [NODES, node] => {
+                [NODES, node, host, port] => {
                     let changed = (object.last_modified, object.e_tag);
-                    let node = NodeId::parse(node);
-                    seen.nodes
-                        .extend(node.map(|node| (node, format!("{changed:?}"))));
+                    let record = NodeId::parse(node).map(|node| NodeRecord {
+                        node,
+                        address: address(host, port),
+                        mark: format!("{changed:?}"),
+                    });
+                    seen.nodes.extend(record);
                 }
                 [OWNERS, shard, term, node] => seen.owners.extend(owner_record(shard, term, node)),
                 _ => {}
@@ -179,13 +200,26 @@ impl Registry {
         Ok(seen)
     }
 
-    fn node(&self, node: &NodeId) -> Path {
-        self.location.path([CLUSTER, NODES, &node.to_string()])
+    fn node(&self, node: &NodeId, address: &str) -> Path {
+        let (host, port) = address.rsplit_once(':').unwrap_or((address, "0"));
+        // Storages escape brackets.
+        let host = host.trim_matches(['[', ']']);
+        let node = node.to_string();
+        self.location.path([CLUSTER, NODES, &node, host, port])
     }
 
     fn owner(&self, OwnerRecord { shard, term, node }: &OwnerRecord) -> Path {
         let (shard, term, node) = (shard.to_string(), term.to_string(), node.to_string());
         self.location.path([CLUSTER, OWNERS, &shard, &term, &node])
+    }
+}
+
+/// Where a node is reached; an address of IPv6 has brackets.
+fn address(host: &str, port: &str) -> String {
+    if host.contains(':') {
+        format!("[{host}]:{port}")
+    } else {
+        format!("{host}:{port}")
     }
 }
 

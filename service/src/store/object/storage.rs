@@ -160,10 +160,10 @@ impl ObjectStorage {
             .nodes
             .into_iter()
             .find(|node| !before.contains(node));
-        at_work.map_or(Ok(()), |(node, _)| {
+        at_work.map_or(Ok(()), |record| {
             let what = format!(
                 "{}: node {} of a cluster is at work on it",
-                self.location, node.name
+                self.location, record.node.name
             );
             Err(StoreError::Io(what))
         })

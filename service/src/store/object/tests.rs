@@ -8,6 +8,9 @@ use std::time::{Duration, Instant};
 use super::super::{LocalStore, ShardNumber, Shards, Store, WholeStore, copy};
 use super::*;
 
+/// Where a node is reached.
+const ADDRESS: &str = "127.0.0.1:8080";
+
 crate::store::suite::suite!(|directory| Box::new(open(directory)));
 
 fn open(directory: &Path) -> ObjectStore {
@@ -195,14 +198,14 @@ fn a_store_that_nodes_are_at_work_on_is_opened_by_none_else() {
     let storage = ObjectStorage::open(&url(directory.path()), Shards::ONE).unwrap();
     let (registry, timeout) = (storage.registry(), Duration::from_secs(5));
     let node = NodeId::parse("ada.1").unwrap();
-    registry.beat(&node, 0, timeout).unwrap();
+    registry.beat(&node, ADDRESS, 0, timeout).unwrap();
     assert!(storage.refuse_a_cluster().is_ok(), "it is gone");
     let stop = Arc::new(AtomicBool::new(false));
     let beating = {
         let (registry, node, stop) = (registry.clone(), node.clone(), Arc::clone(&stop));
         std::thread::spawn(move || {
             for count in 1.. {
-                registry.beat(&node, count, timeout).unwrap();
+                registry.beat(&node, ADDRESS, count, timeout).unwrap();
                 if stop.load(Ordering::Relaxed) {
                     return;
                 }
@@ -214,8 +217,26 @@ fn a_store_that_nodes_are_at_work_on_is_opened_by_none_else() {
     stop.store(true, Ordering::Relaxed);
     beating.join().unwrap();
     assert!(matches!(&refused, Err(StoreError::Io(text)) if text.contains("node ada")));
-    registry.leave(&node, timeout).unwrap();
+    registry.leave(&node, ADDRESS, timeout).unwrap();
     assert_eq!(registry.look(timeout).unwrap(), Seen::default());
+}
+
+#[test]
+fn the_registry_tells_where_nodes_are_reached() {
+    let directory = tempfile::tempdir().unwrap();
+    let storage = ObjectStorage::open(&url(directory.path()), Shards::ONE).unwrap();
+    let (registry, timeout) = (storage.registry(), Duration::from_secs(5));
+    let nodes = [("ada.1", "10.0.0.1:8080"), ("b.c.2", "[fe80::1]:80")];
+    for (node, address) in nodes {
+        let node = NodeId::parse(node).unwrap();
+        registry.beat(&node, address, 0, timeout).unwrap();
+    }
+    let seen = registry.look(timeout).unwrap().nodes;
+    let told = |record: &NodeRecord| (record.node.to_string(), record.address.clone());
+    let mut told: Vec<_> = seen.iter().map(told).collect();
+    told.sort();
+    let nodes = nodes.map(|(node, address)| (node.to_owned(), address.to_owned()));
+    assert_eq!(told, nodes);
 }
 
 #[test]
