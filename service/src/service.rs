@@ -58,9 +58,9 @@ enum Doors {
 
 impl Doors {
     async fn open(session: &Session, served: &Served) -> Result<Self, TransportError> {
-        Ok(if served.cluster.is_some() {
+        Ok(if let Some(cluster) = &served.cluster {
             Self::OfSpaces {
-                _intake: IntakeOfSpaces::start(session, &served.engine),
+                _intake: IntakeOfSpaces::start(session, &served.engine, cluster),
             }
         } else {
             Self::All {

@@ -6,9 +6,11 @@ Not a part of the gate, for it takes minutes: `make drills-cluster`.
 from __future__ import annotations
 
 import time
+import urllib.error
+import urllib.request
 from typing import List
 
-from asking import insist, samples_path
+from asking import AGAIN, insist, samples_path
 from circle import AGENT, BATCH
 from cluster import Cluster
 from cogmap.wire import CBOR
@@ -61,6 +63,22 @@ def test_a_frozen_owner_writes_nothing(cluster: Cluster) -> None:
             writer.through(cluster.others(owner)[0].url)
             stubborn.through(owner.url)
         cluster.assert_all_there_once(writer, stubborn)
+
+
+def test_who_asks_a_frozen_owner_is_not_kept_waiting(cluster: Cluster) -> None:
+    owner = cluster.owner(cluster.create("hall"))
+    url = f"{cluster.others(owner)[0].url}/v1/spaces/hall"
+    owner.pause()
+    begin_s = time.monotonic()
+    # Whatever the answer is: the clients ask again by themselves.
+    try:
+        urllib.request.urlopen(url, timeout=LONG_S).close()
+    except urllib.error.HTTPError as error:
+        assert error.code in AGAIN, error
+    waited_s = time.monotonic() - begin_s
+    owner.resume()
+    report("frozen owner", {"answered after [s]": round(waited_s, 2)})
+    assert waited_s <= FOLLOWED_S_MAX
 
 
 def test_without_its_fence_the_drill_sees_a_loss(cluster: Cluster, storage: Storage) -> None:

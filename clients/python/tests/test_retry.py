@@ -79,6 +79,37 @@ def test_every_request_is_sent_again_while_its_space_moves(server: Server, line:
     assert len({seen.body for seen in server.seen}) == 1
 
 
+def test_another_address_is_asked_where_a_space_stays_away(server: Server) -> None:
+    refuse(server, SPACES, "moving", 503, times=1000)
+    other = Server()
+    try:
+        refuse(other, SPACES, "", 0, times=0)
+        client = cogmap.Client([server.url, other.url])
+        client.spaces()
+        assert (lines(server), lines(other)) == ([SPACES], [SPACES])
+        client.spaces()
+        assert len(lines(server)) == 1, "it stays where it was answered"
+    finally:
+        other.close()
+
+
+def test_an_address_that_does_not_answer_is_left(server: Server) -> None:
+    for line in (SPACES, RECALL):
+        refuse(server, line, "", 0, times=0)
+    with socket.socket() as silent:  # takes connections, as a machine that stands still
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        address = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        client = cogmap.Client([address, server.url], timeout_s=0.2)
+        client.spaces()
+        # What may be done only once is not sent again, and the next request goes elsewhere.
+        client = cogmap.Client([address, server.url], timeout_s=0.2)
+        with pytest.raises(cogmap.Timeout):
+            client.recall("lab", position_m=[0, 0, 0])
+        client.recall("lab", position_m=[0, 0, 0])
+    assert lines(server) == [SPACES, RECALL]
+
+
 def test_the_pause_is_the_one_that_the_service_names(server: Server) -> None:
     server.retry_after = "1"
     refuse(server, SPACES, "moving", 503, times=1)

@@ -90,6 +90,8 @@ impl Followed {
                         Err(error) => tracing::debug!(%shard, %error, "follow a shard"),
                     }
                 }
+                // Its journal could not be read on; the next look begins anew.
+                OwnerState::Elsewhere if self.has_failed(shard) => self.leave(shard),
                 OwnerState::Elsewhere => {
                     if let Err(error) = self.engine.follow_spaces(shard) {
                         tracing::debug!(%shard, %error, "follow the spaces of a shard");
@@ -100,6 +102,14 @@ impl Followed {
                 OwnerState::Opening | OwnerState::Closing | OwnerState::None => {}
             }
         }
+    }
+
+    fn has_failed(&self, shard: ShardNumber) -> bool {
+        let open = self.engine.open_shards().into_iter();
+        let spaces = open
+            .filter(|open| open.number == shard)
+            .flat_map(|open| open.spaces);
+        spaces.into_iter().any(|space| space.failure().is_some())
     }
 
     fn follow(&self, shard: ShardNumber) -> Result<(), StoreError> {

@@ -2,6 +2,8 @@
 
 mod replica;
 
+use std::time::Duration;
+
 use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, Response, StatusCode};
@@ -12,12 +14,17 @@ use futures_util::future::{BoxFuture, join_all};
 use super::forwarder::FORWARDED;
 use super::problem::{Kind, Problem};
 use super::state::{Service, Shared};
-use crate::cluster::{NodeState, Whereabouts};
+use crate::cluster::{Cluster, NodeState, Whereabouts};
 
 pub(crate) use replica::Replica;
 
 /// What stands before the name of a space in a path.
 const SPACES: &str = "/v1/spaces/";
+/// How often is looked whether a node that was asked owns the space still.
+const LOOK_INTERVAL: Duration = Duration::from_millis(250);
+/// How long its answer is awaited after that: a node that gives a space up answers what it has been
+/// asked before.
+const LAST_ANSWER: Duration = Duration::from_secs(2);
 type Middleware = fn(State<Service>, Request, Next) -> BoxFuture<'static, Response<Body>>;
 
 /// The layer that passes requests on.
@@ -47,15 +54,41 @@ async fn pass(service: Service, mut request: Request, next: Next) -> Response<Bo
     }
     match whereabouts {
         Whereabouts::At(address) if !request.headers().contains_key(FORWARDED) => {
-            let node = cluster.standing().node.clone();
-            match service.forwarder.forward(request, &address, &node).await {
-                Ok(response) => response,
-                Err(error) if error.is_connect() => Problem::moving(&space).into_response(),
-                Err(_) => owner_lost(&space).into_response(),
-            }
+            ask_owner(&service, cluster, &space, &address, request).await
         }
         _ => Problem::moving(&space).into_response(),
     }
+}
+
+/// The answer of the node at an address, as long as it owns the space: one that stands still would
+/// keep whoever asks waiting.
+async fn ask_owner(
+    service: &Shared,
+    cluster: &Cluster,
+    space: &str,
+    address: &str,
+    request: Request,
+) -> Response<Body> {
+    let node = cluster.standing().node.clone();
+    let whereabouts = || cluster.whereabouts(service.engine.shards().of(space));
+    let answered = tokio::select! {
+        answered = service.forwarder.forward(request, address, &node) => answered,
+        () = has_moved(whereabouts, address) => return owner_lost(space).into_response(),
+    };
+    match answered {
+        Ok(response) => response,
+        Err(error) if error.is_connect() => Problem::moving(space).into_response(),
+        Err(_) => owner_lost(space).into_response(),
+    }
+}
+
+/// Waits until a space has not been at an address for a while.
+async fn has_moved(whereabouts: impl Fn() -> Whereabouts, address: &str) {
+    let there = Whereabouts::At(address.to_owned());
+    while whereabouts() == there {
+        tokio::time::sleep(LOOK_INTERVAL).await;
+    }
+    tokio::time::sleep(LAST_ANSWER).await;
 }
 
 /// The answer about a space of this node. It may have begun to leave, or is only just coming.

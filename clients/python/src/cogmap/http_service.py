@@ -9,7 +9,7 @@ import urllib.parse
 import urllib.request
 from typing import Any, Callable, Dict, Iterable, Iterator, Optional, Tuple, Type, TypeVar, Union
 
-from .errors import ApiError, Unreachable, WireError
+from .errors import ApiError, Timeout, Unreachable, WireError
 from .request import checked_token, tls_of
 from .retry import Addresses, Retries, seconds_of
 from .scalar import positive_seconds, seconds
@@ -107,12 +107,15 @@ class HttpService:
                 if pause_s is None:
                     raise
                 addresses_left = len(self._addresses)
+                # Another one may know better where the space is.
+                self._addresses.leave(url)
                 time.sleep(pause_s)
-            except Unreachable as error:
+            except (Timeout, Unreachable) as error:
                 addresses_left -= 1
+                # The next request at least shall go elsewhere.
+                self._addresses.leave(url)
                 if not addresses_left or not retries.may_go_elsewhere(error):
                     raise
-                self._addresses.leave(url)
 
     def _stream(
         self,

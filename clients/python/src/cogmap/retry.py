@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import socket
 import time
 import urllib.error
 from typing import Iterable, Optional, Tuple, Union
 
-from .errors import ApiError, Unreachable
+from .errors import ApiError, Timeout, Unreachable
 from .url import checked_urls
 
 #: How long a request is sent again unless told otherwise [s]: longer than another node needs to
@@ -16,6 +18,9 @@ RETRY_TIMEOUT_S = 30.0
 _PAUSE_S = 0.5
 #: Shortest pause, whatever the service says [s].
 _PAUSE_MIN_S = 0.01
+
+#: No such machine is in reach.
+_AWAY = (errno.EHOSTUNREACH, errno.ENETUNREACH)
 
 #: The space has no owner at the moment; nothing was done.
 _MOVING = "/problems/moving"
@@ -43,14 +48,17 @@ class Retries:
         told_s = _PAUSE_S if error.retry_after_s is None else error.retry_after_s
         return min(max(told_s, _PAUSE_MIN_S), left_s)
 
-    def may_go_elsewhere(self, error: Unreachable) -> bool:
-        """Whether another address may be asked at once: nothing listens at this one, or the
+    def may_go_elsewhere(self, error: Union[Timeout, Unreachable]) -> bool:
+        """Whether another address may be asked at once: nothing answers at this one, or the
         connection broke and the request may be sent twice."""
         cause = error.__cause__
         reason = cause.reason if isinstance(cause, urllib.error.URLError) else cause
-        if isinstance(reason, ConnectionRefusedError):
+        if isinstance(reason, (ConnectionRefusedError, socket.gaierror)):
             return True
-        return self._repeatable and isinstance(reason, ConnectionError)
+        if isinstance(reason, OSError) and reason.errno in _AWAY:
+            return True
+        broke = isinstance(reason, (ConnectionError, TimeoutError, socket.timeout))
+        return self._repeatable and broke
 
 
 class Addresses:

@@ -45,10 +45,12 @@ impl Api {
         let retries = Retries::new(self.retry_timeout, repeat);
         loop {
             let answer = self.run_anywhere(method, path, content, repeat)?;
-            match retries.pause_after(&answer) {
-                Some(pause) => thread::sleep(pause),
-                None => return Ok(answer),
-            }
+            let Some(pause) = retries.pause_after(&answer) else {
+                return Ok(answer);
+            };
+            // Another one may know better where the space is.
+            self.addresses.leave(self.addresses.in_use().0);
+            thread::sleep(pause);
         }
     }
 
@@ -65,11 +67,13 @@ impl Api {
             let (index, base) = self.addresses.in_use();
             let answer = self.run_once(method, &format!("{base}{path}"), content);
             left -= 1;
-            match answer {
-                Err(error) if left > 0 && may_go_elsewhere(&error, repeat) => {
-                    self.addresses.leave(index);
-                }
-                answer => return answer,
+            let Err(error @ ApiError::Transport(_)) = answer else {
+                return answer;
+            };
+            // The next request at least shall go elsewhere.
+            self.addresses.leave(index);
+            if left == 0 || !may_go_elsewhere(&error, repeat) {
+                return Err(error);
             }
         }
     }

@@ -73,23 +73,28 @@ fn retry_after(answer: &Response<Vec<u8>>) -> Option<Duration> {
     Some(Duration::from_secs(seconds.trim().parse().ok()?))
 }
 
-/// Whether a request that failed may go to another address at once: nothing listens at this one, or
+/// Whether a request that failed may go to another address at once: nothing answers at this one, or
 /// the connection broke and doing it twice is harmless.
 pub(super) fn may_go_elsewhere(error: &ApiError, repeat: Repeat) -> bool {
     use std::io::ErrorKind::{
-        BrokenPipe, ConnectionAborted, ConnectionRefused, ConnectionReset, UnexpectedEof,
+        BrokenPipe, ConnectionAborted, ConnectionRefused, ConnectionReset, HostUnreachable,
+        NetworkUnreachable, TimedOut, UnexpectedEof,
     };
     let ApiError::Transport(error) = error else {
         return false;
     };
-    let ureq::Error::Io(error) = &**error else {
-        return false;
-    };
-    match error.kind() {
-        ConnectionRefused => true,
-        BrokenPipe | ConnectionAborted | ConnectionReset | UnexpectedEof => {
-            repeat == Repeat::Harmless
-        }
+    match &**error {
+        ureq::Error::HostNotFound
+        | ureq::Error::ConnectionFailed
+        | ureq::Error::Timeout(ureq::Timeout::Resolve | ureq::Timeout::Connect) => true,
+        ureq::Error::Timeout(_) => repeat == Repeat::Harmless,
+        ureq::Error::Io(error) => match error.kind() {
+            ConnectionRefused | HostUnreachable | NetworkUnreachable => true,
+            BrokenPipe | ConnectionAborted | ConnectionReset | TimedOut | UnexpectedEof => {
+                repeat == Repeat::Harmless
+            }
+            _ => false,
+        },
         _ => false,
     }
 }

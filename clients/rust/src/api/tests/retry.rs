@@ -54,6 +54,17 @@ fn kind<T: std::fmt::Debug>(answer: Result<T, ApiError>) -> String {
 }
 
 #[test]
+fn another_address_is_asked_where_a_space_stays_away() {
+    let (first, seen_first) = serve_with(vec![moving("retry-after: 0\r\n")]);
+    let (second, seen_second) = serve_with(vec![ok(SPACES), ok(SPACES)]);
+    let api = Api::new(&first, None).or_at(&second);
+    assert!(api.spaces().unwrap().is_empty());
+    assert!(api.spaces().unwrap().is_empty());
+    assert_eq!(lines(seen_first.iter()).len(), 1);
+    assert_eq!(lines(seen_second.iter()).len(), 2);
+}
+
+#[test]
 fn every_request_is_sent_again_while_its_space_moves() {
     let at_once = || moving("retry-after: 0\r\n");
     let recalled = r#"{"space":"demo","frame":"map","map_revision":1,"places":[],"rivals":null}"#;
