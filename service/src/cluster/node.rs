@@ -285,8 +285,8 @@ impl State {
         }
     }
 
-    /// Removes what the storage says that this node owns, where it does not and is not to: an answer
-    /// was lost as the record came or went, and the others would wait for this node.
+    /// Removes records of shards that this node neither owns nor is to own: an answer was lost as
+    /// they came or went, and the others would wait for this node.
     fn clear_records(&mut self, wanted: Option<&BTreeSet<ShardNumber>>, now: Instant) {
         let Some(wanted) = wanted else { return };
         let stale = self.view.recorded_of_me().filter(|record| {

@@ -55,7 +55,7 @@ pub(super) struct View {
     /// The nodes that are apart.
     apart: Lasting,
     shards: Shards,
-    /// Shards without an owner that is there, each with since when.
+    /// While this node yields, shards without an owner that is there, each with since when.
     unowned: BTreeMap<ShardNumber, Instant>,
     /// Shards that this node left to a larger side, which has not come for them.
     reclaimed: BTreeSet<ShardNumber>,
@@ -170,6 +170,11 @@ impl View {
     /// Of a team in three parts or more, each may see a larger side, which there is not: after two
     /// leases without an owner a shard is for the node that would have it without a cut.
     fn reclaim(&mut self, now: Instant) {
+        if !self.yields(now) {
+            self.unowned.clear();
+            self.reclaimed.clear();
+            return;
+        }
         for shard in self.shards.all() {
             let recorded = self.recorded.get(&shard);
             if recorded.is_some_and(|owner| self.is_there(&owner.node, now)) {
@@ -177,10 +182,6 @@ impl View {
             } else {
                 self.unowned.entry(shard).or_insert(now);
             }
-        }
-        if !self.yields(now) {
-            self.reclaimed.clear();
-            return;
         }
         let all: BTreeSet<_> = self.live.nodes.union(&self.apart.nodes).collect();
         let left = self.unowned.iter().filter(|(shard, since)| {

@@ -184,7 +184,7 @@ fn of_a_team_in_three_parts_somebody_has_each_shard_again() {
         }
         scene.pass(seconds(8.0));
         assert_eq!(scene.wanted(), Some(0), "there may be a larger side");
-        scene.pass(seconds(4.0));
+        scene.pass(seconds(8.0));
         let wanted = scene.view.wanted(scene.now).expect("nobody comes or goes");
         assert!(wanted.iter().all(|shard| had.insert(*shard)), "one has it");
         // It keeps what it has taken, and leaves what others have.

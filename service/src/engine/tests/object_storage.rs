@@ -93,3 +93,39 @@ fn a_session_that_begins_is_of_the_same_term() {
     assert_eq!(term(SESSION), term(SESSION + 1));
     engine.shutdown();
 }
+
+#[test]
+fn who_follows_hears_of_agents_and_sessions_that_begin() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let owner = open_at(directory.path());
+    let url = format!("file://{}", directory.path().display());
+    let storage = ObjectStorage::open(&url, Shards::ONE).expect("the storage answers");
+    let followed = storage.follow_shard(ShardNumber(0));
+    let follower = Engine::following(Shards::ONE, EngineSettings::default());
+    let opened = follower.open_shard(ShardNumber(0), Arc::new(followed.expect("it is read")));
+    opened.expect("the shard opens");
+    let space = follower.space(SPACE).expect("the space is there");
+    // The agent comes when all that was there before is folded.
+    eventually("the map", || space.caught_up().is_some());
+    for session in [SESSION, SESSION + 1] {
+        assert_eq!(ingest(&owner, AGENT, session, &drive()[..40]), Ok(40));
+        eventually("the watermark", || {
+            let view = space.agent(AGENT);
+            view.is_some_and(|view| {
+                let mark = view.watermark();
+                (mark.session, mark.durable, mark.applied) == (session, 40, 40)
+            })
+        });
+    }
+    assert_eq!(digest(&follower), digest(&owner));
+    follower.shutdown();
+    owner.shutdown();
+}
+
+fn eventually(what: &str, is_there: impl Fn() -> bool) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !is_there() {
+        assert!(Instant::now() < deadline, "{what} does not come");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}

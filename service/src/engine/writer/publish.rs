@@ -70,8 +70,9 @@ impl Writer {
             }
             let sequencer = &slot.sequencer;
             let waiting = sequencer.waiting().samples as u64;
-            // A session that has begun and has nothing applied yet is not the map's.
-            let (session, next) = if sequencer.session() == session {
+            // A session that has begun and has nothing applied yet is not the map's. What is only
+            // followed does not pass the sequencer.
+            let (session, next) = if self.shared.follows || sequencer.session() == session {
                 (session, next)
             } else {
                 (sequencer.session(), sequencer.next())
