@@ -58,9 +58,9 @@ enum Doors {
 
 impl Doors {
     async fn open(session: &Session, served: &Served) -> Result<Self, TransportError> {
-        Ok(if let Some(cluster) = &served.cluster {
+        Ok(if served.cluster.is_some() {
             Self::OfSpaces {
-                _intake: IntakeOfSpaces::start(session, &served.engine, cluster),
+                _intake: IntakeOfSpaces::start(session, &served.engine),
             }
         } else {
             Self::All {

@@ -14,9 +14,6 @@ use crate::store::{
     NodeId, ObjectStorage, OwnerRecord, Registry, Seen, ShardNumber, Store, StoreError,
 };
 
-/// Beats that may fail within a lease.
-const BEATS_PER_LEASE: u32 = 3;
-
 /// What a beat has brought.
 #[derive(Debug)]
 pub(super) struct Beat {
@@ -86,8 +83,7 @@ impl Worker {
         let address = self.address.clone();
         self.spawn("beat", move || {
             let asked = Instant::now();
-            // A connection that was lost without a word must not cost the lease.
-            let seen = registry.beat(&node, &address, count, timeout / BEATS_PER_LEASE);
+            let seen = registry.beat(&node, &address, count, timeout);
             Signal::Beat(Beat { asked, seen })
         });
     }
@@ -138,16 +134,6 @@ impl Worker {
                 tracing::debug!(%error, "forget the owner of a shard");
             }
             Signal::Done(Done::Closed(record))
-        });
-    }
-
-    /// Removes the record of an owner.
-    pub(super) fn disown(&self, record: OwnerRecord) {
-        let (registry, timeout) = (self.registry.clone(), self.timeout);
-        spawn("disown", move || {
-            if let Err(error) = registry.disown(&record, timeout) {
-                tracing::debug!(%error, "forget the owner of a shard");
-            }
         });
     }
 

@@ -67,9 +67,8 @@ impl Database {
         }
         let db = runtime.wait(builder.build());
         let db = db.map_err(|error| fault(location, &error))?;
-        // After a take-over the manifest has the epoch of the next writer. Whoever claims the place
-        // of a known one has the epoch after its own.
-        let term = last_term.map_or_else(|| db.manifest().writer_epoch(), |last| last + 1);
+        // Once: after a take-over the manifest has the epoch of the next writer.
+        let term = db.manifest().writer_epoch();
         Ok(Self {
             location: location.clone(),
             runtime: Arc::clone(runtime),
