@@ -12,7 +12,7 @@ use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use zenoh::Session;
 
-use crate::config::{Config, ConfigError};
+use crate::config::{Config, ConfigError, ZenohMode};
 use crate::decode::core_settings;
 use crate::descriptors::{self, Shares};
 use crate::engine::{Engine, Publisher, Silent, SpaceError};
@@ -29,6 +29,9 @@ pub use opening::{open_store, store_at};
 
 /// Longest wait for the Zenoh session to close.
 const SESSION_CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long a node that is a Zenoh router waits before it opens its session. Routers reckon their
+/// trees anew every 100 ms, and tell one that is back within that time nothing of what they know.
+const ROUTER_PAUSE: Duration = Duration::from_millis(500);
 /// Most connections of HTTP that are not yet accepted.
 const HTTP_BACKLOG: u32 = 4096;
 /// Most connections that are not yet a session of Zenoh.
@@ -58,9 +61,9 @@ enum Doors {
 
 impl Doors {
     async fn open(session: &Session, served: &Served) -> Result<Self, TransportError> {
-        Ok(if served.cluster.is_some() {
+        Ok(if let Some(cluster) = &served.cluster {
             Self::OfSpaces {
-                _intake: IntakeOfSpaces::start(session, &served.engine),
+                _intake: IntakeOfSpaces::start(session, &served.engine, cluster),
             }
         } else {
             Self::All {
@@ -254,6 +257,9 @@ async fn open_zenoh(
     };
     if let Some(error) = taken() {
         return Err(error);
+    }
+    if config.cluster.enabled && config.zenoh.mode == ZenohMode::Router {
+        tokio::time::sleep(ROUTER_PAUSE).await;
     }
     // Somebody may have come first since.
     let session = transport::open(&settings).await;

@@ -6,9 +6,9 @@ import time
 from contextlib import ExitStack
 from typing import List
 
-from cluster import Cluster
+from cluster import QUIET_S, Cluster
 from conftest import MakeCluster
-from figures import report
+from figures import ROUNDS, quantile, report
 from writer import Writer
 
 SPACES = 8
@@ -65,3 +65,18 @@ def assert_pauses_short(writers: List[Writer]) -> None:
     }
     report("a node joins and leaves", figures)
     assert max(pauses_s) <= PAUSE_S_MAX
+
+
+def test_a_node_that_is_killed_and_back_at_once_is_seen_by_all(cluster: Cluster) -> None:
+    back_s: List[float] = []
+    for number in range(ROUNDS):
+        node = list(cluster.nodes.values())[number % len(cluster.nodes)]
+        begin_s = time.monotonic()
+        node.kill()
+        cluster.start(node.name)
+        cluster.whole()
+        back_s.append(time.monotonic() - begin_s - QUIET_S)
+    report(
+        "node back at once",
+        {"rounds": ROUNDS, "p50 [s]": round(quantile(back_s, 0.5), 1), "worst [s]": round(max(back_s), 1)},
+    )

@@ -122,7 +122,7 @@ impl Node {
             settled: SETTLED,
         };
         let state = State {
-            view: View::new(me.clone(), patience),
+            view: View::new(me.clone(), engine.shards(), patience),
             worker: Worker::new(storage, engine.clone(), signals.clone(), &settings),
             me,
             settings,
@@ -245,11 +245,10 @@ impl State {
     }
 
     fn look_after_shards(&mut self, now: Instant) {
-        let all = self.engine.shards();
         let wanted = if self.stopping {
             Some(BTreeSet::new())
         } else {
-            self.view.wanted(all.all(), now)
+            self.view.wanted(now)
         };
         for shard in self.engine.open_shards() {
             let number = shard.number;
@@ -263,11 +262,15 @@ impl State {
                 .is_some_and(|wanted| !wanted.contains(&number));
             if lost || (unwanted && !self.resigned) || self.stopping {
                 self.close(number, shard.term, lost);
+                if lost {
+                    self.not_before.insert(number, now + BACK_OFF);
+                }
             }
         }
         if self.resigned || self.stopping {
             return;
         }
+        self.clear_records(wanted.as_ref(), now);
         for number in wanted.into_iter().flatten() {
             let waits = self
                 .not_before
@@ -279,6 +282,26 @@ impl State {
                 let last = self.view.recorded(number).cloned();
                 self.worker.open(number, &self.me, last);
             }
+        }
+    }
+
+    /// Removes records of shards that this node neither owns nor is to own: an answer was lost as
+    /// they came or went, and the others would wait for this node.
+    fn clear_records(&mut self, wanted: Option<&BTreeSet<ShardNumber>>, now: Instant) {
+        let Some(wanted) = wanted else { return };
+        let stale = self.view.recorded_of_me().filter(|record| {
+            let is_due = self
+                .not_before
+                .get(&record.shard)
+                .is_none_or(|at| now >= *at);
+            let held =
+                self.busy.contains_key(&record.shard) || self.open.contains_key(&record.shard);
+            is_due && !held && !wanted.contains(&record.shard)
+        });
+        let stale: Vec<_> = stale.cloned().collect();
+        for record in stale {
+            self.not_before.insert(record.shard, now + BACK_OFF);
+            self.worker.disown(record);
         }
     }
 
@@ -362,6 +385,7 @@ impl State {
             node: self.me.name.clone(),
             resigned: self.resigned,
             contact: self.view.contact(),
+            lease: self.settings.lease,
             nodes,
             owners: owners.collect(),
         });

@@ -1,7 +1,7 @@
 //! How the cluster stands, as a node sees it: what HTTP needs to know.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use arc_swap::ArcSwap;
 use serde::Serialize;
@@ -22,6 +22,8 @@ pub struct Standing {
     pub resigned: bool,
     /// When it had contact to the storage last.
     pub contact: Option<Instant>,
+    /// How long a node does without that.
+    pub lease: Duration,
     /// All nodes, by name.
     pub nodes: Vec<NodeStatus>,
     /// The owners, by shard.
@@ -93,6 +95,14 @@ pub enum Whereabouts {
     Nowhere,
 }
 
+impl Standing {
+    /// Whether this node takes part: it has not given up, nor would it if it had not stood still.
+    fn takes_part(&self) -> bool {
+        let is_over = |contact: Instant| contact.elapsed() >= self.lease;
+        !self.resigned && !self.contact.is_none_or(is_over)
+    }
+}
+
 impl Cluster {
     /// A cluster of which this node knows nothing yet.
     pub fn new(standing: Standing) -> Self {
@@ -109,10 +119,15 @@ impl Cluster {
         self.0.store(Arc::new(standing));
     }
 
+    /// Whether this node takes part.
+    pub fn takes_part(&self) -> bool {
+        self.0.load().takes_part()
+    }
+
     /// Where a shard is.
     pub fn whereabouts(&self, shard: ShardNumber) -> Whereabouts {
         let standing = self.0.load();
-        if standing.resigned {
+        if !standing.takes_part() {
             return Whereabouts::Nowhere;
         }
         match standing.owners.get(shard.0 as usize) {

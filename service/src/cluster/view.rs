@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 use super::placement;
 use super::standing::NodeState;
-use crate::store::{NodeId, NodeRecord, OwnerRecord, Seen, ShardNumber};
+use crate::store::{NodeId, NodeRecord, OwnerRecord, Seen, ShardNumber, Shards};
 
 /// Beats after which a node without a token has lapsed, and what only a token says is forgotten.
 const BEATS_MISSED: u32 = 3;
@@ -54,6 +54,11 @@ pub(super) struct View {
     live: Lasting,
     /// The nodes that are apart.
     apart: Lasting,
+    shards: Shards,
+    /// While this node yields, shards without an owner that is there, each with since when.
+    unowned: BTreeMap<ShardNumber, Instant>,
+    /// Shards that this node left to a larger side, which has not come for them.
+    reclaimed: BTreeSet<ShardNumber>,
 }
 
 /// Nodes, and since when they are the same.
@@ -72,7 +77,7 @@ struct Beat {
 }
 
 impl View {
-    pub(super) fn new(me: NodeId, patience: Patience) -> Self {
+    pub(super) fn new(me: NodeId, shards: Shards, patience: Patience) -> Self {
         Self {
             me,
             patience,
@@ -83,6 +88,9 @@ impl View {
             contact: None,
             live: Lasting::default(),
             apart: Lasting::default(),
+            shards,
+            unowned: BTreeMap::new(),
+            reclaimed: BTreeSet::new(),
         }
     }
 
@@ -90,7 +98,9 @@ impl View {
     pub(super) fn link(&mut self, node: NodeId, there: bool) {
         if !there {
             self.linked.remove(&node);
-        } else if node != self.me && self.linked.len() < TOKENS_MAX {
+        } else if node != self.me
+            && (self.beats.contains_key(&node) || self.linked.len() < TOKENS_MAX)
+        {
             self.linked.insert(node);
         }
     }
@@ -154,6 +164,32 @@ impl View {
         live.insert(self.me.clone());
         self.live.update(live, now);
         self.apart.update(apart, now);
+        self.reclaim(now);
+    }
+
+    /// Of a team in three parts or more, each may see a larger side, which there is not: after two
+    /// leases without an owner a shard is for the node that would have it without a cut.
+    fn reclaim(&mut self, now: Instant) {
+        if !self.yields(now) {
+            self.unowned.clear();
+            self.reclaimed.clear();
+            return;
+        }
+        for shard in self.shards.all() {
+            let recorded = self.recorded.get(&shard);
+            if recorded.is_some_and(|owner| self.is_there(&owner.node, now)) {
+                self.unowned.remove(&shard);
+            } else {
+                self.unowned.entry(shard).or_insert(now);
+            }
+        }
+        let all: BTreeSet<_> = self.live.nodes.union(&self.apart.nodes).collect();
+        let left = self.unowned.iter().filter(|(shard, since)| {
+            now.saturating_duration_since(**since) >= 2 * self.patience.lease
+                && placement::owner(**shard, all.iter().copied()) == Some(&self.me)
+        });
+        let left: Vec<_> = left.map(|(shard, _)| *shard).collect();
+        self.reclaimed.extend(left);
     }
 
     /// When this node had contact to the storage last.
@@ -175,8 +211,11 @@ impl View {
         } else {
             self.patience.beat * BEATS_MISSED
         };
+        // A node that sees nothing itself cannot tell who says nothing.
+        let looked = self.contact.map_or(now, |at| at.min(now));
         let beat = self.beats.get(node);
-        let fresh = beat.is_some_and(|beat| now.saturating_duration_since(beat.changed) < patience);
+        let fresh =
+            beat.is_some_and(|beat| looked.saturating_duration_since(beat.changed) < patience);
         match (fresh, linked) {
             (true, true) => NodeState::Live,
             (true, false) => NodeState::Apart,
@@ -192,21 +231,18 @@ impl View {
             .collect()
     }
 
-    /// The shards of `all` that this node is to own; none while nodes come or go, which leaves
+    /// The shards that this node is to own; none while nodes come or go, which leaves
     /// everything as it is.
-    pub(super) fn wanted(
-        &self,
-        all: impl Iterator<Item = ShardNumber>,
-        now: Instant,
-    ) -> Option<BTreeSet<ShardNumber>> {
+    pub(super) fn wanted(&self, now: Instant) -> Option<BTreeSet<ShardNumber>> {
         if !self.live.lasts(self.patience.settled, now) {
             return None;
         }
         if self.yields(now) {
-            return Some(BTreeSet::new());
+            return Some(self.reclaimed.clone());
         }
         let live = &self.live.nodes;
-        let mine = all.filter(|shard| placement::owner(*shard, live) == Some(&self.me));
+        let mine =
+            { self.shards.all() }.filter(|shard| placement::owner(*shard, live) == Some(&self.me));
         Some(mine.collect())
     }
 
@@ -228,6 +264,11 @@ impl View {
         self.recorded.get(&shard).is_none_or(free)
     }
 
+    /// What the storage says that this node owns.
+    pub(super) fn recorded_of_me(&self) -> impl Iterator<Item = &OwnerRecord> {
+        self.recorded.values().filter(|owner| owner.node == self.me)
+    }
+
     /// The latest owner of a shard by the storage.
     pub(super) fn recorded(&self, shard: ShardNumber) -> Option<&OwnerRecord> {
         self.recorded.get(&shard)
@@ -237,9 +278,12 @@ impl View {
     pub(super) fn owner(&self, shard: ShardNumber, now: Instant) -> Option<&OwnerRecord> {
         let told_by = self.patience.beat * BEATS_MISSED;
         let is_news = |heard: Instant| self.contact.is_none_or(|at| at < heard + told_by);
+        let expected = placement::owner(shard, &self.live.nodes);
         let announced = { self.announced.iter() }
-            .filter(|(owner, heard)| owner.shard == shard && is_news(**heard));
-        { announced.map(|(owner, _)| owner) }
+            .filter(|(owner, heard)| owner.shard == shard && is_news(**heard))
+            .map(|(owner, _)| owner)
+            .filter(|owner| Some(&owner.node) == expected);
+        announced
             .chain(self.recorded.get(&shard))
             .filter(|owner| self.is_there(&owner.node, now))
             .max_by_key(|owner| owner.term)

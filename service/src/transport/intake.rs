@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
+use std::time::Duration;
 
 use cogmap_proto::limits::MESSAGE_BYTES_MAX;
 use cogmap_proto::{Codec, DecodeError, Name, samples_key};
@@ -16,6 +17,7 @@ use zenoh::sample::Sample;
 
 use super::queries;
 use super::session::TransportError;
+use crate::cluster::Cluster;
 use crate::engine::Engine;
 
 /// The subscription to all samples, and the answers to queries. Dropping it ends both.
@@ -56,21 +58,29 @@ impl Intake {
     }
 }
 
+/// How often is looked whether this node takes part in the cluster.
+const LOOK_INTERVAL: Duration = Duration::from_millis(250);
+
 /// Samples and queries of the spaces that are here, while they are: those of others are for other
 /// nodes. Dropping it ends all.
 #[derive(Debug)]
 pub struct IntakeOfSpaces(JoinHandle<()>);
 
 impl IntakeOfSpaces {
-    /// Begins to take samples and queries of each space of the engine.
-    pub fn start(session: &Session, engine: &Engine) -> Self {
-        let (session, engine) = (session.clone(), engine.clone());
+    /// Begins to take samples and queries of each space of the engine, as long as this node takes
+    /// part in the cluster: another one may own them when it does not.
+    pub fn start(session: &Session, engine: &Engine, cluster: &Cluster) -> Self {
+        let (session, engine, cluster) = (session.clone(), engine.clone(), cluster.clone());
         Self(tokio::spawn(async move {
             let (mut changes, room) = (engine.changes(), queries::room());
             let mut taken: BTreeMap<String, Intake> = BTreeMap::new();
             loop {
                 changes.mark_unchanged();
-                let spaces = engine.spaces();
+                let spaces = if cluster.takes_part() {
+                    engine.spaces()
+                } else {
+                    Vec::new()
+                };
                 taken.retain(|name, _| spaces.iter().any(|space| space.name() == name));
                 for space in spaces {
                     if taken.contains_key(space.name()) {
@@ -85,8 +95,11 @@ impl IntakeOfSpaces {
                         }
                     }
                 }
-                if changes.changed().await.is_err() {
-                    return;
+                tokio::select! {
+                    changed = changes.changed() => if changed.is_err() {
+                        return;
+                    },
+                    () = tokio::time::sleep(LOOK_INTERVAL) => {}
                 }
             }
         }))

@@ -14,6 +14,9 @@ use crate::store::{
     NodeId, ObjectStorage, OwnerRecord, Registry, Seen, ShardNumber, Store, StoreError,
 };
 
+/// Beats that may fail within a lease.
+const BEATS_PER_LEASE: u32 = 3;
+
 /// What a beat has brought.
 #[derive(Debug)]
 pub(super) struct Beat {
@@ -83,7 +86,8 @@ impl Worker {
         let address = self.address.clone();
         self.spawn("beat", move || {
             let asked = Instant::now();
-            let seen = registry.beat(&node, &address, count, timeout);
+            // A connection that was lost without a word must not cost the lease.
+            let seen = registry.beat(&node, &address, count, timeout / BEATS_PER_LEASE);
             Signal::Beat(Beat { asked, seen })
         });
     }
@@ -134,6 +138,16 @@ impl Worker {
                 tracing::debug!(%error, "forget the owner of a shard");
             }
             Signal::Done(Done::Closed(record))
+        });
+    }
+
+    /// Removes the record of an owner.
+    pub(super) fn disown(&self, record: OwnerRecord) {
+        let (registry, timeout) = (self.registry.clone(), self.timeout);
+        spawn("disown", move || {
+            if let Err(error) = registry.disown(&record, timeout) {
+                tracing::debug!(%error, "forget the owner of a shard");
+            }
         });
     }
 

@@ -16,6 +16,11 @@ fn node(name: &str) -> NodeId {
     }
 }
 
+fn view(me: &str) -> View {
+    let shards = Shards::new(SHARDS).expect("a count");
+    View::new(node(me), shards, PATIENCE)
+}
+
 /// A view of `a`, at a time that passes as it is told, of nodes that beat until they stop.
 struct Scene {
     view: View,
@@ -29,7 +34,7 @@ struct Scene {
 impl Scene {
     fn new() -> Self {
         Self {
-            view: View::new(node("a"), PATIENCE),
+            view: view("a"),
             now: Instant::now(),
             beating: BTreeSet::new(),
             stopped: BTreeMap::new(),
@@ -80,8 +85,7 @@ impl Scene {
     }
 
     fn wanted(&self) -> Option<usize> {
-        let all = (0..SHARDS).map(ShardNumber);
-        self.view.wanted(all, self.now).map(|wanted| wanted.len())
+        self.view.wanted(self.now).map(|wanted| wanted.len())
     }
 
     fn is_free(&self, shard: u32) -> bool {
@@ -170,13 +174,37 @@ fn the_smaller_side_of_a_cut_yields_and_the_larger_keeps_what_it_has() {
 }
 
 #[test]
+fn of_a_team_in_three_parts_somebody_has_each_shard_again() {
+    let mut had = BTreeSet::new();
+    for me in ["a", "b", "c"] {
+        let mut scene = Scene::new();
+        scene.view = view(me);
+        for name in ["a", "b", "c"].into_iter().filter(|name| *name != me) {
+            scene.beating.insert(name);
+        }
+        scene.pass(seconds(8.0));
+        assert_eq!(scene.wanted(), Some(0), "there may be a larger side");
+        scene.pass(seconds(8.0));
+        let wanted = scene.view.wanted(scene.now).expect("nobody comes or goes");
+        assert!(wanted.iter().all(|shard| had.insert(*shard)), "one has it");
+        // It keeps what it has taken, and leaves what others have.
+        for shard in &wanted {
+            scene.owns(shard.0, me, 8);
+        }
+        scene.pass(seconds(20.0));
+        assert_eq!(scene.wanted(), Some(wanted.len()));
+    }
+    assert_eq!(had.len(), SHARDS as usize);
+}
+
+#[test]
 fn of_two_equal_sides_that_with_the_first_node_stays() {
     let mut first = Scene::new();
     first.beating.insert("b");
     first.pass(seconds(8.0));
     assert_eq!(first.wanted(), Some(SHARDS as usize));
     let mut second = Scene::new();
-    second.view = View::new(node("c"), PATIENCE);
+    second.view = view("c");
     second.beating.insert("b");
     second.pass(seconds(8.0));
     assert_eq!(second.wanted(), Some(0));
@@ -201,11 +229,22 @@ fn a_token_says_where_a_shard_is_and_takes_it_from_nobody() {
         owner.map(|owner| owner.term)
     };
     assert_eq!(known(&scene), Some(7));
+    // Of the two only one is to own the shard now.
     scene.view.announce(owner(3, 8, "c"), true, scene.now);
-    assert_eq!(known(&scene), Some(8));
+    scene.view.announce(owner(3, 9, "a"), true, scene.now);
+    scene.view.announce(owner(3, 10, "b"), true, scene.now);
+    let expected = placement::owner(ShardNumber(3), &scene.view.live.nodes);
+    let term = match expected.map(|node| &*node.name) {
+        Some("a") => 9,
+        Some("b") => 10,
+        _ => 8,
+    };
+    assert_eq!(known(&scene), Some(term));
     assert_eq!(scene.view.recorded(ShardNumber(3)), Some(&owner(3, 7, "b")));
     assert!(!scene.is_free(3));
-    scene.view.announce(owner(3, 8, "c"), false, scene.now);
+    for (term, name) in [(8, "c"), (9, "a"), (10, "b")] {
+        scene.view.announce(owner(3, term, name), false, scene.now);
+    }
     assert_eq!(known(&scene), Some(7));
     scene.view.announce(owner(4, 9, "b"), true, scene.now);
     assert!(scene.is_free(4));

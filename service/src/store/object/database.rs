@@ -67,8 +67,9 @@ impl Database {
         }
         let db = runtime.wait(builder.build());
         let db = db.map_err(|error| fault(location, &error))?;
-        // Once: after a take-over the manifest has the epoch of the next writer.
-        let term = db.manifest().writer_epoch();
+        // After a take-over the manifest has the epoch of the next writer. Whoever claims the place
+        // of a known one has the epoch after its own.
+        let term = last_term.map_or_else(|| db.manifest().writer_epoch(), |last| last + 1);
         Ok(Self {
             location: location.clone(),
             runtime: Arc::clone(runtime),
