@@ -10,7 +10,7 @@ use crate::model::{LevelMemory, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
 use crate::surfels::map::SurfelMap;
 
-use crate::tuning::{FIELD_PER_SPACING, SHARE_BINS, SHARE_SAMPLES};
+use crate::tuning::{FIELD_PER_SPACING, NODE_STEP, SHARE_BINS, SHARE_SAMPLES};
 
 /// A model ready for recognition: its places, their indexes, and the share of them within a
 /// distance.
@@ -37,26 +37,35 @@ pub(crate) struct IndexedModel {
 impl IndexedModel {
     /// Of a model.
     pub(crate) fn new(model: &ObjectModel) -> Self {
-        let field_m = FIELD_PER_SPACING * model.spacing_m();
+        let spacing_m = model.spacing_m();
         let felt: Vec<_> = { model.places().iter() }
             .map(|place| place.position_m)
             .collect();
         let graph = LinkGraph::new(&felt);
+        let fields = Fields::learned(model.places(), &graph);
+        // Beside a place contacts fall up to half a link away, or half the step of nodes.
+        let reach_m = |own| {
+            let link_m = fields.as_ref().and_then(|_| graph.mean_link_m(own, &felt));
+            link_m.map_or(spacing_m, |link_m| {
+                link_m.min(NODE_STEP * spacing_m).max(spacing_m)
+            })
+        };
         let mut places: Vec<_> = model
             .places()
             .iter()
-            .map(|place| IndexedPlace {
+            .enumerate()
+            .map(|(own, place)| IndexedPlace {
                 position: place.position_m,
                 normal: place.normal(),
-                variance_m2: field_m * field_m + place.variance_m2 / (place.count * place.count),
+                variance_m2: (FIELD_PER_SPACING * reach_m(own)).powi(2)
+                    + place.variance_m2 / (place.count * place.count),
                 is_predicted: false,
                 levels: place.levels.clone(),
                 descriptors: place.descriptors.clone(),
             })
             .collect();
-        let fields = Fields::learned(model.places(), &graph);
         if let Some(fields) = &fields {
-            let nodes = interpolated(model.places(), &graph, fields, model.spacing_m());
+            let nodes = interpolated(model.places(), &graph, fields, spacing_m);
             places.extend(nodes);
         }
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
@@ -64,14 +73,13 @@ impl IndexedModel {
         let radius_m = positions
             .iter()
             .map(|p| (p.coords - middle).norm())
-            .fold(model.spacing_m(), f64::max);
+            .fold(spacing_m, f64::max);
         let extent_m = 2.0 * radius_m;
         Self {
-            packed: PackedPlaces::new(&places, model.spacing_m(), extent_m, model.noise_m2()),
+            packed: PackedPlaces::new(&places, spacing_m, extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
-            open: fields
-                .and_then(|_| OpenRegion::new(&positions, felt.len(), &graph, model.spacing_m())),
-            area_m2: positions.len() as f64 * model.spacing_m() * model.spacing_m(),
+            open: fields.and_then(|_| OpenRegion::new(&positions, felt.len(), &graph, spacing_m)),
+            area_m2: positions.len() as f64 * spacing_m * spacing_m,
             surfel_map: SurfelMap::new(model),
             extent_m,
             gap_m: graph.typical_m,

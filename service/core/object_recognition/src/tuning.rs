@@ -139,8 +139,8 @@ pub(crate) const ERROR_NEIGHBOURS: usize = 6;
 /// Nodes and places of a model: a model with more places has no nodes. Budget.
 pub(crate) const NODES_MAX: usize = 1024;
 /// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept
-/// apart by a spacing lie so far from one another, across the diagonals of a square too. Chosen.
-pub(crate) const DENSE_LINK: f64 = 3.0;
+/// apart by a spacing lie so far from one another, across the diagonals of a square too. Derived.
+pub(crate) const DENSE_LINK: f64 = 1.5;
 /// Distance of nodes, in spacings. Chosen.
 pub(crate) const NODE_STEP: f64 = 2.0;
 /// Factor by which this distance grows until the nodes fit. Chosen.

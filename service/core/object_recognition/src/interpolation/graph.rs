@@ -68,6 +68,15 @@ impl LinkGraph {
         }
     }
 
+    /// Mean length of the links of a place \[m\]; none of one without links.
+    pub(crate) fn mean_link_m(&self, own: usize, positions: &[Point3<f64>]) -> Option<f64> {
+        let links = &self.links[own];
+        let lengths = links
+            .iter()
+            .map(|other| (positions[*other as usize] - positions[own]).norm());
+        (!links.is_empty()).then(|| lengths.sum::<f64>() / links.len() as f64)
+    }
+
     /// Whether the places lie along lines, for the most part.
     pub(super) fn is_curve(&self) -> bool {
         2 * self.triangles.len() < self.links.len()

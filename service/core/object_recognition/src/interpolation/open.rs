@@ -88,9 +88,7 @@ impl OpenRegion {
         }
         let has_nodes = all.len() > felt.len();
         let gap_m2 = |own: usize| {
-            let links = graph.links[own].iter();
-            let gaps = links.map(|other| (felt[*other as usize] - felt[own]).norm());
-            let mean_m = gaps.sum::<f64>() / graph.links[own].len().max(1) as f64;
+            let mean_m = graph.mean_link_m(own, felt).unwrap_or(0.0);
             if has_nodes && mean_m > NODE_STEP * spacing_m {
                 (0.5 * mean_m).powi(2)
             } else {
