@@ -78,5 +78,9 @@ def test_a_node_that_is_killed_and_back_at_once_is_seen_by_all(cluster: Cluster)
         back_s.append(time.monotonic() - begin_s - QUIET_S)
     report(
         "node back at once",
-        {"rounds": ROUNDS, "p50 [s]": round(quantile(back_s, 0.5), 1), "worst [s]": round(max(back_s), 1)},
+        {
+            "rounds": ROUNDS,
+            "p50 [s]": round(quantile(back_s, 0.5), 1),
+            "worst [s]": round(max(back_s), 1),
+        },
     )

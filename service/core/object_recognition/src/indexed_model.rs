@@ -43,12 +43,14 @@ impl IndexedModel {
             .collect();
         let graph = LinkGraph::new(&felt);
         let fields = Fields::learned(model.places(), &graph);
-        // Beside a place contacts fall up to half a link away, or half the step of nodes.
-        let reach_m = |own| {
-            let link_m = fields.as_ref().and_then(|_| graph.mean_link_m(own, &felt));
-            link_m.map_or(spacing_m, |link_m| {
-                link_m.min(NODE_STEP * spacing_m).max(spacing_m)
-            })
+        // On a surface contacts fall up to half a link beside a place, or half the step of nodes.
+        let is_surface = fields.is_some() && !graph.is_curve();
+        let field_m = |own| {
+            let link_m = graph.mean_link_m(own, &felt).filter(|_| is_surface);
+            let width_m = link_m.map_or(spacing_m, |link_m| {
+                link_m.clamp(spacing_m, NODE_STEP * spacing_m)
+            });
+            FIELD_PER_SPACING * width_m
         };
         let mut places: Vec<_> = model
             .places()
@@ -57,8 +59,7 @@ impl IndexedModel {
             .map(|(own, place)| IndexedPlace {
                 position: place.position_m,
                 normal: place.normal(),
-                variance_m2: (FIELD_PER_SPACING * reach_m(own)).powi(2)
-                    + place.variance_m2 / (place.count * place.count),
+                variance_m2: field_m(own).powi(2) + place.variance_m2 / (place.count * place.count),
                 is_predicted: false,
                 levels: place.levels.clone(),
                 descriptors: place.descriptors.clone(),

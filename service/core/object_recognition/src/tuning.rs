@@ -44,7 +44,8 @@ pub(crate) const BACKGROUND_WEIGHT_MIN: f64 = 1e-9;
 /// Cosine of the angle between normals of one place: 60°, beyond which they belong to two sides of
 /// something thin or of an edge. Chosen.
 pub(crate) const SAME_SIDE_COS: f64 = 0.5;
-/// Standard deviation of a contact about its place, in spacings: 1/√12 of a uniform field. Derived.
+/// Standard deviation of a contact about its place, in widths of its field, which is a spacing or on
+/// a surface that was felt less densely a link: 1/√12 of a uniform field. Derived.
 pub(crate) const FIELD_PER_SPACING: f64 = 0.288_675;
 /// Distances at which the share of a model within them is tabled, per extent. Budget.
 pub(crate) const SHARE_BINS: usize = 32;
@@ -139,7 +140,7 @@ pub(crate) const ERROR_NEIGHBOURS: usize = 6;
 /// Nodes and places of a model: a model with more places has no nodes. Budget.
 pub(crate) const NODES_MAX: usize = 1024;
 /// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept
-/// apart by a spacing lie so far from one another, across the diagonals of a square too. Derived.
+/// apart by a spacing lie so far from one another, across the diagonals of a square too. Chosen.
 pub(crate) const DENSE_LINK: f64 = 1.5;
 /// Distance of nodes, in spacings. Chosen.
 pub(crate) const NODE_STEP: f64 = 2.0;

@@ -78,7 +78,7 @@ impl LinkGraph {
     }
 
     /// Whether the places lie along lines, for the most part.
-    pub(super) fn is_curve(&self) -> bool {
+    pub(crate) fn is_curve(&self) -> bool {
         2 * self.triangles.len() < self.links.len()
     }
 
