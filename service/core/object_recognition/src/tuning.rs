@@ -44,8 +44,8 @@ pub(crate) const BACKGROUND_WEIGHT_MIN: f64 = 1e-9;
 /// Cosine of the angle between normals of one place: 60°, beyond which they belong to two sides of
 /// something thin or of an edge. Chosen.
 pub(crate) const SAME_SIDE_COS: f64 = 0.5;
-/// Standard deviation of a contact about its place, in widths of its field, which is a spacing or on
-/// a surface that was felt less densely a link: 1/√12 of a uniform field. Derived.
+/// Standard deviation of a contact about its place, in widths of its uniform field: 1/√12. A field
+/// is as wide as a spacing, and on a surface that was felt less densely as a link. Derived.
 pub(crate) const FIELD_PER_SPACING: f64 = 0.288_675;
 /// Distances at which the share of a model within them is tabled, per extent. Budget.
 pub(crate) const SHARE_BINS: usize = 32;
