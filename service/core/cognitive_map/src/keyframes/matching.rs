@@ -12,8 +12,13 @@ pub(super) type ViewMatches = Arc<[ViewMatch]>;
 pub(super) struct Matching {
     /// Most views of a channel, evenly thinned beyond: the cost grows with their square.
     pub(super) views_max: usize,
+    /// Most keyframes of the map, thinned beyond.
+    pub(super) keyframes_max: usize,
     /// Widths of the kernels of matches, in their ranges, one relaxation each.
     pub(super) widths: &'static [f64],
+    /// Whether views without matches are matched only if the new ones resemble others more than
+    /// those before them did.
+    pub(super) needs_news: bool,
     /// Veers of odometry from which it begins anew, in standard deviations.
     pub(super) veers: &'static [f64],
 }

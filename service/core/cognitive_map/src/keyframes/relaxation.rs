@@ -15,9 +15,9 @@ use super::problem::{Among, Calibrating, Problem};
 use super::runs::{Member, Run};
 use super::tuning;
 use crate::estimator::ExternalEstimate;
-use geometry::{is_somewhere, is_within};
+use geometry::is_somewhere;
 use pose_graph::{Graduation, RelaxationSettings, Relaxed};
-use state::{NONE, Slab};
+use state::NONE;
 
 /// What a relaxation says of an agent.
 #[derive(Clone, Copy, Debug)]
@@ -105,35 +105,6 @@ impl RelaxationCopy {
         factors.iter().map(judged).collect()
     }
 
-    /// The coarse graph, which is relaxed while samples come in: one keyframe a step, and those
-    /// with sightings, at the begin of a stretch, and the latest ones. Keyframes and constraints
-    /// keep their numbers.
-    pub(super) fn coarse(graph: &KeyframeGraph) -> Self {
-        let mut coarse = graph.clone();
-        // Attachments move with the keyframes afterwards.
-        coarse.attachments.slab = Slab::default();
-        for track in graph.chains.tracks.iter() {
-            let mut way = Isometry3::identity();
-            let mut number = track.newest;
-            while let Some(keyframe) = coarse.chains.keyframes.get(number) {
-                let (motion, previous) = (keyframe.motion, keyframe.previous);
-                // The chain is walked from its end, since removals change the neighbours.
-                if number == track.newest
-                    || must_stay(&coarse, number)
-                    || !is_within(&way, tuning::COARSE_STEP.0, tuning::COARSE_STEP.1)
-                {
-                    way = motion;
-                } else {
-                    coarse.dissolve(number);
-                    way = motion * way;
-                }
-                number = previous;
-            }
-        }
-        drop_old_candidates(&mut coarse);
-        Self::of(coarse)
-    }
-
     /// The copy as it is now.
     pub(super) fn graph(&self) -> &KeyframeGraph {
         &self.graph
@@ -147,6 +118,17 @@ impl RelaxationCopy {
     /// Replaces the matches of views.
     pub(super) fn set_matches(&mut self, matches: ViewMatches) {
         self.graph.matches = matches;
+    }
+
+    /// Moves the keyframes as in a thinned copy, and adopts its matches.
+    pub(super) fn adopt_thinned(&mut self, thinned: &Self) {
+        let graph = &mut self.graph;
+        graph.matches = Arc::clone(&thinned.graph.matches);
+        for agent in (0..).take(graph.chains.tracks.len()) {
+            graph
+                .chains
+                .adopt(agent, &thinned.graph.chains, graph.revision);
+        }
     }
 
     /// Puts a keyframe somewhere else.
@@ -456,36 +438,5 @@ fn from_wide() -> RelaxationSettings {
     RelaxationSettings {
         graduation: Graduation::FromWide,
         ..RelaxationSettings::default()
-    }
-}
-
-/// Whether a keyframe must stay in the coarse graph.
-fn must_stay(graph: &KeyframeGraph, number: u32) -> bool {
-    let keyframes = &graph.chains.keyframes;
-    let Some(keyframe) = keyframes.get(number) else {
-        return true;
-    };
-    let next = keyframes.get(keyframe.next);
-    let goes_on = next.is_some_and(|next| !next.begins);
-    if keyframe.begins || !goes_on || keyframe.sightings != NONE || keyframe.shown != NONE {
-        return true;
-    }
-    let mut constraints = graph.constraints.of(number, keyframe);
-    constraints.any(|constraint| !constraint.is_closure())
-}
-
-/// Removes candidates but the latest ones.
-fn drop_old_candidates(graph: &mut KeyframeGraph) {
-    let stamped = |(number, constraint): (u32, &Constraint)| {
-        let from = graph.chains.keyframes.get(constraint.from)?;
-        constraint.is_candidate().then_some((from.stamp_ns, number))
-    };
-    let mut pending: Vec<(i64, u32)> = { graph.constraints.slab.iter() }
-        .filter_map(stamped)
-        .collect();
-    pending.sort_unstable();
-    let n_old = pending.len().saturating_sub(tuning::COARSE_PENDING_MAX);
-    for &(_, number) in &pending[..n_old] {
-        graph.remove_constraint(number);
     }
 }

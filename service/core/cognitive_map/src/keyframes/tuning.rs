@@ -135,6 +135,10 @@ pub(super) const RELAXATION_ROUNDS_MAX: usize = 3;
 /// odometry is below that of closures, and is added to what moves to a neighbour.
 pub(super) const COARSE_STEP: (f64, f64) = (1.0, 0.5);
 
+/// Keyframes of the coarse graph beyond which its steps are longer: so that a relaxation of a map
+/// of many kilometres takes seconds, too.
+pub(super) const COARSE_KEYFRAMES_MAX: usize = 4096;
+
 /// Most pending closures of the coarse graph, the latest ones. Earlier ones have been judged many
 /// times; a refinement of the whole past judges them again.
 pub(super) const COARSE_PENDING_MAX: usize = 512;
@@ -188,7 +192,9 @@ pub(super) const KEYFRAMES_PER_SIGHTING: usize = 4;
 /// How views are matched while samples come in, from where the map has them.
 pub(super) const LIVE_MATCHING: Matching = Matching {
     views_max: 1024,
+    keyframes_max: 1024,
     widths: &[4.0, 2.0, 1.0],
+    needs_news: true,
     veers: &[],
 };
 
@@ -196,6 +202,7 @@ pub(super) const LIVE_MATCHING: Matching = Matching {
 /// stays near to it otherwise.
 pub(super) const LIVE_MATCHING_ANEW: Matching = Matching {
     views_max: 512,
+    keyframes_max: 1024,
     ..REFINED_MATCHING
 };
 
@@ -203,9 +210,18 @@ pub(super) const LIVE_MATCHING_ANEW: Matching = Matching {
 /// its first loop lies in another basin of attraction: so other veers are tried.
 pub(super) const REFINED_MATCHING: Matching = Matching {
     views_max: usize::MAX,
+    keyframes_max: 8192,
     widths: &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0],
+    needs_news: false,
     veers: &[0.0, -1.0, 1.0, -2.0, 2.0],
 };
+
+/// Least distance between keyframes where there are too many to match views by, in the range of the
+/// channel: half the standard deviation of a match.
+pub(super) const MATCHED_STEP: f64 = 0.25;
+
+/// Longest such distance \[m\]: views that are all farther apart are matched as they are.
+pub(super) const THINNED_STEP_MAX_M: f64 = 1e3;
 
 /// Widths of kernels where views are matched near to where a relaxed map has them, and how often.
 pub(super) const GATED_WIDTHS: &[f64] = &[4.0, 2.0, 1.0];

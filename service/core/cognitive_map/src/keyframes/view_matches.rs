@@ -32,26 +32,38 @@ impl RelaxationCopy {
     /// Another map than that of odometry has to be more probable by the Bayesian information
     /// criterion of a fold: it has three degrees of freedom, and of many folds that are possible
     /// one is always the most probable.
+    ///
+    /// Of more keyframes than [`Matching`] has, evenly many are compared, and those between move
+    /// with them.
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
         let channels = Similarity::of_channels(log, matching.views_max);
         self.set_learned(channels.iter().map(|channel| *channel.learned()).collect());
-        if channels.is_empty() {
+        let ranges = channels.iter().map(|channel| channel.learned().range_m);
+        let Some(range_m) = ranges.min_by(f64::total_cmp) else {
             return false;
-        }
+        };
         let before = Arc::clone(&self.graph().matches);
         let n_views: usize = { channels.iter() }
             .map(|channel| channel.samples().count())
             .sum();
-        let mut best = self.with_matches(Arc::default(), &[1.0], &channels);
-        let needed = best.log_probability + 1.5 * (n_views as f64).ln();
+        let another_map = 1.5 * (n_views as f64).ln();
+        if matching.needs_news && before.is_empty() {
+            let news: f64 = channels.iter().map(Similarity::news_nats).sum();
+            if news < another_map {
+                return false;
+            }
+        }
+        let thinned = self.thinned(tuning::MATCHED_STEP * range_m, matching.keyframes_max);
+        let mut best = thinned.with_matches(Arc::default(), &[1.0], &channels);
+        let needed = best.log_probability + another_map;
         if !before.is_empty() {
-            let as_before = self.with_matches(Arc::clone(&before), &[1.0], &channels);
+            let as_before = thinned.with_matches(Arc::clone(&before), &[1.0], &channels);
             if as_before.log_probability > best.log_probability {
                 best = as_before;
             }
         }
-        let by_odometry = matching.veers.iter().map(|&veer| self.dead_reckoned(veer));
-        for start in std::iter::once(self.clone()).chain(by_odometry) {
+        let by_odometry = { matching.veers.iter() }.map(|&veer| thinned.dead_reckoned(veer));
+        for start in std::iter::once(thinned.clone()).chain(by_odometry) {
             let other = start.matched(matching.widths, &channels);
             if other.log_probability > needed.max(best.log_probability) {
                 best = other;
@@ -60,7 +72,7 @@ impl RelaxationCopy {
         if before.is_empty() && best.copy.graph().matches.is_empty() {
             return false;
         }
-        *self = best.copy;
+        self.adopt_thinned(&best.copy);
         self.graph().matches != before
     }
 

@@ -5,13 +5,15 @@ use cognitive_map::keyframes::{Correction, KeyframeMap, KeyframeSettings, Moment
 use cognitive_map::{PoseNoise, Relation, RelativePose};
 use nalgebra::{Isometry3, Vector3, Vector6};
 
-/// Steps of a round, and their length \[m\].
+/// Steps of a round.
 const ROUND: u64 = 80;
-const STEP_M: f64 = 0.3;
 
 /// A robot on a circle whose gyroscope drifts, so that the round does not close.
 struct Rounds {
     keyframes: KeyframeMap,
+    /// Steps of a round, and their length \[m\].
+    round: u64,
+    step_m: f64,
     told: Isometry3<f64>,
     truth: Vec<Isometry3<f64>>,
     corrections: Vec<Correction>,
@@ -30,6 +32,8 @@ impl Rounds {
         assert_eq!(agent, 0);
         Self {
             keyframes,
+            round: ROUND,
+            step_m: 0.3,
             told: *frame,
             truth: vec![*frame],
             corrections: Vec::new(),
@@ -37,10 +41,11 @@ impl Rounds {
     }
 
     fn step(&mut self, drift_rad: f64) {
-        let turn = std::f64::consts::TAU / ROUND as f64;
+        let turn = std::f64::consts::TAU / self.round as f64;
+        let ahead = Vector3::x() * self.step_m;
         let seq = self.truth.len() as u64;
-        let true_step = Isometry3::new(Vector3::x() * STEP_M, Vector3::z() * turn);
-        let read = Isometry3::new(Vector3::x() * STEP_M, Vector3::z() * (turn + drift_rad));
+        let true_step = Isometry3::new(ahead, Vector3::z() * turn);
+        let read = Isometry3::new(ahead, Vector3::z() * (turn + drift_rad));
         self.truth
             .push(self.truth[self.truth.len() - 1] * true_step);
         self.told *= read;
@@ -133,6 +138,23 @@ fn true_matches_close_the_loop_whichever_way_the_gyroscope_drifts() {
         let covariance = closed.corrections[0].estimate.covariance;
         assert!(covariance.position_sd_m() < 0.5);
     }
+}
+
+#[test]
+fn a_round_of_more_than_four_kilometres_closes() {
+    let round = 4400;
+    let mut walk = Rounds::new(KeyframeSettings::default(), &Isometry3::identity());
+    (walk.round, walk.step_m) = (round, 1.0);
+    for seq in 1..=round + 800 {
+        walk.step(2e-5);
+        if seq == round {
+            assert!(walk.off_m() > 50.0, "{}", walk.off_m());
+        }
+        if seq > round && seq.is_multiple_of(5) {
+            walk.matched(seq - round, &Isometry3::identity());
+        }
+    }
+    assert!(walk.off_m() < 2.0, "{}", walk.off_m());
 }
 
 #[test]

@@ -103,6 +103,26 @@ impl<'a> Similarity<'a> {
         matches
     }
 
+    /// How much more the new views say of being where others were seen than those before them did
+    /// \[nats\], by the depths of the best matches of all.
+    pub fn news_nats(&self) -> f64 {
+        let n = self.runs.len();
+        let is_new = &self.runs.is_new;
+        let nowhere = tuning::NOWHERE * n as f64;
+        let (mut count, mut nats) = ([0.0; 2], [0.0; 2]);
+        let mut matches = Vec::new();
+        for index in 0..n {
+            let is_before =
+                |&other: &usize| self.is_apart(index, other) && (is_new[index] || !is_new[other]);
+            let candidates: Vec<usize> = (0..n).filter(is_before).collect();
+            self.best(index, candidates, nowhere, 1, &mut matches);
+            let depth = matches.drain(..).map(|best| best.depth).sum::<f64>();
+            count[usize::from(is_new[index])] += 1.0;
+            nats[usize::from(is_new[index])] += depth;
+        }
+        nats[1] - nats[0] * count[1] / f64::max(count[0], 1.0)
+    }
+
     /// The match of each view with another one, earlier or later, near to which a map has it.
     pub fn matches_near(&self, positions: &[Option<Point3<f64>>]) -> Vec<ViewMatch> {
         let gate_m = tuning::GATE_RANGES * self.learned.range_m;
@@ -229,3 +249,6 @@ fn of_sequences(runs: &Runs<'_>, log_odds: &DMatrix<f32>) -> DMatrix<f32> {
     }
     odds
 }
+
+#[cfg(test)]
+mod tests;

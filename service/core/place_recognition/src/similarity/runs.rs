@@ -8,19 +8,25 @@ pub(super) struct Runs<'a> {
     pub(super) views: Vec<&'a LoggedView>,
     /// The run of each view: within one, neighbours are neighbours along the way.
     pub(super) run: Vec<u32>,
+    /// Whether each view was added since the log was last matched.
+    pub(super) is_new: Vec<bool>,
 }
 
 impl<'a> Runs<'a> {
     /// At most so many views of a channel, evenly thinned.
     pub(super) fn of(log: &'a ViewLog, channel: u8, most: usize) -> Self {
-        let views = log.views.iter().filter(|view| view.channel == channel);
-        let mut views: Vec<&LoggedView> = views.collect();
+        let n_old = log.views.len().saturating_sub(log.n_new as usize);
+        let numbered = log.views.iter().enumerate();
+        let views = numbered.filter(|(_, view)| view.channel == channel);
+        let mut views: Vec<(bool, &LoggedView)> = views
+            .map(|(number, view)| (number >= n_old, view))
+            .collect();
         let mut stride = log.stride;
         while views.len() > most {
             stride = stride.saturating_mul(2);
-            views.retain(|view| view.ordinal.is_multiple_of(stride));
+            views.retain(|(_, view)| view.ordinal.is_multiple_of(stride));
         }
-        views.sort_by_key(|view| {
+        views.sort_by_key(|(_, view)| {
             (
                 view.sample.agent,
                 view.sample.session,
@@ -28,6 +34,7 @@ impl<'a> Runs<'a> {
                 view.ordinal,
             )
         });
+        let (is_new, views): (Vec<bool>, Vec<&LoggedView>) = views.into_iter().unzip();
         let mut run = Vec::with_capacity(views.len());
         let mut number = 0;
         for (index, view) in views.iter().enumerate() {
@@ -43,7 +50,7 @@ impl<'a> Runs<'a> {
             }
             run.push(number);
         }
-        Self { views, run }
+        Self { views, run, is_new }
     }
 
     /// Number of views.

@@ -77,10 +77,14 @@ impl Claims {
         }
     }
 
-    /// Whether enough first claims were right.
+    /// Whether enough first claims were right: no more are wrong than the largest share and chance
+    /// explain, by one standard deviation of a binomial count. An agent that taught and had drifted
+    /// itself counts as a wrong claim, too.
     fn are_sound(&self) -> bool {
         let count = self.right + self.wrong;
-        count >= tuning::COUNT_MIN && self.wrong <= tuning::WRONG_MAX * count
+        let most = tuning::WRONG_MAX;
+        let by_chance = (count * most * (1.0 - most)).sqrt();
+        count >= tuning::COUNT_MIN && self.wrong <= most * count + by_chance
     }
 
     /// The covariance of a claim; `None` while it is not sure enough.
