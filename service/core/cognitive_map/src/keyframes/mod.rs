@@ -17,10 +17,10 @@
 //! | constraints | start poses and loop closures, and when closures are judged | `constraints` |
 //! | attachments | places that move with keyframes | `attachments` |
 //!
-//! A relaxation works on a copy of the graph (`relaxation`, `coarse`), as a problem of least squares
-//! (`problem`); `closures` brings its outcome back. While samples come in, a relaxation is of the
-//! graph as it was at one record (`relaxation_job`), and comes into force at a later one
-//! (`adoption`), so that no record waits for it; `meanwhile` has what comes in between.
+//! A relaxation works on a copy of the graph (`relaxation`), with fewer keyframes (`coarse`), as a
+//! problem of least squares (`problem`); `closures` brings its outcome back. While samples come in,
+//! a relaxation is of the graph as it was at one record (`relaxation_job`), and comes into force at
+//! a later one (`adoption`), so that no record waits for it; `meanwhile` has what comes in between.
 //!
 //! [`KeyframeMap`] is the graph with place recognition, which closes loops by what was seen.
 
