@@ -24,8 +24,8 @@ impl RelaxationCopy {
         Self::of(coarse)
     }
 
-    /// A copy of at most so many keyframes: of more, one a step \[m\], and those that a coarse copy
-    /// keeps, too; a longer step if those are still too many.
+    /// A copy without keyframes between those that are a step \[m\] apart, if there are more than so
+    /// many; with a longer step if there still are.
     pub(super) fn thinned(&self, step_m: f64, most: usize) -> Self {
         let mut thinned = self.graph().clone();
         thinned.attachments.slab = Slab::default();
@@ -34,11 +34,14 @@ impl RelaxationCopy {
     }
 }
 
-/// Dissolves keyframes within a step \[m\] of others while there are more than so many, and doubles
-/// the step.
+/// Dissolves keyframes within a step \[m\] of others, and within twice that, and so on, while there
+/// are more than so many. Those that a coarse copy keeps may be more.
 fn thin(graph: &mut KeyframeGraph, mut step_m: f64, most: usize) {
-    while graph.n_keyframes() > most && step_m < tuning::THINNED_STEP_MAX_M {
+    while graph.n_keyframes() > most {
         dissolve_within(graph, (step_m, f64::INFINITY));
+        if step_m >= tuning::THINNED_STEP_MAX_M {
+            return;
+        }
         step_m *= 2.0;
     }
 }

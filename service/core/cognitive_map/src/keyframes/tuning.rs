@@ -220,7 +220,8 @@ pub(super) const REFINED_MATCHING: Matching = Matching {
 /// channel: half the standard deviation of a match.
 pub(super) const MATCHED_STEP: f64 = 0.25;
 
-/// Longest such distance \[m\]: views that are all farther apart are matched as they are.
+/// Step beyond which a longer one would thin a map no further \[m\]: what is left by then are
+/// keyframes that a coarse graph keeps.
 pub(super) const THINNED_STEP_MAX_M: f64 = 1e3;
 
 /// Widths of kernels where views are matched near to where a relaxed map has them, and how often.

@@ -33,8 +33,8 @@ impl RelaxationCopy {
     /// criterion of a fold: it has three degrees of freedom, and of many folds that are possible
     /// one is always the most probable.
     ///
-    /// Of more keyframes than [`Matching`] has, evenly many are compared, and those between move
-    /// with them.
+    /// Beyond the most keyframes of [`Matching`], maps are compared by some of them, evenly spaced.
+    /// Those between move with the one before.
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
         let channels = Similarity::of_channels(log, matching.views_max);
         self.set_learned(channels.iter().map(|channel| *channel.learned()).collect());
