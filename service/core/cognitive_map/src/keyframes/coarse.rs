@@ -24,8 +24,8 @@ impl RelaxationCopy {
         Self::of(coarse)
     }
 
-    /// A copy without keyframes between those that are a step \[m\] apart, if there are more than so
-    /// many; with a longer step if there still are.
+    /// A copy without the keyframes between those that are a step \[m\] apart, if there are more
+    /// than so many; with a longer step if there still are.
     pub(super) fn thinned(&self, step_m: f64, most: usize) -> Self {
         let mut thinned = self.graph().clone();
         thinned.attachments.slab = Slab::default();
