@@ -45,11 +45,16 @@ pub(super) struct Target {
 }
 
 impl Target {
-    /// Lower bound of the length from a waypoint to the goal \[µm\]. Either distance may be less
-    /// than a unit above what is noted.
-    pub(super) fn bound_um(&self, from: &Junction) -> u64 {
+    /// What the first pivot says of a waypoint.
+    pub(super) fn glance(&self, from: &Junction) -> u16 {
+        from.far[0].abs_diff(self.far[0])
+    }
+
+    /// Lower bound of the length from a waypoint to the goal \[µm\], not below `glance`
+    /// coarse units. Either distance may be less than a unit above what is noted.
+    pub(super) fn bound_um(&self, from: &Junction, glance: u16) -> u64 {
         let pairs = from.far.iter().zip(&self.far);
-        let most = pairs.fold(0, |most, (a, b)| a.abs_diff(*b).max(most));
+        let most = pairs.fold(glance, |most, (a, b)| a.abs_diff(*b).max(most));
         u64::from(most.saturating_sub(1)) * self.unit_um
     }
 }

@@ -9,6 +9,7 @@ mod bounds;
 mod cost;
 mod end;
 mod following;
+mod frontier;
 mod graph;
 mod options;
 mod path;

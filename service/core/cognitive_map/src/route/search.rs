@@ -1,12 +1,10 @@
 //! The search for the cheapest route (A*: Hart, Nilsson & Raphael 1968).
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use nalgebra::{Point3, Vector3};
 
 use super::bounds::{RouteBounds, Target};
 use super::cost::Costs;
+use super::frontier::Frontier;
 use super::graph::{Graph, Junction, Link};
 use super::path::{Hop, Path};
 use super::reached::Reached;
@@ -20,11 +18,8 @@ pub(super) struct Search<'a> {
     /// Whether every edge may be taken and costs its length.
     are_lengths: bool,
     reached: Reached,
-    open: BinaryHeap<Reverse<Open>>,
+    frontier: Frontier,
 }
-
-/// A waypoint to go on from: lower bound of a route through it, and its number.
-type Open = (u64, u32);
 
 /// A lower bound of the cost from a waypoint to the goal.
 struct Bound<'a> {
@@ -35,6 +30,15 @@ struct Bound<'a> {
     target: Option<Target>,
     /// The ways, as bounds know them.
     graph: Option<&'a Graph>,
+}
+
+/// What one look at a waypoint tells.
+#[derive(Clone, Copy)]
+struct Glance<'g> {
+    at: &'g Junction,
+    /// Lower bound of the distance by the first pivot, in coarse units.
+    least: u16,
+    is_dead_end: bool,
 }
 
 impl Bound<'_> {
@@ -49,19 +53,33 @@ impl Bound<'_> {
         }
     }
 
-    /// That from a waypoint. Where distances from pivots are known the straight line adds next to
-    /// nothing.
-    fn from(&self, at: &Junction) -> u64 {
+    /// That from a waypoint, at which one has glanced. Where distances from pivots are known the
+    /// straight line adds next to nothing.
+    fn from(&self, glance: &Glance<'_>) -> u64 {
         match &self.target {
-            Some(target) => target.bound_um(at),
-            None => self.straight(&at.near),
+            Some(target) => target.bound_um(glance.at, glance.least),
+            None => self.straight(&glance.at.near),
+        }
+    }
+
+    /// A first look at a waypoint.
+    fn glance<'g>(&self, at: &'g Junction) -> Glance<'g> {
+        let least = self.target.as_ref().map_or(0, |target| target.glance(at));
+        let is_dead_end = at.is_dead_end();
+        Glance {
+            at,
+            least,
+            is_dead_end,
         }
     }
 
     /// That from where an edge leads.
     fn along(&self, edge: &Edge) -> u64 {
         let junction = self.graph.and_then(|graph| graph.junction(edge.to));
-        junction.map_or_else(|| self.straight(&edge.near), |at| self.from(at))
+        junction.map_or_else(
+            || self.straight(&edge.near),
+            |at| self.from(&self.glance(at)),
+        )
     }
 
     /// That by the straight line.
@@ -87,7 +105,7 @@ impl<'a> Search<'a> {
             costs,
             are_lengths: costs.are_lengths(),
             reached: Reached::new(numbers),
-            open: BinaryHeap::new(),
+            frontier: Frontier::default(),
         }
     }
 
@@ -103,9 +121,9 @@ impl<'a> Search<'a> {
         let bound = goal.map_or_else(Bound::none, |goal| self.bound(goal, bounds));
         let found = |search: &Self| goal.and_then(|goal| search.cost_to(goal));
         self.reached.reach(start, 0);
-        self.open.push(Reverse((0, start)));
+        self.frontier.push(0, start);
         let mut visited = 0_usize;
-        while let Some(Reverse((least, at))) = self.open.pop() {
+        while let Some((least, at)) = self.frontier.pop() {
             if found(self).is_some_and(|found| least > found) {
                 break;
             }
@@ -139,31 +157,28 @@ impl<'a> Search<'a> {
             };
             let there = cost + more;
             if self.reached.reach(edge.to, there) {
-                let least = there + bound.along(edge);
-                self.open.push(Reverse((least, edge.to)));
+                self.frontier.push(there + bound.along(edge), edge.to);
             }
         }
     }
 
-    /// Goes on along links. Bounds are asked for together, so that the processor fetches what they
-    /// need at the same time.
+    /// Goes on along links. Most of what a search waits for is what lies far apart in memory. So
+    /// where the links lead is glanced at together, and in any case: no branch has to be guessed
+    /// before the processor fetches what the bounds need.
     fn expand_along(&mut self, graph: &Graph, links: &[Link], cost: u64, bound: &Bound<'_>) {
-        let mut nearer = [(0, 0); tuning::LINKS];
-        let mut count = 0;
-        for link in links {
+        let mut ahead = [None; tuning::LINKS];
+        for (ahead, link) in ahead.iter_mut().zip(links) {
+            *ahead = graph.junction(link.to).map(|at| bound.glance(at));
+        }
+        for (link, glance) in links.iter().zip(ahead) {
             let there = cost + u64::from(link.length_um);
-            if self.reached.reach(link.to, there) {
-                nearer[count] = (there, link.to);
-                count += 1;
+            if self.reached.reach(link.to, there)
+                && let Some(glance) = glance
+                && (!glance.is_dead_end || bound.goal == Some(link.to))
+            {
+                self.frontier.push(there + bound.from(&glance), link.to);
             }
         }
-        for (least, to) in &mut nearer[..count] {
-            let at = graph.junction(*to);
-            let at = at.filter(|at| !at.is_dead_end() || bound.goal == Some(*to));
-            *least = at.map_or(u64::MAX, |at| *least + bound.from(at));
-        }
-        let leads_on = nearer[..count].iter().filter(|open| open.0 < u64::MAX);
-        self.open.extend(leads_on.copied().map(Reverse));
     }
 
     /// Cost to a waypoint, as far as it is known.
