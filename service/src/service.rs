@@ -295,7 +295,7 @@ fn share_descriptors(config: &Config) -> (HttpSettings, Shares) {
         let (key, wanted, most) = ("zenoh.sessions_max", wanted.sessions, shares.sessions);
         tracing::warn!(key, wanted, most, "lowered: too few open files are allowed");
     }
-    let http = fitting(config.http.settings(), shares.http);
+    let http = fitting(config.http_settings(), shares.http);
     tracing::info!(
         limit,
         http_connections = http.connections_max,

@@ -52,8 +52,8 @@ section! {
         #[serde(skip_serializing_if = "Option::is_none")]
         token_file: Option<PathBuf> = None,
             any("the path of a file, absent when http.token is set");
-        /// Names of hosts by which the service is asked, beside its addresses and `localhost`; `*`
-        /// stands for any.
+        /// Names of hosts by which the service is asked, beside its addresses, `localhost` and the
+        /// host of `cluster.address`; `*` stands for any.
         hosts: Vec<String> = Vec::new(), HOSTS;
         /// Origins of pages, such as `https://map.example.org`, that may ask and change everything
         /// as the service's own page may.

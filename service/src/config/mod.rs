@@ -21,6 +21,7 @@ use cogmap_proto::{Name, SpaceSettings};
 use serde::{Deserialize, Serialize};
 
 use crate::decode::core_settings;
+use crate::http::HttpSettings;
 pub use crate::http::Token;
 
 pub use assignment::Assignment;
@@ -155,6 +156,15 @@ impl Config {
             core_settings(settings).map_err(|error| ConfigError::source(&source, &error))?;
         }
         Ok(())
+    }
+
+    /// What the HTTP interface needs to know. Other nodes ask a node by its address.
+    pub fn http_settings(&self) -> HttpSettings {
+        let mut settings = self.http.settings();
+        if self.cluster.enabled {
+            settings.hosts = settings.hosts.and_host_of(&self.cluster.address);
+        }
+        settings
     }
 
     /// The effective settings as TOML; the token is not shown.

@@ -6,14 +6,17 @@ use std::time::Duration;
 
 use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
+use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderMap, Response, StatusCode};
 use axum::middleware::{FromFnLayer, Next, from_fn_with_state};
 use axum::response::IntoResponse;
+use futures_util::StreamExt;
 use futures_util::future::{BoxFuture, join_all};
 
 use super::forwarder::FORWARDED;
 use super::problem::{Kind, Problem};
 use super::state::{Service, Shared};
+use super::streams::{OpenStream, stopped};
 use crate::cluster::{Cluster, NodeState, Whereabouts};
 
 pub(crate) use replica::Replica;
@@ -39,7 +42,6 @@ async fn pass(service: Service, mut request: Request, next: Next) -> Response<Bo
     let (Some(cluster), Some(space)) = (&service.cluster, space_of(request.uri().path())) else {
         return next.run(request).await;
     };
-    let space = space.to_owned();
     let max_age = match replica::take_max_age(&mut request) {
         Ok(max_age) => max_age,
         Err(problem) => return problem.into_response(),
@@ -53,7 +55,7 @@ async fn pass(service: Service, mut request: Request, next: Next) -> Response<Bo
         return replica.answer(request, next).await;
     }
     match whereabouts {
-        Whereabouts::At(address) if !request.headers().contains_key(FORWARDED) => {
+        Whereabouts::At(address) if !is_forwarded(request.headers()) => {
             ask_owner(&service, cluster, &space, &address, request).await
         }
         _ => Problem::moving(&space).into_response(),
@@ -70,25 +72,60 @@ async fn ask_owner(
     request: Request,
 ) -> Response<Body> {
     let node = cluster.standing().node.clone();
-    let whereabouts = || cluster.whereabouts(service.engine.shards().of(space));
+    let shard = service.engine.shards().of(space);
+    let there = Whereabouts::At(address.to_owned());
+    let (cluster, at) = (cluster.clone(), there.clone());
+    let moved = has_moved(move || cluster.whereabouts(shard) == at);
+    let mut moved = Box::pin(moved);
     let answered = tokio::select! {
         answered = service.forwarder.forward(request, address, &node) => answered,
-        () = has_moved(whereabouts, address) => return owner_lost(space).into_response(),
+        () = &mut moved => return owner_lost(space).into_response(),
     };
     match answered {
+        Ok(response) if is_event_stream(&response) => stream(service, response, moved),
         Ok(response) => response,
         Err(error) if error.is_connect() => Problem::moving(space).into_response(),
         Err(_) => owner_lost(space).into_response(),
     }
 }
 
-/// Waits until a space has not been at an address for a while.
-async fn has_moved(whereabouts: impl Fn() -> Whereabouts, address: &str) {
-    let there = Whereabouts::At(address.to_owned());
-    while whereabouts() == there {
+/// Waits until a space has not been there for a while.
+async fn has_moved(is_there: impl Fn() -> bool) {
+    while is_there() {
         tokio::time::sleep(LOOK_INTERVAL).await;
     }
     tokio::time::sleep(LAST_ANSWER).await;
+}
+
+fn is_event_stream(response: &Response<Body>) -> bool {
+    let kind = response.headers().get(CONTENT_TYPE);
+    kind.is_some_and(|kind| kind.as_bytes().starts_with(b"text/event-stream"))
+}
+
+/// Passes a stream on until its space has moved, or this node stops. It is one of the streams that
+/// this node may have open.
+fn stream(
+    service: &Shared,
+    response: Response<Body>,
+    moved: impl Future<Output = ()> + Send + 'static,
+) -> Response<Body> {
+    let open = match OpenStream::open(service) {
+        Ok(open) => open,
+        Err(problem) => return problem.into_response(),
+    };
+    let stopped = stopped(service);
+    let ended = async move {
+        tokio::select! {
+            () = moved => {}
+            () = stopped => {}
+        }
+    };
+    response.map(|body| {
+        let chunks = body.into_data_stream().take_until(Box::pin(ended));
+        Body::from_stream(chunks.inspect(move |_| {
+            let _ = &open; // it counts as long as the stream lives
+        }))
+    })
 }
 
 /// The answer about a space of this node. It may have begun to leave, or is only just coming.
@@ -108,9 +145,11 @@ async fn answer_here(
 }
 
 /// The space that a path is about.
-fn space_of(path: &str) -> Option<&str> {
+fn space_of(path: &str) -> Option<String> {
     let rest = path.strip_prefix(SPACES)?;
-    rest.split('/').next().filter(|name| !name.is_empty())
+    let name = rest.split('/').next().filter(|name| !name.is_empty())?;
+    let name = percent_encoding::percent_decode_str(name).decode_utf8_lossy();
+    Some(name.into_owned())
 }
 
 fn owner_lost(space: &str) -> Problem {
@@ -118,14 +157,19 @@ fn owner_lost(space: &str) -> Problem {
     Problem::new(Kind::OwnerLost, detail)
 }
 
-/// What the other nodes answer under a path, to a request that no node has passed on. Of a node
-/// that does not answer there is nothing.
-pub(crate) async fn ask_others(service: &Shared, path: &str, headers: &HeaderMap) -> Vec<Bytes> {
-    let Some(cluster) = service
-        .cluster
-        .as_ref()
-        .filter(|_| !headers.contains_key(FORWARDED))
-    else {
+/// Whether another node has passed a request on.
+pub(crate) fn is_forwarded(headers: &HeaderMap) -> bool {
+    headers.contains_key(FORWARDED)
+}
+
+/// What the other nodes answer under a path, by their addresses, to a request that no node has
+/// passed on. Of a node that does not answer there is nothing.
+pub(crate) async fn ask_others(
+    service: &Shared,
+    path: &str,
+    headers: &HeaderMap,
+) -> Vec<(String, Bytes)> {
+    let Some(cluster) = service.cluster.as_ref().filter(|_| !is_forwarded(headers)) else {
         return Vec::new();
     };
     let standing = cluster.standing();
@@ -133,10 +177,11 @@ pub(crate) async fn ask_others(service: &Shared, path: &str, headers: &HeaderMap
         .nodes
         .iter()
         .filter(|other| other.name != standing.node && other.state == NodeState::Live);
-    let asked = others.map(|other| {
-        service
-            .forwarder
-            .list(&other.address, path, headers, &standing.node)
+    let asked = others.map(async |other| {
+        let address = other.address.clone();
+        let node = &standing.node;
+        let answer = service.forwarder.list(&address, path, headers, node).await;
+        answer.map(|answer| (address, answer))
     });
     join_all(asked).await.into_iter().flatten().collect()
 }
@@ -147,8 +192,10 @@ mod tests {
 
     #[test]
     fn what_concerns_a_space_is_told_by_its_path() {
-        assert_eq!(space_of("/v1/spaces/hall"), Some("hall"));
-        assert_eq!(space_of("/v1/spaces/hall/agents/ada"), Some("hall"));
+        for path in ["hall", "hall/agents/ada", "h%61ll", "%68all/places"] {
+            let space = space_of(&format!("/v1/spaces/{path}"));
+            assert_eq!(space.as_deref(), Some("hall"), "{path}");
+        }
         for path in [
             "/v1/spaces",
             "/v1/spaces/",

@@ -36,6 +36,18 @@ impl HostRule {
         Self::Named(names.iter().map(|name| name.to_lowercase()).collect())
     }
 
+    /// The rule with the host of an authority, such as `map.local:8080`, added.
+    #[must_use]
+    pub fn and_host_of(self, authority: &str) -> Self {
+        match (self, authority.parse::<Authority>()) {
+            (Self::Named(mut names), Ok(authority)) => {
+                names.push(authority.host().to_lowercase());
+                Self::Named(names)
+            }
+            (rule, _) => rule,
+        }
+    }
+
     /// Whether a request is for this service, and not sent by a page of another that is not among
     /// `origins`.
     pub(crate) fn check(&self, request: &Request, origins: &[String]) -> Result<(), Problem> {
@@ -179,5 +191,16 @@ mod tests {
         let named = HostRule::Named(names(&["a"]));
         assert_eq!(HostRule::new(&names(&["A"]), true), named);
         assert_eq!(HostRule::new(&[], false), HostRule::Named(Vec::new()));
+    }
+
+    #[test]
+    fn a_node_is_asked_by_the_name_in_its_address() {
+        let rule = HostRule::new(&[], false).and_host_of("Node-a.example:8080");
+        let ask = |host| check(&rule, Method::GET, &[("host", host)]);
+        assert_eq!(ask("node-a.example:8080"), Ok(()));
+        assert_eq!(ask("node-b.example:8080"), Err(Kind::UnknownHost));
+        assert_eq!(HostRule::Any.and_host_of("node-a:80"), HostRule::Any);
+        let none = HostRule::new(&[], false);
+        assert_eq!(none.clone().and_host_of(""), none);
     }
 }

@@ -14,12 +14,15 @@ use utoipa::ToSchema;
 use super::extract::{
     AnySpaceOfPath, NoQuery, SpaceOfPath, SpaceParam, must_be_json, name, whole_body,
 };
+use super::forward::{ask_others, is_forwarded};
 use super::json;
 use super::problem::{Kind, Problem};
 use super::reply;
 use super::state::Service;
+use crate::cluster::Whereabouts;
 use crate::encode;
 use crate::engine::{Space, Unavailable};
+use crate::store::ShardNumber;
 
 /// How often to look whether a new space has been set up.
 const SET_UP_POLL: Duration = Duration::from_millis(1);
@@ -32,6 +35,10 @@ pub(crate) struct ListedSpaces {
     /// Spaces that are stopped because their journal is damaged, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     stopped: Vec<StoppedSpace>,
+    /// Shards of which this node knows no spaces for the moment: they change hands, or their owners
+    /// did not answer. Their spaces are missing here.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    missing_shards: Vec<u32>,
 }
 
 impl ListedSpaces {
@@ -65,6 +72,7 @@ pub(crate) async fn list(
     let ListedSpaces {
         mut spaces,
         mut stopped,
+        missing_shards,
     } = elsewhere(&service, &headers).await;
     for space in service.engine.spaces() {
         if let Some(reason) = space.stop_reason() {
@@ -75,7 +83,11 @@ pub(crate) async fn list(
         }
     }
     spaces.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok(reply::json(&ListedSpaces { spaces, stopped }))
+    Ok(reply::json(&ListedSpaces {
+        spaces,
+        stopped,
+        missing_shards,
+    }))
 }
 
 /// The spaces of the other nodes of the cluster.
@@ -83,16 +95,29 @@ pub(crate) async fn elsewhere(service: &Service, headers: &HeaderMap) -> ListedS
     let mut all = ListedSpaces {
         spaces: Vec::new(),
         stopped: Vec::new(),
+        missing_shards: Vec::new(),
     };
-    for answer in super::forward::ask_others(service, "/v1/spaces", headers).await {
+    let Some(cluster) = { service.cluster.as_ref() }.filter(|_| !is_forwarded(headers)) else {
+        return all;
+    };
+    let mut answered = Vec::new();
+    for (address, answer) in ask_others(service, "/v1/spaces", headers).await {
         match serde_json::from_slice::<ListedSpaces>(&answer) {
             Ok(listed) => {
                 all.spaces.extend(listed.spaces);
                 all.stopped.extend(listed.stopped);
+                answered.push(address);
             }
             Err(error) => tracing::debug!(%error, "the spaces of another node"),
         }
     }
+    let is_missing = |shard: &ShardNumber| match cluster.whereabouts(*shard) {
+        Whereabouts::Here => false,
+        Whereabouts::At(address) => !answered.contains(&address),
+        Whereabouts::Nowhere => true,
+    };
+    let missing = service.engine.shards().all().filter(is_missing);
+    all.missing_shards = missing.map(|shard| shard.0).collect();
     all
 }
 

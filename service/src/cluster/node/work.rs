@@ -1,6 +1,7 @@
 //! What takes a node long: beats, and opening and closing shards, each on a thread of its own.
 
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread::Builder;
@@ -43,6 +44,8 @@ pub(super) struct Worker {
     signals: Sender<Signal>,
     /// Where this node is reached over HTTP.
     address: String,
+    /// Time between beats.
+    interval: Duration,
     /// Longest wait for the storage.
     timeout: Duration,
     /// Spaces that are created where they are not there yet.
@@ -63,6 +66,7 @@ impl Worker {
             engine,
             signals,
             address: settings.address.clone(),
+            interval: settings.beat_interval,
             timeout: settings.lease,
             spaces: Arc::new(settings.spaces.clone()),
             beating: false,
@@ -83,11 +87,16 @@ impl Worker {
     pub(super) fn beat(&mut self, node: &NodeId, count: u64) {
         self.beating = true;
         let (registry, node, timeout) = (self.registry.clone(), node.clone(), self.timeout);
-        let address = self.address.clone();
-        self.spawn("beat", move || {
+        let (address, interval) = (self.address.clone(), self.interval);
+        let asked = Instant::now();
+        let failed = Signal::Beat(Beat {
+            asked,
+            seen: Err(StoreError::Io("a beat ended with a panic".into())),
+        });
+        self.spawn("beat", failed, move || {
             let asked = Instant::now();
             // A connection that was lost without a word must not cost the lease.
-            let seen = registry.beat(&node, &address, count, timeout / BEATS_PER_LEASE);
+            let seen = registry.beat(&node, &address, count, interval, timeout / BEATS_PER_LEASE);
             Signal::Beat(Beat { asked, seen })
         });
     }
@@ -97,7 +106,9 @@ impl Worker {
         let (storage, registry) = (Arc::clone(&self.storage), self.registry.clone());
         let (engine, node, timeout) = (self.engine.clone(), node.clone(), self.timeout);
         let spaces = Arc::clone(&self.spaces);
-        self.spawn("open shard", move || {
+        let failed = StoreError::Io("opening it ended with a panic".into());
+        let failed = Signal::Done(Done::Opened(shard, Err(failed)));
+        self.spawn("open shard", failed, move || {
             let open = || {
                 let known = last.as_ref().map_or(0, |last| last.term);
                 let before = storage.term_of(shard)?;
@@ -132,7 +143,9 @@ impl Worker {
     pub(super) fn close(&self, record: OwnerRecord) {
         let (registry, engine, timeout) =
             (self.registry.clone(), self.engine.clone(), self.timeout);
-        self.spawn("close shard", move || {
+        // What the engine still has of it is closed once more.
+        let failed = Signal::Done(Done::Closed(record.clone()));
+        self.spawn("close shard", failed, move || {
             engine.close_shard(record.shard);
             if let Err(error) = registry.disown(&record, timeout) {
                 tracing::debug!(%error, "forget the owner of a shard");
@@ -164,11 +177,18 @@ impl Worker {
         });
     }
 
-    /// Does what takes long, and tells the node what came of it. It may have ended meanwhile.
-    fn spawn(&self, name: &str, work: impl FnOnce() -> Signal + Send + 'static) {
+    /// Does what takes long, and tells the node what came of it, or that it `failed` where it
+    /// panicked. The node may have ended meanwhile.
+    fn spawn(&self, name: &str, failed: Signal, work: impl FnOnce() -> Signal + Send + 'static) {
         let signals = self.signals.clone();
-        spawn(name, move || drop(signals.send(work())));
+        spawn(name, move || drop(signals.send(outcome(work, failed))));
     }
+}
+
+/// What comes of work, or `failed` where it panics. The panic has been logged then.
+fn outcome<T>(work: impl FnOnce() -> T, failed: T) -> T {
+    // What the work shares with others is behind locks, which tell of the panic by themselves.
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or(failed)
 }
 
 fn spawn(name: &str, work: impl FnOnce() + Send + 'static) {
@@ -194,5 +214,16 @@ fn create_spaces(engine: &Engine, shard: ShardNumber, spaces: &BTreeMap<Name, Sp
                 "the settings given for the space are without effect: they were fixed when it was created"),
             Err(error) => tracing::error!(space = %name, %error, "create a space"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_node_is_told_of_work_that_panics() {
+        assert_eq!(outcome(|| "open", "failed"), "open");
+        assert_eq!(outcome(|| panic!("on purpose"), "failed"), "failed");
     }
 }

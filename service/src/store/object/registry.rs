@@ -5,7 +5,8 @@
 //! cluster/owners/{shard}/{term}/{node}.{session}      nothing: the node owns the shard
 //! ```
 //!
-//! A listing tells everything: no object is read. Records of owners say where a shard is; who may
+//! A listing tells nodes everything: they read no object. A beat holds a count and the time between
+//! two beats \[ms\]. Records of owners say where a shard is; who may
 //! write it the storage itself decides, by the epoch of its database.
 
 use std::sync::Arc;
@@ -92,8 +93,8 @@ impl Registry {
         Self { location, runtime }
     }
 
-    /// Says that a node is there, reached over HTTP at an address, and looks who else is. `count`
-    /// differs from beat to beat.
+    /// Says that a node is there, reached over HTTP at an address, and says so again after an
+    /// interval; and looks who else is. `count` differs from beat to beat.
     ///
     /// # Errors
     /// [`StoreError::Unreachable`], also when it takes longer than `timeout`.
@@ -102,11 +103,13 @@ impl Registry {
         node: &NodeId,
         address: &str,
         count: u64,
+        interval: Duration,
         timeout: Duration,
     ) -> Result<Seen, StoreError> {
         let object = self.node(node, address);
         let beat = async {
-            let payload = PutPayload::from(count.to_string().into_bytes());
+            let said = format!("{count} {}", interval.as_millis());
+            let payload = PutPayload::from(said.into_bytes());
             self.location.storage().put(&object, payload).await?;
             self.list().await
         };
@@ -119,6 +122,30 @@ impl Registry {
     /// As [`Registry::beat`].
     pub fn look(&self, timeout: Duration) -> Result<Seen, StoreError> {
         self.wait(self.list(), timeout)
+    }
+
+    /// The time between the beats of a node, by its own word; none of one that is gone.
+    ///
+    /// # Errors
+    /// As [`Registry::beat`].
+    pub fn interval(
+        &self,
+        record: &NodeRecord,
+        timeout: Duration,
+    ) -> Result<Option<Duration>, StoreError> {
+        let object = self.node(&record.node, &record.address);
+        let get = async {
+            match self.location.storage().get(&object).await {
+                Ok(found) => found.bytes().await.map(Some),
+                Err(Error::NotFound { .. }) => Ok(None),
+                Err(error) => Err(error),
+            }
+        };
+        let said = self.wait(get, timeout)?;
+        Ok(said.and_then(|said| {
+            let (_, interval) = std::str::from_utf8(&said).ok()?.split_once(' ')?;
+            interval.parse().ok().map(Duration::from_millis)
+        }))
     }
 
     /// Notes that a node owns a shard.

@@ -1,7 +1,7 @@
 //! A whole store on object storage: its description and its shards.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 use slatedb::admin::Admin;
@@ -23,8 +23,12 @@ const SHARDS: &str = "shards";
 
 /// Longest wait for the registry.
 const LOOK_TIMEOUT: Duration = Duration::from_secs(30);
-/// A time in which nodes say at least once that they are there, unless told otherwise.
-const BEATS: Duration = Duration::from_secs(2);
+/// Least wait for a node's next beat, and the intervals between two beats that are waited for: one
+/// may be late, or fail.
+const WAIT_MIN: Duration = Duration::from_secs(2);
+const INTERVALS_WAITED: u32 = 3;
+/// How often is looked meanwhile.
+const LOOK_INTERVAL: Duration = Duration::from_millis(250);
 
 /// A store on object storage, of which each shard is opened by itself.
 #[derive(Debug)]
@@ -155,11 +159,19 @@ impl ObjectStorage {
             return Ok(());
         }
         // What nodes that are gone have left says nothing.
-        std::thread::sleep(BEATS);
-        let at_work = look()?
-            .nodes
-            .into_iter()
-            .find(|node| !before.contains(node));
+        let mut wait = WAIT_MIN;
+        for node in &before {
+            let interval = self.registry().interval(node, LOOK_TIMEOUT)?;
+            wait = wait.max(INTERVALS_WAITED * interval.unwrap_or_default());
+        }
+        tracing::info!(?wait, "waiting whether nodes of a cluster are at work");
+        let until = Instant::now() + wait;
+        let mut at_work = None;
+        while at_work.is_none() && Instant::now() < until {
+            std::thread::sleep(LOOK_INTERVAL);
+            let mut nodes = look()?.nodes.into_iter();
+            at_work = nodes.find(|node| !before.contains(node));
+        }
         at_work.map_or(Ok(()), |record| {
             let what = format!(
                 "{}: node {} of a cluster is at work on it",

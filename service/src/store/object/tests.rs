@@ -198,18 +198,22 @@ fn a_store_that_nodes_are_at_work_on_is_opened_by_none_else() {
     let storage = ObjectStorage::open(&url(directory.path()), Shards::ONE).unwrap();
     let (registry, timeout) = (storage.registry(), Duration::from_secs(5));
     let node = NodeId::parse("ada.1").unwrap();
-    registry.beat(&node, ADDRESS, 0, timeout).unwrap();
+    // Its beats come later than usual ones, and are awaited nevertheless.
+    let (interval, between) = (Duration::from_secs(1), Duration::from_millis(2500));
+    registry.beat(&node, ADDRESS, 0, interval, timeout).unwrap();
     assert!(storage.refuse_a_cluster().is_ok(), "it is gone");
     let stop = Arc::new(AtomicBool::new(false));
     let beating = {
         let (registry, node, stop) = (registry.clone(), node.clone(), Arc::clone(&stop));
         std::thread::spawn(move || {
             for count in 1.. {
-                registry.beat(&node, ADDRESS, count, timeout).unwrap();
+                registry
+                    .beat(&node, ADDRESS, count, interval, timeout)
+                    .unwrap();
                 if stop.load(Ordering::Relaxed) {
                     return;
                 }
-                std::thread::sleep(Duration::from_millis(100));
+                std::thread::sleep(between);
             }
         })
     };
@@ -229,7 +233,7 @@ fn the_registry_tells_where_nodes_are_reached() {
     let nodes = [("ada.1", "10.0.0.1:8080"), ("b.c.2", "[fe80::1]:80")];
     for (node, address) in nodes {
         let node = NodeId::parse(node).unwrap();
-        registry.beat(&node, address, 0, timeout).unwrap();
+        registry.beat(&node, address, 0, timeout, timeout).unwrap();
     }
     let seen = registry.look(timeout).unwrap().nodes;
     let told = |record: &NodeRecord| (record.node.to_string(), record.address.clone());
