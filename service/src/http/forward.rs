@@ -73,10 +73,8 @@ async fn ask_owner(
 ) -> Response<Body> {
     let node = cluster.standing().node.clone();
     let shard = service.engine.shards().of(space);
-    let there = Whereabouts::At(address.to_owned());
-    let (cluster, at) = (cluster.clone(), there.clone());
-    let moved = has_moved(move || cluster.whereabouts(shard) == at);
-    let mut moved = Box::pin(moved);
+    let (cluster, there) = (cluster.clone(), Whereabouts::At(address.to_owned()));
+    let mut moved = Box::pin(has_moved(move || cluster.whereabouts(shard) == there));
     let answered = tokio::select! {
         answered = service.forwarder.forward(request, address, &node) => answered,
         () = &mut moved => return owner_lost(space).into_response(),

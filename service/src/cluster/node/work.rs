@@ -88,9 +88,8 @@ impl Worker {
         self.beating = true;
         let (registry, node, timeout) = (self.registry.clone(), node.clone(), self.timeout);
         let (address, interval) = (self.address.clone(), self.interval);
-        let asked = Instant::now();
         let failed = Signal::Beat(Beat {
-            asked,
+            asked: Instant::now(),
             seen: Err(StoreError::Io("a beat ended with a panic".into())),
         });
         self.spawn("beat", failed, move || {

@@ -8,6 +8,10 @@
 
 use super::number;
 
+/// Searches in a list that take as long as looking at each of its groups, per group. Source: a
+/// search among a thousand takes ten steps, and each removal moves a part of the list.
+const SEARCHES: usize = 16;
+
 /// Variables that are eliminated together.
 #[derive(Debug, Default)]
 pub(super) struct Stage {
@@ -49,29 +53,51 @@ pub(super) fn order(adjacent: Vec<Vec<u32>>) -> Vec<Stage> {
 /// it.
 #[derive(Debug, Default)]
 struct Group {
-    /// Empty once it is eliminated, or has become part of another group.
     members: Vec<u32>,
-    /// Other groups coupled with it by a link, ascending; those gone are removed now and then.
+    /// Other groups coupled with it by a link and by no element, ascending.
     variables: Vec<u32>,
+    /// Number of members of these, and sum of their numbers.
+    linked: Linked,
     /// Elements that it belongs to, ascending.
     elements: Vec<usize>,
     /// An upper bound of the number of variables coupled with it.
     degree: usize,
 }
 
+impl Group {
+    /// Removes a group of so many members from those that this one has links with.
+    fn forget(&mut self, other: u32, members: u32) {
+        if let Ok(at) = self.variables.binary_search(&other) {
+            self.variables.remove(at);
+            self.linked.members -= members;
+            self.linked.numbers -= other as usize;
+        }
+    }
+}
+
+/// What is counted of the groups that a group has links with.
+#[derive(Clone, Copy, Debug, Default)]
+struct Linked {
+    members: u32,
+    numbers: usize,
+}
+
 /// The state of the elimination.
 struct Quotient {
     groups: Vec<Group>,
+    /// Number of members of each group; 0 once it is eliminated, or has become part of another one.
+    /// Apart from the groups, since this is asked of many that lie far apart in memory.
+    weights: Vec<u32>,
     /// Groups of each element, of which each pivot leaves one; empty once used up.
     elements: Vec<Vec<u32>>,
-    /// Number of variables of each element.
-    sizes: Vec<usize>,
+    /// Number of variables of each element; 0 once it is used up.
+    sizes: Vec<u32>,
     /// How many of an element's variables lie outside the newest element, and when that was
     /// counted.
-    outside: Vec<(usize, usize)>,
+    outside: Vec<(u32, u32)>,
     /// The step at which a group was last seen.
-    seen: Vec<usize>,
-    step: usize,
+    seen: Vec<u32>,
+    step: u32,
     /// Groups by degree; an entry whose group has another degree by now, or is gone, is stale.
     buckets: Vec<Vec<u32>>,
     least_degree: usize,
@@ -86,14 +112,20 @@ impl Quotient {
             variables.dedup();
             variables.retain(|&other| other != own);
             let (members, degree) = (vec![own], variables.len());
+            let linked = Linked {
+                members: number(degree),
+                numbers: variables.iter().map(|&other| other as usize).sum(),
+            };
             groups.push(Group {
                 members,
                 variables,
+                linked,
                 degree,
                 elements: Vec::new(),
             });
         }
         let mut quotient = Self {
+            weights: vec![1; n],
             outside: Vec::new(),
             sizes: Vec::new(),
             elements: Vec::new(),
@@ -120,11 +152,9 @@ impl Quotient {
     fn next_pivot(&mut self) -> Option<usize> {
         while self.least_degree < self.buckets.len() {
             while let Some(group) = self.buckets[self.least_degree].pop() {
-                let Group {
-                    members, degree, ..
-                } = &self.groups[group as usize];
-                if !members.is_empty() && *degree == self.least_degree {
-                    return Some(group as usize);
+                let group = group as usize;
+                if self.weights[group] > 0 && self.groups[group].degree == self.least_degree {
+                    return Some(group);
                 }
             }
             self.least_degree += 1;
@@ -140,26 +170,26 @@ impl Quotient {
         self.seen[pivot] = step;
         let variables = std::mem::take(&mut self.groups[pivot].variables);
         let mut used_up = std::mem::take(&mut self.groups[pivot].elements);
-        used_up.retain(|&element| !self.elements[element].is_empty());
+        used_up.retain(|&element| self.sizes[element] > 0);
         let mut coupled = Vec::new();
-        let parts = used_up
-            .iter()
-            .map(|&element| std::mem::take(&mut self.elements[element]));
+        let parts = used_up.iter().map(|&element| {
+            self.sizes[element] = 0;
+            std::mem::take(&mut self.elements[element])
+        });
         for group in parts.chain([variables]).flatten() {
-            let is_alive = !self.groups[group as usize].members.is_empty();
-            if is_alive && self.seen[group as usize] != step {
-                self.seen[group as usize] = step;
+            let seen = &mut self.seen[group as usize];
+            if self.weights[group as usize] > 0 && *seen != step {
+                *seen = step;
                 coupled.push(group);
             }
         }
         used_up.extend(self.count_outside(&coupled));
-        let size = coupled
-            .iter()
-            .map(|&group| self.groups[group as usize].members.len())
-            .sum();
+        let size = coupled.iter().map(|&group| self.weights[group as usize]);
+        let size: u32 = size.sum();
         for &group in &coupled {
-            self.update(group as usize, size);
+            self.update(group as usize, pivot, &coupled, size);
         }
+        self.weights[pivot] = 0;
         self.elements.push(coupled);
         self.sizes.push(size);
         self.outside.push((0, 0));
@@ -171,52 +201,79 @@ impl Quotient {
     /// returned.
     fn count_outside(&mut self, newest: &[u32]) -> Vec<usize> {
         let mut met = Vec::new();
-        for group in newest.iter().map(|&group| &self.groups[group as usize]) {
-            for &element in group
-                .elements
-                .iter()
-                .filter(|&&e| !self.elements[e].is_empty())
-            {
+        for &group in newest {
+            let weight = self.weights[group as usize];
+            for &element in &self.groups[group as usize].elements {
+                let size = self.sizes[element];
+                if size == 0 {
+                    continue;
+                }
                 let (outside, counted_at) = &mut self.outside[element];
                 if *counted_at != self.step {
-                    (*outside, *counted_at) = (self.sizes[element], self.step);
+                    (*outside, *counted_at) = (size, self.step);
                     met.push(element);
                 }
-                *outside -= group.members.len();
+                *outside -= weight;
             }
         }
         met.retain(|&element| self.outside[element].0 == 0);
         for &element in &met {
             self.elements[element].clear();
+            self.sizes[element] = 0;
         }
         met
     }
 
-    /// Brings a group of the newest element up to date; `size` is that element's number of
-    /// variables.
-    fn update(&mut self, group: usize, size: usize) {
-        let mut own = std::mem::take(&mut self.groups[group]);
-        own.elements
-            .retain(|&element| !self.elements[element].is_empty());
-        own.variables.retain(|&other| {
-            let is_alive = !self.groups[other as usize].members.is_empty();
-            is_alive && self.seen[other as usize] != self.step
+    /// Brings a group of the newest element, which a pivot leaves, up to date; `size` is that
+    /// element's number of variables.
+    fn update(&mut self, group: usize, pivot: usize, newest: &[u32], size: u32) {
+        let most = self.groups.len() - 1;
+        let own = &mut self.groups[group];
+        let mut by_elements = 0_usize;
+        own.elements.retain(|&element| {
+            let is_there = self.sizes[element] > 0;
+            if is_there {
+                by_elements += self.outside[element].0 as usize;
+            }
+            is_there
         });
-        let others = size - own.members.len();
-        let by_links: usize = own
-            .variables
-            .iter()
-            .map(|&other| self.groups[other as usize].members.len())
-            .sum();
-        let by_elements: usize = own
-            .elements
-            .iter()
-            .map(|&element| self.outside[element].0)
-            .sum();
+        // The newest element couples what links have coupled. A landmark that was seen a thousand
+        // times has few of them less at a time.
+        if SEARCHES * newest.len() < own.variables.len() {
+            for &other in newest.iter().chain([&number(pivot)]) {
+                own.forget(other, self.weights[other as usize]);
+            }
+        } else {
+            let linked = &mut own.linked;
+            own.variables.retain(|&other| {
+                let is_apart = self.seen[other as usize] != self.step;
+                if !is_apart {
+                    linked.members -= self.weights[other as usize];
+                    linked.numbers -= other as usize;
+                }
+                is_apart
+            });
+        }
+        let others = size - self.weights[group];
         own.elements.push(self.elements.len());
-        own.degree = (own.degree + others).min(others + by_links + by_elements);
-        own.degree = own.degree.min(self.groups.len() - 1);
-        self.groups[group] = own;
+        let (others, by_links) = (others as usize, own.linked.members as usize);
+        let bound = others + by_links + by_elements;
+        own.degree = (own.degree + others).min(bound).min(most);
+    }
+
+    /// Makes a group part of another one that is coupled with the same others.
+    fn merge(&mut self, kept: usize, other: u32) {
+        let Group {
+            members, variables, ..
+        } = std::mem::take(&mut self.groups[other as usize]);
+        for variable in variables {
+            // The other one has all of its members from now on.
+            self.groups[variable as usize].forget(other, 0);
+        }
+        self.weights[kept] += std::mem::take(&mut self.weights[other as usize]);
+        let kept = &mut self.groups[kept];
+        kept.degree -= members.len().min(kept.degree);
+        kept.members.extend(members);
     }
 
     /// Merges groups of the newest element that are coupled with the same others, and offers what
@@ -229,22 +286,14 @@ impl Quotient {
             .clone();
         let mut by_sum: Vec<(usize, u32)> = Vec::with_capacity(newest.len());
         for &group in &newest {
-            let Group {
-                variables,
-                elements,
-                ..
-            } = &self.groups[group as usize];
-            let sum = variables
-                .iter()
-                .map(|&v| v as usize)
-                .chain(elements.iter().copied())
-                .sum();
+            let own = &self.groups[group as usize];
+            let sum = own.linked.numbers + own.elements.iter().sum::<usize>();
             by_sum.push((sum, group));
         }
         by_sum.sort_unstable();
         for i in 0..by_sum.len() {
             let (sum, kept) = by_sum[i];
-            if self.groups[kept as usize].members.is_empty() {
+            if self.weights[kept as usize] == 0 {
                 continue;
             }
             for &(_, other) in by_sum[i + 1..]
@@ -252,18 +301,16 @@ impl Quotient {
                 .take_while(|(other, _)| *other == sum)
             {
                 let (a, b) = (&self.groups[kept as usize], &self.groups[other as usize]);
-                let is_same =
-                    !b.members.is_empty() && a.elements == b.elements && a.variables == b.variables;
+                let is_same = self.weights[other as usize] > 0
+                    && a.elements == b.elements
+                    && a.variables == b.variables;
                 if is_same {
-                    let members = std::mem::take(&mut self.groups[other as usize].members);
-                    let kept = &mut self.groups[kept as usize];
-                    kept.degree -= members.len().min(kept.degree);
-                    kept.members.extend(members);
+                    self.merge(kept as usize, other);
                 }
             }
         }
         for &group in &newest {
-            if !self.groups[group as usize].members.is_empty() {
+            if self.weights[group as usize] > 0 {
                 self.offer(group as usize);
             }
         }
