@@ -8,9 +8,10 @@
 
 use super::number;
 
-/// Searches in a list that take as long as looking at each of its groups, per group. Source: a
-/// search among a thousand takes ten steps, and each removal moves a part of the list.
-const SEARCHES: usize = 16;
+/// Entries of a list for each one that goes, from which on those are searched for; in a shorter list
+/// all entries are looked at. Source: a search among a thousand takes ten steps, and each removal
+/// moves a part of the list.
+const SEARCHED_MIN: usize = 16;
 
 /// Variables that are eliminated together.
 #[derive(Debug, Default)]
@@ -237,9 +238,9 @@ impl Quotient {
             }
             is_there
         });
-        // The newest element couples what links have coupled. A landmark that was seen a thousand
-        // times has few of them less at a time.
-        if SEARCHES * newest.len() < own.variables.len() {
+        // The newest element takes the place of links. Of the thousand links of a landmark these are
+        // few, and looking at all of them each time would take as long as all else.
+        if SEARCHED_MIN * newest.len() < own.variables.len() {
             for &other in newest.iter().chain([&number(pivot)]) {
                 own.forget(other, self.weights[other as usize]);
             }
@@ -312,6 +313,100 @@ impl Quotient {
         for &group in &newest {
             if self.weights[group as usize] > 0 {
                 self.offer(group as usize);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A chain of poses with landmarks that many of them have seen, and links across.
+    fn sighted(poses: u32, seen: &[(u32, u32)], across: &[(u32, u32)]) -> Vec<BTreeSet<u32>> {
+        let landmark = |number: u32| poses + number % 3;
+        let chain = (1..poses).map(|pose| (pose - 1, pose));
+        let seen = seen
+            .iter()
+            .map(|(pose, number)| (pose % poses, landmark(*number)));
+        let across = across.iter().map(|(a, b)| (a % poses, b % poses));
+        let mut adjacent = vec![BTreeSet::new(); poses as usize + 3];
+        for (a, b) in chain.chain(seen).chain(across).filter(|(a, b)| a != b) {
+            adjacent[a as usize].insert(b);
+            adjacent[b as usize].insert(a);
+        }
+        adjacent
+    }
+
+    /// Eliminates a variable in a plain graph; answers what it was coupled with.
+    fn eliminate(graph: &mut [BTreeSet<u32>], pivot: u32) -> BTreeSet<u32> {
+        let coupled = std::mem::take(&mut graph[pivot as usize]);
+        for &own in &coupled {
+            let others = coupled.iter().filter(|other| **other != own);
+            graph[own as usize].extend(others);
+            graph[own as usize].remove(&pivot);
+        }
+        coupled
+    }
+
+    fn lists(graph: &[BTreeSet<u32>]) -> Vec<Vec<u32>> {
+        graph
+            .iter()
+            .map(|own| own.iter().copied().collect())
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn stages_are_those_of_plain_elimination(
+            poses in 100..200_u32,
+            seen in prop::collection::vec(any::<(u32, u32)>(), 0..400),
+            across in prop::collection::vec(any::<(u32, u32)>(), 0..20),
+        ) {
+            let mut plain = sighted(poses, &seen, &across);
+            let mut eliminated = 0;
+            for stage in order(lists(&plain)) {
+                let mut rest: BTreeSet<u32> = stage.frontal.iter().copied().collect();
+                for pivot in stage.frontal {
+                    rest.remove(&pivot);
+                    let expected: BTreeSet<u32> = { stage.separator.iter() }
+                        .chain(&rest)
+                        .copied()
+                        .collect();
+                    prop_assert_eq!(eliminate(&mut plain, pivot), expected);
+                    eliminated += 1;
+                }
+            }
+            prop_assert_eq!(eliminated, plain.len());
+        }
+
+        #[test]
+        fn what_is_counted_of_links_is_what_there_is(
+            poses in 100..200_u32,
+            seen in prop::collection::vec(any::<(u32, u32)>(), 0..400),
+            across in prop::collection::vec(any::<(u32, u32)>(), 0..20),
+        ) {
+            let mut quotient = Quotient::new(lists(&sighted(poses, &seen, &across)));
+            while let Some(pivot) = quotient.next_pivot() {
+                quotient.eliminate(pivot);
+                quotient.groups[pivot].members.clear();
+                quotient.merge_indistinguishable();
+                for (group, weight) in quotient.groups.iter().zip(&quotient.weights) {
+                    prop_assert_eq!(group.members.len(), *weight as usize);
+                    if *weight == 0 {
+                        continue;
+                    }
+                    let weights = { group.variables.iter() }
+                        .map(|other| quotient.weights[*other as usize]);
+                    prop_assert!(weights.clone().all(|weight| weight > 0), "none is gone");
+                    prop_assert_eq!(group.linked.members, weights.sum::<u32>());
+                    let numbers = group.variables.iter().map(|other| *other as usize);
+                    prop_assert_eq!(group.linked.numbers, numbers.sum::<usize>());
+                }
             }
         }
     }
