@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use super::*;
+use crate::http::HostRule;
 
 const DOCUMENTED: &str = include_str!("../../cogmap.toml");
 
@@ -72,6 +73,16 @@ fn the_documented_file_mentions_every_key() {
 fn no_file_gives_the_defaults() {
     let config = Config::from_sources(None, [], &[]).expect("loads");
     assert_eq!(config, Config::default());
+}
+
+#[test]
+fn a_node_answers_by_the_name_that_other_nodes_ask_for() {
+    let mut config = Config::default();
+    config.cluster.address = "node-a.example:80".into();
+    assert_eq!(config.http_settings().hosts, HostRule::new(&[], false));
+    config.cluster.enabled = true;
+    let named = HostRule::new(&["node-a.example".to_owned()], false);
+    assert_eq!(config.http_settings().hosts, named);
 }
 
 #[test]

@@ -23,9 +23,10 @@ const SHARDS: &str = "shards";
 
 /// Longest wait for the registry.
 const LOOK_TIMEOUT: Duration = Duration::from_secs(30);
-/// Least wait for a node's next beat, and the intervals between two beats that are waited for: one
-/// may be late, or fail.
+/// Least and longest wait for a node's next beat, and the intervals between two beats that are
+/// waited for: one may be late, or fail.
 const WAIT_MIN: Duration = Duration::from_secs(2);
+const WAIT_MAX: Duration = Duration::from_secs(60);
 const INTERVALS_WAITED: u32 = 3;
 /// How often is looked meanwhile.
 const LOOK_INTERVAL: Duration = Duration::from_millis(250);
@@ -162,9 +163,17 @@ impl ObjectStorage {
         let mut wait = WAIT_MIN;
         for node in &before {
             let interval = self.registry().interval(node, LOOK_TIMEOUT)?;
-            wait = wait.max(INTERVALS_WAITED * interval.unwrap_or_default());
+            let interval = interval.unwrap_or_default();
+            wait = wait.max(interval.saturating_mul(INTERVALS_WAITED));
+            if wait > WAIT_MAX {
+                let what = format!(
+                    "{}: node {} of a cluster may be at work on it, and says so only every \
+                     {interval:?}; end it, or if it was killed, start a node and end that",
+                    self.location, node.node.name
+                );
+                return Err(StoreError::Io(what));
+            }
         }
-        tracing::info!(?wait, "waiting whether nodes of a cluster are at work");
         let until = Instant::now() + wait;
         let mut at_work = None;
         while at_work.is_none() && Instant::now() < until {

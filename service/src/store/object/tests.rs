@@ -221,6 +221,12 @@ fn a_store_that_nodes_are_at_work_on_is_opened_by_none_else() {
     stop.store(true, Ordering::Relaxed);
     beating.join().unwrap();
     assert!(matches!(&refused, Err(StoreError::Io(text)) if text.contains("node ada")));
+    // One that is hardly ever heard is not waited for.
+    for interval in [Duration::from_secs(30), Duration::from_millis(u64::MAX)] {
+        registry.beat(&node, ADDRESS, 0, interval, timeout).unwrap();
+        let refused = storage.refuse_a_cluster();
+        assert!(matches!(&refused, Err(StoreError::Io(text)) if text.contains("may be at work")));
+    }
     registry.leave(&node, ADDRESS, timeout).unwrap();
     assert_eq!(registry.look(timeout).unwrap(), Seen::default());
 }
