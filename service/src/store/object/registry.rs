@@ -6,8 +6,8 @@
 //! ```
 //!
 //! A listing tells nodes everything: they read no object. A beat holds a count and the time between
-//! two beats \[ms\], for programs that look whether nodes are at work. Records of owners say where a
-//! shard is; who may write it the storage itself decides, by the epoch of its database.
+//! two beats \[ms\], for programs that look whether nodes are at work. Records of owners say where
+//! a shard is; who may write it the storage itself decides, by the epoch of its database.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -8,9 +8,9 @@
 
 use super::number;
 
-/// Entries of a list for each one that goes, from which on those are searched for; in a shorter list
-/// all entries are looked at. Source: a search among a thousand takes ten steps, and each removal
-/// moves a part of the list.
+/// Entries of a list for each one that goes, from which on those are searched for; in a shorter
+/// list all entries are looked at. Source: a search among a thousand takes ten steps, and each
+/// removal moves a part of the list.
 const SEARCHED_MIN: usize = 16;
 
 /// Variables that are eliminated together.
@@ -238,8 +238,8 @@ impl Quotient {
             }
             is_there
         });
-        // The newest element takes the place of links. Of the thousand links of a landmark these are
-        // few, and looking at all of them each time would take as long as all else.
+        // The newest element takes the place of links. Of the thousand links of a landmark these
+        // are few, and looking at all of them each time would take as long as all else.
         if SEARCHED_MIN * newest.len() < own.variables.len() {
             for &other in newest.iter().chain([&number(pivot)]) {
                 own.forget(other, self.weights[other as usize]);
