@@ -25,6 +25,8 @@ pub(crate) struct IndexedModel {
     pub(crate) area_m2: f64,
     /// Typical distance between neighbouring places that were felt \[m\].
     pub(crate) gap_m: f64,
+    /// Standard deviation of what was predicted between the places \[m\]; none where nothing was.
+    pub(crate) between_sd_m: Option<f64>,
     /// Distributions of its levels, by channel.
     pub(crate) own_levels: Vec<LevelPrior>,
     /// Where it goes on beyond what was felt; none of one that was felt all over.
@@ -84,6 +86,7 @@ impl IndexedModel {
             surfel_map: SurfelMap::new(model),
             extent_m,
             gap_m: graph.typical_m,
+            between_sd_m: between_sd_m(&places),
             own_levels: level_prior(places.iter().flat_map(|place| &place.levels)),
             places,
         }
@@ -94,15 +97,6 @@ impl IndexedModel {
         self.places.iter().flat_map(|place| &place.levels)
     }
 
-    /// Standard deviation of what was predicted between the places \[m\]; none where nothing was.
-    pub(crate) fn between_sd_m(&self) -> Option<f64> {
-        let predicted = self.places.iter().filter(|place| place.is_predicted);
-        let (count, sum) = predicted.fold((0.0, 0.0), |(count, sum), place| {
-            (count + 1.0, sum + place.variance_m2)
-        });
-        (count > 0.0).then(|| f64::sqrt(sum / count))
-    }
-
     /// Mean share of the model within `reach_m` of one of its places.
     pub(crate) fn share(&self, reach_m: f64) -> f64 {
         let at = (reach_m / self.extent_m).clamp(0.0, 1.0) * SHARE_BINS as f64;
@@ -110,6 +104,15 @@ impl IndexedModel {
         let part = at - below as f64;
         self.shares[below] * (1.0 - part) + self.shares[below + 1] * part
     }
+}
+
+/// Standard deviation of what was predicted between the places \[m\].
+fn between_sd_m(places: &[IndexedPlace]) -> Option<f64> {
+    let predicted = places.iter().filter(|place| place.is_predicted);
+    let (count, sum) = predicted.fold((0.0, 0.0), |(count, sum), place| {
+        (count + 1.0, sum + place.variance_m2)
+    });
+    (count > 0.0).then(|| f64::sqrt(sum / count))
 }
 
 fn shares(positions: &[Point3<f64>], extent_m: f64) -> [f64; SHARE_BINS + 1] {

@@ -131,7 +131,7 @@ impl ObjectLibrary {
         (gap_m > 0.0).then(|| Density {
             gap_m,
             contact_sd_m: object.model.noise_m2().sqrt(),
-            between_sd_m: object.indexed.between_sd_m(),
+            between_sd_m: object.indexed.between_sd_m,
         })
     }
 

@@ -9,6 +9,7 @@ use super::{
 use crate::numeric::log_sum;
 use crate::translations::GaussianSum;
 
+mod sparse;
 mod turns;
 mod unknown;
 

@@ -97,9 +97,12 @@ pub(crate) const OPEN_CURVE_COS: f64 = -0.25;
 /// Share of the variance of places across a plane below which they lie in it: a seventh of the
 /// deviation. Chosen.
 pub(crate) const FLAT_SHARE: f64 = 0.02;
-/// Distance within which the errors of what lies between places are common, in typical links: about
-/// one gap. Chosen.
-pub(crate) const ERROR_REACH: f64 = 1.0;
+/// Distance within which the errors of what lies between places are common, in typical links: less
+/// than half a gap, beyond which other places tell what is predicted. Chosen.
+pub(crate) const ERROR_REACH: f64 = 0.35;
+/// The same where they speak for an unknown object: about one gap, so that it is named late rather
+/// than wrongly. Chosen.
+pub(crate) const UNKNOWN_ERROR_REACH: f64 = 1.0;
 /// Least share of an object that counts as not explored. Chosen.
 pub(crate) const UNEXPLORED_MIN: f64 = 0.05;
 /// Objects against each of which an unknown one has to be earned, the likeliest. Budget.
@@ -123,6 +126,25 @@ pub(crate) const ENTRIES_MAX: usize = 64;
 pub(crate) const KRIGING_CURVE: usize = 6;
 /// See [`KRIGING_CURVE`].
 pub(crate) const KRIGING_SURFACE: usize = 12;
+/// Neighbours of a place of which two span a plane with it. Budget.
+pub(crate) const SIDE_PAIRS: usize = 8;
+/// Such planes that are fitted to the places by them, the best. Budget.
+pub(crate) const SIDE_FITTED: usize = 4;
+/// Fits of each. Budget.
+pub(crate) const SIDE_FITS: usize = 2;
+/// Distance from a plane within which a neighbour lies by it, in typical links: a surface that
+/// turns by 9° over a link leaves its tangent plane so far. Chosen.
+pub(crate) const SIDE_REACH: f64 = 0.08;
+/// The same in deviations of a contact: it is as large as the larger of both. Chosen.
+pub(crate) const SIDE_NOISES: f64 = 3.0;
+/// Weight of a neighbour straight above a plane that has as many below, in neighbours by it: a
+/// plane through the body is no tangent plane. Chosen.
+pub(crate) const SIDE_THROUGH: f64 = 8.0;
+/// Cosine of the angle between the normals of two places of one side: 45°. Chosen.
+pub(crate) const SIDE_COS: f64 = 0.707;
+/// Sine of the angle between the tangent plane and the way to a place of the same side: half of
+/// 45°, as on a circle. Derived.
+pub(crate) const SIDE_OFFSET: f64 = 0.383;
 /// Places by which a field is learned: its variance is then good to a seventh. Budget.
 pub(crate) const FIELD_SAMPLES: usize = 96;
 /// Lengths of a field that are tried, in typical links. Chosen.
@@ -132,9 +154,12 @@ pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
 /// Fewer places tell nothing of what lies between and beyond them: of twenty contacts some fall on
 /// one place. Chosen.
 pub(crate) const BETWEEN_MIN: usize = 16;
-/// Share of the variance of a level that neighbours may leave open, at most: beyond, what is felt
-/// at a place says little of what lies beside it. Chosen.
-pub(crate) const UNPREDICTED_MAX: f64 = 0.5;
+/// Deviations by which the share of a level's variance that neighbours leave open is below one,
+/// where n places have a deviation of 1/√n: else what is felt at a place says little of what lies
+/// beside it. Chosen.
+pub(crate) const PREDICTED_DEVIATIONS: f64 = 2.6;
+/// Degrees of freedom of the errors of a field: few are far larger than the rest. Chosen.
+pub(crate) const TAILS: f64 = 4.0;
 /// Places whose errors scale the variance of a field around. Chosen.
 pub(crate) const ERROR_NEIGHBOURS: usize = 6;
 /// Nodes and places of a model: a model with more places has no nodes. Budget.
@@ -144,6 +169,9 @@ pub(crate) const NODES_MAX: usize = 1024;
 pub(crate) const DENSE_LINK: f64 = 1.5;
 /// Distance of nodes, in spacings. Chosen.
 pub(crate) const NODE_STEP: f64 = 2.0;
+/// Error of what is predicted between the places, per distance of nodes, above which that distance
+/// grows: a node's field along the surface is then half as wide as it errs across. Chosen.
+pub(crate) const NODE_ERROR: f64 = 0.6;
 /// Factor by which this distance grows until the nodes fit. Chosen.
 pub(crate) const NODES_GROWTH: f64 = 1.25;
 /// Least distance of two nodes, in steps. Chosen.
@@ -163,9 +191,9 @@ pub(crate) const PRUNE_NATS: f64 = 20.0;
 pub(crate) const SPLIT_SHARE_MIN: f64 = 0.005;
 /// Parts of a split. Budget.
 pub(crate) const SPLIT_MAX: usize = 16;
-/// Cell in which two hypotheses are one, in standard deviations: they lie within a fifth of a
-/// deviation or so of one another, and their sum is a Gaussian again. Chosen.
-pub(crate) const MERGE_CELL_SD: f64 = 0.4;
+/// Cell in which two hypotheses are one, in standard deviations: rounded down to a power of two, it
+/// is as wide as one. Their sum is near a Gaussian again, which has the moments of both. Chosen.
+pub(crate) const MERGE_CELL_SD: f64 = 1.6;
 /// Squared distance, in variances, beyond which a place is not the one touched: e⁻¹⁶. Chosen.
 pub(crate) const GATE_SQUARED: f64 = 32.0;
 

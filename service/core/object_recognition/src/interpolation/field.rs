@@ -1,13 +1,13 @@
 //! What a model's places say of how a field varies between them.
 
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Point3, Vector3};
 
-use super::graph::LinkGraph;
+use super::graph::{LinkGraph, median};
 use super::kriging::{Kriging, Weights};
-use crate::model::ModelPlace;
+use crate::model::{LevelMemory, ModelPlace};
 use crate::tuning::{
     ERROR_NEIGHBOURS, FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE,
-    SHRINKAGE, UNPREDICTED_MAX,
+    PREDICTED_DEVIATIONS, SHRINKAGE, TAILS,
 };
 
 /// What varies over a surface.
@@ -27,8 +27,13 @@ pub(super) struct Field {
     /// Noise per variance.
     noise: f64,
     variance: f64,
+    /// What differs from place to place beyond the noise of contacts, per variance: edges, borders
+    /// of patterns.
+    roughness: f64,
     /// Squared error of each place, left out, per its expectation.
     errors: Vec<f64>,
+    /// Median of how far the places are off their predictions.
+    pub(super) typical_error: f64,
 }
 
 /// Where a field is predicted: the middle, and the axes along the surface.
@@ -36,6 +41,16 @@ pub(super) struct Field {
 pub(super) struct Site {
     pub(super) middle: Point3<f64>,
     pub(super) axes: Vec<Vector3<f64>>,
+    /// Places on whose side of the surface it lies; none of a curve.
+    pub(super) of: Vec<u32>,
+}
+
+/// A place that is predicted by the others.
+#[derive(Clone, Debug)]
+pub(super) struct LeftOut {
+    pub(super) own: usize,
+    /// The sides of the surface about it, and the places of each, nearest first.
+    pub(super) from: Vec<(Site, Vec<u32>)>,
 }
 
 /// A field about a site.
@@ -44,9 +59,19 @@ pub(super) struct LocalField {
     kriging: Kriging,
     near: Vec<u32>,
     variance: f64,
+    roughness: f64,
+    /// Over which plane or line a place is predicted; none of a level.
+    over: Option<Site>,
 }
 
 impl Site {
+    /// The point of the plane or line below a point.
+    pub(super) fn below(&self, point: &Point3<f64>) -> Point3<f64> {
+        let offset = point - self.middle;
+        let along = self.axes.iter().map(|axis| axis * axis.dot(&offset));
+        self.middle + along.sum::<Vector3<f64>>()
+    }
+
     /// Places by which a field is predicted here.
     fn count(&self) -> usize {
         if self.axes.len() == 1 {
@@ -60,12 +85,14 @@ impl Site {
 impl Field {
     /// Learned by leave-one-out cross-validation: length and noise are those of the largest
     /// likelihood of the places, each predicted by the others, and the variance follows.
-    pub(super) fn learned(of: FieldOf, places: &[ModelPlace], graph: &LinkGraph) -> Option<Self> {
-        let step = places.len().div_ceil(FIELD_SAMPLES).max(1);
-        let sites: Vec<(usize, Site)> = (0..places.len())
-            .step_by(step)
-            .filter_map(|own| Some((own, site_of(own, places, graph)?)))
-            .collect();
+    pub(super) fn learned(
+        of: FieldOf,
+        left_out: &[LeftOut],
+        places: &[ModelPlace],
+        graph: &LinkGraph,
+    ) -> Option<(f64, Self)> {
+        let step = left_out.len().div_ceil(FIELD_SAMPLES).max(1);
+        let some: Vec<&LeftOut> = left_out.iter().step_by(step).collect();
         let mut best: Option<(f64, Self)> = None;
         for length in FIELD_LENGTHS {
             for noise in FIELD_NOISES {
@@ -74,49 +101,56 @@ impl Field {
                     length_m: length * graph.typical_m,
                     noise,
                     variance: 1.0,
+                    roughness: 0.0,
                     errors: Vec::new(),
+                    typical_error: 0.0,
                 };
-                if let Some((log, variance)) = field.cross_validated(&sites, places, graph)
+                if let Some((log, variance)) = field.cross_validated(&some, places)
                     && best.as_ref().is_none_or(|(most, _)| log > *most)
                 {
-                    let errors = Vec::new();
-                    best = Some((
-                        log,
-                        Self {
-                            variance,
-                            errors,
-                            ..field
-                        },
-                    ));
+                    best = Some((log, Self { variance, ..field }));
                 }
             }
         }
-        let (_, mut field) = best?;
-        let errors = (0..places.len()).map(|own| {
-            let site = site_of(own, places, graph)?;
-            let (residual, variance) = field.left_out(own, &site, places, graph)?;
-            Some(residual / (field.variance * variance))
-        });
-        field.errors = errors.map(|error| error.unwrap_or(1.0)).collect();
-        Some(field)
+        let (log, mut field) = best?;
+        let felt = places.iter().filter_map(|place| field.noise_of(place));
+        let (count, sum) = felt.fold((0.0, 0.0), |(count, sum), noise| (count + 1.0, sum + noise));
+        let felt = sum / f64::max(count, 1.0) / field.variance;
+        field.roughness = (field.noise - felt).max(0.0);
+        let mut errors = vec![1.0; places.len()];
+        let mut squares = Vec::with_capacity(left_out.len());
+        for of in left_out {
+            if let Some((residual, variance)) = field.error(of, places) {
+                errors[of.own] = residual / (field.variance * variance);
+                squares.push(residual);
+            }
+        }
+        field.errors = errors;
+        field.typical_error = median(squares).sqrt();
+        Some((log, field))
     }
 
-    /// Whether the places around tell most of what is felt at a place.
-    pub(super) fn is_predictable(&self, places: &[ModelPlace], graph: &LinkGraph) -> bool {
+    /// Variance of what was felt at a place, by the noise of its contacts.
+    fn noise_of(&self, place: &ModelPlace) -> Option<f64> {
+        match self.of {
+            FieldOf::Place => Some(place.variance_m2 / (place.count * place.count)),
+            FieldOf::Level(channel) => {
+                let own = place.levels.iter().find(|own| own.channel == channel);
+                own.map(LevelMemory::variance)
+            }
+        }
+    }
+
+    /// Whether the places around surely tell something of what is felt at a place: they leave less
+    /// of its variance open than they would by chance.
+    pub(super) fn is_predictable(&self, left_out: &[LeftOut], places: &[ModelPlace]) -> bool {
         let FieldOf::Level(channel) = self.of else {
             return true;
         };
-        let (mut count, mut error) = (0.0, 0.0);
-        let mut levels = Vec::new();
-        for own in 0..places.len() {
-            levels.extend(level(&places[own], channel));
-            let left_out = site_of(own, places, graph)
-                .and_then(|site| self.left_out(own, &site, places, graph));
-            if let Some((residual, _)) = left_out {
-                count += 1.0;
-                error += residual;
-            }
-        }
+        let errors = left_out.iter().filter_map(|own| self.error(own, places));
+        let (count, error) = errors.fold((0.0, 0.0), |(n, sum), (error, _)| (n + 1.0, sum + error));
+        let levels = places.iter().filter_map(|place| level(place, channel));
+        let levels: Vec<f64> = levels.collect();
         let n = levels.len().max(1) as f64;
         let mean = levels.iter().sum::<f64>() / n;
         let variance = levels
@@ -124,48 +158,51 @@ impl Field {
             .map(|level| (level - mean).powi(2))
             .sum::<f64>()
             / n;
-        error <= UNPREDICTED_MAX * variance * count
+        let open = 1.0 - PREDICTED_DEVIATIONS / f64::sqrt(f64::max(count, 1.0));
+        error <= open * variance * count
     }
 
     /// Squared difference of a place from its prediction by the others, and the variance of that,
-    /// per the field's own.
-    fn left_out(
-        &self,
-        own: usize,
-        site: &Site,
-        places: &[ModelPlace],
-        graph: &LinkGraph,
-    ) -> Option<(f64, f64)> {
-        let local = self.around(site, graph.near[own].iter().copied(), places)?;
-        let place = &places[own];
-        let weights = local.kriging.weights(&place.position_m.coords);
-        let residual = self.residual(&weights, &local, site, place, places)?;
-        Some((residual, weights.variance + self.noise))
+    /// per the field's own. About an edge it lies on the side that predicts it best.
+    fn error(&self, left_out: &LeftOut, places: &[ModelPlace]) -> Option<(f64, f64)> {
+        let place = &places[left_out.own];
+        let of_site = |(site, near): &(Site, Vec<u32>)| {
+            let local = self.around(site, near, places)?;
+            let weights = local.weights(&place.position_m);
+            let residual = self.residual(&weights, &local, site, place, places)?;
+            Some((residual, weights.variance + self.noise))
+        };
+        let all = left_out.from.iter().filter_map(of_site);
+        all.min_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))
     }
 
-    /// Profile log-likelihood of the places left out one by one, and the variance at which it is
-    /// the largest.
-    fn cross_validated(
-        &self,
-        sites: &[(usize, Site)],
-        places: &[ModelPlace],
-        graph: &LinkGraph,
-    ) -> Option<(f64, f64)> {
-        let (mut count, mut squares, mut logs) = (0.0, 0.0, 0.0);
-        for (own, site) in sites {
-            let Some((residual, variance)) = self.left_out(*own, site, places, graph) else {
-                continue;
-            };
-            count += 1.0;
-            squares += residual / variance;
-            logs += variance.ln();
-        }
+    /// Profile log-likelihood of a place, on average over those left out one by one, and the
+    /// variance at which it is the largest.
+    ///
+    /// Errors follow Student's distribution: those at edges say little of all others.
+    fn cross_validated(&self, left_out: &[&LeftOut], places: &[ModelPlace]) -> Option<(f64, f64)> {
+        let errors = left_out.iter().filter_map(|own| {
+            let (residual, variance) = self.error(own, places)?;
+            Some((residual / variance, variance, own.from.len() as f64))
+        });
+        let errors: Vec<(f64, f64, f64)> = errors.collect();
+        let count = errors.len() as f64;
         if count < 4.0 {
             return None;
         }
         // A floor against values that are all the same.
-        let variance = f64::max(squares / count, 1e-18);
-        Some((-0.5 * (count * variance.ln() + logs), variance))
+        let mean =
+            |of: &dyn Fn(f64) -> f64| errors.iter().map(|own| of(own.0)).sum::<f64>() / count;
+        let mut variance = f64::max(mean(&|square| square), 1e-18);
+        for _ in 0..8 {
+            let weighted = |square: f64| square * (TAILS + 1.0) / (TAILS + square / variance);
+            variance = f64::max(mean(&weighted), 1e-18);
+        }
+        let log = |(square, own, sides): &(f64, f64, f64)| {
+            let tail = 0.5 * (TAILS + 1.0) * (square / (TAILS * variance)).ln_1p();
+            -0.5 * (variance * own).ln() - tail - sides.ln()
+        };
+        Some((errors.iter().map(log).sum::<f64>() / count, variance))
     }
 
     /// Squared difference of a place from its prediction.
@@ -196,17 +233,25 @@ impl Field {
     pub(super) fn around(
         &self,
         site: &Site,
-        near: impl Iterator<Item = u32>,
+        near: &[u32],
         places: &[ModelPlace],
     ) -> Option<LocalField> {
         let has = |number: &u32| match self.of {
             FieldOf::Place => true,
             FieldOf::Level(channel) => level(&places[*number as usize], channel).is_some(),
         };
-        let near: Vec<u32> = near.filter(has).take(site.count()).collect();
-        let positions = near
+        let near: Vec<u32> = near
             .iter()
-            .map(|number| places[*number as usize].position_m.coords);
+            .copied()
+            .filter(has)
+            .take(site.count())
+            .collect();
+        // Places lie across the plane by what is to be predicted: it must not tell of itself.
+        let over = (self.of == FieldOf::Place).then(|| site.clone());
+        let positions = near.iter().map(|number| {
+            let at = places[*number as usize].position_m;
+            over.as_ref().map_or(at, |over| over.below(&at)).coords
+        });
         let positions = positions.collect();
         // What errs more than elsewhere, as at an edge, is less certain around (shrinkage).
         let some = near.iter().take(ERROR_NEIGHBOURS);
@@ -217,6 +262,8 @@ impl Field {
             kriging: Kriging::new(positions, &site.axes, self.length_m, self.noise)?,
             near,
             variance: self.variance * local,
+            roughness: self.roughness,
+            over,
         })
     }
 }
@@ -224,9 +271,15 @@ impl Field {
 impl LocalField {
     /// Weights of the places at a point, and the variance of what is predicted.
     pub(super) fn at(&self, point: &Point3<f64>) -> (Weights, f64) {
-        let weights = self.kriging.weights(&point.coords);
-        let variance = self.variance * weights.variance;
+        let weights = self.weights(point);
+        let variance = self.variance * (weights.variance + self.roughness);
         (weights, variance)
+    }
+
+    fn weights(&self, point: &Point3<f64>) -> Weights {
+        let over = self.over.as_ref();
+        let at = over.map_or(*point, |over| over.below(point));
+        self.kriging.weights(&at.coords)
     }
 
     /// The place that is predicted.
@@ -256,32 +309,4 @@ impl LocalField {
 fn level(place: &ModelPlace, channel: u16) -> Option<f64> {
     let own = place.levels.iter().find(|own| own.channel == channel);
     own.map(|own| own.mean)
-}
-
-/// The surface about a place: a plane where it has triangles, a line where it has two links.
-fn site_of(own: usize, places: &[ModelPlace], graph: &LinkGraph) -> Option<Site> {
-    let middle = places[own].position_m;
-    let links = graph.links[own].iter();
-    let to: Vec<Vector3<f64>> = links
-        .map(|other| places[*other as usize].position_m - middle)
-        .collect();
-    if to.len() < 2 {
-        return None;
-    }
-    let has_triangle = graph
-        .triangles
-        .iter()
-        .any(|triangle| triangle.iter().any(|corner| *corner as usize == own));
-    let axes = if has_triangle {
-        let spread = to.iter().map(|to| to * to.transpose());
-        let eigen = spread.sum::<nalgebra::Matrix3<f64>>().symmetric_eigen();
-        let normal = eigen.eigenvalues.imin();
-        let along = (0..3).filter(|axis| *axis != normal);
-        along
-            .map(|axis| eigen.eigenvectors.column(axis).into())
-            .collect()
-    } else {
-        vec![Unit::try_new(to[1] - to[0], 1e-12)?.into_inner()]
-    };
-    Some(Site { middle, axes })
 }

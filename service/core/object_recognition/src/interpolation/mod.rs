@@ -11,6 +11,7 @@ mod graph;
 mod kriging;
 mod nodes;
 mod open;
+mod sides;
 
 pub(crate) use graph::LinkGraph;
 pub(crate) use nodes::{Fields, interpolated};

@@ -4,11 +4,12 @@ use nalgebra::{Point3, Vector3};
 
 use super::field::{Field, FieldOf, LocalField, Site};
 use super::graph::LinkGraph;
+use super::sides::Sides;
 use crate::indexed_place::IndexedPlace;
 use crate::model::{LevelMemory, ModelPlace};
 use crate::tuning::{
-    BETWEEN_MIN, DENSE_LINK, KRIGING_SURFACE, NODE_APART, NODE_FIELD, NODE_STEP, NODES_GROWTH,
-    NODES_MAX,
+    BETWEEN_MIN, DENSE_LINK, KRIGING_SURFACE, NODE_APART, NODE_ERROR, NODE_FIELD, NODE_STEP,
+    NODES_GROWTH, NODES_MAX,
 };
 
 /// Most parts of the side of a triangle: a thousand points lie on it then.
@@ -26,6 +27,7 @@ struct Span {
 pub(crate) struct Fields {
     place: Field,
     levels: Vec<(u16, Field)>,
+    sides: Sides,
 }
 
 /// The nodes between the places of a model that have these links.
@@ -47,9 +49,13 @@ pub(crate) fn interpolated(
     if room == 0 || is_dense {
         return Vec::new();
     }
-    let sites = sites(places, graph);
-    // Finer steps than these never fit.
-    let mut step_m = f64::max(NODE_STEP * spacing_m, graph.longest_m / NODES_MAX as f64);
+    let sites = sites(places, graph, &fields.sides);
+    // Finer steps than these never fit, or say no more.
+    let finest_m = f64::max(
+        graph.longest_m / NODES_MAX as f64,
+        fields.place.typical_error / NODE_ERROR,
+    );
+    let mut step_m = f64::max(NODE_STEP * spacing_m, finest_m);
     let mut spans = spans(places, &sites, step_m);
     while spans.len() > room {
         step_m *= NODES_GROWTH;
@@ -65,11 +71,17 @@ pub(crate) fn interpolated(
     nodes
 }
 
-/// The segments and triangles that are bridged.
-fn sites(places: &[ModelPlace], graph: &LinkGraph) -> Vec<(Site, Vec<u32>)> {
+/// The segments and triangles that are bridged. A triangle over an edge is one for each side.
+fn sites(places: &[ModelPlace], graph: &LinkGraph, sides: &Sides) -> Vec<(Site, Vec<u32>)> {
     let at = |number: u32| places[number as usize].position_m;
     let mut sites = Vec::new();
     for corners in &graph.triangles {
+        let groups = sides.groups(places, corners);
+        if groups.len() > 1 {
+            let of_groups = groups.iter().filter_map(|of| sides.site(places, of));
+            sites.extend(of_groups.map(|site| (site, corners.to_vec())));
+            continue;
+        }
         let [a, b, c] = corners.map(at);
         let along = (b - a).normalize();
         let across = (c - a) - along * along.dot(&(c - a));
@@ -78,7 +90,8 @@ fn sites(places: &[ModelPlace], graph: &LinkGraph) -> Vec<(Site, Vec<u32>)> {
         };
         let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
         let axes = vec![along, across];
-        sites.push((Site { middle, axes }, corners.to_vec()));
+        let of = corners.to_vec();
+        sites.push((Site { middle, axes, of }, corners.to_vec()));
     }
     for (own, links) in (0u32..).zip(&graph.links) {
         for &other in links.iter().filter(|other| **other > own) {
@@ -94,7 +107,8 @@ fn sites(places: &[ModelPlace], graph: &LinkGraph) -> Vec<(Site, Vec<u32>)> {
                 continue;
             };
             let axes = vec![along];
-            sites.push((Site { middle, axes }, vec![own, other]));
+            let of = Vec::new();
+            sites.push((Site { middle, axes, of }, vec![own, other]));
         }
     }
     sites
@@ -104,7 +118,7 @@ fn sites(places: &[ModelPlace], graph: &LinkGraph) -> Vec<(Site, Vec<u32>)> {
 fn spans(places: &[ModelPlace], sites: &[(Site, Vec<u32>)], step_m: f64) -> Vec<Span> {
     let mut spans: Vec<Span> = Vec::new();
     let near_m = NODE_APART * step_m;
-    for (number, (_, corners)) in sites.iter().enumerate() {
+    for (number, (site, corners)) in sites.iter().enumerate() {
         let at: Vec<Vector3<f64>> = corners
             .iter()
             .map(|corner| places[*corner as usize].position_m.coords)
@@ -117,7 +131,7 @@ fn spans(places: &[ModelPlace], sites: &[(Site, Vec<u32>)], step_m: f64) -> Vec<
         let parts = crate::numeric::floor_u32(parts).min(PARTS_MAX);
         for shares in shares(at.len(), parts) {
             let point = at.iter().zip(&shares).map(|(at, share)| at * *share);
-            let at = Point3::from(point.sum::<Vector3<f64>>());
+            let at = site.below(&Point3::from(point.sum::<Vector3<f64>>()));
             let is_near = |other: &Point3<f64>| (other - at).norm() < near_m;
             let is_taken = places.iter().any(|place| is_near(&place.position_m))
                 || spans.iter().any(|span| is_near(&span.at));
@@ -165,18 +179,28 @@ impl Fields {
             .collect();
         channels.sort_unstable();
         channels.dedup();
+        let smooth = Sides::none();
+        let anywhere = smooth.left_out(places, graph);
+        let (log, place) = Field::learned(FieldOf::Place, &anywhere, places, graph)?;
+        // Edges are supposed where places follow better from those on their own side.
+        let edged = Sides::new(places, graph).and_then(|sides| {
+            let left_out = sides.left_out(places, graph);
+            let (own, place) = Field::learned(FieldOf::Place, &left_out, places, graph)?;
+            (own > log).then_some((place, sides))
+        });
+        let (place, sides) = edged.unwrap_or((place, smooth));
         let level = |channel| {
-            let field = Field::learned(FieldOf::Level(channel), places, graph)?;
-            Some((channel, field))
+            let field = Field::learned(FieldOf::Level(channel), &anywhere, places, graph)?;
+            Some((channel, field.1))
         };
-        let fields = Self {
-            place: Field::learned(FieldOf::Place, places, graph)?,
-            levels: channels.into_iter().filter_map(level).collect(),
-        };
-        let mut levels = fields.levels.iter();
-        levels
-            .all(|(_, field)| field.is_predictable(places, graph))
-            .then_some(fields)
+        let levels: Vec<(u16, Field)> = channels.into_iter().filter_map(level).collect();
+        let is_told = |field: &Field| field.is_predictable(&anywhere, places);
+        let is_known = levels.iter().all(|(_, field)| is_told(field));
+        is_known.then_some(Self {
+            place,
+            levels,
+            sides,
+        })
     }
 
     fn around(&self, site: &Site, places: &[ModelPlace]) -> Option<LocalFields> {
@@ -190,11 +214,13 @@ impl Fields {
         }
         near.sort_unstable_by(order);
         let level = |(channel, field): &(u16, Field)| {
-            let local = field.around(site, near.iter().copied(), places)?;
+            let local = field.around(site, &near, places)?;
             Some((*channel, local))
         };
         Some(LocalFields {
-            place: self.place.around(site, near.iter().copied(), places)?,
+            place: self
+                .place
+                .around(site, &self.sides.near(places, site, &near), places)?,
             levels: self.levels.iter().filter_map(level).collect(),
         })
     }

@@ -4,22 +4,19 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::contact::Contact;
 use crate::indexed_model::IndexedModel;
-use crate::tuning::ERROR_REACH;
 
 /// Evidence of contacts in a pose, per that of independent ones.
 ///
 /// What is predicted between places errs by the same wherever contacts lie in one gap. With ρ the
 /// correlation of these errors and m their share of a contact's variance, the variance of a sum
 /// over n contacts is t = 1 + m (Σρ/n − 1) times that of independent ones, of which 1/t is the
-/// share.
+/// share. `reach` is how far these errors are common, in typical links.
 pub(super) fn evidence_share(
     indexed: &IndexedModel,
     map_from_episode: &Isometry3<f64>,
     contacts: &[Contact],
+    reach: f64,
 ) -> f64 {
-    if indexed.places.iter().all(|place| !place.is_predicted) {
-        return 1.0;
-    }
     let points: Vec<Point3<f64>> = { contacts.iter() }
         .map(|contact| map_from_episode * contact.position_m)
         .collect();
@@ -27,7 +24,7 @@ pub(super) fn evidence_share(
     let shares = shares.map(|(point, contact)| error_share(indexed, point, contact));
     let count = points.len().max(1) as f64;
     let share = shares.sum::<f64>() / count;
-    let per = -0.25 / (ERROR_REACH * indexed.gap_m).powi(2).max(f64::MIN_POSITIVE);
+    let per = -0.25 / (reach * indexed.gap_m).powi(2).max(f64::MIN_POSITIVE);
     let correlations = points.iter().enumerate().map(|(number, point)| {
         let before = points[..number].iter();
         let correlation = |other: &Point3<f64>| (per * (other - point).norm_squared()).exp();

@@ -15,7 +15,8 @@ use crate::recognition::likelihoods::{unknown_fit_log, walk_log};
 use crate::surfels::map::SurfelMap;
 use crate::translations::GaussianSum;
 use crate::tuning::{
-    CONTACTS_MAX, EARNED_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, UNKNOWN_PRIOR,
+    CONTACTS_MAX, EARNED_MAX, ERROR_REACH, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX,
+    UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR,
 };
 
 /// The state of one episode of recognition.
@@ -188,30 +189,39 @@ impl Recognition {
         }
     }
 
-    /// Log-likelihood of an unknown object, as far as independent contacts speak for it against
-    /// each of the likeliest objects: `unknown` by all contacts.
+    /// Log-likelihood of an unknown object, as far as independent contacts speak for it or against
+    /// it: `unknown` by all contacts.
     ///
-    /// What speaks for it against an object is tempered by how far the contacts tell the same of
-    /// that object's model. Against the best object it has no more than the least of these. The
-    /// odds between objects do not depend on it.
+    /// What speaks for it against an object, or against it, is tempered by how far the contacts
+    /// tell the same of that object's model. Against the best object it has no more than the least
+    /// of what it has against each of the likeliest. The odds between objects do not depend on it.
     fn earned(&self, library: &ObjectLibrary, objects: &[(ObjectId, f64)], unknown: f64) -> f64 {
-        let best_log = { objects.iter() }.fold(f64::NEG_INFINITY, |best, own| best.max(own.1));
         let Hypotheses::Translations(translations) = &self.hypotheses else {
             return unknown;
         };
-        if unknown <= best_log || !best_log.is_finite() {
-            return unknown;
-        }
+        let share = |object: ObjectId, reach: f64| {
+            let indexed = library.indexed(object)?;
+            if indexed.between_sd_m.is_none() {
+                return Some(1.0);
+            }
+            let heaviest = translations.heaviest(object, 1);
+            let pose = heaviest.first()?.pose(&translations.rotations);
+            Some(evidence_share(indexed, &pose, &self.contacts, reach))
+        };
         let mut likeliest: Vec<_> = objects.iter().filter(|own| own.1.is_finite()).collect();
         likeliest.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let Some(&&(best, best_log)) = likeliest.first() else {
+            return unknown;
+        };
+        if unknown <= best_log {
+            let share = share(best, ERROR_REACH).unwrap_or(1.0);
+            return best_log + share * (unknown - best_log);
+        }
         let leads = likeliest
             .iter()
             .take(EARNED_MAX)
             .filter_map(|(object, log)| {
-                let heaviest = translations.heaviest(*object, 1);
-                let (hypothesis, indexed) = heaviest.first().zip(library.indexed(*object))?;
-                let pose = hypothesis.pose(&translations.rotations);
-                Some(evidence_share(indexed, &pose, &self.contacts) * (unknown - log))
+                Some(share(*object, UNKNOWN_ERROR_REACH)? * (unknown - log))
             });
         best_log + leads.fold(unknown - best_log, f64::min)
     }

@@ -199,7 +199,12 @@ impl GaussianSum {
                 Some(kept) if last == Some(key) => {
                     let sum = log_sum([kept.evidence, hypothesis.evidence].into_iter());
                     let share = (hypothesis.evidence - sum).exp();
-                    kept.translation += (hypothesis.translation - kept.translation) * share;
+                    // The sum has the moments of both.
+                    let apart = hypothesis.translation - kept.translation;
+                    let spread_m2 = share * (1.0 - share) * apart.norm_squared() / 3.0;
+                    kept.variance_m2 +=
+                        (hypothesis.variance_m2 - kept.variance_m2) * share + spread_m2;
+                    kept.translation += apart * share;
                     kept.evidence = sum;
                 }
                 _ => merged.push(hypothesis),
