@@ -191,8 +191,8 @@ pub(crate) const PRUNE_NATS: f64 = 20.0;
 pub(crate) const SPLIT_SHARE_MIN: f64 = 0.005;
 /// Parts of a split. Budget.
 pub(crate) const SPLIT_MAX: usize = 16;
-/// Cell in which two hypotheses are one, in standard deviations: rounded down to a power of two, it
-/// is as wide as one. Their sum is near a Gaussian again, which has the moments of both. Chosen.
+/// Widest cell in which two hypotheses are one, in standard deviations; it is rounded down to a
+/// power of two, so to half of this at least. The sum has the moments of both. Chosen.
 pub(crate) const MERGE_CELL_SD: f64 = 1.6;
 /// Squared distance, in variances, beyond which a place is not the one touched: e⁻¹⁶. Chosen.
 pub(crate) const GATE_SQUARED: f64 = 32.0;

@@ -181,6 +181,15 @@ impl Fields {
         channels.dedup();
         let smooth = Sides::none();
         let anywhere = smooth.left_out(places, graph);
+        let level = |channel| {
+            let field = Field::learned(FieldOf::Level(channel), &anywhere, places, graph)?;
+            Some((channel, field.1))
+        };
+        let levels: Vec<(u16, Field)> = channels.into_iter().filter_map(level).collect();
+        let is_told = |field: &Field| field.is_predictable(&anywhere, places);
+        if !levels.iter().all(|(_, field)| is_told(field)) {
+            return None;
+        }
         let (log, place) = Field::learned(FieldOf::Place, &anywhere, places, graph)?;
         // Edges are supposed where places follow better from those on their own side.
         let edged = Sides::new(places, graph).and_then(|sides| {
@@ -189,14 +198,7 @@ impl Fields {
             (own > log).then_some((place, sides))
         });
         let (place, sides) = edged.unwrap_or((place, smooth));
-        let level = |channel| {
-            let field = Field::learned(FieldOf::Level(channel), &anywhere, places, graph)?;
-            Some((channel, field.1))
-        };
-        let levels: Vec<(u16, Field)> = channels.into_iter().filter_map(level).collect();
-        let is_told = |field: &Field| field.is_predictable(&anywhere, places);
-        let is_known = levels.iter().all(|(_, field)| is_told(field));
-        is_known.then_some(Self {
+        Some(Self {
             place,
             levels,
             sides,

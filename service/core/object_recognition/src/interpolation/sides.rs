@@ -227,7 +227,7 @@ fn along(normal: &Unit<Vector3<f64>>) -> Vec<Vector3<f64>> {
     vec![first, normal.cross(&first)]
 }
 
-/// The plane of least squares through the origin's neighbours and the origin.
+/// The plane of least squares of the origin and these points.
 fn fitted<'a>(to: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> Option<Plane> {
     let count = 1.0 + to.clone().count() as f64;
     let middle = to.clone().sum::<Vector3<f64>>() / count;

@@ -189,12 +189,12 @@ impl Recognition {
         }
     }
 
-    /// Log-likelihood of an unknown object, as far as independent contacts speak for it or against
-    /// it: `unknown` by all contacts.
+    /// Log-likelihood of an unknown object by independent contacts; `unknown` is that by all.
     ///
-    /// What speaks for it against an object, or against it, is tempered by how far the contacts
-    /// tell the same of that object's model. Against the best object it has no more than the least
-    /// of what it has against each of the likeliest. The odds between objects do not depend on it.
+    /// Contacts in one gap of a model share its errors. So the lead of an unknown object over a
+    /// known one, or of the best known one over it, counts as that of fewer contacts. Over the best
+    /// one an unknown object leads by the least of its leads over the likeliest. The odds between
+    /// known objects stay as they are.
     fn earned(&self, library: &ObjectLibrary, objects: &[(ObjectId, f64)], unknown: f64) -> f64 {
         let Hypotheses::Translations(translations) = &self.hypotheses else {
             return unknown;
