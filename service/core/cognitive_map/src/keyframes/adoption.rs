@@ -54,11 +54,12 @@ impl KeyframeMap {
     pub fn go_on_relaxing(&mut self, agent: u32, stamp_ns: i64) -> Vec<Correction> {
         let mut corrections = Vec::new();
         if let Some(PendingRelaxation::Awaited(job)) = &self.pending {
+            let n_keyframes = self.graph.n_keyframes();
             let Some(meanwhile) = &mut self.graph.meanwhile else {
                 return corrections; // never: both begin and end together
             };
             meanwhile.note(agent, stamp_ns);
-            if !meanwhile.is_over(agent, stamp_ns) {
+            if !meanwhile.is_over(agent, stamp_ns, n_keyframes) {
                 return corrections;
             }
             let outcome = Arc::clone(job.outcome());

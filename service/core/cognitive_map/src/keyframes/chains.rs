@@ -3,6 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::agent_track::AgentTrack;
+use super::bridge::bridge;
 use super::keyframe::{Keyframe, KeyframeSlab};
 use super::keyframe_index::{IndexEntry, KeyframeIndex};
 use super::tuning;
@@ -45,6 +46,12 @@ impl Chains {
     pub(super) fn back_from(&self, number: u32) -> impl Iterator<Item = (u32, &Keyframe)> {
         let item = |number: u32| Some((number, self.keyframes.get(number)?));
         std::iter::successors(item(number), move |(_, keyframe)| item(keyframe.previous))
+    }
+
+    /// A keyframe, and those of its agent after it.
+    pub(super) fn on_from(&self, number: u32) -> impl Iterator<Item = (u32, &Keyframe)> {
+        let item = |number: u32| Some((number, self.keyframes.get(number)?));
+        std::iter::successors(item(number), move |(_, keyframe)| item(keyframe.next))
     }
 
     /// The earliest keyframe of an agent; [`NONE`] if it has none. Walks the whole chain.
@@ -102,23 +109,23 @@ impl Chains {
     }
 
     /// Moves the keyframes of an agent of the map as in a copy with some of them. Those between two
-    /// of the copy move with the earlier one.
+    /// of the copy lie where their motions most likely lead from the one to the other.
     pub(super) fn adopt(&mut self, agent: u32, copy: &Self, revision: u64) {
         let Some(newest) = self.track(agent).filter(|track| track.is_in_map()) else {
             return;
         };
         let newest = newest.newest;
-        // Keyframes since the last one of the copy, on the way back.
-        let mut behind: Vec<u32> = Vec::new();
+        // From an earlier keyframe to the one that was looked at before it.
+        let (mut between, mut later): (Vec<u32>, u32) = (Vec::new(), NONE);
         let mut number = newest;
         while let Some(keyframe) = self.keyframes.get(number) {
             let previous = keyframe.previous;
-            behind.push(number);
-            if let (Some(key), Some(was)) = (copy.keyframes.get(number), self.in_map(number)) {
-                let moved = key.pose * was.inverse();
-                for number in behind.drain(..) {
-                    self.move_in_map(number, &moved, revision);
-                }
+            if let Some(pose) = copy.in_map(number) {
+                self.put(number, &pose, revision);
+                self.put_between(number, &between, later, revision);
+                (between, later) = (Vec::new(), number);
+            } else {
+                between.push(number);
             }
             number = previous;
         }
@@ -127,6 +134,22 @@ impl Chains {
         if let (Some(pose), Some(track)) = (pose, self.track_mut(agent, revision)) {
             track.turn_noise = turn_noise;
             track.pose = pose * track.since.motion();
+        }
+    }
+
+    /// Puts keyframes, the last one first, on the way between two that have been put somewhere.
+    fn put_between(&mut self, from: u32, numbers: &[u32], to: u32, revision: u64) {
+        let keyframe = |number: u32| self.keyframes.get(number);
+        let (Some(from), Some(to)) = (keyframe(from), keyframe(to)) else {
+            return;
+        };
+        let passed = numbers.iter().rev().filter_map(|number| keyframe(*number));
+        let motions = passed
+            .chain([to])
+            .map(|keyframe| (keyframe.motion, keyframe.covariance));
+        let poses = bridge(&from.pose, &motions.collect::<Vec<_>>(), &to.pose);
+        for (number, pose) in numbers.iter().rev().zip(&poses) {
+            self.put(*number, pose, revision);
         }
     }
 

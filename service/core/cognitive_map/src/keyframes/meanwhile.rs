@@ -51,11 +51,15 @@ impl Meanwhile {
         *first_ns = Some(first_ns.map_or(stamp_ns, |first_ns| first_ns.min(stamp_ns)));
     }
 
-    /// Whether the outcome is to come into force with a record of an agent.
-    pub(super) fn is_over(&self, agent: u32, stamp_ns: i64) -> bool {
+    /// Whether the outcome, for a graph of so many keyframes, is to come into force with a record
+    /// of an agent.
+    pub(super) fn is_over(&self, agent: u32, stamp_ns: i64, n_keyframes: usize) -> bool {
         let first_ns = self.agents.get(&agent).and_then(|since| since.first_ns);
         let passed_ns = first_ns.map_or(0, |first_ns| stamp_ns.saturating_sub(first_ns));
-        passed_ns >= tuning::RELAXATION_DELAY_NS || self.records >= tuning::RELAXATION_RECORDS_MAX
+        let longer = n_keyframes as f64 / f64::from(tuning::RELAXED_IN_TIME);
+        let longer = longer.max(1.0);
+        passed_ns as f64 >= longer * tuning::RELAXATION_DELAY_NS as f64
+            || f64::from(self.records) >= longer * f64::from(tuning::RELAXATION_RECORDS_MAX)
     }
 
     /// An agent moved.

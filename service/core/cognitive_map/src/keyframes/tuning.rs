@@ -123,6 +123,9 @@ pub(super) const RELAXATION_DELAY_NS: i64 = 500_000_000;
 /// a hundred samples a second.
 pub(super) const RELAXATION_RECORDS_MAX: u32 = 4096;
 
+/// Keyframes up to which these two hold; with more both are longer in proportion.
+pub(super) const RELAXED_IN_TIME: u32 = 10_000;
+
 /// Keyframes that move with one record, once a relaxation is in force: about 0.2 ms.
 pub(super) const KEYFRAMES_MOVED_PER_RECORD: usize = 1024;
 
@@ -138,6 +141,24 @@ pub(super) const COARSE_STEP: (f64, f64) = (1.0, 0.5);
 /// Keyframes of the coarse graph beyond which its steps are longer: so that a relaxation of a map
 /// of many kilometres takes seconds, too.
 pub(super) const COARSE_KEYFRAMES_MAX: usize = 4096;
+
+/// Factor of a step with which too many keyframes are left to the next one that is tried.
+pub(super) const THINNED_LONGER: f64 = 2.0;
+
+/// Keyframes of the coarse graph beyond which those with sightings are dissolved as well. Source: a
+/// relaxation of so many takes a second, and its time grows with their number.
+pub(super) const COARSE_SIGHTED_MAX: usize = 16384;
+
+/// The step of these that is tried first \[m\], and the factor to the next one.
+pub(super) const COARSE_SIGHTED_STEPS_M: (f64, f64) = (0.25, 1.4);
+
+/// Keyframes on either side of a tie to the map that stay. Source: the heading of decent odometry
+/// is lost over some hundred, and with it what they say of how the map lies.
+pub(super) const KEPT_NEAR_TIES: usize = 128;
+
+/// How often what the motions between two keyframes of the coarse graph miss is shared among them.
+/// Source: by then what is left is of third order.
+pub(super) const BRIDGE_ROUNDS: usize = 2;
 
 /// Most pending closures of the coarse graph, the latest ones. Earlier ones have been judged many
 /// times; a refinement of the whole past judges them again.
