@@ -10,6 +10,7 @@ from typing import Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 
 from asking import ask, insist
 from circle import AGENT, undisturbed
+from host import Host
 from server import Server
 from storage import BUCKET, Storage
 from view import Placement, View, agreement
@@ -36,6 +37,7 @@ class Node(Server):
         url: The store.
         variables: What tells it where the storage is.
         settings: Further settings.
+        host: Where it runs.
     """
 
     def __init__(
@@ -45,16 +47,17 @@ class Node(Server):
         url: str,
         variables: Mapping[str, str],
         settings: Sequence[str] = (),
+        host: Host = Host(),
     ) -> None:
         home.mkdir(parents=True)
         self.name = name
         self.is_paused = False
         self._own_settings: List[str] = []
-        super().__init__(home, self._own_settings, variables=variables)
+        super().__init__(home, self._own_settings, variables=variables, host=host)
         self._own_settings += [
             "cluster.enabled=true",
             f"cluster.node={name}",
-            f"cluster.address={self.url.rpartition('/')[2]}",
+            f"cluster.address={self.address}",
             f"store.url={url}",
             f"store.shards={SHARDS}",
             # Routers pass on what others say, and connect to nobody but those whom they are told.
@@ -62,16 +65,9 @@ class Node(Server):
             *settings,
         ]
 
-    @property
-    def zenoh_port(self) -> int:
-        """Port of its Zenoh endpoint."""
-        return self._zenoh.number
-
-    def connect_to(self, ports: Iterable[int]) -> None:
+    def connect_to(self, endpoints: Iterable[str]) -> None:
         """Names the Zenoh endpoints of the others, before it starts."""
-        self._own_settings.append(
-            f"zenoh.connect={json.dumps([f'tcp/127.0.0.1:{port}' for port in ports])}"
-        )
+        self._own_settings.append(f"zenoh.connect={json.dumps(list(endpoints))}")
 
     def pause(self) -> None:
         super().pause()
@@ -122,11 +118,12 @@ class Cluster:
         self.nodes: Dict[str, Node] = {}
         for name in names:
             variables = storage.environment(self._wiring.endpoint(name, storage))
-            self.nodes[name] = Node(home / name, name, url, variables, settings)
+            host = self._wiring.host(name)
+            self.nodes[name] = Node(home / name, name, url, variables, settings, host)
         for name, node in self.nodes.items():
             others = [other for other in self.nodes.values() if other is not node]
             node.connect_to(
-                self._wiring.link(name, other.name, other.zenoh_port) for other in others
+                self._wiring.link(name, other.name, other.endpoint) for other in others
             )
 
     def start(self, *names: str) -> None:

@@ -24,11 +24,14 @@ class Relay:
 
     Args:
         target: Port of the server, on loopback.
+        address: Where it listens.
     """
 
-    def __init__(self, target: int) -> None:
+    def __init__(self, target: int, address: str = "127.0.0.1") -> None:
         self._listening = Port()
         self._target = target
+        #: Where clients connect, beside the port.
+        self.address = address
         self._connections: Set["asyncio.Task[None]"] = set()
         self._server: Optional[asyncio.AbstractServer] = None
         self._loop = asyncio.new_event_loop()
@@ -100,7 +103,7 @@ class Relay:
     async def _mend(self) -> None:
         self._flowing.set()
         if self._server is None:
-            self._server = await asyncio.start_server(self._serve, "127.0.0.1", self.port)
+            self._server = await asyncio.start_server(self._serve, self.address, self.port)
 
     def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if self._server is None:

@@ -23,9 +23,10 @@ class StorageRelay(Relay):
 
     Args:
         target: Port of the S3 server, on loopback.
+        address: Where it listens.
     """
 
-    def __init__(self, target: int) -> None:
+    def __init__(self, target: int, address: str = "127.0.0.1") -> None:
         #: Requests that were passed on, by their methods.
         self.passed: Dict[str, int] = {}
         #: Requests that were answered with 503.
@@ -35,12 +36,12 @@ class StorageRelay(Relay):
         self._refuses = False
         self._loses_every = 0
         self._puts = 0
-        super().__init__(target)
+        super().__init__(target, address)
 
     @property
     def endpoint(self) -> str:
         """What a client of the S3 server takes for it."""
-        return f"http://127.0.0.1:{self.port}"
+        return f"http://{self.address}:{self.port}"
 
     def refuse(self) -> None:
         """Answers every request with 503 SlowDown, in the server's place."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Dict, Tuple
 
+from host import Host
 from relay import Relay
 from storage import Storage
 from storage_relay import StorageRelay
@@ -12,9 +13,13 @@ from storage_relay import StorageRelay
 class Wiring:
     """Straight: every address is the one that it leads to."""
 
-    def link(self, source: str, target: str, port: int) -> int:
-        """The port at which a node finds another one's Zenoh, which listens on `port`."""
-        return port
+    def host(self, node: str) -> Host:
+        """Where a node runs."""
+        return Host()
+
+    def link(self, source: str, target: str, endpoint: str) -> str:
+        """Where a node finds another one's Zenoh, which listens at `endpoint`."""
+        return endpoint
 
     def endpoint(self, node: str, storage: Storage) -> str:
         """Where a node finds the storage."""
@@ -36,9 +41,9 @@ class Relays(Wiring):
         """The links between a node and the others, whichever of them connects."""
         return tuple(relay for ends, relay in self._links.items() if node in ends)
 
-    def link(self, source: str, target: str, port: int) -> int:
-        relay = self._links[source, target] = Relay(port)
-        return relay.port
+    def link(self, source: str, target: str, endpoint: str) -> str:
+        relay = self._links[source, target] = Relay(int(endpoint.rpartition(":")[2]))
+        return f"tcp/127.0.0.1:{relay.port}"
 
     def endpoint(self, node: str, storage: Storage) -> str:
         relay = self.storage[node] = StorageRelay(storage.port)

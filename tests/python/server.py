@@ -11,6 +11,7 @@ from typing import Any, List, Mapping, Optional, Sequence
 import cogmap
 
 from binary import binary, environment, run
+from host import Host
 from port import Port
 from wait import LONG_S, eventually
 
@@ -27,6 +28,7 @@ class Server:
         settings: Settings (`key=value`) beside the ports and the directory.
         token: Bearer token that its clients use, if the settings ask for one.
         variables: Environment variables beside the caller's.
+        host: Where it runs.
     """
 
     def __init__(
@@ -35,7 +37,9 @@ class Server:
         settings: Sequence[str] = (),
         token: Optional[str] = None,
         variables: Optional[Mapping[str, str]] = None,
+        host: Host = Host(),
     ) -> None:
+        self._host = host
         self._http = Port()
         self._zenoh = Port()
         self._settings = settings
@@ -53,8 +57,9 @@ class Server:
     def launch(self) -> None:
         """Starts the process without waiting for it."""
         assert self._process is None, "the service runs already"
-        command = [binary(), "serve", "--data-dir", str(self.data)]
-        command += ["--http", f"127.0.0.1:{self._http.number}", "--zenoh", self.endpoint]
+        command = [*self._host.enter, binary(), "serve", "--data-dir", str(self.data)]
+        listens = f"{self._host.listens}:{self._http.number}"
+        command += ["--http", listens, "--zenoh", self.endpoint]
         for setting in self._settings:
             command += ["--set", setting]
         with self._log.open("ab") as log:
@@ -129,12 +134,17 @@ class Server:
     @property
     def url(self) -> str:
         """Base of its HTTP interface."""
-        return f"http://127.0.0.1:{self._http.number}"
+        return f"http://{self._host.reached}:{self._http.number}"
+
+    @property
+    def address(self) -> str:
+        """Where other services reach its HTTP interface."""
+        return f"{self._host.inner}:{self._http.number}"
 
     @property
     def endpoint(self) -> str:
         """Its Zenoh endpoint."""
-        return f"tcp/127.0.0.1:{self._zenoh.number}"
+        return f"tcp/{self._host.inner}:{self._zenoh.number}"
 
     def client(self, **options: Any) -> cogmap.Client:
         """The client's HTTP side."""
