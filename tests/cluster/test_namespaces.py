@@ -21,6 +21,8 @@ pytestmark = pytest.mark.skipif(
 
 #: Lease of the nodes [s], the default.
 LEASE_S = 5.0
+#: Time until Zenoh misses who says nothing [s].
+ZENOH_S = 10.0
 
 
 @pytest.fixture
@@ -77,11 +79,13 @@ def test_a_team_in_three_parts(apart: Cluster, namespaces: Namespaces) -> None:
             begin_s = time.monotonic()
             for node in apart.awake:
                 namespaces.lose(node.name, NODES)
-            # By then whoever gives its shards up for being alone has done so.
-            time.sleep(2.0 * LEASE_S)
+            # By then all have missed one another, those who are alone have given their shards up,
+            # and two leases later somebody has taken each.
+            time.sleep(ZENOH_S + 4.0 * LEASE_S)
             writer.through(_holder(apart, shard).url)
             writer.await_acks(MESSAGES)
-            report("a team in three parts", {"goes on after [s]": _since(begin_s)})
+            figures = {"goes on after [s]": _since(begin_s), "pause [s]": round(writer.longest_pause_s(), 1)}
+            report("a team in three parts", figures)
             watcher.check()
             for node in apart.awake:
                 namespaces.mend(node.name, NODES)
