@@ -5,10 +5,10 @@ use nalgebra::Isometry3;
 
 use super::CognitiveMap;
 use super::apply::Fold;
-use crate::estimator::{AgentSighted, Effect, FramesMerged};
+use crate::estimator::{AgentSighted, Effect, Estimator, FramesMerged};
 use crate::event::{Event, EventKind, LoopsClosed};
 use crate::input::{AgentId, Relation};
-use crate::keyframes::{Moment, Refined, RelaxationJob, ViewChannel};
+use crate::keyframes::{LiveEstimates, Moment, Refined, RelaxationJob, ViewChannel};
 use crate::memory::place::PlaceId;
 use pose_graph::PoseGraph;
 
@@ -118,7 +118,27 @@ impl Fold<'_> {
             self.apply_effects();
             self.tell_closed_loops(correction.agent, before);
         }
-        self.keyframes.begin_relaxation(agent, stamp_ns);
+        let estimator = &*self.estimator;
+        self.keyframes
+            .begin_relaxation(agent, stamp_ns, || estimates(estimator));
+    }
+}
+
+/// Where an estimator has the agents and landmarks of the map.
+fn estimates(estimator: &Estimator) -> LiveEstimates {
+    let agents = 0..u32::try_from(estimator.agent_count()).unwrap_or(u32::MAX);
+    let estimate = |agent: u32| {
+        let (pose, covariance) = estimator.pose(agent)?;
+        estimator
+            .is_in_map(agent)
+            .then_some((agent, pose, covariance))
+    };
+    let landmarks = estimator.landmarks();
+    LiveEstimates {
+        agents: agents.filter_map(estimate).collect(),
+        landmarks: landmarks
+            .map(|(label, position, covariance)| (label.clone(), position, covariance))
+            .collect(),
     }
 }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::constraint::composed;
 use super::constraints::Schedule;
 use super::graph::KeyframeGraph;
+use super::live_estimates::LiveEstimates;
 use super::map::KeyframeMap;
 use super::meanwhile::Meanwhile;
 use super::pending_relaxation::PendingRelaxation;
@@ -17,8 +18,14 @@ use super::tuning;
 impl KeyframeMap {
     /// Begins a relaxation if one is due and none is under way. The graph goes on, and with a later
     /// record [`go_on_relaxing`](Self::go_on_relaxing) brings the outcome into force. `agent` and
-    /// `stamp_ns` are those of the present record.
-    pub fn begin_relaxation(&mut self, agent: u32, stamp_ns: i64) {
+    /// `stamp_ns` are those of the present record; `live` answers where the estimator has
+    /// the agents and landmarks of the map.
+    pub fn begin_relaxation(
+        &mut self,
+        agent: u32,
+        stamp_ns: i64,
+        live: impl FnOnce() -> LiveEstimates,
+    ) {
         let has_views = !self.graph.is_tied_by_sightings() && self.recognition.views().is_due();
         let is_due = self.graph.is_due() || has_views;
         if self.pending.is_some() || !is_due {
@@ -29,7 +36,7 @@ impl KeyframeMap {
         } else {
             None
         };
-        let job = RelaxationJob::new(&self.graph, views);
+        let job = RelaxationJob::new(&self.graph, views, live());
         self.pending = Some(PendingRelaxation::Awaited(job));
         if self.graph.is_due() {
             // What comes from now on is for the next one.

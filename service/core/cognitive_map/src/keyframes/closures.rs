@@ -11,6 +11,7 @@ use super::constraint::{ClosureState, Constraint, composed};
 use super::constraints::Schedule;
 use super::graph::KeyframeGraph;
 use super::instant::KeyframeOffset;
+use super::live_estimates::LiveEstimates;
 use super::matching::Matching;
 use super::moment::Moment;
 use super::relaxation::{Correction, RelaxationCopy};
@@ -154,11 +155,16 @@ impl KeyframeGraph {
     /// To be called at points that the record stream fixes, as [`is_due`](Self::is_due) does: then
     /// the same records give the same map.
     pub fn relax(&mut self) -> Vec<Correction> {
-        self.relax_matched(None)
+        self.relax_matched(None, &LiveEstimates::default())
     }
 
-    /// The same, after views, if any are given, were matched anew.
-    pub(super) fn relax_matched(&mut self, views: Option<&ViewLog>) -> Vec<Correction> {
+    /// The same, after views, if any are given, were matched anew. What moves keyframes alone is
+    /// held by the live estimates.
+    pub(super) fn relax_matched(
+        &mut self,
+        views: Option<&ViewLog>,
+        live: &LiveEstimates,
+    ) -> Vec<Correction> {
         let is_due = views.is_none() || self.is_due();
         let mut coarse = RelaxationCopy::coarse(self);
         let is_matched = views.is_some_and(|log| coarse.match_views(log, live_matching(log)));
@@ -180,13 +186,17 @@ impl KeyframeGraph {
         if is_nothing_new && judged.is_empty() && is_settled && schedule.points == 0 {
             return Vec::new();
         }
-        let best = RelaxationCopy::most_probable(coarse, judged);
-        let accepted = |copy: &Self| -> BTreeSet<u32> {
-            let all = copy.constraints.slab.iter();
-            let accepted = all.filter(|(_, constraint)| constraint.is_accepted());
-            accepted.map(|(number, _)| number).collect()
+        let accepted = |copy: &RelaxationCopy| -> BTreeSet<u32> {
+            copy.accepted().map(|(number, _)| number).collect()
         };
-        let (before, now) = (accepted(self), accepted(best.copy.graph()));
+        let before = accepted(&RelaxationCopy::whole(self));
+        let mut best = None;
+        if is_settled && judged.is_empty() && accepted(&coarse) == before {
+            let held = RelaxationCopy::most_probable(coarse.held(live), Vec::new());
+            best = Some(held).filter(|best| accepted(&best.copy) == before);
+        }
+        let best = best.unwrap_or_else(|| RelaxationCopy::most_probable(coarse, judged));
+        let now = accepted(&best.copy);
         let is_seen_alone = is_settled && before == now;
         if is_seen_alone && schedule.points == 0 {
             return Vec::new();

@@ -163,4 +163,4 @@ fn drop_old_candidates(graph: &mut KeyframeGraph) {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

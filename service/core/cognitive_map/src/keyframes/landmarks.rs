@@ -29,8 +29,7 @@ pub(super) struct Landmarks {
 impl Landmarks {
     /// Counts a sighting of a landmark; answers its number.
     pub(super) fn show(&mut self, label: &Label, revision: u64) -> Option<u32> {
-        let label_of = |number| label_in(&self.slots, number);
-        if let Some(number) = self.by_label.find(label.as_str(), label_of) {
+        if let Some(number) = self.number(label) {
             self.count(number, revision);
             return Some(number);
         }
@@ -44,6 +43,12 @@ impl Landmarks {
         }
         self.sort_in(number);
         Some(number)
+    }
+
+    /// Number of the landmark with a label.
+    pub(super) fn number(&self, label: &Label) -> Option<u32> {
+        self.by_label
+            .find(label.as_str(), |number| label_in(&self.slots, number))
     }
 
     /// Counts another sighting of a known landmark.

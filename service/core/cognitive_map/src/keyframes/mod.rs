@@ -44,6 +44,7 @@ mod keyframe;
 mod keyframe_index;
 mod landmarks;
 mod list;
+mod live_estimates;
 mod map;
 mod matching;
 mod meanwhile;
@@ -75,6 +76,7 @@ mod view_matches;
 
 pub use checkpoint::{CorruptKeyframes, KeyframePage};
 pub use graph::KeyframeGraph;
+pub use live_estimates::LiveEstimates;
 pub use map::KeyframeMap;
 pub use moment::Moment;
 pub use place_recognition::{Found, Guess, LearnedChannel, Relocalised, View};

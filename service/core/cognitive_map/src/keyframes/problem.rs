@@ -189,6 +189,39 @@ impl Problem {
         self.map.add_link(link, Kernel::Gaussian).ok();
     }
 
+    /// Adds a link that ties a node to a pose, the less the farther it is from there.
+    pub(super) fn hold_pose(
+        &mut self,
+        pose: PoseId,
+        at: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+        is_planar: bool,
+    ) {
+        let link = Link::PosePrior {
+            pose,
+            at: *at,
+            information: information(covariance, is_planar),
+        };
+        self.map.add_link(link, sighting_kernel()).ok();
+    }
+
+    /// The same of a point.
+    pub(super) fn hold_point(
+        &mut self,
+        point: PointId,
+        at: Point3<f64>,
+        covariance: &Matrix3<f64>,
+    ) {
+        if let Ok(information) = PositionInformation::of_covariance(covariance) {
+            let link = Link::PointPrior {
+                point,
+                at,
+                information,
+            };
+            self.map.add_link(link, sighting_kernel()).ok();
+        }
+    }
+
     fn add_constraint(
         &mut self,
         graph: &KeyframeGraph,
@@ -285,10 +318,13 @@ impl Problem {
                 information: RangeInformation::of_variance(range.variance()).ok()?,
             },
         };
-        let kernel =
-            Kernel::Cauchy(Scale::new(tuning::SIGHTING_SCALE).expect("a positive constant"));
-        self.map.add_link(link, kernel).ok()
+        self.map.add_link(link, sighting_kernel()).ok()
     }
+}
+
+/// The kernel of what may be mistaken now and then.
+fn sighting_kernel() -> Kernel {
+    Kernel::Cauchy(Scale::new(tuning::SIGHTING_SCALE).expect("a positive constant"))
 }
 
 /// The information of a covariance, of its planar part for planar motion.

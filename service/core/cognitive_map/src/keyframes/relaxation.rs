@@ -10,6 +10,7 @@ use super::agent_track::AgentTrack;
 use super::constraint::{ClosureState, Constraint, composed};
 use super::evidence::{Chance, log_evidence};
 use super::graph::KeyframeGraph;
+use super::live_estimates::LiveEstimates;
 use super::matching::ViewMatches;
 use super::problem::{Among, Calibrating, Problem};
 use super::runs::{Member, Run};
@@ -35,6 +36,8 @@ pub(super) struct RelaxationCopy {
     /// Whether only runs count that are long enough to be no mistake: where the noise of odometry
     /// is supposed, single closures agree with some supposition.
     only_long_runs: bool,
+    /// What it is held by.
+    live: Arc<LiveEstimates>,
 }
 
 impl RelaxationCopy {
@@ -43,12 +46,21 @@ impl RelaxationCopy {
         Self {
             graph,
             only_long_runs: false,
+            live: Arc::default(),
         }
     }
 
     /// Of the whole graph.
     pub(super) fn whole(graph: &KeyframeGraph) -> Self {
         Self::of(graph.clone())
+    }
+
+    /// The same, held by the live estimates.
+    pub(super) fn held(&self, live: &LiveEstimates) -> Self {
+        Self {
+            live: Arc::new(live.clone()),
+            ..self.clone()
+        }
     }
 
     /// As if no closure had been judged, and the noise of rotations that nobody states were so many
@@ -322,6 +334,7 @@ impl RelaxationCopy {
         let mut rounds_left = tuning::RELAXATION_ROUNDS_MAX;
         loop {
             let mut problem = Problem::new(&self.graph, Among::Accepted, Calibrating::Free);
+            problem.hold_by(&self.graph, &self.live);
             let mut settings = from_wide();
             if self.fits(&problem) {
                 settings.graduation = Graduation::None;

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use place_recognition::ViewLog;
 
 use super::graph::KeyframeGraph;
+use super::live_estimates::LiveEstimates;
 use super::relaxation_outcome::RelaxationOutcome;
 use state::Digest;
 
@@ -26,18 +27,26 @@ struct Shared {
 /// What the outcome is of.
 #[derive(Debug)]
 enum Source {
-    Snapshot(Box<KeyframeGraph>, Option<ViewLog>),
+    Snapshot {
+        graph: Box<KeyframeGraph>,
+        views: Option<ViewLog>,
+        live: LiveEstimates,
+    },
     /// A snapshot with this digest, of which a checkpoint holds the outcome alone.
     Digest(Digest),
 }
 
 impl RelaxationJob {
-    /// Of a graph, under the revision of its latest change, and of the views that are to be
-    /// matched.
-    pub(super) fn new(graph: &KeyframeGraph, views: Option<ViewLog>) -> Self {
+    /// Of a graph, under the revision of its latest change, of the views that are to be matched, and
+    /// of the live estimates.
+    pub(super) fn new(graph: &KeyframeGraph, views: Option<ViewLog>, live: LiveEstimates) -> Self {
         Self(Arc::new(Shared {
             revision: graph.revision,
-            source: Source::Snapshot(Box::new(graph.clone()), views),
+            source: Source::Snapshot {
+                graph: Box::new(graph.clone()),
+                views,
+                live,
+            },
             outcome: OnceLock::new(),
         }))
     }
@@ -69,8 +78,8 @@ impl RelaxationJob {
     /// The outcome.
     pub(super) fn outcome(&self) -> &Arc<RelaxationOutcome> {
         self.0.outcome.get_or_init(|| match &self.0.source {
-            Source::Snapshot(graph, views) => {
-                Arc::new(RelaxationOutcome::of(graph, views.as_ref()))
+            Source::Snapshot { graph, views, live } => {
+                Arc::new(RelaxationOutcome::of(graph, views.as_ref(), live))
             }
             Source::Digest(_) => Arc::default(), // never: it came with its outcome
         })
@@ -79,7 +88,7 @@ impl RelaxationJob {
     /// Digest of the snapshot, which determines the outcome and is sooner computed.
     pub(super) fn digest(&self) -> Digest {
         match &self.0.source {
-            Source::Snapshot(graph, views) => graph.digest(views.as_ref()),
+            Source::Snapshot { graph, views, .. } => graph.digest(views.as_ref()),
             Source::Digest(digest) => *digest,
         }
     }

@@ -7,6 +7,7 @@ use super::agent_track::AgentTrack;
 use super::constraint::{ClosureState, Constraint};
 use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
+use super::live_estimates::LiveEstimates;
 use super::relaxation::Correction;
 use crate::estimator::ExternalEstimate;
 use geometry::is_somewhere;
@@ -32,10 +33,10 @@ pub(super) struct RelaxationOutcome {
 }
 
 impl RelaxationOutcome {
-    /// Of a graph, and of the views that are to be matched.
-    pub(super) fn of(graph: &KeyframeGraph, views: Option<&ViewLog>) -> Self {
+    /// Of a graph, of the views that are to be matched, and of the live estimates.
+    pub(super) fn of(graph: &KeyframeGraph, views: Option<&ViewLog>, live: &LiveEstimates) -> Self {
         let mut relaxed = graph.clone();
-        let corrections = relaxed.relax_matched(views);
+        let corrections = relaxed.relax_matched(views, live);
         let moved = |(number, is): (u32, &Keyframe)| {
             let was = graph.chains.keyframes.get(number)?;
             let is_moved = (was.pose, was.is_in_map) != (is.pose, is.is_in_map);

@@ -23,7 +23,7 @@ const SEEN_SD_M: f64 = 0.05;
 const BEACON_M: f64 = 2.0;
 
 /// A robot that goes round and round and sees the nearest beacon now and then.
-fn patrolled(steps: u64) -> KeyframeGraph {
+pub(in crate::keyframes) fn patrolled(steps: u64) -> KeyframeGraph {
     let mut graph = KeyframeGraph::new(KeyframeSettings::default());
     let agent = graph.enrol();
     graph.found(agent);
