@@ -139,6 +139,9 @@ impl Chains {
 
     /// Puts keyframes, the last one first, on the way between two that have been put somewhere.
     fn put_between(&mut self, from: u32, numbers: &[u32], to: u32, revision: u64) {
+        if numbers.is_empty() {
+            return;
+        }
         let keyframe = |number: u32| self.keyframes.get(number);
         let (Some(from), Some(to)) = (keyframe(from), keyframe(to)) else {
             return;

@@ -18,8 +18,8 @@
 //! | attachments | places that move with keyframes | `attachments` |
 //!
 //! A relaxation works on a copy of the graph (`relaxation`), with fewer keyframes (`coarse`), as a
-//! problem of least squares (`problem`); `closures` brings its outcome back, and `bridge` says where
-//! keyframes lie between two of the copy. While samples come in,
+//! problem of least squares (`problem`); `closures` brings its outcome back, and `bridge` says
+//! where keyframes lie between two of the copy. While samples come in,
 //! a relaxation is of the graph as it was at one record (`relaxation_job`), and comes into force at
 //! a later one (`adoption`), so that no record waits for it; `meanwhile` has what comes in between.
 //!

@@ -37,8 +37,8 @@ enum Source {
 }
 
 impl RelaxationJob {
-    /// Of a graph, under the revision of its latest change, of the views that are to be matched, and
-    /// of the live estimates.
+    /// Of a graph, under the revision of its latest change, of the views that are to be matched,
+    /// and of the live estimates.
     pub(super) fn new(graph: &KeyframeGraph, views: Option<ViewLog>, live: LiveEstimates) -> Self {
         Self(Arc::new(Shared {
             revision: graph.revision,
@@ -85,7 +85,8 @@ impl RelaxationJob {
         })
     }
 
-    /// Digest of the snapshot, which determines the outcome and is sooner computed.
+    /// Digest of the graph and of the views, which is sooner computed than that of the outcome. What
+    /// was estimated then follows from the same records, and is not in it.
     pub(super) fn digest(&self) -> Digest {
         match &self.0.source {
             Source::Snapshot { graph, views, .. } => graph.digest(views.as_ref()),

@@ -333,46 +333,6 @@ fn what_is_seen_is_taken_in_though_there_is_room_for_keyframes_only() {
     assert!(bounded_m < 0.12, "{bounded_m} {whole_m}");
 }
 
-/// More keyframes with sightings than are relaxed while samples come in: they are joined, and those
-/// between lie by what is known of their motions.
-#[test]
-fn places_of_a_long_past_lie_where_they_were_founded() {
-    let mut walk = Walk::new(3, roomy(), &Isometry3::identity());
-    let (mut founded, mut placed) = (Vec::new(), Vec::new());
-    for step in 1..=18_000_u32 {
-        walk.step();
-        if step.is_multiple_of(100) {
-            // As the estimator corrects poses.
-            walk.told.clone_from(&walk.truth);
-            let robot = founded.len() % 3;
-            let place = u32::try_from(founded.len()).unwrap();
-            let agent = u32::try_from(robot).unwrap();
-            let attachment = walk.keyframes.graph.attach_place(agent, place);
-            assert!(attachment.is_some());
-            founded.push(walk.truth[robot].translation.vector);
-            placed.push(founded[founded.len() - 1]);
-        }
-        if step.is_multiple_of(3000) {
-            walk.keyframes.graph.relax();
-            loop {
-                let moved = walk.keyframes.graph.moved_places();
-                if moved.is_empty() {
-                    break;
-                }
-                for (place, pose) in moved {
-                    placed[place as usize] = pose.translation.vector;
-                }
-            }
-            let off = placed
-                .iter()
-                .zip(&founded)
-                .map(|(a, b)| (a - b).norm_squared());
-            let off_m = (off.sum::<f64>() / founded.len() as f64).sqrt();
-            assert!(off_m < 0.05, "{off_m} m after {step} steps");
-        }
-    }
-}
-
 #[test]
 fn memory_stays_flat() {
     let mut walk = walked(2, 2000, tight());

@@ -113,8 +113,8 @@ fn most_likely(
         .collect()
 }
 
-/// A robot whose every step turns by the same too much comes back nearly onto the true arc, off which it
-/// was by 0.35 m and 0.2 rad.
+/// A robot whose every step turns by the same too much comes back nearly onto the true arc, off
+/// which it was by 0.35 m and 0.2 rad.
 #[test]
 fn a_lasting_veer_is_undone() {
     let covariance = PoseCovariance::from_sd(&Vector6::new(1e-3, 1e-3, 1e-3, 0.01, 0.01, 0.01));
