@@ -7,6 +7,7 @@ use super::bridge::bridge;
 use super::keyframe::{Keyframe, KeyframeSlab};
 use super::keyframe_index::{IndexEntry, KeyframeIndex};
 use super::tuning;
+use geometry::is_somewhere;
 use state::{NONE, PagedVec};
 
 /// The chains of keyframes, one for each agent.
@@ -121,7 +122,7 @@ impl Chains {
         while let Some(keyframe) = self.keyframes.get(number) {
             let previous = keyframe.previous;
             if let Some(pose) = copy.in_map(number) {
-                self.put(number, &pose, revision);
+                self.put_somewhere(number, &pose, revision);
                 self.put_between(number, &between, later, revision);
                 (between, later) = (Vec::new(), number);
             } else {
@@ -152,7 +153,16 @@ impl Chains {
             .map(|keyframe| (keyframe.motion, keyframe.covariance));
         let poses = bridge(&from.pose, &motions.collect::<Vec<_>>(), &to.pose);
         for (number, pose) in numbers.iter().rev().zip(&poses) {
-            self.put(*number, pose, revision);
+            self.put_somewhere(*number, pose, revision);
+        }
+    }
+
+    /// Puts a keyframe where it turns out to be, unless that is nowhere: motions may be as large as
+    /// numbers are.
+    fn put_somewhere(&mut self, number: u32, pose: &Isometry3<f64>, revision: u64) {
+        let is_turn = pose.rotation.coords.iter().all(|x| x.is_finite());
+        if is_turn && is_somewhere(&pose.translation.vector) {
+            self.put(number, pose, revision);
         }
     }
 

@@ -85,8 +85,8 @@ impl RelaxationJob {
         })
     }
 
-    /// Digest of the graph and of the views, which is sooner computed than that of the outcome. What
-    /// was estimated then follows from the same records, and is not in it.
+    /// Digest of the graph and of the views, which is sooner computed than that of the outcome.
+    /// What was estimated then follows from the same records, and is not in it.
     pub(super) fn digest(&self) -> Digest {
         match &self.0.source {
             Source::Snapshot { graph, views, .. } => graph.digest(views.as_ref()),
