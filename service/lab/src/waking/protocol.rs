@@ -21,8 +21,19 @@ pub struct WakingProtocol {
     pub view_noise: f64,
     /// Share of views that show something else.
     pub view_wrong: f64,
+    /// What is felt instead of being seen, if that is what robots do.
+    pub felt: Option<FeltFields>,
     /// Number from which everything is drawn.
     pub seed: u64,
+}
+
+/// Levels of smooth fields, one for each of four channels, felt at every step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FeltFields {
+    /// Correlation length of the fields \[m\].
+    pub length_m: f64,
+    /// Deviation of a level's noise; that of the fields is 1.
+    pub noise: f64,
 }
 
 /// A protocol that cannot be followed.
@@ -39,6 +50,11 @@ pub enum InvalidWaking {
     /// Views that make no sense.
     #[error("noise and wrong views are shares from 0 to 1")]
     View,
+    /// Levels that make no sense.
+    #[error(
+        "levels are felt in one room, in fields of a length from 0.01 to 1000 m and with noise up to 10"
+    )]
+    Felt,
 }
 
 impl Default for WakingProtocol {
@@ -52,6 +68,7 @@ impl Default for WakingProtocol {
             view_every: 1,
             view_noise: 0.1,
             view_wrong: 0.05,
+            felt: None,
             seed: 1,
         }
     }
@@ -74,6 +91,13 @@ impl WakingProtocol {
         let share = |value: f64| (0.0..=1.0).contains(&value);
         if !share(self.view_noise) || !share(self.view_wrong) {
             return Err(InvalidWaking::View);
+        }
+        let is_felt = |felt: &FeltFields| {
+            let length = (0.01..=1000.0).contains(&felt.length_m);
+            length && (0.0..=10.0).contains(&felt.noise) && self.rooms == 1
+        };
+        if !self.felt.as_ref().is_none_or(is_felt) {
+            return Err(InvalidWaking::Felt);
         }
         Ok(())
     }

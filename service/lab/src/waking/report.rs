@@ -9,6 +9,8 @@ use super::protocol::WakingProtocol;
 pub(super) const FALSE_M: f64 = 0.5;
 /// One that is nearer at the end was found \[m\].
 pub(super) const FOUND_M: f64 = 0.2;
+/// The same of one that feels, but does not see.
+const FOUND_BY_LEVELS_M: f64 = 0.3;
 
 /// One robot that woke up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -32,7 +34,9 @@ pub struct WakingTrial {
 pub struct WakingReport {
     /// What was done.
     pub protocol: WakingProtocol,
-    /// Share of the robots that are in the map within 0.2 m of where they are at the end.
+    /// How far off a robot may be at the end that counts as found \[m\].
+    pub found_m: f64,
+    /// Share of the robots that are in the map no farther off at the end.
     pub relocalised: f64,
     /// Robots that were ever put more than 0.5 m from where they were.
     pub false_claims: u32,
@@ -81,11 +85,16 @@ impl WakingReport {
             let found = trials.iter().filter(|trial| is(trial)).count();
             u32::try_from(found).unwrap_or(u32::MAX)
         };
-        let found = count(&|trial| trial.error_m.is_some_and(|error_m| error_m <= FOUND_M));
+        let found_m = match protocol.felt {
+            Some(_) => FOUND_BY_LEVELS_M,
+            None => FOUND_M,
+        };
+        let found = count(&|trial| trial.error_m.is_some_and(|error_m| error_m <= found_m));
         let spread =
             |of: &dyn Fn(&WakingTrial) -> Option<f64>| Spread::of(trials.iter().filter_map(of));
         Self {
             protocol: *protocol,
+            found_m,
             relocalised: f64::from(found) / trials.len().max(1) as f64,
             false_claims: count(&|trial| trial.is_false),
             early_claims: count(&|trial| trial.is_early),

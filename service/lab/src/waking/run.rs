@@ -7,12 +7,13 @@ use cognitive_map::{AgentId, CognitiveMap, Label, Record, Sample, Settings, Sett
 use nalgebra::{Isometry3, Translation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
 use super::building::Building;
 use super::protocol::{InvalidWaking, WakingProtocol};
 use super::report::{WakingReport, WakingTrial};
 use crate::eval::object::in_parallel;
-use cogmap_worlds::{ObstacleWorld, Odometer, OdometryNoise, STEP_M, Sensor, Walker};
+use cogmap_worlds::{LevelField, ObstacleWorld, Odometer, OdometryNoise, STEP_M, Sensor, Walker};
 use cogmap_worlds::{Reading, ReadingBody, ReadingTarget};
 
 /// Time of a step: 10 Hz, which makes 1 m/s.
@@ -26,6 +27,8 @@ const SURVEY_EVERY: u32 = 5;
 const SURVEY_RANGE_SHARE: f64 = 0.05;
 const SURVEY_BEARING_SD_RAD: f64 = std::f64::consts::PI / 180.0;
 const CHANNEL: &str = "view";
+/// Channels of levels.
+const LEVELS: u64 = 4;
 /// Below this share of the height a robot wakes up where several rooms look alike.
 const WAKES_BELOW: f64 = 0.55;
 /// Odometry of the robots: that of the obstacle-rich room's accuracy tables.
@@ -100,6 +103,8 @@ pub(super) struct Site {
     seed: u64,
     world: ObstacleWorld,
     building: Building,
+    /// What is felt, if it is.
+    fields: Vec<LevelField>,
     pub(super) map: CognitiveMap,
     /// Where the explorer was in each room.
     way: Vec<Vec<Vector3<f64>>>,
@@ -125,6 +130,10 @@ impl Site {
             seed,
             world,
             building,
+            fields: protocol.felt.map_or_else(Vec::new, |felt| {
+                let field = |channel| LevelField::new(seed, channel, felt.length_m);
+                (0..LEVELS).map(field).collect()
+            }),
             map: CognitiveMap::new(settings),
             way: Vec::new(),
         };
@@ -214,7 +223,11 @@ impl Site {
                 let before = Instant::now();
                 apply(&mut map, agent, seq, &reading);
                 seq += 1;
-                if matches!(reading.body, ReadingBody::Descriptor { .. }) {
+                let is_percept = matches!(
+                    reading.body,
+                    ReadingBody::Descriptor { .. } | ReadingBody::Level { .. }
+                );
+                if is_percept {
                     took_ms.push(before.elapsed().as_secs_f64() * 1e3);
                 }
             }
@@ -281,8 +294,17 @@ impl Robot<'_> {
         self.steps += 1;
         let stamp_ns = self.stamp_ns();
         let mut readings = vec![self.odometer.read(&step, stamp_ns, STEP_NS as f64 * 1e-9)];
-        if self.steps.is_multiple_of(protocol.view_every) {
-            let from_m = self.walker.pose().translation.vector;
+        let from_m = self.walker.pose().translation.vector;
+        if let Some(felt) = &protocol.felt {
+            for (number, field) in self.site.fields.iter().enumerate() {
+                let error: f64 = self.eyes.sample(StandardNormal);
+                let body = ReadingBody::Level {
+                    channel: format!("field-{number}"),
+                    value: field.level(&from_m) + felt.noise * error,
+                };
+                readings.push(Reading { stamp_ns, body });
+            }
+        } else if self.steps.is_multiple_of(protocol.view_every) {
             let vector = self.site.building.view(
                 self.room,
                 &from_m,

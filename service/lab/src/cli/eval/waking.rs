@@ -5,8 +5,8 @@ use std::num::NonZeroUsize;
 
 use clap::Args;
 use cogmap_lab::waking::{
-    CarriedProtocol, CarriedReport, Spread, WakingProtocol, WakingReport, run_carried, run_waking,
-    time_waking,
+    CarriedProtocol, CarriedReport, FeltFields, Spread, WakingProtocol, WakingReport, run_carried,
+    run_waking, time_waking,
 };
 use serde::Serialize;
 
@@ -41,6 +41,18 @@ pub(in crate::cli) struct WakingArgs {
     /// Share of views that show something else.
     #[arg(long, default_value_t = WakingProtocol::default().view_wrong, value_name = "SHARE")]
     view_wrong: f64,
+    /// Robots feel levels on four channels at every step instead of seeing anything, in smooth
+    /// fields of this correlation length [m].
+    #[arg(long, value_name = "M", conflicts_with_all = ["view_every", "view_noise", "view_wrong"])]
+    levels_m: Option<f64>,
+    /// Standard deviation of a level's noise as a share of the field's, with --levels-m.
+    #[arg(
+        long,
+        default_value_t = 0.1,
+        value_name = "SHARE",
+        requires = "levels_m"
+    )]
+    level_noise: f64,
     /// Seed of the first building: of obstacles, walks, views and noise. The next building has the
     /// next.
     #[arg(long, default_value_t = WakingProtocol::default().seed)]
@@ -59,7 +71,7 @@ pub(in crate::cli) struct WakingArgs {
     /// How far they go after that [m]; with 0 they are not carried off.
     #[arg(long, default_value_t = 5.0, value_name = "M", requires = "carried")]
     after_m: f64,
-    /// Print instead how long views take to be taken in, on one thread.
+    /// Print instead how long views or levels take to be taken in, on one thread.
     #[arg(long, conflicts_with = "carried")]
     cost: bool,
     /// Print one JSON object.
@@ -94,6 +106,10 @@ pub(super) fn run(args: &WakingArgs) -> anyhow::Result<()> {
         view_every: args.view_every,
         view_noise: args.view_noise,
         view_wrong: args.view_wrong,
+        felt: args.levels_m.map(|length_m| FeltFields {
+            length_m,
+            noise: args.level_noise,
+        }),
         seed: args.seed,
     };
     protocol.check()?;
@@ -144,7 +160,7 @@ fn cost(args: &WakingArgs, protocol: &WakingProtocol) -> anyhow::Result<()> {
         return output::json(&cost);
     }
     Ok(output::line(&format!(
-        "{views} views [ms]: p50 {:.2}, p75 {:.2}, p90 {:.2}, p99 {:.2}, max {:.2}",
+        "{views} percepts [ms]: p50 {:.2}, p75 {:.2}, p90 {:.2}, p99 {:.2}, max {:.2}",
         cost.p50, cost.p75, cost.p90, cost.p99, cost.max
     ))?)
 }
@@ -215,10 +231,11 @@ impl Display for Table<'_> {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         let report = self.0;
         let protocol = &report.protocol;
+        let within = format!("in the map within {} m at the end", report.found_m);
         let rows = [
             ("robots", protocol.trials.to_string()),
             (
-                "in the map within 0.2 m at the end",
+                within.as_str(),
                 format!("{:.1} %", 100.0 * report.relocalised),
             ),
             (
