@@ -13,6 +13,8 @@ const SHARD_BITS_STEP: u32 = 3;
 const SHARD_BITS_MAX: u32 = 12;
 /// Places per shard at which it is worth having more of them, counted in the larger number.
 const PLACES_PER_SHARD: usize = 4;
+/// Lowest bits of a tag: which of the cells of a block.
+const BLOCK_BITS: u32 = 3;
 /// A search over more cells than this along any axis is left to a scan.
 const CELLS_PER_AXIS_MAX: i64 = 8;
 
@@ -153,21 +155,29 @@ impl SpatialIndex {
             }
         };
         of_cell(entries, &mut limit);
+        // The other cells block by block: one look-up finds the places of a whole block.
+        let own_tag = tag(own);
+        let edge_m = 2.0 * self.cell_edge_m;
+        let [low, high] = [low, high].map(|cell| cell.map(|index| index >> 1));
         for i in low[0]..=high[0] {
-            let along_x = self.outside_squared(i, point.x);
+            let along_x = outside_squared(i, edge_m, point.x);
             if along_x > limit {
                 continue;
             }
             for j in low[1]..=high[1] {
-                let along_xy = along_x + self.outside_squared(j, point.y);
+                let along_xy = along_x + outside_squared(j, edge_m, point.y);
                 if along_xy > limit {
                     continue;
                 }
                 for k in low[2]..=high[2] {
-                    let cell = [i, j, k];
-                    let distance_squared = along_xy + self.outside_squared(k, point.z);
-                    if cell != own && distance_squared <= limit {
-                        of_cell(self.entries(cell), &mut limit);
+                    if along_xy + outside_squared(k, edge_m, point.z) > limit {
+                        continue;
+                    }
+                    let block = self.tagged(tag([i << 1, j << 1, k << 1]), BLOCK_BITS);
+                    for entries in block.chunk_by(|a, b| a.tag == b.tag) {
+                        if entries[0].tag != own_tag {
+                            of_cell(entries, &mut limit);
+                        }
                     }
                 }
             }
@@ -177,10 +187,15 @@ impl SpatialIndex {
 
     /// The entries of a cell, and perhaps those of another one that has the same tag.
     fn entries(&self, cell: Cell) -> &[Entry] {
-        let (shard, tag) = self.slot(cell);
-        let shard = &self.shards[shard];
+        self.tagged(tag(cell), 0)
+    }
+
+    /// The entries that have a tag but for so many of its lowest bits, which are 0 in `tag`.
+    fn tagged(&self, tag: u32, open_bits: u32) -> &[Entry] {
+        let shard = &self.shards[self.shard_of(tag)];
         let rest = &shard[first_of(shard, tag, self.shard_bits)..];
-        let end = rest.iter().position(|entry| entry.tag != tag);
+        let is_beyond = |entry: &Entry| entry.tag >> open_bits != tag >> open_bits;
+        let end = rest.iter().position(is_beyond);
         &rest[..end.unwrap_or(rest.len())]
     }
 
@@ -200,16 +215,16 @@ impl SpatialIndex {
     fn cell(&self, position: [f64; 3]) -> Cell {
         position.map(|x| (x / self.cell_edge_m).floor() as i64)
     }
+}
 
-    /// Lower bound of the squared distance along one axis from a coordinate to anything in the
-    /// cells of an index \[m²\].
-    fn outside_squared(&self, index: i64, x: f64) -> f64 {
-        let low = index as f64 * self.cell_edge_m;
-        let outside = (low - x).max(x - (low + self.cell_edge_m)).max(0.0);
-        // The cells' bounds are rounded, by less than this.
-        let slack = 4.0 * f64::EPSILON * (x.abs() + self.cell_edge_m);
-        (outside - slack).max(0.0).powi(2)
-    }
+/// Lower bound of the squared distance along one axis from a coordinate to anything in the cells or
+/// blocks of an index \[m²\].
+fn outside_squared(index: i64, edge_m: f64, x: f64) -> f64 {
+    let low = index as f64 * edge_m;
+    let outside = (low - x).max(x - (low + edge_m)).max(0.0);
+    // The bounds are rounded, by less than this.
+    let slack = 4.0 * f64::EPSILON * (x.abs() + edge_m);
+    (outside - slack).max(0.0).powi(2)
 }
 
 /// Index of the first entry with a tag, or where it would be.
@@ -282,7 +297,7 @@ fn tag(cell: Cell) -> u32 {
             .rotate_left(29)
     });
     let block = (hash.wrapping_mul(0x9fb2_1c65_1e98_df25) >> 32) as u32;
-    cell.into_iter().fold(block >> 3, |tag, index| {
+    cell.into_iter().fold(block >> BLOCK_BITS, |tag, index| {
         (tag << 1) | u32::from(index & 1 == 1)
     })
 }
