@@ -33,6 +33,15 @@ impl LevelField {
         }
     }
 
+    /// The same field along so many axes of the room alone: along the others it is the same
+    /// everywhere.
+    pub fn along(mut self, axes: usize) -> Self {
+        for (wave, _) in &mut self.waves {
+            wave.iter_mut().skip(axes).for_each(|rate| *rate = 0.0);
+        }
+        self
+    }
+
     /// The level at a position \[m\].
     pub fn level(&self, at_m: &Vector3<f64>) -> f64 {
         let waves = self.waves.iter();

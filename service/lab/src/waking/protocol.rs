@@ -34,6 +34,8 @@ pub struct FeltFields {
     pub length_m: f64,
     /// Deviation of a level's noise; that of the fields is 1.
     pub noise: f64,
+    /// Axes of the room along which they change, 1 to 3.
+    pub axes: usize,
 }
 
 /// A protocol that cannot be followed.
@@ -52,7 +54,7 @@ pub enum InvalidWaking {
     View,
     /// Levels that make no sense.
     #[error(
-        "levels are felt in one room, in fields of a length from 0.01 to 1000 m and with noise up to 10"
+        "levels are felt in one room, in fields of a length from 0.01 to 1000 m along 1 to 3 axes and with noise up to 10"
     )]
     Felt,
 }
@@ -94,7 +96,10 @@ impl WakingProtocol {
         }
         let is_felt = |felt: &FeltFields| {
             let length = (0.01..=1000.0).contains(&felt.length_m);
-            length && (0.0..=10.0).contains(&felt.noise) && self.rooms == 1
+            length
+                && (1..=3).contains(&felt.axes)
+                && (0.0..=10.0).contains(&felt.noise)
+                && self.rooms == 1
         };
         if !self.felt.as_ref().is_none_or(is_felt) {
             return Err(InvalidWaking::Felt);

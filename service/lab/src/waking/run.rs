@@ -131,7 +131,8 @@ impl Site {
             world,
             building,
             fields: protocol.felt.map_or_else(Vec::new, |felt| {
-                let field = |channel| LevelField::new(seed, channel, felt.length_m);
+                let field =
+                    |channel| LevelField::new(seed, channel, felt.length_m).along(felt.axes);
                 (0..LEVELS).map(field).collect()
             }),
             map: CognitiveMap::new(settings),

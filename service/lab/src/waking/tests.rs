@@ -3,7 +3,8 @@
 use std::num::NonZeroUsize;
 
 use super::{
-    CarriedProtocol, InvalidWaking, WakingProtocol, WakingReport, run_carried, run_waking,
+    CarriedProtocol, FeltFields, InvalidWaking, WakingProtocol, WakingReport, run_carried,
+    run_waking,
 };
 
 fn run(protocol: &WakingProtocol) -> WakingReport {
@@ -28,6 +29,33 @@ fn robots_find_out_where_they_woke_up() {
     assert_eq!(report.false_claims, 0);
     assert!(report.travel_m.p50.unwrap() < 2.0, "{report:?}");
     assert!(report.error_m.p50.unwrap() < 0.12, "{report:?}");
+}
+
+/// Fields that change over two metres along so many axes, felt on a way of five.
+fn felt(trials: u32, axes: usize) -> WakingProtocol {
+    WakingProtocol {
+        travel_m: 5.0,
+        felt: Some(FeltFields {
+            length_m: 2.0,
+            noise: 0.1,
+            axes,
+        }),
+        explorer_steps: 12_000,
+        ..few(trials)
+    }
+}
+
+#[test]
+fn robots_find_out_by_what_they_feel_where_they_woke_up() {
+    let report = run(&felt(4, 3));
+    assert!(report.relocalised >= 0.5, "{report:?}");
+    assert_eq!(report.false_claims, 0);
+}
+
+#[test]
+fn nobody_is_put_anywhere_by_fields_that_are_the_same_all_along_a_floor() {
+    let report = run(&felt(4, 1));
+    assert_eq!((report.uncertain, report.false_claims), (4, 0));
 }
 
 #[test]
@@ -78,6 +106,7 @@ fn senseless_protocols_are_refused() {
         ..few(1)
     };
     assert_eq!(refused(blind), InvalidWaking::View);
+    assert_eq!(refused(felt(1, 4)), InvalidWaking::Felt);
 }
 
 #[test]

@@ -53,6 +53,9 @@ pub(in crate::cli) struct WakingArgs {
         requires = "levels_m"
     )]
     level_noise: f64,
+    /// Axes of the room along which fields change, 1 to 3, with --levels-m.
+    #[arg(long, default_value_t = 3, value_name = "N", requires = "levels_m")]
+    level_axes: usize,
     /// Seed of the first building: of obstacles, walks, views and noise. The next building has the
     /// next.
     #[arg(long, default_value_t = WakingProtocol::default().seed)]
@@ -109,6 +112,7 @@ pub(super) fn run(args: &WakingArgs) -> anyhow::Result<()> {
         felt: args.levels_m.map(|length_m| FeltFields {
             length_m,
             noise: args.level_noise,
+            axes: args.level_axes,
         }),
         seed: args.seed,
     };
