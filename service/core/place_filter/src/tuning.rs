@@ -98,36 +98,41 @@ pub(crate) mod search {
     pub(crate) const NODES: usize = 16;
     /// Rounds without looking for places, at most, while there is a likely pose.
     pub(crate) const ROUNDS_PER_SCAN: u32 = 6;
-    /// Places that are looked at with a record.
-    pub(crate) const SCANNED: usize = 2048;
-    /// Nodes at which places are looked for, and the way between two in correlation lengths.
-    pub(crate) const CORNERS: usize = 3;
+    /// Work of a search with a record, in places that are looked at: 0.5 ms or so.
+    pub(crate) const WORK: u32 = 4096;
+    /// Places that are looked at in a step.
+    pub(crate) const SCANNED: u32 = 512;
+    /// Nodes at which places are looked for, and the way between two at least in correlation
+    /// lengths.
+    pub(crate) const CORNERS: usize = 4;
     /// See [`CORNERS`].
     pub(crate) const CORNERS_APART: f64 = 0.6;
     /// Places at which poses are seeded, for each.
-    pub(crate) const ANCHORS: usize = 64;
-    /// The same with a record.
-    pub(crate) const TURNED: usize = 10;
+    pub(crate) const ANCHORS: usize = 18;
+    /// Work of such a place, and of a pose that is weighed.
+    pub(crate) const TURN_WORK: u32 = 256;
+    /// See [`TURN_WORK`].
+    pub(crate) const WEIGH_WORK: u32 = 2048;
     /// Nodes by which a seed is judged.
     pub(crate) const CHECKS: usize = 4;
     /// They are neither nearer nor farther than so many correlation lengths.
     pub(crate) const CHECK_REACH: [f64; 2] = [0.1, 2.5];
     /// Distance by which they may be off, as a part of that of the agent from the anchor.
     pub(crate) const CHECK_BESIDE: f64 = 0.5;
+    /// Probability that a level at a place says nothing of it.
+    pub(crate) const WRONG_LEVEL: f64 = 0.05;
+    /// Odds of the nodes below which a seed is given up: e⁻².
+    pub(crate) const AGAINST_SEED: f64 = 0.135;
     /// Headings that are tried at each place.
     pub(crate) const HEADINGS: u32 = 16;
     /// Distance of the agent from the anchor, in correlation lengths.
     pub(crate) const BESIDE: f64 = 0.35;
     /// Seeds that are refined.
-    pub(crate) const SEEDS: usize = 14;
+    pub(crate) const SEEDS: usize = 8;
     /// Log odds from which on a pose is worth another look \[nats\].
     pub(crate) const HOPELESS: f64 = -8.0;
     /// Poses that are kept.
     pub(crate) const KEPT: usize = 6;
-    /// Poses that are weighed with a record, and of those that are doubted.
-    pub(crate) const WEIGHED: usize = 1;
-    /// See [`WEIGHED`].
-    pub(crate) const DOUBTED: usize = 2;
     /// Steps of a refinement.
     pub(crate) const ROUNDS: usize = 3;
     /// Its longest step \[m\].
@@ -152,8 +157,11 @@ pub(crate) mod search {
     pub(crate) const TILT_PER_M: f64 = 4e-4;
     /// Error of odometry, as a part of the way.
     pub(crate) const DRIFT: f64 = 0.04;
-    /// Part of the errors of slopes that does not count as knowledge.
-    pub(crate) const DOUBT: f64 = 1.0;
+    /// What errors of slopes make up on average does not count as knowledge, so many times over: it
+    /// scatters, as the square of a few numbers does.
+    pub(crate) const DOUBT: f64 = 1.5;
+    /// Part of the variance of a slope that those beside it leave open at least.
+    pub(crate) const SLOPES_APART: f64 = 1e-3;
     /// Log odds at which a pose is believed: one wrong answer in a thousand \[nats\].
     pub(crate) const SURE: f64 = 6.9;
     /// Least factor of the covariance by the mean of the squared residuals.

@@ -134,11 +134,12 @@ fn a_search_finds_where_it_is() {
     assert!(off_m < 0.2, "{off_m}");
 }
 
-/// What a record takes does not depend on how many places there are.
+/// What a record takes does not depend on how many places there are: some four thousand of them on
+/// four channels are looked at, and a last pose is weighed.
 #[test]
 fn a_record_asks_about_a_bounded_number_of_places() {
     for rows in [20, 60, 120] {
         let (_, most) = search(&Floor::new(rows), 120);
-        assert!(most <= 10_000, "{rows}: {most}");
+        assert!(most <= 20_000, "{rows}: {most}");
     }
 }

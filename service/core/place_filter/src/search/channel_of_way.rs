@@ -112,7 +112,7 @@ impl ChannelOfWay {
         let factor = Lower::factor(supports.len(), |row, column| {
             let (a, b) = (&supports[row], &supports[column]);
             let own = if row == column {
-                kernel.nugget + kernel.squared_slope() * a.spread_m2
+                noise_of(&kernel, a)
             } else {
                 0.0
             };
@@ -207,12 +207,21 @@ impl ChannelOfWay {
         }
     }
 
-    /// Covariance of the errors of the slopes at a pose along each axis of the map.
-    pub(super) fn slope_errors(&self, pose: &Isometry3<f64>) -> [DMatrix<f64>; 3] {
+    /// Covariance of what may be made up of the slopes at a pose, along each axis of the map:
+    ///
+    /// ```text
+    /// E − E P⁻¹ E        P of slopes that nothing is known of, E of their errors
+    /// ```
+    ///
+    /// Where places tell the slope, that is E: if the field is the same along the axis, the slope
+    /// is nothing but error. Where they tell nothing the slope is taken for 0, and nothing is made
+    /// up of it.
+    pub(super) fn made_up_slopes(&self, pose: &Isometry3<f64>) -> Option<[DMatrix<f64>; 3]> {
         let m = self.felt.len();
         let points: Vec<_> = self.points().map(|(at, _)| pose * at).collect();
         let squared_length = self.kernel.length_m * self.kernel.length_m;
-        std::array::from_fn(|axis| {
+        let mut all = std::array::from_fn(|_| DMatrix::zeros(0, 0));
+        for (axis, made_up) in all.iter_mut().enumerate() {
             let mut rows = Vec::with_capacity(self.supports.len() * m);
             for support in &self.supports {
                 rows.extend(points.iter().map(|at| {
@@ -226,13 +235,25 @@ impl ChannelOfWay {
                 let part = (1.0 - by[axis] * by[axis] / squared_length) / squared_length;
                 self.kernel.covariance(by.norm_squared()) * part
             });
+            let mut unknown = errors.clone();
+            for k in 0..m {
+                // Slopes at neighbouring nodes are nearly one.
+                unknown[(k, k)] *= 1.0 + tuning::SLOPES_APART;
+            }
             for row in rows.chunks_exact(m) {
                 let row = DVector::from_column_slice(row);
                 errors.ger(-1.0, &row, &row, 1.0);
             }
-            errors
-        })
+            let owned = unknown.cholesky()?.l().solve_lower_triangular(&errors)?;
+            *made_up = errors - owned.transpose() * owned;
+        }
+        Some(all)
     }
+}
+
+/// Variance of what a place remembers: of the sensor, and by where it was.
+fn noise_of(kernel: &Kernel, support: &Support) -> f64 {
+    kernel.nugget + kernel.squared_slope() * support.spread_m2
 }
 
 /// Log density of independent standard normal values, but for a constant of their number; one that

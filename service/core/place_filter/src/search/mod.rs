@@ -109,7 +109,7 @@ impl Search {
         self.stage != Stage::Rest
     }
 
-    /// Goes on by a part; answers the pose once it is sure.
+    /// Goes on by a part of bounded work; answers the pose once it is sure.
     pub(crate) fn seek(
         &mut self,
         window: &Window,
@@ -119,10 +119,10 @@ impl Search {
         let nodes = window.complete();
         if self.stage == Stage::Rest {
             let latest = nodes.last()?;
-            if nodes.len() >= tuning::NODES_MIN && latest.way_m > self.end_m {
-                self.begin(latest.way_m);
+            if nodes.len() < tuning::NODES_MIN || latest.way_m <= self.end_m {
+                return None;
             }
-            return None;
+            self.begin(latest.way_m);
         }
         let end = nodes.partition_point(|node| node.way_m <= self.end_m);
         let used = spaced(&nodes[..end]);
@@ -131,54 +131,80 @@ impl Search {
             self.stage = Stage::Rest;
             return None;
         };
-        match self.stage {
-            Stage::Rest => {}
-            Stage::Scan(first) => {
-                let corners = corners(&used, length_m);
-                let next = scan(&mut self.anchors, first, &corners, length_m, field);
-                self.stage = next.map_or(Stage::Turn, Stage::Scan);
-            }
-            Stage::Turn => {
-                let rest = self.anchors.len().saturating_sub(tuning::TURNED);
-                for anchor in self.anchors.drain(rest..) {
-                    turn(&anchor, &used, seeker, field, length_m, &mut self.seeds);
-                }
-                distinct(&mut self.seeds, tuning::SEEDS, seeker, length_m);
-                if self.anchors.is_empty() {
-                    let seeds = self.seeds.drain(..).map(|seed| seed.pose);
-                    self.queue.extend(seeds);
-                    self.stage = Stage::Weigh;
-                }
-            }
-            Stage::Weigh if self.queue.is_empty() => {
-                distinct(&mut self.weighed, tuning::KEPT, seeker, length_m);
-                self.judge(&used, seeker, length_m, field);
-            }
-            Stage::Weigh => {
-                for _ in 0..tuning::WEIGHED {
-                    self.weigh(&used, seeker, field, tuning::ROUNDS);
-                }
-            }
-            Stage::Doubt => {
-                let best = *self.weighed.first()?;
-                for _ in 0..tuning::DOUBTED {
-                    self.weigh(&used, seeker, field, 1);
-                }
-                let is_rival = |other: &Seed| {
-                    best.log_odds - other.log_odds < tuning::SURE
-                        && !same(&other.pose, &best.pose, seeker, length_m)
-                };
-                if self.weighed.iter().any(is_rival) {
-                    self.queue.clear();
-                    self.stage = Stage::Rest;
-                } else if self.queue.is_empty() {
-                    self.stage = Stage::Rest;
-                    return found(&best.pose, &spaced(nodes), seeker, field)
-                        .map(|(_, found)| found);
-                }
+        let mut left = tuning::WORK;
+        while left > 0 && self.stage != Stage::Rest {
+            let (work, is_sure) = self.step(&used, seeker, length_m, field);
+            left = left.saturating_sub(work);
+            if let Some(best) = self.weighed.first().filter(|_| is_sure) {
+                return found(&best.pose, &spaced(nodes), seeker, field).map(|(_, found)| found);
             }
         }
         None
+    }
+
+    /// Makes the next step of a round; answers its work, and whether the best pose is sure by it.
+    fn step(
+        &mut self,
+        used: &[&Node],
+        seeker: &Seeker<'_>,
+        length_m: f64,
+        field: &dyn Field,
+    ) -> (u32, bool) {
+        match self.stage {
+            Stage::Rest => (0, false),
+            Stage::Scan(first) => {
+                let corners = corners(used, length_m);
+                let next = scan(&mut self.anchors, first, &corners, length_m, field);
+                self.stage = next.map_or(Stage::Turn, Stage::Scan);
+                (tuning::SCANNED, false)
+            }
+            Stage::Turn => {
+                if let Some(anchor) = self.anchors.pop() {
+                    turn(&anchor, used, seeker, field, length_m, &mut self.seeds);
+                    return (tuning::TURN_WORK, false);
+                }
+                distinct(&mut self.seeds, tuning::SEEDS, seeker, length_m);
+                let seeds = self.seeds.drain(..).map(|seed| seed.pose);
+                self.queue.extend(seeds);
+                self.stage = Stage::Weigh;
+                (0, false)
+            }
+            Stage::Weigh if self.queue.is_empty() => {
+                distinct(&mut self.weighed, tuning::KEPT, seeker, length_m);
+                self.judge(used, seeker, length_m, field);
+                (tuning::WEIGH_WORK, false)
+            }
+            Stage::Weigh => {
+                self.weigh(used, seeker, field, tuning::ROUNDS);
+                (tuning::WEIGH_WORK, false)
+            }
+            Stage::Doubt => {
+                self.weigh(used, seeker, field, 1);
+                let is_sure = self.doubt(seeker, length_m);
+                (tuning::WEIGH_WORK, is_sure)
+            }
+        }
+    }
+
+    /// Whether no other pose explains about as much as the best, once all have been weighed.
+    fn doubt(&mut self, seeker: &Seeker<'_>, length_m: f64) -> bool {
+        let Some(best) = self.weighed.first() else {
+            self.stage = Stage::Rest;
+            return false;
+        };
+        let is_rival = |other: &Seed| {
+            best.log_odds - other.log_odds < tuning::SURE
+                && !same(&other.pose, &best.pose, seeker, length_m)
+        };
+        if self.weighed.iter().any(is_rival) {
+            self.queue.clear();
+            self.stage = Stage::Rest;
+            return false;
+        }
+        if self.queue.is_empty() {
+            self.stage = Stage::Rest;
+        }
+        self.queue.is_empty()
     }
 
     /// Begins a round.

@@ -160,7 +160,7 @@ impl<'a> Way<'a> {
             let by_pose = self.by_pose(&body, channel);
             let expected = channel.expect(&refined.pose, &refined.drift);
             let inverse = expected.covariance.cholesky()?.inverse();
-            for (axis, errors) in channel.slope_errors(&refined.pose).iter().enumerate() {
+            for (axis, errors) in channel.made_up_slopes(&refined.pose)?.iter().enumerate() {
                 let weights = inverse.component_mul(errors);
                 let rows = DMatrix::from_fn(by_pose.len(), 6, |k, by| by_pose[k][(axis, by)]);
                 let made_up = rows.transpose() * weights * rows;

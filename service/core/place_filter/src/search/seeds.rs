@@ -35,12 +35,17 @@ pub(super) struct Seed {
 
 state_of_struct!(Seed { log_odds, pose });
 
-/// The nodes at which places are looked for: the latest, and a few apart from it, since there may
-/// be no place about one of them.
+/// The nodes at which places are looked for: the latest, the first, and some between, since there
+/// may be no place about one of them.
 pub(super) fn corners<'a>(used: &[&'a Node], length_m: f64) -> Vec<&'a Node> {
     let mut corners: Vec<&Node> = Vec::with_capacity(tuning::CORNERS);
+    let (Some(first), Some(latest)) = (used.first(), used.last()) else {
+        return corners;
+    };
+    let spread_m = (latest.way_m - first.way_m) / (tuning::CORNERS - 1) as f64;
+    // Ways are sums of steps: what is apart by rounding is apart.
+    let apart_m = spread_m.max(tuning::CORNERS_APART * length_m) * (1.0 - 1e-9);
     for &node in used.iter().rev() {
-        let apart_m = tuning::CORNERS_APART * length_m;
         let is_apart = |other: &&Node| other.way_m - node.way_m >= apart_m;
         if corners.len() < tuning::CORNERS && corners.last().is_none_or(is_apart) {
             corners.push(node);
@@ -60,38 +65,42 @@ pub(super) fn scan(
 ) -> Option<u32> {
     let beside = (tuning::BESIDE * length_m).powi(2);
     // No anchor that would not be kept.
-    let mut least = [0.0; tuning::CORNERS];
+    let mut least = [1.0; tuning::CORNERS];
     for (number, least) in (0u8..).zip(&mut least) {
         let own = anchors.iter().filter(|anchor| anchor.node == number);
         if let Some(last) = own.skip(tuning::ANCHORS - 1).last() {
-            *least = last.log_odds;
+            *least = last.log_odds.exp();
         }
     }
     let channels = channels(corners, beside, field);
+    let asked: Vec<Vec<Asked<'_>>> = { corners.iter() }
+        .map(|node| Asked::all(node, &channels))
+        .collect();
     let mut values: Vec<Option<f64>> = Vec::with_capacity(channels.len());
     let mut last = None;
     let mut count = 0;
-    for place in field.places_from(first).take(tuning::SCANNED) {
+    for place in field.places_from(first).take(tuning::SCANNED as usize) {
         (last, count) = (Some(place), count + 1);
         values.clear();
         values.extend(channels.iter().map(|(channel, _)| {
             let support = field.support(place, *channel);
             support.map(|support| support.value)
         }));
-        for (number, node) in (0u8..).zip(corners) {
-            let mut log_odds = 0.0;
-            for felt in &node.felt {
-                let of_channel = channels.iter().zip(&values);
-                let known = of_channel
-                    .filter(|((channel, _), _)| *channel == felt.channel)
-                    .find_map(|((_, alike), value)| Some((alike, (*value)?)));
-                log_odds += known.map_or(0.0, |(alike, value)| alike.log_odds(felt.value, value));
+        for ((node, asked), least) in (0u8..).zip(&asked).zip(least) {
+            let mut odds = 1.0;
+            for asked in asked {
+                odds *= values[asked.channel].map_or(1.0, |value| asked.odds(value));
+                // Most places are out of the question by one or two of their levels.
+                if odds * asked.rest <= least {
+                    odds = 0.0;
+                    break;
+                }
             }
-            if log_odds > least[usize::from(number)] {
+            if odds > least {
                 anchors.push(Anchor {
-                    log_odds,
+                    log_odds: odds.ln(),
                     place,
-                    node: number,
+                    node,
                 });
             }
         }
@@ -190,38 +199,82 @@ fn channels(nodes: &[&Node], squared_m2: f64, field: &dyn Field) -> Vec<(u8, Ali
 struct Alike {
     kernel: Kernel,
     correlation: f64,
+    /// Variance of one level by the other, and of one alone.
     variance: f64,
-    log_variance: f64,
-    anywhere_log_variance: f64,
+    anywhere: f64,
+    /// Odds of a level that is as it is expected and as anywhere.
+    odds: f64,
 }
 
 impl Alike {
     fn new(kernel: &Kernel, squared_m2: f64) -> Self {
         let correlation = kernel.covariance(squared_m2) / kernel.sill;
         let variance = kernel.sill * (1.0 - correlation * correlation) + 2.0 * kernel.nugget;
+        let anywhere = kernel.sill + kernel.nugget;
         Self {
             kernel: *kernel,
             correlation,
             variance,
-            log_variance: variance.ln(),
-            anywhere_log_variance: (kernel.sill + kernel.nugget).ln(),
+            anywhere,
+            odds: (1.0 - tuning::WRONG_LEVEL) * (anywhere / variance).sqrt(),
         }
     }
 
-    /// Log odds of a level against anywhere, by the one that a place remembers.
-    fn log_odds(&self, value: f64, remembered: f64) -> f64 {
+    /// Odds of a level against anywhere, by the one that a place remembers.
+    fn odds(&self, value: f64, remembered: f64) -> f64 {
         let kernel = &self.kernel;
         let off = value - kernel.mean - self.correlation * (remembered - kernel.mean);
-        let far = value - kernel.mean;
-        let here = off * off / self.variance + self.log_variance;
-        let there = far * far / (kernel.sill + kernel.nugget) + self.anywhere_log_variance;
-        (0.95 * (0.5 * (there - here)).exp() + 0.05).ln()
+        self.odds_of(value, off * off / self.variance)
+    }
+
+    /// The same of a level that is off from what is expected by a square, in its variance.
+    fn odds_of(&self, value: f64, squared: f64) -> f64 {
+        let far = value - self.kernel.mean;
+        let there = far * far / self.anywhere;
+        self.odds * (0.5 * (there - squared)).exp() + tuning::WRONG_LEVEL
+    }
+}
+
+/// A level of a node, of which each place is asked.
+struct Asked<'a> {
+    /// Which of the channels.
+    channel: usize,
+    alike: &'a Alike,
+    value: f64,
+    /// Largest odds that the levels after this one may have together.
+    rest: f64,
+}
+
+impl<'a> Asked<'a> {
+    /// The levels of a node.
+    fn all(node: &Node, channels: &'a [(u8, Alike)]) -> Vec<Self> {
+        let asked = node.felt.iter().filter_map(|felt| {
+            let channel = channels.iter().position(|own| own.0 == felt.channel)?;
+            Some(Self {
+                channel,
+                alike: &channels[channel].1,
+                value: felt.value,
+                rest: 1.0,
+            })
+        });
+        let mut all: Vec<Self> = asked.collect();
+        let mut rest = 1.0;
+        for asked in all.iter_mut().rev() {
+            asked.rest = rest;
+            rest *= asked.alike.odds_of(asked.value, 0.0).max(1.0);
+        }
+        all
+    }
+
+    /// Its odds by the level that a place remembers.
+    fn odds(&self, remembered: f64) -> f64 {
+        self.alike.odds(self.value, remembered)
     }
 }
 
 /// Log odds of a pose by a few nodes; `None` where they speak against it.
 fn check(pose: &Isometry3<f64>, checks: &[(&Node, f64)], field: &dyn Field) -> Option<f64> {
-    let mut sum = 0.0;
+    let mut odds = 1.0;
     for (node, off_m2) in checks {
         let Some(first) = node.felt.first() else {
             continue;
@@ -235,12 +288,12 @@ fn check(pose: &Isometry3<f64>, checks: &[(&Node, f64)], field: &dyn Field) -> O
                 && let Some(kernel) = field.kernel(felt.channel)
             {
                 let squared = (support.at - pose * felt.at).norm_squared() + off_m2;
-                sum += Alike::new(kernel, squared).log_odds(felt.value, support.value);
+                odds *= Alike::new(kernel, squared).odds(felt.value, support.value);
             }
         }
-        if sum < -2.0 {
+        if odds < tuning::AGAINST_SEED {
             return None;
         }
     }
-    Some(sum)
+    Some(odds.ln())
 }
