@@ -161,9 +161,9 @@ impl Search {
             Stage::Turn => {
                 if let Some(anchor) = self.anchors.pop() {
                     turn(&anchor, used, seeker, field, length_m, &mut self.seeds);
+                    distinct(&mut self.seeds, tuning::SEEDS, seeker, length_m);
                     return (tuning::TURN_WORK, false);
                 }
-                distinct(&mut self.seeds, tuning::SEEDS, seeker, length_m);
                 let seeds = self.seeds.drain(..).map(|seed| seed.pose);
                 self.queue.extend(seeds);
                 self.stage = Stage::Weigh;
