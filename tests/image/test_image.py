@@ -53,10 +53,11 @@ def engine(*arguments: str) -> str:
 class Container:
     """A running service."""
 
-    def __init__(self, volume: str) -> None:
+    def __init__(self, volume: str, *environment: str) -> None:
         self.name = f"cogmap-check-{uuid.uuid4().hex[:8]}"
         publish = ["--publish=127.0.0.1::8080", f"--volume={volume}:/data"]
-        engine("run", "--detach", f"--name={self.name}", *CONFINED, *publish, IMAGE)
+        settings = [f"--env={variable}" for variable in environment]
+        engine("run", "--detach", f"--name={self.name}", *CONFINED, *publish, *settings, IMAGE)
         self.url = "http://" + engine("port", self.name, "8080").splitlines()[0]
         eventually("readiness", self.ready)
 
@@ -170,6 +171,14 @@ def test_the_image_carries_the_page(container: Container) -> None:
     assert assets, page
     for asset in assets:
         assert container.get("/" + asset.lstrip("/"))
+
+
+def test_the_store_may_be_on_object_storage(volume: str) -> None:
+    container = Container(volume, "COGMAP_STORE__URL=file:///data/objects")
+    try:
+        assert container.shell("test -d /data/objects").returncode == 0
+    finally:
+        container.remove()
 
 
 def test_compose_takes_its_file() -> None:

@@ -35,6 +35,7 @@ impl LevelField {
 
     /// The same field along so many axes of the room alone: along the others it is the same
     /// everywhere.
+    #[must_use]
     pub fn along(mut self, axes: usize) -> Self {
         for (wave, _) in &mut self.waves {
             wave.iter_mut().skip(axes).for_each(|rate| *rate = 0.0);
