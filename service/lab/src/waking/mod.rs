@@ -6,9 +6,9 @@
 //! it, know neither where they are nor how they are turned, walk on by odometry of their own, and
 //! see the room as the explorer did: with noise, and now and then something that is not there at
 //! all. Or they feel levels of smooth fields instead, as a touch, light, magnetic or radio sensor
-//! does. Each is a trial: is it found, after what way, how far off, and was any place announced that
-//! was wrong? Others are carried off when they know where they are ([`run_carried`]): when do they
-//! notice, and when are they back?
+//! does. Each is a trial: is it found, after what way, how far off, and was any place announced
+//! that was wrong? Others are carried off when they know where they are ([`run_carried`]): when do
+//! they notice, and when are they back?
 
 mod building;
 mod carried;

@@ -53,8 +53,8 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// levels, version 12 no log of views, no ways and no distances alone, version 13 no veers, no
 /// stretches of logged views, no instructions and no episodes that learn nothing, version 14 no
 /// past that is relaxed by sightings, version 15 no cells of mean views and no count of keyframes
-/// that are new, version 16 no past that is held by live estimates, version 17 no searches by levels
-/// at four nodes.
+/// that are new, version 16 no past that is held by live estimates, version 17 no searches by
+/// levels at four nodes.
 const VERSION: u16 = 18;
 
 const HEADER: u8 = 0;
