@@ -35,8 +35,8 @@ pub(super) struct Seed {
 
 state_of_struct!(Seed { log_odds, pose });
 
-/// The nodes at which places are looked for: the latest, the first, and some between, since there
-/// may be no place about one of them.
+/// The nodes at which places are looked for: the latest, and some all along the way before it, since
+/// there may be no place about one of them.
 pub(super) fn corners<'a>(used: &[&'a Node], length_m: f64) -> Vec<&'a Node> {
     let mut corners: Vec<&Node> = Vec::with_capacity(tuning::CORNERS);
     let (Some(first), Some(latest)) = (used.first(), used.last()) else {
