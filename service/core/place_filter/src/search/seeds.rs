@@ -35,8 +35,8 @@ pub(super) struct Seed {
 
 state_of_struct!(Seed { log_odds, pose });
 
-/// The nodes at which places are looked for: the latest, and some all along the way before it, since
-/// there may be no place about one of them.
+/// The nodes at which places are looked for: the latest, and some all along the way before it,
+/// since there may be no place about one of them.
 pub(super) fn corners<'a>(used: &[&'a Node], length_m: f64) -> Vec<&'a Node> {
     let mut corners: Vec<&Node> = Vec::with_capacity(tuning::CORNERS);
     let (Some(first), Some(latest)) = (used.first(), used.last()) else {
@@ -113,9 +113,11 @@ pub(super) fn scan(
     });
     let mut kept = [0; tuning::CORNERS];
     anchors.retain(|anchor| {
-        let kept = &mut kept[usize::from(anchor.node)];
-        *kept += 1;
-        *kept <= tuning::ANCHORS
+        let kept = kept.get_mut(usize::from(anchor.node));
+        kept.is_some_and(|kept| {
+            *kept += 1;
+            *kept <= tuning::ANCHORS
+        })
     });
     last.filter(|_| count == tuning::SCANNED)?.checked_add(1)
 }
