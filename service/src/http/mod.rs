@@ -161,7 +161,11 @@ pub fn router(
         .merge(dashboard::routes::<_, dashboard::Built>());
     let shared = Shared::new(served.into(), prometheus, settings, stopping, paths);
     let service = Service::new(shared);
-    let described = described.layer(forward::layer(&service));
+    // A service by itself has nobody to pass requests on to, and pays nothing for it.
+    let described = match &service.cluster {
+        Some(_) => described.layer(forward::layer(&service)),
+        None => described,
+    };
     let router = described
         .merge(pages.layer(compression::layer()))
         .fallback(elsewhere::unknown_path)
