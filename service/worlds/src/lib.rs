@@ -17,6 +17,9 @@
 //!   beyond its place memory; robots that are to keep their drift bounded need some.
 //! - **Noise**: the paper names none for its odometry; see [`OdometryNoise`].
 //!
+//! Beside them there is a flat room for robots on two wheels ([`Wheels`]), whose odometry errs as
+//! wheels do.
+//!
 //! The demo plays in the second of these rooms ([`Scenario`]): robots that patrol it wake up lost
 //! or are carried off, and an arm feels things ([`Thing`]).
 
@@ -37,6 +40,7 @@ mod steering;
 mod team;
 mod thing;
 mod walker;
+mod wheels;
 mod wire;
 
 pub use dead_reckoning::{DeadReckoning, dead_reckoned};
@@ -54,6 +58,7 @@ pub use sensor::{InvalidSensor, Sensor};
 pub use team::{InvalidTeam, RobotTick, StartKnowledge, Team, TeamSettings};
 pub use thing::Thing;
 pub use walker::{BODY_RADIUS_M, STEP_M, Step, Walker};
+pub use wheels::{WheelSettings, WheelTick, Wheels};
 
 #[cfg(test)]
 mod tests;

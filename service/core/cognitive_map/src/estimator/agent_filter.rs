@@ -96,6 +96,7 @@ impl AgentFilter {
     /// The same body at another pose, whose error is correlated with nothing.
     pub(super) fn placed(mut self, pose: Isometry3<f64>, covariance: &Matrix6<f64>) -> Self {
         self.flush();
+        self.noise.forget_trial_noise();
         self.pose = pose;
         let calibration: SMatrix<f64, 5, 5> =
             self.at_run_start.fixed_view::<5, 5>(6, 6).into_owned();

@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
 
+use super::noise_share::{NoiseShare, ShareProjection};
 use super::tuning::{CONDITION_MIN, COVARIANCE_ROUNDING};
 use geometry::symmetric;
 
@@ -14,6 +15,8 @@ use geometry::symmetric;
 pub(super) struct JointCovariance {
     dim: usize,
     entries: Arc<Vec<f64>>,
+    /// Parts of it that noise makes of which little is known.
+    shares: Vec<NoiseShare>,
 }
 
 /// The part of a measurement's Jacobian that belongs to neighbouring components of the state.
@@ -34,6 +37,8 @@ pub(super) struct Projection<const M: usize> {
     rows: [Vec<f64>; M],
     /// H P Hᵀ.
     pub(super) spread: SMatrix<f64, M, M>,
+    /// Of each share.
+    of_shares: Vec<ShareProjection<M>>,
 }
 
 impl JointCovariance {
@@ -47,7 +52,24 @@ impl JointCovariance {
         (entries.len() == dim * dim).then(|| Self {
             dim,
             entries: Arc::new(entries),
+            shares: Vec::new(),
         })
+    }
+
+    /// Parts of it that noise makes of which little is known.
+    pub(super) fn shares(&self) -> &[NoiseShare] {
+        &self.shares
+    }
+
+    /// The same, to be changed.
+    pub(super) fn shares_mut(&mut self) -> &mut Vec<NoiseShare> {
+        &mut self.shares
+    }
+
+    /// Replaces all entries, row by row, by as many.
+    pub(super) fn replace(&mut self, entries: Vec<f64>) {
+        debug_assert_eq!(entries.len(), self.dim * self.dim);
+        self.entries = Arc::new(entries);
     }
 
     /// All entries, row by row.
@@ -104,6 +126,9 @@ impl JointCovariance {
             }
             entries[k * dim + k] = variances[k - offset];
         }
+        for share in &mut self.shares {
+            share.isolate(dim, offset, N);
+        }
     }
 
     /// Makes room for `width` more components, uncorrelated and without variance; answers where.
@@ -115,6 +140,9 @@ impl JointCovariance {
         }
         self.entries = Arc::new(entries);
         self.dim = new;
+        for share in &mut self.shares {
+            share.grow(old, width);
+        }
         old
     }
 
@@ -126,7 +154,12 @@ impl JointCovariance {
         noise: &SMatrix<f64, K, K>,
     ) -> usize {
         let projection = self.project(blocks);
+        let mut shares = std::mem::take(&mut self.shares);
+        for (share, projection) in shares.iter_mut().zip(&projection.of_shares) {
+            share.append(self.dim, projection);
+        }
         let at = self.grow(K);
+        self.shares = shares;
         let (dim, entries) = (self.dim, Arc::make_mut(&mut self.entries));
         for (k, row) in projection.rows.iter().enumerate() {
             for (other, &value) in row.iter().enumerate() {
@@ -149,6 +182,9 @@ impl JointCovariance {
             entries.extend_from_slice(&row[offset + width..]);
         }
         self.entries = Arc::new(entries);
+        for share in &mut self.shares {
+            share.remove(self.dim, offset, width);
+        }
         self.dim = new;
     }
 
@@ -169,6 +205,9 @@ impl JointCovariance {
                 entries[column * dim + offset + k] = after[k];
                 entries[(offset + k) * dim + column] = after[k];
             }
+        }
+        for share in &mut self.shares {
+            share.transform(dim, offset, transition);
         }
         self.set_diagonal(offset, own);
     }
@@ -210,7 +249,14 @@ impl JointCovariance {
                 }
             }
         }
-        Projection { rows, spread }
+        let of_shares = self.shares.iter();
+        Projection {
+            rows,
+            spread,
+            of_shares: of_shares
+                .map(|share| share.project(self.dim, blocks))
+                .collect(),
+        }
     }
 
     /// Takes in a measurement with this innovation, whose covariance is S; answers the correction
@@ -285,6 +331,12 @@ impl JointCovariance {
             }
             target[index] += COVARIANCE_ROUNDING * variance;
         }
+        if !self.shares.is_empty() {
+            let gains = gains(rows, &lower, corrected);
+            for (share, projection) in self.shares.iter_mut().zip(projection.of_shares) {
+                share.update(dim, projection, &gains);
+            }
+        }
         Some(correction)
     }
 
@@ -298,43 +350,32 @@ impl JointCovariance {
     /// with the levers V and the three rows U of P. Mirrored entries are the same sums.
     pub(super) fn shear(&mut self, source: usize, levers: &[Vec<f64>; 3]) {
         let dim = self.dim;
-        let own: SMatrix<f64, 3, 3> = self.block(source, source);
-        let mut rows: [Vec<f64>; 3] = std::array::from_fn(|k| self.row(source + k).to_vec());
-        let variances: [f64; 3] = std::array::from_fn(|k| own[(k, k)]);
-        for (k, row) in rows.iter_mut().enumerate() {
-            for (other, lever) in levers.iter().enumerate() {
-                let half = 0.5 * own[(k, other)];
-                for (entry, value) in row.iter_mut().zip(lever) {
-                    *entry += half * value;
-                }
-            }
-        }
-        for (index, target) in Arc::make_mut(&mut self.entries)
-            .chunks_exact_mut(dim)
-            .enumerate()
-        {
-            for (lever, row) in levers.iter().zip(&rows) {
-                let (by_lever, by_row) = (lever[index], row[index]);
-                for ((entry, row), lever) in target.iter_mut().zip(row).zip(lever) {
-                    *entry += by_lever * row + by_row * lever;
-                }
-            }
-            for (lever, variance) in levers.iter().zip(variances) {
-                target[index] += COVARIANCE_ROUNDING * lever[index] * lever[index] * variance;
-            }
+        shear(dim, &mut self.entries, source, levers);
+        for share in &mut self.shares {
+            shear(dim, &mut share.entries, source, levers);
         }
     }
 
     /// Lays another covariance over the diagonal from `offset` on.
     pub(super) fn place(&mut self, offset: usize, other: &Self) {
-        let (dim, entries) = (self.dim, Arc::make_mut(&mut self.entries));
-        for row in 0..other.dim {
-            let start = (offset + row) * dim + offset;
-            entries[start..start + other.dim].copy_from_slice(other.row(row));
+        let dim = self.dim;
+        let lay = |entries: &mut Arc<Vec<f64>>, other_entries: &[f64]| {
+            let entries = Arc::make_mut(entries);
+            for (row, source) in other_entries.chunks_exact(other.dim.max(1)).enumerate() {
+                let start = (offset + row) * dim + offset;
+                entries[start..start + other.dim].copy_from_slice(source);
+            }
+        };
+        lay(&mut self.entries, &other.entries);
+        for share in &other.shares {
+            let mut placed = NoiseShare::new(share.agent, share.is_of_angles, dim);
+            lay(&mut placed.entries, &share.entries);
+            self.shares.push(placed);
         }
     }
 
     /// Adds to `width` components from `offset` on a linear function of six others: x ← x + J y.
+    /// Those are in no share.
     pub(super) fn add(
         &mut self,
         offset: usize,
@@ -363,6 +404,60 @@ impl JointCovariance {
                 entries[(offset + row) * dim + offset + column] =
                     entries[(offset + column) * dim + offset + row];
             }
+        }
+    }
+}
+
+/// Columns of the gain K = W L⁻¹, of which rows that are not to be corrected are zero.
+fn gains<const M: usize>(
+    whitened: [Vec<f64>; M],
+    lower: &SMatrix<f64, M, M>,
+    corrected: &Range<usize>,
+) -> [Vec<f64>; M] {
+    // K L = W, from the last column on.
+    let mut gains = whitened;
+    for k in (0..M).rev() {
+        let (rest, done) = gains.split_at_mut(k + 1);
+        let gain = &mut rest[k];
+        for (j, later) in done.iter().enumerate() {
+            let factor = lower[(k + 1 + j, k)];
+            for (entry, value) in gain.iter_mut().zip(later) {
+                *entry -= factor * value;
+            }
+        }
+        let inverse = lower[(k, k)].recip();
+        for (index, entry) in gain.iter_mut().enumerate() {
+            let counts = corrected.contains(&index);
+            *entry = if counts { *entry * inverse } else { 0.0 };
+        }
+    }
+    gains
+}
+
+/// Lets three components from `source` on act on all others of a symmetric matrix: see
+/// [`JointCovariance::shear`].
+fn shear(dim: usize, entries: &mut Arc<Vec<f64>>, source: usize, levers: &[Vec<f64>; 3]) {
+    let row = |k: usize| &entries[(source + k) * dim..][..dim];
+    let own = SMatrix::<f64, 3, 3>::from_fn(|k, other| row(k)[source + other]);
+    let mut rows: [Vec<f64>; 3] = std::array::from_fn(|k| row(k).to_vec());
+    let variances: [f64; 3] = std::array::from_fn(|k| own[(k, k)]);
+    for (k, row) in rows.iter_mut().enumerate() {
+        for (other, lever) in levers.iter().enumerate() {
+            let half = 0.5 * own[(k, other)];
+            for (entry, value) in row.iter_mut().zip(lever) {
+                *entry += half * value;
+            }
+        }
+    }
+    for (index, target) in Arc::make_mut(entries).chunks_exact_mut(dim).enumerate() {
+        for (lever, row) in levers.iter().zip(&rows) {
+            let (by_lever, by_row) = (lever[index], row[index]);
+            for ((entry, row), lever) in target.iter_mut().zip(row).zip(lever) {
+                *entry += by_lever * row + by_row * lever;
+            }
+        }
+        for (lever, variance) in levers.iter().zip(variances) {
+            target[index] += COVARIANCE_ROUNDING * lever[index] * lever[index] * variance;
         }
     }
 }

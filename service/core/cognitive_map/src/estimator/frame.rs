@@ -83,8 +83,12 @@ impl Frame {
     /// Makes an agent a member, with errors that are independent of the others'.
     pub(super) fn join(&mut self, agent: u32, mut state: Arc<AgentState>) {
         let offset = self.covariance.grow(BODY_DIM);
-        let own = Arc::make_mut(&mut state).filter.covariance_mut();
-        self.covariance.set_diagonal(offset, own);
+        let filter = &mut Arc::make_mut(&mut state).filter;
+        self.covariance
+            .set_diagonal(offset, filter.covariance_mut());
+        if let Some(noise) = filter.noise.take_trial_noise() {
+            self.covariance.add_to_shares(agent, offset, &noise);
+        }
         self.members.push(Member {
             agent,
             offset,
@@ -97,6 +101,7 @@ impl Frame {
     pub(super) fn leave(&mut self, agent: u32) -> Option<Arc<AgentState>> {
         let index = self.member(agent)?;
         let member = self.members.remove(index);
+        self.covariance.drop_shares(agent);
         self.drop_components(member.offset, BODY_DIM);
         Some(member.state)
     }
@@ -201,6 +206,13 @@ impl Frame {
                 let transition = member.state_mut().filter.flush();
                 let own = member.state.filter.covariance();
                 self.covariance.transform(member.offset, &transition, own);
+                match member.state_mut().filter.noise.take_trial_noise() {
+                    Some(noise) => {
+                        let (agent, offset) = (member.agent, member.offset);
+                        self.covariance.add_to_shares(agent, offset, &noise);
+                    }
+                    None => self.covariance.drop_shares(member.agent),
+                }
             }
         }
         self.hold_turns();
@@ -236,6 +248,21 @@ impl Frame {
             }
         }
         if has_changed {
+            self.tell_members();
+        }
+    }
+
+    /// Takes back what was assumed of a member's odometry, as soon as it is known to be better.
+    pub(super) fn take_back_noise(&mut self, index: usize, stamp_ns: i64) {
+        if self.members[index].filter().noise.trial.is_none() {
+            return;
+        }
+        self.flush();
+        let member = &mut self.members[index];
+        let Some(parts) = member.state_mut().filter.noise.end_trial(stamp_ns) else {
+            return;
+        };
+        if self.covariance.take_back(member.agent, parts) {
             self.tell_members();
         }
     }

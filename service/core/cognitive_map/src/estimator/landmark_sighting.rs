@@ -36,6 +36,7 @@ impl Estimator {
         let state = frame.members[observer].state_mut();
         if !state.is_doubted() && !matches!(relation, Relation::Range(_)) {
             state.filter.learn_noise(called, stamp_ns, relation);
+            frame.take_back_noise(observer, stamp_ns);
         }
         let measurement = Measurement {
             observer,

@@ -25,7 +25,8 @@
 //!   refused; an agent whose sightings are refused again and again searches farther around, and a
 //!   landmark that only contradicts is forgotten.
 //! - **Noise.** That of each agent's sensor is learned, upwards from what it states; that of its
-//!   odometry, from pairs of sightings (`odometry_noise`).
+//!   odometry, from pairs of sightings (`odometry_noise`); what was assumed of it too much before
+//!   is taken back (`noise_share`).
 //! - **Absurd evidence.** What a doubted agent sees corrects itself alone; one that contradicts
 //!   everything for long, or may be anywhere, is set aside in a frame of its own, with its
 //!   landmarks (`set_aside`).
@@ -56,6 +57,7 @@ mod level;
 mod measurement_update;
 mod merging;
 mod motion;
+mod noise_share;
 mod observers;
 mod odometry_history;
 mod odometry_noise;

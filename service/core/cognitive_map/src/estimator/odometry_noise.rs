@@ -21,19 +21,22 @@
 //! counting for more than others; κ₀ and κ make that right for Gaussian noise.
 //!
 //! - **Assumed noise** is multiplied by its factor; below one, by a part of it only
-//!   ([`NOISE_CAUTION`]).
+//!   ([`NOISE_CAUTION`]). Until the factor is known it is not taken for less than one, and what it
+//!   was too large by is taken back then ([`NoiseTrial`]).
 //! - **Stated noise** counts at least. Beside it counts as much of the assumed noise as is certain
 //!   to be there, so that a robot that states too little does not bend the map.
 
-use nalgebra::{Isometry3, Matrix4, SVector, Vector4, Vector6};
+use nalgebra::{Isometry3, Matrix4, Matrix6, SVector, Vector4, Vector6};
 
 use super::sighting_pair::{Anchor, NoisyMotion, Residual};
 use super::tuning::{
     NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_LOG_SCALE_MAX, NOISE_LOG_STEP_MAX, NOISE_MEMORY,
     NOISE_PAIR_NS_MAX, NOISE_PAIR_WEIGHT, NOISE_PAIRS_MAX, NOISE_PRIOR_SD, NOISE_ROBUST,
     NOISE_SATURATED, NOISE_SHARE_MIN, NOISE_SUM_LENGTH_MAX_M, NOISE_SURELY_SD, NOISE_TARGETS_MAX,
+    NOISE_TRIAL_NS_MAX, NOISE_TRIAL_SD,
 };
 use crate::input::{Label, Relation};
+use geometry::MotionSum;
 
 /// What is learned of the noise of an agent's odometry.
 #[derive(Clone, Debug)]
@@ -51,6 +54,19 @@ pub(super) struct OdometryNoise {
     pub(super) motion: NoisyMotion,
     /// First sightings of pairs.
     pub(super) anchors: Vec<Anchor>,
+    /// What is to be taken back when it is known how large the assumed noise is.
+    pub(super) trial: Option<NoiseTrial>,
+}
+
+/// The time before it is known how large the assumed noise is: it counts in full, and what it adds
+/// to the covariance is followed (`noise_share`).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct NoiseTrial {
+    /// When the first landmark was seen \[ns\].
+    pub(super) seen_ns: Option<i64>,
+    /// Motion since the share was brought up to date, with noise of lengths and of angles.
+    pub(super) by_lengths: MotionSum,
+    pub(super) by_angles: MotionSum,
 }
 
 impl Default for OdometryNoise {
@@ -70,6 +86,7 @@ impl OdometryNoise {
             is_stated,
             motion: NoisyMotion::default(),
             anchors: Vec::new(),
+            trial: (!is_stated).then(NoiseTrial::default),
         }
     }
 
@@ -80,7 +97,8 @@ impl OdometryNoise {
         assumed: &Vector6<f64>,
         stated: Option<&Vector6<f64>>,
     ) -> Vector6<f64> {
-        let learned = Vector6::from_fn(|k, _| assumed[k] * self.factors[k / 3]);
+        let least = if self.trial.is_some() { 1.0 } else { 0.0 };
+        let learned = Vector6::from_fn(|k, _| assumed[k] * self.factors[k / 3].max(least));
         stated.map_or(learned, |stated| stated + learned)
     }
 
@@ -95,12 +113,23 @@ impl OdometryNoise {
         if self.is_stated != stated.is_some() {
             *self = Self::new(stated.is_some());
         }
-        if self.anchors.is_empty() {
+        if self.anchors.is_empty() && self.trial.is_none() {
             return;
         }
         let [mut lengths, mut angles] = [*assumed; 2];
         lengths.fixed_rows_mut::<3>(3).fill(0.0);
         angles.fixed_rows_mut::<3>(0).fill(0.0);
+        if let Some(trial) = &mut self.trial {
+            trial.by_lengths.append(increment, &lengths);
+            trial.by_angles.append(increment, &angles);
+            let lever = &trial.by_lengths.motion().translation.vector;
+            if lever.norm_squared() > NOISE_SUM_LENGTH_MAX_M * NOISE_SUM_LENGTH_MAX_M {
+                self.trial = None;
+            }
+        }
+        if self.anchors.is_empty() {
+            return;
+        }
         self.motion.by_lengths.append(increment, &lengths);
         self.motion.by_angles.append(increment, &angles);
         if let Some(stated) = stated {
@@ -110,6 +139,47 @@ impl OdometryNoise {
         if lever.norm_squared() > NOISE_SUM_LENGTH_MAX_M * NOISE_SUM_LENGTH_MAX_M {
             self.forget_anchors();
         }
+    }
+
+    /// The noise since it was asked for last: covariances of the pose's error, on its right, of
+    /// lengths and of angles; none where it is not followed.
+    pub(super) fn take_trial_noise(&mut self) -> Option<[Matrix6<f64>; 2]> {
+        let trial = self.trial.as_mut()?;
+        let sums = [&mut trial.by_lengths, &mut trial.by_angles];
+        Some(sums.map(|sum| *std::mem::take(sum).covariance().matrix()))
+    }
+
+    /// The body is somewhere else, by what it is told: what it did before does not count any more.
+    pub(super) fn forget_trial_noise(&mut self) {
+        if let Some(trial) = &mut self.trial {
+            (trial.by_lengths, trial.by_angles) = Default::default();
+        }
+    }
+
+    /// Ends the trial when the noise is known: answers the parts of the assumed noise, of lengths
+    /// and of angles, that are not there; negative where there is more.
+    pub(super) fn end_trial(&mut self, stamp_ns: i64) -> Option<[f64; 2]> {
+        let trial = self.trial.as_mut()?;
+        let begun_ns = *trial.seen_ns.get_or_insert(stamp_ns);
+        let root = Self::with_prior(&self.information).cholesky()?;
+        let variances = root.inverse().diagonal();
+        let sd = [0, 1].map(|k| variances[k].sqrt());
+        let is_known = sd[1] <= NOISE_TRIAL_SD;
+        if !is_known && stamp_ns.saturating_sub(begun_ns) < NOISE_TRIAL_NS_MAX {
+            return None;
+        }
+        self.trial = None;
+        Some([0, 1].map(|k| {
+            let log = self.log_scales[k];
+            let surely = (log + sd[k]).min(0.0) + (log - NOISE_SURELY_SD * sd[k]).max(0.0);
+            1.0 - surely.exp()
+        }))
+    }
+
+    /// Information about the logarithms of the factors, with what was known before.
+    fn with_prior(information: &Matrix4<f64>) -> Matrix4<f64> {
+        let prior = Vector4::from(NOISE_PRIOR_SD).map(|sd| sd.powi(-2));
+        information + Matrix4::from_diagonal(&prior)
     }
 
     /// Forgets what later sightings would be compared with.
@@ -204,8 +274,7 @@ impl OdometryNoise {
         let surprise = (residual.square / variance).min(most * most) - mean;
         let information =
             self.information + share * share.transpose() * (NOISE_PAIR_WEIGHT * slope);
-        let prior = Vector4::from(NOISE_PRIOR_SD).map(|sd| sd.powi(-2));
-        let Some(root) = (information + Matrix4::from_diagonal(&prior)).cholesky() else {
+        let Some(root) = Self::with_prior(&information).cholesky() else {
             return;
         };
         let step = root.solve(&(share * (NOISE_PAIR_WEIGHT * surprise)));

@@ -119,6 +119,15 @@ pub(super) const NOISE_SURELY_SD: f64 = 2.0;
 /// Part of the logarithm of a factor below one that counts. Source: a pair sees the noise of some
 /// seconds, while errors that change within minutes (slip on another floor) grow faster; *team*.
 pub(super) const NOISE_CAUTION: f64 = 0.25;
+/// Deviation of the logarithm of the factor of angles from which on the assumed noise that is not
+/// there is taken back. Source: a deviation is known within a third then.
+pub(super) const NOISE_TRIAL_SD: f64 = 0.3;
+/// Longest time from the first sighting until then \[ns\].
+pub(super) const NOISE_TRIAL_NS_MAX: i64 = 60_000_000_000;
+/// Parts of a covariance that are followed at a time, of eight agents, and the largest covariance of
+/// which they are. Source: work; each takes twice as long as the covariance itself.
+pub(super) const NOISE_SHARES_MAX: usize = 16;
+pub(super) const NOISE_SHARE_DIM_MAX: usize = 192;
 
 // --- Sightings -----------------------------------------------------------------------------------
 

@@ -22,7 +22,7 @@ fn beside_a_post(change: impl FnOnce(&mut SettingsValues)) -> (CognitiveMap, Rob
 #[test]
 fn a_new_map_with_the_defaults_has_the_digest_that_it_always_had() {
     let map = CognitiveMap::new(settings(|_| ()));
-    assert_eq!(map.digest().to_string(), "f09ff06d197a211eed15b8220c5cf9fc");
+    assert_eq!(map.digest().to_string(), "b3d5e5575b3d290ee6b3255ec9ef103c");
 }
 
 #[test]

@@ -175,10 +175,7 @@ fn teams(set: &TableSet, agents: &[Agent<'_>], args: &CsvArgs) -> anyhow::Result
     }
     let mut team = Team::new(space, samples, batch);
     for (name, stream, truth) in sent {
-        let known = Known {
-            reckoned: stream.reckoned().to_vec(),
-            truth: Some(truth),
-        };
+        let known = Known::reckoned(stream.reckoned().to_vec(), Some(truth));
         team.robots.insert(name.to_owned(), known);
     }
     Ok(vec![team])

@@ -14,6 +14,7 @@ mod outcome;
 mod points;
 mod replayed;
 mod report;
+mod room;
 mod scoring;
 mod setting;
 mod team;
@@ -33,6 +34,9 @@ pub(in crate::cli) enum ReplayCommand {
     Tuc(tuc::TucArgs),
     /// Victoria Park as text: odometry as motion, trees as landmarks.
     Victoria(victoria::VictoriaArgs),
+    /// Simulated robots on wheels in rooms with landmarks, with sensors as good as one likes: are
+    /// covariances honest?
+    Room(room::RoomArgs),
     /// Tables of motion, levels, views and ranges of robots, with their truth.
     Csv(csv::CsvArgs),
     /// Objects as touches, a place and a level each: learned, and touched again with noise.
@@ -47,6 +51,7 @@ pub(super) fn run(command: &ReplayCommand) -> anyhow::Result<()> {
         ReplayCommand::G2o(args) => g2o::run(args),
         ReplayCommand::Tuc(args) => tuc::run(args),
         ReplayCommand::Victoria(args) => victoria::run(args),
+        ReplayCommand::Room(args) => room::run(args),
         ReplayCommand::Csv(args) => csv::run(args),
         ReplayCommand::Touch(args) => touch::run(args),
         ReplayCommand::Points(args) => points::run(args),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use cogmap_lab::mrclam::{Mrclam, TeamReading};
+use cogmap_lab::mrclam::{Mrclam, PlanarPose, TeamReading};
 use cogmap_proto::Sample;
 use cogmap_worlds::{ReadingBody, ReadingTarget, dead_reckoned, robot_name};
 use trajectory::Alignment;
@@ -81,6 +81,7 @@ fn team(set: &Mrclam, args: &MrclamArgs) -> anyhow::Result<Team> {
         let known = Known {
             reckoned: dead_reckoned(&set.robot_readings(number))?,
             truth: Some(log.truth_trajectory()),
+            true_poses: log.truth().iter().map(PlanarPose::in_space).collect(),
         };
         team.robots.insert(robot_name(number), known);
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use cogmap::cli::output;
+use cogmap_lab::nees::{Nees, NeesMeans};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -63,6 +64,8 @@ struct Consistency {
     /// Normalised estimation error squared of the position in the plane, per component, once a
     /// second (of a replay straight into the core).
     nees_mean: Option<f64>,
+    /// The same by component, along the axes of the map.
+    nees: Option<NeesMeans>,
     /// Normalised innovation squared of the accepted sightings, per component.
     nis_mean: Option<f64>,
 }
@@ -70,13 +73,16 @@ struct Consistency {
 impl Report {
     /// Compares what came out with the truth.
     pub(super) fn of(case: &Case, outcomes: &[Outcome], changed: &[Setting]) -> Self {
-        let mut robots = BTreeMap::new();
+        let (mut robots, mut nees) = (BTreeMap::new(), Nees::default());
         let nothing = RobotOutcome::default();
         let has_one_map = outcomes.len() == 1;
         for (team, outcome) in case.teams.iter().zip(outcomes) {
             for (name, known) in &team.robots {
                 let came_out = outcome.robots.get(name).unwrap_or(&nothing);
-                let mut robot = RobotReport::of(&case.scoring, team, (name, known), came_out);
+                let of_robot = case.scoring.nees(came_out, known);
+                let of = (&case.scoring, of_robot.means());
+                nees.add_all(&of_robot);
+                let mut robot = RobotReport::of(of, team, (name, known), came_out);
                 robot.digest = (!has_one_map).then(|| outcome.digest.clone());
                 robots.insert(name.clone(), robot);
             }
@@ -103,6 +109,7 @@ impl Report {
             rejected: robots.values().map(|robot| robot.rejected).sum(),
             consistency: Consistency {
                 nees_mean: of(|robot| robot.consistency.nees_mean),
+                nees: nees.means(),
                 nis_mean: of(|robot| robot.consistency.nis_mean),
             },
             update_ms: timing,
@@ -121,12 +128,11 @@ impl Report {
 
 impl RobotReport {
     fn of(
-        scoring: &Scoring,
+        (scoring, nees): (&Scoring, Option<NeesMeans>),
         team: &Team,
         (name, known): (&str, &Known),
         came_out: &RobotOutcome,
     ) -> Self {
-        let truth = known.truth.as_ref();
         let placed = came_out.causal.first().zip(known.reckoned.first());
         Self {
             samples: team.samples_of(name),
@@ -137,7 +143,8 @@ impl RobotReport {
             accepted: came_out.evidence.accepted,
             rejected: came_out.evidence.refused,
             consistency: Consistency {
-                nees_mean: mean(scoring.nees(came_out, truth).into_iter()),
+                nees_mean: nees.map(|nees| nees.position),
+                nees,
                 nis_mean: came_out.evidence.nis_mean,
             },
         }
@@ -186,12 +193,19 @@ impl Report {
         let (samples, errors) = (self.samples, self.errors.cells());
         output::line(&format!("mean      {samples:>8}   {errors}"))?;
         output::line(&format!(
-            "{} sightings accepted, {} refused; squared errors over expected: {} of poses, {} of sightings",
+            "{} sightings accepted, {} refused; squared errors over expected: {} of positions, {} of sightings",
             self.accepted,
             self.rejected,
             ratio(self.consistency.nees_mean),
             ratio(self.consistency.nis_mean),
         ))?;
+        if let Some(nees) = self.consistency.nees {
+            let heading = ratio(nees.heading);
+            output::line(&format!(
+                "by component: x {:.2}, y {:.2}, heading {heading}",
+                nees.x, nees.y
+            ))?;
+        }
         if let Some(timing) = self.update_ms {
             let factor = self.real_time_factor;
             let factor = factor.map_or(String::new(), |x| format!("{x:.0} times real time; "));

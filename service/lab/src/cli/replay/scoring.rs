@@ -1,11 +1,13 @@
 //! How far estimates are from the truth.
 
 use cogmap::decode::stamped_pose;
+use cogmap_lab::nees::Nees;
 use cogmap_proto::StampedPose as Row;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 use trajectory::{Alignment, Pairs, Span, StampedPose, Trajectory};
 
 use super::outcome::RobotOutcome;
+use super::team::Known;
 
 /// Which moments of an estimate are compared with the truth.
 #[derive(Clone, Copy, Debug)]
@@ -56,21 +58,21 @@ impl Scoring {
         self.errors_m(&poses, truth)
     }
 
-    /// Normalised squared errors of the position in the plane, per component, of the poses that
-    /// were believed.
-    pub(super) fn nees(&self, came_out: &RobotOutcome, truth: Option<&Trajectory>) -> Vec<f64> {
-        let Some(truth) = truth.filter(|_| self.is_recorded) else {
-            return Vec::new();
+    /// Errors against their covariances, of the poses that were believed.
+    pub(super) fn nees(&self, came_out: &RobotOutcome, known: &Known) -> Nees {
+        let mut nees = Nees::default();
+        let Some(truth) = known.truth.as_ref().filter(|_| self.is_recorded) else {
+            return nees;
         };
-        let squares = came_out.beliefs.iter().filter_map(|(belief, covariance)| {
+        for (belief, covariance) in &came_out.beliefs {
             let believed = stamped_pose(belief).pose;
-            let off = truth.at(belief.stamp_ns)? - believed.translation.vector;
-            let off = believed.rotation.inverse() * off;
-            let off = Vector2::new(off.x, off.y);
-            let spread = covariance.matrix().fixed_view::<2, 2>(0, 0).into_owned();
-            Some(off.dot(&(spread.try_inverse()? * off)) / 2.0)
-        });
-        squares.collect()
+            if let Some(pose) = known.true_pose(belief.stamp_ns) {
+                nees.add(&pose, &believed, covariance);
+            } else if let Some(truth_m) = truth.at(belief.stamp_ns) {
+                nees.add_position(&truth_m, &believed, covariance);
+            }
+        }
+        nees
     }
 }
 

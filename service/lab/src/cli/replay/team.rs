@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use cogmap_lab::stream::Stream;
 use cogmap_proto::Sample;
+use nalgebra::Isometry3;
 use trajectory::{StampedPose, Trajectory};
 
 /// Name of a robot that is alone.
@@ -23,6 +24,31 @@ pub(super) struct Known {
     pub(super) reckoned: Vec<StampedPose>,
     /// Where it was.
     pub(super) truth: Option<Trajectory>,
+    /// Its true poses, by stamp; none where headings are not known.
+    pub(super) true_poses: Vec<StampedPose>,
+}
+
+impl Known {
+    /// Where motion alone would have brought it, and where it was, its headings not being known.
+    pub(super) fn reckoned(reckoned: Vec<StampedPose>, truth: Option<Trajectory>) -> Self {
+        Self {
+            reckoned,
+            truth,
+            true_poses: Vec::new(),
+        }
+    }
+
+    /// Its true pose at a moment, where headings are known.
+    pub(super) fn true_pose(&self, stamp_ns: i64) -> Option<Isometry3<f64>> {
+        let after = self
+            .true_poses
+            .partition_point(|pose| pose.stamp_ns <= stamp_ns);
+        let before = self.true_poses.get(after.checked_sub(1)?)?;
+        if before.stamp_ns == stamp_ns {
+            return Some(before.pose);
+        }
+        Some(before.between(self.true_poses.get(after)?, stamp_ns).pose)
+    }
 }
 
 /// The robots of one space.
@@ -75,7 +101,7 @@ impl Team {
         );
         let reckoned = stream.reckoned().to_vec();
         team.robots
-            .insert(robot.to_owned(), Known { reckoned, truth });
+            .insert(robot.to_owned(), Known::reckoned(reckoned, truth));
         team
     }
 

@@ -4,6 +4,8 @@
 
 mod codecs;
 
+use std::sync::Arc;
+
 use nalgebra::Isometry3;
 
 use codecs::{ListUpTo, MapUpTo, Shared, SortedUpTo, UpTo};
@@ -16,9 +18,10 @@ use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::frame_match::FrameMatch;
 use super::joint::Estimator;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::noise_share::NoiseShare;
 use super::observers::Observers;
 use super::odometry_history::OdometryHistory;
-use super::odometry_noise::OdometryNoise;
+use super::odometry_noise::{NoiseTrial, OdometryNoise};
 use super::outcome::Evidence;
 use super::parameters::Parameters;
 use super::range_hypotheses::{PointHypothesis, RangeHypotheses};
@@ -29,8 +32,9 @@ use super::sighting_pair::{Anchor, NoisyMotion};
 use super::sightings::{CrossFrameSighting, PendingSighting};
 use super::tuning::{
     ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
-    HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX, PENDING_MAX,
-    RANGE_LAYERS, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGED_MAX, SENSOR_TARGETS_MAX,
+    HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_SHARES_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX,
+    PENDING_MAX, RANGE_LAYERS, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGED_MAX,
+    SENSOR_TARGETS_MAX,
 };
 use ::state::{
     Codec, CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum, state_of_struct,
@@ -97,7 +101,13 @@ state_of_struct!(OdometryNoise {
     factors,
     is_stated,
     motion,
-    anchors as ListUpTo<NOISE_TARGETS_MAX>
+    anchors as ListUpTo<NOISE_TARGETS_MAX>,
+    trial
+});
+state_of_struct!(NoiseTrial {
+    seen_ns,
+    by_lengths,
+    by_angles
 });
 state_of_struct!(PointHypothesis {
     log_weight,
@@ -228,38 +238,60 @@ impl State for LandmarkArchive {
 }
 
 impl State for JointCovariance {
-    /// One half of it, unless rounding made the halves differ.
     fn write(&self, out: &mut StateWriter) {
-        let (dim, entries) = (self.dim(), self.entries());
-        let mirror = |at: usize| entries[at % dim * dim + at / dim];
-        let is_symmetric =
-            (0..entries.len()).all(|at| entries[at].to_bits() == mirror(at).to_bits());
-        UpTo::<DIM_MAX>::write(&dim, out);
-        is_symmetric.write(out);
-        for row in 0..dim {
-            let first = if is_symmetric { row } else { 0 };
-            for entry in &entries[row * dim + first..(row + 1) * dim] {
-                entry.write(out);
-            }
+        UpTo::<DIM_MAX>::write(&self.dim(), out);
+        write_square(self.dim(), self.entries(), out);
+        UpTo::<NOISE_SHARES_MAX>::write(&self.shares().len(), out);
+        for share in self.shares() {
+            (share.agent, share.is_of_angles).write(out);
+            write_square(self.dim(), &share.entries, out);
         }
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
         let dim: usize = UpTo::<DIM_MAX>::read(input)?;
-        let is_symmetric = bool::read(input)?;
-        let mut entries = vec![0.0; dim * dim];
-        for row in 0..dim {
-            let first = if is_symmetric { row } else { 0 };
-            for column in first..dim {
-                let entry = f64::read(input)?;
-                entries[row * dim + column] = entry;
-                if is_symmetric {
-                    entries[column * dim + row] = entry;
-                }
+        let entries = read_square(dim, input)?;
+        let mut joint = Self::from_entries(dim, entries).ok_or(CorruptState::Invalid)?;
+        let n_shares: usize = UpTo::<NOISE_SHARES_MAX>::read(input)?;
+        for _ in 0..n_shares {
+            let (agent, is_of_angles) = State::read(input)?;
+            joint.shares_mut().push(NoiseShare {
+                agent,
+                is_of_angles,
+                entries: Arc::new(read_square(dim, input)?),
+            });
+        }
+        Ok(joint)
+    }
+}
+
+/// One half of a symmetric matrix, unless rounding made the halves differ.
+fn write_square(dim: usize, entries: &[f64], out: &mut StateWriter) {
+    let mirror = |at: usize| entries[at % dim * dim + at / dim];
+    let is_symmetric = (0..entries.len()).all(|at| entries[at].to_bits() == mirror(at).to_bits());
+    is_symmetric.write(out);
+    for row in 0..dim {
+        let first = if is_symmetric { row } else { 0 };
+        for entry in &entries[row * dim + first..(row + 1) * dim] {
+            entry.write(out);
+        }
+    }
+}
+
+fn read_square(dim: usize, input: &mut StateReader<'_>) -> Result<Vec<f64>, CorruptState> {
+    let is_symmetric = bool::read(input)?;
+    let mut entries = vec![0.0; dim * dim];
+    for row in 0..dim {
+        let first = if is_symmetric { row } else { 0 };
+        for column in first..dim {
+            let entry = f64::read(input)?;
+            entries[row * dim + column] = entry;
+            if is_symmetric {
+                entries[column * dim + row] = entry;
             }
         }
-        Self::from_entries(dim, entries).ok_or(CorruptState::Invalid)
     }
+    Ok(entries)
 }
 
 impl State for Estimator {
