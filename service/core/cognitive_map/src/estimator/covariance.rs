@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
 
+use super::jacobian::Block;
 use super::noise_share::{NoiseShare, ShareProjection};
 use super::tuning::{CONDITION_MIN, COVARIANCE_ROUNDING};
 use geometry::symmetric;
@@ -17,17 +18,6 @@ pub(super) struct JointCovariance {
     entries: Arc<Vec<f64>>,
     /// Parts of it that noise makes of which little is known.
     shares: Vec<NoiseShare>,
-}
-
-/// The part of a measurement's Jacobian that belongs to neighbouring components of the state.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Block<const M: usize> {
-    /// First component.
-    pub(super) offset: usize,
-    /// Number of components, at most 6.
-    pub(super) width: usize,
-    /// The Jacobian; columns from `width` on do not count.
-    pub(super) jacobian: SMatrix<f64, M, 6>,
 }
 
 /// What a measurement would do: H P, and S = H P Hᵀ without the measurement's own noise.

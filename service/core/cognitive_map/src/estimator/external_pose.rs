@@ -7,9 +7,9 @@ use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
 use super::agent_filter::AgentFilter;
 use super::calibration::Calibration;
-use super::covariance::Block;
 use super::effect::Effect;
 use super::frame::Frame;
+use super::jacobian::Block;
 use super::joint::Estimator;
 use super::parameters::Parameters;
 use super::tuning::{

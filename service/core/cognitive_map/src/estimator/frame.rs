@@ -8,7 +8,8 @@ use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
 use super::agent_filter::{AgentFilter, BODY_DIM, make_up_for_rounding};
 use super::agent_slot::AgentState;
-use super::covariance::{Block, JointCovariance};
+use super::covariance::JointCovariance;
+use super::jacobian::Block;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
 use super::observers::Observers;
 use super::parameters::Parameters;

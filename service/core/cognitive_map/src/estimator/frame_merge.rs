@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::covariance::Block;
 use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::frame_alignment::{FrameAlignment, PointPair, point_by_alignment, pose_by_alignment};
+use super::jacobian::Block;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
 use super::measurement_update::point_block;
 use super::parameters::Parameters;

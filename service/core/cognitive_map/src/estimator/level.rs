@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix1, RowVector6, Vector1};
 
-use super::covariance::Block;
 use super::effect::Effect;
 use super::frame::Frame;
+use super::jacobian::Block;
 use super::joint::Estimator;
 use super::parameters::Parameters;
 use super::tuning::LEVEL_HUBER_SD;

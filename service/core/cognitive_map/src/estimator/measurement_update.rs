@@ -6,9 +6,10 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 
 use super::agent_slot::AgentState;
-use super::covariance::{Block, Projection};
+use super::covariance::Projection;
 use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::innovation::{PointInnovation, pose_innovation, seen_at};
+use super::jacobian::Block;
 use super::landmark_archive::ArchivedLandmark;
 use super::observers::Observers;
 use super::parameters::Parameters;

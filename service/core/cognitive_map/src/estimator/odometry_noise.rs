@@ -170,9 +170,12 @@ impl OdometryNoise {
         }
         self.trial = None;
         Some([0, 1].map(|k| {
+            // The mean of a factor of which the logarithm is known to a deviation; more than one
+            // only as far as that is certain.
             let log = self.log_scales[k];
-            let surely = (log + sd[k]).min(0.0) + (log - NOISE_SURELY_SD * sd[k]).max(0.0);
-            1.0 - surely.exp()
+            let less = (log + sd[k] * sd[k] / 2.0).min(0.0);
+            let more = (log - NOISE_SURELY_SD * sd[k]).max(0.0);
+            1.0 - (less + more).exp()
         }))
     }
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Vector1, Vector3};
 
-use super::covariance::Block;
 use super::frame::Frame;
+use super::jacobian::Block;
 use super::landmark_archive::ArchivedLandmark;
 use super::measurement_update::{CorrectionScope, Measurement, PastPose, point_block};
 use super::range_hypotheses::{ExpectedRange, loss_of_weight};

@@ -120,12 +120,12 @@ pub(super) const NOISE_SURELY_SD: f64 = 2.0;
 /// seconds, while errors that change within minutes (slip on another floor) grow faster; *team*.
 pub(super) const NOISE_CAUTION: f64 = 0.25;
 /// Deviation of the logarithm of the factor of angles from which on the assumed noise that is not
-/// there is taken back. Source: a deviation is known within a third then.
+/// there is taken back. Source: a deviation is known within a sixth then.
 pub(super) const NOISE_TRIAL_SD: f64 = 0.3;
 /// Longest time from the first sighting until then \[ns\].
 pub(super) const NOISE_TRIAL_NS_MAX: i64 = 60_000_000_000;
-/// Parts of a covariance that are followed at a time, of eight agents, and the largest covariance of
-/// which they are. Source: work; each takes twice as long as the covariance itself.
+/// Parts of a covariance that are followed at a time, of eight agents, and the largest covariance
+/// of which they are. Source: work; each takes twice as long as the covariance itself.
 pub(super) const NOISE_SHARES_MAX: usize = 16;
 pub(super) const NOISE_SHARE_DIM_MAX: usize = 192;
 

@@ -1,9 +1,11 @@
 //! A share against the covariance of errors, matrix by matrix.
 
-use nalgebra::{SVector, Vector6};
+use nalgebra::{SMatrix, SVector, Vector6};
 use random::Seeded;
 
+use super::super::jacobian::Block;
 use super::*;
+use geometry::symmetric;
 
 const AGENT: u32 = 3;
 
