@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::jacobian::Block;
 use super::noise_share::{NoiseShare, ShareProjection};
-use super::tuning::{CONDITION_MIN, COVARIANCE_ROUNDING};
+use super::tuning::{CONDITION_MIN, COVARIANCE_ROUNDING, NOISE_SHARES_MAX};
 use geometry::symmetric;
 
 /// A covariance of any dimension, exactly symmetric, row by row. A clone shares the entries.
@@ -357,7 +357,8 @@ impl JointCovariance {
             }
         };
         lay(&mut self.entries, &other.entries);
-        for share in &other.shares {
+        let room = NOISE_SHARES_MAX.saturating_sub(self.shares.len());
+        for share in other.shares.iter().take(room) {
             let mut placed = NoiseShare::new(share.agent, share.is_of_angles, dim);
             lay(&mut placed.entries, &share.entries);
             self.shares.push(placed);

@@ -117,3 +117,27 @@ fn agents_that_are_gone_have_no_share() {
     joint.remove(0, 6);
     assert_eq!(sum_of_shares(&joint), DMatrix::identity(6, 6) * 2.0);
 }
+
+#[test]
+fn of_frames_that_merge_no_more_is_followed_than_of_one() {
+    let crowd = |first: u32| {
+        let mut joint = JointCovariance::default();
+        for agent in first..first + 6 {
+            let offset = joint.grow(6);
+            joint.add_to_shares(agent, offset, &[Matrix6::identity(); 2]);
+        }
+        joint
+    };
+    let (mut one, other) = (crowd(0), crowd(6));
+    let start = one.grow(other.dim());
+    one.place(start, &other);
+    assert_eq!(one.shares().len(), NOISE_SHARES_MAX);
+    // Those that are followed are where their agents are now.
+    let of_all = sum_of_shares(&one);
+    let followed = (0..12).map(|agent| of_all[(6 * agent, 6 * agent)]);
+    let followed: Vec<f64> = followed.collect();
+    assert_eq!(
+        followed,
+        [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0, 0.0]
+    );
+}
