@@ -87,7 +87,7 @@ impl Frame {
         let filter = &mut Arc::make_mut(&mut state).filter;
         self.covariance
             .set_diagonal(offset, filter.covariance_mut());
-        if let Some(noise) = filter.noise.take_trial_noise() {
+        if let Some(noise) = filter.noise.take_trial_noise(filter.history.stamp_ns()) {
             self.covariance.add_to_shares(agent, offset, &noise);
         }
         self.members.push(Member {
@@ -207,7 +207,8 @@ impl Frame {
                 let transition = member.state_mut().filter.flush();
                 let own = member.state.filter.covariance();
                 self.covariance.transform(member.offset, &transition, own);
-                match member.state_mut().filter.noise.take_trial_noise() {
+                let filter = &mut member.state_mut().filter;
+                match filter.noise.take_trial_noise(filter.history.stamp_ns()) {
                     Some(noise) => {
                         let (agent, offset) = (member.agent, member.offset);
                         self.covariance.add_to_shares(agent, offset, &noise);

@@ -64,6 +64,8 @@ pub(super) struct OdometryNoise {
 pub(super) struct NoiseTrial {
     /// When the first landmark was seen \[ns\].
     pub(super) seen_ns: Option<i64>,
+    /// When the noise was followed first, by odometry's clock \[ns\].
+    pub(super) followed_ns: Option<i64>,
     /// Motion since the share was brought up to date, with noise of lengths and of angles.
     pub(super) by_lengths: MotionSum,
     pub(super) by_angles: MotionSum,
@@ -142,9 +144,17 @@ impl OdometryNoise {
     }
 
     /// The noise since it was asked for last: covariances of the pose's error, on its right, of
-    /// lengths and of angles; none where it is not followed.
-    pub(super) fn take_trial_noise(&mut self) -> Option<[Matrix6<f64>; 2]> {
+    /// lengths and of angles; none where it is not followed. Who sees no landmark that tells about
+    /// it is not followed for ever.
+    pub(super) fn take_trial_noise(&mut self, stamp_ns: Option<i64>) -> Option<[Matrix6<f64>; 2]> {
         let trial = self.trial.as_mut()?;
+        if let Some(now_ns) = stamp_ns {
+            let begun_ns = *trial.followed_ns.get_or_insert(now_ns);
+            if now_ns.saturating_sub(begun_ns) > 2 * NOISE_TRIAL_NS_MAX {
+                self.trial = None;
+                return None;
+            }
+        }
         let sums = [&mut trial.by_lengths, &mut trial.by_angles];
         Some(sums.map(|sum| *std::mem::take(sum).covariance().matrix()))
     }

@@ -463,3 +463,27 @@ fn as_merged(effect: Effect) -> Option<FramesMerged> {
         _ => None,
     }
 }
+
+/// Robots that see one another and no landmark tell nothing about their odometry by pairs: what it
+/// adds is not followed for ever.
+#[test]
+fn odometry_that_no_landmark_tells_about_is_followed_for_a_while() {
+    let mut estimator = Estimator::new(Parameters::default());
+    let agents = [estimator.enrol(), estimator.enrol()];
+    for (agent, x) in agents.into_iter().zip([0.0, 2.0]) {
+        let start = StartPose::new([x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], PoseNoise::none());
+        estimator.start_pose(agent, &start.unwrap(), &mut Vec::new());
+    }
+    let step = Motion::from_increment([0.1, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], None).unwrap();
+    let seen = RangeBearing::new(2.0, 0.0, 0.0, 0.03, 0.01).unwrap();
+    let mut followed = Vec::new();
+    for second in 0..200 {
+        for agent in agents {
+            estimator.motion(agent, second * SECOND_NS, &step, &mut Vec::new());
+        }
+        let relation = Relation::RangeBearing(seen);
+        estimator.sighting(0, second * SECOND_NS, 1, &relation, &mut Vec::new());
+        followed.push(estimator.frame(0).covariance.shares().len());
+    }
+    assert_eq!((followed[60], followed[199]), (4, 0));
+}

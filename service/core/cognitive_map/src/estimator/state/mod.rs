@@ -106,6 +106,7 @@ state_of_struct!(OdometryNoise {
 });
 state_of_struct!(NoiseTrial {
     seen_ns,
+    followed_ns,
     by_lengths,
     by_angles
 });
