@@ -45,9 +45,9 @@ pub struct WheelSettings {
     pub reach_m: f64,
     /// How often each of them is seen \[Hz\], at most ten times a second.
     pub sightings_hz: f64,
-    /// Standard deviations of a sighting, as its samples state them \[m, rad\].
+    /// Standard deviation of a seen distance, as its sample states it \[m\].
     pub range_sd_m: f64,
-    /// See above.
+    /// Standard deviation of a seen direction, as its sample states it \[rad\].
     pub bearing_sd_rad: f64,
 }
 
