@@ -206,15 +206,24 @@ impl Question<'_> {
                 break;
             };
             latest = other.path;
-            if found.iter().all(|known| !is_alike(&latest, &known.path)) {
-                let cost = costs.without_penalties(&latest);
-                let path = latest.clone();
-                found.push(Found { path, cost });
-            }
+            let cost = costs.without_penalties(&latest);
+            let path = latest.clone();
+            insert_unless_alike(found, Found { path, cost });
         }
-        // Stable: of equally cheap ones that found first comes first.
-        found[1..].sort_by_key(|other| other.cost);
         Ok(())
+    }
+}
+
+/// Puts an alternative among those found, which are in the order of their costs but for the
+/// first, unless it or a dearer one would have too much in common with one before. Of equally
+/// cheap ones that found first comes first.
+fn insert_unless_alike(found: &mut Vec<Found>, other: Found) {
+    let rank = 1 + found[1..].partition_point(|known| known.cost <= other.cost);
+    let (cheaper, dearer) = found.split_at(rank);
+    let alike = { cheaper.iter() }.any(|known| is_alike(&other.path, &known.path))
+        || { dearer.iter() }.any(|known| is_alike(&known.path, &other.path));
+    if !alike {
+        found.insert(rank, other);
     }
 }
 
