@@ -48,9 +48,9 @@ impl Marginals<'_> {
         Some(symmetric(&block))
     }
 
-    /// Variances of a calibration's length, angle and bias \[1, 1, rad²/s²\]; of a planar robot,
-    /// the bias about z alone. `None` if the links leave it free.
-    pub fn calibration(&self, calibration: CalibrationId) -> Option<(f64, f64, Vector3<f64>)> {
+    /// Variances of a calibration's length, angle, veer and bias \[1, 1, rad²/m², rad²/s²\]; of a
+    /// planar robot, the bias about z alone. `None` if the links leave it free.
+    pub fn calibration(&self, calibration: CalibrationId) -> Option<(f64, f64, f64, Vector3<f64>)> {
         let half = self.half(calibration.0)?;
         let variances = self
             .placed(calibration.0, calibration.0, &half.product(&half))
@@ -58,6 +58,7 @@ impl Marginals<'_> {
         Some((
             variances[0],
             variances[1],
+            variances[2],
             variances.fixed_rows::<3>(3).into_owned(),
         ))
     }

@@ -4,7 +4,7 @@ use std::ops::SubAssign;
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 
-use super::calibration::{Calibrated, Calibration};
+use super::calibration::{Calibrated, Calibration, LASTING_DIM, VEER};
 use super::frame_alignment::{FrameAlignment, pose_by_alignment};
 use super::odometry_history::OdometryHistory;
 use super::odometry_noise::OdometryNoise;
@@ -15,12 +15,12 @@ use crate::input::{Label, Motion, Relation};
 use geometry::{MotionSum, PoseCovariance, is_somewhere, positive, se3, symmetric};
 
 /// Components of a body's error: translation and rotation of the pose (right perturbation), then
-/// relative errors of odometry's lengths and angles, then its bias about the body axes \[rad/s\].
-pub(super) const BODY_DIM: usize = 11;
+/// odometry's lasting errors.
+pub(super) const BODY_DIM: usize = 6 + LASTING_DIM;
 /// Components of the pose.
 const POSE: usize = 6;
 /// Components of odometry's calibration.
-const CALIBRATION: usize = BODY_DIM - POSE;
+const CALIBRATION: usize = LASTING_DIM;
 
 type BodyCovariance = SMatrix<f64, BODY_DIM, BODY_DIM>;
 type Tail = SMatrix<f64, POSE, CALIBRATION>;
@@ -86,7 +86,8 @@ impl AgentFilter {
             .at_run_start
             .fixed_view_mut::<6, 6>(0, 0)
             .copy_from(covariance);
-        let sd = parameters.calibration_sd();
+        let mut sd = parameters.calibration_sd();
+        sd[VEER] = 0.0; // until a landmark is seen: see `begin_veer`
         for (k, sd) in sd.iter().enumerate() {
             filter.at_run_start[(POSE + k, POSE + k)] = sd * sd;
         }
@@ -98,14 +99,16 @@ impl AgentFilter {
         self.flush();
         self.noise.forget_trial_noise();
         self.pose = pose;
-        let calibration: SMatrix<f64, 5, 5> =
-            self.at_run_start.fixed_view::<5, 5>(6, 6).into_owned();
+        let calibration: SMatrix<f64, CALIBRATION, CALIBRATION> = self
+            .at_run_start
+            .fixed_view::<CALIBRATION, CALIBRATION>(POSE, POSE)
+            .into_owned();
         self.at_run_start = BodyCovariance::zeros();
         self.at_run_start
             .fixed_view_mut::<6, 6>(0, 0)
             .copy_from(covariance);
         self.at_run_start
-            .fixed_view_mut::<5, 5>(6, 6)
+            .fixed_view_mut::<CALIBRATION, CALIBRATION>(POSE, POSE)
             .copy_from(&calibration);
         self
     }
@@ -151,8 +154,8 @@ impl AgentFilter {
     /// With the corrected increment Δ, lengths t and rotation vector r:
     ///
     /// ```text
-    /// ξ′ = Ad(Δ⁻¹) ξ + B c + n      B = | −Rᵀ t   0    0  |
-    ///                                   |   0    −r   −Δt |
+    /// ξ′ = Ad(Δ⁻¹) ξ + B c + n      B = | −Rᵀ t   0    0     0  |
+    ///                                   |   0    −r   −Δt  |t|ẑ |
     /// ```
     ///
     /// Gathered about the axes of where the run began, with its motion T until after the step:
@@ -223,8 +226,11 @@ impl AgentFilter {
         let wander = parameters.calibration_wander(length_m, angle_rad, reading.moving_s());
         // Out of the plane a planar robot learns nothing, and so forgets nothing.
         let free = &reading.free;
-        let learns = SVector::<f64, CALIBRATION>::from([1.0, 1.0, free.x, free.y, free.z]);
+        let learns = SVector::<f64, CALIBRATION>::from([1.0, 1.0, free.x, free.y, free.z, 1.0]);
         let mut wander = wander.component_mul(&learns);
+        if self.at_run_start[(POSE + VEER, POSE + VEER)] == 0.0 {
+            wander[VEER] = 0.0;
+        }
         let most = parameters.calibration_variance_max();
         for k in 0..CALIBRATION {
             let left = most[k] - self.at_run_start[(POSE + k, POSE + k)] - self.run.wander[k];
@@ -238,8 +244,14 @@ impl AgentFilter {
     fn moved(&self) -> (BodyCovariance, Tail) {
         let run = &self.run;
         let pose: Matrix6<f64> = self.at_run_start.fixed_view::<6, 6>(0, 0).into_owned();
-        let cross: Tail = self.at_run_start.fixed_view::<6, 5>(0, 6).into_owned();
-        let own: SMatrix<f64, 5, 5> = self.at_run_start.fixed_view::<5, 5>(6, 6).into_owned();
+        let cross: Tail = self
+            .at_run_start
+            .fixed_view::<POSE, CALIBRATION>(0, POSE)
+            .into_owned();
+        let own: SMatrix<f64, CALIBRATION, CALIBRATION> = self
+            .at_run_start
+            .fixed_view::<CALIBRATION, CALIBRATION>(POSE, POSE)
+            .into_owned();
         let back = Shift::of_inverse(run.motion.motion());
         let spread = run.tail * own;
         let mixed = cross * run.tail.transpose();
@@ -291,7 +303,7 @@ impl AgentFilter {
         let back = se3::adjoint(&self.since_flush.inverse());
         transition.fixed_view_mut::<6, 6>(0, 0).copy_from(&back);
         transition
-            .fixed_view_mut::<6, 5>(0, 6)
+            .fixed_view_mut::<POSE, CALIBRATION>(0, POSE)
             .copy_from(&self.tail);
         self.tail = Tail::zeros();
         self.since_flush = Isometry3::identity();
@@ -306,7 +318,7 @@ impl AgentFilter {
         let most = parameters.calibration_max();
         let corrected = self.calibration.components() + error.fixed_rows::<CALIBRATION>(POSE);
         let bounded = corrected.zip_map(&most, |error, most| error.clamp(-most, most));
-        self.calibration = self.calibration.with_components(&bounded);
+        self.calibration = Calibration::of_components(&bounded);
     }
 
     /// Sets the lasting errors of odometry, within what the settings allow.
@@ -314,7 +326,7 @@ impl AgentFilter {
         let most = parameters.calibration_max();
         let components = calibration.components();
         let bounded = components.zip_map(&most, |error, most| error.clamp(-most, most));
-        self.calibration = calibration.with_components(&bounded);
+        self.calibration = Calibration::of_components(&bounded);
     }
 
     /// A landmark was seen: how does that fit with its last sightings and odometry?
@@ -361,6 +373,10 @@ impl Run {
             tail.fixed_rows_mut::<3>(3).sub_assign(axis);
         };
         turn(1, &(axes * reading.angles));
+        let length_m = reading.lengths.norm();
+        if length_m > 0.0 {
+            turn(VEER, &(axes.column(2) * -length_m));
+        }
         for axis in 0..3 {
             let time_s = reading.time_s[axis];
             if time_s > 0.0 {

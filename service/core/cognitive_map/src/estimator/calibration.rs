@@ -6,6 +6,14 @@ use super::tuning::CALIBRATION_FACTOR_MIN;
 use ::state::state_of_struct;
 use pose_graph::Reading;
 
+/// Components of what odometry gets wrong all the time.
+pub const LASTING_DIM: usize = 6;
+/// Of each component a number: relative errors of lengths and of angles, bias about the body axes
+/// \[rad/s\], veer \[rad/m\].
+pub type LastingErrors = SVector<f64, LASTING_DIM>;
+/// Where the veer is among them.
+pub(crate) const VEER: usize = 5;
+
 /// What odometry gets wrong all the time: reading = true · (1 + error) + bias.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Calibration {
@@ -13,8 +21,8 @@ pub struct Calibration {
     pub length: f64,
     /// Relative error of angles.
     pub angle: f64,
-    /// Rotation about the body's z axis for each metre that it goes, which is not read \[rad/m\].
-    /// The estimator does not estimate it: it is what the whole map says.
+    /// Rotation about the body's z axis for each metre that it goes, which is not read \[rad/m\]:
+    /// wheels of unequal diameters drive in a circle.
     pub veer_rad_m: f64,
     /// Bias about the body axes \[rad/s\].
     pub bias_rad_s: Vector3<f64>,
@@ -28,7 +36,7 @@ pub struct Calibrated {
     /// Whether odometry stated its noise.
     pub states_noise: bool,
     /// Variances by which the true errors may have changed with the motion.
-    pub wander: SVector<f64, 5>,
+    pub wander: LastingErrors,
     /// How long the body moved, and the bias with it \[s\].
     pub moving_s: f64,
 }
@@ -50,7 +58,7 @@ impl Calibrated {
     /// The same odometry, and no motion yet.
     pub(crate) fn without_motion(&self) -> Self {
         Self {
-            wander: SVector::zeros(),
+            wander: LastingErrors::zeros(),
             moving_s: 0.0,
             ..*self
         }
@@ -102,19 +110,19 @@ impl Calibration {
         }
     }
 
-    /// With other components: length, angle, bias.
-    pub(crate) fn with_components(&self, components: &SVector<f64, 5>) -> Self {
+    /// Of these components.
+    pub(crate) fn of_components(components: &LastingErrors) -> Self {
         Self {
             length: components[0],
             angle: components[1],
             bias_rad_s: components.fixed_rows::<3>(2).into_owned(),
-            ..*self
+            veer_rad_m: components[VEER],
         }
     }
 
-    /// Its components that the estimator estimates: length, angle, bias.
-    pub(crate) fn components(&self) -> SVector<f64, 5> {
-        let bias = &self.bias_rad_s;
-        SVector::from([self.length, self.angle, bias.x, bias.y, bias.z])
+    /// Its components.
+    pub(crate) fn components(&self) -> LastingErrors {
+        let (bias, veer) = (&self.bias_rad_s, self.veer_rad_m);
+        SVector::from([self.length, self.angle, bias.x, bias.y, bias.z, veer])
     }
 }

@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Isometry3, Matrix6, SMatrix, Vector6};
 
 use super::agent_filter::AgentFilter;
-use super::calibration::Calibration;
+use super::calibration::{Calibration, LastingErrors, VEER};
 use super::effect::Effect;
 use super::frame::Frame;
 use super::jacobian::Block;
@@ -25,7 +25,7 @@ pub struct ExternalEstimate {
     /// Covariance of the pose's error (right perturbation).
     pub covariance: PoseCovariance,
     /// The lasting errors of its odometry, and their variances in the order of the components.
-    pub calibration: Option<(Calibration, SVector<f64, 5>)>,
+    pub calibration: Option<(Calibration, LastingErrors)>,
     /// Whether it prevails where the pose contradicts the present one, because it knows of more:
     /// odometry was worse than it said, and the present pose is widened first. Otherwise it does
     /// not count then.
@@ -128,15 +128,27 @@ impl Frame {
         &mut self,
         index: usize,
         calibration: &Calibration,
-        variances: &SVector<f64, 5>,
+        variances: &LastingErrors,
         parameters: &Parameters,
     ) {
         let member = &mut self.members[index];
         let (offset, mut variances) = (member.offset + 6, *variances);
+        let own = &member.filter().calibration;
+        let mut calibration = Calibration {
+            length: own.length,
+            ..*calibration
+        };
         variances[0] = self.covariance.variance(offset);
+        // Until a landmark was seen, the veer is as the past has it. From then on it stays where the
+        // past does not say what it is.
+        let veer_variance = self.covariance.variance(offset + VEER);
+        if veer_variance == 0.0 {
+            variances[VEER] = 0.0;
+        } else if variances[VEER] == 0.0 {
+            calibration.veer_rad_m = own.veer_rad_m;
+            variances[VEER] = veer_variance;
+        }
         self.covariance.isolate(offset, &variances);
-        let mut calibration = *calibration;
-        calibration.length = member.filter().calibration.length;
         member
             .state_mut()
             .filter

@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
 use super::agent_filter::{AgentFilter, BODY_DIM, make_up_for_rounding};
 use super::agent_slot::AgentState;
+use super::calibration::{LASTING_DIM, VEER};
 use super::covariance::JointCovariance;
 use super::jacobian::Block;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
@@ -252,6 +253,20 @@ impl Frame {
         if has_changed {
             self.tell_members();
         }
+    }
+
+    /// From its first landmark on it is not taken for granted that a member drives straight: only
+    /// landmarks tell that in time. What views say of it comes with the past.
+    pub(super) fn begin_veer(&mut self, index: usize, parameters: &Parameters) {
+        let component = self.members[index].offset + BODY_DIM - LASTING_DIM + VEER;
+        let sd = parameters.calibration_sd()[VEER];
+        if sd == 0.0 || self.covariance.variance(component) > 0.0 {
+            return;
+        }
+        self.flush();
+        let variance = SMatrix::<f64, 1, 1>::new(sd * sd);
+        self.covariance.set_diagonal(component, &variance);
+        self.tell_members();
     }
 
     /// Takes back what was assumed of a member's odometry, as soon as it is known to be better.

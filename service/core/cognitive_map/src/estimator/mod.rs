@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! agent      ξ 6     pose T = T̂ exp(ξ)                   landmark   δ 3   l = l̂ + δ
-//!            c 5     relative error of lengths, of angles; bias about the body axes
+//!            c 6     relative error of lengths, of angles; bias about the body axes; veer
 //!
 //! motion     ξ ← Ad(Δ⁻¹) ξ + B c + n     Δ = what odometry read, corrected by ĉ
 //! sighting   ν = z − h(x̂)     S = H P Hᵀ + R     δx = P Hᵀ S⁻¹ ν     P ← P − P Hᵀ S⁻¹ H P
@@ -80,7 +80,7 @@ mod state;
 mod tuning;
 mod verdict;
 
-pub use calibration::{Calibrated, Calibration};
+pub use calibration::{Calibrated, Calibration, LASTING_DIM, LastingErrors};
 pub use effect::{AgentSighted, Effect, FramesMerged};
 pub use external_pose::ExternalEstimate;
 pub use joint::Estimator;

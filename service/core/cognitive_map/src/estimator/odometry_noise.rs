@@ -26,8 +26,9 @@
 //! - **Stated noise** counts at least. Beside it counts as much of the assumed noise as is certain
 //!   to be there, so that a robot that states too little does not bend the map.
 
-use nalgebra::{Isometry3, Matrix4, Matrix6, SVector, Vector4, Vector6};
+use nalgebra::{Isometry3, Matrix4, Matrix6, Vector4, Vector6};
 
+use super::calibration::LastingErrors;
 use super::sighting_pair::{Anchor, NoisyMotion, Residual};
 use super::tuning::{
     NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_LOG_SCALE_MAX, NOISE_LOG_STEP_MAX, NOISE_MEMORY,
@@ -207,7 +208,7 @@ impl OdometryNoise {
         label: &Label,
         stamp_ns: i64,
         relation: &Relation,
-        lasting: &SVector<f64, 5>,
+        lasting: &LastingErrors,
     ) {
         let is_recent =
             |anchor: &Anchor| stamp_ns.saturating_sub(anchor.stamp_ns) <= NOISE_PAIR_NS_MAX;

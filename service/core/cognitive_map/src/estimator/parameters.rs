@@ -2,8 +2,10 @@
 
 use nalgebra::{Isometry3, SVector, Vector6};
 
+use super::calibration::LastingErrors;
 use super::tuning::{
-    ANY_TURN_SD_RAD, CALIBRATION_RENEWAL, LASTING_DEVIATIONS_MAX, LASTING_RATIO_MAX, WANDERED_MAX,
+    ANY_TURN_SD_RAD, CALIBRATION_RENEWAL, LASTING_DEVIATIONS_MAX, LASTING_RATIO_MAX,
+    VEER_PER_ANGLE_ERROR_RAD_M, WANDERED_MAX,
 };
 use crate::input::Motion;
 use crate::settings::Settings;
@@ -62,13 +64,21 @@ impl Parameters {
     }
 
     /// Deviations of the calibration, in the order of the body's error.
-    pub(crate) fn calibration_sd(&self) -> SVector<f64, 5> {
+    pub(crate) fn calibration_sd(&self) -> LastingErrors {
         let bias = self.bias_sd_rad_s;
-        SVector::from([self.length_error_sd, self.angle_error_sd, bias, bias, bias])
+        let veer = VEER_PER_ANGLE_ERROR_RAD_M * self.angle_error_sd;
+        SVector::from([
+            self.length_error_sd,
+            self.angle_error_sd,
+            bias,
+            bias,
+            bias,
+            veer,
+        ])
     }
 
     /// Largest lasting errors that are accepted.
-    pub(super) fn calibration_max(&self) -> SVector<f64, 5> {
+    pub(super) fn calibration_max(&self) -> LastingErrors {
         let most = self.calibration_sd() * LASTING_DEVIATIONS_MAX;
         SVector::from_fn(|k, _| {
             if k < 2 {
@@ -80,7 +90,7 @@ impl Parameters {
     }
 
     /// Largest variances of the calibration that its wandering leads to.
-    pub(super) fn calibration_variance_max(&self) -> SVector<f64, 5> {
+    pub(super) fn calibration_variance_max(&self) -> LastingErrors {
         let sd = self.calibration_sd() * WANDERED_MAX;
         sd.component_mul(&sd)
     }
@@ -91,10 +101,17 @@ impl Parameters {
         path_m: f64,
         angle_rad: f64,
         duration_s: f64,
-    ) -> SVector<f64, 5> {
+    ) -> LastingErrors {
         let sd = self.calibration_sd();
         let time = duration_s / 1000.0;
-        let renewed = SVector::from([path_m / 100.0, angle_rad / 100.0, time, time, time]);
+        let renewed = SVector::from([
+            path_m / 100.0,
+            angle_rad / 100.0,
+            time,
+            time,
+            time,
+            path_m / 100.0,
+        ]);
         sd.component_mul(&sd).component_mul(&renewed) * self.calibration_renewal
     }
 

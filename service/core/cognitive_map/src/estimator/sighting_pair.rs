@@ -1,7 +1,8 @@
 //! Two sightings of one landmark from one robot, and what it moved in between.
 
-use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, SMatrix, SVector, Vector3, Vector4};
+use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, SMatrix, Vector3, Vector4};
 
+use super::calibration::{LASTING_DIM, LastingErrors, VEER};
 use super::innovation::{PointInnovation, seen_at};
 use crate::input::{Label, Relation};
 use geometry::{MotionSum, se3, seen_by_pose};
@@ -86,7 +87,7 @@ impl Anchor {
         stamp_ns: i64,
         relation: &Relation,
         motion: &NoisyMotion,
-        lasting: &SVector<f64, 5>,
+        lasting: &LastingErrors,
     ) -> Vec<Residual> {
         let now = motion.motion();
         let moved = self.motion.inv_mul(now);
@@ -136,12 +137,12 @@ fn sensor_part(is_polar: bool, component: usize) -> usize {
 fn lasting_errors(
     motion: &Isometry3<f64>,
     duration_s: f64,
-    variance: &SVector<f64, 5>,
-) -> SMatrix<f64, 6, 5> {
+    variance: &LastingErrors,
+) -> SMatrix<f64, 6, LASTING_DIM> {
     let (_, angles) = se3::log(motion);
     let sd = variance.map(|variance| variance.max(0.0).sqrt());
     let lengths = motion.rotation.inverse() * motion.translation.vector;
-    let mut errors = SMatrix::<f64, 6, 5>::zeros();
+    let mut errors = SMatrix::<f64, 6, LASTING_DIM>::zeros();
     errors
         .fixed_view_mut::<3, 1>(0, 0)
         .copy_from(&(lengths * sd[0]));
@@ -156,5 +157,6 @@ fn lasting_errors(
         bias[axis] = sd[2 + axis] * duration_s;
         turn(2 + axis, bias);
     }
+    turn(VEER, Vector3::z() * (sd[VEER] * lengths.norm()));
     errors
 }

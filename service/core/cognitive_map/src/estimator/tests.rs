@@ -3,6 +3,7 @@ mod effects;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::*;
 
+use super::agent_filter::BODY_DIM;
 use super::innovation::PointInnovation;
 use super::*;
 use crate::input::{Label, Motion, PoseNoise, RangeBearing, Relation, RelativePosition, StartPose};
@@ -438,7 +439,7 @@ fn of_a_crowd_those_that_see_take_part() {
         }
         let frame = estimator.frame(0);
         assert_eq!((frame.members.len(), frame.population), (32, 40), "{round}");
-        assert_eq!(frame.covariance.dim(), 32 * 11 + POSTS.len() * 3);
+        assert_eq!(frame.covariance.dim(), 32 * BODY_DIM + POSTS.len() * 3);
     }
     // Agent 0 has left the joint estimate: its motion leaves that alone, and it comes back.
     let before = estimator.frame(0).covariance.entries().to_vec();

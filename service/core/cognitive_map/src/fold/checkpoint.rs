@@ -54,8 +54,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// stretches of logged views, no instructions and no episodes that learn nothing, version 14 no
 /// past that is relaxed by sightings, version 15 no cells of mean views and no count of keyframes
 /// that are new, version 16 no past that is held by live estimates, version 17 no searches by
-/// levels at four nodes, version 18 no trial of the noise of odometry.
-const VERSION: u16 = 19;
+/// levels at four nodes, version 18 no trial of the noise of odometry, version 19 no
+/// veer in the estimate.
+const VERSION: u16 = 20;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

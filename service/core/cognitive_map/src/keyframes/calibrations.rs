@@ -1,13 +1,23 @@
 //! The calibrations of the agents' odometry over the past, as nodes of a pose graph.
 
-use nalgebra::{SVector, Vector3};
+use nalgebra::Vector3;
 
 use super::agent_track::AgentTrack;
 use super::chains::Chains;
 use super::tuning;
+use crate::estimator::LastingErrors;
 use pose_graph::{
     CalibrationId, CalibrationInformation, Freedom, Kernel, Lengths, Link, PoseGraph, Veer,
 };
+
+/// What a graph tells of the calibrations.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Told {
+    pub(super) lengths: Lengths,
+    pub(super) veer: Veer,
+    /// Whether it has landmarks, by which the estimator learns the veer.
+    pub(super) by_landmarks: bool,
+}
 
 /// The calibration nodes of a pose graph.
 #[derive(Debug, Default)]
@@ -27,8 +37,8 @@ impl Calibrations {
     /// as the estimator has learned them by now.
     pub(super) fn add(
         chains: &Chains,
-        prior_sd: &SVector<f64, 5>,
-        (lengths, veer): (Lengths, Veer),
+        prior_sd: &LastingErrors,
+        told: Told,
         map: &mut PoseGraph,
     ) -> Self {
         let mut all = Self {
@@ -40,7 +50,7 @@ impl Calibrations {
         }
         for (track, agent) in chains.tracks.iter().zip(0..) {
             if track.is_in_map() {
-                let latest = all.add_agent(chains, (agent, track), prior_sd, (lengths, veer), map);
+                let latest = all.add_agent(chains, (agent, track), prior_sd, told, map);
                 all.latest[agent as usize] = latest;
             }
         }
@@ -62,8 +72,8 @@ impl Calibrations {
         &mut self,
         chains: &Chains,
         (agent, track): (u32, &AgentTrack),
-        prior_sd: &SVector<f64, 5>,
-        (lengths, veer): (Lengths, Veer),
+        prior_sd: &LastingErrors,
+        told: Told,
         map: &mut PoseGraph,
     ) -> Option<CalibrationId> {
         let freedom = if track.is_planar {
@@ -72,30 +82,32 @@ impl Calibrations {
             Freedom::Full
         };
         let learned = track.calibrated.calibration.in_graph();
-        let expected = match lengths {
-            Lengths::Estimated => pose_graph::Calibration {
-                veer_rad_m: 0.0, // only matches of views say what it is
-                ..learned
-            },
+        let mut expected = match told.lengths {
+            Lengths::Estimated => learned,
             // What the estimator has learned of rotations may be by closures that are judged here.
             Lengths::Known => pose_graph::Calibration {
                 length: learned.length,
                 ..pose_graph::Calibration::default()
             },
         };
+        // Without landmarks, what the estimator has learned of it is by matches that are judged here.
+        expected.veer_rad_m = match told.veer {
+            Veer::Known if told.by_landmarks => learned.veer_rad_m,
+            Veer::Known | Veer::Estimated => 0.0,
+        };
         let prior = prior_sd.component_mul(prior_sd);
-        let veer_variance = match veer {
+        let veer_variance = match told.veer {
             Veer::Known => f64::INFINITY,
             Veer::Estimated => tuning::VEER_SD_RAD_M * tuning::VEER_SD_RAD_M,
         };
         let mut newest = None;
-        let (mut n_motions, mut wander) = (0, SVector::zeros());
+        let (mut n_motions, mut wander) = (0, LastingErrors::zeros());
         let mut number = chains.first(agent);
         while let Some(keyframe) = chains.keyframes.get(number) {
             let calibrated = &keyframe.calibrated;
             let node = newest.filter(|_| n_motions < tuning::CALIBRATED_TOGETHER);
             let node = node.unwrap_or_else(|| {
-                let node = map.add_calibration(&expected, freedom, lengths, veer);
+                let node = map.add_calibration(&expected, freedom, told.lengths, told.veer);
                 let link = match newest {
                     None => Link::CalibrationPrior {
                         calibration: node,
@@ -112,7 +124,7 @@ impl Calibrations {
                     },
                 };
                 map.add_link(link, Kernel::Gaussian).ok();
-                (n_motions, wander) = (0, SVector::zeros());
+                (n_motions, wander) = (0, LastingErrors::zeros());
                 node
             });
             n_motions += 1;
@@ -127,7 +139,7 @@ impl Calibrations {
 
 /// Information of variances of a calibration's components; those that the settings exclude are held
 /// by a variance next to nothing.
-fn information(variances: &SVector<f64, 5>, veer: f64) -> CalibrationInformation {
+fn information(variances: &LastingErrors, veer: f64) -> CalibrationInformation {
     let least = variances.map(|variance| variance.max(tuning::CALIBRATION_VARIANCE_MIN));
     let bias: Vector3<f64> = least.fixed_rows::<3>(2).into_owned();
     CalibrationInformation::of_variances(least[0], least[1], veer, &bias)

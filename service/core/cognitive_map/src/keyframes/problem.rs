@@ -1,15 +1,15 @@
 //! The keyframe graph as a problem of nonlinear least squares.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SVector, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
-use super::calibrations::Calibrations;
+use super::calibrations::{Calibrations, Told};
 use super::constraint::{ClosureState, Constraint};
 use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
 use super::observation::Observation;
 use super::sighting::{Seen, Sighting};
 use super::tuning;
-use crate::estimator::Calibration;
+use crate::estimator::{Calibration, LastingErrors};
 use geometry::{PoseCovariance, from_planar_part, planar_part};
 use pose_graph::{
     Freedom, Kernel, Lengths, Link, LinkId, Marginals, PointId, PoseGraph, PoseId, PoseInformation,
@@ -71,18 +71,20 @@ impl Problem {
         if calibrating == Calibrating::Free {
             let prior_sd = &graph.settings.calibration_sd;
             let has_closures = graph.constraints.n_accepted() > 0 || !graph.matches.is_empty();
-            let lengths = if has_closures || among == Among::All {
-                Lengths::Known
-            } else {
-                Lengths::Estimated
+            let told = Told {
+                lengths: if has_closures || among == Among::All {
+                    Lengths::Known
+                } else {
+                    Lengths::Estimated
+                },
+                veer: if graph.matches.is_empty() {
+                    Veer::Known
+                } else {
+                    Veer::Estimated
+                },
+                by_landmarks: graph.n_sightings() > 0,
             };
-            let veer = if graph.matches.is_empty() {
-                Veer::Known
-            } else {
-                Veer::Estimated
-            };
-            problem.calibrations =
-                Calibrations::add(chains, prior_sd, (lengths, veer), &mut problem.map);
+            problem.calibrations = Calibrations::add(chains, prior_sd, told, &mut problem.map);
         }
         for (number, keyframe) in chains.keyframes.iter() {
             problem.add_motion(graph, number, keyframe);
@@ -126,10 +128,10 @@ impl Problem {
         &self,
         agent: u32,
         marginals: &Marginals<'_>,
-    ) -> Option<(Calibration, SVector<f64, 5>)> {
+    ) -> Option<(Calibration, LastingErrors)> {
         let latest = self.calibrations.latest(agent)?;
-        let (length, angle, bias) = marginals.calibration(latest)?;
-        let variances = SVector::from([length, angle, bias.x, bias.y, bias.z]);
+        let (length, angle, veer, bias) = marginals.calibration(latest)?;
+        let variances = LastingErrors::from([length, angle, bias.x, bias.y, bias.z, veer]);
         Some((
             Calibration::of_graph(&self.map.calibration(latest)),
             variances,

@@ -1,9 +1,7 @@
 //! Limits of the keyframe graph, and what a space sets of it.
 
-use nalgebra::SVector;
-
 use super::tuning::REFUTED_PER_GATE;
-use crate::estimator::Parameters;
+use crate::estimator::{LastingErrors, Parameters};
 use crate::settings::Settings;
 
 /// Part of the spacing of keyframes up to which a sighting is attached to the latest one: where
@@ -28,7 +26,7 @@ pub struct KeyframeSettings {
     pub closure_gate_chi2: f64,
     /// Standard deviations of odometry's lasting errors: of lengths, of angles, of the bias about
     /// each axis \[1, 1, rad/s\].
-    pub calibration_sd: SVector<f64, 5>,
+    pub calibration_sd: LastingErrors,
 }
 
 impl KeyframeSettings {

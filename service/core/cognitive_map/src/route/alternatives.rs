@@ -220,8 +220,9 @@ impl Question<'_> {
 fn insert_unless_alike(found: &mut Vec<Found>, other: Found) {
     let rank = 1 + found[1..].partition_point(|known| known.cost <= other.cost);
     let (cheaper, dearer) = found.split_at(rank);
-    let alike = { cheaper.iter() }.any(|known| is_alike(&other.path, &known.path))
-        || { dearer.iter() }.any(|known| is_alike(&known.path, &other.path));
+    let alike =
+        { cheaper.iter() }.any(|known| is_alike(&other.path, &known.path)) || { dearer.iter() }
+            .any(|known| is_alike(&known.path, &other.path));
     if !alike {
         found.insert(rank, other);
     }

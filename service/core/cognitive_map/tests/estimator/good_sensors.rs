@@ -31,6 +31,8 @@ struct Wheels {
     stated: Option<f64>,
     /// Steps before the robot looks around for the first time.
     blind_steps: i64,
+    /// By how much they turn the robot with each metre, unread \[rad/m\].
+    veer_rad_m: f64,
 }
 
 /// Normalised errors squared of pose, after odometry is known, and its mean squared error of
@@ -125,7 +127,7 @@ impl Wheels {
         let sd_rad = (by_path + by_turn).sqrt();
         let mut off = |sd: f64| self.noise * sd * random.normal();
         let read = [length_m + off(sd_m), off(sd_m), 0.0];
-        let half = 0.5 * (turn_rad + off(sd_rad));
+        let half = 0.5 * (turn_rad - self.veer_rad_m * length_m + off(sd_rad));
         let noise = self.stated.map(|part| {
             PoseNoise::new([part * sd_m, part * sd_m, 0.0], [0.0, 0.0, part * sd_rad]).unwrap()
         });
@@ -168,6 +170,7 @@ fn covariances_are_honest_whatever_wheels_are_worth() {
             noise,
             stated: None,
             blind_steps: 0,
+            veer_rad_m: 0.0,
         }
         .errors();
         assert!(
@@ -188,9 +191,37 @@ fn a_map_that_begins_blindly_is_as_unsure_as_the_wheels_are_worth() {
             noise,
             stated: None,
             blind_steps: 20,
+            veer_rad_m: 0.0,
         };
         let of_heading = wheels.errors().nees_of_heading;
         assert!(honest.contains(&of_heading), "{noise}: {of_heading}");
+    }
+}
+
+/// Wheels of different sizes, either way: a robot that has found it out is off by no more than one
+/// with even wheels by half again.
+#[test]
+fn robots_that_veer_are_found_out() {
+    let wheels = |veer_rad_m| Wheels {
+        noise: 0.3,
+        stated: None,
+        blind_steps: 0,
+        veer_rad_m,
+    };
+    let even = wheels(0.0).errors();
+    for veer_rad_m in [0.05, -0.05] {
+        let errors = wheels(veer_rad_m).errors();
+        assert!(
+            errors.squared_m2 < 1.5 * 1.5 * even.squared_m2,
+            "{veer_rad_m}: {} and {}",
+            errors.squared_m2.sqrt(),
+            even.squared_m2.sqrt()
+        );
+        assert!(
+            (0.4..1.7).contains(&errors.nees),
+            "{veer_rad_m}: {}",
+            errors.nees
+        );
     }
 }
 
@@ -202,6 +233,7 @@ fn noise_that_is_stated_rightly_stays_honest() {
             noise,
             stated,
             blind_steps: 0,
+            veer_rad_m: 0.0,
         };
         let errors = wheels.errors();
         assert!(
@@ -218,6 +250,7 @@ fn a_robot_that_states_next_to_no_noise_does_not_bend_the_map() {
         noise: 1.0,
         stated: Some(1e-4),
         blind_steps: 0,
+        veer_rad_m: 0.0,
     };
     let errors = liar.errors();
     assert!(

@@ -195,7 +195,7 @@ fn what_does_not_belong_together_is_refused() {
         broken(|estimator| {
             let landmarks = Arc::make_mut(&mut estimator.frame_mut(1).landmarks);
             for landmark in landmarks.values_mut() {
-                landmark.offset = 12;
+                landmark.offset = BODY_DIM + 1;
             }
         }),
         invalid
