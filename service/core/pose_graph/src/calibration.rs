@@ -1,5 +1,7 @@
 //! Lasting errors of odometry, and motion as odometry read it.
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use geometry::{log_jacobian, se3};
@@ -63,13 +65,43 @@ impl Calibration {
     }
 }
 
+/// The part of a rotation vector that a relative error of angles counts for \[rad\]: all of it up to
+/// a quarter turn, and beyond that less again, down to nothing of half a turn. That one reads the
+/// same to the left and to the right, so that nobody knows which way it was misread.
+///
+/// ```text
+/// f(ω) = ω                   |ω| ≤ π/2
+///        (π − |ω|) ω / |ω|   beyond
+/// ```
+#[inline]
+pub fn scaled_angles(read_rad: &Vector3<f64>) -> Vector3<f64> {
+    let squared = read_rad.norm_squared();
+    if squared <= FRAC_PI_2 * FRAC_PI_2 {
+        return *read_rad;
+    }
+    let angle_rad = squared.sqrt();
+    read_rad * ((PI - angle_rad) / angle_rad)
+}
+
+/// The rotation vector ω of which ω − d f(ω) is left, with the part f that an error d counts for
+/// ([`scaled_angles`]).
+fn read_angles(corrected_rad: &Vector3<f64>, error: f64) -> Vector3<f64> {
+    let angle_rad = corrected_rad.norm();
+    let quarter_rad = (1.0 - error) * FRAC_PI_2;
+    if angle_rad <= quarter_rad {
+        return corrected_rad / (1.0 - error);
+    }
+    corrected_rad * ((angle_rad + error * PI) / ((1.0 + error) * angle_rad))
+}
+
 /// An even motion between two poses as odometry read it.
 ///
 /// With the errors of lengths and angles c and d, the veer e, the bias b, the length v and the
-/// rotation vector ω that were read, and the time T over which the body moved, it is
+/// rotation vector ω that were read, the part f of it that d counts for ([`scaled_angles`]), and
+/// the time T over which the body moved, it is
 ///
 /// ```text
-/// exp((1 − c) v, (1 − d) ω + |v| e ẑ − T b)
+/// exp((1 − c) v, ω − d f(ω) + |v| e ẑ − T b)
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
@@ -81,7 +113,7 @@ pub struct Reading {
 impl Reading {
     /// The reading that a calibration corrects to a motion, made over `moving_s`.
     ///
-    /// A correction by the factor 1 − c of less than `factor_min` counts as one by that.
+    /// A correction by a factor 1 ± c of less than `factor_min` counts as one by that.
     pub fn corrected_to(
         motion: &Isometry3<f64>,
         by: &Calibration,
@@ -91,9 +123,10 @@ impl Reading {
         let (linear, angular) = se3::log(motion);
         let linear_m = linear / (1.0 - by.length).max(factor_min);
         let lasting = by.bias_rad_s * moving_s - Vector3::z() * (by.veer_rad_m * linear_m.norm());
+        let most = 1.0 - factor_min;
         Self {
             linear_m,
-            angular_rad: (angular + lasting) / (1.0 - by.angle).max(factor_min),
+            angular_rad: read_angles(&(angular + lasting), by.angle.clamp(-most, most)),
             moving_s,
         }
     }
@@ -108,8 +141,8 @@ impl Reading {
     fn corrected(&self, calibration: &Calibration) -> (Vector3<f64>, Vector3<f64>) {
         let linear = self.linear_m * (1.0 - calibration.length);
         let veered = Vector3::z() * (calibration.veer_rad_m * self.linear_m.norm());
-        let angular = self.angular_rad * (1.0 - calibration.angle) + veered
-            - calibration.bias_rad_s * self.moving_s;
+        let misread = scaled_angles(&self.angular_rad) * calibration.angle;
+        let angular = self.angular_rad - misread + veered - calibration.bias_rad_s * self.moving_s;
         (linear, angular)
     }
 
@@ -117,8 +150,8 @@ impl Reading {
     /// its right: D exp(C c). `error` is M⁻¹ D. The columns are those of [`CALIBRATION_AXES`].
     ///
     /// ```text
-    /// C = Ad(error⁻¹) Jᵣ(ξ) | v  0   0    0 |      ξ = log M
-    ///                       | 0  ω  −|v|ẑ  T |
+    /// C = Ad(error⁻¹) Jᵣ(ξ) | v   0     0    0 |      ξ = log M
+    ///                       | 0  f(ω)  −|v|ẑ  T |
     /// ```
     pub(super) fn jacobian(
         &self,
@@ -132,7 +165,7 @@ impl Reading {
             .copy_from(&self.linear_m);
         by_twist
             .fixed_view_mut::<3, 1>(3, 1)
-            .copy_from(&self.angular_rad);
+            .copy_from(&scaled_angles(&self.angular_rad));
         by_twist[(5, 2)] = -self.linear_m.norm();
         for k in 3..6 {
             by_twist[(k, k)] = self.moving_s;
@@ -142,3 +175,6 @@ impl Reading {
         se3::adjoint(&error.inverse()) * right.unwrap_or_else(Matrix6::zeros) * by_twist
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,6 +13,7 @@ use super::parameters::Parameters;
 use super::tuning::{POSITION_SD_MAX_M, ROUNDING, RUN_LENGTH_MAX_M, RUN_STEPS_MAX};
 use crate::input::{Label, Motion, Relation};
 use geometry::{MotionSum, PoseCovariance, is_somewhere, positive, se3, symmetric};
+use pose_graph::scaled_angles;
 
 /// Components of a body's error: translation and rotation of the pose (right perturbation), then
 /// odometry's lasting errors.
@@ -151,11 +152,12 @@ impl AgentFilter {
 
     /// Moves the body by what odometry read, over `duration_s`.
     ///
-    /// With the corrected increment Δ, lengths t and rotation vector r:
+    /// With the corrected increment Δ, lengths t, and of the rotation vector r the part f that an error
+    /// of angles counts for:
     ///
     /// ```text
     /// ξ′ = Ad(Δ⁻¹) ξ + B c + n      B = | −Rᵀ t   0    0     0  |
-    ///                                   |   0    −r   −Δt  |t|ẑ |
+    ///                                   |   0   −f(r) −Δt  |t|ẑ |
     /// ```
     ///
     /// Gathered about the axes of where the run began, with its motion T until after the step:
@@ -372,7 +374,7 @@ impl Run {
             tail.fixed_rows_mut::<3>(0).sub_assign(&lever.cross(axis));
             tail.fixed_rows_mut::<3>(3).sub_assign(axis);
         };
-        turn(1, &(axes * reading.angles));
+        turn(1, &(axes * scaled_angles(&reading.angles)));
         let length_m = reading.lengths.norm();
         if length_m > 0.0 {
             turn(VEER, &(axes.column(2) * -length_m));
@@ -453,7 +455,7 @@ impl OdometryReading {
     fn corrected_by(&self, calibration: &Calibration) -> Isometry3<f64> {
         let by_bias = self.time_s.component_mul(&calibration.bias_rad_s);
         let veered = Vector3::z() * (calibration.veer_rad_m * self.lengths.norm());
-        let correction = veered - (self.angles * calibration.angle + by_bias);
+        let correction = veered - (scaled_angles(&self.angles) * calibration.angle + by_bias);
         let rotation = self.rotation * UnitQuaternion::from_scaled_axis(correction);
         let lengths = self.lengths * (1.0 - calibration.length);
         Isometry3::from_parts(lengths.into(), rotation)
