@@ -111,7 +111,8 @@ pub struct NoiseSettings {
     pub rotation_sd_per_sqrt_rad: f64,
     /// Of the lasting relative error of lengths, e.g. of a wheel's radius.
     pub length_error_sd: f64,
-    /// Of the lasting relative error of angles, e.g. of a wheel base.
+    /// Of the lasting relative error of angles, e.g. of a wheel base. 0.3 of it is that of the
+    /// turn with each metre \[rad/m\], e.g. by wheels of different sizes.
     pub angle_error_sd: f64,
     /// Of the lasting bias about each axis, e.g. of a gyroscope \[rad/s\].
     pub bias_sd_rad_s: f64,

@@ -44,7 +44,8 @@ class NoiseSettings:
     rotation_sd_per_sqrt_rad: float
     #: Of the lasting relative error of lengths, e.g. of a wheel's radius.
     length_error_sd: float = 0.05
-    #: Of the lasting relative error of angles, e.g. of a wheel base.
+    #: Of the lasting relative error of angles, e.g. of a wheel base. 0.3 of it is that of the turn
+    #: with each metre [rad/m], e.g. by wheels of different sizes.
     angle_error_sd: float = 0.1
     #: Of the lasting bias about each axis, e.g. of a gyroscope [rad/s].
     bias_sd_rad_s: float = 0.004

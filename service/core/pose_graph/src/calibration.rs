@@ -65,9 +65,9 @@ impl Calibration {
     }
 }
 
-/// The part of a rotation vector that a relative error of angles counts for \[rad\]: all of it up to
-/// a quarter turn, and beyond that less again, down to nothing of half a turn. That one reads the
-/// same to the left and to the right, so that nobody knows which way it was misread.
+/// The part of a rotation vector that a relative error of angles counts for \[rad\]: all of it up
+/// to a quarter turn, and beyond that less again, down to nothing of half a turn. That one reads
+/// the same to the left and to the right, so that nobody knows which way it was misread.
 ///
 /// ```text
 /// f(ω) = ω                   |ω| ≤ π/2

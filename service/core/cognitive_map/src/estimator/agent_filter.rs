@@ -2,12 +2,13 @@
 
 use std::ops::SubAssign;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
 use super::calibration::{Calibrated, Calibration, LASTING_DIM, VEER};
 use super::frame_alignment::{FrameAlignment, pose_by_alignment};
 use super::odometry_history::OdometryHistory;
 use super::odometry_noise::OdometryNoise;
+use super::odometry_reading::OdometryReading;
 use super::outcome::Step;
 use super::parameters::Parameters;
 use super::tuning::{POSITION_SD_MAX_M, ROUNDING, RUN_LENGTH_MAX_M, RUN_STEPS_MAX};
@@ -152,8 +153,8 @@ impl AgentFilter {
 
     /// Moves the body by what odometry read, over `duration_s`.
     ///
-    /// With the corrected increment Δ, lengths t, and of the rotation vector r the part f that an error
-    /// of angles counts for:
+    /// With the corrected increment Δ, lengths t, and of the rotation vector r the part f that an
+    /// error of angles counts for:
     ///
     /// ```text
     /// ξ′ = Ad(Δ⁻¹) ξ + B c + n      B = | −Rᵀ t   0    0     0  |
@@ -397,71 +398,6 @@ impl Run {
     }
 }
 
-/// A motion as odometry read it.
-struct OdometryReading {
-    rotation: UnitQuaternion<f64>,
-    /// Translation \[m\].
-    lengths: Vector3<f64>,
-    /// Rotation vector \[rad\].
-    angles: Vector3<f64>,
-    /// The axes about which odometry has a bias, as ones: none at rest, and in the plane z alone.
-    free: Vector3<f64>,
-    duration_s: f64,
-    /// How long it turned about each free axis \[s\].
-    time_s: Vector3<f64>,
-}
-
-impl OdometryReading {
-    #[inline]
-    fn new(motion: &Motion, duration_s: f64) -> Self {
-        let read = motion.increment();
-        let lengths = read.translation.vector;
-        let angles = rotation_vector(&read.rotation);
-        let mut reading = Self {
-            rotation: read.rotation,
-            lengths,
-            angles,
-            free: Vector3::repeat(1.0),
-            duration_s,
-            time_s: Vector3::zeros(),
-        };
-        if reading.is_rest() {
-            reading.free = Vector3::zeros();
-        } else if reading.is_planar() {
-            reading.free = Vector3::z();
-        }
-        reading.time_s = reading.free * duration_s;
-        reading
-    }
-
-    #[inline]
-    fn is_rest(&self) -> bool {
-        self.lengths == Vector3::zeros() && self.angles == Vector3::zeros()
-    }
-
-    #[inline]
-    fn is_planar(&self) -> bool {
-        self.lengths.z == 0.0 && self.angles.x == 0.0 && self.angles.y == 0.0
-    }
-
-    /// How long it moved \[s\].
-    #[inline]
-    fn moving_s(&self) -> f64 {
-        if self.is_rest() { 0.0 } else { self.duration_s }
-    }
-
-    /// The motion without the lasting errors of odometry.
-    #[inline]
-    fn corrected_by(&self, calibration: &Calibration) -> Isometry3<f64> {
-        let by_bias = self.time_s.component_mul(&calibration.bias_rad_s);
-        let veered = Vector3::z() * (calibration.veer_rad_m * self.lengths.norm());
-        let correction = veered - (scaled_angles(&self.angles) * calibration.angle + by_bias);
-        let rotation = self.rotation * UnitQuaternion::from_scaled_axis(correction);
-        let lengths = self.lengths * (1.0 - calibration.length);
-        Isometry3::from_parts(lengths.into(), rotation)
-    }
-}
-
 /// Adds to the variances of a pose what rounding may have taken away, as parts of the sums of
 /// variances that they were made of. What is known without error stays so.
 pub(super) fn make_up_for_rounding(covariance: &mut Matrix6<f64>, position: f64, turn: f64) {
@@ -509,9 +445,4 @@ impl Shift {
             .copy_from(&(self.inverse * lower));
         product
     }
-}
-
-/// Axis times angle, exactly zero for no rotation and exactly along z for one about z.
-fn rotation_vector(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
-    se3::log(&Isometry3::from_parts(Vector3::zeros().into(), *rotation)).1
 }

@@ -139,8 +139,8 @@ impl Frame {
             ..*calibration
         };
         variances[0] = self.covariance.variance(offset);
-        // Until a landmark was seen, the veer is as the past has it. From then on it stays where the
-        // past does not say what it is.
+        // Until a landmark was seen, the veer is as the past has it. From then on it stays where
+        // the past does not say what it is.
         let veer_variance = self.covariance.variance(offset + VEER);
         if veer_variance == 0.0 {
             variances[VEER] = 0.0;

@@ -63,6 +63,7 @@ mod noise_share;
 mod observers;
 mod odometry_history;
 mod odometry_noise;
+mod odometry_reading;
 mod outcome;
 mod parameters;
 mod placement;

@@ -19,7 +19,8 @@ use crate::settings::Settings;
 pub struct Parameters {
     /// Deviation of odometry's lasting relative error of lengths, e.g. of a wheel's radius.
     pub length_error_sd: f64,
-    /// Deviation of odometry's lasting relative error of angles, e.g. of a wheel base.
+    /// Deviation of odometry's lasting relative error of angles, e.g. of a wheel base; 0.3 of it is
+    /// that of the veer \[rad/m\].
     pub angle_error_sd: f64,
     /// Deviation of odometry's lasting bias about each axis \[rad/s\], e.g. of a gyroscope.
     pub bias_sd_rad_s: f64,

@@ -64,9 +64,9 @@ pub(super) const POSITION_SD_MAX_M: f64 = 1e6;
 /// Largest lasting error of odometry that is accepted, in the deviations that the settings state.
 /// Source: *liars* (`docs/decisions/0027-covariances-stay-positive.md`).
 pub(super) const LASTING_DEVIATIONS_MAX: f64 = 8.0;
-/// Deviation of the veer that is expected, in that of the lasting error of angles \[rad/m\]. Source:
-/// wheels whose diameters differ by a part in a hundred, a third of a metre apart, where angles are
-/// known to a tenth.
+/// Deviation of the veer that is expected, in that of the lasting error of angles \[rad/m\].
+/// Source: wheels whose diameters differ by a part in a hundred, a third of a metre apart, where
+/// angles are known to a tenth.
 pub(super) const VEER_PER_ANGLE_ERROR_RAD_M: f64 = 0.3;
 /// Largest lasting error of lengths and of angles, as a ratio. Source: with more, readings would
 /// say next to nothing, or the contrary.

@@ -90,7 +90,8 @@ impl Calibrations {
                 ..pose_graph::Calibration::default()
             },
         };
-        // Without landmarks, what the estimator has learned of it is by matches that are judged here.
+        // Without landmarks, what the estimator has learned of it is by matches that are judged
+        // here.
         expected.veer_rad_m = match told.veer {
             Veer::Known if told.by_landmarks => learned.veer_rad_m,
             Veer::Known | Veer::Estimated => 0.0,

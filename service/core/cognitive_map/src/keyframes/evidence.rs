@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Matrix2, Matrix6, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 
 use super::chains::Chains;
 use super::constraint::Constraint;
 use super::problem::Problem;
 use super::tuning;
-use geometry::{planar_part, se3};
+use geometry::{planar_part, se3, symmetric};
 use pose_graph::Marginals;
 
 /// Where a false closure leads: to any earlier place.
@@ -17,38 +17,60 @@ use pose_graph::Marginals;
 /// displacements between places of the map, as a normal distribution, in any direction.
 pub(super) struct Chance {
     log_density: f64,
+    /// Covariance of displacements in space \[m²\].
+    displacements: Matrix3<f64>,
+    /// Variance of how two places are tilted to one another, about each of two axes \[rad²\].
+    tilts: f64,
 }
 
 impl Chance {
     /// Of a map.
     pub(super) fn of(chains: &Chains, problem: &Problem) -> Self {
         let numbers = 0..chains.keyframes.numbers();
-        let places: Vec<Vector2<f64>> = numbers
-            .filter_map(|number| Some(problem.pose(number)?.translation.vector.xy()))
-            .collect();
-        let n = places.len().max(1) as f64;
-        let mean = places.iter().sum::<Vector2<f64>>() / n;
-        let spread = |sum: Matrix2<f64>, place: &Vector2<f64>| {
-            let off = place - mean;
+        let poses = || { numbers.clone() }.filter_map(|number| problem.pose(number));
+        let n = poses().count().max(1) as f64;
+        let mean = { poses() }
+            .map(|pose| pose.translation.vector)
+            .sum::<Vector3<f64>>()
+            / n;
+        let spread = |sum: Matrix3<f64>, pose: &Isometry3<f64>| {
+            let off = pose.translation.vector - mean;
             sum + off * off.transpose()
         };
         let least = tuning::CHANCE_SD_MIN_M * tuning::CHANCE_SD_MIN_M;
-        let covariance = places.iter().fold(Matrix2::zeros(), spread) / n
-            + Matrix2::from_diagonal_element(least);
+        let covariance = poses().fold(Matrix3::zeros(), spread) / n
+            + Matrix3::from_diagonal(&Vector3::new(least, least, 0.0));
         // The displacement of two places has twice the covariance of one.
-        let area_m2 = TAU * (covariance * 2.0).determinant().sqrt();
+        let displacements = covariance * 2.0;
+        let area_m2 = TAU * displacements.fixed_view::<2, 2>(0, 0).determinant().sqrt();
+        // The mean direction of the vertical axes is as long as they are alike.
+        let up = { poses() }.map(|pose| pose.rotation * Vector3::z());
+        let alike = (up.sum::<Vector3<f64>>() / n).norm();
         Self {
             log_density: -(area_m2 * TAU).ln(),
+            displacements,
+            tilts: 2.0 * (1.0 - alike).max(0.0),
         }
     }
 
     /// Log of the ratio between the probability density of a closure that fits exactly and that by
     /// chance.
-    pub(super) fn log_gain(&self, closure: &Constraint) -> f64 {
+    pub(super) fn log_gain(&self, closure: &Constraint, is_planar: bool) -> f64 {
         let least = tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
         let own = closure.covariance.matrix() + Matrix6::from_diagonal_element(least);
-        let volume = (TAU.powi(3) * planar_part(&own).determinant()).sqrt();
-        -volume.ln() - self.log_density
+        if is_planar {
+            let volume = (TAU.powi(3) * planar_part(&own).determinant()).sqrt();
+            return -volume.ln() - self.log_density;
+        }
+        -0.5 * (own * TAU).determinant().ln() - self.log_density_in_space(&own)
+    }
+
+    /// The log-density in space, where it is known but for a covariance what lies where: any
+    /// heading, and no more tilted than places of the map are.
+    fn log_density_in_space(&self, whole: &Matrix6<f64>) -> f64 {
+        let shift = self.displacements + whole.fixed_view::<3, 3>(0, 0);
+        let tilts = self.tilts + 0.5 * (whole[(3, 3)] + whole[(4, 4)]);
+        -0.5 * (shift * TAU).determinant().ln() - (TAU * tilts).ln() - TAU.ln()
     }
 }
 
@@ -60,9 +82,10 @@ impl Chance {
 /// ```
 ///
 /// with the covariance S of what the map expects, which lasting errors of odometry are part of, and
-/// that of the closure, R: only in the plane, where nearly all motion is.
+/// that of the closure, R: of robots in the plane, only there.
 pub(super) fn log_evidence(
     constraint: &Constraint,
+    is_planar: bool,
     problem: &Problem,
     marginals: &Marginals<'_>,
     chance: &Chance,
@@ -75,6 +98,12 @@ pub(super) fn log_evidence(
     let least = tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
     let whole: Matrix6<f64> =
         spread.matrix() + constraint.covariance.matrix() + Matrix6::from_diagonal_element(least);
+    if !is_planar {
+        let root = symmetric(&whole).cholesky()?;
+        let squared = off.dot(&root.solve(&off));
+        let log_volume = 0.5 * (whole * TAU).determinant().ln();
+        return Some(-0.5 * squared - log_volume - chance.log_density_in_space(&whole));
+    }
     let planar = planar_part(&whole);
     let off = Vector3::new(off[0], off[1], off[5]);
     let squared = off.dot(&(planar.try_inverse()? * off));

@@ -79,6 +79,15 @@ impl KeyframeGraph {
         self.sightings.slab.len()
     }
 
+    /// Whether a constraint is one of robots that all stay in the plane.
+    pub(super) fn is_planar(&self, constraint: &Constraint) -> bool {
+        [constraint.from, constraint.to].iter().all(|&end| {
+            let keyframe = self.chains.keyframes.get(end);
+            let track = keyframe.and_then(|keyframe| self.chains.track(keyframe.agent));
+            track.is_none_or(|track| track.is_planar)
+        })
+    }
+
     /// Whether so much is sighted that the map needs no views to hold together.
     pub(super) fn is_tied_by_sightings(&self) -> bool {
         self.n_sightings() * tuning::KEYFRAMES_PER_SIGHTING >= self.n_keyframes()

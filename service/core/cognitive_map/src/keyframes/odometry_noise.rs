@@ -1,6 +1,7 @@
 //! How noisy an agent's odometry is, as its loop closures show.
 
 use super::chains::Chains;
+use super::constraint::Constraint;
 use super::evidence::Chance;
 use super::problem::{Among, Calibrating, Problem};
 use super::relaxation::RelaxationCopy;
@@ -69,7 +70,10 @@ impl RelaxationCopy {
         problem.map.relax(&RelaxationSettings::default());
         let chains = &self.graph().chains;
         let chance = Chance::of(chains, &problem);
-        let closures = copy.accepted().map(|(_, closure)| chance.log_gain(closure));
+        let gain = |(_, closure): (u32, &Constraint)| {
+            chance.log_gain(closure, self.graph().is_planar(closure))
+        };
+        let closures = copy.accepted().map(gain);
         let noise = (0..)
             .zip(chains.tracks.iter())
             .map(|(agent, track)| turns(chains, agent, track.is_planar) * track.turn_noise.ln());

@@ -168,7 +168,9 @@ impl RelaxationCopy {
         all.map.relax(&from_wide());
         let mut runs = self.pending_runs(&all);
         let mut n_accepted = 0;
-        for _ in 0..tuning::ACCEPTANCE_ROUNDS_MAX {
+        let (fewest, most) = tuning::ACCEPTANCE_ROUNDS.into_inner();
+        let n_rounds = tuning::ACCEPTANCE_KEYFRAMES / self.graph.n_keyframes().max(1);
+        for _ in 0..n_rounds.clamp(fewest, most) {
             let mut n_new = self.accept_evident(&runs);
             if n_new == 0 {
                 n_new = self.accept_together(&runs);
@@ -295,7 +297,8 @@ impl RelaxationCopy {
         let constraints = &self.graph.constraints.slab;
         let odds = |(index, run): (usize, &Run)| {
             let constraint = constraints.get(run.middle)?;
-            let odds = log_evidence(constraint, &problem, &marginals, &chance)?;
+            let is_planar = self.graph.is_planar(constraint);
+            let odds = log_evidence(constraint, is_planar, &problem, &marginals, &chance)?;
             Some((index, odds))
         };
         runs.iter().enumerate().filter_map(odds).collect()

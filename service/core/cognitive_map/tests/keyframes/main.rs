@@ -9,4 +9,5 @@ mod calibration; // what odometry gets wrong all the time
 mod laws; // what holds of every keyframes
 mod matches;
 mod revisits; // places taken for one another
-mod settings; // what a space's settings change
+mod settings;
+mod space; // what a space's settings change
