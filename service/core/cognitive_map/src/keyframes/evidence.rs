@@ -101,7 +101,8 @@ pub(super) fn log_evidence(
     if !is_planar {
         let root = symmetric(&whole).cholesky()?;
         let squared = off.dot(&root.solve(&off));
-        let log_volume = 0.5 * (whole * TAU).determinant().ln();
+        let diagonal = root.l_dirty().diagonal();
+        let log_volume = 3.0 * TAU.ln() + diagonal.map(f64::ln).sum();
         return Some(-0.5 * squared - log_volume - chance.log_density_in_space(&whole));
     }
     let planar = planar_part(&whole);

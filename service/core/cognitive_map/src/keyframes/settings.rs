@@ -25,7 +25,7 @@ pub struct KeyframeSettings {
     /// closure.
     pub closure_gate_chi2: f64,
     /// Standard deviations of odometry's lasting errors: of lengths, of angles, of the bias about
-    /// each axis \[1, 1, rad/s\].
+    /// each axis \[1, 1, rad/s\]; of the veer the graph expects what it always does.
     pub calibration_sd: LastingErrors,
 }
 
