@@ -39,7 +39,8 @@ impl Estimator {
     /// upon the same samples. The pose becomes the covariance intersection (Julier & Uhlmann 1997)
     /// of the two, and everything correlated with it follows; to say the same twice adds nothing.
     ///
-    /// The lasting errors of odometry are taken over as they are.
+    /// The lasting errors of odometry's rotations are taken over, and no longer correlated with
+    /// anything.
     pub fn fuse(
         &mut self,
         agent: u32,

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, SVector, Vector6};
 use super::calibration::{LastingErrors, VEER};
 use super::tuning::{
     ANY_TURN_SD_RAD, CALIBRATION_RENEWAL, LASTING_DEVIATIONS_MAX, LASTING_RATIO_MAX,
-    VEER_PER_ANGLE_ERROR_RAD_M, VEER_RAD_M_MAX, WANDERED_MAX,
+    VEER_ACCEPTED_RAD_M, VEER_PER_ANGLE_ERROR_RAD_M, WANDERED_MAX,
 };
 use crate::input::Motion;
 use crate::settings::Settings;
@@ -81,8 +81,8 @@ impl Parameters {
     /// Largest lasting errors that are accepted.
     pub(super) fn calibration_max(&self) -> LastingErrors {
         let mut most = self.calibration_sd() * LASTING_DEVIATIONS_MAX;
-        // What views tell of the veer is taken over whatever is expected of angles.
-        most[VEER] = most[VEER].max(VEER_RAD_M_MAX);
+        // The graph, which tells the veer where views are matched, has a prior of its own.
+        most[VEER] = most[VEER].max(VEER_ACCEPTED_RAD_M);
         SVector::from_fn(|k, _| {
             if k < 2 {
                 most[k].min(LASTING_RATIO_MAX)

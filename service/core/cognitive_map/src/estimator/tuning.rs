@@ -68,8 +68,9 @@ pub(super) const LASTING_DEVIATIONS_MAX: f64 = 8.0;
 /// Source: wheels whose diameters differ by a part in a hundred, a third of a metre apart, where
 /// angles are known to a tenth.
 pub(super) const VEER_PER_ANGLE_ERROR_RAD_M: f64 = 0.3;
-/// Least bound of the veer \[rad/m\]. Source: eight deviations of what a pose graph expects of it.
-pub(super) const VEER_RAD_M_MAX: f64 = 0.24;
+/// Veer that is accepted in any case, either way \[rad/m\]: more only if the settings expect more.
+/// Source: eight deviations of the prior of the pose graph.
+pub(super) const VEER_ACCEPTED_RAD_M: f64 = 0.24;
 /// Largest lasting error of lengths and of angles, as a ratio. Source: with more, readings would
 /// say next to nothing, or the contrary.
 pub(super) const LASTING_RATIO_MAX: f64 = 0.9;

@@ -25,7 +25,8 @@ pub struct KeyframeSettings {
     /// closure.
     pub closure_gate_chi2: f64,
     /// Standard deviations of odometry's lasting errors: of lengths, of angles, of the bias about
-    /// each axis \[1, 1, rad/s\]; of the veer the graph expects what it always does.
+    /// each axis \[1, 1, rad/s\], of the veer \[rad/m\]. That of the veer does not count here: the
+    /// graph has a fixed one.
     pub calibration_sd: LastingErrors,
 }
 
