@@ -13,7 +13,7 @@ async fn an_export_tells_the_landmarks_that_the_list_tells() {
             .wrapping_add(1);
         (state >> 40) as f64 / f64::from(1 << 23) - 1.0
     };
-    let samples = (0..4000_u64).map(|seq| {
+    let samples = (0..1000_u64).map(|seq| {
         let place = [5.0 * random(), 5.0 * random(), 0.0];
         let body = match seq % 2 {
             0 => SampleBody::Increment(Increment {

@@ -1,6 +1,7 @@
 //! Agents whose sightings contradict the estimate.
 //!
-//! An agent's *doubt* counts its refused sightings, less those that fit.
+//! An agent's *doubt* counts its refused sightings, and by half those of which a component lost
+//! weight, less those that fit.
 //!
 //! - From [`DOUBT_MIN`] on the agent is doubted: its sightings correct itself alone, and sightings
 //!   of it correct only it, as in a Schmidt-Kalman filter.
@@ -22,7 +23,9 @@ use super::effect::Effect;
 use super::frame::{Frame, LandmarkState};
 use super::joint::{Estimator, MAP};
 use super::observers::Observers;
-use super::tuning::{DOUBT_MAX, DOUBT_MIN, DOUBT_ON_RETURN, POSITION_SD_MAX_M};
+use super::tuning::{
+    DOUBT_BY_OUTLIER, DOUBT_BY_SIGHTING, DOUBT_MAX, DOUBT_MIN, DOUBT_ON_RETURN, POSITION_SD_MAX_M,
+};
 use crate::input::Label;
 use geometry::is_somewhere;
 
@@ -36,11 +39,15 @@ impl AgentState {
     pub(super) fn weigh(&mut self, is_refused: bool, fits: bool) {
         if is_refused {
             self.refused += 1;
-            self.doubt = (self.doubt + 1).min(DOUBT_MAX);
-        } else {
-            self.refused = 0;
-            self.doubt = self.doubt.saturating_sub(u32::from(fits));
+            self.doubt = (self.doubt + DOUBT_BY_SIGHTING).min(DOUBT_MAX);
+            return;
         }
+        self.refused = 0;
+        self.doubt = if fits {
+            self.doubt.saturating_sub(DOUBT_BY_SIGHTING)
+        } else {
+            (self.doubt + DOUBT_BY_OUTLIER).min(DOUBT_MAX)
+        };
     }
 }
 
@@ -257,7 +264,7 @@ mod tests {
     #[test]
     fn an_archived_landmark_is_not_moved_by_a_doubted_agent() {
         let (mut estimator, honest, liar) = two(100);
-        lie(&mut estimator, liar, 50, DOUBT_MIN);
+        lie(&mut estimator, liar, 50, DOUBT_MIN / DOUBT_BY_SIGHTING);
         assert!(estimator.is_doubted(liar) && !estimator.is_doubted(honest));
         let archived = *estimator.frame(MAP).archive.get(&label(0)).unwrap();
         let beside = post(0) + nalgebra::Vector3::new(0.7, 0.0, 0.0);
@@ -274,7 +281,7 @@ mod tests {
     #[test]
     fn who_was_set_aside_comes_back_on_probation() {
         let (mut estimator, _, liar) = two(10);
-        lie(&mut estimator, liar, 5, DOUBT_MAX);
+        lie(&mut estimator, liar, 5, DOUBT_MAX / DOUBT_BY_SIGHTING);
         assert!(estimator.is_aside(liar) && !estimator.is_in_map(liar));
         let known: Vec<_> = estimator.landmarks().map(|(_, at, _)| at).collect();
         let mut sightings = 0;
@@ -286,13 +293,13 @@ mod tests {
         assert!(estimator.is_doubted(liar) && estimator.is_aside(liar));
         let after: Vec<_> = estimator.landmarks().map(|(_, at, _)| at).collect();
         assert_eq!(known, after, "it corrects itself alone");
-        for number in 0..DOUBT_ON_RETURN as usize {
+        for number in 0..(DOUBT_ON_RETURN / DOUBT_BY_SIGHTING) as usize {
             assert!(estimator.is_aside(liar), "{number}");
             see(&mut estimator, liar, number % 10, &post(number % 10));
         }
         assert!(!estimator.is_doubted(liar) && !estimator.is_aside(liar));
         // After a start pose it is doubted no less.
-        lie(&mut estimator, liar, 5, 2 * DOUBT_MAX);
+        lie(&mut estimator, liar, 5, 2 * DOUBT_MAX / DOUBT_BY_SIGHTING);
         assert!(estimator.is_aside(liar));
         estimator.start_pose(liar, &start(&Isometry3::identity(), 0.1), &mut Vec::new());
         assert!(estimator.is_in_map(liar) && estimator.is_doubted(liar));

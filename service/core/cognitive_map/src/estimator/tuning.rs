@@ -242,14 +242,19 @@ pub(super) const REFUSED_TO_FORGET: u32 = 8;
 /// Refused sightings in a row after which a label is that of a landmark of its own again. Source:
 /// less than [`REFUSED_TO_FORGET`], so that the landmark itself stays.
 pub(super) const REFUSED_TO_DISSOCIATE: u32 = 6;
+/// What a refused sighting adds to an agent's doubt, and one that fits takes away.
+pub(super) const DOUBT_BY_SIGHTING: u32 = 2;
+/// What a sighting adds of which a component lost weight. Source: where sightings are random, as
+/// many lose weight as are refused or fit; where they are merely noisier than stated, few are.
+pub(super) const DOUBT_BY_OUTLIER: u32 = 1;
 /// Doubt from which on an agent corrects nobody but itself. Source: what it takes to search farther
 /// around once; *liars*.
-pub(super) const DOUBT_MIN: u32 = REFUSED_TO_WIDEN;
+pub(super) const DOUBT_MIN: u32 = DOUBT_BY_SIGHTING * REFUSED_TO_WIDEN;
 /// Doubt at which an agent is set aside. Source: an agent that slipped or was carried off a few
 /// metres has found its way back before, by searching farther around eight times; *liars*.
-pub(super) const DOUBT_MAX: u32 = 64;
-/// Doubt of an agent that was set aside and is back in the map: so many sightings have to fit, more
-/// than do not, before it corrects others again.
+pub(super) const DOUBT_MAX: u32 = DOUBT_BY_SIGHTING * 64;
+/// Doubt of an agent that was set aside and is back in the map: half as many sightings have to fit,
+/// more than do not, before it counts as others do.
 pub(super) const DOUBT_ON_RETURN: u32 = 2 * DOUBT_MIN;
 
 // --- Agents and landmarks that come back
