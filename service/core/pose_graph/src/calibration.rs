@@ -1,7 +1,5 @@
 //! Lasting errors of odometry, and motion as odometry read it.
 
-use std::f64::consts::{FRAC_PI_2, PI};
-
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use geometry::{log_jacobian, se3};
@@ -65,68 +63,57 @@ impl Calibration {
     }
 }
 
-/// The part of a rotation vector that a relative error of angles counts for \[rad\]: all of it up
-/// to a quarter turn, and beyond that less again, down to nothing of half a turn. That one reads
-/// the same to the left and to the right, so that nobody knows which way it was misread.
-///
-/// ```text
-/// f(ω) = ω                   |ω| ≤ π/2
-///        (π − |ω|) ω / |ω|   beyond
-/// ```
-#[inline]
-pub fn scaled_angles(read_rad: &Vector3<f64>) -> Vector3<f64> {
-    let squared = read_rad.norm_squared();
-    if squared <= FRAC_PI_2 * FRAC_PI_2 {
-        return *read_rad;
-    }
-    let angle_rad = squared.sqrt();
-    read_rad * ((PI - angle_rad) / angle_rad)
-}
-
-/// The rotation vector ω of which ω − d f(ω) is left, with the part f that an error d counts for
-/// ([`scaled_angles`]).
-fn read_angles(corrected_rad: &Vector3<f64>, error: f64) -> Vector3<f64> {
-    let angle_rad = corrected_rad.norm();
-    let quarter_rad = (1.0 - error) * FRAC_PI_2;
-    if angle_rad <= quarter_rad {
-        return corrected_rad / (1.0 - error);
-    }
-    corrected_rad * ((angle_rad + error * PI) / ((1.0 + error) * angle_rad))
+/// How much of each lasting error a motion is exposed to, added up over its steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Exposure {
+    /// How long the body moved, and the bias with it \[s\].
+    pub moving_s: f64,
+    /// Rotation that was read, which an error of angles counts for, about the body axes of the
+    /// end \[rad\].
+    pub turned_rad: Vector3<f64>,
 }
 
 /// An even motion between two poses as odometry read it.
 ///
 /// With the errors of lengths and angles c and d, the veer e, the bias b, the length v and the
-/// rotation vector ω that were read, the part f of it that d counts for ([`scaled_angles`]), and
-/// the time T over which the body moved, it is
+/// rotation vector ω that were read, and of its [`Exposure`] the rotation f and the time T, it
+/// is
 ///
 /// ```text
-/// exp((1 − c) v, ω − d f(ω) + |v| e ẑ − T b)
+/// exp((1 − c) v, ω − d Jᵣ⁻¹(ω) f + |v| e ẑ − T b)
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     linear_m: Vector3<f64>,
     angular_rad: Vector3<f64>,
+    /// How the rotation vector changes with an error of angles \[rad\].
+    turned_rad: Vector3<f64>,
     moving_s: f64,
 }
 
 impl Reading {
-    /// The reading that a calibration corrects to a motion, made over `moving_s`.
+    /// The reading that a calibration corrects to a motion.
     ///
-    /// A correction by a factor 1 ± c of less than `factor_min` counts as one by that.
+    /// A correction of lengths by a factor of less than `factor_min` counts as one by that.
     pub fn corrected_to(
         motion: &Isometry3<f64>,
         by: &Calibration,
-        moving_s: f64,
+        exposure: &Exposure,
         factor_min: f64,
     ) -> Self {
+        let &Exposure {
+            moving_s,
+            turned_rad,
+        } = exposure;
         let (linear, angular) = se3::log(motion);
+        let right = log_jacobian(&linear, &angular);
+        let turned_rad = right.fixed_view::<3, 3>(3, 3) * turned_rad;
         let linear_m = linear / (1.0 - by.length).max(factor_min);
         let lasting = by.bias_rad_s * moving_s - Vector3::z() * (by.veer_rad_m * linear_m.norm());
-        let most = 1.0 - factor_min;
         Self {
             linear_m,
-            angular_rad: read_angles(&(angular + lasting), by.angle.clamp(-most, most)),
+            angular_rad: angular + lasting + turned_rad * by.angle,
+            turned_rad,
             moving_s,
         }
     }
@@ -141,7 +128,7 @@ impl Reading {
     fn corrected(&self, calibration: &Calibration) -> (Vector3<f64>, Vector3<f64>) {
         let linear = self.linear_m * (1.0 - calibration.length);
         let veered = Vector3::z() * (calibration.veer_rad_m * self.linear_m.norm());
-        let misread = scaled_angles(&self.angular_rad) * calibration.angle;
+        let misread = self.turned_rad * calibration.angle;
         let angular = self.angular_rad - misread + veered - calibration.bias_rad_s * self.moving_s;
         (linear, angular)
     }
@@ -150,8 +137,8 @@ impl Reading {
     /// its right: D exp(C c). `error` is M⁻¹ D. The columns are those of [`CALIBRATION_AXES`].
     ///
     /// ```text
-    /// C = Ad(error⁻¹) Jᵣ(ξ) | v   0     0    0 |      ξ = log M
-    ///                       | 0  f(ω)  −|v|ẑ  T |
+    /// C = Ad(error⁻¹) Jᵣ(ξ) | v      0        0    0 |      ξ = log M
+    ///                       | 0  Jᵣ⁻¹(ω) f  −|v| ẑ  T |
     /// ```
     pub(super) fn jacobian(
         &self,
@@ -165,7 +152,7 @@ impl Reading {
             .copy_from(&self.linear_m);
         by_twist
             .fixed_view_mut::<3, 1>(3, 1)
-            .copy_from(&scaled_angles(&self.angular_rad));
+            .copy_from(&self.turned_rad);
         by_twist[(5, 2)] = -self.linear_m.norm();
         for k in 3..6 {
             by_twist[(k, k)] = self.moving_s;

@@ -18,7 +18,7 @@ mod range_blocks;
 mod relaxation;
 mod rotation_first;
 
-pub use calibration::{Calibration, Reading, scaled_angles};
+pub use calibration::{Calibration, Exposure, Reading};
 pub use graph::{InvalidLink, PoseGraph};
 pub use information::{
     Information, InvalidInformation, PoseInformation, PositionInformation, RangeInformation,

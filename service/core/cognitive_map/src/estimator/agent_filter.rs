@@ -14,7 +14,6 @@ use super::parameters::Parameters;
 use super::tuning::{POSITION_SD_MAX_M, ROUNDING, RUN_LENGTH_MAX_M, RUN_STEPS_MAX};
 use crate::input::{Label, Motion, Relation};
 use geometry::{MotionSum, PoseCovariance, is_somewhere, positive, se3, symmetric};
-use pose_graph::scaled_angles;
 
 /// Components of a body's error: translation and rotation of the pose (right perturbation), then
 /// odometry's lasting errors.
@@ -196,6 +195,7 @@ impl AgentFilter {
                 states_noise: motion.noise().is_some(),
                 wander,
                 moving_s: reading.moving_s(),
+                turned_rad: reading.scaled_angles(),
             },
         }
     }
@@ -375,7 +375,7 @@ impl Run {
             tail.fixed_rows_mut::<3>(0).sub_assign(&lever.cross(axis));
             tail.fixed_rows_mut::<3>(3).sub_assign(axis);
         };
-        turn(1, &(axes * scaled_angles(&reading.angles)));
+        turn(1, &(axes * reading.scaled_angles()));
         let length_m = reading.lengths.norm();
         if length_m > 0.0 {
             turn(VEER, &(axes.column(2) * -length_m));

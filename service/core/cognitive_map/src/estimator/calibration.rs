@@ -1,10 +1,10 @@
 //! What odometry gets wrong all the time.
 
-use nalgebra::{Isometry3, SVector, Vector3};
+use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
 
 use super::tuning::CALIBRATION_FACTOR_MIN;
 use ::state::state_of_struct;
-use pose_graph::Reading;
+use pose_graph::{Exposure, Reading};
 
 /// Components of what odometry gets wrong all the time.
 pub const LASTING_DIM: usize = 6;
@@ -39,6 +39,9 @@ pub struct Calibrated {
     pub wander: LastingErrors,
     /// How long the body moved, and the bias with it \[s\].
     pub moving_s: f64,
+    /// Rotation that was read, which the error of angles counts for, about the body axes of the
+    /// end \[rad\].
+    pub turned_rad: Vector3<f64>,
 }
 
 state_of_struct!(Calibration {
@@ -51,24 +54,27 @@ state_of_struct!(Calibrated {
     calibration,
     states_noise,
     wander,
-    moving_s
+    moving_s,
+    turned_rad
 });
 
 impl Calibrated {
     /// The same odometry, and no motion yet.
     pub(crate) fn without_motion(&self) -> Self {
         Self {
-            wander: LastingErrors::zeros(),
-            moving_s: 0.0,
-            ..*self
+            calibration: self.calibration,
+            states_noise: self.states_noise,
+            ..Self::default()
         }
     }
 
-    /// This motion, then the `next` one.
-    pub(crate) fn then(&self, next: &Self) -> Self {
+    /// This motion, then the `next` one, with its rotation.
+    pub(crate) fn then(&self, next: &Self, rotation: &UnitQuaternion<f64>) -> Self {
+        let before = rotation.inverse_transform_vector(&self.turned_rad);
         Self {
             wander: self.wander + next.wander,
             moving_s: self.moving_s + next.moving_s,
+            turned_rad: before + next.turned_rad,
             ..*next
         }
     }
@@ -76,7 +82,11 @@ impl Calibrated {
     /// What odometry read of a motion that was corrected so, as if it had been an even one.
     pub(crate) fn reading(&self, motion: &Isometry3<f64>) -> Reading {
         let by = self.calibration.in_graph();
-        Reading::corrected_to(motion, &by, self.moving_s, CALIBRATION_FACTOR_MIN)
+        let exposure = Exposure {
+            moving_s: self.moving_s,
+            turned_rad: self.turned_rad,
+        };
+        Reading::corrected_to(motion, &by, &exposure, CALIBRATION_FACTOR_MIN)
     }
 
     /// A motion that was corrected so, as it would have been corrected by another calibration.
@@ -124,5 +134,48 @@ impl Calibration {
     pub(crate) fn components(&self) -> LastingErrors {
         let (bias, veer) = (&self.bias_rad_s, self.veer_rad_m);
         SVector::from([self.length, self.angle, bias.x, bias.y, bias.z, veer])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::se3;
+
+    /// Many small turns, corrected together by what was found out later, come out as if each had
+    /// been corrected so: in the plane in any angle, about changing axes to the first order.
+    #[test]
+    fn turns_together_are_corrected_as_each_of_them_is() {
+        let found = Calibration {
+            angle: 0.02,
+            veer_rad_m: 0.03,
+            bias_rad_s: Vector3::new(0.0, 0.0, -0.004),
+            ..Calibration::default()
+        };
+        for (tilt, most) in [(0.0, 1e-9), (0.4, 0.01)] {
+            for sense in [1.0, -1.0] {
+                let mut together = (Isometry3::identity(), Calibrated::default());
+                let mut each = Isometry3::identity();
+                for step in 0..30 {
+                    let about = Vector3::new(tilt * f64::from(step % 5) / 4.0, 0.0, 1.0);
+                    let linear = Vector3::new(0.1, 0.0, 0.0);
+                    let read = se3::exp(&linear, &(about * (sense * 5_f64.to_radians())));
+                    let calibrated = Calibrated {
+                        moving_s: 0.1,
+                        turned_rad: se3::log(&read).1,
+                        ..Calibrated::default()
+                    };
+                    each *= calibrated.corrected_by(&read, &found);
+                    together.0 *= read;
+                    together.1 = together.1.then(&calibrated, &read.rotation);
+                }
+                let (motion, calibrated) = together;
+                let corrected = calibrated.corrected_by(&motion, &found);
+                let off = corrected.rotation.angle_to(&each.rotation);
+                let uncorrected = motion.rotation.angle_to(&each.rotation);
+                assert!(uncorrected > 0.03, "{uncorrected} rad are to be corrected");
+                assert!(off < most, "{off} rad off of {uncorrected}, tilted {tilt}");
+            }
+        }
     }
 }

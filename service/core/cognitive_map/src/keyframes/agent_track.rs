@@ -128,7 +128,7 @@ impl AgentTrack {
         calibrated: &Calibrated,
     ) {
         self.since.append(increment, variance);
-        self.calibrated = self.calibrated.then(calibrated);
+        self.calibrated = self.calibrated.then(calibrated, &increment.rotation);
         self.states_noise &= calibrated.states_noise;
         self.is_planar &= is_level(increment);
         self.pose = moment.pose;

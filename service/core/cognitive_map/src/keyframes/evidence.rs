@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 use super::chains::Chains;
 use super::constraint::Constraint;
@@ -55,22 +55,31 @@ impl Chance {
 
     /// Log of the ratio between the probability density of a closure that fits exactly and that by
     /// chance.
-    pub(super) fn log_gain(&self, closure: &Constraint, is_planar: bool) -> f64 {
+    pub(super) fn log_gain(&self, closure: &Constraint, is_planar: bool, problem: &Problem) -> f64 {
         let least = tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
         let own = closure.covariance.matrix() + Matrix6::from_diagonal_element(least);
         if is_planar {
             let volume = (TAU.powi(3) * planar_part(&own).determinant()).sqrt();
             return -volume.ln() - self.log_density;
         }
-        -0.5 * (own * TAU).determinant().ln() - self.log_density_in_space(&own)
+        let to =
+            { problem.pose(closure.to) }.map_or_else(UnitQuaternion::identity, |to| to.rotation);
+        let by_chance = self.log_density_in_space(&own, &to);
+        -0.5 * (own * TAU).determinant().ln() - by_chance
     }
 
-    /// The log-density in space, where it is known but for a covariance what lies where: any
-    /// heading, and no more tilted than places of the map are.
-    fn log_density_in_space(&self, whole: &Matrix6<f64>) -> f64 {
-        let shift = self.displacements + whole.fixed_view::<3, 3>(0, 0);
-        let tilts = self.tilts + 0.5 * (whole[(3, 3)] + whole[(4, 4)]);
-        -0.5 * (shift * TAU).determinant().ln() - (TAU * tilts).ln() - TAU.ln()
+    /// The log-density in space, about the body axes of where a closure leads, where it is known
+    /// but for a covariance what lies where: any heading, and no more tilted than places of the map
+    /// are.
+    fn log_density_in_space(&self, whole: &Matrix6<f64>, to: &UnitQuaternion<f64>) -> f64 {
+        let axes = to.inverse().to_rotation_matrix().into_inner();
+        let mut known = whole.fixed_view::<5, 5>(0, 0).into_owned();
+        let mut displacements = known.fixed_view_mut::<3, 3>(0, 0);
+        displacements += axes * self.displacements * axes.transpose();
+        for k in 3..5 {
+            known[(k, k)] += self.tilts;
+        }
+        -0.5 * (known * TAU).determinant().ln() - TAU.ln()
     }
 }
 
@@ -103,7 +112,8 @@ pub(super) fn log_evidence(
         let squared = off.dot(&root.solve(&off));
         let diagonal = root.l_dirty().diagonal();
         let log_volume = 3.0 * TAU.ln() + diagonal.map(f64::ln).sum();
-        return Some(-0.5 * squared - log_volume - chance.log_density_in_space(&whole));
+        let by_chance = chance.log_density_in_space(&whole, &problem.map.pose(to).rotation);
+        return Some(-0.5 * squared - log_volume - by_chance);
     }
     let planar = planar_part(&whole);
     let off = Vector3::new(off[0], off[1], off[5]);

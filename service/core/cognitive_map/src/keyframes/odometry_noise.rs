@@ -71,7 +71,7 @@ impl RelaxationCopy {
         let chains = &self.graph().chains;
         let chance = Chance::of(chains, &problem);
         let gain = |(_, closure): (u32, &Constraint)| {
-            chance.log_gain(closure, self.graph().is_planar(closure))
+            chance.log_gain(closure, self.graph().is_planar(closure), &problem)
         };
         let closures = copy.accepted().map(gain);
         let noise = (0..)

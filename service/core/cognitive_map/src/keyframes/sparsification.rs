@@ -169,9 +169,9 @@ fn join_motions(removed: &Keyframe, next: &mut Keyframe) {
             .calibrated
             .corrected_by(&removed.motion, calibration);
         let covariance = composed(&removed.covariance, &next.motion, &next.covariance);
+        next.calibrated = { removed.calibrated }.then(&next.calibrated, &next.motion.rotation);
         next.motion = before * next.motion;
         next.motion.rotation.renormalize_fast();
-        next.calibrated = removed.calibrated.then(&next.calibrated);
         next.covariance = covariance;
     }
 }

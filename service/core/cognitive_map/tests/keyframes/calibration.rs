@@ -41,11 +41,14 @@ fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
         path.push(truth);
         let bias = Vector3::new(0.0, 0.0, sense * BIAS_RAD_S / RATE_HZ as f64);
         let is_known = seq >= known_from;
+        let read = se3::exp(
+            &(linear / (1.0 - sense * LENGTH)),
+            &((angular + bias) / (1.0 - sense * ANGLE)),
+        );
         let increment = if is_known {
             se3::exp(&linear, &angular)
         } else {
-            let read = (angular + bias) / (1.0 - sense * ANGLE);
-            se3::exp(&(linear / (1.0 - sense * LENGTH)), &read)
+            read
         };
         let calibration = Calibration {
             length: sense * LENGTH,
@@ -62,6 +65,7 @@ fn largest_errors(known_from: u64, keyframes_max: u32, sense: f64) -> [f64; 2] {
             states_noise: true,
             wander: SVector::repeat(1e-12),
             moving_s: 1.0 / RATE_HZ as f64,
+            turned_rad: se3::log(&read).1,
         };
         told *= increment;
         let moment = Moment {

@@ -7,8 +7,8 @@ use crate::link::{Link, SightingTarget};
 use crate::node::{CalibrationId, Freedom, Lengths, Node, PointId, PoseId, Veer};
 use crate::normal_blocks::NormalBlocks;
 use crate::{
-    Calibration, CalibrationInformation, PoseInformation, PositionInformation, RangeInformation,
-    Reading,
+    Calibration, CalibrationInformation, Exposure, PoseInformation, PositionInformation,
+    RangeInformation, Reading,
 };
 
 /// A node from, a node to, and a link from the first to the second.
@@ -129,7 +129,10 @@ fn cases(
                 reading: Reading::corrected_to(
                     &(from.inv_mul(&to) * error),
                     &calibration(),
-                    0.7,
+                    &Exposure {
+                        moving_s: 0.7,
+                        turned_rad: Vector3::new(0.3, -0.2, 0.5),
+                    },
                     0.1,
                 ),
                 information: whole,
