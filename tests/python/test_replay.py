@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import random
+import struct
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Tuple
 
@@ -112,3 +113,36 @@ def test_a_replay_says_what_was_told(tmp_path: Path) -> None:
     assert 0.4 < report["false_share"] < 0.6
     # A gyroscope that drifts by 0.01 rad/s for 40 s.
     assert report["dead_reckoning_ate_rmse_m"] > 0.5
+
+
+def write_views(directory: Path) -> None:
+    """Two robots that go the same way, one after the other, and see it alike but for noise."""
+    draw = random.Random(1)
+    samples = ["t_s,agent,kind,f1,f2,f3,f4,f5,f6,f7"]
+    truth = ["t_s,agent,x,y,z,yaw,quality"]
+    places = [[draw.gauss(0, 1) for _ in range(32)] for _ in range(40)]
+    views = []
+    for robot in ("one", "two"):
+        for k, place in enumerate(places):
+            if k:
+                samples.append(f"{k},{robot},increment,2,0,0,0,0.01,0,0.001")
+            samples.append(f"{k},{robot},descriptor,camera,{len(views)}")
+            views.append([x + draw.gauss(0, 0.3) for x in place])
+            truth.append(f"{k},{robot},{2 * k},0,0,0,")
+    (directory / "samples.csv").write_text("\n".join(samples) + "\n")
+    (directory / "truth.csv").write_text("\n".join(truth) + "\n")
+    header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({len(views)}, 32)}}".encode()
+    numbers = b"".join(struct.pack("<32f", *view) for view in views)
+    magic = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header))
+    (directory / "camera.npy").write_bytes(magic + header + numbers)
+
+
+def test_a_robot_is_told_where_it_is_by_its_last_views(tmp_path: Path) -> None:
+    write_views(tmp_path)
+    asked = ["--taught", "one", "--length", "3", "--within-m", "2.5", "--json"]
+    (row,) = json.loads(lab("replay", "sequences", tmp_path, *asked))["rows"]
+    assert row["agent"] == "two"
+    assert row["questions"] == 37
+    assert row["right"] == 1.0
+    assert row["claims"] > 30
+    assert row["claims_right"] == 1.0

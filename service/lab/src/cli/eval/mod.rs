@@ -15,6 +15,7 @@ mod waking;
 
 pub(super) use object::Turns;
 pub(super) use progress::Progress;
+pub(super) use service::Host;
 
 use clap::Subcommand;
 use cogmap_lab::eval::Environment;

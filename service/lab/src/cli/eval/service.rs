@@ -9,7 +9,7 @@ use cogmap::service::Service;
 use cogmap_client::Api;
 
 /// A service on loopback, with a store that goes with it.
-pub(super) struct Host {
+pub(in crate::cli) struct Host {
     runtime: tokio::runtime::Runtime,
     service: Service,
     directory: PathBuf,
@@ -17,7 +17,7 @@ pub(super) struct Host {
 
 impl Host {
     /// Starts it.
-    pub(super) fn start() -> anyhow::Result<Self> {
+    pub(in crate::cli) fn start() -> anyhow::Result<Self> {
         let name = format!("cogmap-eval-{}", std::process::id());
         let directory = std::env::temp_dir().join(name);
         let mut config = Config::default();
@@ -37,12 +37,12 @@ impl Host {
     }
 
     /// A client of it.
-    pub(super) fn api(&self) -> Api {
+    pub(in crate::cli) fn api(&self) -> Api {
         Api::new(&format!("http://{}", self.service.address()), None)
     }
 
     /// Ends it; its store is removed.
-    pub(super) fn stop(self) {
+    pub(in crate::cli) fn stop(self) {
         self.runtime.block_on(self.service.stop());
         // What is left of it is in the directory for temporary files.
         let _ = std::fs::remove_dir_all(self.directory);

@@ -16,6 +16,7 @@ mod replayed;
 mod report;
 mod room;
 mod scoring;
+mod sequences;
 mod setting;
 mod team;
 mod touch;
@@ -39,6 +40,9 @@ pub(in crate::cli) enum ReplayCommand {
     Room(room::RoomArgs),
     /// Tables of motion, levels, views and ranges of robots, with their truth.
     Csv(csv::CsvArgs),
+    /// Tables with views: one agent's way is remembered, and the others are told where they are by
+    /// their last views.
+    Sequences(sequences::SequencesArgs),
     /// Objects as touches, a place and a level each: learned, and touched again with noise.
     Touch(touch::TouchArgs),
     /// Objects as points with normals: learned from some, and recognised from others in any pose.
@@ -53,6 +57,7 @@ pub(super) fn run(command: &ReplayCommand) -> anyhow::Result<()> {
         ReplayCommand::Victoria(args) => victoria::run(args),
         ReplayCommand::Room(args) => room::run(args),
         ReplayCommand::Csv(args) => csv::run(args),
+        ReplayCommand::Sequences(args) => sequences::run(args),
         ReplayCommand::Touch(args) => touch::run(args),
         ReplayCommand::Points(args) => points::run(args),
     }
