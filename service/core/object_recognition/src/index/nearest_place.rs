@@ -65,15 +65,14 @@ mod tests {
         positions.extend_from_within(..100);
         for typical_m in [0.0, 1e-4, 0.01, 1.0] {
             let nearest = NearestPlace::new(&positions, typical_m);
-            for k in 1000..1200 {
-                let scale = [0.5, 1.0, 2.0, 100.0][k as usize % 4];
+            for (k, scale) in (1000..1200).zip([0.5, 1.0, 2.0, 100.0].into_iter().cycle()) {
                 let query = Point3::from(point(k).coords * scale);
                 let (square, number) = nearest.find(&query).unwrap();
                 assert!(number < 300);
-                let own = (positions[number as usize] - query).norm_squared();
-                assert_eq!(square, own);
-                let least = positions.iter().map(|other| (other - query).norm_squared());
-                assert_eq!(square, least.fold(f64::INFINITY, f64::min));
+                let squares = { positions.iter() }.map(|other| (other - query).norm_squared());
+                let least = squares.clone().fold(f64::INFINITY, f64::min);
+                let found = squares.clone().nth(number as usize);
+                assert_eq!([Some(square), found], [Some(least); 2]);
             }
             assert_eq!(nearest.find(&positions[150]), Some((0.0, 150)));
             assert_eq!(nearest.find(&positions[350]), Some((0.0, 50)));

@@ -11,6 +11,7 @@ use crate::percept_likelihood::ContactPercepts;
 use crate::translations::background::{BackgroundModel, UnknownContact};
 use crate::translations::hypothesis::TranslationHypothesis;
 use crate::translations::mass_histogram::MassHistogram;
+use crate::translations::merge::merged;
 use crate::translations::prefilter::{Prefilter, Seed};
 use crate::translations::split::SplitBuffers;
 use crate::translations::touch_update::TouchUpdate;
@@ -94,8 +95,7 @@ impl GaussianSum {
         let (rotations, least) = (&self.rotations, best - PRUNE_NATS);
         { &self.unexplored }.entered(library, rotations, (last, contact), bare, least, &mut parts);
         self.unexplored.stayed(densities);
-        self.all = parts;
-        self.merge();
+        self.all = merged(&parts);
         self.prune();
     }
 
@@ -177,41 +177,6 @@ impl GaussianSum {
         }
         prefilter.drop_below(least);
         self.prefilter = prefilter;
-    }
-
-    /// Merges hypotheses of one cell, and sorts by object, rotation and cell.
-    fn merge(&mut self) {
-        let mut keyed: Vec<_> = { self.all.iter() }
-            .zip(0u32..)
-            .map(|(hypothesis, number)| (hypothesis.key(), number))
-            .collect();
-        let evidence = |number: u32| self.all[number as usize].evidence;
-        keyed.sort_unstable_by(|(a, one), (b, other)| {
-            a.cmp(b)
-                .then_with(|| evidence(*other).total_cmp(&evidence(*one)))
-                .then(one.cmp(other))
-        });
-        let mut merged: Vec<TranslationHypothesis> = Vec::with_capacity(keyed.len());
-        let mut last = None;
-        for (key, number) in keyed {
-            let hypothesis = self.all[number as usize];
-            match merged.last_mut() {
-                Some(kept) if last == Some(key) => {
-                    let sum = log_sum([kept.evidence, hypothesis.evidence].into_iter());
-                    let share = (hypothesis.evidence - sum).exp();
-                    // The sum has the moments of both.
-                    let apart = hypothesis.translation - kept.translation;
-                    let spread_m2 = share * (1.0 - share) * apart.norm_squared() / 3.0;
-                    kept.variance_m2 +=
-                        (hypothesis.variance_m2 - kept.variance_m2) * share + spread_m2;
-                    kept.translation += apart * share;
-                    kept.evidence = sum;
-                }
-                _ => merged.push(hypothesis),
-            }
-            last = Some(key);
-        }
-        self.all = merged;
     }
 
     /// Drops hypotheses without evidence, and the lightest beyond the budget; each object keeps its
