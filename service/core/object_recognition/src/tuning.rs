@@ -220,9 +220,9 @@ pub(crate) const PROMOTION_SEEDS: usize = 150_000;
 pub(crate) const WAITING_CONTACTS: usize = 12;
 /// Share of all mass that seeds which wait may hold when the others are promoted. Chosen.
 pub(crate) const WAITING_SHARE: f64 = 1e-3;
-/// Share of all mass that seeds which are never promoted may hold: a tenth of what may wait, so
-/// that no more are replayed than can still matter. Chosen.
-pub(crate) const NEGLIGIBLE_SHARE: f64 = 1e-4;
+/// Share of all mass that seeds which are never promoted may hold: as that of hypotheses that are
+/// dropped at a touch. Chosen.
+pub(crate) const NEGLIGIBLE_SHARE: f64 = 1e-5;
 /// Contacts after which the prefilter is given up. Budget.
 pub(crate) const PREFILTER_CONTACTS_MAX: usize = 32;
 /// Factor from one at which weights are scaled back, so that `f32` holds them. Derived.
