@@ -1,9 +1,12 @@
 //! Places of a model, packed for vectorised lookups, with their indexes.
 
+use std::ops::Range;
+
 use nalgebra::Point3;
 
 use crate::index::lattice_index::LatticeIndex;
 use crate::index::nearest_grid::NearestGrid;
+use crate::index::wide_places::WidePlaces;
 use crate::indexed_place::IndexedPlace;
 use crate::numeric::{centroid, to_f32};
 use crate::tuning::{
@@ -34,10 +37,11 @@ pub(crate) struct PackedPlaces {
     /// Number of each among the model's places.
     order: Vec<u32>,
     pub(crate) middle: Point3<f64>,
-    pub(crate) lattice_index: LatticeIndex,
-    /// Mean and maximum of the places' variances per axis \[m²\].
+    lattice_index: LatticeIndex,
+    /// Places that are found without the index.
+    pub(crate) wide: WidePlaces,
+    /// Mean of the places' variances per axis \[m²\].
     pub(crate) variance_m2: f64,
-    pub(crate) variance_max_m2: f64,
     /// Channel and mean of the levels, if every place has one level of the same channel and no
     /// descriptor.
     levels: Option<(u16, f64)>,
@@ -76,11 +80,17 @@ impl PackedPlaces {
                 .map(|packed_place| packed_place.at[axis])
                 .collect()
         });
-        let variances = || places.iter().map(|place| place.variance_m2);
-        let variance_m2 = variances().sum::<f64>() / count;
+        let variances = places.iter().map(|place| place.variance_m2);
+        let variance_m2 = variances.sum::<f64>() / count;
         // The first scale: a touch like the learned ones, in a hypothesis of the same variance.
         let mut reach_m =
             (NEAREST_MARGIN * NEAREST_SD * (2.0 * (noise_m2 + variance_m2)).sqrt()).max(1e-9);
+        let touch_m2 = 2.0 * noise_m2 + variance_m2;
+        let of_index = ordered().zip(&all);
+        let of_index: Vec<_> = { of_index }
+            .map(|(place, packed_place)| (place.position, packed_place.variance_m2))
+            .collect();
+        let wide = WidePlaces::new(&lattice_index, &of_index, touch_m2);
         let mut nearest = Vec::new();
         loop {
             let edge_m = spacing_m.max(reach_m / NEAREST_CELLS_PER_REACH);
@@ -100,12 +110,12 @@ impl PackedPlaces {
                     .collect(),
             ],
             axes,
-            variance_max_m2: variances().fold(0.0, f64::max),
             variance_m2,
             all,
             order,
             middle,
             lattice_index,
+            wide,
             levels,
             nearest,
         }
@@ -133,12 +143,20 @@ impl PackedPlaces {
     /// Visits the places that a point with this variance per axis \[m²\] could be of, and some
     /// others, by their number among the model's places.
     pub(crate) fn near(&self, point: &Point3<f64>, variance_m2: f64, mut visit: impl FnMut(u32)) {
-        let reach_m = (GATE_SQUARED * (variance_m2 + self.variance_max_m2)).sqrt();
         let mut runs = Vec::new();
-        self.lattice_index.runs(point, reach_m, &mut runs);
-        for place in runs.into_iter().flatten() {
+        self.runs(point, variance_m2, &mut runs);
+        let wide = self.wide.numbers.iter().copied();
+        for place in runs.into_iter().flatten().chain(wide) {
             visit(self.order[place as usize]);
         }
+    }
+
+    /// Lists runs of places that hold all that a point with this variance per axis \[m²\] could be
+    /// of, and some others, but for the wide ones.
+    pub(crate) fn runs(&self, point: &Point3<f64>, variance_m2: f64, runs: &mut Vec<Range<u32>>) {
+        let widest_m2 = variance_m2 + f64::from(self.wide.narrow_max_m2);
+        let reach_m = (GATE_SQUARED * widest_m2).sqrt();
+        self.lattice_index.runs(point, reach_m, runs);
     }
 }
 

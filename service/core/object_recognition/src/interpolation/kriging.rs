@@ -1,6 +1,6 @@
 //! Universal kriging: the best linear unbiased prediction from values around.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Dyn, LU, Vector3};
 
 /// Weights of the values at some places for a prediction in between.
 ///
@@ -13,7 +13,7 @@ pub(super) struct Kriging {
     positions: Vec<Vector3<f64>>,
     axes: Vec<Vector3<f64>>,
     scale_m: f64,
-    inverse: DMatrix<f64>,
+    matrix: LU<f64, Dyn, Dyn>,
 }
 
 /// Weights of the values, and the variance of the prediction per that of the process.
@@ -37,48 +37,54 @@ impl Kriging {
             return None;
         }
         let middle = positions.iter().sum::<Vector3<f64>>() / count as f64;
-        let mut kriging = Self {
-            middle,
-            positions,
-            axes: axes.to_vec(),
-            scale_m: length_m,
-            inverse: DMatrix::zeros(0, 0),
-        };
         let size = count + 1 + axes.len();
         let mut matrix = DMatrix::zeros(size, size);
-        for (row, at) in kriging.positions.iter().enumerate() {
-            for (column, other) in kriging.positions.iter().enumerate() {
-                matrix[(row, column)] = covariance((at - other).norm() / length_m);
+        for (row, at) in positions.iter().enumerate() {
+            for (column, other) in positions[..row].iter().enumerate() {
+                let covariance = covariance((at - other).norm() / length_m);
+                matrix[(row, column)] = covariance;
+                matrix[(column, row)] = covariance;
             }
-            matrix[(row, row)] += noise;
-            for (number, value) in kriging.trend(at).into_iter().enumerate() {
+            matrix[(row, row)] = covariance(0.0) + noise;
+            for (number, value) in trend(at, &middle, axes, length_m).enumerate() {
                 matrix[(row, count + number)] = value;
                 matrix[(count + number, row)] = value;
             }
         }
-        kriging.inverse = matrix.try_inverse()?;
-        Some(kriging)
+        let matrix = matrix.lu();
+        matrix.is_invertible().then(|| Self {
+            middle,
+            positions,
+            axes: axes.to_vec(),
+            scale_m: length_m,
+            matrix,
+        })
     }
 
     /// For a prediction at a point \[m\].
     pub(super) fn weights(&self, point: &Vector3<f64>) -> Weights {
         let near = self.positions.iter();
         let covariances = near.map(|at| covariance((at - point).norm() / self.scale_m));
-        let right: Vec<f64> = covariances.chain(self.trend(point)).collect();
-        let right = DVector::from_vec(right);
-        let solved = &self.inverse * &right;
+        let trend = trend(point, &self.middle, &self.axes, self.scale_m);
+        let right = DVector::from_vec(covariances.chain(trend).collect());
+        let solved = { self.matrix.solve(&right) }.expect("the matrix is invertible");
         Weights {
             variance: (1.0 - solved.dot(&right)).max(0.0),
             of: solved.iter().copied().take(self.positions.len()).collect(),
         }
     }
+}
 
-    fn trend(&self, point: &Vector3<f64>) -> Vec<f64> {
-        let along = |axis: &Vector3<f64>| axis.dot(&(point - self.middle)) / self.scale_m;
-        std::iter::once(1.0)
-            .chain(self.axes.iter().map(along))
-            .collect()
-    }
+/// A constant, and what grows linearly along each axis from the middle, in lengths.
+fn trend(
+    point: &Vector3<f64>,
+    middle: &Vector3<f64>,
+    axes: &[Vector3<f64>],
+    length_m: f64,
+) -> impl Iterator<Item = f64> {
+    let apart = point - middle;
+    let along = axes.iter().map(move |axis| axis.dot(&apart) / length_m);
+    std::iter::once(1.0).chain(along)
 }
 
 impl Weights {

@@ -12,6 +12,7 @@ mod kriging;
 mod nodes;
 mod open;
 mod sides;
+mod taken;
 
 pub(crate) use graph::LinkGraph;
 pub(crate) use nodes::{Fields, interpolated};

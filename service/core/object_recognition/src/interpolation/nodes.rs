@@ -5,6 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::field::{Field, FieldOf, LocalField, Site};
 use super::graph::LinkGraph;
 use super::sides::Sides;
+use super::taken::Taken;
 use crate::indexed_place::IndexedPlace;
 use crate::model::{LevelMemory, ModelPlace};
 use crate::tuning::{
@@ -117,7 +118,10 @@ fn sites(places: &[ModelPlace], graph: &LinkGraph, sides: &Sides) -> Vec<(Site, 
 /// Points of all sites, no two nearer than about a step.
 fn spans(places: &[ModelPlace], sites: &[(Site, Vec<u32>)], step_m: f64) -> Vec<Span> {
     let mut spans: Vec<Span> = Vec::new();
-    let near_m = NODE_APART * step_m;
+    let mut taken = Taken::new(NODE_APART * step_m);
+    for place in places {
+        taken.add(place.position_m);
+    }
     for (number, (site, corners)) in sites.iter().enumerate() {
         let at: Vec<Vector3<f64>> = corners
             .iter()
@@ -132,10 +136,8 @@ fn spans(places: &[ModelPlace], sites: &[(Site, Vec<u32>)], step_m: f64) -> Vec<
         for shares in shares(at.len(), parts) {
             let point = at.iter().zip(&shares).map(|(at, share)| at * *share);
             let at = site.below(&Point3::from(point.sum::<Vector3<f64>>()));
-            let is_near = |other: &Point3<f64>| (other - at).norm() < near_m;
-            let is_taken = places.iter().any(|place| is_near(&place.position_m))
-                || spans.iter().any(|span| is_near(&span.at));
-            if !is_taken {
+            if !taken.holds(&at) {
+                taken.add(at);
                 spans.push(Span {
                     at,
                     corners: corners.clone(),
@@ -206,15 +208,17 @@ impl Fields {
     }
 
     fn around(&self, site: &Site, places: &[ModelPlace]) -> Option<LocalFields> {
-        let apart = |number: &u32| (places[*number as usize].position_m - site.middle).norm();
-        let mut near: Vec<u32> = (0u32..).take(places.len()).collect();
-        let order = |a: &u32, b: &u32| apart(a).total_cmp(&apart(b)).then(a.cmp(b));
+        let apart = |place: &ModelPlace| (place.position_m - site.middle).norm();
+        let near = places.iter().map(apart).zip(0u32..);
+        let mut near: Vec<(f64, u32)> = near.collect();
+        let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         let most = 2 * KRIGING_SURFACE;
         if near.len() > most {
             near.select_nth_unstable_by(most, order);
             near.truncate(most);
         }
         near.sort_unstable_by(order);
+        let near: Vec<u32> = near.into_iter().map(|(_, number)| number).collect();
         let level = |(channel, field): &(u16, Field)| {
             let local = field.around(site, &near, places)?;
             Some((*channel, local))

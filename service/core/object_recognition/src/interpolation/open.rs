@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::Point3;
 
 use super::graph::LinkGraph;
+use crate::index::nearest_place::NearestPlace;
 use crate::numeric::centroid;
 use crate::tuning::{
     BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FIELD_PER_SPACING, FLAT_SHARE,
@@ -16,6 +17,7 @@ use crate::tuning::{
 #[derive(Clone, Debug)]
 pub(crate) struct OpenRegion {
     felt: Vec<FeltPlace>,
+    nearest: NearestPlace,
     /// The places and nodes about the edge of what was felt.
     entries: Vec<u32>,
     /// Typical distance of places \[m\].
@@ -40,7 +42,6 @@ pub(crate) enum Part {
 /// A place that was felt.
 #[derive(Clone, Copy, Debug)]
 struct FeltPlace {
-    position: Point3<f64>,
     is_open: bool,
     /// Squared distance beyond which a gap begins \[m²\].
     gap_m2: f64,
@@ -95,8 +96,7 @@ impl OpenRegion {
                 f64::INFINITY
             }
         };
-        let places = felt.iter().enumerate().map(|(own, position)| FeltPlace {
-            position: *position,
+        let places = (0..felt.len()).map(|own| FeltPlace {
             is_open: is_open[own] && is_open_anywhere,
             gap_m2: gap_m2(own),
         });
@@ -110,6 +110,7 @@ impl OpenRegion {
         let step = entries.len().div_ceil(ENTRIES_MAX).max(1);
         Some(Self {
             felt: places,
+            nearest: NearestPlace::new(felt, graph.typical_m),
             entries: entries.into_iter().step_by(step).collect(),
             typical_m: graph.typical_m,
             unexplored: if is_open_anywhere {
@@ -143,16 +144,10 @@ impl OpenRegion {
 
     /// What the model says of a point.
     pub(crate) fn part(&self, point: &Point3<f64>) -> Part {
-        let mut best = (f64::INFINITY, None);
-        for place in &self.felt {
-            let square = (place.position - point).norm_squared();
-            if square < best.0 {
-                best = (square, Some(place));
-            }
-        }
-        let (square, Some(place)) = best else {
+        let Some((square, number)) = self.nearest.find(point) else {
             return Part::Known;
         };
+        let place = &self.felt[number as usize];
         let is_far = square > (EXPLORED_REACH * self.typical_m).powi(2);
         if place.is_open || is_far && self.unexplored > 0.0 {
             Part::Beyond

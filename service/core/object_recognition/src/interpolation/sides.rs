@@ -172,6 +172,7 @@ impl Sides {
 
     /// Normal of the tangent plane of a place with neighbours at these offsets, nearest first.
     fn tangent(&self, to: &[Vector3<f64>]) -> Option<Unit<Vector3<f64>>> {
+        let lengths: Vec<f64> = to.iter().map(Vector3::norm).collect();
         let some = &to[..to.len().min(SIDE_PAIRS)];
         let pairs = some.iter().enumerate();
         let planes = pairs.flat_map(|(number, a)| {
@@ -183,7 +184,7 @@ impl Sides {
         });
         let scored = planes.map(|(_, _, across)| {
             let plane = (Vector3::zeros(), Unit::new_normalize(across));
-            (self.score(&plane, to), plane)
+            (self.score(&plane, to, &lengths), plane)
         });
         let mut scored: Vec<(f64, Plane)> = scored.collect();
         scored.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -194,7 +195,7 @@ impl Sides {
                 let is_by = |to: &&Vector3<f64>| self.is_by(&plane.1, &(*to - plane.0));
                 plane = fitted(to.iter().filter(is_by)).unwrap_or(plane);
             }
-            (self.score(&plane, to), plane.1)
+            (self.score(&plane, to, &lengths), plane.1)
         });
         let best = fitted.max_by(|a, b| a.0.total_cmp(&b.0));
         best.map(|(_, normal)| normal)
@@ -202,12 +203,12 @@ impl Sides {
 
     /// How well a plane is tangent to a surface through these offsets: places by it, less those on
     /// the side where there are fewer, each by the sine of its elevation.
-    fn score(&self, (middle, normal): &Plane, to: &[Vector3<f64>]) -> f64 {
+    fn score(&self, (middle, normal): &Plane, to: &[Vector3<f64>], lengths_m: &[f64]) -> f64 {
         let (mut by, mut above, mut below) = (0.0, 0.0, 0.0);
-        for to in to {
+        for (to, length_m) in to.iter().zip(lengths_m) {
             let off_m = normal.dot(&(to - middle));
             let share = off_m / self.reach_m;
-            let sine = (off_m / to.norm().max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
+            let sine = (off_m / length_m.max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
             if share.abs() < 1.0 {
                 by += 1.0 - share * share;
             } else if sine > 0.0 {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{Point3, Vector3};
 use pulp::Arch;
 
-use crate::index::packed_places::PackedPlaces;
+use crate::index::packed_places::{PackedPlace, PackedPlaces};
 use crate::numeric::{exp, to_f32};
 use crate::percept_likelihood::{LANES, PerceptLikelihood};
 use crate::tuning::GATE_SQUARED;
@@ -126,36 +126,47 @@ impl CandidateSearch {
     /// stale.
     fn gather(&mut self, packed: &PackedPlaces, point: &Point3<f64>, variance_m2: f64) -> usize {
         let Self { runs, all, .. } = self;
-        let reach_m = (GATE_SQUARED * (variance_m2 + packed.variance_max_m2)).sqrt();
-        packed.lattice_index.runs(point, reach_m, runs);
+        packed.runs(point, variance_m2, runs);
         let at: [f32; 3] = (point - packed.middle).map(to_f32).into();
-        let wide = to_f32(variance_m2);
+        let variance_m2 = to_f32(variance_m2);
+        let wide = &packed.wide;
         let most = { runs.iter() }.map(|run| (run.end - run.start) as usize);
-        let most = most.sum::<usize>();
+        let most = most.sum::<usize>() + wide.numbers.len();
         if all.len() < most {
             all.resize(most, NearPlace::default());
         }
+        let near = |number: u32, packed_place: &PackedPlace| {
+            let apart: [f32; 3] = [
+                packed_place.at[0] - at[0],
+                packed_place.at[1] - at[1],
+                packed_place.at[2] - at[2],
+            ];
+            let square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
+            let variance = variance_m2 + packed_place.variance_m2;
+            let near = NearPlace {
+                number,
+                apart,
+                square,
+                variance,
+            };
+            let is_beyond = square > to_f32(GATE_SQUARED) * variance;
+            (near, !is_beyond)
+        };
         let mut count = 0;
         for run in runs {
             let own = &packed.all[run.start as usize..run.end as usize];
             for (number, packed_place) in run.zip(own) {
-                let apart: [f32; 3] = [
-                    packed_place.at[0] - at[0],
-                    packed_place.at[1] - at[1],
-                    packed_place.at[2] - at[2],
-                ];
-                let square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
-                let variance = wide + packed_place.variance_m2;
                 // Branch-free, since the outcome is unpredictable: loads then overlap.
-                all[count] = NearPlace {
-                    number,
-                    apart,
-                    square,
-                    variance,
-                };
-                let is_beyond = square > to_f32(GATE_SQUARED) * variance;
-                count += usize::from(!is_beyond);
+                let is_wide = packed_place.variance_m2 > wide.narrow_max_m2;
+                let (near, is_near) = near(number, packed_place);
+                all[count] = near;
+                count += usize::from(is_near && !is_wide);
             }
+        }
+        for number in &wide.numbers {
+            let (near, is_near) = near(*number, &packed.all[*number as usize]);
+            all[count] = near;
+            count += usize::from(is_near);
         }
         count
     }

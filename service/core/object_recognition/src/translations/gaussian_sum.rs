@@ -6,18 +6,19 @@ use nalgebra::UnitQuaternion;
 
 use crate::contact::{Contact, Reached};
 use crate::library::{ObjectId, ObjectLibrary};
-use crate::numeric::{log_sum, to_f32};
+use crate::numeric::{exp, log_sum, to_f32};
 use crate::percept_likelihood::ContactPercepts;
 use crate::translations::background::{BackgroundModel, UnknownContact};
 use crate::translations::hypothesis::TranslationHypothesis;
 use crate::translations::mass_histogram::MassHistogram;
+use crate::translations::merge::merged;
 use crate::translations::prefilter::{Prefilter, Seed};
 use crate::translations::split::SplitBuffers;
 use crate::translations::touch_update::TouchUpdate;
 use crate::translations::unexplored::Unexplored;
 use crate::tuning::{
-    NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN, PROMOTION_SEEDS,
-    PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
+    DROPPED_SHARE, NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN,
+    PROMOTION_SEEDS, PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
 };
 
 /// All hypotheses.
@@ -94,8 +95,7 @@ impl GaussianSum {
         let (rotations, least) = (&self.rotations, best - PRUNE_NATS);
         { &self.unexplored }.entered(library, rotations, (last, contact), bare, least, &mut parts);
         self.unexplored.stayed(densities);
-        self.all = parts;
-        self.merge();
+        self.all = merged(&parts);
         self.prune();
     }
 
@@ -179,48 +179,13 @@ impl GaussianSum {
         self.prefilter = prefilter;
     }
 
-    /// Merges hypotheses of one cell, and sorts by object, rotation and cell.
-    fn merge(&mut self) {
-        let mut keyed: Vec<_> = { self.all.iter() }
-            .zip(0u32..)
-            .map(|(hypothesis, number)| (hypothesis.key(), number))
-            .collect();
-        let evidence = |number: u32| self.all[number as usize].evidence;
-        keyed.sort_unstable_by(|(a, one), (b, other)| {
-            a.cmp(b)
-                .then_with(|| evidence(*other).total_cmp(&evidence(*one)))
-                .then(one.cmp(other))
-        });
-        let mut merged: Vec<TranslationHypothesis> = Vec::with_capacity(keyed.len());
-        let mut last = None;
-        for (key, number) in keyed {
-            let hypothesis = self.all[number as usize];
-            match merged.last_mut() {
-                Some(kept) if last == Some(key) => {
-                    let sum = log_sum([kept.evidence, hypothesis.evidence].into_iter());
-                    let share = (hypothesis.evidence - sum).exp();
-                    // The sum has the moments of both.
-                    let apart = hypothesis.translation - kept.translation;
-                    let spread_m2 = share * (1.0 - share) * apart.norm_squared() / 3.0;
-                    kept.variance_m2 +=
-                        (hypothesis.variance_m2 - kept.variance_m2) * share + spread_m2;
-                    kept.translation += apart * share;
-                    kept.evidence = sum;
-                }
-                _ => merged.push(hypothesis),
-            }
-            last = Some(key);
-        }
-        self.all = merged;
-    }
-
     /// Drops hypotheses without evidence, and the lightest beyond the budget; each object keeps its
     /// best.
     fn prune(&mut self) {
         let most = TRANSLATIONS_MAX;
         let evidences = self.all.iter().map(|hypothesis| hypothesis.evidence);
         let best = evidences.clone().fold(self.prefilter.best_log(), f64::max);
-        let mut least = best - PRUNE_NATS;
+        let mut least = f64::max(best - PRUNE_NATS, self.negligible_log(best));
         let mut evidences: Vec<f64> = evidences.filter(|evidence| *evidence > least).collect();
         // Room for hypotheses exactly as heavy as the lightest.
         let mut room = usize::MAX;
@@ -246,6 +211,25 @@ impl GaussianSum {
             }
         }
         self.all = kept;
+    }
+
+    /// Log of the mass below which hypotheses hold next to nothing together; `best` is that of the
+    /// heaviest.
+    fn negligible_log(&self, best: f64) -> f64 {
+        let share = |log: f64| exp(to_f32(log - best));
+        let mut histogram = MassHistogram::new(0);
+        for hypothesis in &self.all {
+            histogram.add(share(hypothesis.evidence));
+        }
+        let seeds = self.prefilter.masses().map(|(_, log)| share(log));
+        let all = histogram.sum() + seeds.map(f64::from).sum::<f64>();
+        let least = histogram.left_without(DROPPED_SHARE * all);
+        // Without hypotheses, or where nearly all is among the seeds, none is negligible.
+        if least < 1.0 {
+            best + f64::from(least).ln()
+        } else {
+            f64::NEG_INFINITY
+        }
     }
 
     /// Log of the mass of each object that has any.

@@ -5,6 +5,11 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use crate::library::ObjectId;
 use crate::tuning::MERGE_CELL_SD;
 
+/// Bits of a cell's number along an axis; cells that differ by more are far beyond any map.
+const AXIS_BITS: u32 = 24;
+/// Bits of a cell's number.
+pub(crate) const CELL_BITS: u32 = 3 * AXIS_BITS;
+
 /// One hypothesis: a Gaussian over the translation, its mass being e^`evidence`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TranslationHypothesis {
@@ -27,20 +32,20 @@ impl TranslationHypothesis {
         )
     }
 
-    /// Object, rotation and cell of the translation: hypotheses with one key are merged.
-    pub(crate) fn key(&self) -> u128 {
-        /// Bits of a cell's number along an axis; cells that differ by more are far beyond any map.
-        const BITS: u32 = 26;
+    /// Cell of the translation: hypotheses of one object, rotation and cell are merged.
+    pub(crate) fn cell(&self) -> u128 {
         // The width of a cell is rounded down to a power of two, the exponent's bits alone, so that
         // hypotheses of about the same variance have the same cells.
         const EXPONENT: u64 = 0x7FF0_0000_0000_0000;
+        /// 1.5 · 2⁵²: adding it leaves the nearest whole number in the low bits.
+        const WHOLE: f64 = 6_755_399_441_055_744.0;
+        const AXIS: u64 = (1 << AXIS_BITS) - 1;
         let cell = MERGE_CELL_SD * self.variance_m2.sqrt().max(1e-12);
         let per_cell = 1.0 / f64::from_bits(cell.to_bits() & EXPONENT);
-        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-        let at = self.translation.map(|x| (x * per_cell).round() as i64);
-        let map = u128::from(self.object.0) << 16 | u128::from(self.rotation);
-        at.iter().fold(map, |key, at| {
-            key << BITS | u128::from(at.cast_unsigned() & ((1 << BITS) - 1))
-        })
+        let at = self
+            .translation
+            .map(|x| (x * per_cell + WHOLE).to_bits() & AXIS);
+        at.iter()
+            .fold(0, |key, at| key << AXIS_BITS | u128::from(*at))
     }
 }

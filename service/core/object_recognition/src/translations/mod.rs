@@ -5,6 +5,7 @@ mod candidates;
 mod gaussian_sum;
 mod hypothesis;
 mod mass_histogram;
+mod merge;
 mod prefilter;
 mod prefilter_group;
 mod split;
