@@ -1,6 +1,6 @@
 //! Laws of the keyframes.
 
-use cognitive_map::estimator::Calibrated;
+use crate::as_read;
 use cognitive_map::keyframes::{KeyframeMap, KeyframeSettings, Moment, Refined};
 use cognitive_map::{Label, PoseNoise, Relation, RelativePosition, StartPose};
 use geometry::PoseCovariance;
@@ -94,7 +94,7 @@ impl Walk {
             let moment = self.moment(robot);
             self.keyframes
                 .graph
-                .motion(&moment, &read, &variance, &Calibrated::default());
+                .motion(&moment, &read, &variance, &as_read(&read));
             self.paths[robot].push(self.truth[robot]);
         }
         if self.seq.is_multiple_of(3) {
@@ -392,7 +392,7 @@ fn an_agent_that_finds_its_place_takes_its_past_along() {
             &moment(agent, seq, &pose),
             &step,
             &variance,
-            &Calibrated::default(),
+            &as_read(&step),
         );
     }
     assert!(!keyframes.graph.refine().agents[0].is_in_map);
@@ -404,7 +404,7 @@ fn an_agent_that_finds_its_place_takes_its_past_along() {
             &moment(agent, seq, &pose),
             &step,
             &variance,
-            &Calibrated::default(),
+            &as_read(&step),
         );
     }
     let refined = &keyframes.graph.refine().agents[0];
@@ -451,7 +451,7 @@ fn rest_is_remembered_as_rest() {
             &moment(agent, seq, &pose),
             &increment,
             &if moves { variance } else { Vector6::zeros() },
-            &Calibrated::default(),
+            &as_read(&increment),
         );
         truth.push(pose);
     }

@@ -1,6 +1,6 @@
 //! Matches: true ones correct, false ones do not bend.
 
-use cognitive_map::estimator::Calibrated;
+use crate::as_read;
 use cognitive_map::keyframes::{Correction, KeyframeMap, KeyframeSettings, Moment};
 use cognitive_map::{PoseNoise, Relation, RelativePose};
 use nalgebra::{Isometry3, Vector3, Vector6};
@@ -50,12 +50,9 @@ impl Rounds {
             .push(self.truth[self.truth.len() - 1] * true_step);
         self.told *= read;
         let variance = Vector6::new(1e-4, 1e-4, 0.0, 0.0, 0.0, 1e-4);
-        self.keyframes.graph.motion(
-            &moment(seq, &self.told),
-            &read,
-            &variance,
-            &Calibrated::default(),
-        );
+        self.keyframes
+            .graph
+            .motion(&moment(seq, &self.told), &read, &variance, &as_read(&read));
         if self.keyframes.graph.is_due() {
             let corrections = self.keyframes.graph.relax();
             if let Some(correction) = corrections.first() {

@@ -1,11 +1,11 @@
 //! Revisits: what was seen before corrects the way, and nothing else does.
 
-use cognitive_map::estimator::Calibrated;
 use cognitive_map::keyframes::{KeyframeMap, KeyframeSettings, Moment};
 use cognitive_map::{Descriptor, Label};
 use geometry::PoseCovariance;
 use nalgebra::{Isometry3, Vector3, Vector6};
 
+use crate::as_read;
 use random::Seeded;
 
 /// Steps of a round, their length \[m\], and numbers of a view.
@@ -65,7 +65,7 @@ impl Round {
             &moment(self.told, self.seq),
             &read,
             &variance,
-            &Calibrated::default(),
+            &as_read(&read),
         );
         let mut noise = Seeded(strange.unwrap_or(self.seq) << 20);
         let at = self.truth.translation.vector;

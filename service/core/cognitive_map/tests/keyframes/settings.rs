@@ -1,6 +1,6 @@
 //! What a space's settings change of the keyframe graph.
 
-use cognitive_map::estimator::Calibrated;
+use crate::as_read;
 use cognitive_map::keyframes::{KeyframeMap, KeyframeSettings, Moment};
 use nalgebra::{Isometry3, Vector3, Vector6};
 
@@ -26,8 +26,7 @@ fn keyframes(spacing: (f64, f64), step: Vector6<f64>) -> usize {
             pose,
         };
         let variance = Vector6::repeat(1e-6);
-        map.graph
-            .motion(&moment, &step, &variance, &Calibrated::default());
+        map.graph.motion(&moment, &step, &variance, &as_read(&step));
     }
     map.graph.n_keyframes()
 }

@@ -1,6 +1,6 @@
 //! Closures of a robot that leaves the plane.
 
-use cognitive_map::estimator::Calibrated;
+use crate::as_read;
 use cognitive_map::keyframes::{KeyframeMap, KeyframeSettings, Moment};
 use cognitive_map::{PoseNoise, Relation, RelativePose, StartPose};
 use geometry::se3;
@@ -49,7 +49,7 @@ fn single_closures_hold_a_helix_together() {
         told *= read;
         let now = moment(seq, &told);
         let graph = &mut keyframes.graph;
-        graph.motion(&now, &read, &variance, &Calibrated::default());
+        graph.motion(&now, &read, &variance, &as_read(&read));
         if seq > TURN {
             let is = |seq: u64| truth[usize::try_from(seq).unwrap()];
             let seen = noisy(&is(seq).inv_mul(&is(seq - TURN)), &mut random);
