@@ -186,9 +186,6 @@ pub(crate) const NODE_FIELD: f64 = 0.288_675;
 pub(crate) const TRANSLATIONS_MAX: usize = 4096;
 /// A hypothesis so far below the best holds nothing worth its keep \[nats\]. Chosen.
 pub(crate) const PRUNE_NATS: f64 = 20.0;
-/// Share of all mass that hypotheses which are dropped at a touch may hold together: over all
-/// contacts that are kept, a thousandth. Chosen.
-pub(crate) const DROPPED_SHARE: f64 = 1e-5;
 /// A hypothesis splits where several places could be the one touched; each part has this share of
 /// the contact's likelihood at least. Chosen.
 pub(crate) const SPLIT_SHARE_MIN: f64 = 0.005;
@@ -220,9 +217,8 @@ pub(crate) const PROMOTION_SEEDS: usize = 150_000;
 pub(crate) const WAITING_CONTACTS: usize = 12;
 /// Share of all mass that seeds which wait may hold when the others are promoted. Chosen.
 pub(crate) const WAITING_SHARE: f64 = 1e-3;
-/// Share of all mass that seeds which are never promoted may hold: as that of hypotheses that are
-/// dropped at a touch. Chosen.
-pub(crate) const NEGLIGIBLE_SHARE: f64 = 1e-5;
+/// Share of all mass that seeds which are never promoted may hold. Chosen.
+pub(crate) const NEGLIGIBLE_SHARE: f64 = 1e-6;
 /// Contacts after which the prefilter is given up. Budget.
 pub(crate) const PREFILTER_CONTACTS_MAX: usize = 32;
 /// Factor from one at which weights are scaled back, so that `f32` holds them. Derived.

@@ -143,26 +143,32 @@ mod tests {
     use geometry::se3;
 
     /// Many small turns, corrected together by what was found out later, come out as if each had
-    /// been corrected so: in the plane in any angle, about changing axes to the first order.
+    /// been corrected so: in the plane, and about one axis after another.
     #[test]
     fn turns_together_are_corrected_as_each_of_them_is() {
-        let found = Calibration {
+        let planar = Calibration {
             angle: 0.02,
             veer_rad_m: 0.03,
             bias_rad_s: Vector3::new(0.0, 0.0, -0.004),
             ..Calibration::default()
         };
-        for (tilt, most) in [(0.0, 1e-9), (0.4, 0.01)] {
+        let angle = Calibration {
+            angle: 0.02,
+            ..Calibration::default()
+        };
+        let axes = [Vector3::z(), Vector3::x()];
+        for (found, first, most) in [(planar, axes[0], 1e-9), (angle, axes[1], 0.002)] {
             for sense in [1.0, -1.0] {
                 let mut together = (Isometry3::identity(), Calibrated::default());
                 let mut each = Isometry3::identity();
-                for step in 0..30 {
-                    let about = Vector3::new(tilt * f64::from(step % 5) / 4.0, 0.0, 1.0);
+                for step in 0..36 {
+                    let about = if step < 18 { first } else { axes[0] };
                     let linear = Vector3::new(0.1, 0.0, 0.0);
-                    let read = se3::exp(&linear, &(about * (sense * 5_f64.to_radians())));
+                    let turn = about * (sense * 4.9_f64.to_radians());
+                    let read = se3::exp(&linear, &turn);
                     let calibrated = Calibrated {
                         moving_s: 0.1,
-                        turned_rad: se3::log(&read).1,
+                        turned_rad: turn,
                         ..Calibrated::default()
                     };
                     each *= calibrated.corrected_by(&read, &found);
@@ -174,7 +180,7 @@ mod tests {
                 let off = corrected.rotation.angle_to(&each.rotation);
                 let uncorrected = motion.rotation.angle_to(&each.rotation);
                 assert!(uncorrected > 0.03, "{uncorrected} rad are to be corrected");
-                assert!(off < most, "{off} rad off of {uncorrected}, tilted {tilt}");
+                assert!(off < most, "{off} rad off of {uncorrected}");
             }
         }
     }

@@ -15,7 +15,7 @@ use super::observers::Observers;
 use super::parameters::Parameters;
 use super::sensor::SightingTarget;
 use super::tuning::{
-    ARCHIVE_GAIN_MIN_M2, ARCHIVE_GATE, REFUSED_TO_FORGET, REFUSED_TO_WIDEN, WIDENED_SD,
+    ARCHIVE_GAIN_MIN_M2, ARCHIVE_GATE, ODD_SD, REFUSED_TO_FORGET, REFUSED_TO_WIDEN, WIDENED_SD,
 };
 use super::verdict::{Outcome, Verdict};
 use crate::input::{Label, Relation, RelativePose};
@@ -401,7 +401,8 @@ impl CorrectionScope {
         let are_within = |most: f64| squares.iter().all(|square| square.sqrt() <= most);
         let is_accepted = are_within(parameters.gate);
         if self.counts {
-            observer.weigh(!is_accepted, is_accepted && are_within(parameters.soft));
+            let fits = is_accepted && are_within(parameters.soft.max(ODD_SD));
+            observer.weigh(!is_accepted, fits);
         }
         is_accepted.then_some(squares)
     }

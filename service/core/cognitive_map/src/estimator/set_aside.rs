@@ -1,7 +1,7 @@
 //! Agents whose sightings contradict the estimate.
 //!
-//! An agent's *doubt* counts its refused sightings, and by half those of which a component lost
-//! weight, less those that fit.
+//! An agent's *doubt* counts, in halves, its refused sightings and by half those that are taken in
+//! but do not fit, less those that fit.
 //!
 //! - From [`DOUBT_MIN`] on the agent is doubted: its sightings correct itself alone, and sightings
 //!   of it correct only it, as in a Schmidt-Kalman filter.
@@ -35,7 +35,8 @@ impl AgentState {
         self.doubt >= DOUBT_MIN
     }
 
-    /// A sighting was refused, or taken in; `fits` says whether none of its components lost weight.
+    /// A sighting was refused, or taken in; `fits` says whether all of its components
+    /// are about where they were expected.
     pub(super) fn weigh(&mut self, is_refused: bool, fits: bool) {
         if is_refused {
             self.refused += 1;
@@ -224,7 +225,8 @@ mod tests {
     use super::super::parameters::Parameters;
     use super::super::tests::{polar, start};
     use super::*;
-    use nalgebra::Point3;
+    use crate::input::{Relation, RelativePosition};
+    use nalgebra::{Point3, Vector3};
 
     fn label(number: usize) -> Label {
         Label::new(&format!("post-{number}")).unwrap()
@@ -267,7 +269,7 @@ mod tests {
         lie(&mut estimator, liar, 50, DOUBT_MIN / DOUBT_BY_SIGHTING);
         assert!(estimator.is_doubted(liar) && !estimator.is_doubted(honest));
         let archived = *estimator.frame(MAP).archive.get(&label(0)).unwrap();
-        let beside = post(0) + nalgebra::Vector3::new(0.7, 0.0, 0.0);
+        let beside = post(0) + Vector3::new(0.7, 0.0, 0.0);
         see(&mut estimator, liar, 0, &beside);
         let frame = estimator.frame(MAP);
         let restored = &frame.landmarks[&label(0)];
@@ -276,6 +278,27 @@ mod tests {
         assert!(lost.amax() < 1e-6 * archived.covariance.amax(), "{lost}");
         let pose = estimator.in_frame(honest).unwrap();
         assert!(pose.translation.vector.norm() < 1e-9);
+    }
+
+    /// However soon the settings let errors lose weight, those that a sensor states raise no doubt.
+    #[test]
+    fn errors_as_large_as_stated_raise_no_doubt() {
+        let mut estimator = Estimator::new(Parameters {
+            soft: 0.5,
+            ..Parameters::default()
+        });
+        let agent = estimator.enrol();
+        assert!(estimator.found(agent));
+        let random = &mut random::Seeded(1);
+        for seen in 0..400 {
+            let number = seen / 2 % 4;
+            let off = Vector3::from_fn(|_, _| 0.1 * random.normal());
+            let at = post(number).coords + off;
+            let seen_at = RelativePosition::new(at.into(), [0.1; 3]).unwrap();
+            let relation = Relation::Position(seen_at);
+            estimator.landmark(agent, 0, &label(number), &relation, &mut Vec::new());
+            assert!(!estimator.is_doubted(agent), "{seen}");
+        }
     }
 
     #[test]

@@ -244,9 +244,13 @@ pub(super) const REFUSED_TO_FORGET: u32 = 8;
 pub(super) const REFUSED_TO_DISSOCIATE: u32 = 6;
 /// What a refused sighting adds to an agent's doubt, and one that fits takes away.
 pub(super) const DOUBT_BY_SIGHTING: u32 = 2;
-/// What a sighting adds of which a component lost weight. Source: where sightings are random, as
-/// many lose weight as are refused or fit; where they are merely noisier than stated, few are.
+/// What a sighting adds that is taken in but does not fit. Source: where sightings are random, as
+/// many are odd as are refused or fit; where they are merely noisier than stated, few are.
 pub(super) const DOUBT_BY_OUTLIER: u32 = 1;
+/// Deviations within which all components of a sighting that fits are, or more where the settings
+/// let them lose weight only later. Source: of six true components one is beyond in a quarter of
+/// all sightings, and doubt grows where two thirds are.
+pub(super) const ODD_SD: f64 = 2.0;
 /// Doubt from which on an agent corrects nobody but itself. Source: what it takes to search farther
 /// around once; *liars*.
 pub(super) const DOUBT_MIN: u32 = DOUBT_BY_SIGHTING * REFUSED_TO_WIDEN;

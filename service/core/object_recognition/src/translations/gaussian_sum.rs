@@ -6,7 +6,7 @@ use nalgebra::UnitQuaternion;
 
 use crate::contact::{Contact, Reached};
 use crate::library::{ObjectId, ObjectLibrary};
-use crate::numeric::{exp, log_sum, to_f32};
+use crate::numeric::{log_sum, to_f32};
 use crate::percept_likelihood::ContactPercepts;
 use crate::translations::background::{BackgroundModel, UnknownContact};
 use crate::translations::hypothesis::TranslationHypothesis;
@@ -17,8 +17,8 @@ use crate::translations::split::SplitBuffers;
 use crate::translations::touch_update::TouchUpdate;
 use crate::translations::unexplored::Unexplored;
 use crate::tuning::{
-    DROPPED_SHARE, NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN,
-    PROMOTION_SEEDS, PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
+    NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN, PROMOTION_SEEDS,
+    PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
 };
 
 /// All hypotheses.
@@ -185,7 +185,7 @@ impl GaussianSum {
         let most = TRANSLATIONS_MAX;
         let evidences = self.all.iter().map(|hypothesis| hypothesis.evidence);
         let best = evidences.clone().fold(self.prefilter.best_log(), f64::max);
-        let mut least = f64::max(best - PRUNE_NATS, self.negligible_log(best));
+        let mut least = best - PRUNE_NATS;
         let mut evidences: Vec<f64> = evidences.filter(|evidence| *evidence > least).collect();
         // Room for hypotheses exactly as heavy as the lightest.
         let mut room = usize::MAX;
@@ -211,25 +211,6 @@ impl GaussianSum {
             }
         }
         self.all = kept;
-    }
-
-    /// Log of the mass below which hypotheses hold next to nothing together; `best` is that of the
-    /// heaviest.
-    fn negligible_log(&self, best: f64) -> f64 {
-        let share = |log: f64| exp(to_f32(log - best));
-        let mut histogram = MassHistogram::new(0);
-        for hypothesis in &self.all {
-            histogram.add(share(hypothesis.evidence));
-        }
-        let seeds = self.prefilter.masses().map(|(_, log)| share(log));
-        let all = histogram.sum() + seeds.map(f64::from).sum::<f64>();
-        let least = histogram.left_without(DROPPED_SHARE * all);
-        // Without hypotheses, or where nearly all is among the seeds, none is negligible.
-        if least < 1.0 {
-            best + f64::from(least).ln()
-        } else {
-            f64::NEG_INFINITY
-        }
     }
 
     /// Log of the mass of each object that has any.

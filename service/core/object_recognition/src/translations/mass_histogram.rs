@@ -51,7 +51,7 @@ impl MassHistogram {
     }
 
     /// Bins that are not empty, heaviest first: number, count and the mass in the bin's middle.
-    fn masses(&self) -> impl DoubleEndedIterator<Item = (u32, u32, f64)> {
+    fn masses(&self) -> impl Iterator<Item = (u32, u32, f64)> {
         let histogram = self.counts.iter().enumerate().rev();
         histogram
             .filter(|(_, count)| **count > 0)
@@ -90,18 +90,6 @@ impl MassHistogram {
         (least, heaviest)
     }
 
-    /// Lower bound of what is left without the lightest, as many as hold at most `mass` together.
-    pub(crate) fn left_without(&self, mass: f64) -> f32 {
-        let mut dropped = 0.0;
-        for (bin, count, middle) in self.masses().rev() {
-            dropped += f64::from(count) * middle;
-            if dropped > mass {
-                return f32::from_bits(bin << DROPPED_BITS);
-            }
-        }
-        f32::INFINITY
-    }
-
     /// Sum of all masses, to about a hundredth.
     pub(crate) fn sum(&self) -> f64 {
         { self.masses() }
@@ -130,11 +118,6 @@ mod tests {
         let (least, count) = histogram.least(10);
         assert_eq!(count, masses.iter().filter(|mass| **mass >= least).count());
         assert!((9..=10).contains(&count), "{count}");
-        // The lightest 100 hold 9 · 0.9¹⁰⁰ of it, give or take one.
-        let left = histogram.left_without(9.0 * 0.9_f64.powi(100));
-        let count = masses.iter().filter(|mass| **mass >= left).count();
-        assert!(count.abs_diff(100) <= 1, "{count}");
-        assert!(histogram.left_without(0.0) <= 0.9_f32.powi(200));
         // One that is heavier than all others together is one.
         histogram.add(1.0);
         histogram.add(1e-9);
