@@ -121,7 +121,7 @@ def write_views(directory: Path) -> None:
     samples = ["t_s,agent,kind,f1,f2,f3,f4,f5,f6,f7"]
     truth = ["t_s,agent,x,y,z,yaw,quality"]
     places = [[draw.gauss(0, 1) for _ in range(32)] for _ in range(40)]
-    views = []
+    views: List[List[float]] = []
     for robot in ("one", "two"):
         for k, place in enumerate(places):
             if k:
