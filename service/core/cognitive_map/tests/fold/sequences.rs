@@ -307,8 +307,8 @@ proptest! {
         prop_assert!((sum(&recalled) - 1.0).abs() < 1e-9, "{recalled:?}");
         let (expected, none) = exhaustive(&map, &cue);
         // Off the parts that are looked at, all positions are taken for one. On a map of some
-        // twenty places that matters for a sequence that nobody travelled: 0.23 was met.
-        let off_max = if is_travelled { 0.05 } else { 0.3 };
+        // twenty places that matters for a sequence that nobody travelled.
+        let off_max = if is_travelled { 0.05 } else { 0.15 };
         prop_assert!((recalled.none - none).abs() < off_max, "{} {none}", recalled.none);
         for next in &recalled.next {
             let expected = expected.get(&next.place.0).copied().unwrap_or(0.0);

@@ -154,6 +154,10 @@ impl<'a> Forward<'a> {
         let mut probabilities = self.positions.iter();
         for window in self.windows {
             for (index, probability) in (0..window.places.len()).zip(probabilities.by_ref()) {
+                if !window.is_near(index) {
+                    none += probability;
+                    continue;
+                }
                 match window.after(index) {
                     After::Place(place) => *next.entry(place).or_default() += probability,
                     After::End => none += probability,

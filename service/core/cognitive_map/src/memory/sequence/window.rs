@@ -1,5 +1,7 @@
 //! The parts of trips that a sequence may be on.
 
+use std::ops::Range;
+
 use crate::memory::ids::{PlaceId, TripId};
 use crate::memory::strength::Clock;
 use crate::memory::trip::{TripEnd, TripMap};
@@ -9,6 +11,9 @@ use super::evidence::Evidence;
 /// Places that the sequence may have skipped, or have besides: a part is so much longer on both
 /// sides.
 const SLACK: u32 = 2;
+/// Positions up to which all trips are looked at as a whole: so few cost next to nothing, and what
+/// is elsewhere is not small beside what is near.
+const WHOLE_MAX: usize = 512;
 
 /// A part of a trip.
 #[derive(Debug)]
@@ -17,6 +22,8 @@ pub(super) struct Window {
     /// Position of its first place in the trip.
     pub(super) first: u32,
     pub(super) places: Vec<PlaceId>,
+    /// The positions, counted from the first, that are near an element of the sequence.
+    near: Vec<Range<usize>>,
     /// What comes after its last place.
     pub(super) after: After,
     /// How much the trip counts: 1, less as it fades. That later trips went the same way does not
@@ -68,6 +75,17 @@ impl Window {
                 _ => joined.push((trip, from, to)),
             }
         }
+        if !joined.is_empty() && trips.legs() + trips.len() <= WHOLE_MAX {
+            let whole = trips.iter_from(TripId(0)).filter_map(|(trip, _)| {
+                let mut window = Self::of(trips, trip, 0, u32::MAX - 1, now)?;
+                let near = joined.iter().filter(|span| span.0 == trip);
+                window.near = near
+                    .map(|span| span.1 as usize..span.2 as usize + 1)
+                    .collect();
+                Some(window)
+            });
+            return Some(whole.collect());
+        }
         let windows = joined.into_iter();
         Some(
             windows
@@ -81,6 +99,9 @@ impl Window {
         let record = trips.get(trip)?;
         let mut places = record.places_from(from as usize);
         let within: Vec<_> = { places.by_ref() }.take((to - from) as usize + 1).collect();
+        if within.is_empty() {
+            return None;
+        }
         let after = match (places.next(), record.ended()) {
             (Some(place), _) => After::Place(place),
             (None, Some(TripEnd::Stillness | TripEnd::SessionEnd | TripEnd::Marker)) => After::End,
@@ -89,10 +110,16 @@ impl Window {
         Some(Self {
             trip,
             first: from,
+            near: std::iter::once(0..within.len()).collect(),
             places: within,
             after,
             weight: record.strength.now(now).min(1.0),
         })
+    }
+
+    /// Whether it can be told of one of its places that the sequence is there.
+    pub(super) fn is_near(&self, index: usize) -> bool {
+        self.near.iter().any(|near| near.contains(&index))
     }
 
     /// What comes after one of its places.
