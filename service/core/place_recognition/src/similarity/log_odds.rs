@@ -3,8 +3,9 @@
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
+use super::neighbours::{NeighbourPair, Neighbours};
 use super::runs::Runs;
-use super::two_covariance::{self, single};
+use super::two_covariance::{TwoCovariance, single};
 use crate::tuning::similarity as tuning;
 
 /// What was learned of a channel.
@@ -16,66 +17,118 @@ pub(super) struct Learned {
     pub(super) independence: f64,
     /// Log-odds of all pairs of views.
     pub(super) log_odds: DMatrix<f32>,
+    /// Weights of a score, of both backgrounds together and of a constant in the log-odds.
+    weights: Vector3<f64>,
+    /// How alike the most similar far views of each view are.
+    backgrounds: Vec<f64>,
 }
 
 impl Learned {
-    /// From the scores of all pairs of views; `None` if there are no far views, or near ones are no
-    /// more alike.
-    pub(super) fn of(runs: &Runs<'_>, mut scores: DMatrix<f32>) -> Option<Self> {
+    /// From the scores of all pairs of views and of neighbours; `None` if there are no far views,
+    /// or near ones are no more alike.
+    pub(super) fn of(
+        runs: &Runs<'_>,
+        neighbours: &[NeighbourPair],
+        mut scores: DMatrix<f32>,
+    ) -> Option<Self> {
         let far = far_pairs(runs);
         if far.len() < tuning::FAR_PAIRS / 100 {
             return None;
         }
-        let range_m = range_m(runs, &scores, &far)?;
+        let range_m = range_m(neighbours, &scores, &far)?;
         let backgrounds = backgrounds(runs, &scores);
-        let near = near_pairs(runs, range_m);
-        let feature = |pair| feature(pair, &scores, &backgrounds);
-        let [near, distant]: [Vec<_>; 2] =
-            [&near, &far].map(|pairs| pairs.iter().copied().map(feature).collect());
+        let near = near_features(neighbours, range_m, &backgrounds);
+        let distant = far_features(&far, &scores, &backgrounds);
         let weights = logistic(&near, &distant)?;
-        let [low, high] = [tuning::LOG_ODDS.0, tuning::LOG_ODDS.1];
+        let mut learned = Self {
+            range_m,
+            independence: 1.0,
+            log_odds: DMatrix::zeros(0, 0),
+            weights,
+            backgrounds,
+        };
         for column in 0..runs.len() {
             for row in 0..runs.len() {
                 let score = &mut scores[(row, column)];
-                let background = backgrounds[row] + backgrounds[column];
-                let odds = weights.dot(&Vector3::new(f64::from(*score), background, 1.0));
-                *score = single(odds).clamp(low, high);
+                *score = learned.log_odds_by(*score, (row, column));
             }
         }
-        Some(Self {
-            range_m,
-            independence: independence(runs, &scores, &far),
-            log_odds: scores,
-        })
+        learned.independence = independence(runs, &scores, &far);
+        learned.log_odds = scores;
+        Some(learned)
+    }
+
+    /// Log-odds by the score of two views, each one of those that were compared, or beside it.
+    pub(super) fn log_odds_by(&self, score: f32, beside: (usize, usize)) -> f32 {
+        let both = self.backgrounds[beside.0] + self.backgrounds[beside.1];
+        let odds = self.weights.dot(&Vector3::new(f64::from(score), both, 1.0));
+        let [low, high] = [tuning::LOG_ODDS.0, tuning::LOG_ODDS.1];
+        single(odds).clamp(low, high)
     }
 }
 
-/// What the log-odds of two views depend on: their score, and how alike everything is to them.
-fn feature((a, b): (usize, usize), scores: &DMatrix<f32>, backgrounds: &[f64]) -> Vector3<f64> {
-    let score = f64::from(scores[(a, b)]);
-    Vector3::new(score, backgrounds[a] + backgrounds[b], 1.0)
+/// What the log-odds of two far views depend on: their score, and how alike everything is to them.
+fn far_features(
+    pairs: &[(usize, usize)],
+    scores: &DMatrix<f32>,
+    backgrounds: &[f64],
+) -> Vec<Vector3<f64>> {
+    let feature = |&(a, b): &(usize, usize)| {
+        let score = f64::from(scores[(a, b)]);
+        Vector3::new(score, backgrounds[a] + backgrounds[b], 1.0)
+    };
+    pairs.iter().map(feature).collect()
+}
+
+/// The same of neighbours within a range.
+fn near_features(
+    neighbours: &[NeighbourPair],
+    range_m: f64,
+    backgrounds: &[f64],
+) -> Vec<Vector3<f64>> {
+    let near = { neighbours.iter() }.filter(|pair| pair.lag >= 2 && pair.distance_m < range_m);
+    let feature = |pair: &NeighbourPair| {
+        let (a, b) = pair.about;
+        Vector3::new(pair.score, backgrounds[a] + backgrounds[b], 1.0)
+    };
+    near.map(feature).collect()
 }
 
 /// Mean log-odds of neighbours within a range \[nats\], of the later half of the views by what is
 /// learned of the earlier half: what was learned of the same pairs would flatter it.
-pub(super) fn information_nats(runs: &Runs<'_>, range_m: f64) -> f64 {
-    validated_nats(runs, range_m).unwrap_or(0.0)
+pub(super) fn information_nats(
+    runs: &Runs<'_>,
+    neighbours: &Neighbours<'_>,
+    views: &DMatrix<f64>,
+    range_m: f64,
+) -> f64 {
+    validated_nats(runs, neighbours, views, range_m).unwrap_or(0.0)
 }
 
-fn validated_nats(runs: &Runs<'_>, range_m: f64) -> Option<f64> {
+fn validated_nats(
+    runs: &Runs<'_>,
+    neighbours: &Neighbours<'_>,
+    views: &DMatrix<f64>,
+    range_m: f64,
+) -> Option<f64> {
     let half = runs.len() / 2;
-    let scores = two_covariance::scores(runs, 0..half)?;
+    let matched = neighbours.of_matched(views);
+    let within = neighbours.within(views, half)?;
+    let model = TwoCovariance::of(within, &matched.rows(0, half).into_owned())?;
+    let components = model.components(views);
+    let (scores, score_sd) = model.scores(&neighbours.of_matched(&components));
     let backgrounds = backgrounds(runs, &scores);
-    let (near, far) = (near_pairs(runs, range_m), far_pairs(runs));
-    let features = |pairs: &[(usize, usize)], is_later: bool| -> Vec<Vector3<f64>> {
-        let all = pairs.iter().copied();
-        let those = all.filter(|&(a, b)| (a >= half) == is_later && (b >= half) == is_later);
-        those
-            .map(|pair| feature(pair, &scores, &backgrounds))
-            .collect()
-    };
-    let weights = logistic(&features(&near, false), &features(&far, false))?;
-    let later = features(&near, true);
+    let pairs = neighbours.pairs(&model, &components, score_sd);
+    let (later, earlier): (Vec<_>, Vec<_>) = { pairs.into_iter() }
+        .filter(|pair| pair.about.0 >= half || pair.about.1 < half)
+        .partition(|pair| pair.about.0 >= half);
+    let far = far_pairs(runs).into_iter();
+    let far: Vec<_> = far.filter(|&(a, b)| a < half && b < half).collect();
+    let weights = logistic(
+        &near_features(&earlier, range_m, &backgrounds),
+        &far_features(&far, &scores, &backgrounds),
+    )?;
+    let later = near_features(&later, range_m, &backgrounds);
     let [low, high] = [tuning::LOG_ODDS.0, tuning::LOG_ODDS.1].map(f64::from);
     let odds = later.iter().map(|one| weights.dot(one).clamp(low, high));
     (!later.is_empty()).then(|| odds.sum::<f64>() / later.len() as f64)
@@ -107,17 +160,14 @@ fn floor(value: f64) -> usize {
 }
 
 /// The range of a channel, from its views' neighbours along the way.
-fn range_m(runs: &Runs<'_>, scores: &DMatrix<f32>, far: &[(usize, usize)]) -> Option<f64> {
-    let mut pairs: Vec<(f64, f64)> = Vec::new();
-    for index in 0..runs.len() {
-        for lag in 1..=tuning::RANGE_LAGS {
-            let other = index + lag;
-            if other < runs.len() && runs.is_same(index, other) {
-                let score = f64::from(scores[(index, other)]);
-                pairs.push((runs.distance_m(index, other), score));
-            }
-        }
-    }
+fn range_m(
+    neighbours: &[NeighbourPair],
+    scores: &DMatrix<f32>,
+    far: &[(usize, usize)],
+) -> Option<f64> {
+    let mut pairs: Vec<(f64, f64)> = { neighbours.iter() }
+        .map(|pair| (pair.distance_m, pair.score))
+        .collect();
     if pairs.len() < tuning::NEIGHBOURS_MIN {
         return None;
     }
@@ -166,23 +216,6 @@ fn backgrounds(runs: &Runs<'_>, scores: &DMatrix<f32>) -> Vec<f64> {
         largest + (sum / far.len().max(1) as f64).ln()
     };
     (0..n).map(background).collect()
-}
-
-/// Pairs of neighbours along the way within a range.
-fn near_pairs(runs: &Runs<'_>, range_m: f64) -> Vec<(usize, usize)> {
-    let mut pairs = Vec::new();
-    for index in 0..runs.len() {
-        for lag in 2..=tuning::RANGE_LAGS {
-            let other = index + lag;
-            if other < runs.len()
-                && runs.is_same(index, other)
-                && runs.distance_m(index, other) < range_m
-            {
-                pairs.push((index, other));
-            }
-        }
-    }
-    pairs
 }
 
 /// Weights of a logistic regression of near against far pairs, both with the same weight.

@@ -2,10 +2,13 @@
 
 use nalgebra::{DMatrix, Point3};
 
+use super::centres::Centres;
 use super::learned_channel::LearnedChannel;
 use super::log_odds::{Learned, information_nats};
+use super::neighbours::Neighbours;
 use super::runs::Runs;
-use super::two_covariance;
+use super::sequence_odds;
+use super::two_covariance::{TwoCovariance, single};
 use super::view_log::ViewLog;
 use crate::keyframes::SampleKey;
 use crate::tuning::similarity as tuning;
@@ -59,19 +62,33 @@ impl<'a> Similarity<'a> {
     }
 
     fn of(log: &'a ViewLog, channel: u8, most: usize) -> Option<Self> {
-        let runs = Runs::of(log, channel, most);
+        let all = Runs::of(log, channel);
+        let runs = all.thinned(most);
         if runs.len() < crate::tuning::log::VIEWS_MIN {
             return None;
         }
-        let scores = two_covariance::scores(&runs, 0..runs.len())?;
-        let learned = Learned::of(&runs, scores)?;
-        let of_sequences = of_sequences(&runs, &learned.log_odds);
+        let neighbours = Neighbours::of(&all, &runs);
+        let centres = Centres::of(&all);
+        let views = centres.centred(&all);
+        let within = neighbours.within(&views, runs.len())?;
+        let model = TwoCovariance::of(within, &neighbours.of_matched(&views))?;
+        let components = model.components(&views);
+        let (scores, score_sd) = model.scores(&neighbours.of_matched(&components));
+        let pairs = neighbours.pairs(&model, &components, score_sd);
+        let learned = Learned::of(&runs, &pairs, scores)?;
+        let of_sequences = if all.len() == runs.len() {
+            sequence_odds::of_all(&runs, &learned.log_odds)
+        } else {
+            let score =
+                |some: &_, others: &_| model.scores_between(some, others) / single(score_sd);
+            sequence_odds::of_thinned(&neighbours, &components, score, &learned)
+        };
         Some(Self {
             learned: LearnedChannel {
                 channel,
                 views: u32::try_from(runs.len()).unwrap_or(u32::MAX),
                 range_m: learned.range_m,
-                information_nats: information_nats(&runs, learned.range_m),
+                information_nats: information_nats(&runs, &neighbours, &views, learned.range_m),
                 independence: learned.independence,
             },
             runs,
@@ -217,37 +234,6 @@ impl<'a> Similarity<'a> {
         }
         sum * self.learned.independence.sqrt()
     }
-}
-
-/// Log-odds of the sequences about all pairs of views: √n times the mean of n pairs, the better of
-/// both directions of travel.
-fn of_sequences(runs: &Runs<'_>, log_odds: &DMatrix<f32>) -> DMatrix<f32> {
-    let n = runs.len();
-    let reach = tuning::SEQUENCE;
-    let scale = two_covariance::single((2.0 * reach as f64 + 1.0).sqrt());
-    let mut odds = DMatrix::zeros(n, n);
-    for column in 0..n {
-        for row in 0..=column {
-            let along = |direction: isize| {
-                let (mut sum, mut count) = (0.0, 0.0);
-                for lag in -reach..=reach {
-                    let pair = runs
-                        .after(row, lag)
-                        .zip(runs.after(column, lag * direction));
-                    if let Some(pair) = pair {
-                        sum += log_odds[pair];
-                        count += 1.0;
-                    }
-                }
-                sum / count
-            };
-            // Both orders of a pair are the same sequences.
-            let best = scale * f32::max(along(1), along(-1));
-            odds[(row, column)] = best;
-            odds[(column, row)] = best;
-        }
-    }
-    odds
 }
 
 #[cfg(test)]

@@ -1,10 +1,13 @@
 //! How alike views are as a function of where they were taken, learned for each channel from the
 //! views themselves; and which of them are likely to be of one place.
 
+mod centres;
 mod learned_channel;
 mod log_odds;
 mod matching;
+mod neighbours;
 mod runs;
+mod sequence_odds;
 mod two_covariance;
 mod view_log;
 

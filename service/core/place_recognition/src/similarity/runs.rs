@@ -10,22 +10,19 @@ pub(super) struct Runs<'a> {
     pub(super) run: Vec<u32>,
     /// Whether each view was added since the log was last matched.
     pub(super) is_new: Vec<bool>,
+    /// Difference of the ordinals of neighbours.
+    pub(super) stride: u32,
 }
 
 impl<'a> Runs<'a> {
-    /// At most so many views of a channel, evenly thinned.
-    pub(super) fn of(log: &'a ViewLog, channel: u8, most: usize) -> Self {
+    /// The views of a channel.
+    pub(super) fn of(log: &'a ViewLog, channel: u8) -> Self {
         let n_old = log.views.len().saturating_sub(log.n_new as usize);
         let numbered = log.views.iter().enumerate();
         let views = numbered.filter(|(_, view)| view.channel == channel);
         let mut views: Vec<(bool, &LoggedView)> = views
             .map(|(number, view)| (number >= n_old, view))
             .collect();
-        let mut stride = log.stride;
-        while views.len() > most {
-            stride = stride.saturating_mul(2);
-            views.retain(|(_, view)| view.ordinal.is_multiple_of(stride));
-        }
         views.sort_by_key(|(_, view)| {
             (
                 view.sample.agent,
@@ -34,6 +31,22 @@ impl<'a> Runs<'a> {
                 view.ordinal,
             )
         });
+        Self::of_sorted(views, log.stride)
+    }
+
+    /// At most so many of them, evenly thinned.
+    pub(super) fn thinned(&self, most: usize) -> Self {
+        let numbered = self.is_new.iter().copied().zip(self.views.iter().copied());
+        let mut views: Vec<(bool, &LoggedView)> = numbered.collect();
+        let mut stride = self.stride;
+        while views.len() > most {
+            stride = stride.saturating_mul(2);
+            views.retain(|(_, view)| view.ordinal.is_multiple_of(stride));
+        }
+        Self::of_sorted(views, stride)
+    }
+
+    fn of_sorted(views: Vec<(bool, &'a LoggedView)>, stride: u32) -> Self {
         let (is_new, views): (Vec<bool>, Vec<&LoggedView>) = views.into_iter().unzip();
         let mut run = Vec::with_capacity(views.len());
         let mut number = 0;
@@ -50,7 +63,25 @@ impl<'a> Runs<'a> {
             }
             run.push(number);
         }
-        Self { views, run, is_new }
+        Self {
+            views,
+            run,
+            is_new,
+            stride,
+        }
+    }
+
+    /// Where each view of a thinned selection of these is among them.
+    pub(super) fn places_of(&self, thinned: &Self) -> Vec<usize> {
+        let mut places = Vec::with_capacity(thinned.len());
+        let mut place = 0;
+        for view in &thinned.views {
+            while self.views[place].sample != view.sample {
+                place += 1;
+            }
+            places.push(place);
+        }
+        places
     }
 
     /// Number of views.

@@ -74,3 +74,54 @@ fn views_are_news_where_the_robot_comes_back() {
     let once = news_nats(&[out.as_slice(), back.as_slice()].concat());
     assert!(again < 0.6 * once, "{again} {once}");
 }
+
+#[test]
+fn views_are_recognised_where_few_of_them_are_matched() {
+    // Of four views 0.6 m apart one is matched, and those are farther apart than what two show
+    // together.
+    let once: Vec<f64> = (0..400).map(|number| 0.6 * f64::from(number)).collect();
+    let twice = [once.as_slice(), once.as_slice()].concat();
+    let log = log_of(&twice, 0);
+    let channels = Similarity::of_channels(&log, 256);
+    assert_eq!(channels.len(), 1, "views of one channel that say something");
+    let channel = &channels[0];
+    assert_eq!(channel.learned().views, 200);
+    let range_m = channel.learned().range_m;
+    assert!((1.0..3.0).contains(&range_m), "{range_m}");
+    assert!(channel.learned().information_nats > 1.0);
+    let at = |sample: SampleKey| twice[usize::try_from(sample.seq).unwrap()];
+    let matches = channel.matches();
+    let best = |seq: u64| {
+        let of_view = matches.iter().filter(|one| one.now.seq == seq);
+        of_view.max_by(|a, b| a.depth.total_cmp(&b.depth))
+    };
+    let is_true = |one: &&ViewMatch| (at(one.now) - at(one.then)).abs() < 3.0;
+    let again = (400..800).step_by(4).filter_map(best).filter(is_true);
+    let n_true = again.count();
+    assert!(n_true >= 95, "{n_true} of 100");
+}
+
+#[test]
+fn sequences_of_all_views_are_those_of_views_between_which_there_are_none() {
+    let once: Vec<f64> = (0..100).map(|number| 0.4 * f64::from(number)).collect();
+    let back: Vec<f64> = once.iter().rev().copied().collect();
+    let log = log_of(&[once, back].concat(), 0);
+    let all = Runs::of(&log, 0);
+    let neighbours = Neighbours::of(&all, &all);
+    let views = Centres::of(&all).centred(&all);
+    let model = TwoCovariance::of(neighbours.within(&views, all.len()).unwrap(), &views).unwrap();
+    let components = model.components(&views);
+    let (scores, score_sd) = model.scores(&components);
+    let pairs = neighbours.pairs(&model, &components, score_sd);
+    for pair in pairs.iter().step_by(97) {
+        let score = f64::from(scores[(pair.about.0, pair.about.0 + pair.lag)]);
+        assert!((score - pair.score).abs() < 1e-4, "{score} {pair:?}");
+    }
+    let learned = Learned::of(&all, &pairs, scores).unwrap();
+    let score = |some: &_, others: &_| model.scores_between(some, others) / single(score_sd);
+    let of_thinned = sequence_odds::of_thinned(&neighbours, &components, score, &learned);
+    let of_all = sequence_odds::of_all(&all, &learned.log_odds);
+    assert_eq!(of_all.shape(), of_thinned.shape());
+    let apart = (of_all - of_thinned).abs().max();
+    assert!(apart < 1e-3, "{apart}");
+}
