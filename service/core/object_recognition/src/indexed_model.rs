@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
-use crate::interpolation::{Fields, LinkGraph, OpenRegion, interpolated};
+use crate::interpolation::{Fields, LinkGraph, OpenRegion, Spread, interpolated};
 use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::{LevelMemory, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
@@ -45,8 +45,10 @@ impl IndexedModel {
             .collect();
         let graph = LinkGraph::new(&felt);
         let fields = Fields::learned(model.places(), &graph);
+        let spread = Spread::learned(model.places(), &graph, spacing_m);
+        let between = fields.as_ref().filter(|_| spread == Spread::Even);
         // On a surface contacts fall up to half a link beside a place, or half the step of nodes.
-        let is_surface = fields.is_some() && !graph.is_curve();
+        let is_surface = between.is_some() && !graph.is_curve();
         let field_m = |own| {
             let link_m = graph.mean_link_m(own, &felt).filter(|_| is_surface);
             let width_m = link_m.map_or(spacing_m, |link_m| {
@@ -67,7 +69,7 @@ impl IndexedModel {
                 descriptors: place.descriptors.clone(),
             })
             .collect();
-        if let Some(fields) = &fields {
+        if let Some(fields) = between {
             let nodes = interpolated(model.places(), &graph, fields, spacing_m);
             places.extend(nodes);
         }
@@ -81,7 +83,8 @@ impl IndexedModel {
         Self {
             packed: PackedPlaces::new(&places, spacing_m, extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
-            open: fields.and_then(|_| OpenRegion::new(&positions, felt.len(), &graph, spacing_m)),
+            open: fields
+                .and_then(|_| OpenRegion::new(&positions, felt.len(), &graph, (spread, spacing_m))),
             area_m2: positions.len() as f64 * spacing_m * spacing_m,
             surfel_map: SurfelMap::new(model),
             extent_m,

@@ -162,6 +162,11 @@ pub(crate) const PREDICTED_DEVIATIONS: f64 = 2.6;
 pub(crate) const TAILS: f64 = 4.0;
 /// Places whose errors scale the variance of a field around. Chosen.
 pub(crate) const ERROR_NEIGHBOURS: usize = 6;
+/// Share of contacts that fall evenly over a surface, and not on its places alone, below which
+/// nothing stands between these; so many may lie there all the same. Hands that feel a surface
+/// anywhere have a share from a third to one, those that reach for the same points again less than
+/// a tenth. Chosen.
+pub(crate) const EVEN_SHARE_MIN: f64 = 0.25;
 /// Nodes and places of a model: a model with more places has no nodes. Budget.
 pub(crate) const NODES_MAX: usize = 1024;
 /// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept

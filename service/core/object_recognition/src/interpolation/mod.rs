@@ -4,7 +4,8 @@
 //! links are what is bridged. On them stand *nodes*, so close that a contact between two places has
 //! one beside it. Where a node lies and what is felt there follows by kriging ([`kriging`]), a
 //! Gaussian process over the places around, whose length and variance are learned from the model's
-//! own places by leave-one-out cross-validation ([`field`]).
+//! own places by leave-one-out cross-validation ([`field`]). Nothing stands between places where
+//! contacts fall on them alone ([`spread`]).
 
 mod field;
 mod graph;
@@ -12,8 +13,10 @@ mod kriging;
 mod nodes;
 mod open;
 mod sides;
+mod spread;
 mod taken;
 
 pub(crate) use graph::LinkGraph;
 pub(crate) use nodes::{Fields, interpolated};
 pub(crate) use open::{OpenRegion, Part};
+pub(crate) use spread::Spread;

@@ -5,11 +5,12 @@ use std::f64::consts::PI;
 use nalgebra::Point3;
 
 use super::graph::LinkGraph;
+use super::spread::Spread;
 use crate::index::nearest_place::NearestPlace;
 use crate::numeric::centroid;
 use crate::tuning::{
-    BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FIELD_PER_SPACING, FLAT_SHARE,
-    MISSING_PER_KNOWN, NODE_STEP, PARTIAL_PRIOR, UNEXPLORED_MIN,
+    BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EVEN_SHARE_MIN, EXPLORED_REACH, FIELD_PER_SPACING,
+    FLAT_SHARE, MISSING_PER_KNOWN, NODE_STEP, PARTIAL_PRIOR, UNEXPECTED_SHARE, UNEXPLORED_MIN,
 };
 
 /// The part of space of which a model knows little: beyond the edge of what was felt, and in the
@@ -22,6 +23,8 @@ pub(crate) struct OpenRegion {
     entries: Vec<u32>,
     /// Typical distance of places \[m\].
     typical_m: f64,
+    /// Share of contacts in a gap that are not as predicted there.
+    pub(crate) unexpected: f64,
     /// Probability that a contact is with what was not felt; 0 where next to nothing is missing.
     pub(crate) unexplored: f64,
     /// Length of what was felt, or the side of a square as large \[m\].
@@ -57,7 +60,7 @@ impl OpenRegion {
         positions: &[Point3<f64>],
         felt: usize,
         graph: &LinkGraph,
-        spacing_m: f64,
+        (spread, spacing_m): (Spread, f64),
     ) -> Option<Self> {
         if felt < BETWEEN_MIN {
             return None;
@@ -84,11 +87,15 @@ impl OpenRegion {
         };
         let unexplored = missing / (missing + known).max(f64::MIN_POSITIVE);
         let is_open_anywhere = unexplored >= UNEXPLORED_MIN;
-        if !is_open_anywhere && all.len() == felt.len() {
+        let has_nodes = all.len() > felt.len();
+        if !is_open_anywhere && !has_nodes && spread == Spread::Even {
             return None;
         }
-        let has_nodes = all.len() > felt.len();
+        // A gap begins beyond the field of a place, which is as wide as a spacing or a link.
         let gap_m2 = |own: usize| {
+            if spread == Spread::OnPlaces {
+                return (0.5 * spacing_m).powi(2);
+            }
             let mean_m = graph.mean_link_m(own, felt).unwrap_or(0.0);
             if has_nodes && mean_m > NODE_STEP * spacing_m {
                 (0.5 * mean_m).powi(2)
@@ -113,6 +120,10 @@ impl OpenRegion {
             nearest: NearestPlace::new(felt, graph.typical_m),
             entries: entries.into_iter().step_by(step).collect(),
             typical_m: graph.typical_m,
+            unexpected: match spread {
+                Spread::Even => UNEXPECTED_SHARE,
+                Spread::OnPlaces => EVEN_SHARE_MIN,
+            },
             unexplored: if is_open_anywhere {
                 PARTIAL_PRIOR * unexplored
             } else {

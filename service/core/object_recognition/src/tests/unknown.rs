@@ -39,13 +39,44 @@ fn what_lies_on_a_part_of_something_learned_is_another_thing() {
     assert_eq!(posterior.verdict(), Verdict::Object(ObjectId(1)));
 }
 
-/// What is felt of a box that has waves of level over its faces.
-fn waved(box_number: u64, key: u64) -> (Point3<f64>, f64) {
-    let side = |axis: u64| 0.05 + 0.06 * uniform(900_000 + 8 * box_number + axis);
-    let (point, _) = on_box([side(0), side(1), side(2)], key);
+/// Sides of a box \[m\].
+fn sides_m(box_number: u64) -> [f64; 3] {
+    [0, 1, 2].map(|axis| 0.05 + 0.06 * uniform(900_000 + 8 * box_number + axis))
+}
+
+/// A point of a box that has waves of level over its faces, with its level.
+fn waved_at(box_number: u64, point: Point3<f64>) -> (Point3<f64>, f64) {
     let wave = |axis: u64| 100.0 * (uniform(910_000 + 8 * box_number + axis) - 0.5);
     let phase = wave(0) * point.x + wave(1) * point.y + wave(2) * point.z;
     (point, (phase + 6.0 * uniform(920_000 + box_number)).sin())
+}
+
+/// What is felt of such a box.
+fn waved(box_number: u64, key: u64) -> (Point3<f64>, f64) {
+    waved_at(box_number, on_box(sides_m(box_number), key).0)
+}
+
+/// The same at the points of a raster over all faces, a centimetre apart.
+fn raster(box_number: u64) -> Vec<(Point3<f64>, f64)> {
+    let sides_m = Vector3::from(sides_m(box_number));
+    let along = |side_m: f64| {
+        let from_m = 0.005 - side_m / 2.0;
+        { (0..20).map(move |k| from_m + 0.01 * f64::from(k)) }.filter(move |at| *at < side_m / 2.0)
+    };
+    let mut points = Vec::new();
+    for axis in 0..3 {
+        let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+        for at_u in along(sides_m[u]) {
+            for at_v in along(sides_m[v]) {
+                for sign in [-0.5, 0.5] {
+                    let mut at = Point3::origin();
+                    (at[axis], at[u], at[v]) = (sign * sides_m[axis], at_u, at_v);
+                    points.push(waved_at(box_number, at));
+                }
+            }
+        }
+    }
+    points
 }
 
 /// A noisy contact with it.
@@ -115,4 +146,28 @@ fn what_was_taught_by_few_contacts_is_never_called_unknown() {
         unknown += u32::from(posterior.unknown > posterior.objects[0].1);
     }
     assert!(unknown >= 2, "{unknown} of three");
+}
+
+#[test]
+fn what_was_taught_at_the_same_points_again_may_be_felt_between_them() {
+    let mut library = ObjectLibrary::default();
+    for (id, box_number) in (0u32..).zip(0..3) {
+        let mut model = ObjectModel::new(ModelSettings::default());
+        let visits = std::iter::repeat_n(raster(box_number), 4).flatten();
+        for (key, point) in (0..).zip(visits) {
+            model.learn(&felt(point, 7_000_000 + 100_000 * box_number + key));
+        }
+        library.put(ObjectId(id), model);
+    }
+    for own in 0..3 {
+        let mut recognition = Recognition::new(&Orientation::Known);
+        for (count, contact) in (1..).zip(run_over(own, 100)) {
+            recognition.touch(&library, contact);
+            let verdict = recognition.posterior(&library).verdict();
+            assert_ne!(verdict, Verdict::Unknown, "{own} after {count} touches");
+        }
+        let id = ObjectId(u32::try_from(own).expect("there are three"));
+        let verdict = recognition.posterior(&library).verdict();
+        assert_eq!(verdict, Verdict::Object(id));
+    }
 }

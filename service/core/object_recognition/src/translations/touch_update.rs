@@ -9,7 +9,7 @@ use crate::indexed_model::IndexedModel;
 use crate::interpolation::Part;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::percept_likelihood::ContactPercepts;
-use crate::tuning::{OUTLIER_SHARE, UNEXPECTED_SHARE};
+use crate::tuning::OUTLIER_SHARE;
 
 /// A touch, with what its update of every hypothesis shares.
 #[derive(Debug)]
@@ -63,7 +63,7 @@ impl<'a> TouchUpdate<'a> {
         };
         let (share, density) = match open.part(point) {
             Part::Known => (0.0, 0.0),
-            Part::Gap => (UNEXPECTED_SHARE, density.gap),
+            Part::Gap => (open.unexpected, density.gap),
             Part::Beyond => (1.0, density.open),
         };
         if explored < density {
