@@ -1,5 +1,7 @@
 //! Laws of recognition, and an oracle by brute force.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
 use super::{
@@ -9,6 +11,7 @@ use super::{
 use crate::numeric::log_sum;
 use crate::translations::GaussianSum;
 
+mod sizes;
 mod sparse;
 mod turns;
 mod unknown;
@@ -267,7 +270,13 @@ fn the_evidence_is_that_of_all_assignments_of_contacts_to_places() {
             .collect();
         let mut translations = GaussianSum::new(rotations.clone());
         for (count, contact) in contacts.iter().enumerate() {
-            translations.touch(&library, &contacts[..count], contact, &|_| 0.0);
+            translations.touch(
+                &library,
+                &contacts[..count],
+                contact,
+                BTreeMap::new(),
+                &|_| 0.0,
+            );
             let contacts = &contacts[..=count];
             let found = |id: u32| translations.object_logs()[&ObjectId(id)];
             let told = |id: u32| by_assignment(&library, id, &rotations, contacts);

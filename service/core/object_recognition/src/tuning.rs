@@ -228,6 +228,9 @@ pub(crate) const NEGLIGIBLE_SHARE: f64 = 1e-6;
 pub(crate) const PREFILTER_CONTACTS_MAX: usize = 32;
 /// Factor from one at which weights are scaled back, so that `f32` holds them. Derived.
 pub(crate) const RESCALE: f32 = 1_048_576.0;
+/// Most by which the weights of an object fall at once for its size \[nats\], so that `f32` holds
+/// them: three times what is pruned. Derived.
+pub(crate) const RESIZE_NATS_MAX: f64 = 60.0;
 /// Largest factor of a weight at one touch, so that numbers stay finite. Derived.
 pub(crate) const GAIN_MAX: f32 = 1e30;
 /// A list is made anew when fewer of its seeds than one in so many hold a mass. Chosen.

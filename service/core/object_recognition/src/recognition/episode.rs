@@ -81,13 +81,15 @@ impl Recognition {
         self.count += 1;
         let (steps, reach_m) = (self.steps_m.len(), self.reach_m());
         let spread = (self.count - self.aimed) as f64;
+        let sizes = self.translation_sizes(library);
         match &mut self.hypotheses {
             Hypotheses::Translations(translations) => {
                 let log = |indexed: &IndexedModel| -walk_log(indexed, 1, reach_m);
                 let logs = library.indexed_models().map(|(_, indexed)| log(indexed));
                 let mean = logs.sum::<f64>() / library.len().max(1) as f64;
                 let share = |object| library.indexed(object).map_or(0.0, |own| log(own) - mean);
-                translations.touch(library, &self.contacts, &contact, &share);
+                translations.touch(library, &self.contacts, &contact, sizes, &share);
+                translations.settle();
             }
             Hypotheses::Poses(poses) => {
                 let size_log = |indexed: &IndexedModel, surfel_map: &SurfelMap| {
@@ -95,10 +97,6 @@ impl Recognition {
                 };
                 poses.touch(library, &contact, CONTACTS_MAX, &size_log);
             }
-        }
-        let sizes = self.translation_shares(library);
-        if let Hypotheses::Translations(translations) = &mut self.hypotheses {
-            translations.settle(&sizes);
         }
         if self.contacts.len() >= CONTACTS_MAX {
             self.contacts.remove(0);

@@ -26,32 +26,31 @@ pub(super) struct PoseMass {
 
 impl Recognition {
     /// Log of each object's mass, in one measure.
-    pub(super) fn object_logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
+    pub(crate) fn object_logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
         match &self.hypotheses {
             Hypotheses::Translations(translations) => {
                 let logs = translations.object_logs();
-                let shares = self.translation_shares(library).into_iter();
-                let log = |(object, share)| {
+                let log = |(object, _)| {
                     let own = logs.get(&object).copied();
-                    (object, own.map_or(f64::NEG_INFINITY, |own| own + share))
+                    (object, own.unwrap_or(f64::NEG_INFINITY))
                 };
-                shares.map(log).collect()
+                library.indexed_models().map(log).collect()
             }
             Hypotheses::Poses(_) => sums(library, &self.pose_logs(library)),
         }
     }
 
     /// Logs of the factors that the masses of each object's translations have for its size.
-    pub(super) fn translation_shares(&self, library: &ObjectLibrary) -> BTreeMap<ObjectId, f64> {
+    pub(super) fn translation_sizes(&self, library: &ObjectLibrary) -> BTreeMap<ObjectId, f64> {
         let reach_m = self.reach_m();
-        let shares = library.indexed_models().map(|(object, indexed)| {
+        let sizes = library.indexed_models().map(|(object, indexed)| {
             let aimed = self.aimed as f64 * indexed.area_m2.ln();
             (
                 object,
                 aimed + walk_log(indexed, self.steps_m.len(), reach_m),
             )
         });
-        shares.collect()
+        sizes.collect()
     }
 
     /// Log of the mass of each pose, in one measure.
@@ -69,8 +68,7 @@ impl Recognition {
     /// How many hypotheses hold `LIVE_MASS` of the mass of all.
     pub(super) fn live_hypotheses(&self, library: &ObjectLibrary) -> usize {
         if let Hypotheses::Translations(translations) = &self.hypotheses {
-            let shares = self.translation_shares(library);
-            return translations.holding(LIVE_MASS, |object| shares.get(&object).copied());
+            return translations.holding(LIVE_MASS, |object| library.indexed(object).is_some());
         }
         let mut logs = self.pose_logs(library);
         logs.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));

@@ -33,6 +33,8 @@ pub(crate) struct GaussianSum {
     unexplored: Unexplored,
     /// Log-likelihoods of the contacts under an unknown object, without those that were asked for.
     pub(crate) background: BackgroundModel,
+    /// Logs of the factors that all masses of each object have for its size.
+    sizes: BTreeMap<ObjectId, f64>,
 }
 
 impl GaussianSum {
@@ -44,6 +46,7 @@ impl GaussianSum {
             prefilter: Prefilter::default(),
             unexplored: Unexplored::default(),
             background: BackgroundModel::default(),
+            sizes: BTreeMap::new(),
         }
     }
 
@@ -52,20 +55,27 @@ impl GaussianSum {
         self.all.is_empty() && self.prefilter.is_empty()
     }
 
-    /// Updates all hypotheses with a contact; `before` are the earlier ones that are kept. `share`
-    /// is the log of an object's share within a walk's step, per that of a typical one.
+    /// Updates all hypotheses with a contact; `before` are the earlier ones that are kept. `sizes`
+    /// are the logs of the factors that the masses of each object have for its size, after the
+    /// contact, and `share` is that of one step of a walk, per that of a typical object.
+    ///
+    /// All masses have these factors, so that the lightest hypotheses are those of the least
+    /// probability: a large object explains each contact by more places than a small one.
     pub(crate) fn touch(
         &mut self,
         library: &ObjectLibrary,
         before: &[Contact],
         contact: &Contact,
+        sizes: BTreeMap<ObjectId, f64>,
         share: &impl Fn(ObjectId) -> f64,
     ) {
         let Some(last) = before.last() else {
             self.prefilter = Prefilter::new(library, &self.rotations, contact);
             self.unexplored = Unexplored::new(library);
+            self.resize(sizes);
             return;
         };
+        self.resize(sizes);
         let unknown = self.unknown(library, before, contact);
         let densities =
             self.unexplored
@@ -99,13 +109,27 @@ impl GaussianSum {
         self.prune();
     }
 
-    /// After a touch: what an unknown object would be taken for, where the masses of objects are
-    /// multiplied by e^`sizes`.
-    pub(crate) fn settle(&mut self, sizes: &BTreeMap<ObjectId, f64>) {
-        let size = |object: ObjectId| sizes.get(&object).copied().unwrap_or_default();
+    /// Changes the factors that the masses of each object have for its size.
+    fn resize(&mut self, sizes: BTreeMap<ObjectId, f64>) {
+        let of = |object: ObjectId| {
+            let before = self.sizes.get(&object).copied().unwrap_or_default();
+            sizes.get(&object).map_or(0.0, |now| now - before)
+        };
+        for own in self.all.chunk_by_mut(|a, b| a.object == b.object) {
+            let log = of(own[0].object);
+            for hypothesis in own {
+                hypothesis.evidence += log;
+            }
+        }
+        self.prefilter.resize(of);
+        self.unexplored.resize(of);
+        self.sizes.extend(sizes);
+    }
+
+    /// After a touch: what an unknown object would be taken for.
+    pub(crate) fn settle(&mut self) {
         let logs = self.object_logs().into_iter();
-        let best = { logs.map(|(object, log)| (object, log + size(object))) }
-            .max_by(|a, b| a.1.total_cmp(&b.1));
+        let best = logs.max_by(|a, b| a.1.total_cmp(&b.1));
         self.background.settle(best.map(|(object, _)| object));
     }
 
@@ -149,7 +173,9 @@ impl GaussianSum {
             .collect();
         let touches: Vec<&TouchUpdate<'_>> = touches.iter().chain([touch]).collect();
         let mut replay = |prefilter: &mut Prefilter, seed: &Seed, parts: &mut Vec<_>| {
-            let (hypothesis, known) = prefilter.take(seed, &self.rotations, &first);
+            let (mut hypothesis, known) = prefilter.take(seed, &self.rotations, &first);
+            let size = self.sizes.get(&hypothesis.object);
+            hypothesis.evidence += size.copied().unwrap_or_default();
             let rotation = &self.rotations[usize::from(hypothesis.rotation)];
             buffers.replay(rotation, &known.indexed, hypothesis, &touches, parts);
         };
@@ -228,23 +254,16 @@ impl GaussianSum {
         sums
     }
 
-    /// Number of hypotheses that hold a share of all mass, each object's multiplied by e^`log`.
-    pub(crate) fn holding(&self, share: f64, log: impl Fn(ObjectId) -> Option<f64>) -> usize {
+    /// Number of hypotheses that hold a share of all mass of the objects that count.
+    pub(crate) fn holding(&self, share: f64, counts: impl Fn(ObjectId) -> bool) -> usize {
         let logs = self.object_logs();
-        let all = logs
-            .iter()
-            .filter_map(|(object, own)| Some(own + log(*object)?));
-        let all = log_sum(all);
-        let log = |object| Some(log(object)? - all);
+        let logs = logs.iter().filter(|(object, _)| counts(**object));
+        let all = log_sum(logs.map(|(_, log)| *log));
         let mut histogram = MassHistogram::new(self.prefilter.len());
-        for own in self.all.chunk_by(|a, b| a.object == b.object) {
-            if let Some(log) = log(own[0].object) {
-                for hypothesis in own {
-                    histogram.add(to_f32((hypothesis.evidence + log).exp()));
-                }
-            }
+        for hypothesis in self.all.iter().filter(|own| counts(own.object)) {
+            histogram.add(to_f32((hypothesis.evidence - all).exp()));
         }
-        self.prefilter.count(&mut histogram, log);
+        self.prefilter.count(&mut histogram, -all, counts);
         histogram.holding(share * histogram.sum())
     }
 

@@ -19,7 +19,7 @@ pub(crate) struct TranslationHypothesis {
     pub(crate) translation: Vector3<f64>,
     /// Variance of the translation per axis \[m²\]: all of its terms are isotropic.
     pub(crate) variance_m2: f64,
-    /// Log-likelihood of the contacts so far, without the share of the model within a step.
+    /// Log-likelihood of the contacts so far, with the factor for the object's size.
     pub(crate) evidence: f64,
 }
 

@@ -12,7 +12,7 @@ use crate::translations::hypothesis::TranslationHypothesis;
 use crate::translations::mass_histogram::MassHistogram;
 use crate::translations::prefilter_group::{PrefilterGroup, Scratch};
 use crate::translations::touch_update::TouchUpdate;
-use crate::tuning::{RESCALE, SEEDS_MAX};
+use crate::tuning::{RESCALE, RESIZE_NATS_MAX, SEEDS_MAX};
 
 /// The *seeds*: all first places that hold a mass and were not promoted to hypotheses of their own.
 ///
@@ -103,17 +103,35 @@ impl Prefilter {
             .map(|group| (group.object, group.sum.ln() + self.log))
     }
 
-    /// Counts all masses, each multiplied by e^`log` of its object.
+    /// Counts the masses of the objects that count, multiplied by e^`log`.
     pub(crate) fn count(
         &self,
         histogram: &mut MassHistogram,
-        log: impl Fn(ObjectId) -> Option<f64>,
+        log: f64,
+        counts: impl Fn(ObjectId) -> bool,
     ) {
-        for group in &self.groups {
-            if let Some(log) = log(group.object) {
-                histogram.add_all(&group.weights, to_f32((self.log + log).exp()));
+        let scale = to_f32((self.log + log).exp());
+        for group in self.groups.iter().filter(|group| counts(group.object)) {
+            histogram.add_all(&group.weights, scale);
+        }
+    }
+
+    /// Multiplies the masses of each object by e^`log`.
+    pub(crate) fn resize(&mut self, log: impl Fn(ObjectId) -> f64) {
+        let logs: Vec<f64> = { self.groups.iter() }
+            .map(|group| log(group.object))
+            .collect();
+        // What all have in common is no matter of weights.
+        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        for (group, log) in self.groups.iter_mut().zip(logs) {
+            if log < most {
+                group.multiply(to_f32((log - most).max(-RESIZE_NATS_MAX).exp()));
             }
         }
+        if most.is_finite() {
+            self.log += most;
+        }
+        self.normalise();
     }
 
     /// Updates all weights with a touch. Returns them, group after group, for the seeds that the
@@ -268,7 +286,7 @@ impl Prefilter {
         if most > 0.0 && !(1.0 / RESCALE..=RESCALE).contains(&most) {
             self.log += f64::from(most).ln();
             for group in &mut self.groups {
-                group.divide(most);
+                group.multiply(1.0 / most);
             }
         }
     }

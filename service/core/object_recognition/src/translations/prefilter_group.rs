@@ -240,10 +240,10 @@ impl PrefilterGroup {
         }
     }
 
-    /// Divides all weights.
-    pub(crate) fn divide(&mut self, by: f32) {
+    /// Multiplies all weights.
+    pub(crate) fn multiply(&mut self, by: f32) {
         for weight in &mut self.weights {
-            *weight /= by;
+            *weight *= by;
         }
         self.weigh(0.0);
     }

@@ -115,6 +115,13 @@ impl Unexplored {
         }
     }
 
+    /// Multiplies the masses of each object by e^`log`.
+    pub(crate) fn resize(&mut self, log: impl Fn(ObjectId) -> f64) {
+        for (object, own) in &mut self.logs {
+            *own += log(*object);
+        }
+    }
+
     /// A contact lay there.
     pub(crate) fn stayed(&mut self, densities: BTreeMap<ObjectId, UnpredictedDensity>) {
         for (object, log) in &mut self.logs {
