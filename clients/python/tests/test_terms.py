@@ -63,6 +63,21 @@ def test_a_robot_takes_what_the_latest_owner_says() -> None:
         robot.flush()
 
 
+def test_an_estimate_is_heard_once_and_none_after_a_later_one() -> None:
+    heard: List[Tuple[int, int]] = []
+    with StandIn() as service, cogmap.Robot("lab", "ada", connect=service.endpoint) as robot:
+        for _ in range(5):
+            robot.marker("x")
+        robot.flush()
+        known = robot.estimate(seq=4)
+        robot.on_estimate(lambda estimate: heard.append((estimate.seq, estimate.map_revision)))
+        revision = known.map_revision
+        for seq, more in [(4, 0), (6, 2), (5, 1), (6, 2), (6, 3), (7, 4)]:
+            service.publish_estimate(replace(known, seq=seq, map_revision=revision + more))
+        wait_for(lambda: (7, revision + 4) in heard)
+        assert heard == [(6, revision + 2), (6, revision + 3), (7, revision + 4)]
+
+
 def test_another_owner_gets_what_the_one_before_had_not_made_durable() -> None:
     with StandIn() as service, cogmap.Robot("lab", "ada", connect=service.endpoint) as robot:
         service.term = 3

@@ -193,9 +193,9 @@ impl Shared {
         state.counters.estimates += 1;
         let is_outdated = state.window.is_outdated(estimate.term);
         // Another owner of the space begins where the journal ends, which may be before.
-        let age = |estimate: &Estimate| (estimate.term, estimate.seq);
+        let age = |estimate: &Estimate| (estimate.term, estimate.seq, estimate.map_revision);
         let known = state.estimate.as_ref();
-        let is_late = known.is_some_and(|known| age(&estimate) < age(known));
+        let is_late = known.is_some_and(|known| age(&estimate) <= age(known));
         if estimate.session != state.session || is_outdated || is_late {
             return;
         }

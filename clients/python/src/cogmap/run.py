@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from typing import Callable, Optional
+from typing import Callable, Optional, Tuple
 
 import zenoh
 
@@ -434,10 +434,13 @@ class Run:
                 self._take_problem(told)
 
     def _is_wanted(self, estimate: Estimate) -> bool:
-        """Whether it is of this run, and of no owner of the space that has lost it."""
+        """Whether it is of this run and later than the one that is known, and of no owner of the
+        space that has lost it. The answer to a question may be the estimate that was published."""
         with self.changed:
             is_outdated = self.window.is_outdated(estimate.term)
-        return not is_outdated and estimate.session == self.session_id
+            known = self.estimate
+        is_later = known is None or _age(estimate) > _age(known)
+        return not is_outdated and estimate.session == self.session_id and is_later
 
     def _take_estimate(self, estimate: Estimate) -> None:
         with self.changed:
@@ -492,3 +495,9 @@ class Run:
             _log.warning("%s: %s", self.agent, sentence)
         for rejection in told:
             self._listeners.hear_rejection(rejection)
+
+
+def _age(estimate: Estimate) -> Tuple[int, int, int]:
+    """What grows from one estimate of a run to the next. Another owner of the space begins where
+    the journal ends, which may be before."""
+    return (estimate.term, estimate.seq, estimate.map_revision)

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 use super::chains::Chains;
 use super::constraint::Constraint;
@@ -65,21 +65,33 @@ impl Chance {
         let to =
             { problem.pose(closure.to) }.map_or_else(UnitQuaternion::identity, |to| to.rotation);
         let by_chance = self.log_density_in_space(&own, &to);
-        -0.5 * (own * TAU).determinant().ln() - by_chance
+        // Of no covariance nothing is gained.
+        by_chance.map_or(0.0, |by_chance| {
+            -0.5 * (own * TAU).determinant().ln() - by_chance
+        })
     }
 
-    /// The log-density in space, about the body axes of where a closure leads, where it is known
-    /// but for a covariance what lies where: any heading, and no more tilted than places of the map
-    /// are.
-    fn log_density_in_space(&self, whole: &Matrix6<f64>, to: &UnitQuaternion<f64>) -> f64 {
-        let axes = to.inverse().to_rotation_matrix().into_inner();
-        let mut known = whole.fixed_view::<5, 5>(0, 0).into_owned();
+    /// The log-density in space where a closure leads, where it is known but for a covariance, about
+    /// the body axes there, what lies where: any heading, and no more tilted than places of the map
+    /// are. `None` if that is no covariance.
+    ///
+    /// Displacements are about the axes of the map, with z and the tilts first: those across a map
+    /// may be ten orders of magnitude larger.
+    fn log_density_in_space(&self, whole: &Matrix6<f64>, to: &UnitQuaternion<f64>) -> Option<f64> {
+        let mut turn = Matrix6::identity();
+        let axes = to.to_rotation_matrix().into_inner();
+        turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&axes);
+        let mut known = turn * whole * turn.transpose();
         let mut displacements = known.fixed_view_mut::<3, 3>(0, 0);
-        displacements += axes * self.displacements * axes.transpose();
+        displacements += self.displacements;
         for k in 3..5 {
             known[(k, k)] += self.tilts;
         }
-        -0.5 * (known * TAU).determinant().ln() - TAU.ln()
+        let order = [2, 3, 4, 0, 1];
+        let known = SMatrix::<f64, 5, 5>::from_fn(|row, column| known[(order[row], order[column])]);
+        let root = ((known + known.transpose()) * 0.5).cholesky()?;
+        let log_volume = 2.5 * TAU.ln() + root.l_dirty().diagonal().map(f64::ln).sum();
+        Some(-log_volume - TAU.ln())
     }
 }
 
@@ -112,7 +124,7 @@ pub(super) fn log_evidence(
         let squared = off.dot(&root.solve(&off));
         let diagonal = root.l_dirty().diagonal();
         let log_volume = 3.0 * TAU.ln() + diagonal.map(f64::ln).sum();
-        let by_chance = chance.log_density_in_space(&whole, &problem.map.pose(to).rotation);
+        let by_chance = chance.log_density_in_space(&whole, &problem.map.pose(to).rotation)?;
         return Some(-0.5 * squared - log_volume - by_chance);
     }
     let planar = planar_part(&whole);
@@ -120,4 +132,74 @@ pub(super) fn log_evidence(
     let squared = off.dot(&(planar.try_inverse()? * off));
     let volume = (TAU.powi(3) * planar.determinant()).sqrt();
     Some(-0.5 * squared - volume.ln() - chance.log_density)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A map of this extent \[m\], of which the places are tilted by a tenth of a radian.
+    fn chance(extent_m: f64) -> Chance {
+        let displacements = Vector3::new(extent_m, 0.5 * extent_m, 2.0).map(|sd| sd * sd);
+        Chance {
+            log_density: 0.0,
+            displacements: Matrix3::from_diagonal(&displacements),
+            tilts: 0.01,
+        }
+    }
+
+    fn known() -> Matrix6<f64> {
+        let sd = [0.1, 0.2, 0.05, 0.02, 0.03, 0.04];
+        let root = Matrix6::from_fn(|row, column| {
+            if row == column {
+                sd[row]
+            } else {
+                0.3 * sd[row] * (1.7 * row as f64 + 0.9 * column as f64).sin()
+            }
+        });
+        root * root.transpose()
+    }
+
+    #[test]
+    fn the_density_in_space_is_that_of_the_whole_covariance() {
+        let (chance, known) = (chance(30.0), known());
+        for to in [
+            UnitQuaternion::identity(),
+            UnitQuaternion::from_euler_angles(0.4, -0.3, 2.0),
+            UnitQuaternion::from_euler_angles(3.0, 0.1, -1.0),
+        ] {
+            // About the axes of the body, where the displacements of the map are turned.
+            let axes = to.inverse().to_rotation_matrix().into_inner();
+            let mut whole = known.fixed_view::<5, 5>(0, 0).into_owned();
+            let mut place = whole.fixed_view_mut::<3, 3>(0, 0);
+            place += axes * chance.displacements * axes.transpose();
+            whole[(3, 3)] += chance.tilts;
+            whole[(4, 4)] += chance.tilts;
+            let expected = -0.5 * (whole * TAU).determinant().ln() - TAU.ln();
+            let found = chance.log_density_in_space(&known, &to).unwrap();
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn maps_as_wide_as_a_continent_have_one() {
+        let to = UnitQuaternion::from_euler_angles(0.4, -0.3, 2.0);
+        let density = |extent_m| {
+            chance(extent_m)
+                .log_density_in_space(&known(), &to)
+                .unwrap()
+        };
+        // Ten times as wide and as long: a hundredth.
+        for extent_m in [1e3, 1e5, 1e7] {
+            let less = density(extent_m) - density(10.0 * extent_m);
+            assert!((less - 100.0_f64.ln()).abs() < 1e-6, "{less}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_covariance_has_none() {
+        let nobody = Matrix6::from_diagonal_element(f64::NAN);
+        let to = UnitQuaternion::identity();
+        assert_eq!(chance(30.0).log_density_in_space(&nobody, &to), None);
+    }
 }

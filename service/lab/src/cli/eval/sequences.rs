@@ -132,7 +132,7 @@ pub(super) fn run(args: &SequencesArgs) -> anyhow::Result<()> {
         progress.finish();
         report.rows.push(tally.row(&protocol));
     }
-    host.stop();
+    drop(host);
     if args.json {
         return output::json(&report);
     }

@@ -1,5 +1,6 @@
 //! A service of its own for an experiment that asks as a user does.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use cogmap::cli::free_port;
@@ -8,10 +9,13 @@ use cogmap::metrics;
 use cogmap::service::Service;
 use cogmap_client::Api;
 
-/// A service on loopback, with a store that goes with it.
+/// A service on loopback. It ends when it is dropped, and its store with it, whatever became of the
+/// experiment.
 pub(in crate::cli) struct Host {
     runtime: tokio::runtime::Runtime,
-    service: Service,
+    /// `None` once it has ended.
+    service: Option<Service>,
+    address: SocketAddr,
     directory: PathBuf,
 }
 
@@ -31,20 +35,24 @@ impl Host {
         let service = runtime.block_on(Service::start(&config, prometheus))?;
         Ok(Self {
             runtime,
-            service,
+            address: service.address(),
+            service: Some(service),
             directory,
         })
     }
 
     /// A client of it.
     pub(in crate::cli) fn api(&self) -> Api {
-        Api::new(&format!("http://{}", self.service.address()), None)
+        Api::new(&format!("http://{}", self.address), None)
     }
+}
 
-    /// Ends it; its store is removed.
-    pub(in crate::cli) fn stop(self) {
-        self.runtime.block_on(self.service.stop());
+impl Drop for Host {
+    fn drop(&mut self) {
+        if let Some(service) = self.service.take() {
+            self.runtime.block_on(service.stop());
+        }
         // What is left of it is in the directory for temporary files.
-        let _ = std::fs::remove_dir_all(self.directory);
+        let _ = std::fs::remove_dir_all(&self.directory);
     }
 }

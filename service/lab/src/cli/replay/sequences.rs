@@ -37,11 +37,21 @@ pub(in crate::cli) struct SequencesArgs {
         value_parser = clap::value_parser!(u32).range(1..=64))]
     length: u32,
     /// An answer is right that is no farther off \[m\].
-    #[arg(long, default_value_t = 30.0, value_name = "M")]
+    #[arg(long, default_value_t = 30.0, value_name = "M", value_parser = distance_m)]
     within_m: f64,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
+}
+
+/// A distance \[m\].
+fn distance_m(text: &str) -> Result<f64, String> {
+    let metres: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;
+    if metres.is_finite() && metres >= 0.0 {
+        Ok(metres)
+    } else {
+        Err("a distance is finite, and not below zero".to_owned())
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -90,10 +100,15 @@ pub(super) fn run(args: &SequencesArgs) -> anyhow::Result<()> {
     for (name, log) in &set.agents {
         if let Some(truth) = log.truth.as_ref().filter(|_| *name != args.taught) {
             let views = views(&set, name, truth)?;
+            let fewest = args.length as usize + 1;
+            anyhow::ensure!(
+                views.len() >= fewest,
+                "{name} has fewer than {fewest} views"
+            );
             report.rows.push(ask(&api, args, &places, (name, &views))?);
         }
     }
-    host.stop();
+    drop(host);
     if args.json {
         return output::json(&report);
     }
