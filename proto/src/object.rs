@@ -233,7 +233,7 @@ pub struct ObjectSummary {
     pub gap_m: Option<f64>,
     /// Distance between places at which the surface between them would be known as exactly as it is
     /// felt \[m\]: what is above it should be felt more densely. Absent where places are dense, or
-    /// too few to tell.
+    /// too few to tell, or where contacts fall on them alone.
     #[serde(default)]
     pub advised_gap_m: Option<f64>,
     /// In the answer to a lesson that asks for it, another object for which this one would be

@@ -193,9 +193,12 @@ impl Shared {
         state.counters.estimates += 1;
         let is_outdated = state.window.is_outdated(estimate.term);
         // Another owner of the space begins where the journal ends, which may be before.
-        let age = |estimate: &Estimate| (estimate.term, estimate.seq, estimate.map_revision);
+        let age = |estimate: &Estimate| (estimate.term, estimate.seq);
         let known = state.estimate.as_ref();
-        let is_late = known.is_some_and(|known| age(&estimate) <= age(known));
+        let is_late = known.is_some_and(|known| {
+            let is_again = estimate.map_revision == known.map_revision;
+            age(&estimate) < age(known) || (age(&estimate) == age(known) && is_again)
+        });
         if estimate.session != state.session || is_outdated || is_late {
             return;
         }

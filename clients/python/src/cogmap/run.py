@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from typing import Callable, Optional, Tuple
+from typing import Callable, Optional
 
 import zenoh
 
@@ -434,13 +434,13 @@ class Run:
                 self._take_problem(told)
 
     def _is_wanted(self, estimate: Estimate) -> bool:
-        """Whether it is of this run and later than the one that is known, and of no owner of the
-        space that has lost it. The answer to a question may be the estimate that was published."""
+        """Whether it is of this run and not before the one that is known, nor that one again, and
+        of no owner of the space that has lost it."""
         with self.changed:
             is_outdated = self.window.is_outdated(estimate.term)
             known = self.estimate
-        is_later = known is None or _age(estimate) > _age(known)
-        return not is_outdated and estimate.session == self.session_id and is_later
+        is_news = known is None or _is_news(estimate, known)
+        return not is_outdated and estimate.session == self.session_id and is_news
 
     def _take_estimate(self, estimate: Estimate) -> None:
         with self.changed:
@@ -497,7 +497,10 @@ class Run:
             self._listeners.hear_rejection(rejection)
 
 
-def _age(estimate: Estimate) -> Tuple[int, int, int]:
-    """What grows from one estimate of a run to the next. Another owner of the space begins where
-    the journal ends, which may be before."""
-    return (estimate.term, estimate.seq, estimate.map_revision)
+def _is_news(estimate: Estimate, known: Estimate) -> bool:
+    """Whether one of a run is later than another one, or of the same sample and another map.
+    Another owner of the space begins where the journal ends, which may be before."""
+    age, known_age = (estimate.term, estimate.seq), (known.term, known.seq)
+    return age > known_age or (
+        age == known_age and estimate.map_revision != known.map_revision
+    )

@@ -31,7 +31,7 @@ pub struct Density {
     /// Standard deviation of a contact, per axis \[m\].
     pub contact_sd_m: f64,
     /// Standard deviation of the surface between the places, as it is predicted \[m\]; none where
-    /// they are dense, or too few to tell.
+    /// they are dense, or too few to tell, or where contacts fall on them alone.
     pub between_sd_m: Option<f64>,
 }
 

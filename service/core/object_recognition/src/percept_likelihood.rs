@@ -304,6 +304,7 @@ mod tests {
                     position_m: Point3::new(f64::from(at), 0.0, 0.0),
                     normals: Vector3::new(f64::from(at), 0.0, 0.5 * f64::from(at)),
                     count: 3.0,
+                    visits: 1.0,
                     variance_m2: 1e-6,
                     normal_variance: 0.0,
                     levels,

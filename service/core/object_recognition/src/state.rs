@@ -43,6 +43,7 @@ state_of_struct!(ModelPlace {
     position_m,
     normals,
     count,
+    visits,
     variance_m2,
     normal_variance,
     levels,
@@ -61,6 +62,7 @@ impl State for ObjectModel {
         (settings.spacing_m, settings.places_max as u64).write(out);
         self.spacing_m().write(out);
         write_list(self.places().iter(), out);
+        self.latest().map(|place| place as u64).write(out);
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
@@ -70,8 +72,14 @@ impl State for ObjectModel {
             places_max: usize::try_from(places_max).map_err(|_| CorruptState::Invalid)?,
         };
         let spacing_m = State::read(input)?;
-        let places = State::read(input)?;
-        Ok(Self::with_places(settings, spacing_m, places))
+        let places: Vec<ModelPlace> = State::read(input)?;
+        let latest: Option<u64> = State::read(input)?;
+        let latest = latest.map(usize::try_from).transpose();
+        let latest = latest.map_err(|_| CorruptState::Invalid)?;
+        if latest.is_some_and(|latest| latest >= places.len()) {
+            return Err(CorruptState::Invalid);
+        }
+        Ok(Self::with_places(settings, spacing_m, places).after(latest))
     }
 }
 

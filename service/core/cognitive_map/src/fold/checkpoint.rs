@@ -56,7 +56,7 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// that are new, version 16 no past that is held by live estimates, version 17 no searches by
 /// levels at four nodes, version 18 no trial of the noise of odometry, version 19 no
 /// veer in the estimate, version 20 no rotation as read beside a motion.
-const VERSION: u16 = 21;
+const VERSION: u16 = 22;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

@@ -19,23 +19,24 @@ pub(crate) enum Spread {
 }
 
 impl Spread {
-    /// By how many contacts made a place of their own.
+    /// By how many visits made a place of their own. A finger that rests or slides makes many
+    /// contacts on one visit.
     ///
-    /// Let a share e of the contacts fall evenly over the surface, and the others on places. A
-    /// contact makes a new place if it is farther than a spacing from all others. Of the even ones
-    /// it is the share q of the surface that lies so far from its places. Of all n contacts it is
-    /// u = n₁/n, where n₁ places have one contact only (Good 1953, The population frequencies of
-    /// species and the estimation of population parameters). So e = u/q. One place more is counted
-    /// in n₁, so that few contacts do not tell that none falls between.
+    /// Let a share e of the visits fall evenly over the surface, and the others on places. One makes
+    /// a new place if it is farther than a spacing from all others. Of the even ones it is the share
+    /// q of the surface that lies so far from its places. Of all n visits it is u = n₁/n, where n₁
+    /// places have one visit only (Good 1953, The population frequencies of species and the
+    /// estimation of population parameters). So e = u/q. One place more is counted in n₁, so that
+    /// few visits do not tell that none falls between.
     ///
     /// Contacts that fall evenly give e = 1 while places are few. Then it falls, since a new place
     /// in a small gap takes the contacts beside it too: so a surface that is covered tells nothing.
     pub(crate) fn learned(places: &[ModelPlace], graph: &LinkGraph, spacing_m: f64) -> Self {
-        let contacts: f64 = places.iter().map(|place| place.count).sum();
-        let single = places.iter().filter(|place| place.count < 1.5).count() as f64;
+        let visits: f64 = places.iter().map(|place| place.visits).sum();
+        let single = places.iter().filter(|place| place.visits < 1.5).count() as f64;
         let uncovered = uncovered_share(places, graph, spacing_m);
         let is_covered = uncovered < UNEXPLORED_MIN;
-        if !is_covered && single + 1.0 < EVEN_SHARE_MIN * uncovered * contacts {
+        if !is_covered && single + 1.0 < EVEN_SHARE_MIN * uncovered * visits {
             Self::OnPlaces
         } else {
             Self::Even
@@ -129,6 +130,22 @@ mod tests {
         };
         for contacts in [60, 120, 240, 500, 1000, 4000] {
             assert_eq!(spread((0..contacts).map(ring)), Spread::Even);
+        }
+    }
+
+    #[test]
+    fn a_finger_that_rests_or_slides_is_between_places_all_the_same() {
+        for times in [2, 3, 10] {
+            let rests = (0..300).flat_map(|key| (0..times).map(move |_| anywhere(key)));
+            assert_eq!(spread(rests), Spread::Even, "{times} times");
+        }
+        for along_m in [0.001, 0.002, 0.003] {
+            let strokes = (0..14_u32).flat_map(|stroke| {
+                let contacts = (0..).map(move |number| along_m * f64::from(number));
+                let contacts = contacts.take_while(|x| *x < 0.16);
+                contacts.map(move |x| Point3::new(x, 0.012 * f64::from(stroke), 0.0))
+            });
+            assert_eq!(spread(strokes), Spread::Even, "{along_m}");
         }
     }
 

@@ -38,6 +38,8 @@ pub struct ObjectModel {
     settings: ModelSettings,
     spacing_m: f64,
     places: Vec<ModelPlace>,
+    /// The place of the latest contact.
+    latest: Option<usize>,
     by_cell: BTreeMap<[i64; 3], Vec<u32>>,
 }
 
@@ -48,6 +50,7 @@ impl ObjectModel {
             settings,
             spacing_m: settings.spacing_m.max(1e-9),
             places: Vec::new(),
+            latest: None,
             by_cell: BTreeMap::new(),
         }
     }
@@ -59,6 +62,7 @@ impl ObjectModel {
             settings,
             spacing_m: spacing_m.max(1e-9),
             places,
+            latest: None,
             by_cell: BTreeMap::new(),
         };
         for place in 0..model.places.len() {
@@ -67,15 +71,32 @@ impl ObjectModel {
         model
     }
 
+    /// The same model, whose latest contact was at this place.
+    pub(crate) fn after(mut self, latest: Option<usize>) -> Self {
+        self.latest = latest;
+        self
+    }
+
+    /// The place of the latest contact, if there was one since places were last put together.
+    pub(crate) fn latest(&self) -> Option<usize> {
+        self.latest
+    }
+
     /// Learns one contact, whose position is in the model's frame.
     pub fn learn(&mut self, contact: &Contact) {
-        self.add(&ModelPlace::of(contact));
+        let mut place = ModelPlace::of(contact);
+        let own = self.nearest(&place);
+        if own.is_some() && own == self.latest {
+            place.visits = 0.0; // it is still there
+        }
+        self.latest = Some(self.put(&place, own));
         self.keep_budget();
     }
 
     fn keep_budget(&mut self) {
         while self.places.len() > self.settings.places_max.max(8) {
             self.spacing_m *= 2.0;
+            self.latest = None;
             self.by_cell.clear();
             for place in std::mem::take(&mut self.places) {
                 self.add(&place);
@@ -85,6 +106,7 @@ impl ObjectModel {
 
     /// Learns all places of another model, whose frame has this pose in this one's.
     pub fn extend(&mut self, other: &Self, self_from_other: &nalgebra::Isometry3<f64>) {
+        self.latest = None;
         for place in &other.places {
             let mut place = place.clone();
             place.position_m = self_from_other * place.position_m;
@@ -116,14 +138,20 @@ impl ObjectModel {
     }
 
     fn add(&mut self, place: &ModelPlace) {
-        if let Some(own) = self.nearest(place) {
+        self.put(place, self.nearest(place));
+    }
+
+    /// Merges a place into another one, or adds it; answers the number of the place that has it.
+    fn put(&mut self, place: &ModelPlace, own: Option<usize>) -> usize {
+        let number = own.unwrap_or(self.places.len());
+        if let Some(own) = own {
             self.unindex(own);
             self.places[own].merge(place);
-            self.index(own);
         } else {
             self.places.push(place.clone());
-            self.index(self.places.len() - 1);
         }
+        self.index(number);
+        number
     }
 
     /// The nearest place of the same side within one spacing.

@@ -52,6 +52,8 @@ pub struct ModelPlace {
     pub normals: Vector3<f64>,
     /// Contacts.
     pub count: f64,
+    /// Visits: contacts one after the other are one.
+    pub visits: f64,
     /// Sum of the contacts' position variances per axis \[m²\].
     pub variance_m2: f64,
     /// Sum of the normals' variances per axis \[rad²\].
@@ -98,6 +100,7 @@ impl ModelPlace {
             position_m: contact.position_m,
             normals,
             count: 1.0,
+            visits: 1.0,
             variance_m2: contact.variance_m2(),
             normal_variance: contact.normal_sd_rad * contact.normal_sd_rad,
             levels: contact.levels.iter().map(level).collect(),
@@ -118,6 +121,7 @@ impl ModelPlace {
         self.position_m += (other.position_m - self.position_m) * (other.count / count);
         self.normals += other.normals;
         self.count = count;
+        self.visits += other.visits;
         self.variance_m2 += other.variance_m2;
         self.normal_variance += other.normal_variance;
         for level in &other.levels {

@@ -86,13 +86,14 @@ impl<'a> Neighbours<'a> {
         let mut lags: Vec<isize> = near.clone().chain(near.map(|lag| lag * stride)).collect();
         lags.sort_unstable();
         lags.dedup();
+        let score = model.score(components);
         let mut pairs = Vec::new();
         for &lag in &lags {
             for (first, second) in self.beside(lag).into_iter().enumerate() {
                 let (Some(second), place) = (second, self.places[first]) else {
                     continue;
                 };
-                let score = model.score(components, (place, second.place));
+                let score = score(place, second.place);
                 pairs.push(NeighbourPair {
                     about: (first, second.about),
                     lag: lag.unsigned_abs(),

@@ -39,9 +39,15 @@ impl<'a> Runs<'a> {
         let numbered = self.is_new.iter().copied().zip(self.views.iter().copied());
         let mut views: Vec<(bool, &LoggedView)> = numbered.collect();
         let mut stride = self.stride;
-        while views.len() > most {
+        let last = views.iter().map(|(_, view)| view.ordinal).max();
+        while views.len() > most && last.is_some_and(|last| stride <= last) {
             stride = stride.saturating_mul(2);
             views.retain(|(_, view)| view.ordinal.is_multiple_of(stride));
+        }
+        if views.len() > most {
+            // The first views of many sessions.
+            let every = views.len().div_ceil(most.max(1));
+            views = views.into_iter().step_by(every).collect();
         }
         Self::of_sorted(views, stride)
     }
@@ -76,7 +82,7 @@ impl<'a> Runs<'a> {
         let mut places = Vec::with_capacity(thinned.len());
         let mut place = 0;
         for view in &thinned.views {
-            while self.views[place].sample != view.sample {
+            while !std::ptr::eq(self.views[place], *view) {
                 place += 1;
             }
             places.push(place);

@@ -1,5 +1,5 @@
-//! Log-odds of the sequences about two views: √n times the mean of the n pairs that they meet in, the
-//! better of both directions of travel.
+//! Log-odds of the sequences about two views: √n times the mean of the pairs that they meet in, where
+//! n is the length of a whole sequence, the better of both directions of travel.
 
 use nalgebra::DMatrix;
 

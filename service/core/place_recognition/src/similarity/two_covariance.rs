@@ -89,14 +89,19 @@ impl TwoCovariance {
         scores
     }
 
-    /// S of two views by the components of all.
-    pub(super) fn score(&self, components: &DMatrix<f64>, (one, other): (usize, usize)) -> f64 {
-        let of = |(number, &r): (usize, &f64)| {
-            let (one, other) = (components[(one, number)], components[(other, number)]);
-            let (shared, own) = (r * one * other, 0.5 * r * r * (one * one + other * other));
-            (shared - own) / (1.0 - r * r) - 0.5 * (1.0 - r * r).ln()
-        };
-        self.correlations.iter().enumerate().map(of).sum()
+    /// S of two views, by the components of all.
+    pub(super) fn score<'a>(
+        &self,
+        components: &'a DMatrix<f64>,
+    ) -> impl Fn(usize, usize) -> f64 + use<'a> {
+        let (shared, own, constant) = self.terms();
+        move |one, other| {
+            let of = |number: usize| {
+                let (one, other) = (components[(one, number)], components[(other, number)]);
+                shared[number] * one * other - own[number] * (one * one + other * other)
+            };
+            constant + (0..shared.len()).map(of).sum::<f64>()
+        }
     }
 
     /// What each component of two views has in common, and of itself, and a constant, of the score.

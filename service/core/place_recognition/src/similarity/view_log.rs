@@ -61,9 +61,25 @@ impl ViewLog {
         self.views.push(view, revision);
         self.n_new = self.n_new.saturating_add(1);
         if self.views.len() > tuning::VIEWS_MAX {
+            self.thin(revision);
+        }
+    }
+
+    /// Drops every second view of each way, or, of the first views of many sessions, every second
+    /// one of all.
+    fn thin(&mut self, revision: u64) {
+        let last = self.views.iter().map(|view| view.ordinal).max();
+        if last.is_some_and(|last| self.stride <= last) {
             self.stride = self.stride.saturating_mul(2);
             let stride = self.stride;
             self.retain(revision, |view| view.ordinal.is_multiple_of(stride));
+        }
+        if self.views.len() > tuning::VIEWS_MAX {
+            let mut number = 0_u32;
+            self.retain(revision, |_| {
+                number += 1;
+                number.is_multiple_of(2)
+            });
         }
     }
 
@@ -78,7 +94,7 @@ impl ViewLog {
         }
     }
 
-    fn retain(&mut self, revision: u64, is_kept: impl Fn(&LoggedView) -> bool) {
+    fn retain(&mut self, revision: u64, mut is_kept: impl FnMut(&LoggedView) -> bool) {
         let mut next = 0;
         for number in 0..self.views.len() {
             let view = self.views.get(number).filter(|view| is_kept(view)).cloned();

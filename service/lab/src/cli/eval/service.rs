@@ -9,8 +9,7 @@ use cogmap::metrics;
 use cogmap::service::Service;
 use cogmap_client::Api;
 
-/// A service on loopback. It ends when it is dropped, and its store with it, whatever became of the
-/// experiment.
+/// A service on loopback. It ends when it is dropped, and its store with it.
 pub(in crate::cli) struct Host {
     runtime: tokio::runtime::Runtime,
     /// `None` once it has ended.

@@ -57,6 +57,46 @@ fn news_nats(way: &[f64]) -> f64 {
     channels[0].news_nats()
 }
 
+/// The log of so many sessions, of one view each.
+fn log_of_sessions(count: u32) -> ViewLog {
+    let mut log = ViewLog::default();
+    for session in 0..count {
+        let at = 0.05 * f64::from(session);
+        let sample = SampleKey {
+            agent: 0,
+            session,
+            seq: 0,
+        };
+        let view = LoggedView {
+            channel: 0,
+            sample,
+            ordinal: 0,
+            stretch: 0,
+            in_odom: Isometry3::identity(),
+            vector: seen(at),
+        };
+        log.add(view, 1);
+    }
+    log
+}
+
+#[test]
+fn first_views_of_many_sessions_are_thinned_too() {
+    let log = log_of_sessions(600);
+    let all = Runs::of(&log, 0);
+    assert_eq!(all.len(), 600);
+    for most in [1, 7, 300, 512, 600, 1024] {
+        let n_kept = all.thinned(most).len();
+        assert!(
+            (most.min(600) / 2..=most).contains(&n_kept),
+            "{n_kept} of {most}"
+        );
+    }
+    let most = crate::tuning::log::VIEWS_MAX;
+    let n_logged = Runs::of(&log_of_sessions(10_000), 0).len();
+    assert!((most / 2..=most).contains(&n_logged), "{n_logged}");
+}
+
 #[test]
 fn views_are_news_where_the_robot_comes_back() {
     let ahead = |number: u32| 0.4 * f64::from(number);
